@@ -1,0 +1,348 @@
+"""Configuration: TOML in, frozen structures out. The single source of every default.
+
+Each default carries its unit and, in brackets, its origin: [paper] is Reilink et al. 2013,
+[ours] is chosen here, [geometry] is a plausible instrument (shared by no publication).
+SI units throughout: m, rad, s; px for images.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from os import PathLike
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+import tomli_w
+from msgspec import Meta, Struct, field
+
+from tautscope.dof import Dof
+from tautscope.errors import ConfigError, MissingPathError
+
+Positive = Annotated[float, Meta(gt=0)]
+NonNegative = Annotated[float, Meta(ge=0)]
+Fraction = Annotated[float, Meta(gt=0, lt=1)]
+Gain = Annotated[float, Meta(ge=1)]
+Vector3 = tuple[float, float, float]
+Vector8 = tuple[float, float, float, float, float, float, float, float]
+
+
+class _Section(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Base of every section: immutable, and a misspelt key is an error."""
+
+
+class DofConfig(_Section):
+    """One degree of freedom: its compensator, Eqs. (2)-(3), and estimator, Eqs. (4)-(6)."""
+
+    update_distance: Positive
+    """tau: command travel between two estimator updates [m or rad]; about 1 % of the stroke."""
+    observable_deviation: Positive
+    """Largest standard deviation of the state per px of marker noise [m/px or rad/px] at which
+    the DOF counts as observable; beyond it the DOF is held."""
+    free_gain: Gain = 5.0
+    """K_b: command over reference while the slack is crossed [paper]."""
+    gain_limit: Gain = 5.0
+    """Upper bound of every gain; free_gain may not exceed it [paper]."""
+    contact_tolerance: Fraction = 0.4
+    """epsilon in Eq. (4) [ours]."""
+    smoothing_factor: Fraction = 0.25
+    """alpha in Eq. (6), per update_distance travelled [ours]."""
+    delta_minus: float = 0.0
+    """Contact offset at the start [m or rad] [paper]."""
+    delta_plus: float = 0.0
+    """Contact offset at the start [m or rad], not below delta_minus [paper]."""
+
+
+class InstrumentConfig(_Section):
+    """Geometry of the instrument, Fig. 4. All [geometry]."""
+
+    diameter: Positive = 3.5e-3
+    """Outer diameter of shaft, section and tip [m]."""
+    bending_length: Positive = 18.5e-3
+    """Length of the bending section [m]."""
+    tip_length: Positive = 20e-3
+    """Length of the rigid tip [m]."""
+    marker_a: NonNegative = 5e-3
+    """Centre of the proximal band A, from the distal end of the bending section [m]."""
+    marker_b: NonNegative = 15e-3
+    """Centre of the distal band B, from the distal end of the bending section [m]."""
+    band_length: Positive = 4e-3
+    """Length of each band along the axis [m]."""
+
+
+class PoseConfig(_Section):
+    """Pose of the guide (where the instrument leaves the scope) in the camera's frame."""
+
+    translation: Vector3 = (9e-3, 7e-3, 8e-3)
+    """Guide's origin in the camera's frame: x right, y down, z forward [m] [ours]."""
+    rotation: Vector3 = (0.29, -0.37, 0.0)
+    """Rotation vector, axis times angle [rad], that turns guide axes into camera axes; the
+    guide's z axis is the channel's axis, outwards [ours]."""
+
+
+class CameraConfig(_Section):
+    """Pinhole with OpenCV's distortion, Eq. (8)."""
+
+    width: Annotated[int, Meta(ge=1, le=8192)] = 720
+    """[px], PAL DV [paper]."""
+    height: Annotated[int, Meta(ge=1, le=8192)] = 576
+    """[px], PAL DV [paper]."""
+    fx: Positive = 424.0
+    """Focal length along x [px] [public colonoscope calibration]."""
+    fy: Positive = 454.0
+    """Focal length along y [px]; DV pixels are not square."""
+    cx: float = 349.6
+    """Principal point [px]."""
+    cy: float = 285.0
+    """Principal point [px]."""
+    distortion: Vector8 = (-0.18, 0.05, 0.0, 0.0, -0.005, 0.0, 0.0, 0.0)
+    """k1, k2, p1, p2, k3, k4, k5, k6 in OpenCV's order and meaning [ours]."""
+    camera_from_guide: PoseConfig = field(default_factory=PoseConfig)
+
+
+class VisionConfig(_Section):
+    """Eq. (12) and Fig. 5."""
+
+    weights: Vector3 = (-0.2, 1.0, -0.8)
+    """Fisher's discriminant: weight of blue, green, red [ours, fitted on labelled pixels]."""
+    threshold: float = 10.0
+    """A pixel whose weighted sum exceeds this is marker [grey levels]."""
+    smoothing: Annotated[int, Meta(ge=0, le=8)] = 1
+    """Passes of the 3x3 binomial low-pass over the projected channel; 0 is none [ours]."""
+    minimum_area: Annotated[int, Meta(ge=1)] = 40
+    """Regions below this are dropped [px]."""
+    gate: Positive = 120.0
+    """A marker is not sought farther than this from where it is predicted [px]."""
+
+
+class ControlConfig(_Section):
+    """Rates and memory of the loop."""
+
+    period: Positive = 0.005
+    """Control tick [s] [ours; the article says hundreds of Hz]."""
+    history: Positive = 2.0
+    """How long commands are remembered, so that a frame finds the one in force when it was
+    captured [s]; at most 1024 ticks. An older frame is refused."""
+
+
+class Sine(_Section):
+    """Reference of one DOF: centre + amplitude sin(2 pi t / period)."""
+
+    centre: float
+    """Where the DOF is held while the others move [m or rad]."""
+    amplitude: Positive
+    """[m or rad]."""
+    period: Positive = 10.0
+    """[s]."""
+
+
+class ExperimentConfig(_Section):
+    """Section 5: a sine on each DOF in succession. Amplitudes [ours]: the article's are in its
+    figure only."""
+
+    periods: Annotated[int, Meta(ge=3)] = 5
+    """Per DOF [paper]."""
+    insertion: Sine = field(default_factory=lambda: Sine(centre=25e-3, amplitude=15e-3))
+    rotation: Sine = field(default_factory=lambda: Sine(centre=0.0, amplitude=2.0))
+    bending: Sine = field(default_factory=lambda: Sine(centre=0.9, amplitude=1.1))
+
+    def __getitem__(self, dof: Dof) -> Sine:
+        """The reference of one DOF."""
+        sine: Sine = getattr(self, dof.label)
+        return sine
+
+
+class TwinConfig(_Section):
+    """The physical twin: physics, drives and camera of the simulated rig. All [ours]."""
+
+    seed: Annotated[int, Meta(ge=0)] = 0
+    """Of everything random: same seed, same bytes."""
+    bends: Annotated[float, Meta(ge=0, le=6)] = 4.0
+    """Bends of the endoscope; the wall presses on the shaft in proportion (0 is straight)."""
+    frame_rate: Positive = 25.0
+    """Images per second [paper: PAL]."""
+    latency: NonNegative = 0.08
+    """From capture to arrival of a frame, mean [s]."""
+    latency_jitter: NonNegative = 0.01
+    """Largest deviation from the mean latency [s], uniform."""
+    image_noise: NonNegative = 2.0
+    """Standard deviation of the sensor noise [grey levels]."""
+    background: str | None = None
+    """Folder of images to use as tissue instead of procedural mucosa."""
+
+
+class Config(_Section):
+    """Everything a run depends on. The defaults are the article's experiment."""
+
+    insertion: DofConfig = field(
+        default_factory=lambda: DofConfig(update_distance=0.4e-3, observable_deviation=0.5e-3)
+    )
+    rotation: DofConfig = field(
+        default_factory=lambda: DofConfig(update_distance=0.04, observable_deviation=0.05)
+    )
+    bending: DofConfig = field(
+        default_factory=lambda: DofConfig(update_distance=0.02, observable_deviation=0.05)
+    )
+    instrument: InstrumentConfig = field(default_factory=InstrumentConfig)
+    camera: CameraConfig = field(default_factory=CameraConfig)
+    vision: VisionConfig = field(default_factory=VisionConfig)
+    control: ControlConfig = field(default_factory=ControlConfig)
+    experiment: ExperimentConfig = field(default_factory=ExperimentConfig)
+    twin: TwinConfig = field(default_factory=TwinConfig)
+
+    def __getitem__(self, dof: Dof) -> DofConfig:
+        """The settings of one DOF."""
+        settings: DofConfig = getattr(self, dof.label)
+        return settings
+
+    def replace(self, **changes: Any) -> Config:
+        """A copy with changes by dotted path, checked: ``replace(**{"twin.seed": 3})``.
+
+        Raises:
+            ConfigError: As `load_config`.
+        """
+        document = to_document(self)
+        for path, value in changes.items():
+            *sections, key = path.split(".")
+            place = document
+            for section in sections:
+                place = place.setdefault(section, {})
+            place[key] = value
+        return from_document(document)
+
+
+def load_config(path: str | PathLike[str] | None = None) -> Config:
+    """Read a TOML configuration; keys that are not named keep their defaults.
+
+    Args:
+        path: TOML file; without it, the article's experiment.
+
+    Raises:
+        MissingPathError: The file is not there.
+        ConfigError: It is not TOML, or a key is unknown, of the wrong type or out of range; the
+            error names the key, what came and what may come.
+    """
+    if path is None:
+        return Config()
+    file = Path(path)
+    try:
+        document = tomllib.loads(file.read_text(encoding="utf-8"))
+    except (FileNotFoundError, IsADirectoryError):
+        raise MissingPathError("config", str(file), "a TOML file") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigError("config", str(file), f"TOML ({error})") from None
+    return from_document(document)
+
+
+def from_document(document: dict[str, Any]) -> Config:
+    """Check a nested dictionary and make it a `Config`; what it does not name keeps its default.
+
+    Raises:
+        ConfigError: As `load_config`.
+    """
+    document = _merged(to_document(Config()), document)
+    try:
+        config = msgspec.convert(document, Config)
+    except msgspec.ValidationError as error:
+        raise _named(error, document) from None
+    _check_finite(msgspec.to_builtins(config), "")
+    _check_relations(config)
+    return config
+
+
+def to_document(config: Config) -> dict[str, Any]:
+    """The nested dictionary of a configuration, without the keys that are None."""
+    document: dict[str, Any] = _without_none(msgspec.to_builtins(config))
+    return document
+
+
+def dump_config(config: Config) -> str:
+    """The configuration as TOML, every key written out; `load_config` reads it back equal."""
+    return tomli_w.dumps(to_document(config))
+
+
+def _merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    merged = dict(base)
+    for key, value in changes.items():
+        old = merged.get(key)
+        both = isinstance(old, dict) and isinstance(value, dict)
+        merged[key] = _merged(old, value) if both else value
+    return merged
+
+
+def _without_none(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _without_none(item) for key, item in value.items() if item is not None}
+    return value
+
+
+def _named(error: msgspec.ValidationError, document: dict[str, Any]) -> ConfigError:
+    """msgspec says what and where; the value that came is looked up in the document."""
+    message = str(error)
+    expected, _, path = message.partition(" - at `$")
+    path = path.rstrip("`").lstrip(".")
+    unknown = re.search(r"unknown field `([^`]*)`", expected)
+    if unknown:
+        path = f"{path}.{unknown[1]}".lstrip(".")
+    value: Any = document
+    for key in re.findall(r"[^.\[\]]+", path):
+        try:
+            value = value[int(key)] if isinstance(value, list) else value[key]
+        except (KeyError, TypeError, IndexError, ValueError):
+            value = None
+            break
+    if unknown:
+        allowed = "no such key; `tautscope config` prints those there are"
+    else:
+        allowed = expected.removeprefix("Expected ").split(", got")[0].replace("`", "")
+    return ConfigError(path or "config", value, allowed)
+
+
+def _check_finite(value: Any, path: str) -> None:
+    if isinstance(value, dict):
+        for key, item in value.items():
+            _check_finite(item, f"{path}.{key}".lstrip("."))
+    elif isinstance(value, list | tuple):
+        for index, item in enumerate(value):
+            _check_finite(item, f"{path}[{index}]")
+    elif isinstance(value, float) and not math.isfinite(value):
+        raise ConfigError(path, value, "a finite number")
+
+
+def _check_relations(config: Config) -> None:
+    """What no single field can check."""
+    for dof in Dof:
+        settings = config[dof]
+        if settings.free_gain > settings.gain_limit:
+            raise ConfigError(
+                f"{dof.label}.free_gain",
+                settings.free_gain,
+                f"at most {dof.label}.gain_limit = {settings.gain_limit}",
+            )
+        if settings.delta_minus > settings.delta_plus:
+            raise ConfigError(
+                f"{dof.label}.delta_minus",
+                settings.delta_minus,
+                f"at most {dof.label}.delta_plus = {settings.delta_plus}",
+            )
+    instrument = config.instrument
+    half = instrument.band_length / 2
+    if not half <= instrument.marker_a <= instrument.marker_b - 2 * half:
+        raise ConfigError(
+            "instrument.marker_a",
+            instrument.marker_a,
+            "a band on the tip, wholly proximal of marker_b's band",
+        )
+    if instrument.marker_b + half > instrument.tip_length:
+        raise ConfigError(
+            "instrument.marker_b", instrument.marker_b, "a band that ends before the tip does"
+        )
+    ticks = config.control.history / config.control.period
+    if not 1 <= ticks <= 1024:
+        raise ConfigError(
+            "control.history",
+            config.control.history,
+            f"1 to 1024 ticks of control.period = {config.control.period}",
+        )

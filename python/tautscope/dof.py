@@ -1,0 +1,28 @@
+"""The three degrees of freedom, in the order every (3,) array has."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class Dof(IntEnum):
+    """A degree of freedom of the instrument; its value is its index in every (3,) array."""
+
+    INSERTION = 0
+    ROTATION = 1
+    BENDING = 2
+
+    @property
+    def label(self) -> str:
+        """The name in configurations, column names and tables."""
+        return self.name.lower()
+
+    @property
+    def display_unit(self) -> str:
+        """The unit a person reads: mm for insertion, rad otherwise. Inside it is m and rad."""
+        return "mm" if self is Dof.INSERTION else "rad"
+
+    @property
+    def display_scale(self) -> float:
+        """Factor from the unit inside (m, rad) to `display_unit`."""
+        return 1e3 if self is Dof.INSERTION else 1.0
