@@ -29,11 +29,7 @@ Vector3 = tuple[float, float, float]
 Vector8 = tuple[float, float, float, float, float, float, float, float]
 
 
-class _Section(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Base of every section: immutable, and a misspelt key is an error."""
-
-
-class DofConfig(_Section):
+class DofConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """One degree of freedom: its compensator, Eqs. (2)-(3), and estimator, Eqs. (4)-(6)."""
 
     update_distance: Positive
@@ -55,7 +51,7 @@ class DofConfig(_Section):
     """Contact offset at the start [m or rad], not below delta_minus [paper]."""
 
 
-class InstrumentConfig(_Section):
+class InstrumentConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Geometry of the instrument, Fig. 4. All [geometry]."""
 
     diameter: Positive = 3.5e-3
@@ -72,7 +68,7 @@ class InstrumentConfig(_Section):
     """Length of each band along the axis [m]."""
 
 
-class PoseConfig(_Section):
+class PoseConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Pose of the guide (where the instrument leaves the scope) in the camera's frame."""
 
     translation: Vector3 = (9e-3, 7e-3, 8e-3)
@@ -82,7 +78,7 @@ class PoseConfig(_Section):
     guide's z axis is the channel's axis, outwards [ours]."""
 
 
-class CameraConfig(_Section):
+class CameraConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Pinhole with OpenCV's distortion, Eq. (8)."""
 
     width: Annotated[int, Meta(ge=1, le=8192)] = 720
@@ -102,7 +98,7 @@ class CameraConfig(_Section):
     camera_from_guide: PoseConfig = field(default_factory=PoseConfig)
 
 
-class VisionConfig(_Section):
+class VisionConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Eq. (12) and Fig. 5."""
 
     weights: Vector3 = (-0.2, 1.0, -0.8)
@@ -117,7 +113,7 @@ class VisionConfig(_Section):
     """A marker is not sought farther than this from where it is predicted [px]."""
 
 
-class ControlConfig(_Section):
+class ControlConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Rates and memory of the loop."""
 
     period: Positive = 0.005
@@ -127,7 +123,7 @@ class ControlConfig(_Section):
     captured [s]; at most 1024 ticks. An older frame is refused."""
 
 
-class Sine(_Section):
+class Sine(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Reference of one DOF: centre + amplitude sin(2 pi t / period)."""
 
     centre: float
@@ -138,9 +134,11 @@ class Sine(_Section):
     """[s]."""
 
 
-class ExperimentConfig(_Section):
-    """Section 5: a sine on each DOF in succession. Amplitudes [ours]: the article's are in its
-    figure only."""
+class ExperimentConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Section 5: a sine on each DOF in succession.
+
+    Amplitudes are [ours]: the article's are in its figure only.
+    """
 
     periods: Annotated[int, Meta(ge=3)] = 5
     """Per DOF [paper]."""
@@ -154,7 +152,7 @@ class ExperimentConfig(_Section):
         return sine
 
 
-class TwinConfig(_Section):
+class TwinConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The physical twin: physics, drives and camera of the simulated rig. All [ours]."""
 
     seed: Annotated[int, Meta(ge=0)] = 0
@@ -173,7 +171,7 @@ class TwinConfig(_Section):
     """Folder of images to use as tissue instead of procedural mucosa."""
 
 
-class Config(_Section):
+class Config(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Everything a run depends on. The defaults are the article's experiment."""
 
     insertion: DofConfig = field(
@@ -267,8 +265,10 @@ def _merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
     merged = dict(base)
     for key, value in changes.items():
         old = merged.get(key)
-        both = isinstance(old, dict) and isinstance(value, dict)
-        merged[key] = _merged(old, value) if both else value
+        if isinstance(old, dict) and isinstance(value, dict):
+            merged[key] = _merged(old, value)
+        else:
+            merged[key] = value
     return merged
 
 
@@ -279,7 +279,7 @@ def _without_none(value: Any) -> Any:
 
 
 def _named(error: msgspec.ValidationError, document: dict[str, Any]) -> ConfigError:
-    """msgspec says what and where; the value that came is looked up in the document."""
+    """The library says what and where; the value that came is looked up in the document."""
     message = str(error)
     expected, _, path = message.partition(" - at `$")
     path = path.rstrip("`").lstrip(".")
