@@ -144,12 +144,79 @@ class ExperimentConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     """Per DOF [paper]."""
     insertion: Sine = field(default_factory=lambda: Sine(centre=25e-3, amplitude=15e-3))
     rotation: Sine = field(default_factory=lambda: Sine(centre=0.0, amplitude=2.0))
-    bending: Sine = field(default_factory=lambda: Sine(centre=0.9, amplitude=1.1))
+    bending: Sine = field(default_factory=lambda: Sine(centre=0.9, amplitude=0.9))
 
     def __getitem__(self, dof: Dof) -> Sine:
         """The reference of one DOF."""
         sine: Sine = getattr(self, dof.label)
         return sine
+
+
+class ShaftConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The twin's shaft in the scope's channel, unknown to the loop.
+
+    All [ours], set so that the loops have the article's widths (Table 1).
+    """
+
+    segments: Annotated[int, Meta(ge=8, le=64)] = 8
+    axial_stiffness: Positive = 3.7e3
+    """Of each of the couplings, motor to first segment included [N/m]."""
+    axial_damping: NonNegative = 600.0
+    """[N s/m]."""
+    torsional_stiffness: Positive = 0.033
+    """[N m/rad]."""
+    torsional_damping: NonNegative = 8e-3
+    """[N m s/rad]."""
+    friction: Positive = 0.5
+    """Coulomb coefficient between shaft and wall."""
+    straight_load: Positive = 0.2
+    """Force of each segment on the wall in a straight scope [N]."""
+    load_per_bend: NonNegative = 0.2
+    """What each bend of the scope adds to it [N]."""
+    load_spread: Annotated[float, Meta(ge=0, le=0.3)] = 0.05
+    """Standard deviation of a segment's share of the load, relative; drawn from the seed."""
+    liner_stiffness: tuple[Positive, Positive] = (6e3, 40e3)
+    """Of the channel's wall, dragged along the axis and around it [N/m]."""
+    set_torque: NonNegative = 2e-4
+    """A shaft that has taken a set turns unevenly in a bent channel: amplitude of the torque on
+    each segment [N m], sinusoidal in its angle."""
+    set_angle: float = 0.6
+    """Angle at which that torque vanishes [rad]."""
+
+
+class CableConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The twin's bending section and its two antagonistic cables. All [ours], as `ShaftConfig`."""
+
+    joints: Annotated[int, Meta(ge=10, le=64)] = 12
+    """Of the bending section."""
+    joint_stiffness: Positive = 0.01
+    """[N m/rad]."""
+    joint_friction: NonNegative = 4e-3
+    """[N m]."""
+    joint_spread: Annotated[float, Meta(ge=0, le=0.3)] = 0.03
+    """Standard deviation of a joint's friction, relative; drawn from the seed. It is what makes
+    the curvature vary along the section."""
+    arm: Positive = 1.2e-3
+    """Distance of each cable from the section's axis [m]."""
+    lumps: Annotated[int, Meta(ge=2, le=16)] = 3
+    """Sliding masses that stand for one cable in its sheath."""
+    stiffness: Positive = 33e3
+    """Of each piece of cable between drum, lumps and section [N/m]; a cable cannot push."""
+    damping: NonNegative = 100.0
+    """[N s/m]."""
+    friction: NonNegative = 1.5
+    """Of each lump in the sheath [N]."""
+    slack: NonNegative = 0.24e-3
+    """Of each cable when the drum and the section agree [m]."""
+
+
+class DriveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The twin's position servos. All [ours]."""
+
+    speed_limit: tuple[Positive, Positive, Positive] = (0.15, 20.0, 10.0)
+    """[m/s, rad/s, rad/s]."""
+    encoder_step: tuple[Positive, Positive, Positive] = (1e-6, 1e-4, 1e-4)
+    """What one encoder count is at the instrument [m, rad, rad]."""
 
 
 class TwinConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -164,11 +231,14 @@ class TwinConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     latency: NonNegative = 0.08
     """From capture to arrival of a frame, mean [s]."""
     latency_jitter: NonNegative = 0.01
-    """Largest deviation from the mean latency [s], uniform."""
+    """Largest deviation from the mean latency [s], uniform; not above latency."""
     image_noise: NonNegative = 2.0
     """Standard deviation of the sensor noise [grey levels]."""
     background: str | None = None
     """Folder of images to use as tissue instead of procedural mucosa."""
+    shaft: ShaftConfig = field(default_factory=ShaftConfig)
+    cables: CableConfig = field(default_factory=CableConfig)
+    drives: DriveConfig = field(default_factory=DriveConfig)
 
 
 class Config(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -338,6 +408,11 @@ def _check_relations(config: Config) -> None:
     if instrument.marker_b + half > instrument.tip_length:
         raise ConfigError(
             "instrument.marker_b", instrument.marker_b, "a band that ends before the tip does"
+        )
+    twin = config.twin
+    if twin.latency_jitter > twin.latency:
+        raise ConfigError(
+            "twin.latency_jitter", twin.latency_jitter, f"at most twin.latency = {twin.latency}"
         )
     ticks = config.control.history / config.control.period
     if not 1 <= ticks <= 1024:

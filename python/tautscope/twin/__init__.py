@@ -1,0 +1,5 @@
+"""The physical twin: a simulated rig that shares no code with the loop it tests."""
+
+from tautscope.twin.rig import Twin
+
+__all__ = ["Twin"]

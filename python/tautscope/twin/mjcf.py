@@ -1,0 +1,154 @@
+"""The twin's physics as a MuJoCo model: what slides, bends, rubs and stretches.
+
+World axes are the guide's: z along the channel outwards, origin where the instrument leaves the
+guide. SI units.
+
+Shaft: segments on slides and hinges along the channel, coupled by axial and torsional springs,
+each pressed on the channel's wall. One elliptic friction cone per contact holds axial and
+circumferential friction together, so that sliding one way lowers the friction the other way. The
+wall itself gives a little (liner), which rounds the loops.
+
+Section: a chain of hinges. Two cables, each a row of lumps with sheath friction joined by springs
+that only pull, run from a drum to the chain's far end.
+"""
+
+from __future__ import annotations
+
+from tautscope.config import CableConfig, Config, ShaftConfig
+
+MAX_TIMESTEP = 0.005
+"""Largest physics step [s]; the inertias below are chosen for it."""
+
+SERVO_LAG = 0.01
+"""Position servo: damping over stiffness [s], the lag the drives feed forward."""
+
+# Everything here moves slowly: friction and elasticity decide, inertia does not. The inertias are
+# larger than a real instrument's so that the stiffest spring stays below 2/MAX_TIMESTEP; in the
+# article's experiment inertial forces stay below 1 % of friction (tests/twin/test_plant.py).
+_SEGMENT_MASS = 0.3
+_SEGMENT_INERTIA = 3.5e-6
+_WALL_MASS = 3.0
+_LUMP_MASS = 1.0
+_SECTION_INERTIA = 1e-4
+
+# Contacts and friction in MuJoCo are soft; these impedances make creep below the friction limit
+# invisible next to the hysteresis without making the normal direction chatter.
+_CONTACT = 'solref="0.02 1" solimp="0.6 0.6 0.001 0.5 2"'
+_FRICTION = 'solimpfriction="0.999 0.999 0.001 0.5 2"'
+_IMPEDANCE_RATIO = 100
+_INERT = 'contype="0" conaffinity="0"'
+
+
+def build(config: Config, timestep: float) -> str:
+    """The MJCF text of the twin for one configuration."""
+    shaft, cables = config.twin.shaft, config.twin.cables
+    return f"""
+<mujoco>
+<compiler angle="radian"/>
+<option timestep="{timestep}" integrator="implicitfast" cone="elliptic"
+  impratio="{_IMPEDANCE_RATIO}" gravity="0 0 0"/>
+<default><geom size="0.001" mass="0.001" {_CONTACT}/></default>
+<worldbody>
+  {_drives()}
+  {_wall(config)}
+  {"".join(_segment(config, i) for i in range(shaft.segments))}
+  {"".join(_lumps(cables, name) for name in "pn")}
+</worldbody>
+<tendon>
+  {"".join(_coupling(shaft, i) for i in range(shaft.segments))}
+  {_cable(cables, "p", 1)}
+  {_cable(cables, "n", -1)}
+</tendon>
+<actuator>
+  <position joint="motor_insertion" kp="5e4" kv="{5e4 * SERVO_LAG}"/>
+  <position joint="motor_rotation" kp="1" kv="{SERVO_LAG}"/>
+  <position joint="motor_bending" kp="10" kv="{10 * SERVO_LAG}"/>
+</actuator>
+</mujoco>"""
+
+
+def _drives() -> str:
+    kinds = (("insertion", "slide", 5), ("rotation", "hinge", 1e-4), ("bending", "hinge", 1e-3))
+    return "".join(
+        f"""<body name="motor_{name}">
+          <joint name="motor_{name}" type="{kind}" axis="0 0 1" armature="{inertia}"/>
+          <geom type="sphere" {_INERT}/></body>"""
+        for name, kind, inertia in kinds
+    )
+
+
+def _wall(config: Config) -> str:
+    shaft, radius = config.twin.shaft, config.instrument.diameter / 2
+    along, around = shaft.liner_stiffness
+    return f"""<body name="wall" pos="0 {-radius - 0.01} 0">
+      <joint type="slide" axis="0 0 1" stiffness="{along}" damping="60"/>
+      <joint type="slide" axis="1 0 0" stiffness="{around}" damping="60"/>
+      <geom type="box" size="0.05 0.01 10" mass="{_WALL_MASS}" contype="2" conaffinity="1"
+        friction="{shaft.friction} 0 0"/></body>"""
+
+
+def _segment(config: Config, index: int) -> str:
+    """Slides along the channel, presses on the wall, turns; the last one carries the section."""
+    shaft = config.twin.shaft
+    last = index == shaft.segments - 1
+    return f"""<body name="segment_{index}" pos="0 0 {-0.1 * (shaft.segments - 1 - index)}">
+      <joint name="slide_{index}" type="slide" axis="0 0 1" armature="{_SEGMENT_MASS}"/>
+      <joint name="press_{index}" type="slide" axis="0 1 0" armature="{_WALL_MASS}" damping="20"/>
+      <joint name="turn_{index}" type="hinge" axis="0 0 1" armature="{_SEGMENT_INERTIA}"/>
+      <geom type="sphere" size="{config.instrument.diameter / 2}" contype="1" conaffinity="2"
+        condim="3" friction="{shaft.friction} 0 0"/>
+      {_section(config) if last else ""}</body>"""
+
+
+def _section(config: Config) -> str:
+    """A chain of hinges, half a link straight at either end, then the rigid tip."""
+    cables, instrument = config.twin.cables, config.instrument
+    link = instrument.bending_length / cables.joints
+    bodies = "".join(
+        f"""<body name="joint_{j}" pos="0 0 {link if j else link / 2}">
+          <joint name="bend_{j}" type="hinge" axis="0 1 0" stiffness="{cables.joint_stiffness}"
+            damping="2e-4" armature="{_SECTION_INERTIA / cables.joints}"
+            frictionloss="{cables.joint_friction}" {_FRICTION}/>
+          <geom type="sphere" mass="1e-4" {_INERT}/>"""
+        for j in range(cables.joints)
+    )
+    tip = f"""<body name="tip" pos="0 0 {link / 2}">
+      <geom type="capsule" fromto="0 0 0 0 0 {instrument.tip_length}" {_INERT}/></body>"""
+    return bodies + tip + "</body>" * cables.joints
+
+
+def _lumps(cables: CableConfig, name: str) -> str:
+    return "".join(
+        f"""<body name="cable_{name}{i}">
+          <joint name="cable_{name}{i}" type="slide" axis="0 0 1" armature="{_LUMP_MASS}"
+            frictionloss="{cables.friction}" {_FRICTION}/>
+          <geom type="sphere" {_INERT}/></body>"""
+        for i in range(cables.lumps)
+    )
+
+
+def _coupling(shaft: ShaftConfig, index: int) -> str:
+    def spring(joint: str, motor: str, stiffness: float, damping: float) -> str:
+        before = f"{joint}_{index - 1}" if index else motor
+        return f"""<fixed stiffness="{stiffness}" damping="{damping}">
+          <joint joint="{before}" coef="1"/><joint joint="{joint}_{index}" coef="-1"/></fixed>"""
+
+    return spring("slide", "motor_insertion", shaft.axial_stiffness, shaft.axial_damping) + spring(
+        "turn", "motor_rotation", shaft.torsional_stiffness, shaft.torsional_damping
+    )
+
+
+def _cable(cables: CableConfig, name: str, sign: int) -> str:
+    """Drum, lumps and section in a row; each piece pulls when it is longer than its slack."""
+    drum = [f'<joint joint="motor_bending" coef="{sign * cables.arm}"/>']
+    section = "".join(
+        f'<joint joint="bend_{j}" coef="{-sign * cables.arm}"/>' for j in range(cables.joints)
+    )
+    starts = drum + [f'<joint joint="cable_{name}{i}" coef="1"/>' for i in range(cables.lumps)]
+    ends = [f'<joint joint="cable_{name}{i}" coef="-1"/>' for i in range(cables.lumps)] + [section]
+    slacks = [0.0] * cables.lumps + [cables.slack]
+    return "".join(
+        f"""<fixed stiffness="{cables.stiffness}" damping="{cables.damping}"
+          springlength="-1 {slack}">{start}{end}</fixed>"""
+        for start, end, slack in zip(starts, ends, slacks, strict=True)
+    )

@@ -1,0 +1,119 @@
+"""The moving part of the twin: drives, shaft, cables and section under MuJoCo."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from tautscope.config import Config
+from tautscope.dof import Dof
+from tautscope.twin.mjcf import MAX_TIMESTEP, SERVO_LAG, build
+
+_SETTLING = 1.0
+"""Time the instrument is left alone in its start posture before a run [s]."""
+
+
+class Plant:
+    """Friction and elasticity between three drives and the tip.
+
+    Args:
+        config: Geometry, twin and start posture (the centres of `config.experiment`).
+        generator: Source of what differs between two instruments of a kind.
+
+    Attributes:
+        bends: Of the scope; may be changed at any time.
+    """
+
+    def __init__(self, config: Config, generator: np.random.Generator) -> None:
+        shaft, cables = config.twin.shaft, config.twin.cables
+        self._config = config
+        self._substeps = math.ceil(config.control.period / MAX_TIMESTEP - 1e-9)
+        self._timestep = config.control.period / self._substeps
+        self._model = mujoco.MjModel.from_xml_string(build(config, self._timestep))
+        self._data = mujoco.MjData(self._model)
+        segments = range(shaft.segments)
+        self._slides = self._addresses(f"slide_{i}" for i in segments)
+        self._presses = self._addresses(f"press_{i}" for i in segments)
+        self._turns = self._addresses(f"turn_{i}" for i in segments)
+        self._hinges = self._addresses(f"bend_{j}" for j in range(cables.joints))
+        self._motors = self._addresses(f"motor_{dof.label}" for dof in Dof)
+        self._base = self._model.body(f"segment_{shaft.segments - 1}").id
+        self._links = [self._model.body(f"joint_{j}").id for j in range(cables.joints)]
+        self._tip = self._model.body("tip").id
+
+        self._load_share = 1 + shaft.load_spread * generator.standard_normal(shaft.segments)
+        spread = 1 + cables.joint_spread * generator.standard_normal(cables.joints)
+        self._model.dof_frictionloss[self._hinges] *= spread
+        self._speed_limit = np.array(config.twin.drives.speed_limit)
+        self._encoder_step = np.array(config.twin.drives.encoder_step)
+        self._setpoint = np.array([config.experiment[dof].centre for dof in Dof])
+        self.bends = config.twin.bends
+        self._start()
+
+    def step(self, command: NDArray[np.float64]) -> None:
+        """Let one control period pass while the drives follow the command (3,) [m, rad, rad]."""
+        data, shaft = self._data, self._config.twin.shaft
+        load = shaft.straight_load + shaft.load_per_bend * self.bends
+        data.qfrc_applied[self._presses] = -load * self._load_share
+        limit = self._speed_limit * self._timestep
+        for _ in range(self._substeps):
+            travel = np.clip(command - self._setpoint, -limit, limit)
+            self._setpoint = self._setpoint + travel
+            data.ctrl[:] = self._setpoint + travel * (SERVO_LAG / self._timestep)
+            angles = data.qpos[self._turns] - shaft.set_angle
+            data.qfrc_applied[self._turns] = -shaft.set_torque * np.sin(angles)
+            mujoco.mj_step(self._model, data)
+
+    @property
+    def applied(self) -> NDArray[np.float64]:
+        """What the encoders read (3,) [m, rad, rad], in whole counts."""
+        counts: NDArray[np.float64] = np.round(self._data.qpos[self._motors] / self._encoder_step)
+        return counts * self._encoder_step
+
+    @property
+    def true_state(self) -> NDArray[np.float64]:
+        """Insertion and rotation where the shaft leaves the guide, and the angle between the
+        section's two ends: (3,) [m, rad, rad].
+        """  # noqa: D205
+        q = self._data.qpos
+        return np.array([q[self._slides[-1]], q[self._turns[-1]], q[self._hinges].sum()])
+
+    def centreline(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Points and unit tangents (n, 3) along the instrument in the guide's frame [m],
+        from the guide's mouth to the end of the tip.
+        """  # noqa: D205
+        # Positions of bodies lag one step behind the joints after mj_step.
+        mujoco.mj_kinematics(self._model, self._data)
+        places, turns = self._data.xpos, self._data.xmat.reshape(-1, 3, 3)
+        axes = turns[[self._base, *self._links], :, 2]
+        at_joints = axes[:-1] + axes[1:]
+        at_joints /= np.linalg.norm(at_joints, axis=1, keepdims=True)
+        along = np.array([0.0, 0.0, 1.0])
+        ahead = turns[self._tip][:, 2]
+        end = places[self._tip] + self._config.instrument.tip_length * ahead
+        points = np.vstack(
+            [np.zeros(3), places[self._base], places[self._links], places[self._tip], end]
+        )
+        return points, np.vstack([along, axes[0], at_joints, ahead, ahead])
+
+    def _start(self) -> None:
+        """Unstrained in the start posture, then left to settle."""
+        config, q = self._config, self._data.qpos
+        posture = self._setpoint
+        insertion, rotation, bending = posture
+        q[self._slides], q[self._turns] = insertion, rotation
+        q[self._hinges] = bending / len(self._hinges)
+        q[self._motors] = posture
+        for name, sign in (("p", 1), ("n", -1)):
+            lumps = self._addresses(f"cable_{name}{i}" for i in range(config.twin.cables.lumps))
+            q[lumps] = sign * config.twin.cables.arm * bending
+        for _ in range(round(_SETTLING / config.control.period)):
+            self.step(posture)
+
+    def _addresses(self, names: Iterable[str]) -> NDArray[np.intp]:
+        """Where the joints of these names are in every state vector (all have one coordinate)."""
+        return np.array([self._model.joint(name).qposadr[0] for name in names], dtype=np.intp)

@@ -1,0 +1,112 @@
+"""The twin as a rig: plant and camera behind the seam of `tautscope.rig`."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tautscope.config import Config
+from tautscope.errors import SignalError
+from tautscope.rig import Frame, Sample
+from tautscope.twin.camera import TwinCamera
+from tautscope.twin.plant import Plant
+
+
+class Twin:
+    """A robotic endoscopic instrument in MuJoCo, seen by a drawn endoscope; implements `Rig`.
+
+    Hysteresis comes out of friction and elasticity. Nothing of `Play`, `Compensator`,
+    `Instrument` or `Camera` moves or draws it. The same seed gives the same bytes.
+
+    Args:
+        config: The rig's geometry and `config.twin`.
+        images: Without them no frame ever arrives, and the twin runs several times faster.
+
+    Limits: quasi-static (inertias are raised for the time step, see `twin/mjcf.py`); the scope and
+    the tissue do not move; the instrument touches nothing outside the guide.
+    """
+
+    def __init__(self, config: Config, *, images: bool = True) -> None:
+        self._config = config
+        self._camera = TwinCamera(config) if images else None
+        self._plant: Plant | None = None
+
+    @property
+    def control_period(self) -> float:
+        """Time from one command to the next [s]."""
+        return self._config.control.period
+
+    @property
+    def bends(self) -> float:
+        """Bends of the scope; may be set during a run.
+
+        Raises:
+            ConfigError: On a value outside what `twin.bends` may be.
+        """
+        return self._running().bends
+
+    @bends.setter
+    def bends(self, value: float) -> None:
+        self._running().bends = self._config.replace(**{"twin.bends": value}).twin.bends
+
+    def reset(self) -> Sample:
+        """A fresh instrument in the start posture, settled, at time 0."""
+        seed = np.random.SeedSequence(self._config.twin.seed)
+        physics, timing = (np.random.default_rng(child) for child in seed.spawn(2))
+        self._plant = Plant(self._config, physics)
+        self._timing = timing
+        self._ticks = 0
+        self._sequence = 0
+        self._under_way: deque[tuple[float, Frame]] = deque()
+        return self._sample(self._plant)
+
+    def step(self, command: ArrayLike) -> Sample:
+        """Send command (3,) [m, rad, rad] and let one control period pass.
+
+        Raises:
+            SignalError: The command is not three finite numbers.
+        """
+        plant = self._running()
+        target = np.asarray(command, dtype=np.float64)
+        if target.shape != (3,) or not np.isfinite(target).all():
+            raise SignalError("command", command, "three finite numbers [m, rad, rad]")
+        plant.step(target)
+        self._ticks += 1
+        return self._sample(plant)
+
+    def close(self) -> None:
+        """Release the physics; `reset` starts anew."""
+        self._plant = None
+
+    def _running(self) -> Plant:
+        if self._plant is None:
+            raise SignalError("rig", "closed", "a twin after reset() and before close()")
+        return self._plant
+
+    def _sample(self, plant: Plant) -> Sample:
+        time = self._ticks * self.control_period
+        state = plant.true_state
+        self._capture(plant, time)
+        return Sample(time, plant.applied, self._arrived(time), state)
+
+    def _capture(self, plant: Plant, time: float) -> None:
+        twin = self._config.twin
+        # Half a tick of tolerance: n / frame_rate and n * period differ in the last digits.
+        if (
+            self._camera is None
+            or time + self.control_period / 2 < self._sequence / twin.frame_rate
+        ):
+            return
+        picture = self._camera.draw(*plant.centreline(), self._sequence)
+        frame = Frame(picture.image, time, self._sequence, picture.true_features)
+        delay = twin.latency + twin.latency_jitter * self._timing.uniform(-1, 1)
+        self._under_way.append((time + delay, frame))
+        self._sequence += 1
+
+    def _arrived(self, time: float) -> Frame | None:
+        newest = None
+        while self._under_way and self._under_way[0][0] <= time:
+            newest = self._under_way.popleft()[1]
+        return newest
