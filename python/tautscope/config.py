@@ -191,7 +191,7 @@ class CableConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """Of the bending section."""
     joint_stiffness: Positive = 0.01
     """[N m/rad]."""
-    joint_friction: NonNegative = 4e-3
+    joint_friction: NonNegative = 1.5e-3
     """[N m]."""
     joint_spread: Annotated[float, Meta(ge=0, le=0.3)] = 0.03
     """Standard deviation of a joint's friction, relative; drawn from the seed. It is what makes
@@ -200,13 +200,13 @@ class CableConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """Distance of each cable from the section's axis [m]."""
     lumps: Annotated[int, Meta(ge=2, le=16)] = 3
     """Sliding masses that stand for one cable in its sheath."""
-    stiffness: Positive = 33e3
+    stiffness: Positive = 45e3
     """Of each piece of cable between drum, lumps and section [N/m]; a cable cannot push."""
     damping: NonNegative = 100.0
     """[N s/m]."""
-    friction: NonNegative = 1.5
+    friction: NonNegative = 1.0
     """Of each lump in the sheath [N]."""
-    slack: NonNegative = 0.24e-3
+    slack: NonNegative = 0.15e-3
     """Of each cable when the drum and the section agree [m]."""
 
 

@@ -28,14 +28,14 @@ SERVO_LAG = 0.01
 _SEGMENT_MASS = 0.3
 _SEGMENT_INERTIA = 3.5e-6
 _WALL_MASS = 3.0
-_LUMP_MASS = 1.0
-_SECTION_INERTIA = 1e-4
+_LUMP_MASS = 2.0
+_SECTION_INERTIA = 6e-4
 
 # Contacts and friction in MuJoCo are soft; these impedances make creep below the friction limit
 # invisible next to the hysteresis without making the normal direction chatter.
 _CONTACT = 'solref="0.02 1" solimp="0.6 0.6 0.001 0.5 2"'
-_FRICTION = 'solimpfriction="0.999 0.999 0.001 0.5 2"'
-_IMPEDANCE_RATIO = 100
+_FRICTION = 'solreffriction="0.01 1" solimpfriction="0.9999 0.9999 0.001 0.5 2"'
+_IMPEDANCE_RATIO = 1000
 _INERT = 'contype="0" conaffinity="0"'
 
 
@@ -120,9 +120,9 @@ def _section(config: Config) -> str:
 def _lumps(cables: CableConfig, name: str) -> str:
     return "".join(
         f"""<body name="cable_{name}{i}">
-          <joint name="cable_{name}{i}" type="slide" axis="0 0 1" armature="{_LUMP_MASS}"
+          <joint name="cable_{name}{i}" type="slide" axis="0 0 1"
             frictionloss="{cables.friction}" {_FRICTION}/>
-          <geom type="sphere" {_INERT}/></body>"""
+          <geom type="sphere" mass="{_LUMP_MASS}" {_INERT}/></body>"""
         for i in range(cables.lumps)
     )
 
