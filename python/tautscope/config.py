@@ -60,9 +60,9 @@ class InstrumentConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     """Length of the bending section [m]."""
     tip_length: Positive = 20e-3
     """Length of the rigid tip [m]."""
-    marker_a: NonNegative = 5e-3
+    marker_a: NonNegative = 4e-3
     """Centre of the proximal band A, from the distal end of the bending section [m]."""
-    marker_b: NonNegative = 15e-3
+    marker_b: NonNegative = 16e-3
     """Centre of the distal band B, from the distal end of the bending section [m]."""
     band_length: Positive = 4e-3
     """Length of each band along the axis [m]."""
@@ -71,9 +71,9 @@ class InstrumentConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 class PoseConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Pose of the guide (where the instrument leaves the scope) in the camera's frame."""
 
-    translation: Vector3 = (9e-3, 7e-3, 8e-3)
+    translation: Vector3 = (13.5e-3, 14e-3, 15e-3)
     """Guide's origin in the camera's frame: x right, y down, z forward [m] [ours]."""
-    rotation: Vector3 = (0.29, -0.37, 0.0)
+    rotation: Vector3 = (0.32, -0.26, 0.0)
     """Rotation vector, axis times angle [rad], that turns guide axes into camera axes; the
     guide's z axis is the channel's axis, outwards [ours]."""
 
@@ -142,7 +142,7 @@ class ExperimentConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 
     periods: Annotated[int, Meta(ge=3)] = 5
     """Per DOF [paper]."""
-    insertion: Sine = field(default_factory=lambda: Sine(centre=25e-3, amplitude=15e-3))
+    insertion: Sine = field(default_factory=lambda: Sine(centre=20e-3, amplitude=15e-3))
     rotation: Sine = field(default_factory=lambda: Sine(centre=0.0, amplitude=2.0))
     bending: Sine = field(default_factory=lambda: Sine(centre=0.9, amplitude=0.9))
 
@@ -245,13 +245,13 @@ class Config(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Everything a run depends on. The defaults are the article's experiment."""
 
     insertion: DofConfig = field(
-        default_factory=lambda: DofConfig(update_distance=0.4e-3, observable_deviation=0.5e-3)
+        default_factory=lambda: DofConfig(update_distance=0.4e-3, observable_deviation=2e-3)
     )
     rotation: DofConfig = field(
-        default_factory=lambda: DofConfig(update_distance=0.04, observable_deviation=0.05)
+        default_factory=lambda: DofConfig(update_distance=0.04, observable_deviation=0.1)
     )
     bending: DofConfig = field(
-        default_factory=lambda: DofConfig(update_distance=0.02, observable_deviation=0.05)
+        default_factory=lambda: DofConfig(update_distance=0.02, observable_deviation=0.1)
     )
     instrument: InstrumentConfig = field(default_factory=InstrumentConfig)
     camera: CameraConfig = field(default_factory=CameraConfig)
