@@ -142,7 +142,7 @@ class ExperimentConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 
     periods: Annotated[int, Meta(ge=3)] = 5
     """Per DOF [paper]."""
-    insertion: Sine = field(default_factory=lambda: Sine(centre=20e-3, amplitude=15e-3))
+    insertion: Sine = field(default_factory=lambda: Sine(centre=25e-3, amplitude=15e-3))
     rotation: Sine = field(default_factory=lambda: Sine(centre=0.0, amplitude=2.0))
     bending: Sine = field(default_factory=lambda: Sine(centre=0.9, amplitude=0.9))
 
@@ -159,13 +159,13 @@ class ShaftConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """
 
     segments: Annotated[int, Meta(ge=8, le=64)] = 8
-    axial_stiffness: Positive = 3.7e3
+    axial_stiffness: Positive = 4.0e3
     """Of each of the couplings, motor to first segment included [N/m]."""
-    axial_damping: NonNegative = 600.0
+    axial_damping: NonNegative = 40.0
     """[N s/m]."""
     torsional_stiffness: Positive = 0.033
     """[N m/rad]."""
-    torsional_damping: NonNegative = 8e-3
+    torsional_damping: NonNegative = 4e-4
     """[N m s/rad]."""
     friction: Positive = 0.5
     """Coulomb coefficient between shaft and wall."""
@@ -175,12 +175,15 @@ class ShaftConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """What each bend of the scope adds to it [N]."""
     load_spread: Annotated[float, Meta(ge=0, le=0.3)] = 0.05
     """Standard deviation of a segment's share of the load, relative; drawn from the seed."""
+    wall_viscosity: tuple[NonNegative, NonNegative] = (4.0, 13.0)
+    """Of the wet wall on each segment's surface, along the axis and around it [N s/m]; a few
+    per cent of the friction at the speeds of the article's experiment."""
     liner_stiffness: tuple[Positive, Positive] = (6e3, 40e3)
     """Of the channel's wall, dragged along the axis and around it [N/m]."""
     set_torque: NonNegative = 2e-4
     """A shaft that has taken a set turns unevenly in a bent channel: amplitude of the torque on
     each segment [N m], sinusoidal in its angle."""
-    set_angle: float = 0.6
+    set_angle: float = 1.2
     """Angle at which that torque vanishes [rad]."""
 
 
@@ -189,7 +192,7 @@ class CableConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
 
     joints: Annotated[int, Meta(ge=10, le=64)] = 12
     """Of the bending section."""
-    joint_stiffness: Positive = 0.01
+    joint_stiffness: Positive = 0.003
     """[N m/rad]."""
     joint_friction: NonNegative = 1.5e-3
     """[N m]."""

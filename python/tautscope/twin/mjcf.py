@@ -25,15 +25,17 @@ SERVO_LAG = 0.01
 # Everything here moves slowly: friction and elasticity decide, inertia does not. The inertias are
 # larger than a real instrument's so that the stiffest spring stays below 2/MAX_TIMESTEP; in the
 # article's experiment inertial forces stay below 1 % of friction (tests/twin/test_plant.py).
-_SEGMENT_MASS = 0.3
-_SEGMENT_INERTIA = 3.5e-6
+_SEGMENT_MASS = 0.08
+_SEGMENT_INERTIA = 1e-6
+_PRESS_MASS = 0.05
 _WALL_MASS = 3.0
 _LUMP_MASS = 2.0
 _SECTION_INERTIA = 6e-4
 
-# Contacts and friction in MuJoCo are soft; these impedances make creep below the friction limit
-# invisible next to the hysteresis without making the normal direction chatter.
-_CONTACT = 'solref="0.02 1" solimp="0.6 0.6 0.001 0.5 2"'
+# Contacts and friction in MuJoCo are soft. These impedances keep creep below the friction limit
+# small next to the hysteresis without making the normal direction chatter; the segments are light
+# across the wall so that the load on it stays what is set, whatever the slip does.
+_CONTACT = 'solref="0.02 1" solimp="0.9 0.9 0.001 0.5 2"'
 _FRICTION = 'solreffriction="0.01 1" solimpfriction="0.9999 0.9999 0.001 0.5 2"'
 _IMPEDANCE_RATIO = 1000
 _INERT = 'contype="0" conaffinity="0"'
@@ -90,12 +92,16 @@ def _wall(config: Config) -> str:
 def _segment(config: Config, index: int) -> str:
     """Slides along the channel, presses on the wall, turns; the last one carries the section."""
     shaft = config.twin.shaft
+    radius = config.instrument.diameter / 2
+    along, around = shaft.wall_viscosity
     last = index == shaft.segments - 1
     return f"""<body name="segment_{index}" pos="0 0 {-0.1 * (shaft.segments - 1 - index)}">
-      <joint name="slide_{index}" type="slide" axis="0 0 1" armature="{_SEGMENT_MASS}"/>
-      <joint name="press_{index}" type="slide" axis="0 1 0" armature="{_WALL_MASS}" damping="20"/>
-      <joint name="turn_{index}" type="hinge" axis="0 0 1" armature="{_SEGMENT_INERTIA}"/>
-      <geom type="sphere" size="{config.instrument.diameter / 2}" contype="1" conaffinity="2"
+      <joint name="slide_{index}" type="slide" axis="0 0 1" armature="{_SEGMENT_MASS}"
+        damping="{along}"/>
+      <joint name="press_{index}" type="slide" axis="0 1 0" armature="{_PRESS_MASS}"/>
+      <joint name="turn_{index}" type="hinge" axis="0 0 1" armature="{_SEGMENT_INERTIA}"
+        damping="{around * radius**2}"/>
+      <geom type="sphere" size="{radius}" contype="1" conaffinity="2"
         condim="3" friction="{shaft.friction} 0 0"/>
       {_section(config) if last else ""}</body>"""
 
