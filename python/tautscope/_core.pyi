@@ -1,11 +1,12 @@
 from collections.abc import Sequence
-from typing import Self
+from typing import Self, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 __version__: str
 
+@final
 class MarkerDetector:
     def __new__(
         cls,
