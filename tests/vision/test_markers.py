@@ -43,8 +43,9 @@ def test_bands_of_unequal_size() -> None:
     assert_found(detect((A, BAND // 2), (B, BAND), predicted=[*A, *B]), A, B)
 
 
-def test_a_speck_on_the_prediction_is_no_band() -> None:
-    speck = ((430, 330), 4)
+@pytest.mark.parametrize("half", [1, 4, 6])
+def test_a_speck_on_the_prediction_is_no_band(half: int) -> None:
+    speck = ((430, 330), half)
     assert_found(detect((A, BAND), (B, BAND), speck, predicted=[*A, *speck[0]]), A, B)
 
 

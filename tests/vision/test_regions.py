@@ -72,9 +72,9 @@ def test_regular_masks(size: tuple[int, int]) -> None:
         assert ours(mask.T) == by_scipy(mask.T)
 
 
-def test_regions_come_in_the_order_of_their_first_pixels() -> None:
-    mask = np.array([[0, 0, 0, 1], [1, 0, 0, 0], [1, 0, 1, 0]], dtype=bool)
-    assert label_regions(mask)[:, 3:5].tolist() == [[3, 0], [0, 1], [2, 2]]
+def test_regions_come_in_the_order_of_their_last_rows() -> None:
+    mask = np.array([[1, 0, 0, 1, 0, 0], [1, 0, 0, 0, 0, 1], [1, 0, 1, 0, 0, 0]], dtype=bool)
+    assert label_regions(mask)[:, 3:5].tolist() == [[3, 0], [5, 1], [0, 0], [2, 2]]
 
 
 def test_a_mask_without_pixels_has_no_regions() -> None:

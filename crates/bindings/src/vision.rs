@@ -99,7 +99,7 @@ impl MarkerDetector {
 
 type Measured<'py> = (Bound<'py, PyArray1<f64>>, String, Bound<'py, PyArray2<f64>>);
 
-/// The 8-connected regions of a mask (h, w), in the order of their first pixels: (n, 7).
+/// The 8-connected regions of a mask (h, w), in the order of their last rows: (n, 7).
 #[pyfunction]
 pub fn label_regions<'py>(
     py: Python<'py>,
@@ -112,17 +112,19 @@ pub fn label_regions<'py>(
     }
     let regions = py.detach(|| {
         let mut labeller = Labeller::default();
-        labeller.start(width, height);
+        let mut regions = Vec::new();
+        labeller.start(width);
         for (v, row) in mask.outer_iter().enumerate() {
-            labeller.next_row();
             let row = row.to_vec();
             each_run(
                 &row,
                 |inside| *inside,
                 |start, end| labeller.add(v, start, end),
             );
+            labeller.end_row(|region| regions.push(region));
         }
-        rows(labeller.regions(1))
+        labeller.end_row(|region| regions.push(region));
+        rows(regions.into_iter())
     });
     Ok(regions.into_pyarray(py))
 }

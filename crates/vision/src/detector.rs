@@ -98,18 +98,19 @@ impl Detector {
             regions,
             settings,
         } = self;
-        labeller.start(frame.width(), frame.height());
-        segmenter.each_row(frame, |v, runs| {
-            labeller.next_row();
-            runs.each(|start, end| labeller.add(v, start, end));
-        });
         regions.clear();
-        for region in labeller.regions(settings.minimum_area) {
+        let mut keep = |region: Region| {
             let place = regions.partition_point(|kept| kept.area >= region.area);
-            if place < CANDIDATES {
+            if region.area >= settings.minimum_area && place < CANDIDATES {
                 regions.truncate(CANDIDATES - 1);
                 regions.insert(place, region);
             }
-        }
+        };
+        labeller.start(frame.width());
+        segmenter.each_row(frame, |v, runs| {
+            runs.each(|start, end| labeller.add(v, start, end));
+            labeller.end_row(&mut keep);
+        });
+        labeller.end_row(&mut keep);
     }
 }

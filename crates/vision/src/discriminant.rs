@@ -111,6 +111,11 @@ mod tests {
             discriminant.project(pixels.as_flattened(), &mut projected);
             for (pixel, value) in pixels.iter().zip(projected) {
                 prop_assert!(value.abs() <= 8191);
+                let stored = discriminant.weights.iter().zip(pixel);
+                let sum: f64 = stored.map(|(w, p)| f64::from(*w) * f64::from(*p)).sum();
+                prop_assert!((f64::from(value) - sum / 512.0).abs() <= 0.5);
+                let level = threshold * discriminant.scale;
+                prop_assert_eq!(value > discriminant.threshold(), f64::from(value) > level);
                 let exact: f64 = weights.iter().zip(pixel).map(|(w, p)| w * f64::from(*p)).sum();
                 let fixed = f64::from(value) / discriminant.scale;
                 prop_assert!((fixed - exact).abs() <= discriminant.tolerance(0));

@@ -23,8 +23,9 @@ impl LowPass {
 
     /// Takes row `n` of an image of `height` rows and leaves the filtered row `n - 1` in its place.
     ///
-    /// To be called for `n` = 0, 1, ..., `height`. The first call leaves nothing of use, and in the
-    /// last, which asks for the bottom row, what `row` held does not count.
+    /// To be called for `n` = 0, 1, ..., `height`. The first call leaves nothing of use, and the
+    /// last, which asks for the bottom row, does not read `row`. Nor do calls beyond that, which
+    /// leave nothing of use.
     pub(crate) fn step(&mut self, row: &mut [i16], n: usize, height: usize) {
         if n < height {
             along(row, &mut self.below);
@@ -64,4 +65,39 @@ fn combine(above: &[i16], here: &[i16], below: &[i16], filtered: &mut [i16]) {
 /// `(a + 2 b + c) / 4` to the nearest; the values are within +-8191, so no sum leaves an `i16`.
 fn mean(a: i16, b: i16, c: i16) -> i16 {
     (a + 2 * b + c + 2) >> 2
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn one_pass_is_the_binomial_filter_to_within_one_unit(
+            width in 1..12_usize,
+            values in prop::collection::vec(-8191..=8191_i16, 12 * 8),
+        ) {
+            let rows: Vec<&[i16]> = values.chunks_exact(width).collect();
+            let height = rows.len();
+            let mut pass = LowPass::default();
+            pass.prepare(width);
+            for n in 0..=height {
+                let mut row = rows.get(n).map_or_else(|| vec![0; width], |row| row.to_vec());
+                pass.step(&mut row, n, height);
+                let Some(v) = n.checked_sub(1) else { continue };
+                for (u, filtered) in row.iter().enumerate() {
+                    let mut exact = 0;
+                    for (dv, weight_v) in [(0, 1), (1, 2), (2, 1)] {
+                        for (du, weight_u) in [(0, 1), (1, 2), (2, 1)] {
+                            let v = (v + dv).clamp(1, height) - 1;
+                            let u = (u + du).clamp(1, width) - 1;
+                            exact += weight_v * weight_u * i32::from(rows[v][u]);
+                        }
+                    }
+                    prop_assert!((16 * i32::from(*filtered) - exact).abs() <= 16);
+                }
+            }
+        }
+    }
 }

@@ -51,21 +51,26 @@ impl Region {
     }
 }
 
-/// Labels connected components from runs, in one sweep from the top to the bottom.
+/// Labels connected components from runs, in one sweep from the top to the bottom, in memory that
+/// grows with the image's width alone.
 ///
-/// Union-find over the runs' labels (Rosenfeld and Pfaltz 1966, with runs in the place of pixels): a run takes
-/// the label of what it touches in the row above and joins the labels it brings together. Each label gathers
-/// its sums while the runs come in, so no image of labels is kept and the frame is not read again.
+/// Union-find over labels (Rosenfeld and Pfaltz 1966, with runs in the place of pixels): a run takes
+/// the label of what it touches in the row above and joins the labels it brings together. Each label
+/// gathers its sums while the runs come in, so no image of labels is kept and the frame is not read
+/// again. A region that a row does not touch is finished, and its label is free (Bailey and Johnston 2007).
+///
+/// [`start`](Self::start), then for each row [`add`](Self::add) its runs and [`end_row`](Self::end_row);
+/// a last, empty row ends the regions that touch the bottom.
 #[derive(Clone, Debug, Default)]
 pub struct Labeller {
     above: Vec<Run>,
     here: Vec<Run>,
     /// Where in `above` the next run may first touch.
     cursor: usize,
-    /// Of each label: a label joined with it and not later in order; itself, if it is the first.
-    parents: Vec<usize>,
-    /// Of each label: the pixels gathered under it and not yet handed to its parent.
-    parts: Vec<Region>,
+    /// By label: what touches the row above or begins in this one.
+    parts: Vec<Part>,
+    /// By label: what the next row will find.
+    next: Vec<Part>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -75,86 +80,111 @@ struct Run {
     label: usize,
 }
 
+/// The pixels gathered under a label.
+#[derive(Clone, Copy, Debug)]
+struct Part {
+    region: Region,
+    /// A label joined with this one; itself, if it speaks for all that are joined.
+    parent: usize,
+    /// Its label in the next row, if it reaches that far.
+    renamed: Option<usize>,
+}
+
+impl Part {
+    fn new(label: usize, region: Region) -> Self {
+        Self {
+            region,
+            parent: label,
+            renamed: None,
+        }
+    }
+}
+
 impl Labeller {
-    /// Forgets the last image and makes room for the worst of this size, a lattice of single
-    /// pixels; allocates only when the size grows.
-    pub fn start(&mut self, width: usize, height: usize) {
-        let (runs, labels) = (width.div_ceil(2), width.div_ceil(2) * height.div_ceil(2));
+    /// Forgets the last image and makes room for rows of this width; allocates only when it grows.
+    pub fn start(&mut self, width: usize) {
+        let runs = width.div_ceil(2);
         for row in [&mut self.above, &mut self.here] {
             row.clear();
             row.reserve(runs);
         }
-        self.parents.clear();
-        self.parents.reserve(labels);
-        self.parts.clear();
-        self.parts.reserve(labels);
-        self.cursor = 0;
-    }
-
-    /// Begins the next row.
-    pub fn next_row(&mut self) {
-        std::mem::swap(&mut self.above, &mut self.here);
-        self.here.clear();
+        for parts in [&mut self.parts, &mut self.next] {
+            parts.clear();
+            parts.reserve(2 * runs);
+        }
         self.cursor = 0;
     }
 
     /// Adds a run of row `v`, `start < end <= MAX_SIDE`, to the right of the row's runs so far.
     pub fn add(&mut self, v: usize, start: usize, end: usize) {
         debug_assert!(start < end && end <= MAX_SIDE);
-        while self
-            .above
-            .get(self.cursor)
-            .is_some_and(|run| run.end < start)
-        {
+        let Self { above, parts, .. } = self;
+        while above.get(self.cursor).is_some_and(|run| run.end < start) {
             self.cursor += 1;
         }
-        let mut label = None;
-        let mut touching = self.cursor;
-        while let Some(run) = self.above.get(touching).filter(|run| run.start <= end) {
-            let theirs = run.label;
-            label = Some(self.join(label.unwrap_or(theirs), theirs));
-            touching += 1;
-        }
-        let part = Region::of_run(v, start, end);
-        let label = if let Some(label) = label {
-            self.parts[label].absorb(&part);
+        let candidates = above.get(self.cursor..).unwrap_or_default();
+        let touching = candidates.iter().take_while(|run| run.start <= end);
+        let joined = touching
+            .map(|run| run.label)
+            .reduce(|one, other| join(parts, one, other));
+        let region = Region::of_run(v, start, end);
+        let label = if let Some(label) = joined {
+            let label = root(parts, label);
+            parts[label].region.absorb(&region);
             label
         } else {
-            self.parents.push(self.parents.len());
-            self.parts.push(part);
-            self.parents.len() - 1
+            parts.push(Part::new(parts.len(), region));
+            parts.len() - 1
         };
         self.here.push(Run { start, end, label });
     }
 
-    /// The regions of at least `minimum_area` (px), in the order of their first pixels.
-    pub fn regions(&self, minimum_area: u64) -> impl Iterator<Item = Region> {
-        let labels = self.parents.iter().zip(&self.parts).enumerate();
-        labels
-            .filter(move |(label, (parent, part))| label == *parent && part.area >= minimum_area)
-            .map(|(_, (_, part))| *part)
-    }
-
-    /// The first of the labels joined with this one. Labels come from `parents.len()`, so they index it.
-    fn root(&mut self, mut label: usize) -> usize {
-        while self.parents[label] != label {
-            self.parents[label] = self.parents[self.parents[label]];
-            label = self.parents[label];
+    /// Ends a row; `finished` gets the regions that do not touch it.
+    pub fn end_row(&mut self, mut finished: impl FnMut(Region)) {
+        let Self {
+            here, parts, next, ..
+        } = self;
+        next.clear();
+        for run in &mut *here {
+            let root = root(parts, run.label);
+            let part = &mut parts[root];
+            run.label = *part.renamed.get_or_insert_with(|| {
+                next.push(Part::new(next.len(), part.region));
+                next.len() - 1
+            });
         }
-        label
-    }
-
-    fn join(&mut self, ours: usize, theirs: usize) -> usize {
-        let (ours, theirs) = (self.root(ours), self.root(theirs));
-        if ours == theirs {
-            return ours;
+        for (label, part) in parts.iter().enumerate() {
+            if part.parent == label && part.renamed.is_none() {
+                finished(part.region);
+            }
         }
-        let (first, second) = (ours.min(theirs), ours.max(theirs));
-        self.parents[second] = first;
-        let part = self.parts[second];
-        self.parts[first].absorb(&part);
-        first
+        std::mem::swap(&mut self.parts, &mut self.next);
+        std::mem::swap(&mut self.above, &mut self.here);
+        self.here.clear();
+        self.cursor = 0;
     }
+}
+
+/// The label that speaks for this one. A label is the length `parts` had, so it indexes them.
+fn root(parts: &mut [Part], mut label: usize) -> usize {
+    while parts[label].parent != label {
+        let grandparent = parts[parts[label].parent].parent;
+        parts[label].parent = grandparent;
+        label = grandparent;
+    }
+    label
+}
+
+/// Makes the earlier label speak for both, and returns it.
+fn join(parts: &mut [Part], one: usize, other: usize) -> usize {
+    let (one, other) = (root(parts, one), root(parts, other));
+    let (first, second) = (one.min(other), one.max(other));
+    if first != second {
+        parts[second].parent = first;
+        let region = parts[second].region;
+        parts[first].region.absorb(&region);
+    }
+    first
 }
 
 fn count(pixels: usize) -> u64 {

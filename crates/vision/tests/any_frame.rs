@@ -77,12 +77,11 @@ proptest! {
     ) {
         let mut segmenter = Segmenter::new(settings.discriminant, settings.smoothing);
         let mut labeller = Labeller::default();
-        labeller.start(image.width, image.height);
-        let (mut pixels, mut rows) = (0, 0);
+        labeller.start(image.width);
+        let (mut pixels, mut rows, mut regions) = (0, 0, Vec::new());
         segmenter.each_row(&image.frame(), |v, runs| {
             assert_eq!(v, rows);
             rows += 1;
-            labeller.next_row();
             let mut last_end = None;
             runs.each(|start, end| {
                 assert!(start < end && end <= image.width && last_end.is_none_or(|last| last < start));
@@ -90,11 +89,13 @@ proptest! {
                 pixels += end - start;
                 labeller.add(v, start, end);
             });
+            labeller.end_row(|region| regions.push(region));
         });
+        labeller.end_row(|region| regions.push(region));
         prop_assert_eq!(rows, image.height);
-        let area: u64 = labeller.regions(1).map(|region| region.area).sum();
+        let area: u64 = regions.iter().map(|region| region.area).sum();
         prop_assert_eq!(area, pixels as u64);
-        for region in labeller.regions(1) {
+        for region in regions {
             prop_assert!(region.left < region.right && region.right <= image.width);
             prop_assert!(region.top < region.bottom && region.bottom <= image.height);
             let sides = (region.right - region.left) * (region.bottom - region.top);
