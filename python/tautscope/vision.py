@@ -74,6 +74,9 @@ class MarkerDetector:
 
     Args:
         config: The configuration; `camera` and `vision` are used.
+
+    Raises:
+        ConfigError: All weights of the discriminant are zero, or too small or large to be meant.
     """
 
     def __init__(self, config: Config) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from tautscope.config import Config
-from tautscope.errors import FieldError, FrameError
+from tautscope.errors import ConfigError, FieldError, FrameError
 from tautscope.vision import MarkerDetector
 
 Image = NDArray[np.uint8]
@@ -113,6 +113,12 @@ def test_what_is_not_an_image_is_refused(image: Image) -> None:
     for call in (detector.detect, detector.mask):
         with pytest.raises(FrameError, match=r"^image: got .* expected uint8 array \(20, 30, 3\)"):
             call(image)
+
+
+@pytest.mark.parametrize("weights", [[0.0, 0.0, 0.0], [1e-12, 0.0, 0.0], [1.0, 1e300, 0.0]])
+def test_a_discriminant_that_tells_nothing_apart_is_refused(weights: list[float]) -> None:
+    with pytest.raises(ConfigError, match=r"^vision\.weights: got .* expected finite weights"):
+        MarkerDetector(config((20, 30), **{"vision.weights": weights}))
 
 
 @pytest.mark.parametrize("predicted", ["near", 3.0, [1, 2, 3], [[1, 2, 3, 4]], [1, 2, 3, None, 5]])

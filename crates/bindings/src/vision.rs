@@ -33,6 +33,7 @@ impl MarkerDetector {
     #[new]
     #[pyo3(signature = (*, weights, threshold, smoothing, minimum_area, gate, entry_point))]
     fn new(
+        py: Python<'_>,
         weights: [f64; 3],
         threshold: f64,
         smoothing: usize,
@@ -40,7 +41,7 @@ impl MarkerDetector {
         gate: f64,
         entry_point: [f64; 2],
     ) -> PyResult<Self> {
-        let discriminant = ColorDiscriminant::new(weights, threshold).map_err(refused)?;
+        let discriminant = ColorDiscriminant::new(weights, threshold).map_err(refused(py))?;
         let detector = Detector::new(Settings {
             discriminant,
             smoothing,
@@ -50,7 +51,7 @@ impl MarkerDetector {
         });
         Ok(Self {
             segmenter: Segmenter::new(discriminant, smoothing),
-            detector: Mutex::new(detector.map_err(refused)?),
+            detector: Mutex::new(detector.map_err(refused(py))?),
         })
     }
 
@@ -177,6 +178,17 @@ fn rows(regions: impl Iterator<Item = Region>) -> Array2<f64> {
     Array2::from(rows)
 }
 
-fn refused(error: Error) -> PyErr {
-    PyValueError::new_err(error.to_string())
+/// A refused setting as `tautscope.errors.ConfigError` about `vision`.
+fn refused(py: Python<'_>) -> impl Fn(Error) -> PyErr {
+    move |error| {
+        let facts = (
+            format!("vision.{}", error.field),
+            error.value,
+            error.allowed,
+        );
+        py.import("tautscope.errors")
+            .and_then(|errors| errors.getattr("ConfigError"))
+            .and_then(|class| class.call1(facts))
+            .map_or_else(|failure| failure, PyErr::from_value)
+    }
 }
