@@ -224,11 +224,11 @@ def test_the_blocks_name_what_is_wrong_with_their_settings() -> None:
 
 
 def test_batch_run_is_step_by_step() -> None:
-    from tautscope.reduction import _loop
+    from tautscope.reduction import build_loop
 
     references = REST + 0.1 * np.sin(np.arange(300.0))[:, None] * AMPLITUDES
     times = np.arange(300) * PERIOD
-    one, other = _loop(CONFIG, True), HysteresisReduction(CONFIG)
+    one, other = build_loop(CONFIG), HysteresisReduction(CONFIG)
     np.testing.assert_array_equal(
         one.run(references, times), [other.step(reference) for reference in references]
     )
