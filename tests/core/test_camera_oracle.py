@@ -36,7 +36,7 @@ def test_what_is_not_in_front_of_the_camera_is_not_seen() -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_poses_are_opencvs_rodrigues(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    # A straight instrument without thickness: the band is a point on the guide's z axis.
+    # Without thickness a band is a point.
     instrument = _core.Instrument(
         bending_length=0.01, marker_a=0.0, marker_b=0.01, radius=0.0, band_length=0.0
     )
@@ -46,8 +46,9 @@ def test_poses_are_opencvs_rodrigues(seed: int) -> None:
         model = _core.FeatureModel(
             instrument, flat, translation=tuple(translation), rotation=tuple(rotation)
         )
-        prediction = model.predict([0.02, 0.0, 0.0])
+        state = rng.uniform([0.02, -3.0, 0.2], [0.03, 3.0, 0.8])
+        prediction = model.predict(state)
         assert prediction is not None
-        axis = cv2.Rodrigues(rotation)[0][:, 2]
-        expected = flat.project(translation + np.outer([0.03, 0.04], axis))
+        turn = cv2.Rodrigues(rotation)[0]
+        expected = flat.project(translation + instrument.markers(state) @ turn.T)
         np.testing.assert_allclose(prediction[0], expected.ravel(), atol=1e-9)

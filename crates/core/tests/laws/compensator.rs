@@ -52,6 +52,7 @@ proptest! {
     ) {
         let (mut compensator, mut state) = start(5.0, play);
         let mut reference = first;
+        let (mut believed, mut position) = (play, state.position());
         prop_assert_eq!(compensator.step(&mut state, reference), reference);
         for event in events {
             let before = state.command();
@@ -62,15 +63,21 @@ proptest! {
                     let moved = compensator.step(&mut state, reference) - before;
                     let asked = reference - last;
                     let scale = before.abs().max(state.command().abs()).max(asked.abs());
+                    position = believed.clamp(position + moved);
+                    prop_assert!(close(state.position(), position));
                     prop_assert!(moved * asked >= 0.0);
                     prop_assert!(moved.abs() <= 5.0 * asked.abs() + 4.0 * f64::EPSILON * scale);
                     continue;
                 }
                 Event::Hold => { compensator.step(&mut state, reference); }
-                Event::Offsets(play) => compensator.retune(&mut state, play),
+                Event::Offsets(other) => {
+                    believed = other;
+                    position = believed.clamp(position);
+                    compensator.retune(&mut state, believed);
+                }
                 Event::Gain(gain) => {
                     compensator = Compensator::new(gain, 5.0).unwrap();
-                    compensator.retune(&mut state, play);
+                    compensator.retune(&mut state, believed);
                 }
                 Event::Spoil(bad) => { compensator.step(&mut state, bad); }
             }
@@ -169,4 +176,12 @@ fn bad_gains_are_named() {
         Compensator::new(2.0, f64::INFINITY).unwrap_err().field,
         "gain_limit"
     );
+}
+
+#[test]
+fn holding_the_reference_keeps_even_the_sign_of_zero() {
+    let (compensator, mut state) = start(5.0, Play::new(0.0, 1.0).unwrap());
+    compensator.step(&mut state, -0.0);
+    let held = compensator.step(&mut state, -0.0);
+    assert_eq!(held.to_bits(), (-0.0_f64).to_bits());
 }

@@ -146,3 +146,13 @@ fn bad_settings_are_named() {
     assert_eq!(field(0.1, 1.0, 0.25), "contact_tolerance");
     assert_eq!(field(0.1, 0.4, 0.0), "smoothing_factor");
 }
+
+#[test]
+fn together_means_within_the_tolerance_of_the_commands_travel() {
+    for (followed, expected) in [(0.61, Some(Trigger::Contact)), (0.59, None)] {
+        let mut state = EstimatorState::new(Play::new(-2.0, 2.0).unwrap());
+        estimator().update(&mut state, 0.0, 0.0);
+        let triggers = estimator().update(&mut state, 1.0, followed);
+        assert_eq!((triggers.minus, triggers.plus), (None, expected));
+    }
+}

@@ -106,3 +106,22 @@ fn with_anything_not_finite_nothing_is_observable() {
     }
     assert_eq!(StateEstimator::new([1.0, 0.0, 1.0]).unwrap_err().value, 0.0);
 }
+
+#[test]
+fn the_worst_for_its_limit_goes_first_and_that_may_save_the_other() {
+    let nearly_the_same = [[1e3, 0.0, 0.0, 0.0], [1e3, 1.0, 0.0, 0.0]];
+    let [a, b] = nearly_the_same;
+    let c = [0.0, 0.0, 1e3, 0.0];
+    let watch = StateEstimator::new([0.1, 0.5, 0.5]).unwrap();
+    let found = watch.estimate([0.0; 3], &prediction([a, b, c]), [1.0; 4]);
+    assert_eq!(found.observable, [false, true, true]);
+    let watch = StateEstimator::new([0.5, 0.1, 0.5]).unwrap();
+    let found = watch.estimate([0.0; 3], &prediction([a, b, c]), [1.0; 4]);
+    assert_eq!(found.observable, [true, false, true]);
+    // The limit itself: alone, c is known to 1e-3 per px.
+    for (limit, observable) in [(1.01e-3, true), (0.99e-3, false)] {
+        let watch = StateEstimator::new([1.0, 1.0, limit]).unwrap();
+        let found = watch.estimate([0.0; 3], &prediction([a, [0.0; 4], c]), [1.0; 4]);
+        assert_eq!(found.observable[2], observable);
+    }
+}
