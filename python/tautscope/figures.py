@@ -1,0 +1,168 @@
+"""Figures, in one style: colours that colour-blind readers tell apart, readable in a column.
+
+Figure objects only: nothing here touches pyplot's global state, a display or a file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from tautscope.dof import Dof
+from tautscope.recording import Recording
+from tautscope.references import Segment
+from tautscope.results import estimated_loop
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+BLACK, GREY = "#222222", "#8a8a8a"
+BLUE, ORANGE, GREEN, PURPLE = "#0072b2", "#d55e00", "#009e73", "#aa4499"
+"""After Okabe and Ito (2008)."""
+
+COLUMN, PAGE = 3.5, 7.2
+"""Widths of a column and of a page [inch]."""
+
+_STYLE: dict[str, Any] = {
+    "font.size": 8,
+    "font.family": "DejaVu Sans",
+    "axes.titlesize": 8,
+    "axes.titlelocation": "left",
+    "axes.titleweight": "bold",
+    "axes.labelsize": 8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.6,
+    "xtick.labelsize": 7,
+    "ytick.labelsize": 7,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "legend.fontsize": 7,
+    "legend.frameon": False,
+    "lines.linewidth": 1.0,
+    "savefig.dpi": 200,
+    "pdf.fonttype": 42,
+}
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """Within it, figures are made and saved in the house style."""
+    with matplotlib.rc_context(_STYLE):
+        yield
+
+
+def figure9(uncompensated: Recording, compensated: Recording) -> Figure:
+    """The article's Fig. 9: one column per DOF.
+
+    (a)-(c): reference, command, estimate and both contact offsets over time, with compensation.
+    (d)-(f): estimate over command without, and over reference with compensation.
+    """
+    segments = compensated.segments
+    with style():
+        figure = Figure(figsize=(PAGE, 4.9), layout="constrained")
+        axes = figure.subplots(2, len(segments), squeeze=False)
+        for column, segment in enumerate(segments):
+            _over_time(axes[0, column], compensated, segment)
+            _loops(axes[1, column], uncompensated, compensated, segment)
+            for row, letters in enumerate(("abc", "def")):
+                axes[row, column].set_title(f"({letters[column]}) {segment.dof.label}")
+        for row, count in ((0, 5), (1, 2)):
+            lines, labels = axes[row, 0].get_legend_handles_labels()
+            axes[row, 1].legend(
+                lines,
+                labels,
+                loc="lower center",
+                bbox_to_anchor=(0.5, 1.12),
+                ncols=count,
+                borderaxespad=0,
+            )
+    return figure
+
+
+def _over_time(axes: Axes, recording: Recording, segment: Segment) -> None:
+    dof = segment.dof
+    trace = recording.trace[recording.during(segment, 0, segment.periods)]
+    time = trace["time"] - trace["time"][0]
+    for name, label, colour, width in (
+        ("command", "command c", ORANGE, 0.8),
+        ("reference", "reference u", BLACK, 0.8),
+        ("estimate", "estimate q̂", BLUE, 1.1),
+        ("delta_plus", "offset δ⁺", GREEN, 1.1),
+        ("delta_minus", "offset δ⁻", PURPLE, 1.1),
+    ):
+        values = trace[f"{name}_{dof.label}"] * dof.display_scale
+        axes.plot(time, values, color=colour, linewidth=width, label=label)
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel(f"{dof.label} [{dof.display_unit}]")
+    axes.margins(x=0)
+
+
+def _loops(
+    axes: Axes, uncompensated: Recording, compensated: Recording, segment: Segment
+) -> None:
+    dof = segment.dof
+    for recording, name, label, colour in (
+        (uncompensated, "command", "uncompensated: q̂ over c", GREY),
+        (compensated, "reference", "compensated: q̂ over u", BLUE),
+    ):
+        x, y = estimated_loop(recording, segment, name, first=0)
+        scale = dof.display_scale
+        axes.plot(x * scale, y * scale, color=colour, linewidth=0.8, label=label)
+    axes.axline((0, 0), slope=1, color=BLACK, linewidth=0.5, linestyle=(0, (4, 4)), zorder=0)
+    axes.set_xlabel(f"c or u [{dof.display_unit}]")
+    axes.set_ylabel(f"estimate q̂ [{dof.display_unit}]")
+    axes.set_aspect("equal", adjustable="datalim")
+
+
+def analysis_figure(
+    command: NDArray[np.float64],
+    measured: NDArray[np.float64],
+    predicted: NDArray[np.float64],
+    delta_minus: NDArray[np.float64],
+    delta_plus: NDArray[np.float64],
+    time: NDArray[np.float64] | None = None,
+) -> Figure:
+    """A record and what the estimator made of it: signals and offsets in order, and the loop.
+
+    Args:
+        command: (n,) actuator position.
+        measured: (n,) tip position, same unit.
+        predicted: (n,) the model's causal prediction of it.
+        delta_minus: (n,) contact offset after each sample.
+        delta_plus: (n,) contact offset after each sample.
+        time: (n,) horizontal axis [s]; without it, samples are counted.
+    """
+    with style():
+        figure = Figure(figsize=(PAGE, 3.6), layout="constrained")
+        grid = figure.add_gridspec(2, 2, width_ratios=(2, 1.15), height_ratios=(1.6, 1))
+        signals = figure.add_subplot(grid[0, 0])
+        offsets = figure.add_subplot(grid[1, 0], sharex=signals)
+        loop = figure.add_subplot(grid[:, 1])
+        at = np.arange(len(command)) if time is None else time
+        signals.plot(at, command, color=ORANGE, linewidth=0.8, label="command")
+        signals.plot(at, measured, color=BLACK, linewidth=0.9, label="measured")
+        signals.plot(at, predicted, color=BLUE, linewidth=0.9, label="predicted")
+        signals.set_title("Signals")
+        signals.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=3, borderaxespad=0.2)
+        signals.tick_params(labelbottom=False)
+        signals.margins(x=0)
+        offsets.plot(at, delta_plus, color=GREEN, label="δ⁺")
+        offsets.plot(at, delta_minus, color=PURPLE, label="δ⁻")
+        offsets.set_title("Contact offsets, input minus output")
+        offsets.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, borderaxespad=0.2)
+        offsets.set_xlabel("sample" if time is None else "time [s]")
+        half = len(command) // 2
+        loop.plot(command[half:], measured[half:], color=BLACK, linewidth=0.8, label="measured")
+        loop.plot(command[half:], predicted[half:], color=BLUE, linewidth=0.8, label="predicted")
+        loop.set_title("Loop, second half")
+        loop.legend(loc="upper left")
+        loop.set_xlabel("command")
+        loop.set_ylabel("tip")
+    return figure
