@@ -12,12 +12,14 @@ from typing import TYPE_CHECKING, Any
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
-from tautscope.dof import Dof
-from tautscope.recording import Recording
+from tautscope.config import Config
+from tautscope.recording import Recording, Snapshot
 from tautscope.references import Segment
 from tautscope.results import estimated_loop
+from tautscope.vision import MarkerDetector
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -104,9 +106,7 @@ def _over_time(axes: Axes, recording: Recording, segment: Segment) -> None:
     axes.margins(x=0)
 
 
-def _loops(
-    axes: Axes, uncompensated: Recording, compensated: Recording, segment: Segment
-) -> None:
+def _loops(axes: Axes, uncompensated: Recording, compensated: Recording, segment: Segment) -> None:
     dof = segment.dof
     for recording, name, label, colour in (
         (uncompensated, "command", "uncompensated: q̂ over c", GREY),
@@ -119,6 +119,70 @@ def _loops(
     axes.set_xlabel(f"c or u [{dof.display_unit}]")
     axes.set_ylabel(f"estimate q̂ [{dof.display_unit}]")
     axes.set_aspect("equal", adjustable="datalim")
+
+
+def figure5(snapshot: Snapshot, config: Config) -> Figure:
+    """The article's Fig. 5: what the vision made of one frame.
+
+    (a) the frame, (b) the pixels above the discriminant's threshold, (c) the regions, the markers
+    among them named, (d) measured beside predicted features, magnified.
+    """
+    detector = MarkerDetector(config)
+    regions = detector.detect(snapshot.image, snapshot.predicted_features).regions
+    picture = np.ascontiguousarray(snapshot.image[:, :, ::-1])
+    measured, predicted = snapshot.features.reshape(2, 2), snapshot.predicted_features.reshape(2, 2)
+    with style():
+        figure = Figure(figsize=(PAGE, 6.1), layout="constrained")
+        axes = figure.subplots(2, 2).ravel()
+        axes[0].imshow(picture)
+        axes[1].imshow(detector.mask(snapshot.image), cmap="gray", interpolation="nearest")
+        axes[2].imshow(picture // 2 + 96)
+        for region in regions:
+            left, top, width, height = region.box
+            outline = Rectangle(
+                (left - 0.5, top - 0.5), width, height, fill=False, color=ORANGE, linewidth=1.0
+            )
+            axes[2].add_patch(outline)
+        for name, (x, y) in zip("AB", measured, strict=True):
+            _name_marker(axes[2], name, x, y)
+        axes[3].imshow(picture)
+        axes[3].plot(*predicted.T, "x", color="white", markersize=9, label="predicted s")
+        axes[3].plot(
+            *measured.T, "o", color=ORANGE, fillstyle="none", markersize=9, label="measured s*"
+        )
+        for begin, end in zip(predicted, measured, strict=True):
+            axes[3].plot(*np.array([begin, end]).T, color="white", linewidth=1.0)
+        _magnify(axes[3], np.concatenate([measured, predicted]), picture.shape)
+        axes[3].legend(loc="lower right", frameon=True, facecolor="#555555", labelcolor="white")
+        titles = ("frame", "mask", "regions and markers", "features, magnified")
+        for axis, letter, title in zip(axes, "abcd", titles, strict=True):
+            axis.set_title(f"({letter}) {title}")
+            axis.set_axis_off()
+    return figure
+
+
+def _name_marker(axes: Axes, name: str, x: float, y: float) -> None:
+    axes.plot(x, y, "+", color=BLACK, markersize=8)
+    axes.annotate(
+        name,
+        (x, y),
+        xytext=(22, -22),
+        textcoords="offset points",
+        color=BLACK,
+        fontsize=11,
+        fontweight="bold",
+        arrowprops={"arrowstyle": "-", "color": BLACK, "linewidth": 0.8},
+    )
+
+
+def _magnify(axes: Axes, points: NDArray[np.float64], shape: tuple[int, ...]) -> None:
+    """Show the points with room around them, in the proportions of the picture."""
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    span = np.ptp(points, axis=0) + 80
+    height = max(span[1], span[0] * shape[0] / shape[1])
+    half = np.array([height * shape[1] / shape[0], height]) / 2
+    axes.set_xlim(middle[0] - half[0], middle[0] + half[0])
+    axes.set_ylim(middle[1] + half[1], middle[1] - half[1])
 
 
 def analysis_figure(

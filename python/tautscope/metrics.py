@@ -149,14 +149,21 @@ def period_widths(
     return np.array([loop_width(x[window], y[window]).mean for window in windows])
 
 
+def rms(errors: ArrayLike) -> float:
+    """Root of the mean square of those errors that are finite; NaN if there is none."""
+    values = np.asarray(errors, dtype=np.float64)
+    values = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(values**2))) if values.size else np.nan
+
+
 def tracking_rms(reference: ArrayLike, tip: ArrayLike) -> float:
     """RMS of (tip - reference), in their unit; over whatever samples are passed."""
-    return _rms(np.subtract(*_pair("reference", reference, "tip", tip)))
+    return rms(np.subtract(*_pair("reference", reference, "tip", tip)))
 
 
 def state_rms(estimate: ArrayLike, truth: ArrayLike) -> float:
     """RMS of (state_estimate - true_state at the capture time), one DOF, in its unit."""
-    return _rms(np.subtract(*_pair("estimate", estimate, "truth", truth)))
+    return rms(np.subtract(*_pair("estimate", estimate, "truth", truth)))
 
 
 def tip_overspeed(time: ArrayLike, reference: ArrayLike, tip: ArrayLike) -> float:
@@ -202,12 +209,7 @@ def marker_rms(measured: ArrayLike, truth: ArrayLike) -> float:
     Frames whose features or truth are not known (NaN) are left out.
     """
     errors = marker_errors(measured, truth)
-    return _rms(errors[np.isfinite(errors).all(axis=1)].ravel())
-
-
-def _rms(errors: Floats) -> float:
-    errors = errors[np.isfinite(errors)]
-    return float(np.sqrt(np.mean(errors**2))) if errors.size else np.nan
+    return rms(errors[np.isfinite(errors).all(axis=1)].ravel())
 
 
 def _pair(name_a: str, a: ArrayLike, name_b: str, b: ArrayLike) -> tuple[Floats, Floats]:
