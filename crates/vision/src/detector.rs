@@ -1,0 +1,115 @@
+//! Frame to markers: Fig. 5 as a whole.
+
+use crate::markers::{near_prediction, two_largest};
+use crate::{ColorDiscriminant, Error, Frame, Labeller, Region, Rejection, Segmenter};
+
+/// Only so many regions, the largest, are considered: it bounds the time on a noisy frame.
+pub const CANDIDATES: usize = 16;
+
+/// What a [`Detector`] goes by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Which colours are marker.
+    pub discriminant: ColorDiscriminant,
+    /// Passes of the 3x3 binomial low-pass, 0 to 8.
+    pub smoothing: usize,
+    /// Regions below this are dropped [px], at least 1.
+    pub minimum_area: u64,
+    /// A marker is not sought farther than this from where it is predicted [px], positive.
+    pub gate: f64,
+    /// Where the instrument enters the picture, `[u, v]` [px]; may lie outside it.
+    pub entry_point: [f64; 2],
+}
+
+/// Finds the two markers in frames. It carries memory from frame to frame, never information.
+#[derive(Clone, Debug)]
+pub struct Detector {
+    settings: Settings,
+    segmenter: Segmenter,
+    labeller: Labeller,
+    regions: Vec<Region>,
+}
+
+/// What a frame shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Detection<'a> {
+    /// Measured features, centroids `[u_A, v_A, u_B, v_B]` [px], or why there are none.
+    pub features: Result<[f64; 4], Rejection>,
+    /// The regions considered, the largest first; at most [`CANDIDATES`].
+    pub regions: &'a [Region],
+}
+
+impl Detector {
+    /// Ready for the first frame.
+    ///
+    /// # Errors
+    /// A setting is out of its range.
+    pub fn new(settings: Settings) -> Result<Self, Error> {
+        let Settings {
+            smoothing,
+            minimum_area,
+            gate,
+            entry_point,
+            ..
+        } = settings;
+        if smoothing > 8 {
+            return Err(Error::new("smoothing", &smoothing, "0 to 8 passes"));
+        }
+        if minimum_area < 1 {
+            return Err(Error::new("minimum_area", &minimum_area, "at least 1 px"));
+        }
+        if !(gate.is_finite() && gate > 0.0) {
+            return Err(Error::new("gate", &gate, "a finite distance above 0 px"));
+        }
+        if !entry_point.iter().all(|value| value.is_finite()) {
+            return Err(Error::new(
+                "entry_point",
+                &entry_point,
+                "two finite numbers",
+            ));
+        }
+        Ok(Self {
+            settings,
+            segmenter: Segmenter::new(settings.discriminant, smoothing),
+            labeller: Labeller::default(),
+            regions: Vec::with_capacity(CANDIDATES),
+        })
+    }
+
+    /// Finds the markers, near `predicted` `[u_A, v_A, u_B, v_B]` [px] if that is given and finite,
+    /// else as the two largest regions.
+    ///
+    /// Allocates only when a frame is larger than those before.
+    pub fn detect(&mut self, frame: &impl Frame, predicted: Option<[f64; 4]>) -> Detection<'_> {
+        self.find_regions(frame);
+        let regions = self.regions.as_slice();
+        let predicted = predicted.filter(|values| values.iter().all(|value| value.is_finite()));
+        let features = match predicted {
+            Some(predicted) => near_prediction(regions, predicted, self.settings.gate),
+            None => two_largest(regions, self.settings.entry_point),
+        };
+        Detection { features, regions }
+    }
+
+    fn find_regions(&mut self, frame: &impl Frame) {
+        let Self {
+            segmenter,
+            labeller,
+            regions,
+            settings,
+        } = self;
+        labeller.start(frame.width(), frame.height());
+        segmenter.each_row(frame, |v, runs| {
+            labeller.next_row();
+            runs.each(|start, end| labeller.add(v, start, end));
+        });
+        regions.clear();
+        for region in labeller.regions(settings.minimum_area) {
+            let place = regions.partition_point(|kept| kept.area >= region.area);
+            if place < CANDIDATES {
+                regions.truncate(CANDIDATES - 1);
+                regions.insert(place, region);
+            }
+        }
+    }
+}
