@@ -92,6 +92,8 @@ def analyze(record: Record, config: Config, update_distance: float | None = None
         update_distance=tau,
         contact_tolerance=settings.contact_tolerance,
         smoothing_factor=settings.smoothing_factor,
+        delta_minus=0.0,
+        delta_plus=0.0,
     )
     predicted, delta_minus, delta_plus = predict_tip(record.command, record.measured, estimator)
     half = len(predicted) // 2
@@ -122,7 +124,7 @@ def write_analysis(analysis: Analysis, folder: str | PathLike[str]) -> None:
     record = analysis.record
     columns = (record.command, record.measured, analysis.predicted)
     deltas = (analysis.delta_minus, analysis.delta_plus)
-    figure = figures.analysis_figure(*columns, *deltas, record.time)
+    figure = figures.analysis_figure(analysis)
     with new_folder(folder) as place, figures.style():
         np.savetxt(
             place / "analysis.csv",

@@ -105,14 +105,7 @@ def write_run_folder(demo: Demo, folder: str | PathLike[str]) -> None:
             figure9.savefig(place / "fig9.pdf", metadata={"CreationDate": None})
             for picture in pictures[1:]:
                 picture.figure.savefig(place / "fig5.png")
-            page = report.demo_report(
-                demo.config,
-                demo.seeds,
-                demo.results,
-                pictures,
-                demo.sim_seconds,
-                demo.wall_seconds,
-            )
+            page = report.demo_report(demo, pictures)
         (place / "report.html").write_text(page, encoding="utf-8")
 
 

@@ -24,6 +24,8 @@ from tautscope.vision import MarkerDetector
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from tautscope.analysis import Analysis
+
 BLACK, GREY = "#222222", "#8a8a8a"
 BLUE, ORANGE, GREEN, PURPLE = "#0072b2", "#d55e00", "#009e73", "#aa4499"
 """After Okabe and Ito (2008)."""
@@ -185,46 +187,36 @@ def _magnify(axes: Axes, points: NDArray[np.float64], shape: tuple[int, ...]) ->
     axes.set_ylim(middle[1] + half[1], middle[1] - half[1])
 
 
-def analysis_figure(
-    command: NDArray[np.float64],
-    measured: NDArray[np.float64],
-    predicted: NDArray[np.float64],
-    delta_minus: NDArray[np.float64],
-    delta_plus: NDArray[np.float64],
-    time: NDArray[np.float64] | None = None,
-) -> Figure:
+def analysis_figure(found: Analysis) -> Figure:
     """A record and what the estimator made of it: signals and offsets in order, and the loop.
 
-    Args:
-        command: (n,) actuator position.
-        measured: (n,) tip position, same unit.
-        predicted: (n,) the model's causal prediction of it.
-        delta_minus: (n,) contact offset after each sample.
-        delta_plus: (n,) contact offset after each sample.
-        time: (n,) horizontal axis [s]; without it, samples are counted.
+    The horizontal axis is the record's time if it was read, and counts samples if not.
     """
+    command, measured, time = found.record.command, found.record.measured, found.record.time
+    at = np.arange(len(command)) if time is None else time
     with style():
         figure = Figure(figsize=(PAGE, 3.6), layout="constrained")
         grid = figure.add_gridspec(2, 2, width_ratios=(2, 1.15), height_ratios=(1.6, 1))
         signals = figure.add_subplot(grid[0, 0])
         offsets = figure.add_subplot(grid[1, 0], sharex=signals)
         loop = figure.add_subplot(grid[:, 1])
-        at = np.arange(len(command)) if time is None else time
         signals.plot(at, command, color=ORANGE, linewidth=0.8, label="command")
         signals.plot(at, measured, color=BLACK, linewidth=0.9, label="measured")
-        signals.plot(at, predicted, color=BLUE, linewidth=0.9, label="predicted")
+        signals.plot(at, found.predicted, color=BLUE, linewidth=0.9, label="predicted")
         signals.set_title("Signals")
         signals.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=3, borderaxespad=0.2)
         signals.tick_params(labelbottom=False)
         signals.margins(x=0)
-        offsets.plot(at, delta_plus, color=GREEN, label="δ⁺")
-        offsets.plot(at, delta_minus, color=PURPLE, label="δ⁻")
+        offsets.plot(at, found.delta_plus, color=GREEN, label="δ⁺")
+        offsets.plot(at, found.delta_minus, color=PURPLE, label="δ⁻")
         offsets.set_title("Contact offsets, input minus output")
         offsets.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, borderaxespad=0.2)
         offsets.set_xlabel("sample" if time is None else "time [s]")
         half = len(command) // 2
         loop.plot(command[half:], measured[half:], color=BLACK, linewidth=0.8, label="measured")
-        loop.plot(command[half:], predicted[half:], color=BLUE, linewidth=0.8, label="predicted")
+        loop.plot(
+            command[half:], found.predicted[half:], color=BLUE, linewidth=0.8, label="predicted"
+        )
         loop.set_title("Loop, second half")
         loop.legend(loc="upper left")
         loop.set_xlabel("command")

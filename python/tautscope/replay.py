@@ -53,7 +53,7 @@ def predict_tip(
         command: (n,) actuator position, any unit.
         measured: (n,) tip position, in the same unit and with a scale of one: an actuator that
             moves by 1 in contact moves the tip by 1.
-        estimator: Its settings; not changed.
+        estimator: A fresh one: it learns, and would go on from what it knows.
 
     Returns:
         predicted (n,), delta_minus (n,), delta_plus (n,). Causal: ``predicted[k]`` uses

@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING
 
 from tautscope import tables
 from tautscope._core import __version__
-from tautscope.config import Config, dump_config
-from tautscope.dof import Dof
+from tautscope.config import dump_config
 from tautscope.results import Results
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from tautscope.demo import Demo
 
 _STYLE = """
 :root { color-scheme: light; }
@@ -70,24 +71,9 @@ class Picture:
     caption: str
 
 
-def demo_report(
-    config: Config,
-    seeds: Sequence[int],
-    results: Sequence[Results],
-    pictures: Sequence[Picture],
-    sim_seconds: float,
-    wall_seconds: float,
-) -> str:
-    """The page of ``tautscope demo``.
-
-    Args:
-        config: As used; its seed is the first of `seeds`.
-        seeds: One per result.
-        results: Table 1 of each seed.
-        pictures: Shown in this order.
-        sim_seconds: Simulated time of all runs.
-        wall_seconds: How long they took.
-    """
+def demo_report(demo: Demo, pictures: Sequence[Picture]) -> str:
+    """The page of ``tautscope demo``, with the pictures in the order given."""
+    seeds = demo.seeds
     count = f"{len(seeds)} seeds" if len(seeds) > 1 else "one seed"
     facts = {
         "tautscope": __version__,
@@ -95,8 +81,8 @@ def demo_report(
         **{name: _version(name) for name in ("numpy", "mujoco", "opencv-python-headless")},
         "machine": f"{platform.system()} {platform.machine()}",
         "seeds": ", ".join(map(str, seeds)),
-        "simulated": f"{sim_seconds:.0f} s in {2 * len(seeds)} runs",
-        "took": f"{wall_seconds:.0f} s",
+        "simulated": f"{demo.sim_seconds:.0f} s in {2 * len(seeds)} runs",
+        "took": f"{demo.wall_seconds:.0f} s",
     }
     figures = "".join(_figure(picture) for picture in pictures)
     facts_list = "".join(f"<dt>{escape(k)}</dt><dd>{escape(v)}</dd>" for k, v in facts.items())
@@ -105,11 +91,11 @@ def demo_report(
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <title>tautscope: hysteresis reduction</title><style>{_STYLE}</style></head><body>
 <h1>Hysteresis reduction from the endoscope&rsquo;s images</h1>
-<p class="lead">The experiment of Reilink, Stramigioli and Misra (Mechatronics 23, 2013, 652&ndash;658,
-<span style="white-space:nowrap">doi 10.1016/j.mechatronics.2013.06.006</span>) on a simulated
-instrument, camera images the only feedback; {count}.</p>
+<p class="lead">The experiment of Reilink, Stramigioli and Misra (Mechatronics 23, 2013, 652, doi
+10.1016/j.mechatronics.2013.06.006) on a simulated instrument, camera images the only feedback;
+{count}.</p>
 <h2>Table 1</h2>
-<div class="wide">{_table(results)}</div>
+<div class="wide">{_table(demo.results)}</div>
 <p class="note">Median over the seeds{", the worst seed in brackets" if len(seeds) > 1 else ""}.
 Widths over the last two periods of each degree of freedom: mean over 41 levels across the central
 80&nbsp;% of the tip&rsquo;s range, of the true tip unless said otherwise.</p>
@@ -120,7 +106,7 @@ Widths over the last two periods of each degree of freedom: mean over 41 levels 
 <h2>Made with</h2>
 <dl>{facts_list}</dl>
 <h2>Configuration</h2>
-<pre>{escape(dump_config(config))}</pre>
+<pre>{escape(dump_config(demo.config))}</pre>
 </body></html>
 """
 
@@ -137,17 +123,13 @@ def _table(results: Sequence[Results]) -> str:
             ours = tables.cell(row, dof, getattr(middle[dof], row.name))
             worst = tables.cell(row, dof, getattr(bad[dof], row.name))
             note = f" <small>({worst})</small>" if len(results) > 1 else ""
-            cells.append(f"<td>{_article(row, dof)}</td>")
+            cells.append(f"<td>{tables.article_cell(row, dof)}</td>")
             cells.append(f'<td class="ours">{ours}{note}</td>')
         lines.append(f"<tr><td>{escape(row.title)}</td>{''.join(cells)}</tr>")
     return (
         f"<table><thead><tr><th></th>{heads}</tr><tr><th></th>{columns}</tr></thead>"
         f"<tbody>{''.join(lines)}</tbody></table>"
     )
-
-
-def _article(row: tables.Row, dof: Dof) -> str:
-    return tables.article_cell(row, dof)
 
 
 def _figure(picture: Picture) -> str:

@@ -38,9 +38,9 @@ class DofResult:
         start_periods: Periods until the compensated mean width stays within 1.2 times its last.
         tracking_rms: RMS of (true tip - reference) after the start, with compensation.
         state_rms: RMS of (state_estimate - true_state at the capture time) over all frames of the
-            whole compensated run that were used (status ok) with this DOF observable.
+            whole compensated run that measured this DOF.
         marker_rms_px: RMS distance of measured from true features in the DOF's segment [px].
-        frames_used: Share of the segment's frames that were used with this DOF observable.
+        frames_used: Share of the segment's frames that measured this DOF.
         tip_overspeed: 99.9th percentile of |tip speed| over the peak of |reference speed|.
         actuator_gain: Largest |change of command| over |change of reference|.
     """
@@ -127,8 +127,8 @@ def estimated_loop(
 
 
 def _used(recording: Recording, dof: Dof) -> NDArray[np.bool_]:
-    frames = recording.frames
-    return np.asarray((frames["status"] == "ok") & frames[f"observable_{dof.label}"])
+    """(frames,) which frames measured this DOF; a frame that was not used observes none."""
+    return np.asarray(recording.frames[f"observable_{dof.label}"])
 
 
 def _dof_result(segment: Segment, uncompensated: Recording, compensated: Recording) -> DofResult:
