@@ -9,7 +9,6 @@ from __future__ import annotations
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-
 from tautscope import Config, Frame, Sample, run_experiment
 from tautscope.config import ExperimentConfig, Sine
 from tautscope.reduction import build_feature_model
@@ -35,11 +34,13 @@ class DrawnRig:
         self.reset()
 
     def reset(self) -> Sample:
+        """Home."""
         self._ticks = 0
         self._tip = self._home.copy()
         return self._sample(self._home)
 
     def step(self, command: ArrayLike) -> Sample:
+        """Move, and look every fourth time."""
         applied = np.asarray(command, dtype=np.float64)
         self._tip = np.clip(self._tip, applied - SLACK / 2, applied + SLACK / 2)
         self._ticks += 1
