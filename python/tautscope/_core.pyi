@@ -1,10 +1,166 @@
 from collections.abc import Sequence
-from typing import Self
+from typing import Self, final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = [
+    "Camera",
+    "Compensator",
+    "Estimator",
+    "FeatureModel",
+    "Instrument",
+    "MarkerDetector",
+    "Play",
+    "Reduction",
+    "StateEstimator",
+    "__version__",
+    "label_regions",
+]
 
 __version__: str
+
+# The control law: crates/core.
+
+_Floats = NDArray[np.float64]
+_Flags = NDArray[np.bool_]
+_Vector3 = tuple[float, float, float]
+_Vector8 = tuple[float, float, float, float, float, float, float, float]
+_Triggers = tuple[str | None, str | None]
+
+@final
+class Play:
+    def __new__(cls, *, delta_minus: float, delta_plus: float, output: float = 0.0) -> Play: ...
+    def step(self, input: float) -> float: ...
+    def run(self, inputs: ArrayLike) -> _Floats: ...
+    @property
+    def output(self) -> float: ...
+    @property
+    def delta_minus(self) -> float: ...
+    @property
+    def delta_plus(self) -> float: ...
+    @property
+    def width(self) -> float: ...
+
+@final
+class Compensator:
+    def __new__(
+        cls, *, free_gain: float, gain_limit: float, delta_minus: float, delta_plus: float
+    ) -> Compensator: ...
+    def step(self, reference: float) -> float: ...
+    def run(self, references: ArrayLike) -> _Floats: ...
+    def set_offsets(self, delta_minus: float, delta_plus: float) -> None: ...
+    def set_gain(self, free_gain: float, gain_limit: float) -> None: ...
+    @property
+    def command(self) -> float: ...
+    @property
+    def position(self) -> float: ...
+    @property
+    def predicted_state(self) -> float: ...
+    @property
+    def delta_minus(self) -> float: ...
+    @property
+    def delta_plus(self) -> float: ...
+
+@final
+class Estimator:
+    def __new__(
+        cls,
+        *,
+        update_distance: float,
+        contact_tolerance: float,
+        smoothing_factor: float,
+        delta_minus: float,
+        delta_plus: float,
+    ) -> Estimator: ...
+    def update(self, command: float, measured: float) -> _Triggers: ...
+    def predict(self, command: float) -> float: ...
+    def run(self, commands: ArrayLike, measured: ArrayLike) -> tuple[_Floats, _Floats, _Floats]: ...
+    @property
+    def delta_minus(self) -> float: ...
+    @property
+    def delta_plus(self) -> float: ...
+
+@final
+class Instrument:
+    def __new__(
+        cls,
+        *,
+        bending_length: float,
+        marker_a: float,
+        marker_b: float,
+        radius: float,
+        band_length: float,
+    ) -> Instrument: ...
+    def markers(self, state: ArrayLike) -> _Floats: ...
+    def jacobian(self, state: ArrayLike) -> _Floats: ...
+
+@final
+class Camera:
+    def __new__(
+        cls, *, fx: float, fy: float, cx: float, cy: float, distortion: _Vector8
+    ) -> Camera: ...
+    def project(self, points: ArrayLike) -> _Floats: ...
+    def jacobian(self, point: ArrayLike) -> _Floats: ...
+
+@final
+class FeatureModel:
+    def __new__(
+        cls, instrument: Instrument, camera: Camera, *, translation: _Vector3, rotation: _Vector3
+    ) -> FeatureModel: ...
+    def predict(self, state: ArrayLike) -> tuple[_Floats, _Floats] | None: ...
+
+@final
+class StateEstimator:
+    def __new__(cls, *, observable_deviation: _Vector3) -> StateEstimator: ...
+    def estimate(
+        self,
+        predicted_state: ArrayLike,
+        predicted_features: ArrayLike,
+        interaction_matrix: ArrayLike,
+        measured_features: ArrayLike,
+    ) -> tuple[_Floats, _Flags, _Floats]: ...
+    def run(
+        self, model: FeatureModel, predicted_states: ArrayLike, measured_features: ArrayLike
+    ) -> tuple[_Floats, _Flags]: ...
+
+@final
+class Reduction:
+    def __new__(
+        cls,
+        compensators: Sequence[Compensator],
+        estimators: Sequence[Estimator],
+        model: FeatureModel,
+        state_estimator: StateEstimator,
+        *,
+        span: float,
+        period: float,
+    ) -> Reduction: ...
+    def step(self, reference: ArrayLike, time: float) -> _Floats: ...
+    def run(self, references: ArrayLike, times: ArrayLike) -> _Floats: ...
+    def on_features(
+        self, features: ArrayLike | None, captured_at: float
+    ) -> tuple[
+        str,
+        _Floats,
+        _Floats,
+        _Floats,
+        _Floats,
+        _Flags,
+        _Floats,
+        tuple[_Triggers, _Triggers, _Triggers],
+        _Floats,
+        _Floats,
+    ]: ...
+    def predicted_features(self, captured_at: float) -> _Floats | None: ...
+    @property
+    def predicted_state(self) -> _Floats: ...
+    @property
+    def delta_minus(self) -> _Floats: ...
+    @property
+    def delta_plus(self) -> _Floats: ...
+
+# Image processing: crates/vision.
 
 class MarkerDetector:
     def __new__(

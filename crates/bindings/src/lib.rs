@@ -1,5 +1,18 @@
 //! `tautscope._core`: what Python sees of the Rust crates. The only crate that knows Python.
 
+// PyO3 hands arguments over by value.
+#![allow(clippy::needless_pass_by_value)]
+
+mod arrays;
+mod camera;
+mod compensator;
+mod errors;
+mod estimator;
+mod features;
+mod instrument;
+mod play;
+mod reduction;
+mod state;
 mod vision;
 
 use pyo3::prelude::*;
@@ -9,7 +22,23 @@ mod _core {
     use super::{Bound, PyModule, PyModuleMethods, PyResult};
 
     #[pymodule_export]
-    use crate::vision::{MarkerDetector, label_regions};
+    use super::camera::Camera;
+    #[pymodule_export]
+    use super::compensator::Compensator;
+    #[pymodule_export]
+    use super::estimator::Estimator;
+    #[pymodule_export]
+    use super::features::FeatureModel;
+    #[pymodule_export]
+    use super::instrument::Instrument;
+    #[pymodule_export]
+    use super::play::Play;
+    #[pymodule_export]
+    use super::reduction::Reduction;
+    #[pymodule_export]
+    use super::state::StateEstimator;
+    #[pymodule_export]
+    use super::vision::{MarkerDetector, label_regions};
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

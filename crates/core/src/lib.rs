@@ -1,1 +1,45 @@
-//! The article's control law.
+//! Image-based hysteresis reduction for flexible endoscopic instruments: the control law.
+//!
+//! One file per block of the loop. "Eq. (n)", "Fig. n" and "Table n" always mean R. Reilink,
+//! S. Stramigioli, S. Misra, "Image-based hysteresis reduction for the control of flexible
+//! endoscopic instruments", Mechatronics 23 (2013) 652-658, in the one sign convention of
+//! decision 0001: a contact offset is input minus output.
+//!
+//! Constructors check their arguments and say which is wrong ([`ConfigError`]); what runs in the
+//! loop cannot fail, does not allocate, reads no clock and does no I/O. Units are m, rad, s, px.
+#![no_std]
+#![forbid(unsafe_code)]
+#![cfg_attr(
+    not(test),
+    deny(
+        clippy::unwrap_used,
+        clippy::expect_used,
+        clippy::panic,
+        clippy::indexing_slicing
+    )
+)]
+
+mod camera;
+mod compensator;
+mod dof;
+mod error;
+mod estimator;
+mod features;
+mod history;
+mod instrument;
+mod linear;
+mod play;
+mod reduction;
+mod state;
+
+pub use camera::{Camera, Pose, Projection};
+pub use compensator::{Compensator, CompensatorState};
+pub use dof::{PerDof, all_finite};
+pub use error::ConfigError;
+pub use estimator::{Estimator, EstimatorState, Trigger, Triggers};
+pub use features::{FeatureModel, FeaturePrediction};
+pub use history::{Entry, History};
+pub use instrument::{Instrument, Marker};
+pub use play::{ContactMode, Play, PlayState};
+pub use reduction::{Axis, HysteresisReduction, Report, Status};
+pub use state::{StateEstimate, StateEstimator};

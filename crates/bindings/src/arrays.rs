@@ -1,0 +1,70 @@
+//! Between numpy arrays and the fixed-size arrays of the core.
+
+use numpy::ndarray::ArrayView1;
+use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayLike1, PyArrayLike2, PyArrayMethods};
+use pyo3::prelude::*;
+
+use crate::errors;
+
+/// Anything numpy makes a vector (n,) of.
+pub type Vector<'py> = PyArrayLike1<'py, f64, AllowTypeChange>;
+
+/// Anything numpy makes a table (n, columns) of.
+pub type Table<'py> = PyArrayLike2<'py, f64, AllowTypeChange>;
+
+/// The N values of a vector.
+pub fn fixed<const N: usize>(field: &str, array: &Vector<'_>) -> PyResult<[f64; N]> {
+    let view = array.as_array();
+    row(view).ok_or_else(|| {
+        let allowed = format!("{N} values");
+        errors::length(array.py(), field, view.len(), &allowed)
+    })
+}
+
+/// The rows of a table with N columns.
+pub fn rows<const N: usize>(field: &str, table: &Table<'_>) -> PyResult<Vec<[f64; N]>> {
+    let view = table.as_array();
+    let rows: Option<Vec<[f64; N]>> = view.rows().into_iter().map(row).collect();
+    rows.ok_or_else(|| {
+        let allowed = format!("{N} values per row");
+        errors::length(table.py(), field, view.ncols(), &allowed)
+    })
+}
+
+/// Rows as a table.
+pub fn table<'py, T: numpy::Element + Copy, const N: usize>(
+    py: Python<'py>,
+    rows: &[[T; N]],
+) -> PyResult<Bound<'py, PyArray2<T>>> {
+    PyArray1::from_slice(py, rows.as_flattened()).reshape([rows.len(), N])
+}
+
+/// Columns as a table.
+pub fn columns<'py>(
+    py: Python<'py>,
+    columns: &[impl AsRef<[f64]>],
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let height = columns.first().map_or(0, |column| column.as_ref().len());
+    let values = (0..height).flat_map(|row| columns.iter().map(move |column| column.as_ref()[row]));
+    PyArray1::from_iter(py, values).reshape([height, columns.len()])
+}
+
+/// That two arrays that belong together are of one length.
+pub fn same_length(py: Python<'_>, field: &str, length: usize, expected: usize) -> PyResult<()> {
+    if length == expected {
+        return Ok(());
+    }
+    let allowed = format!("{expected} values, one per sample");
+    Err(errors::length(py, field, length, &allowed))
+}
+
+fn row<const N: usize>(view: ArrayView1<'_, f64>) -> Option<[f64; N]> {
+    let mut values = [0.0; N];
+    if view.len() != N {
+        return None;
+    }
+    for (value, item) in values.iter_mut().zip(view) {
+        *value = *item;
+    }
+    Some(values)
+}

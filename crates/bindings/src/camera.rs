@@ -1,0 +1,52 @@
+//! `Camera`.
+
+use numpy::PyArray2;
+use pyo3::prelude::*;
+use tautscope_core as core;
+
+use crate::arrays::{Table, Vector, fixed, rows, table};
+use crate::errors;
+
+#[pyclass(name = "Camera", module = "tautscope._core", frozen)]
+pub struct Camera(pub core::Camera);
+
+#[pymethods]
+impl Camera {
+    #[new]
+    #[pyo3(signature = (*, fx, fy, cx, cy, distortion))]
+    fn new(
+        py: Python<'_>,
+        fx: f64,
+        fy: f64,
+        cx: f64,
+        cy: f64,
+        distortion: [f64; 8],
+    ) -> PyResult<Self> {
+        core::Camera::new([fx, fy], [cx, cy], distortion)
+            .map(Self)
+            .map_err(errors::config(py))
+    }
+
+    fn project<'py>(
+        &self,
+        py: Python<'py>,
+        points: Table<'py>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let unseen = [f64::NAN; 2];
+        let pixels: Vec<[f64; 2]> = rows("points", &points)?
+            .into_iter()
+            .map(|point| self.0.project(point).map_or(unseen, |image| image.pixel))
+            .collect();
+        table(py, &pixels)
+    }
+
+    fn jacobian<'py>(
+        &self,
+        py: Python<'py>,
+        point: Vector<'py>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let unseen = [[f64::NAN; 3]; 2];
+        let image = self.0.project(fixed("point", &point)?);
+        table(py, &image.map_or(unseen, |image| image.pixel_by_point))
+    }
+}

@@ -1,0 +1,96 @@
+//! `Estimator`.
+
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use tautscope_core as core;
+
+use crate::arrays::{Vector, same_length};
+use crate::errors;
+
+type Series<'py> = Bound<'py, PyArray1<f64>>;
+
+#[pyclass(name = "Estimator", module = "tautscope._core")]
+pub struct Estimator {
+    pub inner: core::Estimator,
+    pub state: core::EstimatorState,
+    output: core::PlayState,
+}
+
+#[pymethods]
+impl Estimator {
+    #[new]
+    #[pyo3(signature = (
+        *, update_distance, contact_tolerance, smoothing_factor, delta_minus, delta_plus
+    ))]
+    fn new(
+        py: Python<'_>,
+        update_distance: f64,
+        contact_tolerance: f64,
+        smoothing_factor: f64,
+        delta_minus: f64,
+        delta_plus: f64,
+    ) -> PyResult<Self> {
+        let inner = core::Estimator::new(update_distance, contact_tolerance, smoothing_factor)
+            .map_err(errors::config(py))?;
+        let play = core::Play::new(delta_minus, delta_plus).map_err(errors::config(py))?;
+        Ok(Self {
+            inner,
+            state: core::EstimatorState::new(play),
+            output: core::PlayState { output: f64::NAN },
+        })
+    }
+
+    fn update(&mut self, command: f64, measured: f64) -> TriggerNames {
+        let triggers = self.inner.update(&mut self.state, command, measured);
+        trigger_names(triggers)
+    }
+
+    fn predict(&mut self, command: f64) -> f64 {
+        self.state.play().step(&mut self.output, command)
+    }
+
+    fn run<'py>(
+        &mut self,
+        py: Python<'py>,
+        commands: Vector<'py>,
+        measured: Vector<'py>,
+    ) -> PyResult<(Series<'py>, Series<'py>, Series<'py>)> {
+        let (commands, measured) = (commands.as_array(), measured.as_array());
+        same_length(py, "measured", measured.len(), commands.len())?;
+        let mut predicted = Vec::with_capacity(commands.len());
+        let mut minus = Vec::with_capacity(commands.len());
+        let mut plus = Vec::with_capacity(commands.len());
+        for (command, measured) in commands.iter().zip(measured) {
+            predicted.push(self.predict(*command));
+            self.inner.update(&mut self.state, *command, *measured);
+            minus.push(self.delta_minus());
+            plus.push(self.delta_plus());
+        }
+        Ok((
+            PyArray1::from_vec(py, predicted),
+            PyArray1::from_vec(py, minus),
+            PyArray1::from_vec(py, plus),
+        ))
+    }
+
+    #[getter]
+    fn delta_minus(&self) -> f64 {
+        self.state.play().delta_minus()
+    }
+
+    #[getter]
+    fn delta_plus(&self) -> f64 {
+        self.state.play().delta_plus()
+    }
+}
+
+/// Of `delta_minus` and of `delta_plus`.
+pub type TriggerNames = (Option<&'static str>, Option<&'static str>);
+
+pub fn trigger_names(triggers: core::Triggers) -> TriggerNames {
+    let name = |trigger| match trigger {
+        core::Trigger::Contact => "contact",
+        core::Trigger::Violation => "violation",
+    };
+    (triggers.minus.map(name), triggers.plus.map(name))
+}

@@ -1,0 +1,43 @@
+//! `FeatureModel`.
+
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use tautscope_core as core;
+
+use crate::arrays::{Vector, columns, fixed};
+use crate::camera::Camera;
+use crate::errors;
+use crate::instrument::Instrument;
+
+type Prediction<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>);
+
+#[pyclass(name = "FeatureModel", module = "tautscope._core", frozen)]
+pub struct FeatureModel(pub core::FeatureModel);
+
+#[pymethods]
+impl FeatureModel {
+    #[new]
+    #[pyo3(signature = (instrument, camera, *, translation, rotation))]
+    fn new(
+        py: Python<'_>,
+        instrument: &Instrument,
+        camera: &Camera,
+        translation: [f64; 3],
+        rotation: [f64; 3],
+    ) -> PyResult<Self> {
+        let pose = core::Pose::new(translation, rotation).map_err(errors::config(py))?;
+        Ok(Self(core::FeatureModel::new(instrument.0, camera.0, pose)))
+    }
+
+    fn predict<'py>(
+        &self,
+        py: Python<'py>,
+        state: Vector<'py>,
+    ) -> PyResult<Option<Prediction<'py>>> {
+        let Some(prediction) = self.0.predict(fixed("state", &state)?) else {
+            return Ok(None);
+        };
+        let features = PyArray1::from_slice(py, &prediction.features);
+        Ok(Some((features, columns(py, &prediction.columns)?)))
+    }
+}

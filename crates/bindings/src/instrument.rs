@@ -1,0 +1,50 @@
+//! `Instrument`.
+
+use numpy::PyArray2;
+use pyo3::prelude::*;
+use tautscope_core as core;
+
+use crate::arrays::{Vector, columns, fixed, table};
+use crate::errors;
+
+#[pyclass(name = "Instrument", module = "tautscope._core", frozen)]
+pub struct Instrument(pub core::Instrument);
+
+#[pymethods]
+impl Instrument {
+    #[new]
+    #[pyo3(signature = (*, bending_length, marker_a, marker_b, radius, band_length))]
+    fn new(
+        py: Python<'_>,
+        bending_length: f64,
+        marker_a: f64,
+        marker_b: f64,
+        radius: f64,
+        band_length: f64,
+    ) -> PyResult<Self> {
+        core::Instrument::new(bending_length, marker_a, marker_b, radius, band_length)
+            .map(Self)
+            .map_err(errors::config(py))
+    }
+
+    fn markers<'py>(
+        &self,
+        py: Python<'py>,
+        state: Vector<'py>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let markers = self.0.markers(fixed("state", &state)?);
+        table(py, &markers.map(|marker| marker.position))
+    }
+
+    /// The Jacobian (6, 3): rows as in `markers` flattened, a column per DOF.
+    fn jacobian<'py>(
+        &self,
+        py: Python<'py>,
+        state: Vector<'py>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let [a, b] = self.0.markers(fixed("state", &state)?);
+        let joined = |[a, b]: [[f64; 3]; 2]| [a, b].as_flattened().to_vec();
+        let ([a0, a1, a2], [b0, b1, b2]) = (a.position_by_dof, b.position_by_dof);
+        columns(py, &[joined([a0, b0]), joined([a1, b1]), joined([a2, b2])])
+    }
+}

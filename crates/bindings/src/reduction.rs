@@ -1,0 +1,142 @@
+//! `Reduction`: the loop, wrapped by `tautscope.reduction.HysteresisReduction`.
+
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use tautscope_core as core;
+
+use crate::arrays::{Table, Vector, fixed, rows, same_length, table};
+use crate::compensator::Compensator;
+use crate::errors;
+use crate::estimator::{Estimator, TriggerNames, trigger_names};
+use crate::features::FeatureModel;
+use crate::state::StateEstimator;
+
+type Floats<'py> = Bound<'py, PyArray1<f64>>;
+
+/// status, `state_estimate`, `predicted_state`, `predicted_features`, innovation, observable,
+/// deviation, triggers, `delta_minus`, `delta_plus`.
+type Report<'py> = (
+    &'static str,
+    Floats<'py>,
+    Floats<'py>,
+    Floats<'py>,
+    Floats<'py>,
+    Bound<'py, PyArray1<bool>>,
+    Floats<'py>,
+    (TriggerNames, TriggerNames, TriggerNames),
+    Floats<'py>,
+    Floats<'py>,
+);
+
+#[pyclass(name = "Reduction", module = "tautscope._core")]
+pub struct Reduction(core::HysteresisReduction);
+
+#[pymethods]
+impl Reduction {
+    #[new]
+    #[pyo3(signature = (compensators, estimators, model, state_estimator, *, span, period))]
+    fn new(
+        py: Python<'_>,
+        compensators: [PyRef<'_, Compensator>; 3],
+        estimators: [PyRef<'_, Estimator>; 3],
+        model: &FeatureModel,
+        state_estimator: &StateEstimator,
+        span: f64,
+        period: f64,
+    ) -> PyResult<Self> {
+        let axes = [0, 1, 2].map(|dof| {
+            let (compensator, estimator) = (&compensators[dof], &estimators[dof]);
+            core::Axis::new(compensator.inner, estimator.inner, estimator.state.play())
+        });
+        let history = core::History::new(span, period).map_err(errors::config(py))?;
+        Ok(Self(core::HysteresisReduction::new(
+            axes,
+            model.0,
+            state_estimator.0,
+            history,
+        )))
+    }
+
+    fn step<'py>(
+        &mut self,
+        py: Python<'py>,
+        reference: Vector<'py>,
+        time: f64,
+    ) -> PyResult<Floats<'py>> {
+        let command = self.0.step(fixed("reference", &reference)?, time);
+        Ok(PyArray1::from_slice(py, &command))
+    }
+
+    fn run<'py>(
+        &mut self,
+        py: Python<'py>,
+        references: Table<'py>,
+        times: Vector<'py>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let references: Vec<[f64; 3]> = rows("references", &references)?;
+        let times = times.as_array();
+        same_length(py, "times", times.len(), references.len())?;
+        let commands: Vec<[f64; 3]> = references
+            .into_iter()
+            .zip(times)
+            .map(|(reference, time)| self.0.step(reference, *time))
+            .collect();
+        table(py, &commands)
+    }
+
+    fn on_features<'py>(
+        &mut self,
+        py: Python<'py>,
+        features: Option<Vector<'py>>,
+        captured_at: f64,
+    ) -> PyResult<Report<'py>> {
+        let features = features
+            .map(|features| fixed("features", &features))
+            .transpose()?;
+        let report = self.0.on_features(features, captured_at);
+        let estimate = &report.estimate;
+        let [insertion, rotation, bending] = report.triggers.map(trigger_names);
+        Ok((
+            status_name(report.status),
+            PyArray1::from_slice(py, &estimate.state),
+            PyArray1::from_slice(py, &report.predicted_state),
+            PyArray1::from_slice(py, &report.predicted_features),
+            PyArray1::from_slice(py, &estimate.innovation),
+            PyArray1::from_slice(py, &estimate.observable),
+            PyArray1::from_slice(py, &estimate.deviation),
+            (insertion, rotation, bending),
+            self.delta_minus(py),
+            self.delta_plus(py),
+        ))
+    }
+
+    fn predicted_features<'py>(&self, py: Python<'py>, captured_at: f64) -> Option<Floats<'py>> {
+        let features = self.0.predicted_features(captured_at)?;
+        Some(PyArray1::from_slice(py, &features))
+    }
+
+    #[getter]
+    fn predicted_state<'py>(&self, py: Python<'py>) -> Floats<'py> {
+        PyArray1::from_slice(py, &self.0.predicted_state())
+    }
+
+    #[getter]
+    fn delta_minus<'py>(&self, py: Python<'py>) -> Floats<'py> {
+        PyArray1::from_slice(py, &self.0.play().map(|play| play.delta_minus()))
+    }
+
+    #[getter]
+    fn delta_plus<'py>(&self, py: Python<'py>) -> Floats<'py> {
+        PyArray1::from_slice(py, &self.0.play().map(|play| play.delta_plus()))
+    }
+}
+
+fn status_name(status: core::Status) -> &'static str {
+    match status {
+        core::Status::Ok => "ok",
+        core::Status::Held => "held",
+        core::Status::NoMarkers => "no_markers",
+        core::Status::Stale => "stale",
+        core::Status::Duplicate => "duplicate",
+    }
+}

@@ -1,0 +1,84 @@
+//! `StateEstimator`.
+
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use tautscope_core as core;
+
+use crate::arrays::{Table, Vector, fixed, rows, same_length, table};
+use crate::errors;
+use crate::features::FeatureModel;
+
+type Estimate<'py> = (
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<bool>>,
+    Bound<'py, PyArray1<f64>>,
+);
+
+type Estimates<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<bool>>);
+
+#[pyclass(name = "StateEstimator", module = "tautscope._core", frozen)]
+pub struct StateEstimator(pub core::StateEstimator);
+
+#[pymethods]
+impl StateEstimator {
+    #[new]
+    #[pyo3(signature = (*, observable_deviation))]
+    fn new(py: Python<'_>, observable_deviation: [f64; 3]) -> PyResult<Self> {
+        core::StateEstimator::new(observable_deviation)
+            .map(Self)
+            .map_err(errors::config(py))
+    }
+
+    fn estimate<'py>(
+        &self,
+        py: Python<'py>,
+        predicted_state: Vector<'py>,
+        predicted_features: Vector<'py>,
+        interaction_matrix: Table<'py>,
+        measured_features: Vector<'py>,
+    ) -> PyResult<Estimate<'py>> {
+        let rows = rows("interaction_matrix", &interaction_matrix)?;
+        let found = rows.len();
+        let [a, b, c, d]: [[f64; 3]; 4] = rows
+            .try_into()
+            .map_err(|_| errors::length(py, "interaction_matrix", found, "4 rows"))?;
+        let prediction = core::FeaturePrediction {
+            features: fixed("predicted_features", &predicted_features)?,
+            columns: [0, 1, 2].map(|dof| [a[dof], b[dof], c[dof], d[dof]]),
+        };
+        let estimate = self.0.estimate(
+            fixed("predicted_state", &predicted_state)?,
+            &prediction,
+            fixed("measured_features", &measured_features)?,
+        );
+        Ok((
+            PyArray1::from_slice(py, &estimate.state),
+            PyArray1::from_slice(py, &estimate.observable),
+            PyArray1::from_slice(py, &estimate.deviation),
+        ))
+    }
+
+    fn run<'py>(
+        &self,
+        py: Python<'py>,
+        model: &FeatureModel,
+        predicted_states: Table<'py>,
+        measured_features: Table<'py>,
+    ) -> PyResult<Estimates<'py>> {
+        let states: Vec<[f64; 3]> = rows("predicted_states", &predicted_states)?;
+        let measured: Vec<[f64; 4]> = rows("measured_features", &measured_features)?;
+        same_length(py, "measured_features", measured.len(), states.len())?;
+        let (estimates, observable): (Vec<_>, Vec<_>) = states
+            .into_iter()
+            .zip(measured)
+            .map(|(state, measured)| match model.0.predict(state) {
+                Some(prediction) => {
+                    let estimate = self.0.estimate(state, &prediction, measured);
+                    (estimate.state, estimate.observable)
+                }
+                None => (state, [false; 3]),
+            })
+            .unzip();
+        Ok((table(py, &estimates)?, table(py, &observable)?))
+    }
+}

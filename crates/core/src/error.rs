@@ -1,0 +1,63 @@
+//! What a constructor says when a value is out of range.
+
+use core::fmt;
+
+/// A configuration value that is out of range.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ConfigError {
+    /// The name of the argument.
+    pub field: &'static str,
+    /// What came.
+    pub value: f64,
+    /// What may come, in words.
+    pub allowed: &'static str,
+}
+
+impl fmt::Display for ConfigError {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            field,
+            value,
+            allowed,
+        } = self;
+        write!(formatter, "{field}: got {value}, expected {allowed}")
+    }
+}
+
+impl core::error::Error for ConfigError {}
+
+pub(crate) fn require(
+    holds: bool,
+    field: &'static str,
+    value: f64,
+    allowed: &'static str,
+) -> Result<(), ConfigError> {
+    if holds {
+        Ok(())
+    } else {
+        Err(ConfigError {
+            field,
+            value,
+            allowed,
+        })
+    }
+}
+
+pub(crate) fn require_finite(field: &'static str, value: f64) -> Result<(), ConfigError> {
+    require(value.is_finite(), field, value, "a finite number")
+}
+
+pub(crate) fn require_positive(field: &'static str, value: f64) -> Result<(), ConfigError> {
+    let holds = value.is_finite() && value > 0.0;
+    require(holds, field, value, "a finite number above 0")
+}
+
+pub(crate) fn require_non_negative(field: &'static str, value: f64) -> Result<(), ConfigError> {
+    let holds = value.is_finite() && value >= 0.0;
+    require(holds, field, value, "a finite number, 0 or above")
+}
+
+pub(crate) fn require_fraction(field: &'static str, value: f64) -> Result<(), ConfigError> {
+    let holds = value > 0.0 && value < 1.0;
+    require(holds, field, value, "a number above 0 and below 1")
+}

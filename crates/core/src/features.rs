@@ -1,0 +1,149 @@
+//! Predicted features and interaction matrix, Eqs. (9)-(11).
+
+use core::f64::consts::PI;
+
+use crate::camera::{Camera, Pose};
+use crate::dof::{PerDof, all_finite};
+use crate::instrument::{Instrument, Marker};
+use crate::linear::{Vector, add, dot, scale};
+
+/// h = g after f, Eqs. (9)-(11): from the state to the centroids of the two marker bands.
+///
+/// Decision 0002: the camera sees the near half of a cylindrical band, so the centroid of its
+/// colour is not the image of its centre. The point that is projected, from the centre p, the
+/// axis t, the radius r and the band's length l, all in the camera frame, is
+///
+/// ```text
+/// m = p + (pi / 4) r n                n: unit vector from the axis to the camera, across the axis
+/// e = m - (4 / m_z) S z               z: the optical axis
+/// S = l^2 / 12 t t' + r^2 (2/3 - pi^2 / 16) n n' + r^2 / 3 (t x n) (t x n)'
+/// ```
+///
+/// m is the mean of the visible surface, each element weighted by the area it fills in the image;
+/// e adds that near parts fill more of the image than far ones. With r = l = 0 it is the article's h.
+///
+/// Wrong where the scope or tissue hides part of a band, and within a few radii of the camera.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FeatureModel {
+    instrument: Instrument,
+    camera: Camera,
+    camera_from_guide: Pose,
+}
+
+/// What the camera should see, and how it changes with the state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FeaturePrediction {
+    /// h(q): u and v of band A, u and v of band B [px].
+    pub features: [f64; 4],
+    /// dh/dq, Eq. (11): one column of four per DOF [px/m, px/rad, px/rad].
+    pub columns: PerDof<[f64; 4]>,
+}
+
+/// A function of the state: its value and its change per DOF.
+struct Moving {
+    value: Vector,
+    by_dof: PerDof<Vector>,
+}
+
+impl FeatureModel {
+    /// The model of one instrument seen by one camera.
+    pub const fn new(instrument: Instrument, camera: Camera, camera_from_guide: Pose) -> Self {
+        Self {
+            instrument,
+            camera,
+            camera_from_guide,
+        }
+    }
+
+    /// h(q) and its interaction matrix for the state q (3,) [m, rad, rad].
+    ///
+    /// None where a band cannot be seen: behind the camera, looked at along its axis, in the part
+    /// of the image the distortion folds over, or for a state that is not finite.
+    pub fn predict(&self, state: PerDof<f64>) -> Option<FeaturePrediction> {
+        let [marker_a, marker_b] = self.instrument.markers(state);
+        let ([ua, va], [ua_by, va_by]) = self.centroid(&marker_a)?;
+        let ([ub, vb], [ub_by, vb_by]) = self.centroid(&marker_b)?;
+        let [[a0, a1, a2], [b0, b1, b2], [c0, c1, c2], [d0, d1, d2]] = [ua_by, va_by, ub_by, vb_by];
+        let prediction = FeaturePrediction {
+            features: [ua, va, ub, vb],
+            columns: [[a0, b0, c0, d0], [a1, b1, c1, d1], [a2, b2, c2, d2]],
+        };
+        let finite = prediction.columns.iter().all(|column| all_finite(*column));
+        finite.then_some(prediction)
+    }
+
+    /// The image of one band: u and v, and each by DOF.
+    fn centroid(&self, marker: &Marker) -> Option<([f64; 2], [PerDof<f64>; 2])> {
+        let centre = Moving {
+            value: self.camera_from_guide.transform(marker.position),
+            by_dof: marker
+                .position_by_dof
+                .map(|by| self.camera_from_guide.rotate(by)),
+        };
+        let axis = Moving {
+            value: self.camera_from_guide.rotate(marker.axis),
+            by_dof: marker
+                .axis_by_dof
+                .map(|by| self.camera_from_guide.rotate(by)),
+        };
+        let point = self.visible_point(&centre, &axis)?;
+        let projection = self.camera.project(point.value)?;
+        if projection.is_folded() {
+            return None;
+        }
+        let by_dof = projection
+            .pixel_by_point
+            .map(|row| point.by_dof.map(|by| dot(row, by)));
+        Some((projection.pixel, by_dof))
+    }
+
+    /// The point whose image is the centroid of the visible part of a band.
+    fn visible_point(&self, centre: &Moving, axis: &Moving) -> Option<Moving> {
+        let (radius, length) = (self.instrument.radius(), self.instrument.band_length());
+        let (p, t) = (centre.value, axis.value);
+        let along = dot(p, t);
+        let across = add(scale(-1.0, p), along, t);
+        let distance = libm::sqrt(dot(across, across));
+        // A camera inside the cylinder's extension sees none of its outside.
+        if distance.is_nan() || distance <= radius {
+            return None;
+        }
+        let n = scale(1.0 / distance, across);
+        let mean = add(p, PI / 4.0 * radius, n);
+
+        let spread_across = radius * radius / 3.0;
+        let spread_along = length * length / 12.0 - spread_across;
+        let spread_towards = radius * radius * (2.0 / 3.0 - PI * PI / 16.0) - spread_across;
+        let [[_, _, n_z], [_, _, t_z], [_, _, mean_z]] = [n, t, mean];
+        // S z, with the part across both t and n written as what they leave of z.
+        let spread = add(
+            add([0.0, 0.0, spread_across], spread_along * t_z, t),
+            spread_towards * n_z,
+            n,
+        );
+        let pull = -4.0 / mean_z;
+
+        let slope = |p_by: Vector, t_by: Vector| {
+            let along_by = dot(p_by, t) + dot(p, t_by);
+            let across_by = add(add(scale(-1.0, p_by), along_by, t), along, t_by);
+            let n_by = scale(1.0 / distance, add(across_by, -dot(across_by, n), n));
+            let mean_by = add(p_by, PI / 4.0 * radius, n_by);
+            let [[_, _, n_z_by], [_, _, t_z_by], [_, _, mean_z_by]] = [n_by, t_by, mean_by];
+            let along_part = add(scale(t_z_by, t), t_z, t_by);
+            let towards_part = add(scale(n_z_by, n), n_z, n_by);
+            let spread_by = add(
+                scale(spread_along, along_part),
+                spread_towards,
+                towards_part,
+            );
+            let stretched = add(spread_by, -mean_z_by / mean_z, spread);
+            add(mean_by, pull, stretched)
+        };
+        let [p0, p1, p2] = centre.by_dof;
+        let [t0, t1, t2] = axis.by_dof;
+        Some(Moving {
+            value: add(mean, pull, spread),
+            by_dof: [slope(p0, t0), slope(p1, t1), slope(p2, t2)],
+        })
+    }
+}

@@ -1,0 +1,124 @@
+//! What was commanded when: a frame speaks of the moment it was captured, not of its arrival.
+
+use crate::dof::{PerDof, all_finite};
+use crate::error::{ConfigError, require_positive};
+
+const CAPACITY: usize = 1024;
+
+/// One control tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Entry {
+    /// [s].
+    pub time: f64,
+    /// The command c [m, rad, rad].
+    pub command: PerDof<f64>,
+    /// The predicted state q [m, rad, rad].
+    pub predicted_state: PerDof<f64>,
+}
+
+/// The latest control ticks, at most 1024; it never allocates.
+#[derive(Debug, Clone)]
+pub struct History {
+    ring: [Entry; CAPACITY],
+    /// Where the next entry goes.
+    next: usize,
+    len: usize,
+    span: f64,
+    period: f64,
+}
+
+impl History {
+    /// A history of `span` [s] for a control tick every `period` [s].
+    ///
+    /// # Errors
+    /// A value is not a finite number above 0.
+    pub fn new(span: f64, period: f64) -> Result<Self, ConfigError> {
+        require_positive("span", span)?;
+        require_positive("period", period)?;
+        let blank = Entry {
+            time: 0.0,
+            command: [0.0; 3],
+            predicted_state: [0.0; 3],
+        };
+        Ok(Self {
+            ring: core::array::from_fn(|_| blank),
+            next: 0,
+            len: 0,
+            span,
+            period,
+        })
+    }
+
+    /// Remember a tick.
+    ///
+    /// A time that jumps back starts the history afresh; then the answer is true. The same time
+    /// again replaces the newest entry. An entry that is not finite is not remembered.
+    pub fn push(&mut self, entry: Entry) -> bool {
+        let finite = all_finite(entry.command) && all_finite(entry.predicted_state);
+        if !(finite && entry.time.is_finite()) {
+            return false;
+        }
+        let newest = self.newest().map(|newest| newest.time);
+        let jumped = newest.is_some_and(|newest| entry.time < newest);
+        if jumped {
+            self.len = 0;
+        } else if newest == Some(entry.time) {
+            self.next = (self.next + CAPACITY - 1) % CAPACITY;
+            self.len -= 1;
+        }
+        if let Some(slot) = self.ring.get_mut(self.next) {
+            *slot = entry;
+        }
+        self.next = (self.next + 1) % CAPACITY;
+        self.len = (self.len + 1).min(CAPACITY);
+        jumped
+    }
+
+    /// What held at `time` [s], interpolated between two ticks.
+    ///
+    /// None before the oldest tick within the span, more than one period after the newest, and
+    /// for a time that is not finite.
+    pub fn at(&self, time: f64) -> Option<Entry> {
+        let newest = *self.newest()?;
+        if !(time >= newest.time - self.span && time <= newest.time + self.period) {
+            return None;
+        }
+        if time >= newest.time {
+            return Some(Entry { time, ..newest });
+        }
+        // Ages 0 (newest, later than `time`) to len - 1: the youngest that is not later.
+        let (mut later, mut sought) = (0, self.len - 1);
+        if self.aged(sought)?.time > time {
+            return None;
+        }
+        while sought - later > 1 {
+            let middle = usize::midpoint(later, sought);
+            if self.aged(middle)?.time > time {
+                later = middle;
+            } else {
+                sought = middle;
+            }
+        }
+        let (before, after) = (self.aged(sought)?, self.aged(later)?);
+        let share = (time - before.time) / (after.time - before.time);
+        Some(Entry {
+            time,
+            command: between(before.command, after.command, share),
+            predicted_state: between(before.predicted_state, after.predicted_state, share),
+        })
+    }
+
+    fn newest(&self) -> Option<&Entry> {
+        self.aged(0)
+    }
+
+    fn aged(&self, age: usize) -> Option<&Entry> {
+        let place = (self.next + CAPACITY - 1 - age) % CAPACITY;
+        self.ring.get(place).filter(|_| age < self.len)
+    }
+}
+
+fn between([a0, a1, a2]: PerDof<f64>, [b0, b1, b2]: PerDof<f64>, share: f64) -> PerDof<f64> {
+    let mix = |a: f64, b: f64| a + share * (b - a);
+    [mix(a0, b0), mix(a1, b1), mix(a2, b2)]
+}

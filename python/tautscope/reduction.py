@@ -1,0 +1,254 @@
+"""The loop of Fig. 6: reference in, command out; images teach it the slack."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tautscope import _core
+from tautscope.config import Config, DofConfig
+from tautscope.dof import Dof
+from tautscope.errors import SignalError
+from tautscope.rig import Frame
+
+if TYPE_CHECKING:
+    from tautscope.vision import Detection, MarkerDetector
+
+Triggers = tuple[str | None, str | None]
+
+
+class Status(StrEnum):
+    """What became of a frame."""
+
+    OK = "ok"
+    """Every DOF was measured."""
+    HELD = "held"
+    """Some DOF could not be observed and was held at its prediction."""
+    NO_MARKERS = "no_markers"
+    """The markers were not found."""
+    STALE = "stale"
+    """Captured at a time the command history does not reach."""
+    DUPLICATE = "duplicate"
+    """Captured no later than a frame already used."""
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """What the loop made of a frame. Every (3,) array is [m, rad, rad]; NaN is not known.
+
+    Attributes:
+        detection: What the vision saw, if it was asked.
+        captured_at: When the frame was taken [s].
+        status: What became of it.
+        state_estimate: q_hat (3,), Eq. (16); the prediction where a DOF is not observable.
+        predicted_state: q (3,) at the capture time.
+        predicted_features: h(q) (4,) [px], Eq. (9).
+        innovation: Measured minus predicted features (4,) [px].
+        observable: (3,) which DOFs the image determined.
+        deviation: (3,) standard deviation per px of marker noise [m/px, rad/px].
+        triggers: Per DOF why (delta_minus, delta_plus) were updated: "contact", Eq. (4),
+            "violation", Eq. (5), or None.
+        delta_minus: (3,) contact offsets after this frame, input minus output.
+        delta_plus: (3,) contact offsets after this frame, input minus output.
+    """
+
+    detection: Detection | None
+    captured_at: float
+    status: Status
+    state_estimate: NDArray[np.float64]
+    predicted_state: NDArray[np.float64]
+    predicted_features: NDArray[np.float64]
+    innovation: NDArray[np.float64]
+    observable: NDArray[np.bool_]
+    deviation: NDArray[np.float64]
+    triggers: tuple[Triggers, Triggers, Triggers]
+    delta_minus: NDArray[np.float64]
+    delta_plus: NDArray[np.float64]
+
+
+class HysteresisReduction:
+    """Image-based hysteresis reduction, Fig. 6: `step` at the control rate, `on_frame` per image.
+
+    Args:
+        config: Everything the loop depends on.
+        compensate: Without it every gain is 1 (Table 1, "uncompensated"); the estimation goes on.
+    """
+
+    def __init__(self, config: Config, compensate: bool = True) -> None:
+        self._config = config
+        self._ticks = 0
+        self._loop = _loop(config, compensate)
+
+    def step(self, reference: ArrayLike, time: float | None = None) -> NDArray[np.float64]:
+        """One control tick: the command for a reference, Eqs. (2)-(3).
+
+        Args:
+            reference: u (3,) [m, rad, rad].
+            time: The rig's clock [s]; without it, ticks of `control.period` from 0 on.
+
+        Returns:
+            c (3,) [m, rad, rad]. The first reference is passed through.
+
+        Raises:
+            SignalError: The reference is not three finite numbers, or the time is not finite;
+                the loop is left as it was.
+        """
+        values = _finite("reference", reference, (3,))
+        at = self._ticks * self._config.control.period if time is None else _time("time", time)
+        self._ticks += 1
+        return self._loop.step(values, at)
+
+    def on_frame(self, frame: Frame) -> Report:
+        """Image update: find the markers, estimate the state, learn the slack, Eqs. (4)-(16).
+
+        Raises:
+            FrameError: The image is not what the configured camera gives.
+            SignalError: The capture time is not finite.
+        """
+        captured_at = _time("captured_at", frame.captured_at)
+        predicted = self._loop.predicted_features(captured_at)
+        detection = self._detector.detect(frame.image, predicted)
+        features = detection.features if detection.valid else None
+        return self._report(features, captured_at, detection)
+
+    def on_features(self, features: ArrayLike | None, captured_at: float) -> Report:
+        """Image update from a marker detector of your own.
+
+        Args:
+            features: u and v of band A, u and v of band B (4,) [px]; None if not found.
+            captured_at: When the frame was taken [s, the clock of `step`].
+
+        Raises:
+            SignalError: The features are not four finite numbers, or the time is not finite.
+        """
+        values = None if features is None else _finite("features", features, (4,))
+        return self._report(values, _time("captured_at", captured_at), None)
+
+    def predicted_features(self, captured_at: float) -> NDArray[np.float64] | None:
+        """Where to look in a frame captured at this time: h(q) (4,) [px], None if not known."""
+        return self._loop.predicted_features(captured_at)
+
+    @property
+    def predicted_state(self) -> NDArray[np.float64]:
+        """The model's tip state q (3,) [m, rad, rad] now; NaN before the first tick."""
+        return self._loop.predicted_state
+
+    @property
+    def delta_minus(self) -> NDArray[np.float64]:
+        """The estimated negative contact offsets (3,) [m, rad, rad], input minus output."""
+        return self._loop.delta_minus
+
+    @property
+    def delta_plus(self) -> NDArray[np.float64]:
+        """The estimated positive contact offsets (3,) [m, rad, rad], input minus output."""
+        return self._loop.delta_plus
+
+    @cached_property
+    def _detector(self) -> MarkerDetector:
+        # Not every user of the loop has this package look at the images.
+        from tautscope.vision import MarkerDetector  # noqa: PLC0415
+
+        return MarkerDetector(self._config)
+
+    def _report(
+        self, features: NDArray[np.float64] | None, captured_at: float, detection: Detection | None
+    ) -> Report:
+        facts = self._loop.on_features(features, captured_at)
+        return Report(detection, captured_at, Status(facts[0]), *facts[1:])
+
+
+def build_compensator(dof: DofConfig, compensate: bool = True) -> _core.Compensator:
+    """The compensator of one DOF, Eqs. (2)-(3); without compensation its gain is 1."""
+    return _core.Compensator(
+        free_gain=dof.free_gain if compensate else 1.0,
+        gain_limit=dof.gain_limit,
+        delta_minus=dof.delta_minus,
+        delta_plus=dof.delta_plus,
+    )
+
+
+def build_estimator(dof: DofConfig) -> _core.Estimator:
+    """The hysteresis estimator of one DOF, Eqs. (4)-(6)."""
+    return _core.Estimator(
+        update_distance=dof.update_distance,
+        contact_tolerance=dof.contact_tolerance,
+        smoothing_factor=dof.smoothing_factor,
+        delta_minus=dof.delta_minus,
+        delta_plus=dof.delta_plus,
+    )
+
+
+def build_instrument(config: Config) -> _core.Instrument:
+    """The kinematics, Eq. (7)."""
+    instrument = config.instrument
+    return _core.Instrument(
+        bending_length=instrument.bending_length,
+        marker_a=instrument.marker_a,
+        marker_b=instrument.marker_b,
+        radius=instrument.diameter / 2,
+        band_length=instrument.band_length,
+    )
+
+
+def build_camera(config: Config) -> _core.Camera:
+    """The projection, Eq. (8)."""
+    camera = config.camera
+    return _core.Camera(
+        fx=camera.fx, fy=camera.fy, cx=camera.cx, cy=camera.cy, distortion=camera.distortion
+    )
+
+
+def build_feature_model(config: Config) -> _core.FeatureModel:
+    """The predicted features and their interaction matrix, Eqs. (9)-(11)."""
+    pose = config.camera.camera_from_guide
+    return _core.FeatureModel(
+        build_instrument(config),
+        build_camera(config),
+        translation=pose.translation,
+        rotation=pose.rotation,
+    )
+
+
+def build_state_estimator(config: Config) -> _core.StateEstimator:
+    """The state estimation with its rank watch, Eqs. (13)-(16)."""
+    insertion, rotation, bending = (config[dof].observable_deviation for dof in Dof)
+    return _core.StateEstimator(observable_deviation=(insertion, rotation, bending))
+
+
+def _loop(config: Config, compensate: bool) -> _core.Reduction:
+    insertion, rotation, bending = (config[dof] for dof in Dof)
+    return _core.Reduction(
+        (
+            build_compensator(insertion, compensate),
+            build_compensator(rotation, compensate),
+            build_compensator(bending, compensate),
+        ),
+        (build_estimator(insertion), build_estimator(rotation), build_estimator(bending)),
+        build_feature_model(config),
+        build_state_estimator(config),
+        span=config.control.history,
+        period=config.control.period,
+    )
+
+
+def _finite(field: str, values: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    allowed = f"{shape[0]} finite numbers"
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise SignalError(field, values, allowed) from None
+    if array.shape != shape or not np.isfinite(array).all():
+        raise SignalError(field, array.tolist(), allowed)
+    return array
+
+
+def _time(field: str, value: float) -> float:
+    if not isinstance(value, float | int | np.floating) or not math.isfinite(value):
+        raise SignalError(field, value, "a finite number of seconds")
+    return float(value)
