@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from tautscope import Config, Frame, Sample, run_experiment
-from tautscope.config import ExperimentConfig, Sine
+from tautscope.config import ControlConfig, DofConfig, ExperimentConfig, Sine
 from tautscope.reduction import build_feature_model
 from tautscope.references import SineSequence
 from tautscope.results import evaluate
@@ -40,7 +40,7 @@ class DrawnRig:
         return self._sample(self._home)
 
     def step(self, command: ArrayLike) -> Sample:
-        """Move, and look every fourth time."""
+        """Move, and look every eighth time."""
         applied = np.asarray(command, dtype=np.float64)
         self._tip = np.clip(self._tip, applied - SLACK / 2, applied + SLACK / 2)
         self._ticks += 1
@@ -51,7 +51,7 @@ class DrawnRig:
 
     def _sample(self, applied: NDArray[np.float64]) -> Sample:
         time = self._ticks * self.control_period
-        frame = Frame(self._picture(), time, self._ticks) if self._ticks % 4 == 0 else None
+        frame = Frame(self._picture(), time, self._ticks) if self._ticks % 8 == 0 else None
         return Sample(time, applied, frame, self._tip.copy())
 
     def _picture(self) -> NDArray[np.uint8]:
@@ -66,12 +66,14 @@ class DrawnRig:
 def short_experiment() -> Config:
     """The article's protocol, three periods of 4 s."""
     return Config(
+        control=ControlConfig(period=DrawnRig.control_period),
+        insertion=DofConfig(update_distance=0.4e-3, observable_deviation=3e-3),
         experiment=ExperimentConfig(
             periods=3,
             insertion=Sine(centre=25e-3, amplitude=15e-3, period=4.0),
             rotation=Sine(centre=0.0, amplitude=1.5, period=4.0),
             bending=Sine(centre=0.9, amplitude=0.7, period=4.0),
-        )
+        ),
     )
 
 

@@ -16,7 +16,7 @@ from tautscope.errors import (
     SignalError,
 )
 from tautscope.experiment import run_experiment
-from tautscope.recording import Recording, per_dof, per_feature
+from tautscope.recording import Recording, Table, per_dof, per_feature
 from tautscope.references import SineSequence
 from tautscope.results import DofResult, combine, evaluate
 from tautscope.rig import Rig, Sample
@@ -51,6 +51,12 @@ class StandingClock(DrawnRig):
         return replace(super().step(command), time=0.0)
 
 
+def assert_same(table: Table, other: Table) -> None:
+    assert table.dtype == other.dtype
+    for name in table.dtype.names or ():
+        np.testing.assert_array_equal(table[name], other[name], err_msg=name)
+
+
 def run(rig: Rig, compensate: bool = True) -> Recording:
     return run_experiment(rig, REFERENCE, CONFIG, compensate)
 
@@ -75,7 +81,10 @@ def test_the_slack_goes_down_to_what_the_gain_leaves(
 ) -> None:
     result = evaluate(uncompensated, compensated)[dof]
     slack = SLACK[dof]
-    assert result.uncompensated == pytest.approx(slack, rel=0.01)
+    sine = CONFIG.experiment[dof]
+    per_tick = 2 * np.pi * sine.amplitude / sine.period * DrawnRig.control_period
+    # The rig's tip is where the command of the tick before has put it.
+    assert slack < result.uncompensated < slack + 2 * per_tick
     ideal = 1 - 1 / CONFIG[dof].free_gain
     assert 0.9 * ideal < result.reduction < 1.02 * ideal
     assert result.uncompensated_estimate == pytest.approx(slack, rel=0.1)
@@ -115,7 +124,7 @@ def test_the_trace_has_every_tick(compensated: Recording) -> None:
 
 def test_frames_carry_the_truth_at_their_capture_time(compensated: Recording) -> None:
     frames = compensated.frames
-    assert np.all(np.diff(frames["sequence"]) == 1 * 4)
+    assert np.all(np.diff(frames["sequence"]) == 8)
     rows = np.searchsorted(compensated.trace["time"], frames["captured_at"][:-1] - 1e-9)
     np.testing.assert_allclose(
         per_dof(frames, "true")[:-1], per_dof(compensated.trace, "true")[rows]
@@ -142,8 +151,8 @@ def test_a_recording_reads_back_equal(compensated: Recording, tmp_path: Path) ->
     names = {path.name for path in folder.iterdir()}
     assert names == {"trace.csv", "frames.csv", "recording.toml", "config.toml"}
     again = Recording.load(folder)
-    np.testing.assert_array_equal(again.trace, compensated.trace)
-    np.testing.assert_array_equal(again.frames, compensated.frames)
+    assert_same(again.trace, compensated.trace)
+    assert_same(again.frames, compensated.frames)
     assert again.config == compensated.config
     assert again.segments == compensated.segments
     assert again.compensated
@@ -216,7 +225,7 @@ def test_progress_reaches_the_end() -> None:
         CONFIG,
         progress=lambda elapsed, duration: told.append((elapsed, duration)),
     )
-    assert told == pytest.approx([(1.0, 2.0), (2.0, 2.0)])
+    np.testing.assert_allclose(told, [(1.0, 2.0), (2.0, 2.0)])
 
 
 def test_runs_in_processes_are_the_same_runs(
@@ -225,8 +234,8 @@ def test_runs_in_processes_are_the_same_runs(
     shares: list[float] = []
     trials = [Trial(CONFIG, False), Trial(CONFIG, True)]
     first, second = run_trials(trials, shares.append, DrawnRig, workers=2)
-    np.testing.assert_array_equal(first.trace, uncompensated.trace)
-    np.testing.assert_array_equal(second.trace, compensated.trace)
+    assert_same(first.trace, uncompensated.trace)
+    assert_same(second.trace, compensated.trace)
     assert shares == sorted(shares)
 
 

@@ -67,12 +67,13 @@ def run_experiment(
         desired = reference(elapsed)
         command = reduction.step(desired, time=sample.time)
         recorder.tick(sample, desired, command)
-        before, sample = sample, rig.step(command)
-        if not sample.time > before.time:
-            raise SignalError("sample.time", sample.time, f"later than the last, {before.time}")
+        # After the command, which never waits for an image.
         if sample.frame is not None:
             report = reduction.on_frame(sample.frame)
             recorder.frame(sample.time, sample.frame, report, elapsed)
+        before, sample = sample, rig.step(command)
+        if not sample.time > before.time:
+            raise SignalError("sample.time", sample.time, f"later than the last, {before.time}")
         if progress is not None and int(sample.time - start) > int(elapsed):
             progress(sample.time - start, reference.duration)
     trace, frames = recorder.tables()

@@ -96,8 +96,11 @@ def combine(results: Sequence[Results], how: dict[str, str] | str) -> Results:
 
 def _combined(values: list[float], how: str) -> float:
     known = [value for value in values if not np.isnan(value)]
-    pick = {"median": np.median, "min": np.min, "max": np.max}[how]
-    return float(pick(known)) if known else np.nan
+    if not known:
+        return np.nan
+    if how == "median":
+        return float(np.median(known))
+    return max(known) if how == "max" else min(known)
 
 
 def true_loop(

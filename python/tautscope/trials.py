@@ -77,7 +77,7 @@ def run_trials(
                     run.result()
         except BaseException:
             stop.set()
-            pool.shutdown(wait=False, cancel_futures=True)
+            pool.shutdown(cancel_futures=True)
             raise
     return [run.result() for run in runs]
 
