@@ -59,7 +59,7 @@ class DrawnRig:
         prediction = self._model.predict(self._tip)
         if prediction is not None:
             for x, y in np.round(prediction[0]).astype(int).reshape(2, 2).tolist():
-                cv2.circle(image, (x, y), 14, (60, 190, 60), -1)
+                cv2.circle(image, (x, y), 8, (60, 190, 60), -1)
         return image
 
 
@@ -72,7 +72,7 @@ def short_experiment() -> Config:
             periods=3,
             insertion=Sine(centre=25e-3, amplitude=15e-3, period=4.0),
             rotation=Sine(centre=0.0, amplitude=1.5, period=4.0),
-            bending=Sine(centre=0.9, amplitude=0.7, period=4.0),
+            bending=Sine(centre=1.2, amplitude=0.6, period=4.0),
         ),
     )
 

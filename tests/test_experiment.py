@@ -221,7 +221,7 @@ def test_progress_reaches_the_end() -> None:
 
     run_experiment(
         DrawnRig(CONFIG),
-        TwoSeconds([25e-3, 0, 0.9]),
+        TwoSeconds([25e-3, 0, 1.2]),
         CONFIG,
         progress=lambda elapsed, duration: told.append((elapsed, duration)),
     )
