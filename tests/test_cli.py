@@ -121,7 +121,7 @@ def test_demo_prints_the_article_beside_ours(
     out = capsys.readouterr().out
     reduction = next(line for line in out.splitlines() if line.startswith("reduction "))
     assert [cell for cell in reduction.split("  ") if cell.strip()][1].strip() == "75 %"
-    assert "1.8 rad" in out
+    assert "rotation [rad]" in out
     assert "report.html" in out
 
 

@@ -202,7 +202,8 @@ def _print_json(document: dict[str, Any]) -> None:
 def _console() -> Console:
     from rich.console import Console  # noqa: PLC0415
 
-    return Console(highlight=False) if sys.stdout.isatty() else Console(highlight=False, width=110)
+    width = None if sys.stdout.isatty() else 120
+    return Console(highlight=False, markup=False, width=width)
 
 
 def _print_table1(demo: Demo, folder: Path) -> None:
@@ -216,10 +217,10 @@ def _print_table1(demo: Demo, folder: Path) -> None:
         f" (median of {len(demo.seeds)} seeds, worst in brackets)" if several else ""
     )
     table = Table(title=title, box=None, title_justify="left", title_style="bold", pad_edge=False)
-    table.add_column("")
+    table.add_column("", no_wrap=True)
     for dof in middle:
-        table.add_column("article", justify="right", style="dim")
-        table.add_column(dof.label, justify="right")
+        table.add_column("article", justify="right", style="dim", no_wrap=True)
+        table.add_column(tables.heading(dof), justify="right", no_wrap=True)
     for row in tables.ROWS:
         cells = []
         for dof in middle:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from tautscope.config import Config
 from tautscope.recording import Recording, Snapshot
 from tautscope.references import Segment
-from tautscope.results import estimated_loop
+from tautscope.results import estimated_loop, used_frames
 from tautscope.vision import MarkerDetector
 
 if TYPE_CHECKING:
@@ -50,6 +50,7 @@ _STYLE: dict[str, Any] = {
     "legend.fontsize": 7,
     "legend.frameon": False,
     "lines.linewidth": 1.0,
+    "figure.constrained_layout.w_pad": 0.08,
     "savefig.dpi": 200,
     "pdf.fonttype": 42,
 }
@@ -70,39 +71,39 @@ def figure9(uncompensated: Recording, compensated: Recording) -> Figure:
     """
     segments = compensated.segments
     with style():
-        figure = Figure(figsize=(PAGE, 4.9), layout="constrained")
-        axes = figure.subplots(2, len(segments), squeeze=False)
-        for column, segment in enumerate(segments):
-            _over_time(axes[0, column], compensated, segment)
-            _loops(axes[1, column], uncompensated, compensated, segment)
-            for row, letters in enumerate(("abc", "def")):
-                axes[row, column].set_title(f"({letters[column]}) {segment.dof.label}")
-        for row, count in ((0, 5), (1, 2)):
-            lines, labels = axes[row, 0].get_legend_handles_labels()
-            axes[row, 1].legend(
-                lines,
-                labels,
-                loc="lower center",
-                bbox_to_anchor=(0.5, 1.12),
-                ncols=count,
-                borderaxespad=0,
-            )
+        figure = Figure(figsize=(PAGE, 5.3), layout="constrained")
+        upper, lower = figure.subfigures(2, 1, height_ratios=(1, 1.12))
+        for part, letters in ((upper, "abc"), (lower, "def")):
+            axes = part.subplots(1, len(segments), squeeze=False)[0]
+            for axis, letter, segment in zip(axes, letters, segments, strict=False):
+                if part is upper:
+                    _over_time(axis, compensated, segment)
+                else:
+                    _loops(axis, uncompensated, compensated, segment)
+                axis.set_title(f"({letter}) {segment.dof.label}")
+            lines, labels = axes[0].get_legend_handles_labels()
+            part.legend(lines, labels, loc="outside upper center", ncols=len(lines))
     return figure
 
 
 def _over_time(axes: Axes, recording: Recording, segment: Segment) -> None:
     dof = segment.dof
     trace = recording.trace[recording.during(segment, 0, segment.periods)]
-    time = trace["time"] - trace["time"][0]
-    for name, label, colour, width in (
-        ("command", "command c", ORANGE, 0.8),
-        ("reference", "reference u", BLACK, 0.8),
-        ("estimate", "estimate q̂", BLUE, 1.1),
-        ("delta_plus", "offset δ⁺", GREEN, 1.1),
-        ("delta_minus", "offset δ⁻", PURPLE, 1.1),
+    frames = used_frames(recording, segment)
+    for table, clock, name, label, colour, width in (
+        (trace, "time", "command", "command c", ORANGE, 0.8),
+        (trace, "time", "reference", "reference u", BLACK, 0.8),
+        (frames, "captured_at", "estimate", "estimate q̂", BLUE, 1.1),
+        (trace, "time", "delta_plus", "offset δ⁺", GREEN, 1.1),
+        (trace, "time", "delta_minus", "offset δ⁻", PURPLE, 1.1),
     ):
-        values = trace[f"{name}_{dof.label}"] * dof.display_scale
-        axes.plot(time, values, color=colour, linewidth=width, label=label)
+        axes.plot(
+            table[clock] - trace["time"][0],
+            table[f"{name}_{dof.label}"] * dof.display_scale,
+            color=colour,
+            linewidth=width,
+            label=label,
+        )
     axes.set_xlabel("time [s]")
     axes.set_ylabel(f"{dof.label} [{dof.display_unit}]")
     axes.margins(x=0)
@@ -117,10 +118,13 @@ def _loops(axes: Axes, uncompensated: Recording, compensated: Recording, segment
         x, y = estimated_loop(recording, segment, name, first=0)
         scale = dof.display_scale
         axes.plot(x * scale, y * scale, color=colour, linewidth=0.8, label=label)
+    low, high = zip(axes.get_xlim(), axes.get_ylim(), strict=True)
     axes.axline((0, 0), slope=1, color=BLACK, linewidth=0.5, linestyle=(0, (4, 4)), zorder=0)
     axes.set_xlabel(f"c or u [{dof.display_unit}]")
     axes.set_ylabel(f"estimate q̂ [{dof.display_unit}]")
-    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_box_aspect(1)
+    axes.set_xlim(min(low), max(high))
+    axes.set_ylim(min(low), max(high))
 
 
 def figure5(snapshot: Snapshot, config: Config) -> Figure:

@@ -51,8 +51,7 @@ _CAVEATS = """
 not an instrument; the figures say how the method works on that plant. This is research software,
 not a medical device.</li>
 <li>The article's figures were measured on its own rig with the tip as its camera saw it; the
-twin's widths are of its true tip. The rows &ldquo;seen by the camera&rdquo; compare like with
-like.</li>
+twin's widths are of its true tip. The rows &ldquo;by camera&rdquo; compare like with like.</li>
 <li>The instrument's geometry, the camera's pose, the reference's amplitudes and the estimator's
 parameters are not in the article; the configuration below has the ones used. The twin's friction
 is set so that the uncompensated widths resemble the article's: agreement of those rows is by
@@ -114,7 +113,7 @@ Widths over the last two periods of each degree of freedom: mean over 41 levels 
 def _table(results: Sequence[Results]) -> str:
     middle, bad = tables.median(results), tables.worst(results)
     dofs = list(middle)
-    heads = "".join(f'<th colspan="2">{dof.label}</th>' for dof in dofs)
+    heads = "".join(f'<th colspan="2">{tables.heading(dof)}</th>' for dof in dofs)
     columns = "<th>article</th><th>twin</th>" * len(dofs)
     lines = []
     for row in tables.ROWS:

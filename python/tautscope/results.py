@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tautscope import metrics
 from tautscope.dof import Dof
-from tautscope.recording import Recording, per_dof, per_feature
+from tautscope.recording import Recording, Table, per_feature
 from tautscope.references import Segment
 
 LAST_PERIODS = 2
@@ -115,23 +115,21 @@ def true_loop(
 def estimated_loop(
     recording: Recording, segment: Segment, x: str, first: float | None = None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """X and the estimate at the capture times of the frames that were used.
+    """X and the estimate at the capture times of the frames that measured the DOF.
 
     From period `first` of the segment to its end; without it, its last two periods.
     """
     begin = segment.periods - LAST_PERIODS if first is None else first
-    frames = recording.frames[
-        recording.frames_during(segment, begin, segment.periods) & _used(recording, segment.dof)
-    ]
-    label = segment.dof.label
-    trace = recording.trace
+    frames = used_frames(recording, segment, begin)
+    label, trace = segment.dof.label, recording.trace
     at_capture = np.interp(frames["captured_at"], trace["time"], trace[f"{x}_{label}"])
     return at_capture, frames[f"estimate_{label}"]
 
 
-def _used(recording: Recording, dof: Dof) -> NDArray[np.bool_]:
-    """(frames,) which frames measured this DOF; a frame that was not used observes none."""
-    return np.asarray(recording.frames[f"observable_{dof.label}"])
+def used_frames(recording: Recording, segment: Segment, first: float = 0) -> Table:
+    """The frames that measured a segment's DOF, from its period `first` to its end."""
+    inside = recording.frames_during(segment, first, segment.periods)
+    return recording.frames[inside & recording.frames[f"observable_{segment.dof.label}"]]
 
 
 def _dof_result(segment: Segment, uncompensated: Recording, compensated: Recording) -> DofResult:
@@ -154,10 +152,9 @@ def _dof_result(segment: Segment, uncompensated: Recording, compensated: Recordi
         )
     )
     settled = compensated.trace[compensated.during(segment, np.nan_to_num(start), segment.periods)]
-    used = _used(compensated, segment.dof)
-    frames = compensated.frames[used]
-    own = compensated.frames_during(segment, 0, segment.periods)
-    own_used = compensated.frames[own & used]
+    frames = compensated.frames[compensated.frames[f"observable_{label}"]]
+    own_used = used_frames(compensated, segment)
+    own_count = int(compensated.frames_during(segment, 0, segment.periods).sum())
     return DofResult(
         uncompensated=before.mean,
         uncompensated_max=before.max,
@@ -170,13 +167,11 @@ def _dof_result(segment: Segment, uncompensated: Recording, compensated: Recordi
         reduction_estimate=metrics.reduction(seen_before.mean, seen_after.mean),
         start_periods=start,
         tracking_rms=metrics.tracking_rms(settled[f"reference_{label}"], settled[f"true_{label}"]),
-        state_rms=metrics.state_rms(
-            per_dof(frames, "estimate")[:, segment.dof], per_dof(frames, "true")[:, segment.dof]
-        ),
+        state_rms=metrics.state_rms(frames[f"estimate_{label}"], frames[f"true_{label}"]),
         marker_rms_px=metrics.marker_rms(
             per_feature(own_used, "features"), per_feature(own_used, "true_features")
         ),
-        frames_used=len(own_used) / own.sum() if own.any() else np.nan,
+        frames_used=len(own_used) / own_count if own_count else np.nan,
         tip_overspeed=metrics.tip_overspeed(time, reference, truth),
         actuator_gain=metrics.actuator_gain(reference, rows[f"command_{label}"]),
     )

@@ -22,15 +22,15 @@ class Row:
     Attributes:
         name: Field of `DofResult`.
         title: For people.
-        kind: ``length`` is in the DOF's unit, ``share`` is printed in percent, ``px`` and
-            ``number`` are as they are.
+        kind: ``length`` is in the DOF's unit, ``share`` is printed in percent, ``number`` and
+            ``count`` are as they are.
         worst: Which end is the bad one.
         in_summary: Whether ``--json`` names it.
     """
 
     name: str
     title: str
-    kind: Literal["length", "share", "number", "px"]
+    kind: Literal["length", "share", "number", "count"]
     worst: Worst = "max"
     in_summary: bool = False
 
@@ -42,13 +42,13 @@ ROWS = (
     Row("compensated_max", "compensated width, largest", "length"),
     Row("reduction", "reduction", "share", "min", in_summary=True),
     Row("reduction_max", "reduction of the largest width", "share", "min", in_summary=True),
-    Row("uncompensated_estimate", "uncompensated width, seen by the camera", "length"),
-    Row("compensated_estimate", "compensated width, seen by the camera", "length"),
-    Row("reduction_estimate", "reduction, seen by the camera", "share", "min"),
-    Row("start_periods", "periods until settled", "number", in_summary=True),
+    Row("uncompensated_estimate", "uncompensated width, by camera", "length"),
+    Row("compensated_estimate", "compensated width, by camera", "length"),
+    Row("reduction_estimate", "reduction, by camera", "share", "min"),
+    Row("start_periods", "periods until settled", "count", in_summary=True),
     Row("tracking_rms", "tracking error, RMS", "length", in_summary=True),
     Row("state_rms", "state error, RMS", "length", in_summary=True),
-    Row("marker_rms_px", "marker error, RMS", "px", in_summary=True),
+    Row("marker_rms_px", "marker error, RMS [px]", "number", in_summary=True),
     Row("frames_used", "frames used", "share", "min"),
     Row("tip_overspeed", "tip overspeed", "number"),
     Row("actuator_gain", "actuator gain", "number"),
@@ -77,30 +77,27 @@ def in_display_unit(row: Row, dof: Dof, value: float) -> float:
     return value * dof.display_scale if row.kind == "length" else value
 
 
-def unit(row: Row, dof: Dof) -> str:
-    """The unit people read of a figure."""
-    return {"length": dof.display_unit, "share": "", "number": "", "px": "px"}[row.kind]
+def heading(dof: Dof) -> str:
+    """The title of a DOF's columns, with the unit of its lengths."""
+    return f"{dof.label} [{dof.display_unit}]"
 
 
 def cell(row: Row, dof: Dof, value: float) -> str:
-    """A figure as text with three digits at most, a dash if it is not known."""
+    """A figure as text, in the unit of the column or the row; a dash if it is not known."""
     if math.isnan(value):
         return "-"
     if row.kind == "share":
-        return f"{value:.0%}".replace("%", " %")
+        return f"{100 * value:.0f} %"
+    if row.kind == "count":
+        return f"{value:g}"
     shown = in_display_unit(row, dof, value)
-    text = f"{shown:.2f}" if abs(shown) < 10 else f"{shown:.1f}"
-    return f"{text} {unit(row, dof)}".rstrip()
+    return f"{shown:.3g}" if abs(shown) >= 1 else f"{shown:.2g}"
 
 
 def article_cell(row: Row, dof: Dof) -> str:
     """The article's figure as its Table 1 prints it, or nothing."""
-    if row.name not in ARTICLE:
-        return ""
-    value = ARTICLE[row.name][dof]
-    if row.kind == "share":
-        return f"{value:.0%}".replace("%", " %")
-    return f"{in_display_unit(row, dof, value):g} {unit(row, dof)}"
+    value = ARTICLE.get(row.name, {}).get(dof)
+    return "" if value is None else cell(row, dof, value)
 
 
 def write_csv(path: Path, seeds: Sequence[int], results: Sequence[Results]) -> None:
