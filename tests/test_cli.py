@@ -235,9 +235,7 @@ def test_analyze_names_what_it_cannot_use(
     arguments = ["analyze", str(file), "--command", "c", "--measured"]
     out = ["--out", str(tmp_path / "out")]
     assert "line 3, column m: got 'oops'" in failed(capsys, *arguments, "m", *out)
-    assert "m2: got 'no such column', expected one of c" in failed(
-        capsys, *arguments, "m2", *out
-    )
+    assert "m2: got 'no such column', expected one of c" in failed(capsys, *arguments, "m2", *out)
     file.write_text("c,m\n1,2\n1,3\n")
     assert "command: got '1 throughout'" in failed(capsys, *arguments, "m", *out)
     assert [path.name for path in tmp_path.iterdir()] == ["log.csv"]

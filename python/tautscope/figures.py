@@ -72,7 +72,7 @@ def figure9(uncompensated: Recording, compensated: Recording) -> Figure:
     segments = compensated.segments
     with style():
         figure = Figure(figsize=(PAGE, 5.3), layout="constrained")
-        upper, lower = figure.subfigures(2, 1, height_ratios=(1, 1.12))
+        upper, lower = figure.subfigures(2, 1, height_ratios=(1, 1.12), squeeze=False).flat
         for part, letters in ((upper, "abc"), (lower, "def")):
             axes = part.subplots(1, len(segments), squeeze=False)[0]
             for axis, letter, segment in zip(axes, letters, segments, strict=False):

@@ -129,7 +129,8 @@ def estimated_loop(
 def used_frames(recording: Recording, segment: Segment, first: float = 0) -> Table:
     """The frames that measured a segment's DOF, from its period `first` to its end."""
     inside = recording.frames_during(segment, first, segment.periods)
-    return recording.frames[inside & recording.frames[f"observable_{segment.dof.label}"]]
+    frames: Table = recording.frames[inside & recording.frames[f"observable_{segment.dof.label}"]]
+    return frames
 
 
 def _dof_result(segment: Segment, uncompensated: Recording, compensated: Recording) -> DofResult:
