@@ -162,6 +162,7 @@ class Reduction:
 
 # Image processing: crates/vision.
 
+@final
 class MarkerDetector:
     def __new__(
         cls,

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tautscope import _core
 from tautscope.config import CameraConfig, Config
-from tautscope.errors import FrameError, SignalError
+from tautscope.errors import FieldError, FrameError
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ class MarkerDetector:
     pixels above the threshold joined into 8-connected regions. `config.vision` has the numbers.
 
     - With predicted features, A and B are the two regions that lie nearest to them, within
-      ``vision.gate``, and that have comparable areas; the cost is in `crates/vision/src/markers.rs`.
+      ``vision.gate``, and that have comparable areas; crates/vision/src/markers.rs has the cost.
     - Without, they are the two largest regions, as in the article, and A, the proximal band, is the
       one nearer to where the instrument enters the picture.
 
@@ -105,7 +105,7 @@ class MarkerDetector:
 
         Raises:
             FrameError: The image is not what the configured camera gives.
-            SignalError: The prediction is not four numbers.
+            FieldError: The prediction is not four numbers.
         """
         features, reason, regions = self._core.detect(
             self._checked(image), _checked_prediction(predicted_features)
@@ -135,8 +135,8 @@ def entry_point(camera: CameraConfig) -> tuple[float, float]:
     """Where the instrument enters the picture, u, v [px], possibly outside it.
 
     u = cx + fx x / z, v = cy + fy y / z, with (x, y, z) the guide's origin in the camera's frame
-    [m]. Lens distortion is left out: that far from the axis its polynomial folds back. A guide beside
-    or behind the camera counts as 84 degrees off its axis; only the direction matters then.
+    [m]. Lens distortion is left out: that far from the axis its polynomial folds back. A guide
+    beside or behind the camera counts as 84 degrees off its axis: only the direction matters then.
 
     Args:
         camera: Intrinsics and `camera_from_guide`.
@@ -156,7 +156,7 @@ def _checked_prediction(predicted: ArrayLike | None) -> NDArray[np.float64] | No
     except (TypeError, ValueError):
         features = np.empty(0)
     if features.shape != (4,):
-        raise SignalError("predicted_features", predicted, "four numbers u_A, v_A, u_B, v_B [px]")
+        raise FieldError("predicted_features", predicted, "four numbers u_A, v_A, u_B, v_B [px]")
     return features
 
 

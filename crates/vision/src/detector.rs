@@ -13,11 +13,11 @@ pub struct Settings {
     pub discriminant: ColorDiscriminant,
     /// Passes of the 3x3 binomial low-pass, 0 to 8.
     pub smoothing: usize,
-    /// Regions below this are dropped [px], at least 1.
+    /// Regions below this are dropped (px), at least 1.
     pub minimum_area: u64,
-    /// A marker is not sought farther than this from where it is predicted [px], positive.
+    /// A marker is not sought farther than this from where it is predicted (px), positive.
     pub gate: f64,
-    /// Where the instrument enters the picture, `[u, v]` [px]; may lie outside it.
+    /// Where the instrument enters the picture, `[u, v]` (px); may lie outside it.
     pub entry_point: [f64; 2],
 }
 
@@ -33,7 +33,7 @@ pub struct Detector {
 /// What a frame shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Detection<'a> {
-    /// Measured features, centroids `[u_A, v_A, u_B, v_B]` [px], or why there are none.
+    /// Measured features, centroids `[u_A, v_A, u_B, v_B]` (px), or why there are none.
     pub features: Result<[f64; 4], Rejection>,
     /// The regions considered, the largest first; at most [`CANDIDATES`].
     pub regions: &'a [Region],
@@ -76,7 +76,7 @@ impl Detector {
         })
     }
 
-    /// Finds the markers, near `predicted` `[u_A, v_A, u_B, v_B]` [px] if that is given and finite,
+    /// Finds the markers, near `predicted` `[u_A, v_A, u_B, v_B]` (px) if that is given and finite,
     /// else as the two largest regions.
     ///
     /// Allocates only when a frame is larger than those before.

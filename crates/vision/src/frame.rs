@@ -2,7 +2,7 @@
 
 use crate::Error;
 
-/// The longest side of a frame [px]; counts and sums over it are exact.
+/// The longest side of a frame (px); counts and sums over it are exact.
 pub const MAX_SIDE: usize = 1 << 16;
 
 /// An image, row by row: 8-bit B, G, R interleaved.

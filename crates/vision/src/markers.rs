@@ -17,7 +17,7 @@ pub enum Rejection {
     OneRegion,
     /// No two regions of comparable size lie where the markers are predicted.
     NoPair {
-        /// How far from its prediction a marker may be [px].
+        /// How far from its prediction a marker may be (px).
         gate: f64,
     },
 }
@@ -34,7 +34,7 @@ impl fmt::Display for Rejection {
     }
 }
 
-/// The markers among `regions` where they are predicted: their centroids `[u_A, v_A, u_B, v_B]` [px].
+/// The markers among `regions` where they are predicted: their centroids `[u_A, v_A, u_B, v_B]` (px).
 ///
 /// Of all ordered pairs of regions, both within `gate` px of the position predicted for them and
 /// neither more than [`AREA_RATIO`] times the other, the pair of the least cost
@@ -43,7 +43,7 @@ impl fmt::Display for Rejection {
 /// (d_A^2 + d_B^2) / gate^2 + (ln(a_A / a_B) / ln R)^2 + (ln(a / (a_A + a_B)) / ln R)^2
 /// ```
 ///
-/// with d the distance to the prediction [px], `a_A` and `a_B` the areas [px], a the largest sum of areas
+/// with d the distance to the prediction (px), `a_A` and `a_B` the areas (px), a the largest sum of areas
 /// among these pairs, R the [`AREA_RATIO`]. The second term keeps a speck near a prediction, or a
 /// large green thing in reach, from standing in for one band beside the other; the third keeps two
 /// specks from standing in for both. It errs when a band is lost and something of the same colour and
@@ -67,7 +67,7 @@ pub fn near_prediction(
 }
 
 /// The first two of `regions` as markers, as in the article, which takes the two largest; A, the proximal band,
-/// is the one nearer to where the instrument enters the picture, `entry_point` `[u, v]` [px].
+/// is the one nearer to where the instrument enters the picture, `entry_point` `[u, v]` (px).
 ///
 /// It errs when anything else of the colour is larger than a band, and when the instrument bends
 /// back on itself.

@@ -5,19 +5,19 @@ use crate::frame::MAX_SIDE;
 /// A set of marker pixels that touch each other along edges or at corners.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Region {
-    /// Number of pixels [px].
+    /// Number of pixels (px).
     pub area: u64,
-    /// Sum of the columns of its pixels [px].
+    /// Sum of the columns of its pixels (px).
     pub sum_u: u64,
-    /// Sum of the rows of its pixels [px].
+    /// Sum of the rows of its pixels (px).
     pub sum_v: u64,
-    /// First column of the bounding box [px].
+    /// First column of the bounding box (px).
     pub left: usize,
-    /// First row of the bounding box [px].
+    /// First row of the bounding box (px).
     pub top: usize,
-    /// First column after the bounding box [px].
+    /// First column after the bounding box (px).
     pub right: usize,
-    /// First row after the bounding box [px].
+    /// First row after the bounding box (px).
     pub bottom: usize,
 }
 
@@ -45,7 +45,7 @@ impl Region {
         self.bottom = self.bottom.max(other.bottom);
     }
 
-    /// Mean of the pixels' centres `[u, v]` [px].
+    /// Mean of the pixels' centres `[u, v]` (px).
     pub fn centroid(&self) -> [f64; 2] {
         [self.sum_u, self.sum_v].map(|sum| real(sum) / real(self.area))
     }
@@ -127,7 +127,7 @@ impl Labeller {
         self.here.push(Run { start, end, label });
     }
 
-    /// The regions of at least `minimum_area` [px], in the order of their first pixels.
+    /// The regions of at least `minimum_area` (px), in the order of their first pixels.
     pub fn regions(&self, minimum_area: u64) -> impl Iterator<Item = Region> {
         let labels = self.parents.iter().zip(&self.parts).enumerate();
         labels

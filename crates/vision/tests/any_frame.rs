@@ -1,0 +1,185 @@
+//! Whatever a frame holds, there is an answer, and it adds up.
+
+use proptest::prelude::*;
+use tautscope_vision::detector::CANDIDATES;
+use tautscope_vision::{
+    BgrFrame, ColorDiscriminant, Detector, Frame, Labeller, Segmenter, Settings,
+};
+
+#[derive(Clone, Debug)]
+struct Image {
+    data: Vec<u8>,
+    width: usize,
+    height: usize,
+    stride: usize,
+}
+
+impl Image {
+    fn frame(&self) -> BgrFrame<'_> {
+        BgrFrame::new(&self.data, self.width, self.height, self.stride).unwrap()
+    }
+}
+
+fn image() -> impl Strategy<Value = Image> {
+    (1..70_usize, 1..40_usize, 0..5_usize).prop_flat_map(|(width, height, padding)| {
+        let stride = 3 * width + padding;
+        let pixel = prop_oneof![4 => Just(0_u8), 1 => any::<u8>(), 1 => Just(255)];
+        prop::collection::vec(pixel, stride * height).prop_map(move |data| Image {
+            data,
+            width,
+            height,
+            stride,
+        })
+    })
+}
+
+fn settings() -> impl Strategy<Value = Settings> {
+    let weights = prop::array::uniform3(-2.0..2.0_f64);
+    (
+        weights,
+        -300.0..300.0_f64,
+        0..9_usize,
+        1..50_u64,
+        1.0..500.0_f64,
+    )
+        .prop_filter_map(
+            "weights all but zero",
+            |(weights, threshold, smoothing, minimum_area, gate)| {
+                Some(Settings {
+                    discriminant: ColorDiscriminant::new(weights, threshold).ok()?,
+                    smoothing,
+                    minimum_area,
+                    gate,
+                    entry_point: [30.0, 20.0],
+                })
+            },
+        )
+}
+
+fn prediction() -> impl Strategy<Value = Option<[f64; 4]>> {
+    let inside = prop::array::uniform4(0.0..70.0_f64);
+    prop::option::of(prop_oneof![inside, prop::array::uniform4(any::<f64>())])
+}
+
+/// `first <= value <= end - 1`
+fn within(first: usize, value: f64, end: usize) -> bool {
+    let [first, last] = [first, end - 1].map(|pixel| f64::from(u32::try_from(pixel).unwrap()));
+    (first..=last).contains(&value)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(100))]
+
+    #[test]
+    fn the_areas_of_all_regions_sum_to_the_marker_pixels(
+        image in image(),
+        settings in settings(),
+    ) {
+        let mut segmenter = Segmenter::new(settings.discriminant, settings.smoothing);
+        let mut labeller = Labeller::default();
+        labeller.start(image.width, image.height);
+        let (mut pixels, mut rows) = (0, 0);
+        segmenter.each_row(&image.frame(), |v, runs| {
+            assert_eq!(v, rows);
+            rows += 1;
+            labeller.next_row();
+            let mut last_end = None;
+            runs.each(|start, end| {
+                assert!(start < end && end <= image.width && last_end.is_none_or(|last| last < start));
+                last_end = Some(end);
+                pixels += end - start;
+                labeller.add(v, start, end);
+            });
+        });
+        prop_assert_eq!(rows, image.height);
+        let area: u64 = labeller.regions(1).map(|region| region.area).sum();
+        prop_assert_eq!(area, pixels as u64);
+        for region in labeller.regions(1) {
+            prop_assert!(region.left < region.right && region.right <= image.width);
+            prop_assert!(region.top < region.bottom && region.bottom <= image.height);
+            let sides = (region.right - region.left) * (region.bottom - region.top);
+            prop_assert!(region.area <= sides as u64);
+            let [u, v] = region.centroid();
+            prop_assert!(within(region.left, u, region.right) && within(region.top, v, region.bottom));
+        }
+    }
+
+    #[test]
+    fn a_used_detector_answers_like_a_fresh_one(
+        images in prop::collection::vec((image(), prediction()), 1..5),
+        settings in settings(),
+    ) {
+        let mut used = Detector::new(settings).unwrap();
+        for (image, predicted) in &images {
+            let mut fresh = Detector::new(settings).unwrap();
+            let answer = used.detect(&image.frame(), *predicted);
+            prop_assert_eq!(answer, fresh.detect(&image.frame(), *predicted));
+            prop_assert!(answer.regions.len() <= CANDIDATES);
+            prop_assert!(answer.regions.is_sorted_by(|one, next| one.area >= next.area));
+            if let Ok([u_a, v_a, u_b, v_b]) = answer.features {
+                let centroids = || answer.regions.iter().map(tautscope_vision::Region::centroid);
+                prop_assert!(centroids().any(|centroid| centroid.as_slice() == [u_a, v_a]));
+                prop_assert!(centroids().any(|centroid| centroid.as_slice() == [u_b, v_b]));
+            }
+        }
+    }
+
+    #[test]
+    fn a_frame_is_refused_before_it_is_read_beyond_its_end(
+        length in 0..200_usize, width in 0..9_usize, height in 0..9_usize, stride in 0..30_usize,
+    ) {
+        let data = vec![7; length];
+        if let Ok(frame) = BgrFrame::new(&data, width, height, stride) {
+            for v in 0..height {
+                prop_assert_eq!(frame.row(v).len(), 3 * width);
+            }
+        } else {
+            let fits = width > 0 && height > 0 && stride >= 3 * width
+                && length >= stride * (height - 1) + 3 * width;
+            prop_assert!(!fits);
+        }
+    }
+}
+
+#[test]
+fn senseless_settings_are_refused_by_name() {
+    let good = Settings {
+        discriminant: ColorDiscriminant::new([-0.5, 1.0, -0.6], 10.0).unwrap(),
+        smoothing: 1,
+        minimum_area: 40,
+        gate: 120.0,
+        entry_point: [0.0, 0.0],
+    };
+    assert!(Detector::new(good).is_ok());
+    let refused = |settings| Detector::new(settings).unwrap_err().field;
+    assert_eq!(
+        refused(Settings {
+            smoothing: 9,
+            ..good
+        }),
+        "smoothing"
+    );
+    assert_eq!(
+        refused(Settings {
+            minimum_area: 0,
+            ..good
+        }),
+        "minimum_area"
+    );
+    assert_eq!(refused(Settings { gate: 0.0, ..good }), "gate");
+    assert_eq!(
+        refused(Settings {
+            gate: f64::NAN,
+            ..good
+        }),
+        "gate"
+    );
+    let entry_point = [f64::INFINITY, 0.0];
+    assert_eq!(
+        refused(Settings {
+            entry_point,
+            ..good
+        }),
+        "entry_point"
+    );
+}
