@@ -83,7 +83,7 @@ class HysteresisReduction:
     def __init__(self, config: Config, compensate: bool = True) -> None:
         self._config = config
         self._ticks = 0
-        self._loop = _loop(config, compensate)
+        self._loop = build_loop(config, compensate)
 
     def step(self, reference: ArrayLike, time: float | None = None) -> NDArray[np.float64]:
         """One control tick: the command for a reference, Eqs. (2)-(3).
@@ -221,7 +221,8 @@ def build_state_estimator(config: Config) -> _core.StateEstimator:
     return _core.StateEstimator(observable_deviation=(insertion, rotation, bending))
 
 
-def _loop(config: Config, compensate: bool) -> _core.Reduction:
+def build_loop(config: Config, compensate: bool = True) -> _core.Reduction:
+    """The whole loop, Fig. 6, without checks of what goes in: `HysteresisReduction` has those."""
     insertion, rotation, bending = (config[dof] for dof in Dof)
     return _core.Reduction(
         (

@@ -31,13 +31,13 @@ pub struct Projection {
     pub pixel: [f64; 2],
     /// `d pixel / d p_in_camera`, two rows [px/m].
     pub pixel_by_point: [Vector; 2],
-    determinant: f64,
+    folded: bool,
 }
 
 impl Projection {
-    /// Whether the distortion has turned the image inside out here: no lens does that.
-    pub fn is_folded(&self) -> bool {
-        self.determinant <= 0.0
+    /// Whether the distortion has mirrored or turned the image over here: no lens does that.
+    pub const fn is_folded(&self) -> bool {
+        self.folded
     }
 }
 
@@ -91,6 +91,8 @@ impl Camera {
         let y_by_x = x_by_y;
         let y_by_y = gain + y * y * gain_slope + 6.0 * p1 * y + 2.0 * p2 * x;
 
+        let determinant = x_by_x * y_by_y - x_by_y * y_by_x;
+
         let [fx, fy] = self.focal;
         let [cx, cy] = self.centre;
         let row = |focal: f64, by_x: f64, by_y: f64| {
@@ -104,7 +106,7 @@ impl Camera {
             .then(|| Projection {
                 pixel,
                 pixel_by_point: [row(fx, x_by_x, x_by_y), row(fy, y_by_x, y_by_y)],
-                determinant: x_by_x * y_by_y - x_by_y * y_by_x,
+                folded: determinant <= 0.0 || x_by_x + y_by_y <= 0.0,
             })
     }
 }

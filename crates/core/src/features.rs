@@ -11,18 +11,21 @@ use crate::linear::{Vector, add, dot, scale};
 ///
 /// Decision 0002: the camera sees the near half of a cylindrical band, so the centroid of its
 /// colour is not the image of its centre. The point that is projected, from the centre p, the
-/// axis t, the radius r and the band's length l, all in the camera frame, is
+/// axis t, the radius r, the band's length l and the distance D of the camera from the axis, all
+/// in the camera frame [m], is
 ///
 /// ```text
-/// m = p + (pi / 4) r n                n: unit vector from the axis to the camera, across the axis
-/// e = m - (4 / m_z) S z               z: the optical axis
+/// m = p + r (pi/4 + (pi^2/8 - 1) r/D) n       n: unit vector from the axis to the camera, across
+/// e = m - (4 / m_z) S z                       z: the optical axis
 /// S = l^2 / 12 t t' + r^2 (2/3 - pi^2 / 16) n n' + r^2 / 3 (t x n) (t x n)'
 /// ```
 ///
-/// m is the mean of the visible surface, each element weighted by the area it fills in the image;
-/// e adds that near parts fill more of the image than far ones. With r = l = 0 it is the article's h.
+/// m is the mean of the visible surface, each element weighted by the solid angle it fills, to
+/// first order in r/D; e adds that near parts fill more of the image than far ones. With r = l = 0
+/// it is the article's h.
 ///
-/// Wrong where the scope or tissue hides part of a band, and within a few radii of the camera.
+/// Wrong where the scope or tissue hides part of a band, within a few radii of the camera, and, by
+/// some 0.3 px, where the distortion changes much across a band.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FeatureModel {
     instrument: Instrument,
@@ -109,7 +112,9 @@ impl FeatureModel {
             return None;
         }
         let n = scale(1.0 / distance, across);
-        let mean = add(p, PI / 4.0 * radius, n);
+        let nearer = (PI * PI / 8.0 - 1.0) * radius * radius / distance;
+        let lift = PI / 4.0 * radius + nearer;
+        let mean = add(p, lift, n);
 
         let spread_across = radius * radius / 3.0;
         let spread_along = length * length / 12.0 - spread_across;
@@ -126,8 +131,10 @@ impl FeatureModel {
         let slope = |p_by: Vector, t_by: Vector| {
             let along_by = dot(p_by, t) + dot(p, t_by);
             let across_by = add(add(scale(-1.0, p_by), along_by, t), along, t_by);
-            let n_by = scale(1.0 / distance, add(across_by, -dot(across_by, n), n));
-            let mean_by = add(p_by, PI / 4.0 * radius, n_by);
+            let distance_by = dot(across_by, n);
+            let n_by = scale(1.0 / distance, add(across_by, -distance_by, n));
+            let lift_by = -nearer * distance_by / distance;
+            let mean_by = add(add(p_by, lift, n_by), lift_by, n);
             let [[_, _, n_z_by], [_, _, t_z_by], [_, _, mean_z_by]] = [n_by, t_by, mean_by];
             let along_part = add(scale(t_z_by, t), t_z, t_by);
             let towards_part = add(scale(n_z_by, n), n_z, n_by);

@@ -135,7 +135,7 @@ impl Unknown {
         let own = without(without(own, first), second);
         let square = dot(own, own);
         self.solution = dot(own, innovation) / square;
-        self.ratio = if self.solution.is_finite() {
+        self.ratio = if square.is_finite() && self.solution.is_finite() {
             1.0 / libm::sqrt(square)
         } else {
             f64::INFINITY

@@ -1,0 +1,109 @@
+"""Speed of the control tick and of the state estimation, beside NumPy's pinv in the same run.
+
+One thread. The tick is three DOFs: play model, compensator, command history. The state estimation
+is h(q), its interaction matrix, the step and the rank watch; NumPy's figure is
+``pinv(matrix) @ innovation`` alone, with the matrix given.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import statistics
+from collections.abc import Callable
+from time import perf_counter_ns
+from typing import Any
+
+import numpy as np
+from tautscope.config import Config
+from tautscope.reduction import build_feature_model, build_loop, build_state_estimator
+
+REPEATS = 60
+
+
+def nanoseconds(work: Callable[[], object], per: int) -> list[float]:
+    """Time per item of work that does `per` items, once per repeat."""
+    times = []
+    for _ in range(REPEATS):
+        start = perf_counter_ns()
+        work()
+        times.append((perf_counter_ns() - start) / per)
+    return times
+
+
+def row(what: str, unit: str, values: list[float], goal: float, sense: str) -> dict[str, Any]:
+    median = statistics.median(values)
+    return {
+        "what": what,
+        "dof": None,
+        "profile": None,
+        "unit": unit,
+        "median": median,
+        "worst": max(values) if sense == "max" else min(values),
+        "n": len(values),
+        "goal": goal,
+        "sense": sense,
+        "holds": median <= goal if sense == "max" else median >= goal,
+    }
+
+
+def control_tick(config: Config) -> list[float]:
+    ticks = 20_000
+    sines = [config.experiment.insertion, config.experiment.rotation, config.experiment.bending]
+    phase = np.linspace(0.0, 40 * np.pi, ticks)
+    references = np.stack([s.centre + s.amplitude * np.sin(phase) for s in sines], axis=1)
+    times = np.arange(ticks) * config.control.period
+    loop = build_loop(config)
+    return nanoseconds(lambda: loop.run(references, times), ticks)
+
+
+def state_estimation(config: Config) -> tuple[list[float], list[float]]:
+    count, pinv_count = 5_000, 200
+    rng = np.random.default_rng(0)
+    model, estimator = build_feature_model(config), build_state_estimator(config)
+    states = rng.uniform([0.015, -1.0, 0.3], [0.035, 1.0, 1.2], (count, 3))
+    predictions = [model.predict(state) for state in states]
+    features, matrices = zip(*(p for p in predictions if p is not None), strict=True)
+    measured = np.array(features) + rng.normal(0.0, 1.0, (len(features), 4))
+    innovations = measured - np.array(features)
+    states = states[[p is not None for p in predictions]]
+    some = list(zip(matrices, innovations, strict=True))[:pinv_count]
+
+    def numpys() -> None:
+        for matrix, innovation in some:
+            np.matmul(np.linalg.pinv(matrix), innovation)
+
+    ours = nanoseconds(lambda: estimator.run(model, states, measured), len(states))
+    return ours, nanoseconds(numpys, len(some))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--json", action="store_true", help="one JSON object on stdout")
+    arguments = parser.parse_args()
+
+    config = Config()
+    tick = control_tick(config)
+    ours, numpys = state_estimation(config)
+    ratio = [theirs / own for theirs, own in zip(numpys, ours, strict=True)]
+    rows = [
+        row("control tick", "ns", tick, 1000.0, "max"),
+        row("state estimation", "ns", ours, 2000.0, "max"),
+        row("NumPy pinv over state estimation", "ratio", ratio, 10.0, "min"),
+    ]
+    if arguments.json:
+        print(json.dumps({"rows": rows, "numpy_pinv_ns": statistics.median(numpys)}))
+        return
+    print(f"{'what':<34}{'median':>10}{'worst':>10}  unit   goal")
+    for line in rows:
+        bound = "<=" if line["sense"] == "max" else ">="
+        verdict = "holds" if line["holds"] else "missed"
+        print(
+            f"{line['what']:<34}{line['median']:>10.1f}{line['worst']:>10.1f}  {line['unit']:<6}"
+            f" {bound} {line['goal']:g}: {verdict}"
+        )
+    print(f"NumPy's pinv alone: {statistics.median(numpys):.0f} ns; {REPEATS} repeats each")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,172 @@
+//! Eqs. (2)-(3).
+
+use proptest::prelude::*;
+use tautscope_core::{Compensator, CompensatorState, Play, PlayState};
+
+use crate::{close, config, path, plays, turning_points};
+
+#[derive(Debug, Clone)]
+enum Event {
+    Move(f64),
+    Hold,
+    Offsets(Play),
+    Gain(f64),
+    Spoil(f64),
+}
+
+fn events() -> impl Strategy<Value = Vec<Event>> {
+    let event = prop_oneof![
+        4 => (-1.0..1.0).prop_map(Event::Move),
+        1 => (-1e-15..1e-15).prop_map(Event::Move),
+        1 => Just(Event::Hold),
+        2 => plays().prop_map(Event::Offsets),
+        1 => (1.0..5.0).prop_map(Event::Gain),
+        1 => prop_oneof![Just(f64::NAN), Just(f64::INFINITY)].prop_map(Event::Spoil),
+    ];
+    prop::collection::vec(event, 1..200)
+}
+
+fn start(free_gain: f64, play: Play) -> (Compensator, CompensatorState) {
+    (
+        Compensator::new(free_gain, 5.0).unwrap(),
+        CompensatorState::new(play),
+    )
+}
+
+/// The output of a true play behind a compensator that believes in another.
+fn tip_behind(compensator: &Compensator, believed: Play, truth: Play, travel: &[f64]) -> Vec<f64> {
+    let mut state = CompensatorState::new(believed);
+    let mut tip = PlayState { output: 0.0 };
+    travel
+        .iter()
+        .map(|reference| truth.step(&mut tip, compensator.step(&mut state, *reference)))
+        .collect()
+}
+
+proptest! {
+    #![proptest_config(config())]
+
+    #[test]
+    fn gain_is_between_nothing_and_the_limit_and_every_switch_is_bumpless(
+        play in plays(), first in -5.0..5.0, events in events()
+    ) {
+        let (mut compensator, mut state) = start(5.0, play);
+        let mut reference = first;
+        prop_assert_eq!(compensator.step(&mut state, reference), reference);
+        for event in events {
+            let before = state.command();
+            match event {
+                Event::Move(increment) => {
+                    let last = reference;
+                    reference += increment;
+                    let moved = compensator.step(&mut state, reference) - before;
+                    let asked = reference - last;
+                    let scale = before.abs().max(state.command().abs()).max(asked.abs());
+                    prop_assert!(moved * asked >= 0.0);
+                    prop_assert!(moved.abs() <= 5.0 * asked.abs() + 4.0 * f64::EPSILON * scale);
+                    continue;
+                }
+                Event::Hold => { compensator.step(&mut state, reference); }
+                Event::Offsets(play) => compensator.retune(&mut state, play),
+                Event::Gain(gain) => {
+                    compensator = Compensator::new(gain, 5.0).unwrap();
+                    compensator.retune(&mut state, play);
+                }
+                Event::Spoil(bad) => { compensator.step(&mut state, bad); }
+            }
+            prop_assert_eq!(state.command().to_bits(), before.to_bits());
+            let held = compensator.step(&mut state, reference);
+            prop_assert_eq!(held.to_bits(), before.to_bits());
+        }
+    }
+
+    #[test]
+    fn predicted_state_is_the_play_of_the_command(
+        gain in 1.0..5.0_f64, play in plays(), references in turning_points()
+    ) {
+        let (compensator, mut state) = start(gain, play);
+        compensator.step(&mut state, references[0]);
+        let mut tip = PlayState { output: state.predicted_state() };
+        for reference in path(&references, 3) {
+            let command = compensator.step(&mut state, reference);
+            prop_assert!(close(play.step(&mut tip, command), state.predicted_state()));
+        }
+    }
+
+    #[test]
+    fn only_the_turning_points_matter(
+        gain in 1.0..5.0_f64, play in plays(), references in turning_points()
+    ) {
+        let end = |steps| {
+            let (compensator, mut state) = start(gain, play);
+            let commands = path(&references, steps);
+            commands.iter().map(|reference| compensator.step(&mut state, *reference)).last()
+        };
+        prop_assert!(close(end(1).unwrap(), end(17).unwrap()));
+    }
+
+    #[test]
+    fn what_remains_of_the_width_is_one_gainth(gain in 1.0..5.0_f64, width in 0.1..3.0_f64) {
+        let play = Play::new(-width, 0.0).unwrap();
+        let compensator = Compensator::new(gain, 5.0).unwrap();
+        let rest = width / gain;
+        let tip = tip_behind(&compensator, play, play, &[0.0, 1.0, 1.0 - rest, -rest]);
+        prop_assert!(close(tip[2], tip[1]), "held for width / gain: {:?}", tip);
+        prop_assert!(close(tip[3], tip[1] - 1.0), "then followed: {:?}", tip);
+    }
+
+    #[test]
+    fn over_estimation_overshoots_by_the_law(
+        gain in 1.0..5.0_f64, true_width in 0.0..3.0_f64, estimated_width in 0.0..3.0_f64
+    ) {
+        let believed = Play::new(-estimated_width, 0.0).unwrap();
+        let truth = Play::new(-true_width, 0.0).unwrap();
+        let compensator = Compensator::new(gain, 5.0).unwrap();
+        let back = path(&[1.0, -4.0], 5000);
+        let mut travel = vec![0.0];
+        travel.extend(&back);
+        let tip = tip_behind(&compensator, believed, truth, &travel);
+        let turned_at = tip[1];
+        let overshoot = back.iter().zip(&tip[1..])
+            .map(|(reference, tip)| (turned_at - tip) - (1.0 - reference))
+            .fold(0.0, f64::max);
+        let law = (estimated_width * (1.0 - 1.0 / gain) - true_width).max(0.0);
+        prop_assert!((overshoot - law).abs() <= 5e-3, "{} against {}", overshoot, law);
+    }
+}
+
+#[test]
+fn nothing_drifts_over_a_hundred_thousand_reversals() {
+    let play = Play::new(-0.004, 0.006).unwrap();
+    let (compensator, mut state) = start(5.0, play);
+    let invariant = |state: &CompensatorState, reference: f64| {
+        state.command() - reference - (1.0 - 1.0 / 5.0) * state.position()
+    };
+    compensator.step(&mut state, 0.0);
+    let at_start = invariant(&state, 0.0);
+    for reversal in 0..100_000_u32 {
+        let sign = if reversal % 2 == 0 { 1.0 } else { -1.0 };
+        // Strides that never end a tick at a contact, at a tick rate that resolves them badly.
+        for step in 1..=5_u32 {
+            let depth = 0.02 + 0.003 * (f64::from(reversal) * 0.7).sin();
+            let reference = sign * depth * (f64::from(step) / 2.5 - 1.0);
+            compensator.step(&mut state, reference);
+            let drift = invariant(&state, reference) - at_start;
+            assert!(drift.abs() <= 1e-12, "{drift} after {reversal} reversals");
+        }
+    }
+}
+
+#[test]
+fn bad_gains_are_named() {
+    assert_eq!(Compensator::new(0.9, 5.0).unwrap_err().field, "free_gain");
+    assert_eq!(Compensator::new(6.0, 5.0).unwrap_err().field, "free_gain");
+    assert_eq!(
+        Compensator::new(f64::NAN, 5.0).unwrap_err().field,
+        "free_gain"
+    );
+    assert_eq!(
+        Compensator::new(2.0, f64::INFINITY).unwrap_err().field,
+        "gain_limit"
+    );
+}

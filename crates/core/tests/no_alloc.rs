@@ -1,0 +1,60 @@
+//! The control tick and the image update do not allocate: an allocation aborts this test.
+
+use assert_no_alloc::{AllocDisabler, assert_no_alloc};
+use tautscope_core::{
+    Axis, Camera, Compensator, Estimator, FeatureModel, History, HysteresisReduction, Instrument,
+    Play, Pose, StateEstimator, Status, Triggers,
+};
+
+#[global_allocator]
+static ALLOCATOR: AllocDisabler = AllocDisabler;
+
+fn reduction() -> HysteresisReduction {
+    let axis = |update_distance| {
+        Axis::new(
+            Compensator::new(5.0, 5.0).unwrap(),
+            Estimator::new(update_distance, 0.4, 0.25).unwrap(),
+            Play::new(0.0, 0.0).unwrap(),
+        )
+    };
+    let distortion = [-0.18, 0.05, 0.001, -0.001, -0.005, 0.0, 0.0, 0.0];
+    let model = FeatureModel::new(
+        Instrument::new(18.5e-3, 5e-3, 15e-3, 1.75e-3, 4e-3).unwrap(),
+        Camera::new([424.0, 454.0], [349.6, 285.0], distortion).unwrap(),
+        Pose::new([9e-3, 7e-3, 8e-3], [0.29, -0.37, 0.0]).unwrap(),
+    );
+    HysteresisReduction::new(
+        [axis(0.4e-3), axis(0.04), axis(0.02)],
+        model,
+        StateEstimator::new([1.0; 3]).unwrap(),
+        History::new(2.0, 0.005).unwrap(),
+    )
+}
+
+#[test]
+fn step_and_image_update_do_not_allocate() {
+    let mut reduction = reduction();
+    let (mut used, mut learnt) = (0, 0);
+    assert_no_alloc(|| {
+        for tick in 0..4000_u32 {
+            let time = f64::from(tick) * 0.005;
+            let wave = time.sin();
+            let reference = [0.025 + 0.01 * wave, wave, 0.9 + 0.5 * wave];
+            reduction.step(reference, time);
+            if tick % 8 == 0 {
+                let captured_at = time - 0.08;
+                let seen = reduction.predicted_features(captured_at);
+                let shifted = seen.map(|features| features.map(|value| value + 3.0 * wave));
+                let report = reduction.on_features(shifted, captured_at);
+                used += u32::from(report.status == Status::Ok);
+                learnt += u32::from(report.triggers.iter().any(Triggers::any));
+            }
+        }
+        reduction.step([f64::NAN; 3], 20.0);
+        reduction.on_features(None, 20.0);
+    });
+    assert!(
+        used > 400 && learnt > 40,
+        "the whole path ran: {used} {learnt}"
+    );
+}

@@ -1,0 +1,23 @@
+"""What several tests share."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+
+def shared_data(*parts: str) -> Path:
+    """A path in the shared data: TAUTSCOPE_DATA, or ../shared/data beside the repository.
+
+    Where it is missing the test is skipped, on CI it fails.
+    """
+    default = Path(__file__).resolve().parents[2] / "shared" / "data"
+    path = Path(os.environ.get("TAUTSCOPE_DATA", default)).joinpath(*parts)
+    if not path.exists():
+        reason = f"no {path}: set TAUTSCOPE_DATA to the folder of the shared data"
+        if os.environ.get("CI") == "true":
+            pytest.fail(reason)
+        pytest.skip(reason)
+    return path

@@ -1,0 +1,75 @@
+"""Decision 0001: one sign convention works, the printed mixture of two does not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from tautscope import _core
+
+Floats = NDArray[np.float64]
+
+DISTANCE, TOLERANCE, FACTOR = 0.05, 0.4, 0.25
+
+
+def signals(delta_minus: float, delta_plus: float) -> Iterator[tuple[float, float]]:
+    """Command and tip of a true play over six periods of a sine."""
+    tip = 0.0
+    for command in 3.0 * np.sin(np.linspace(0.0, 12.0 * np.pi, 12_000)):
+        tip = min(max(tip, command - delta_plus), command - delta_minus)
+        yield float(command), tip
+
+
+def as_printed(delta_minus: float, delta_plus: float) -> Floats:
+    """The printed signs: (5) takes an offset as output minus input, (4) and (6) the reverse.
+
+    The estimated width after each update.
+    """
+    minus = plus = last_c = last_m = 0.0
+    widths = []
+    for c, m in signals(delta_minus, delta_plus):
+        moved, followed = c - last_c, m - last_m
+        if abs(moved) < DISTANCE:
+            continue
+        last_c, last_m = c, m
+        together = abs(moved - followed) < TOLERANCE * abs(moved)
+        update_plus = (moved > 0 and together) or m > c + plus
+        update_minus = (moved < 0 and together) or m < c + minus
+        if update_plus:
+            plus = (1 - FACTOR) * plus + FACTOR * (c - m)
+        if update_minus:
+            minus = (1 - FACTOR) * minus + FACTOR * (c - m)
+        widths.append(plus - minus)
+    return np.array(widths)
+
+
+def as_decided(delta_minus: float, delta_plus: float) -> Floats:
+    """Ours: an offset is input minus output throughout. The estimated width after each sample."""
+    estimator = _core.Estimator(
+        update_distance=DISTANCE,
+        contact_tolerance=TOLERANCE,
+        smoothing_factor=FACTOR,
+        delta_minus=0.0,
+        delta_plus=0.0,
+    )
+    command, measured = np.array(list(signals(delta_minus, delta_plus))).T
+    _, minus, plus = estimator.run(command, measured)
+    assert (minus[-1], plus[-1]) == pytest.approx((delta_minus, delta_plus), abs=1e-3)
+    return plus - minus
+
+
+def second_half(widths: Floats) -> Floats:
+    return widths[len(widths) // 2 :]
+
+
+@pytest.mark.parametrize("truth", [(-0.5, 0.5), (-1.0, 0.2), (-0.2, 1.4)])
+def test_the_printed_signs_collapse_and_ours_find_the_play(truth: tuple[float, float]) -> None:
+    width = truth[1] - truth[0]
+    assert np.abs(second_half(as_printed(*truth))).min() < 1e-3 * width
+    assert np.abs(second_half(as_decided(*truth)) - width).max() < 1e-3 * width
+
+
+def test_about_zero_nothing_of_the_width_is_left() -> None:
+    assert np.abs(second_half(as_printed(-0.5, 0.5))).mean() < 0.1
