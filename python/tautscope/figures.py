@@ -13,6 +13,7 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
+from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from tautscope.config import Config
@@ -106,7 +107,7 @@ def _over_time(axes: Axes, recording: Recording, segment: Segment) -> None:
         )
     axes.set_xlabel("time [s]")
     axes.set_ylabel(f"{dof.label} [{dof.display_unit}]")
-    axes.margins(x=0)
+    axes.set_xlim(0, segment.period * segment.periods)
 
 
 def _loops(axes: Axes, uncompensated: Recording, compensated: Recording, segment: Segment) -> None:
@@ -149,8 +150,9 @@ def figure5(snapshot: Snapshot, config: Config) -> Figure:
                 (left - 0.5, top - 0.5), width, height, fill=False, color=ORANGE, linewidth=1.0
             )
             axes[2].add_patch(outline)
-        for name, (x, y) in zip("AB", measured, strict=True):
-            _name_marker(axes[2], name, x, y)
+        away = (measured[1] - measured[0]) / np.hypot(*(measured[1] - measured[0]))
+        _name_marker(axes[2], "A", measured[0], -away)
+        _name_marker(axes[2], "B", measured[1], away)
         axes[3].imshow(picture)
         axes[3].plot(*predicted.T, "x", color="white", markersize=9, label="predicted s")
         axes[3].plot(
@@ -167,16 +169,20 @@ def figure5(snapshot: Snapshot, config: Config) -> Figure:
     return figure
 
 
-def _name_marker(axes: Axes, name: str, x: float, y: float) -> None:
-    axes.plot(x, y, "+", color=BLACK, markersize=8)
+def _name_marker(axes: Axes, name: str, at: NDArray[np.float64], away: NDArray[np.float64]) -> None:
+    """A cross at a marker [px], its name 26 points off in the direction `away` [px]."""
+    axes.plot(*at, "+", color=BLACK, markersize=8)
     axes.annotate(
         name,
-        (x, y),
-        xytext=(22, -22),
+        (at[0], at[1]),
+        xytext=(26 * away[0], -26 * away[1]),
         textcoords="offset points",
+        ha="center",
+        va="center",
         color=BLACK,
         fontsize=11,
         fontweight="bold",
+        path_effects=[withStroke(linewidth=2.5, foreground="white")],
         arrowprops={"arrowstyle": "-", "color": BLACK, "linewidth": 0.8},
     )
 
