@@ -46,6 +46,16 @@ class BlindToTruth(DrawnRig):
         return replace(super()._sample(applied), true_state=None)
 
 
+class SlowCamera(DrawnRig):
+    """Its images are 0.05 s old, the first from before the start."""
+
+    def _sample(self, applied: NDArray[np.float64]) -> Sample:
+        sample = super()._sample(applied)
+        if sample.frame is None:
+            return sample
+        return replace(sample, frame=replace(sample.frame, captured_at=sample.time - 0.05))
+
+
 class StandingClock(DrawnRig):
     def step(self, command: ArrayLike) -> Sample:
         return replace(super().step(command), time=0.0)
@@ -135,6 +145,14 @@ def test_frames_carry_the_truth_at_their_capture_time(compensated: Recording) ->
         per_feature(used, "innovation"),
         atol=1e-9,
     )
+
+
+def test_a_frame_from_before_the_start_is_not_used() -> None:
+    frames = run_experiment(SlowCamera(CONFIG), Constant([25e-3, 0, 1.2]), CONFIG).frames
+    assert frames["status"].tolist() == ["stale", "ok", "ok", "ok"]
+    assert np.isnan(per_dof(frames, "true")[0]).all()
+    assert np.isfinite(per_dof(frames, "true")[1:]).all()
+    np.testing.assert_allclose(frames["arrived_at"] - frames["captured_at"], 0.05)
 
 
 def test_the_snapshot_is_from_the_middle(compensated: Recording) -> None:

@@ -147,6 +147,8 @@ def test_widths_per_period_see_a_play_that_shrinks() -> None:
     widths = metrics.period_widths(time, x, y, start=0.0, period=1.0, periods=5)
     np.testing.assert_allclose(widths[[0, 1, 2, 4]], [0.8, 0.8, 0.8, 0.2], rtol=1e-2)
     assert metrics.start_periods(widths) == 4
+    whole = [metrics.loop_width(x[k : k + 1001], y[k : k + 1001]) for k in range(0, 5000, 1000)]
+    np.testing.assert_array_equal(widths, [loop.mean for loop in whole])
 
 
 def test_rms_of_a_constant_error_is_that_error() -> None:
@@ -164,6 +166,8 @@ def test_overspeed_is_the_ratio_of_speeds() -> None:
 
 def test_actuator_gain_is_the_largest_ratio_of_steps() -> None:
     assert metrics.actuator_gain([0, 1, 2, 1], [0, 1, 2, -3]) == pytest.approx(5.0)
+    assert metrics.actuator_gain([0, 1, 1.1], [0, 1, 1.7]) == pytest.approx(7.0)
+    assert metrics.actuator_gain([0, 1, 1 + 1e-12], [0, 1, 1 + 1e-10]) == pytest.approx(1.0)
     assert metrics.actuator_gain([0, 1, 1], [0, 1, 1.5]) == math.inf
     assert math.isnan(metrics.actuator_gain([0, 0], [0, 0]))
 

@@ -133,7 +133,6 @@ def start_periods(widths: ArrayLike) -> float:
     if values.size == 0 or not np.isfinite(values[-1]):
         return np.nan
     unsettled = ~(values <= SETTLED * abs(values[-1]))
-    unsettled[-1] = False
     return float(np.flatnonzero(unsettled)[-1] + 1) if unsettled.any() else 0.0
 
 
