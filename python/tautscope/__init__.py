@@ -1,5 +1,87 @@
-"""tautscope."""
+"""Image-based hysteresis reduction for flexible endoscopic instruments.
+
+Reilink, Stramigioli, Misra, Mechatronics 23 (2013) 652-658. Names below are loaded when first
+used: importing the package imports neither the physics nor OpenCV nor matplotlib.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from tautscope._core import __version__
 
-__all__ = ["__version__"]
+if TYPE_CHECKING:
+    from tautscope import metrics, replay
+    from tautscope._core import Camera, Compensator, Estimator, Instrument, Play
+    from tautscope.config import Config, load_config
+    from tautscope.dof import Dof
+    from tautscope.errors import TautscopeError
+    from tautscope.experiment import run_experiment
+    from tautscope.recording import Recording
+    from tautscope.reduction import HysteresisReduction, Report
+    from tautscope.rig import Frame, Rig, Sample
+    from tautscope.twin import Twin
+    from tautscope.vision import Detection, MarkerDetector
+
+_HOMES = {
+    "Camera": "_core",
+    "Compensator": "_core",
+    "Config": "config",
+    "Detection": "vision",
+    "Dof": "dof",
+    "Estimator": "_core",
+    "Frame": "rig",
+    "HysteresisReduction": "reduction",
+    "Instrument": "_core",
+    "MarkerDetector": "vision",
+    "Play": "_core",
+    "Recording": "recording",
+    "Report": "reduction",
+    "Rig": "rig",
+    "Sample": "rig",
+    "TautscopeError": "errors",
+    "Twin": "twin",
+    "load_config": "config",
+    "run_experiment": "experiment",
+}
+_MODULES = ("metrics", "replay")
+
+__all__ = [
+    "Camera",
+    "Compensator",
+    "Config",
+    "Detection",
+    "Dof",
+    "Estimator",
+    "Frame",
+    "HysteresisReduction",
+    "Instrument",
+    "MarkerDetector",
+    "Play",
+    "Recording",
+    "Report",
+    "Rig",
+    "Sample",
+    "TautscopeError",
+    "Twin",
+    "__version__",
+    "load_config",
+    "metrics",
+    "replay",
+    "run_experiment",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _MODULES:
+        return import_module(f"tautscope.{name}")
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f"tautscope.{_HOMES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,95 @@
+"""A rig of your own: the loop runs on any object with these methods.
+
+This one is three plays and a drawn picture: a stand-in for your drives and your camera.
+Run it with ``uv run python examples/own_rig.py``.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from tautscope import Config, Frame, Sample, run_experiment
+from tautscope.config import ControlConfig, DofConfig, ExperimentConfig, Sine
+from tautscope.reduction import build_feature_model
+from tautscope.references import SineSequence
+from tautscope.results import evaluate
+
+SLACK = np.array([10e-3, 1.0, 0.5])
+"""Width of each DOF's play [m, rad, rad]."""
+
+
+class DrawnRig:
+    """Tip = play of the command; picture = two green discs where the bands would be."""
+
+    control_period = 0.01
+
+    def __init__(self, config: Config) -> None:
+        experiment = config.experiment
+        self._model = build_feature_model(config)
+        self._shape = (config.camera.height, config.camera.width, 3)
+        self._home = np.array(
+            [experiment.insertion.centre, experiment.rotation.centre, experiment.bending.centre]
+        )
+        self.reset()
+
+    def reset(self) -> Sample:
+        """Home."""
+        self._ticks = 0
+        self._tip = self._home.copy()
+        return self._sample(self._home)
+
+    def step(self, command: ArrayLike) -> Sample:
+        """Move, and look every eighth time."""
+        applied = np.asarray(command, dtype=np.float64)
+        self._tip = np.clip(self._tip, applied - SLACK / 2, applied + SLACK / 2)
+        self._ticks += 1
+        return self._sample(applied)
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+    def _sample(self, applied: NDArray[np.float64]) -> Sample:
+        time = self._ticks * self.control_period
+        frame = Frame(self._picture(), time, self._ticks) if self._ticks % 8 == 0 else None
+        return Sample(time, applied, frame, self._tip.copy())
+
+    def _picture(self) -> NDArray[np.uint8]:
+        image = np.full(self._shape, (60, 60, 150), np.uint8)
+        prediction = self._model.predict(self._tip)
+        if prediction is not None:
+            for x, y in np.round(prediction[0]).astype(int).reshape(2, 2).tolist():
+                cv2.circle(image, (x, y), 8, (60, 190, 60), -1)
+        return image
+
+
+def short_experiment() -> Config:
+    """The article's protocol, three periods of 4 s."""
+    return Config(
+        control=ControlConfig(period=DrawnRig.control_period),
+        insertion=DofConfig(update_distance=0.4e-3, observable_deviation=3e-3),
+        experiment=ExperimentConfig(
+            periods=3,
+            insertion=Sine(centre=25e-3, amplitude=15e-3, period=4.0),
+            rotation=Sine(centre=0.0, amplitude=1.5, period=4.0),
+            bending=Sine(centre=1.2, amplitude=0.6, period=4.0),
+        ),
+    )
+
+
+def main() -> None:
+    config = short_experiment()
+    runs = []
+    for compensate in (False, True):
+        rig = DrawnRig(config)
+        try:
+            reference = SineSequence(config.experiment)
+            runs.append(run_experiment(rig, reference, config, compensate))
+        finally:
+            rig.close()
+    for dof, result in evaluate(*runs).items():
+        print(f"{dof.label}: {result.reduction:.0%} of the hysteresis is gone")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,234 @@
+"""Figures, in one style: colours that colour-blind readers tell apart, readable in a column.
+
+Figure objects only: nothing here touches pyplot's global state, a display or a file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from matplotlib.patheffects import withStroke
+from numpy.typing import NDArray
+
+from tautscope.config import Config
+from tautscope.recording import Recording, Snapshot
+from tautscope.references import Segment
+from tautscope.results import estimated_loop, used_frames
+from tautscope.vision import MarkerDetector
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from tautscope.analysis import Analysis
+
+BLACK, GREY = "#222222", "#8a8a8a"
+BLUE, ORANGE, GREEN, PURPLE = "#0072b2", "#d55e00", "#009e73", "#aa4499"
+"""After Okabe and Ito (2008)."""
+
+COLUMN, PAGE = 3.5, 7.2
+"""Widths of a column and of a page [inch]."""
+
+_STYLE: dict[str, Any] = {
+    "font.size": 8,
+    "font.family": "DejaVu Sans",
+    "axes.titlesize": 8,
+    "axes.titlelocation": "left",
+    "axes.titleweight": "bold",
+    "axes.labelsize": 8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.6,
+    "xtick.labelsize": 7,
+    "ytick.labelsize": 7,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "legend.fontsize": 7,
+    "legend.frameon": False,
+    "lines.linewidth": 1.0,
+    "figure.constrained_layout.w_pad": 0.08,
+    "savefig.dpi": 200,
+    "pdf.fonttype": 42,
+}
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """Within it, figures are made and saved in the house style."""
+    with matplotlib.rc_context(_STYLE):  # type: ignore[arg-type]  # its stub lists every key
+        yield
+
+
+def figure9(uncompensated: Recording, compensated: Recording) -> Figure:
+    """The article's Fig. 9: one column per DOF.
+
+    (a)-(c): reference, command, estimate and both contact offsets over time, with compensation.
+    (d)-(f): estimate over command without, and over reference with compensation.
+    """
+    segments = compensated.segments
+    with style():
+        figure = Figure(figsize=(PAGE, 5.3), layout="constrained")
+        upper, lower = figure.subfigures(2, 1, height_ratios=(1, 1.12), squeeze=False).flat
+        for part, letters in ((upper, "abc"), (lower, "def")):
+            axes = part.subplots(1, len(segments), squeeze=False)[0]
+            for axis, letter, segment in zip(axes, letters, segments, strict=False):
+                if part is upper:
+                    _over_time(axis, compensated, segment)
+                else:
+                    _loops(axis, uncompensated, compensated, segment)
+                axis.set_title(f"({letter}) {segment.dof.label}")
+            lines, labels = axes[0].get_legend_handles_labels()
+            part.legend(lines, labels, loc="outside upper center", ncols=len(lines))
+    return figure
+
+
+def _over_time(axes: Axes, recording: Recording, segment: Segment) -> None:
+    dof = segment.dof
+    trace = recording.trace[recording.during(segment, 0, segment.periods)]
+    frames = used_frames(recording, segment)
+    for table, clock, name, label, colour, width in (
+        (trace, "time", "command", "command c", ORANGE, 0.8),
+        (trace, "time", "reference", "reference u", BLACK, 0.8),
+        (frames, "captured_at", "estimate", "estimate q̂", BLUE, 1.1),
+        (trace, "time", "delta_plus", "offset δ⁺", GREEN, 1.1),
+        (trace, "time", "delta_minus", "offset δ⁻", PURPLE, 1.1),
+    ):
+        axes.plot(
+            table[clock] - trace["time"][0],
+            table[f"{name}_{dof.label}"] * dof.display_scale,
+            color=colour,
+            linewidth=width,
+            label=label,
+        )
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel(f"{dof.label} [{dof.display_unit}]")
+    axes.set_xlim(0, segment.period * segment.periods)
+
+
+def _loops(axes: Axes, uncompensated: Recording, compensated: Recording, segment: Segment) -> None:
+    dof = segment.dof
+    for recording, name, label, colour in (
+        (uncompensated, "command", "uncompensated: q̂ over c", GREY),
+        (compensated, "reference", "compensated: q̂ over u", BLUE),
+    ):
+        x, y = estimated_loop(recording, segment, name, first=0)
+        scale = dof.display_scale
+        axes.plot(x * scale, y * scale, color=colour, linewidth=0.8, label=label)
+    low, high = zip(axes.get_xlim(), axes.get_ylim(), strict=True)
+    axes.axline((0, 0), slope=1, color=BLACK, linewidth=0.5, linestyle=(0, (4, 4)), zorder=0)
+    axes.set_xlabel(f"c or u [{dof.display_unit}]")
+    axes.set_ylabel(f"estimate q̂ [{dof.display_unit}]")
+    axes.set_box_aspect(1)
+    axes.set_xlim(min(low), max(high))
+    axes.set_ylim(min(low), max(high))
+
+
+def figure5(snapshot: Snapshot, config: Config) -> Figure:
+    """The article's Fig. 5: what the vision made of one frame.
+
+    (a) the frame, (b) the pixels above the discriminant's threshold, (c) the regions, the markers
+    among them named, (d) measured beside predicted features, magnified.
+    """
+    detector = MarkerDetector(config)
+    regions = detector.detect(snapshot.image, snapshot.predicted_features).regions
+    picture = np.ascontiguousarray(snapshot.image[:, :, ::-1])
+    measured, predicted = snapshot.features.reshape(2, 2), snapshot.predicted_features.reshape(2, 2)
+    with style():
+        figure = Figure(figsize=(PAGE, 6.1), layout="constrained")
+        axes = figure.subplots(2, 2).ravel()
+        axes[0].imshow(picture)
+        axes[1].imshow(detector.mask(snapshot.image), cmap="gray", interpolation="nearest")
+        axes[2].imshow(picture // 2 + 96)
+        for region in regions:
+            left, top, width, height = region.box
+            outline = Rectangle(
+                (left - 0.5, top - 0.5), width, height, fill=False, color=ORANGE, linewidth=1.0
+            )
+            axes[2].add_patch(outline)
+        away = (measured[1] - measured[0]) / np.hypot(*(measured[1] - measured[0]))
+        _name_marker(axes[2], "A", measured[0], -away)
+        _name_marker(axes[2], "B", measured[1], away)
+        axes[3].imshow(picture)
+        axes[3].plot(*predicted.T, "x", color="white", markersize=9, label="predicted s")
+        axes[3].plot(
+            *measured.T, "o", color=ORANGE, fillstyle="none", markersize=9, label="measured s*"
+        )
+        for begin, end in zip(predicted, measured, strict=True):
+            axes[3].plot(*np.array([begin, end]).T, color="white", linewidth=1.0)
+        _magnify(axes[3], np.concatenate([measured, predicted]), picture.shape)
+        axes[3].legend(loc="lower right", frameon=True, facecolor="#555555", labelcolor="white")
+        titles = ("frame", "mask", "regions and markers", "features, magnified")
+        for axis, letter, title in zip(axes, "abcd", titles, strict=True):
+            axis.set_title(f"({letter}) {title}")
+            axis.set_axis_off()
+    return figure
+
+
+def _name_marker(axes: Axes, name: str, at: NDArray[np.float64], away: NDArray[np.float64]) -> None:
+    """A cross at a marker [px], its name 26 points off in the direction `away` [px]."""
+    axes.plot(*at, "+", color=BLACK, markersize=8)
+    axes.annotate(
+        name,
+        (at[0], at[1]),
+        xytext=(26 * away[0], -26 * away[1]),
+        textcoords="offset points",
+        ha="center",
+        va="center",
+        color=BLACK,
+        fontsize=11,
+        fontweight="bold",
+        path_effects=[withStroke(linewidth=2.5, foreground="white")],
+        arrowprops={"arrowstyle": "-", "color": BLACK, "linewidth": 0.8},
+    )
+
+
+def _magnify(axes: Axes, points: NDArray[np.float64], shape: tuple[int, ...]) -> None:
+    """Show the points with room around them, in the proportions of the picture."""
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    span = np.ptp(points, axis=0) + 80
+    height = max(span[1], span[0] * shape[0] / shape[1])
+    half = np.array([height * shape[1] / shape[0], height]) / 2
+    axes.set_xlim(middle[0] - half[0], middle[0] + half[0])
+    axes.set_ylim(middle[1] + half[1], middle[1] - half[1])
+
+
+def analysis_figure(found: Analysis) -> Figure:
+    """A record and what the estimator made of it: signals and offsets in order, and the loop.
+
+    The horizontal axis is the record's time if it was read, and counts samples if not.
+    """
+    command, measured, time = found.record.command, found.record.measured, found.record.time
+    at = np.arange(len(command)) if time is None else time
+    with style():
+        figure = Figure(figsize=(PAGE, 3.6), layout="constrained")
+        grid = figure.add_gridspec(2, 2, width_ratios=(2, 1.15), height_ratios=(1.6, 1))
+        signals = figure.add_subplot(grid[0, 0])
+        offsets = figure.add_subplot(grid[1, 0], sharex=signals)
+        loop = figure.add_subplot(grid[:, 1])
+        signals.plot(at, command, color=ORANGE, linewidth=0.8, label="command")
+        signals.plot(at, measured, color=BLACK, linewidth=0.9, label="measured")
+        signals.plot(at, found.predicted, color=BLUE, linewidth=0.9, label="predicted")
+        signals.set_title("Signals")
+        signals.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=3, borderaxespad=0.2)
+        signals.tick_params(labelbottom=False)
+        signals.margins(x=0)
+        offsets.plot(at, found.delta_plus, color=GREEN, label="δ⁺")
+        offsets.plot(at, found.delta_minus, color=PURPLE, label="δ⁻")
+        offsets.set_title("Contact offsets, input minus output")
+        offsets.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, borderaxespad=0.2)
+        offsets.set_xlabel("sample" if time is None else "time [s]")
+        half = len(command) // 2
+        loop.plot(command[half:], measured[half:], color=BLACK, linewidth=0.8, label="measured")
+        loop.plot(
+            command[half:], found.predicted[half:], color=BLUE, linewidth=0.8, label="predicted"
+        )
+        loop.set_title("Loop, second half")
+        loop.legend(loc="upper left")
+        loop.set_xlabel("command")
+        loop.set_ylabel("tip")
+    return figure

@@ -1,0 +1,41 @@
+"""Progress on stderr: a bar in a terminal, plain lines elsewhere."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+
+@contextmanager
+def progress_bar(title: str) -> Iterator[Callable[[float], None]]:
+    """Yields a function to tell the share of the work that is done, 0 to 1."""
+    if not sys.stderr.isatty():
+        yield _lines(title)
+        return
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(title, total=1.0)
+        yield lambda share: bar.update(task, completed=share)
+
+
+def _lines(title: str) -> Callable[[float], None]:
+    """One line at the start and at every tenth of the way."""
+    told = -1
+
+    def tell(share: float) -> None:
+        nonlocal told
+        tenth = int(share * 10 + 1e-9)
+        if tenth > told:
+            told = tenth
+            print(f"{title}: {10 * tenth} %", file=sys.stderr, flush=True)
+
+    return tell

@@ -1,0 +1,215 @@
+"""What a run leaves behind: every tick, every frame, and the configuration they came from."""
+
+from __future__ import annotations
+
+import csv
+import tomllib
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+import tomli_w
+from numpy.typing import NDArray
+
+from tautscope.config import Config, dump_config, load_config
+from tautscope.dof import Dof
+from tautscope.errors import MissingPathError, RecordError
+from tautscope.output import new_folder
+from tautscope.references import Segment
+
+Floats = NDArray[np.float64]
+Table = NDArray[np.void]
+
+FEATURES = ("a_x", "a_y", "b_x", "b_y")
+"""The order of every (4,) array of features."""
+
+
+def _names(groups: list[str], members: list[str]) -> list[str]:
+    return [f"{group}_{member}" for group in groups for member in members]
+
+
+_DOFS = [dof.label for dof in Dof]
+TRACE_COLUMNS = np.dtype(
+    [("time", "f8")]
+    + [
+        (name, "f8")
+        for name in _names(
+            ["reference", "command", "applied", "estimate", "true", "delta_minus", "delta_plus"],
+            _DOFS,
+        )
+    ]
+    + [("status", "U16")]
+)
+FRAME_COLUMNS = np.dtype(
+    [("captured_at", "f8"), ("arrived_at", "f8"), ("sequence", "i8")]
+    + [("status", "U16"), ("valid", "?")]
+    + [(name, "f8") for name in _names(["estimate", "predicted", "true"], _DOFS)]
+    + [(name, "?") for name in _names(["observable"], _DOFS)]
+    + [
+        (name, "f8")
+        for name in _names(
+            ["features", "predicted_features", "innovation", "true_features"], list(FEATURES)
+        )
+    ]
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """One frame of a run and what the vision measured in it, for a figure.
+
+    Attributes:
+        image: uint8 (height, width, 3), BGR.
+        captured_at: [s, the rig's clock].
+        features: (4,) measured features [px]; NaN if they were not found.
+        predicted_features: (4,) [px].
+    """
+
+    image: NDArray[np.uint8]
+    captured_at: float
+    features: Floats
+    predicted_features: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A run.
+
+    Attributes:
+        trace: Structured array, one row per control tick: `time` [s, the rig's clock]; per DOF
+            [m, rad, rad] `reference_*`, `command_*` (given at this time), `applied_*` and
+            `true_*` (at this time; truth is NaN if the rig has none), `estimate_*`,
+            `delta_minus_*`, `delta_plus_*` (of the newest frame); `status` of that frame.
+        frames: Structured array, one row per image: `captured_at`, `arrived_at` [s], `sequence`,
+            `status`, `valid`; per DOF `estimate_*`, `predicted_*`, `true_*` (at the capture time,
+            interpolated), `observable_*`; per feature [px] `features_*`, `predicted_features_*`,
+            `innovation_*`, `true_features_*`.
+        config: As used.
+        compensated: Whether the compensator was on.
+        segments: Which DOF moved when.
+        snapshot: One frame from about the middle; not saved.
+    """
+
+    trace: Table
+    frames: Table
+    config: Config
+    compensated: bool
+    segments: tuple[Segment, ...]
+    snapshot: Snapshot | None = None
+
+    def during(self, segment: Segment, first: float, last: float) -> NDArray[np.bool_]:
+        """(ticks,) which rows of the trace lie in periods `first` to `last` of a segment."""
+        return _between(self.trace["time"], self._clock(segment), segment, first, last)
+
+    def frames_during(self, segment: Segment, first: float, last: float) -> NDArray[np.bool_]:
+        """(frames,) which frames were captured in periods `first` to `last` of a segment."""
+        return _between(self.frames["captured_at"], self._clock(segment), segment, first, last)
+
+    def _clock(self, segment: Segment) -> float:
+        return float(self.trace["time"][0]) + segment.start
+
+    def save(self, folder: str | PathLike[str]) -> None:
+        """Make `folder` with trace.csv, frames.csv, recording.toml and config.toml, or nothing.
+
+        Raises:
+            OutputError: The folder holds something already, or cannot be written.
+        """
+        with new_folder(folder) as place:
+            self.write(place)
+
+    def write(self, folder: Path, suffix: str = "") -> None:
+        """Write the files of `save` into a folder that is there; `suffix` goes on their names."""
+        write_csv(folder / f"trace{suffix}.csv", self.trace)
+        write_csv(folder / f"frames{suffix}.csv", self.frames)
+        segments = [
+            {
+                "dof": segment.dof.label,
+                "start": segment.start,
+                "period": segment.period,
+                "periods": segment.periods,
+            }
+            for segment in self.segments
+        ]
+        facts = tomli_w.dumps({"compensated": self.compensated, "segments": segments})
+        (folder / f"recording{suffix}.toml").write_text(facts, encoding="utf-8")
+        (folder / "config.toml").write_text(dump_config(self.config), encoding="utf-8")
+
+    @classmethod
+    def load(cls, folder: str | PathLike[str], suffix: str = "") -> Recording:
+        """Read what `save` wrote; equal to the last bit, but without the snapshot.
+
+        Raises:
+            MissingPathError: A file is not there.
+            RecordError: A file is not as `save` writes it.
+        """
+        place = Path(folder)
+        facts_file = place / f"recording{suffix}.toml"
+        if not facts_file.is_file():
+            raise MissingPathError("recording", str(facts_file), "a file of a saved recording")
+        try:
+            facts = tomllib.loads(facts_file.read_text(encoding="utf-8"))
+            segments = tuple(
+                Segment(Dof[item["dof"].upper()], item["start"], item["period"], item["periods"])
+                for item in facts["segments"]
+            )
+            compensated = bool(facts["compensated"])
+        except (tomllib.TOMLDecodeError, KeyError, TypeError, AttributeError) as error:
+            allowed = f"compensated and segments ({error})"
+            raise RecordError("recording", str(facts_file), allowed) from None
+        return cls(
+            trace=read_csv(place / f"trace{suffix}.csv", TRACE_COLUMNS),
+            frames=read_csv(place / f"frames{suffix}.csv", FRAME_COLUMNS),
+            config=load_config(place / "config.toml"),
+            compensated=compensated,
+            segments=segments,
+        )
+
+
+def per_dof(table: Table, group: str) -> Floats:
+    """(n, 3) the columns ``<group>_insertion``, ``_rotation``, ``_bending`` of a table."""
+    return np.stack([table[f"{group}_{dof.label}"] for dof in Dof], axis=1)
+
+
+def per_feature(table: Table, group: str) -> Floats:
+    """(n, 4) the columns ``<group>_a_x`` to ``<group>_b_y`` of a table [px]."""
+    return np.stack([table[f"{group}_{name}"] for name in FEATURES], axis=1)
+
+
+def write_csv(path: Path, table: Table) -> None:
+    """A structured array as CSV with a header; numbers in full, so that they read back equal."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(table.dtype.names or ())
+        writer.writerows(table.tolist())
+
+
+def read_csv(path: Path, dtype: np.dtype[np.void]) -> Table:
+    """Read back what `write_csv` wrote.
+
+    Raises:
+        MissingPathError: There is no such file.
+        RecordError: Its columns or cells are others.
+    """
+    if not path.is_file():
+        raise MissingPathError("recording", str(path), "a file of a saved recording")
+    with path.open(newline="", encoding="utf-8") as file:
+        header, *rows = list(csv.reader(file)) or [[]]
+    names = dtype.names or ()
+    if tuple(header) != names:
+        raise RecordError(str(path), ",".join(header), f"the columns {', '.join(names)}")
+    table = np.empty(len(rows), dtype)
+    try:
+        columns = list(zip(*rows, strict=True)) or [()] * len(names)
+        for name, column in zip(names, columns, strict=True):
+            is_flag = dtype[name].kind == "b"
+            table[name] = [cell == "True" for cell in column] if is_flag else column
+    except ValueError as error:
+        raise RecordError(str(path), str(error), "a number in every cell") from None
+    return table
+
+
+def _between(
+    time: Floats, start: float, segment: Segment, first: float, last: float
+) -> NDArray[np.bool_]:
+    return (time >= start + first * segment.period) & (time <= start + last * segment.period)

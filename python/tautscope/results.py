@@ -1,0 +1,178 @@
+"""Two runs to one Table 1: the figures per DOF and seed, their medians and the worst."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tautscope import metrics
+from tautscope.dof import Dof
+from tautscope.recording import Recording, Table, per_feature
+from tautscope.references import Segment
+
+LAST_PERIODS = 2
+"""Loop widths are read over this many periods at the end of a segment."""
+
+
+@dataclass(frozen=True, slots=True)
+class DofResult:
+    """What two runs, without and with compensation, say about one DOF [m or rad].
+
+    Widths are of y over x in the last two periods of the DOF's segment; x is the command without
+    and the reference with compensation; y is the true tip, or the estimate where the name says so.
+    NaN where the rig has no truth.
+
+    Attributes:
+        uncompensated: Mean width without compensation.
+        uncompensated_max: Largest width without compensation.
+        compensated: Mean width with compensation.
+        compensated_max: Largest width with compensation.
+        reduction: 1 - compensated / uncompensated, of the mean widths.
+        reduction_max: The same of the largest widths.
+        uncompensated_estimate: Mean width without compensation, as the camera sees it.
+        compensated_estimate: Mean width with compensation, as the camera sees it.
+        reduction_estimate: The reduction, as the camera sees it; this is the article's.
+        start_periods: Periods until the compensated mean width stays within 1.2 times its last.
+        tracking_rms: RMS of (true tip - reference) after the start, with compensation.
+        state_rms: RMS of (state_estimate - true_state at the capture time) over all frames of the
+            whole compensated run that measured this DOF.
+        marker_rms_px: RMS distance of measured from true features in the DOF's segment [px].
+        frames_used: Share of the segment's frames that measured this DOF.
+        tip_overspeed: 99.9th percentile of |tip speed| over the peak of |reference speed|.
+        actuator_gain: Largest |change of command| over |change of reference|.
+    """
+
+    uncompensated: float
+    uncompensated_max: float
+    compensated: float
+    compensated_max: float
+    reduction: float
+    reduction_max: float
+    uncompensated_estimate: float
+    compensated_estimate: float
+    reduction_estimate: float
+    start_periods: float
+    tracking_rms: float
+    state_rms: float
+    marker_rms_px: float
+    frames_used: float
+    tip_overspeed: float
+    actuator_gain: float
+
+
+Results = dict[Dof, DofResult]
+
+
+def evaluate(uncompensated: Recording, compensated: Recording) -> Results:
+    """The figures of every DOF that has a segment of its own."""
+    return {
+        segment.dof: _dof_result(segment, uncompensated, compensated)
+        for segment in compensated.segments
+    }
+
+
+def combine(results: Sequence[Results], how: dict[str, str] | str) -> Results:
+    """One figure from several seeds: ``"median"``, or per name ``"min"``, ``"max"``, ``"median"``.
+
+    Seeds for which a figure is not known do not count.
+    """
+    names = DofResult.__dataclass_fields__
+    return {
+        dof: DofResult(
+            **{
+                name: _combined(
+                    [getattr(result[dof], name) for result in results],
+                    how if isinstance(how, str) else how[name],
+                )
+                for name in names
+            }
+        )
+        for dof in results[0]
+    }
+
+
+def _combined(values: list[float], how: str) -> float:
+    known = [value for value in values if not np.isnan(value)]
+    if not known:
+        return np.nan
+    if how == "median":
+        return float(np.median(known))
+    return max(known) if how == "max" else min(known)
+
+
+def true_loop(
+    recording: Recording, segment: Segment, x: str
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """X (``"command"`` or ``"reference"``) and the true tip over a segment's last two periods."""
+    rows = recording.during(segment, segment.periods - LAST_PERIODS, segment.periods)
+    label = segment.dof.label
+    return recording.trace[f"{x}_{label}"][rows], recording.trace[f"true_{label}"][rows]
+
+
+def estimated_loop(
+    recording: Recording, segment: Segment, x: str, first: float | None = None
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """X and the estimate at the capture times of the frames that measured the DOF.
+
+    From period `first` of the segment to its end; without it, its last two periods.
+    """
+    begin = segment.periods - LAST_PERIODS if first is None else first
+    frames = used_frames(recording, segment, begin)
+    label, trace = segment.dof.label, recording.trace
+    at_capture = np.interp(frames["captured_at"], trace["time"], trace[f"{x}_{label}"])
+    return at_capture, frames[f"estimate_{label}"]
+
+
+def used_frames(recording: Recording, segment: Segment, first: float = 0) -> Table:
+    """The frames that measured a segment's DOF, from its period `first` to its end."""
+    inside = recording.frames_during(segment, first, segment.periods)
+    frames: Table = recording.frames[inside & recording.frames[f"observable_{segment.dof.label}"]]
+    return frames
+
+
+def _dof_result(segment: Segment, uncompensated: Recording, compensated: Recording) -> DofResult:
+    label = segment.dof.label
+    before = metrics.loop_width(*true_loop(uncompensated, segment, "command"))
+    after = metrics.loop_width(*true_loop(compensated, segment, "reference"))
+    seen_before = metrics.loop_width(*estimated_loop(uncompensated, segment, "command"))
+    seen_after = metrics.loop_width(*estimated_loop(compensated, segment, "reference"))
+
+    rows = compensated.trace[compensated.during(segment, 0, segment.periods)]
+    time, reference, truth = rows["time"], rows[f"reference_{label}"], rows[f"true_{label}"]
+    start = metrics.start_periods(
+        metrics.period_widths(
+            time,
+            reference,
+            truth,
+            start=float(compensated.trace["time"][0]) + segment.start,
+            period=segment.period,
+            periods=segment.periods,
+        )
+    )
+    settled = compensated.trace[compensated.during(segment, np.nan_to_num(start), segment.periods)]
+    frames = compensated.frames[compensated.frames[f"observable_{label}"]]
+    own_used = used_frames(compensated, segment)
+    own_count = int(compensated.frames_during(segment, 0, segment.periods).sum())
+    return DofResult(
+        uncompensated=before.mean,
+        uncompensated_max=before.max,
+        compensated=after.mean,
+        compensated_max=after.max,
+        reduction=metrics.reduction(before.mean, after.mean),
+        reduction_max=metrics.reduction(before.max, after.max),
+        uncompensated_estimate=seen_before.mean,
+        compensated_estimate=seen_after.mean,
+        reduction_estimate=metrics.reduction(seen_before.mean, seen_after.mean),
+        start_periods=start,
+        tracking_rms=metrics.tracking_rms(settled[f"reference_{label}"], settled[f"true_{label}"]),
+        state_rms=metrics.state_rms(frames[f"estimate_{label}"], frames[f"true_{label}"]),
+        marker_rms_px=metrics.marker_rms(
+            per_feature(own_used, "features"), per_feature(own_used, "true_features")
+        ),
+        frames_used=len(own_used) / own_count if own_count else np.nan,
+        tip_overspeed=metrics.tip_overspeed(time, reference, truth),
+        actuator_gain=metrics.actuator_gain(reference, rows[f"command_{label}"]),
+    )

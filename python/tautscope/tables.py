@@ -1,0 +1,166 @@
+"""Table 1 as people and programs read it: text, CSV, JSON. The article beside ours."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from tautscope.dof import Dof
+from tautscope.results import DofResult, Results, combine
+
+Worst = Literal["min", "max"]
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One line of the table.
+
+    Attributes:
+        name: Field of `DofResult`.
+        title: For people.
+        kind: ``length`` is in the DOF's unit, ``share`` is printed in percent, ``number`` and
+            ``count`` are as they are.
+        worst: Which end is the bad one.
+        in_summary: Whether ``--json`` names it.
+    """
+
+    name: str
+    title: str
+    kind: Literal["length", "share", "number", "count"]
+    worst: Worst = "max"
+    in_summary: bool = False
+
+
+ROWS = (
+    Row("uncompensated", "uncompensated width", "length", in_summary=True),
+    Row("uncompensated_max", "uncompensated width, largest", "length"),
+    Row("compensated", "compensated width", "length", in_summary=True),
+    Row("compensated_max", "compensated width, largest", "length"),
+    Row("reduction", "reduction", "share", "min", in_summary=True),
+    Row("reduction_max", "reduction of the largest width", "share", "min", in_summary=True),
+    Row("uncompensated_estimate", "uncompensated width, by camera", "length"),
+    Row("compensated_estimate", "compensated width, by camera", "length"),
+    Row("reduction_estimate", "reduction, by camera", "share", "min"),
+    Row("start_periods", "periods until settled", "count", in_summary=True),
+    Row("tracking_rms", "tracking error, RMS", "length", in_summary=True),
+    Row("state_rms", "state error, RMS", "length", in_summary=True),
+    Row("marker_rms_px", "marker error, RMS [px]", "number", in_summary=True),
+    Row("frames_used", "frames used", "share", "min"),
+    Row("tip_overspeed", "tip overspeed", "number"),
+    Row("actuator_gain", "actuator gain", "number"),
+)
+
+ARTICLE: dict[str, dict[Dof, float]] = {
+    "uncompensated": {Dof.INSERTION: 10e-3, Dof.ROTATION: 1.8, Dof.BENDING: 1.1},
+    "compensated": {Dof.INSERTION: 2.5e-3, Dof.ROTATION: 0.4, Dof.BENDING: 0.3},
+    "reduction": {Dof.INSERTION: 0.75, Dof.ROTATION: 0.78, Dof.BENDING: 0.73},
+}
+"""Table 1 of the article [m or rad, fraction]."""
+
+
+def median(results: Sequence[Results]) -> Results:
+    """The median over seeds of every figure."""
+    return combine(results, "median")
+
+
+def worst(results: Sequence[Results]) -> Results:
+    """The worst seed of every figure, each figure for itself."""
+    return combine(results, {row.name: row.worst for row in ROWS})
+
+
+def in_display_unit(row: Row, dof: Dof, value: float) -> float:
+    """A figure [m or rad] in the unit people read."""
+    return value * dof.display_scale if row.kind == "length" else value
+
+
+def heading(dof: Dof) -> str:
+    """The title of a DOF's columns, with the unit of its lengths."""
+    return f"{dof.label} [{dof.display_unit}]"
+
+
+def cell(row: Row, dof: Dof, value: float) -> str:
+    """A figure as text, in the unit of the column or the row; a dash if it is not known."""
+    if math.isnan(value):
+        return "-"
+    if row.kind == "share":
+        return f"{100 * value:.0f} %"
+    if row.kind == "count":
+        return f"{value:g}"
+    shown = in_display_unit(row, dof, value)
+    return f"{shown:.3g}" if abs(shown) >= 1 else f"{shown:.2g}"
+
+
+def article_cell(row: Row, dof: Dof) -> str:
+    """The article's figure as its Table 1 prints it, or nothing."""
+    value = ARTICLE.get(row.name, {}).get(dof)
+    return "" if value is None else cell(row, dof, value)
+
+
+def write_csv(path: Path, seeds: Sequence[int], results: Sequence[Results]) -> None:
+    """table1.csv: per DOF the article, every seed, the median and the worst, in display units."""
+    lines: list[tuple[str, Results]] = [
+        *((f"seed {seed}", result) for seed, result in zip(seeds, results, strict=True)),
+        ("median", median(results)),
+        ("worst", worst(results)),
+    ]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["dof", "unit", "source", *(row.name for row in ROWS)])
+        for dof in results[0]:
+            article = [_number(row, dof, ARTICLE.get(row.name, {}).get(dof)) for row in ROWS]
+            writer.writerow([dof.label, dof.display_unit, "article", *article])
+            for source, result in lines:
+                values = [_number(row, dof, getattr(result[dof], row.name)) for row in ROWS]
+                writer.writerow([dof.label, dof.display_unit, source, *values])
+
+
+def to_json(
+    profile: str,
+    seeds: Sequence[int],
+    results: Sequence[Results],
+    sim_seconds: float,
+    wall_seconds: float,
+) -> dict[str, Any]:
+    """What ``tautscope demo --json`` prints; a figure that is not known is None.
+
+    Medians over the seeds; under ``worst`` the worst seed of each figure. Insertion in mm.
+    """
+    middle, bad = median(results), worst(results)
+    return {
+        "profile": profile,
+        "seeds": list(seeds),
+        "dof": {
+            dof.label: {
+                "unit": dof.display_unit,
+                **_summary(dof, middle[dof]),
+                "worst": _summary(dof, bad[dof]),
+            }
+            for dof in results[0]
+        },
+        "sim_seconds": sim_seconds,
+        "wall_seconds": wall_seconds,
+    }
+
+
+def _summary(dof: Dof, result: DofResult) -> dict[str, float | None]:
+    values = asdict(result)
+    return {
+        row.name: finite_or_none(in_display_unit(row, dof, values[row.name]))
+        for row in ROWS
+        if row.in_summary
+    }
+
+
+def finite_or_none(value: float) -> float | None:
+    """The value, or None where JSON has no word for it."""
+    return value if math.isfinite(value) else None
+
+
+def _number(row: Row, dof: Dof, value: float | None) -> str:
+    if value is None or math.isnan(value):
+        return ""
+    return f"{in_display_unit(row, dof, value):.6g}"

@@ -1,0 +1,18 @@
+"""The rig of examples/own_rig.py, for tests and for the worker processes they start."""
+
+import sys
+from pathlib import Path
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+sys.path.insert(0, str(EXAMPLES))  # spawned workers inherit the path
+
+from own_rig import SLACK, DrawnRig, short_experiment  # noqa: E402
+
+__all__ = ["EXAMPLES", "SLACK", "BadFrameRig", "DrawnRig", "short_experiment"]
+
+
+class BadFrameRig(DrawnRig):
+    """Its camera is not the configured one."""
+
+    def _picture(self):  # noqa: ANN202
+        return super()._picture()[:-1]

@@ -1,0 +1,85 @@
+"""Configuration: what it takes, what it refuses, and how it says so."""
+
+from pathlib import Path
+
+import pytest
+from tautscope.config import Config, dump_config, from_document, load_config
+from tautscope.dof import Dof
+from tautscope.errors import ConfigError, MissingPathError
+
+
+def loaded(tmp_path: Path, text: str) -> Config:
+    file = tmp_path / "config.toml"
+    file.write_text(text, encoding="utf-8")
+    return load_config(file)
+
+
+def test_defaults_are_the_articles_protocol() -> None:
+    config = load_config()
+    assert config.experiment.periods == 5
+    for dof in Dof:
+        assert config[dof].free_gain == 5.0
+        assert config[dof].delta_minus == config[dof].delta_plus == 0.0
+
+
+def test_what_is_written_reads_back_equal(tmp_path: Path) -> None:
+    config = Config().replace(**{"twin.seed": 7, "insertion.free_gain": 3.5})
+    assert loaded(tmp_path, dump_config(config)) == config
+
+
+def test_a_file_names_only_what_it_changes(tmp_path: Path) -> None:
+    config = loaded(tmp_path, "[rotation]\nfree_gain = 4\n[camera.camera_from_guide]\n")
+    assert config == Config().replace(**{"rotation.free_gain": 4.0})
+
+
+@pytest.mark.parametrize(
+    ("text", "field", "value"),
+    [
+        ("[insertion]\nfree_gian = 5", "insertion.free_gian", 5),
+        ("colour = 1", "colour", 1),
+        ("[rotation]\nfree_gain = 0.5", "rotation.free_gain", 0.5),
+        ("[rotation]\nfree_gain = 6.0", "rotation.free_gain", 6.0),
+        ("[bending]\nsmoothing_factor = 1.0", "bending.smoothing_factor", 1.0),
+        ("[bending]\nupdate_distance = nan", "bending.update_distance", None),
+        ("[bending]\ndelta_minus = 0.1", "bending.delta_minus", 0.1),
+        ("[camera]\nwidth = '720'", "camera.width", "720"),
+        ("[camera]\ncx = inf", "camera.cx", float("inf")),
+        ("[camera]\ndistortion = [0.1]", "camera.distortion", [0.1]),
+        ("[twin]\nseed = -1", "twin.seed", -1),
+        ("[experiment]\nperiods = 2", "experiment.periods", 2),
+        ("[experiment.bending]\namplitude = 0.0", "experiment.bending.amplitude", 0.0),
+        ("[instrument]\nmarker_a = 14e-3", "instrument.marker_a", 14e-3),
+        ("[instrument]\ntip_length = 16e-3", "instrument.marker_b", 15e-3),
+        ("[control]\nperiod = 1e-4", "control.history", 2.0),
+        ("insertion = 3", "insertion", 3),
+    ],
+)
+def test_a_bad_value_is_named(tmp_path: Path, text: str, field: str, value: object) -> None:
+    with pytest.raises(ConfigError) as error:
+        loaded(tmp_path, text)
+    assert error.value.field == field
+    if value is not None:
+        assert error.value.value == value
+    assert error.value.allowed
+
+
+def test_a_file_that_is_not_toml_or_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"config: got '.*config\.toml', expected TOML"):
+        loaded(tmp_path, "insertion = [")
+    with pytest.raises(MissingPathError, match=r"config: got '.*none\.toml'"):
+        load_config(tmp_path / "none.toml")
+    with pytest.raises(MissingPathError):
+        load_config(tmp_path)
+
+
+def test_changes_are_checked_and_leave_the_original() -> None:
+    config = Config()
+    with pytest.raises(ConfigError, match=r"twin\.seeds: got 1, expected no such key"):
+        config.replace(**{"twin.seeds": 1})
+    assert config == Config()
+    with pytest.raises(AttributeError):
+        config.twin.seed = 3  # type: ignore[misc]
+
+
+def test_an_empty_document_is_the_default() -> None:
+    assert from_document({}) == Config()

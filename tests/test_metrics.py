@@ -1,0 +1,179 @@
+"""The figures' definitions, checked on signals whose answer is known beforehand."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import ArrayLike, NDArray
+from play_model import play
+from tautscope import metrics
+from tautscope.errors import SignalError
+
+TWO_PERIODS = np.linspace(0, 4 * np.pi, 4001)
+
+
+def settled_loop(
+    amplitude: float, delta_minus: float, delta_plus: float, centre: float = 0.0
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    x = centre + amplitude * np.sin(np.linspace(0, 6 * np.pi, 6001))
+    y = play(x, delta_minus, delta_plus)
+    return x[2000:], y[2000:]
+
+
+@given(
+    amplitude=st.floats(0.01, 100),
+    slack=st.floats(0.01, 0.8),
+    offset=st.floats(-5, 5),
+    centre=st.floats(-10, 10),
+)
+@settings(max_examples=60, deadline=None)
+def test_width_of_a_play_is_the_difference_of_its_offsets(
+    amplitude: float, slack: float, offset: float, centre: float
+) -> None:
+    width = 2 * amplitude * slack
+    x, y = settled_loop(amplitude, offset, offset + width, centre)
+    loop = metrics.loop_width(x, y)
+    assert loop.mean == pytest.approx(width, rel=1e-3)
+    assert loop.max == pytest.approx(width, rel=3e-3)
+    assert float(loop) == loop.mean
+
+
+@given(scale=st.floats(0.1, 10), shift=st.floats(-5, 5), other=st.floats(-5, 5))
+@settings(max_examples=40, deadline=None)
+def test_width_scales_with_the_input_and_ignores_shifts(
+    scale: float, shift: float, other: float
+) -> None:
+    x, y = settled_loop(1.0, -0.3, 0.2)
+    plain = metrics.loop_width(x, y)
+    moved = metrics.loop_width(scale * x + shift, 3 * scale * y + other)
+    assert moved.mean == pytest.approx(scale * plain.mean, rel=1e-6)
+    assert moved.max == pytest.approx(scale * plain.max, rel=1e-6)
+
+
+def test_a_leading_output_has_a_negative_width() -> None:
+    x, y = settled_loop(1.0, -0.2, 0.2)
+    ahead = metrics.loop_width(y, x)
+    assert ahead.mean < 0
+    assert metrics.loop_width(x, x).mean == pytest.approx(0, abs=1e-12)
+
+
+def test_a_repeated_sample_changes_nothing() -> None:
+    x, y = settled_loop(1.0, -0.2, 0.4)
+    plain = metrics.loop_width(x, y)
+    repeated = metrics.loop_width(np.repeat(x, 3), np.repeat(y, 3))
+    np.testing.assert_allclose(repeated.widths, plain.widths, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_noise_in_the_output_does_not_close_the_loop(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    x, y = settled_loop(15.0, -5.0, 5.0)
+    noisy = metrics.loop_width(x, y + rng.normal(0, 0.15, len(y)))
+    assert noisy.mean == pytest.approx(10.0, abs=0.2), f"seed {seed}"
+    assert noisy.max < 11.0, f"seed {seed}"
+
+
+def test_uneven_width_shows_as_maximum() -> None:
+    """An ellipse is widest in the middle: y = sin(t), x = sin(t + lag)."""
+    lag = 0.3
+    loop = metrics.loop_width(np.sin(TWO_PERIODS + lag), np.sin(TWO_PERIODS))
+    level = np.linspace(-0.8, 0.8, 41)
+    np.testing.assert_allclose(loop.widths, 2 * np.sin(lag) * np.sqrt(1 - level**2), atol=1e-5)
+    assert loop.max == pytest.approx(2 * np.sin(lag), abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("x", "y"),
+    [
+        (TWO_PERIODS, np.zeros_like(TWO_PERIODS)),
+        (TWO_PERIODS, TWO_PERIODS),
+        (TWO_PERIODS, np.full_like(TWO_PERIODS, np.nan)),
+        ([], []),
+    ],
+    ids=["still", "one way", "unknown", "empty"],
+)
+def test_what_is_no_loop_has_no_width(x: ArrayLike, y: ArrayLike) -> None:
+    loop = metrics.loop_width(x, y)
+    assert math.isnan(loop.mean)
+    assert math.isnan(loop.max)
+
+
+def test_signals_of_different_length_are_refused() -> None:
+    with pytest.raises(SignalError, match="y: got '3 samples', expected as many as x: 2"):
+        metrics.loop_width([0, 1], [0, 1, 2])
+    with pytest.raises(SignalError, match="x: got"):
+        metrics.loop_width([[0, 1]], [0, 1])
+
+
+def test_reduction_is_the_share_that_is_gone() -> None:
+    assert metrics.reduction(10.0, 2.5) == pytest.approx(0.75)
+    assert math.isnan(metrics.reduction(0.0, 1.0))
+    loop = metrics.loop_width(*settled_loop(1.0, -0.2, 0.2))
+    assert metrics.reduction(loop, loop) == 0
+
+
+@pytest.mark.parametrize(
+    ("widths", "expected"),
+    [
+        ([1, 1, 1], 0),
+        ([9, 1.1, 1], 1),
+        ([1, 9, 1.1, 1], 2),
+        ([9, 8, 7, 6, 1], 4),
+        ([math.nan, 1, 1], 1),
+        ([-1, -1], 0),
+    ],
+)
+def test_start_counts_the_periods_before_the_settled_ones(
+    widths: list[float], expected: float
+) -> None:
+    assert metrics.start_periods(widths) == expected
+
+
+def test_start_of_an_unknown_end_is_unknown() -> None:
+    assert math.isnan(metrics.start_periods([1.0, math.nan]))
+    assert math.isnan(metrics.start_periods([]))
+
+
+def test_widths_per_period_see_a_play_that_shrinks() -> None:
+    time = np.arange(5001) * 1e-3
+    x = np.sin(2 * np.pi * time)
+    y = np.empty_like(x)
+    last = 0.0
+    for index, value in enumerate(x):
+        half = 0.4 if time[index] < 3.25 else 0.1
+        last = y[index] = min(max(last, value - half), value + half)
+    widths = metrics.period_widths(time, x, y, start=0.0, period=1.0, periods=5)
+    np.testing.assert_allclose(widths[[0, 1, 2, 4]], [0.8, 0.8, 0.8, 0.2], rtol=1e-2)
+    assert metrics.start_periods(widths) == 4
+    whole = [metrics.loop_width(x[k : k + 1001], y[k : k + 1001]) for k in range(0, 5000, 1000)]
+    np.testing.assert_array_equal(widths, [loop.mean for loop in whole])
+
+
+def test_rms_of_a_constant_error_is_that_error() -> None:
+    reference = np.sin(TWO_PERIODS)
+    assert metrics.tracking_rms(reference, reference - 0.25) == pytest.approx(0.25)
+    assert metrics.state_rms([1.0, np.nan, 3.0], [0.0, 0.0, 4.0]) == pytest.approx(1.0)
+    assert math.isnan(metrics.state_rms([], []))
+
+
+def test_overspeed_is_the_ratio_of_speeds() -> None:
+    time = TWO_PERIODS
+    assert metrics.tip_overspeed(time, np.sin(time), 3 * np.sin(time)) == pytest.approx(3, rel=1e-5)
+    assert math.isnan(metrics.tip_overspeed(time, np.zeros_like(time), time))
+
+
+def test_actuator_gain_is_the_largest_ratio_of_steps() -> None:
+    assert metrics.actuator_gain([0, 1, 2, 1], [0, 1, 2, -3]) == pytest.approx(5.0)
+    assert metrics.actuator_gain([0, 1, 1.1], [0, 1, 1.7]) == pytest.approx(7.0)
+    assert metrics.actuator_gain([0, 1, 1 + 1e-12], [0, 1, 1 + 1e-10]) == pytest.approx(1.0)
+    assert metrics.actuator_gain([0, 1, 1], [0, 1, 1.5]) == math.inf
+    assert math.isnan(metrics.actuator_gain([0, 0], [0, 0]))
+
+
+def test_marker_errors_are_distances_per_marker() -> None:
+    measured = np.array([[0, 0, 10, 10], [3, 4, 10, 10], [np.nan] * 4], dtype=float)
+    truth = np.array([[0, 0, 10, 10]] * 3, dtype=float)
+    np.testing.assert_array_equal(metrics.marker_errors(measured[:2], truth[:2]), [[0, 0], [5, 0]])
+    assert metrics.marker_rms(measured, truth) == pytest.approx(2.5)

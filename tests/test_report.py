@@ -1,0 +1,156 @@
+"""The report stands alone; the figures are drawn without anyone's global state."""
+
+import base64
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import matplotlib
+import numpy as np
+import pytest
+from drawn import DrawnRig, short_experiment
+from matplotlib.figure import Figure
+from tautscope import figures, tables
+from tautscope.demo import Demo
+from tautscope.dof import Dof
+from tautscope.experiment import run_experiment
+from tautscope.recording import Recording
+from tautscope.references import SineSequence
+from tautscope.report import Picture, demo_report
+from tautscope.results import DofResult, evaluate
+from tautscope.tables import ROWS, article_cell, cell
+
+VOID = {"meta", "img", "br"}
+
+
+class Page(HTMLParser):
+    """What a page is made of; complains if a tag is not closed."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.tags: list[str] = []
+        self.links: list[str] = []
+        self.text = ""
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        if tag not in VOID:
+            self.open.append(tag)
+        self.links += [value or "" for name, value in attrs if name in ("src", "href")]
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+@pytest.fixture(scope="module")
+def runs() -> tuple[Recording, Recording]:
+    config = short_experiment()
+    reference = SineSequence(config.experiment)
+    first, second = (
+        run_experiment(DrawnRig(config), reference, config, compensate)
+        for compensate in (False, True)
+    )
+    return first, second
+
+
+@pytest.fixture(scope="module")
+def demo(runs: tuple[Recording, Recording]) -> Demo:
+    uncompensated, compensated = runs
+    result = evaluate(uncompensated, compensated)
+    config = compensated.config.replace(**{"twin.background": "<b>&"})
+    return Demo(config, (3, 4), (result, result), uncompensated, compensated, 144.0, 12.0)
+
+
+def test_the_report_needs_nothing_else(demo: Demo) -> None:
+    page_text = demo_report(demo, [Picture(Figure(figsize=(2, 1)), "A <figure> of nothing.")])
+    page = Page(page_text)
+    assert page.open == []
+    assert {"script", "link", "iframe"}.isdisjoint(page.tags)
+    assert all(link.startswith("data:image/jpeg;base64,") for link in page.links)
+    assert len(page.links) == 1
+    picture = base64.b64decode(page.links[0].partition(",")[2])
+    assert picture.startswith(b"\xff\xd8\xff")
+    assert not re.search(r"url\(|@import|https?:", page_text)
+
+
+def test_the_report_says_what_was_found(demo: Demo) -> None:
+    page = Page(demo_report(demo, []))
+    for row in ROWS:
+        assert row.title in page.text
+    result = demo.results[0][Dof.INSERTION]
+    assert cell(ROWS[0], Dof.INSERTION, result.uncompensated) in page.text
+    assert 'background = "<b>&"' in page.text  # escaped, so it reads as it is
+    assert "not a medical device" in " ".join(page.text.split())
+    assert "3, 4" in page.text
+    assert "nan" not in page.text
+
+
+def test_figures_leave_no_trace_in_global_state(runs: tuple[Recording, Recording]) -> None:
+    before = dict(matplotlib.rcParams)
+    figure = figures.figure9(*runs)
+    assert dict(matplotlib.rcParams) == before
+    axes = figure.axes
+    assert len(axes) == 6
+    assert [axis.get_title(loc="left")[:3] for axis in axes] == [f"({k})" for k in "abcdef"]
+    command = axes[0].lines[0]
+    assert np.nanmax(command.get_ydata()) > 40  # mm, and beyond the reference's 40
+
+
+def test_the_uncompensated_loop_is_drawn_wider(runs: tuple[Recording, Recording]) -> None:
+    axis = figures.figure9(*runs).axes[4]
+    spread = [np.ptp(line.get_xdata() - line.get_ydata()) for line in axis.lines[:2]]
+    assert spread[0] > spread[1] > 0
+
+
+def test_figure5_names_the_markers_where_they_are(runs: tuple[Recording, Recording]) -> None:
+    snapshot = runs[1].snapshot
+    assert snapshot is not None
+    figure = figures.figure5(snapshot, runs[1].config)
+    labels = {text.get_text(): text.xy for text in figure.axes[2].texts}
+    np.testing.assert_array_equal([*labels["A"], *labels["B"]], snapshot.features)
+    assert figure.axes[1].images[0].get_array().any()
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "text"),
+    [
+        ("uncompensated", 10.04e-3, "10"),
+        ("uncompensated", 2.513e-3, "2.51"),
+        ("state_rms", 0.2345e-3, "0.23"),
+        ("reduction", 0.754, "75 %"),
+        ("start_periods", 1.5, "1.5"),
+        ("marker_rms_px", 0.71, "0.71"),
+        ("marker_rms_px", float("nan"), "-"),
+    ],
+)
+def test_figures_are_rounded_for_people(name: str, value: float, text: str) -> None:
+    row = next(row for row in ROWS if row.name == name)
+    assert cell(row, Dof.INSERTION, value) == text
+
+
+def test_the_articles_table_is_its_table() -> None:
+    columns = [
+        [article_cell(row, dof) for row in ROWS if row.name in tables.ARTICLE] for dof in Dof
+    ]
+    assert columns == [["10", "2.5", "75 %"], ["1.8", "0.4", "78 %"], ["1.1", "0.3", "73 %"]]
+
+
+def test_every_figure_has_a_row() -> None:
+    assert {row.name for row in ROWS} == set(DofResult.__dataclass_fields__)
+
+
+def test_what_is_not_known_is_null_in_json(demo: Demo) -> None:
+    unknown = {
+        dof: replace(result, tracking_rms=float("nan")) for dof, result in demo.results[0].items()
+    }
+    found = tables.to_json("paper", [0], [unknown], 1.0, 1.0)
+    assert found["dof"]["rotation"]["tracking_rms"] is None
+    assert found["dof"]["rotation"]["worst"]["tracking_rms"] is None
+    assert found["dof"]["insertion"]["unit"] == "mm"
+    inside = unknown[Dof.INSERTION].compensated
+    assert found["dof"]["insertion"]["compensated"] == pytest.approx(1e3 * inside)
