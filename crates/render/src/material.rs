@@ -5,10 +5,10 @@ use crate::vector::Vector;
 /// Light guides beside the lens, in the camera's frame [m].
 const LIGHTS: [[f32; 3]; 2] = [[-3.0e-3, -1.0e-3, 0.0], [3.0e-3, -1.0e-3, 0.0]];
 /// Share of the light that comes back from the tissue all around.
-const AMBIENT: f32 = 0.3;
+const AMBIENT: f32 = 0.42;
 /// Distance over which the light falls to half [m]; the exposure control takes up the rest.
-const FALLOFF: f32 = 60e-3;
-const EXPOSURE: f32 = 1.12;
+const FALLOFF: f32 = 90e-3;
+const EXPOSURE: f32 = 1.15;
 
 /// A surface, lit by Lambert's law and Blinn and Phong's highlight.
 #[derive(Clone, Copy, Debug)]
@@ -86,7 +86,7 @@ impl Material {
         )
     }
 
-    /// Blue, green and red, 0 to 255, of the place `p` [m] with unit normal `n`, both in the
+    /// Blue, green and red, 2 to 253 so that rounding in between cannot leave 0 to 255, of the place `p` [m] with unit normal `n`, both in the
     /// camera's frame; `shade` is a factor on the diffuse colour.
     pub(crate) fn lit(&self, p: [f32; 3], n: [f32; 3], shade: f32) -> [f32; 3] {
         let distance2 = dot(p, p);
@@ -111,7 +111,7 @@ impl Material {
         let gain = EXPOSURE / (1.0 + distance2 / (FALLOFF * FALLOFF));
         let diffuse = gain * shade * (AMBIENT + (1.0 - AMBIENT) * lambert * share);
         let gloss = gain * self.gloss * highlight * share;
-        self.colour.map(|c| (c * diffuse + gloss).clamp(0.0, 255.0))
+        self.colour.map(|c| (c * diffuse + gloss).clamp(2.0, 253.0))
     }
 }
 

@@ -49,37 +49,49 @@ impl Samples {
     }
 
     /// Draws one triangle of either orientation with colours interpolated between its corners.
+    ///
+    /// A sample on an edge that two triangles share is drawn by exactly one of them.
     pub(crate) fn triangle(&mut self, tag: u8, corners: [&Vertex; 3]) {
         if corners.iter().any(|corner| corner.nearness <= 0.0) {
             return;
         }
-        let place = |v: &Vertex| v.at.map(|x| FINE as f32 * (x + 0.5) - 0.5);
-        let mut sorted = corners.map(|v| (place(v), v));
-        sorted.sort_by(|a, b| a.0[1].total_cmp(&b.0[1]));
-        let [(a, va), (b, vb), (c, vc)] = sorted;
+        let [mut va, mut vb, mut vc] = corners;
+        if vb.at[1] < va.at[1] {
+            (va, vb) = (vb, va);
+        }
+        if vc.at[1] < va.at[1] {
+            (va, vc) = (vc, va);
+        }
+        if vc.at[1] < vb.at[1] {
+            (vb, vc) = (vc, vb);
+        }
+        let [a, b, c] = [va, vb, vc].map(|v| v.at.map(|x| FINE as f32 * (x + 0.5) - 0.5));
+        let (top, bottom) = (ceil(a[1], self.height), ceil(c[1], self.height));
         let area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
-        if area.abs() < 1e-6 {
+        if top >= bottom || area == 0.0 {
             return;
         }
-        let top = a[1].ceil().max(0.0);
-        let bottom = c[1].ceil().min(self.height as f32);
-        if top >= bottom {
-            return;
-        }
-        let plane = |f: [f32; 3]| {
-            let (fb, fc) = (f[1] - f[0], f[2] - f[0]);
-            [
-                (fb * (c[1] - a[1]) - fc * (b[1] - a[1])) / area,
-                (fc * (b[0] - a[0]) - fb * (c[0] - a[0])) / area,
-            ]
-        };
-        let near = plane([va.nearness, vb.nearness, vc.nearness]);
-        let hue = [0, 1, 2].map(|k| plane([va.colour[k], vb.colour[k], vc.colour[k]]));
+        let near = Plane::through([a, b, c], area, [va.nearness, vb.nearness, vc.nearness]);
+        let hue = [0, 1, 2].map(|k| {
+            let colours = [va.colour[k], vb.colour[k], vc.colour[k]];
+            Fixed::from(Plane::through([a, b, c], area, colours))
+        });
         let long = (c[0] - a[0]) / (c[1] - a[1]);
         let upper = (b[0] - a[0]) / (b[1] - a[1]);
         let lower = (c[0] - b[0]) / (c[1] - b[1]);
-
-        for row in top as usize..bottom as usize {
+        let tag = u32::from(tag) << 24;
+        let memory = top * self.width..bottom * self.width;
+        let (Some(nearness), Some(paint), Some(spans)) = (
+            self.nearness.get_mut(memory.clone()),
+            self.paint.get_mut(memory),
+            self.spans.get_mut(top..bottom),
+        ) else {
+            return;
+        };
+        let rows = nearness
+            .chunks_exact_mut(self.width)
+            .zip(paint.chunks_exact_mut(self.width));
+        for ((row, span), (nearness, paint)) in (top..).zip(spans).zip(rows) {
             let y = row as f32;
             let one = a[0] + (y - a[1]) * long;
             let other = if y < b[1] {
@@ -87,36 +99,30 @@ impl Samples {
             } else {
                 b[0] + (y - b[1]) * lower
             };
-            let left = one.min(other).ceil().max(0.0) as usize;
-            let right = (one.max(other).ceil().max(0.0) as usize).min(self.width);
-            if left >= right {
+            let left = ceil(one.min(other), self.width);
+            let right = ceil(one.max(other), self.width);
+            let (Some(nearness), Some(paint)) =
+                (nearness.get_mut(left..right), paint.get_mut(left..right))
+            else {
+                continue;
+            };
+            if nearness.is_empty() {
                 continue;
             }
-            let (dx, dy) = (left as f32 - a[0], y - a[1]);
-            let start = row * self.width;
-            let (Some(nearness), Some(paint), Some(span)) = (
-                self.nearness.get_mut(start + left..start + right),
-                self.paint.get_mut(start + left..start + right),
-                self.spans.get_mut(row),
-            ) else {
-                continue;
-            };
-            *span = if Range::is_empty(span) {
-                left..right
-            } else {
+            *span = if span.start < span.end {
                 span.start.min(left)..span.end.max(right)
+            } else {
+                left..right
             };
-            let run = (right - left - 1) as f32;
-            let ramp = [0, 1, 2].map(|k| {
-                let first = va.colour[k] + dx * hue[k][0] + dy * hue[k][1];
-                Ramp::between(first, first + run * hue[k][0], run)
-            });
-            let first = va.nearness + dx * near[0] + dy * near[1];
-            let tag = u32::from(tag) << 24;
+            let first = near.at(left as f32, y);
+            let [blue, green, red] = hue.map(|hue| hue.at(left as i32, row as i32));
             for (i, (nearest, word)) in nearness.iter_mut().zip(paint).enumerate() {
                 let i = i as i32;
-                let here = first + i as f32 * near[0];
-                let new = tag | ramp[2].at(i) << 16 | ramp[1].at(i) << 8 | ramp[0].at(i);
+                let here = first + i as f32 * near.gradient[0];
+                let level = |start: i32, k: usize| {
+                    start.wrapping_add(i.wrapping_mul(hue[k].gradient[0])) as u32 & 0x00ff_0000
+                };
+                let new = tag | level(red, 2) | level(green, 1) >> 8 | level(blue, 0) >> 16;
                 let front = here > *nearest;
                 *nearest = if front { here } else { *nearest };
                 *word = if front { new } else { *word };
@@ -198,24 +204,72 @@ impl Samples {
     }
 }
 
-/// A colour channel along a row in 16.16 fixed point, held between its two ends.
+/// Steepest change from sample to sample that is followed; a sliver with more is drawn in one
+/// colour.
+const STEEPEST: f32 = 8192.0;
+
+/// A quantity that is linear in the picture.
 #[derive(Clone, Copy)]
-struct Ramp {
-    first: i32,
-    step: i32,
+struct Plane {
+    from: [f32; 2],
+    value: f32,
+    gradient: [f32; 2],
 }
 
-impl Ramp {
-    fn between(first: f32, last: f32, run: f32) -> Self {
-        let fixed = |value: f32| (value.clamp(0.0, 255.0) * 65536.0) as i32 + 32767;
-        let (first, last) = (fixed(first).min(255 << 16), fixed(last).min(255 << 16));
+impl Plane {
+    /// With `values` at the three `corners` [samples] of a triangle of twice the `area`.
+    fn through(corners: [[f32; 2]; 3], area: f32, values: [f32; 3]) -> Self {
+        let [a, b, c] = corners;
+        let (fb, fc) = (values[1] - values[0], values[2] - values[0]);
+        let gradient = [
+            (fb * (c[1] - a[1]) - fc * (b[1] - a[1])) / area,
+            (fc * (b[0] - a[0]) - fb * (c[0] - a[0])) / area,
+        ];
+        let gentle = gradient.iter().all(|g| g.abs() < STEEPEST);
         Self {
-            first,
-            step: ((last - first) as f32 / run.max(1.0)) as i32,
+            from: a,
+            value: values[0],
+            gradient: if gentle { gradient } else { [0.0; 2] },
         }
     }
 
-    fn at(self, i: i32) -> u32 {
-        ((self.first + i * self.step) >> 16) as u32
+    fn at(&self, x: f32, y: f32) -> f32 {
+        self.value + (x - self.from[0]) * self.gradient[0] + (y - self.from[1]) * self.gradient[1]
     }
+}
+
+/// A plane of grey levels in 16.16 fixed point: exact sums, modulo 2^32, wherever they start.
+#[derive(Clone, Copy)]
+struct Fixed {
+    from: [i32; 2],
+    value: i32,
+    gradient: [i32; 2],
+}
+
+impl From<Plane> for Fixed {
+    fn from(plane: Plane) -> Self {
+        let from = plane.from.map(|x| x as i32);
+        let value = plane.at(from[0] as f32, from[1] as f32);
+        Self {
+            from,
+            value: (f64::from(value) * 65536.0) as i64 as i32,
+            gradient: plane.gradient.map(|g| (g * 65536.0) as i32),
+        }
+    }
+}
+
+impl Fixed {
+    fn at(&self, x: i32, y: i32) -> i32 {
+        let [dx, dy] = [x - self.from[0], y - self.from[1]];
+        self.value
+            .wrapping_add(dx.wrapping_mul(self.gradient[0]))
+            .wrapping_add(dy.wrapping_mul(self.gradient[1]))
+    }
+}
+
+/// The first whole number not below `x`, from 0 to `most`.
+fn ceil(x: f32, most: usize) -> usize {
+    let x = x.clamp(0.0, most as f32);
+    let whole = x as i32;
+    (whole + i32::from((whole as f32) < x)) as usize
 }
