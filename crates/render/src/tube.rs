@@ -87,7 +87,7 @@ type Ring = [Vertex; FACETS + 1];
 /// ```
 ///
 /// with d the length of C's part across T and φ0 the angle of its negative. The facets divide that
-/// arc: outlines are exact and nothing hidden behind its own side is ever set up.
+/// arc: the outline is where it belongs and nothing hidden behind its own side is ever set up.
 pub(crate) struct Sweep<'a> {
     pub(crate) curve: &'a Curve,
     pub(crate) lens: &'a Lens,
@@ -163,8 +163,11 @@ impl Sweep<'_> {
         let (sin, cos) = slope.sin_cos();
         let bound = (radius * cos + along * sin) / (d * cos).max(1e-12);
         let half = bound.clamp(-1.0, 1.0).acos() as f32;
+        // The facets' corners stand out so far that facets and circle enclose the same area.
+        let facet = (2.0 * half / FACETS as f32).max(1e-4);
+        let radius = radius as f32 * (facet / facet.sin()).sqrt();
         let (centre, axis) = (single(centre), single(axis));
-        let (e0, e1, radius) = (single(e0), single(e1), radius as f32);
+        let (e0, e1) = (single(e0), single(e1));
         let (lift, out) = (slope as f32 + tilt).sin_cos();
         core::array::from_fn(|j| {
             let phi = half * (2.0 * j as f32 / FACETS as f32 - 1.0);

@@ -71,7 +71,7 @@ class TwinCamera:
             markers=(instrument.marker_a, instrument.marker_b),
             band_length=instrument.band_length,
             noise=twin.image_noise,
-            seed=twin.seed,
+            seed=twin.seed % 2**64,
         )
         if twin.background is None:
             self._backgrounds = [mucosa(camera.width, camera.height, twin.seed)]

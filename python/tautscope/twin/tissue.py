@@ -13,6 +13,18 @@ from tautscope.errors import MissingPathError
 
 SUFFIXES = (".jpg", ".jpeg", ".png")
 
+# Blue, green, red.
+PALE = (112.0, 130.0, 224.0)
+FLUSH = (-5.0, -7.0, 1.0)
+VESSEL_ABSORPTION = (0.34, 0.36, 0.16)
+DEEPENING = (1.22, 1.20, 0.92)
+WET = (243.0, 250.0, 255.0)
+
+DEEPEST = 0.26
+
+COARSE = (200, 160)
+"""Columns and rows of rays; the wall is smooth, so the picture is enlarged from them."""
+
 
 def load_backgrounds(
     folder: str | PathLike[str], width: int, height: int
@@ -30,8 +42,11 @@ def load_backgrounds(
     if not place.is_dir():
         raise MissingPathError("twin.background", str(folder), allowed)
     files = sorted(file for file in place.iterdir() if file.suffix.lower() in SUFFIXES)
-    images = (cv2.imread(str(file), cv2.IMREAD_COLOR) for file in files)
-    backgrounds = [_fitted(image, width, height) for image in images if image is not None]
+    backgrounds = [
+        _fitted(np.asarray(image, dtype=np.uint8), width, height)
+        for file in files
+        if (image := cv2.imread(str(file), cv2.IMREAD_COLOR)) is not None
+    ]
     if not backgrounds:
         raise MissingPathError("twin.background", str(folder), allowed)
     return backgrounds
@@ -74,20 +89,7 @@ def mucosa(width: int, height: int, seed: int) -> NDArray[np.uint8]:
     colour = albedo * level ** np.array(DEEPENING)
     wet = _highlights(rng, _enlarged(facing, width, height) * (distance < 60e-3))[..., None]
     colour += wet * (np.array(WET) - colour)
-    return np.clip(np.rint(colour), 0, 255).astype(np.uint8)
-
-
-# Blue, green, red.
-PALE = (112.0, 130.0, 224.0)
-FLUSH = (-5.0, -7.0, 1.0)
-VESSEL_ABSORPTION = (0.34, 0.36, 0.16)
-DEEPENING = (1.22, 1.20, 0.92)
-WET = (243.0, 250.0, 255.0)
-
-DEEPEST = 0.26
-
-COARSE = (200, 160)
-"""Columns and rows of rays; the wall is smooth, so the picture is enlarged from them."""
+    return np.asarray(np.clip(np.rint(colour), 0, 255), dtype=np.uint8)
 
 
 def _tunnel(rng: np.random.Generator) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -127,7 +129,7 @@ def _tunnel(rng: np.random.Generator) -> tuple[NDArray[np.float64], NDArray[np.f
     normal = np.cross(_slope(wall, 1), _slope(wall, 0))
     cosine = np.abs((normal * wall).sum(-1))
     cosine /= np.linalg.norm(normal, axis=-1) * np.linalg.norm(wall, axis=-1)
-    cosine = cv2.GaussianBlur(cosine, (0, 0), 1.5)
+    cosine = np.asarray(cv2.GaussianBlur(cosine, (0, 0), 1.5), dtype=np.float64)
     return depth, 0.45 + 0.55 * np.clip(cosine, 0, 1)
 
 
@@ -152,7 +154,7 @@ def _clouds(rng: np.random.Generator, width: int, height: int, cells: int) -> ND
         coarse = rng.standard_normal((n, n), dtype=np.float32)
         fine = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_CUBIC)
         total += np.asarray(fine, dtype=np.float32) / 2**octave
-    return total / max(float(total.std()), 1e-9)
+    return np.asarray(total / max(float(total.std()), 1e-9), dtype=np.float64)
 
 
 def _vignette(width: int, height: int) -> NDArray[np.float64]:
@@ -193,7 +195,7 @@ def _highlights(rng: np.random.Generator, facing: NDArray[np.float64]) -> NDArra
     height, width = facing.shape
     sheet = np.zeros((height, width), np.uint8)
     scale = width / 720
-    weight = np.where(facing > np.quantile(facing, 0.80), facing, 0).ravel()
+    weight = np.where(facing >= np.quantile(facing, 0.80), facing + 1e-9, 0).ravel()
     centres = rng.choice(weight.size, 9, p=weight / weight.sum())
     for centre in centres:
         slant = rng.uniform(0, 180)
