@@ -115,7 +115,7 @@ def test_bands_lie_where_opencv_projects_them_whatever_the_lens(seed: int) -> No
     rng = np.random.default_rng(seed)
     coefficients = rng.uniform(-1, 1, 8) * [0.25, 0.08, 0.01, 0.01, 0.01, 0.1, 0.05, 0.01]
     lens = rng.uniform([350, 350, 320, 250], [600, 600, 400, 320])
-    place = np.array([0.010, 0, 0.045]) + rng.uniform(-4e-3, 4e-3, 3)
+    place = np.array([0.014, 0, 0.050]) + rng.uniform(-4e-3, 4e-3, 3)
     turn = np.array([0, -1.3, 0]) + rng.uniform(-0.3, 0.3, 3)
     config, camera = make(
         **QUIET,
@@ -133,12 +133,14 @@ def test_bands_lie_where_opencv_projects_them_whatever_the_lens(seed: int) -> No
         state = rng.uniform([0, -3, -0.3], [4e-3, 3, 0.6])
         frames = bent(config, *state)
         expected = integrated(config, *frames)
-        assert ((expected > 20) & (expected < np.tile([700, 556], 2))).all(), "bands left the view"
+        assert ((expected > 20) & (expected < np.tile([700, 556], 2))).all(), (
+            f"bands left the view: {expected}"
+        )
         drawn = camera.draw(*frames, 0).true_features
         assert np.abs(drawn - expected).max() < 0.05, f"seed {seed}, state {state}"
 
 
-@pytest.mark.parametrize("rotation", [0.0, 1.0, 2.5, 4.0, 5.5])
+@pytest.mark.parametrize("rotation", [0.9, 1.9, 2.6, 3.7, 5.2])
 @pytest.mark.parametrize("bending", [0.0, 0.4, 0.9, 1.3])
 def test_bands_of_a_thick_tube_lie_at_the_centroid_of_their_visible_side(
     rotation: float, bending: float
@@ -166,7 +168,7 @@ def crossing(offset: float) -> Frames:
 CROSSED = {
     **QUIET,
     "camera.camera_from_guide.translation": (0.0, 0.0, 30e-3),
-    "camera.camera_from_guide.rotation": (0.0, 0.0, 0.0),
+    "camera.camera_from_guide.rotation": (0.0, 0.0, 0.4),
 }
 
 
@@ -178,19 +180,21 @@ def test_bands_behind_the_shaft_are_not_visible() -> None:
     assert np.abs(free - integrated(config, *crossing(12e-3))).max() < 0.1
 
 
-@pytest.mark.parametrize("offset", [2.0e-3, 2.6e-3, -2.3e-3])
+@pytest.mark.parametrize("offset", [2.3e-3, 2.8e-3, -2.5e-3])
 def test_half_hidden_bands_lie_at_the_centroid_of_what_is_left(offset: float) -> None:
     config, camera = make(**CROSSED)
 
+    place, along = (in_camera(config, crossing(offset)[k], directions=k == 1)[0] for k in (0, 1))
+
     def hidden(patch: Array) -> Array:
-        # The straight shaft runs along x through (0, 30 mm): a ray of slope y / z meets it when
-        # it passes its axis at less than the radius.
-        distance = np.abs(patch[..., 1]) * 30e-3 / np.hypot(patch[..., 1], patch[..., 2])
-        return distance < config.instrument.diameter / 2
+        # The straight shaft in front: a ray meets it where it passes its axis within the radius.
+        normal = np.cross(along, patch)
+        distance = np.abs(normal @ place) / np.linalg.norm(normal, axis=-1)
+        return np.asarray(distance < config.instrument.diameter / 2)
 
     seen = camera.draw(*crossing(offset), 0).true_features
     expected = integrated(config, *crossing(offset), hidden)
-    assert np.abs(seen - expected).max() < 0.15, (seen, expected)
+    assert np.abs(seen - expected).max() < 0.2, (seen, expected)
 
 
 def test_the_drawn_green_is_where_the_features_say() -> None:

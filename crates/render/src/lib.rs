@@ -13,6 +13,7 @@
 
 mod curve;
 mod error;
+mod features;
 mod lens;
 mod material;
 mod noise;
@@ -23,7 +24,8 @@ mod tube;
 mod vector;
 
 pub use error::Error;
+pub use features::Features;
 pub use lens::Lens;
 pub use pose::Pose;
-pub use renderer::{Features, Renderer};
+pub use renderer::Renderer;
 pub use tube::Geometry;

@@ -13,8 +13,8 @@ const EXPOSURE: f32 = 1.15;
 /// A surface, lit by Lambert's law and Blinn and Phong's highlight.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Material {
-    /// Kept beside each pixel: 0 is tissue.
-    pub(crate) tag: u8,
+    /// Which of the bands this is, if any.
+    pub(crate) band: Option<usize>,
     /// Diffuse colour: blue, green, red [grey levels].
     colour: [f32; 3],
     /// Height of the highlight [grey levels].
@@ -28,11 +28,8 @@ pub(crate) struct Material {
     pub(crate) pitch: f64,
 }
 
-/// Tag of the proximal band; the distal one's is one more.
-pub(crate) const TAG_BAND: u8 = 2;
-
 pub(crate) const SHAFT: Material = Material {
-    tag: 1,
+    band: None,
     colour: [74.0, 70.0, 68.0],
     gloss: 170.0,
     sharpness: 5,
@@ -41,7 +38,7 @@ pub(crate) const SHAFT: Material = Material {
     pitch: 1.0,
 };
 pub(crate) const SECTION: Material = Material {
-    tag: 1,
+    band: None,
     colour: [40.0, 38.0, 38.0],
     gloss: 95.0,
     sharpness: 4,
@@ -50,7 +47,7 @@ pub(crate) const SECTION: Material = Material {
     pitch: 1.25e-3,
 };
 pub(crate) const TIP: Material = Material {
-    tag: 1,
+    band: None,
     colour: [172.0, 174.0, 172.0],
     gloss: 120.0,
     sharpness: 5,
@@ -59,7 +56,7 @@ pub(crate) const TIP: Material = Material {
     pitch: 1.0,
 };
 pub(crate) const BAND_A: Material = Material {
-    tag: TAG_BAND,
+    band: Some(0),
     colour: [70.0, 190.0, 60.0],
     gloss: 70.0,
     sharpness: 6,
@@ -68,7 +65,7 @@ pub(crate) const BAND_A: Material = Material {
     pitch: 1.0,
 };
 pub(crate) const BAND_B: Material = Material {
-    tag: TAG_BAND + 1,
+    band: Some(1),
     ..BAND_A
 };
 

@@ -14,22 +14,16 @@ pub(crate) struct Vertex {
     pub(crate) colour: [f32; 3],
 }
 
-/// What a pixel row holds of the two bands: samples, and their sum of x [px].
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct BandRow {
-    pub(crate) samples: [u32; 2],
-    pub(crate) sum_x: [u64; 2],
-}
-
 /// The picture at 2x2 samples per pixel, with the nearest surface of each.
 ///
-/// Sample (i, j) lies at x = (i + 1/2) / 2 - 1/2, likewise y. Memory outside the spans that were
+/// Sample (i, j) lies at x = (i + 1/2 + s) / 2 - 1/2 and y = (j + 1/2) / 2 - 1/2 [px]; the shift s
+/// is -1/4 in even rows and 1/4 in odd ones, so that upright edges get four steps. Memory outside the spans that were
 /// drawn to is never touched, neither to clear it nor to read it.
 pub(crate) struct Samples {
     width: usize,
     height: usize,
     nearness: Vec<f32>,
-    /// Tag, red, green, blue from the highest byte to the lowest; 0 is nothing.
+    /// 1, red, green, blue from the highest byte to the lowest; 0 is nothing.
     paint: Vec<u32>,
     /// Samples drawn to, per row of samples.
     spans: Vec<Range<usize>>,
@@ -51,7 +45,7 @@ impl Samples {
     /// Draws one triangle of either orientation with colours interpolated between its corners.
     ///
     /// A sample on an edge that two triangles share is drawn by exactly one of them.
-    pub(crate) fn triangle(&mut self, tag: u8, corners: [&Vertex; 3]) {
+    pub(crate) fn triangle(&mut self, corners: [&Vertex; 3]) {
         if corners.iter().any(|corner| corner.nearness <= 0.0) {
             return;
         }
@@ -79,7 +73,6 @@ impl Samples {
         let long = (c[0] - a[0]) / (c[1] - a[1]);
         let upper = (b[0] - a[0]) / (b[1] - a[1]);
         let lower = (c[0] - b[0]) / (c[1] - b[1]);
-        let tag = u32::from(tag) << 24;
         let memory = top * self.width..bottom * self.width;
         let (Some(nearness), Some(paint), Some(spans)) = (
             self.nearness.get_mut(memory.clone()),
@@ -99,8 +92,9 @@ impl Samples {
             } else {
                 b[0] + (y - b[1]) * lower
             };
-            let left = ceil(one.min(other), self.width);
-            let right = ceil(one.max(other), self.width);
+            let shift = shift(row);
+            let left = ceil(one.min(other) - shift, self.width);
+            let right = ceil(one.max(other) - shift, self.width);
             let (Some(nearness), Some(paint)) =
                 (nearness.get_mut(left..right), paint.get_mut(left..right))
             else {
@@ -114,7 +108,7 @@ impl Samples {
             } else {
                 left..right
             };
-            let first = near.at(left as f32, y);
+            let first = near.at(left as f32 + shift, y);
             let [blue, green, red] = hue.map(|hue| hue.at(left as i32, row as i32));
             for (i, (nearest, word)) in nearness.iter_mut().zip(paint).enumerate() {
                 let i = i as i32;
@@ -122,7 +116,7 @@ impl Samples {
                 let level = |start: i32, k: usize| {
                     start.wrapping_add(i.wrapping_mul(hue[k].gradient[0])) as u32 & 0x00ff_0000
                 };
-                let new = tag | level(red, 2) | level(green, 1) >> 8 | level(blue, 0) >> 16;
+                let new = DRAWN | level(red, 2) | level(green, 1) >> 8 | level(blue, 0) >> 16;
                 let front = here > *nearest;
                 *nearest = if front { here } else { *nearest };
                 *word = if front { new } else { *word };
@@ -130,24 +124,25 @@ impl Samples {
         }
     }
 
-    /// Lays row `y` of the drawing over the tissue in `pixels` (3 width) and wipes it: afterwards
-    /// the row is empty for the next picture. Returns the pixels it may have changed, and what it
-    /// held of the bands.
-    pub(crate) fn resolve(
-        &mut self,
-        y: usize,
-        first_band: u8,
-        pixels: &mut [u8],
-    ) -> (Range<usize>, BandRow) {
-        let mut band = BandRow::default();
+    /// Whether `at` [px] lies outside the picture or behind something nearer than `limit` [1/m].
+    pub(crate) fn hides(&self, at: [f32; 2], limit: f32) -> bool {
+        let [x, y] = at.map(|x| (FINE as f32 * (x + 0.5)).floor());
+        let inside = x >= 0.0 && y >= 0.0 && x < self.width as f32 && y < self.height as f32;
+        let sample = self.nearness.get(y as usize * self.width + x as usize);
+        !inside || sample.is_none_or(|nearest| *nearest > limit)
+    }
+
+    /// Lays row `y` of the drawing over the tissue in `pixels` (3 bytes each) and wipes it:
+    /// afterwards the row is empty for the next picture.
+    pub(crate) fn resolve(&mut self, y: usize, pixels: &mut [u8]) {
         let mut touched = 0..0;
         for span in self.spans.iter_mut().skip(FINE * y).take(FINE) {
-            if !Range::is_empty(span) {
-                let pixels = span.start / FINE..span.end.div_ceil(FINE);
-                touched = if Range::is_empty(&touched) {
-                    pixels
+            if span.start < span.end {
+                let (start, end) = (span.start / FINE, span.end.div_ceil(FINE));
+                touched = if touched.start < touched.end {
+                    touched.start.min(start)..touched.end.max(end)
                 } else {
-                    touched.start.min(pixels.start)..touched.end.max(pixels.end)
+                    start..end
                 };
             }
             *span = 0..0;
@@ -159,7 +154,7 @@ impl Samples {
             self.nearness.get_mut(rows.clone()),
             self.paint.get_mut(rows),
         ) else {
-            return (0..0, band);
+            return;
         };
         for row in nearness.chunks_exact_mut(self.width) {
             if let Some(row) = row.get_mut(drawn.clone()) {
@@ -172,36 +167,33 @@ impl Samples {
             odd.get_mut(drawn),
             pixels.get_mut(3 * touched.start..3 * touched.end),
         ) else {
-            return (0..0, band);
+            return;
         };
         let quads = even.chunks_exact(FINE).zip(odd.chunks_exact(FINE));
-        for ((x, quad), pixel) in touched.clone().zip(quads).zip(pixels.chunks_exact_mut(3)) {
-            let words = [quad.0[0], quad.0[1], quad.1[0], quad.1[1]];
-            let empty = words.iter().filter(|word| **word == 0).count() as u32;
-            if empty == 4 {
-                continue;
+        for (quad, pixel) in quads.zip(pixels.chunks_exact_mut(3)) {
+            // Blue and red side by side in one word: four of them cannot run into each other.
+            let (mut blue_red, mut green, mut drawn) = (0, 0, 0);
+            for word in quad.0.iter().chain(quad.1) {
+                blue_red += word & 0x00ff_00ff;
+                green += word >> 8 & 0xff;
+                drawn += word >> 24;
             }
-            // Blue and red side by side in one word: four of them cannot overflow into the other.
-            let blue_red: u32 = words.iter().map(|word| word & 0x00ff_00ff).sum();
-            let green: u32 = words.iter().map(|word| word >> 8 & 0xff).sum();
             let sums = [blue_red & 0xffff, green, blue_red >> 16];
             for (value, sum) in pixel.iter_mut().zip(sums) {
-                *value = ((sum + empty * u32::from(*value) + 2) / 4) as u8;
-            }
-            for word in words {
-                let which = (word >> 24).wrapping_sub(u32::from(first_band)) as usize;
-                if let (Some(samples), Some(sum)) =
-                    (band.samples.get_mut(which), band.sum_x.get_mut(which))
-                {
-                    *samples += 1;
-                    *sum += x as u64;
-                }
+                *value = ((sum + (4 - drawn) * u32::from(*value) + 2) / 4) as u8;
             }
         }
         even.fill(0);
         odd.fill(0);
-        (touched, band)
     }
+}
+
+/// Marks a sample that shows the instrument.
+const DRAWN: u32 = 1 << 24;
+
+/// How far the samples of a row lie off the even grid [samples].
+fn shift(row: usize) -> f32 {
+    if row & 1 == 0 { -0.25 } else { 0.25 }
 }
 
 /// Steepest change from sample to sample that is followed; a sliver with more is drawn in one

@@ -1,7 +1,7 @@
 use crate::Error;
 use crate::curve::Curve;
+use crate::features::{Features, Patches};
 use crate::lens::Lens;
-use crate::material::TAG_BAND;
 use crate::noise::Noise;
 use crate::pose::Pose;
 use crate::raster::Samples;
@@ -9,9 +9,6 @@ use crate::tube::{Geometry, Sweep};
 
 /// Longest centreline that is drawn [m]; a longer one is a fault of the caller's physics.
 const LONGEST: f64 = 10.0;
-
-/// Centroids of the visible part of the two bands, u and v of each [px]; NaN where not visible.
-pub type Features = [f64; 4];
 
 /// Draws the instrument over a picture of tissue, as a camera with light guides sees it.
 pub struct Renderer {
@@ -23,6 +20,7 @@ pub struct Renderer {
     noise: Noise,
     curve: Curve,
     samples: Samples,
+    bands: Patches,
 }
 
 impl Renderer {
@@ -62,6 +60,7 @@ impl Renderer {
             noise: Noise::new(noise, seed)?,
             curve: Curve::default(),
             samples: Samples::new(width, height),
+            bands: Patches::default(),
         })
     }
 
@@ -74,8 +73,8 @@ impl Renderer {
     /// `background` (the same), and returns where the bands are in it.
     ///
     /// `frames` are positions [m] and tangents along the centreline in the guide's frame, proximal
-    /// to distal; the last is the distal end of the tip. The features are centroids of each band's
-    /// visible samples, pixel by pixel, before the noise. Frames with a number that is not finite,
+    /// to distal; the last is the distal end of the tip. The features are the centroids of
+    /// each band's visible part in the picture, before the noise. Frames with a number that is not finite,
     /// or that make a line longer than 10 m, give a picture without instrument. Slices of another
     /// size are filled as far as they go.
     pub fn draw(
@@ -86,38 +85,22 @@ impl Renderer {
         image: &mut [u8],
     ) -> Features {
         self.sweep(frames);
-        let mut count = [0_u32; 2];
-        let mut sum = [[0_u64; 2]; 2];
+        let slack = 0.25 * self.geometry.diameter as f32;
+        let features = self.bands.centroids(&self.samples, slack);
         let stride = 3 * self.width;
         let rows = image.chunks_mut(stride).zip(background.chunks(stride));
         for (y, (row, tissue)) in rows.take(self.height).enumerate() {
             for (value, below) in row.iter_mut().zip(tissue) {
                 *value = *below;
             }
-            let (_, band) = self.samples.resolve(y, TAG_BAND, row);
-            for k in 0..2 {
-                count[k] += band.samples[k];
-                sum[k][0] += band.sum_x[k];
-                sum[k][1] += y as u64 * u64::from(band.samples[k]);
-            }
+            self.samples.resolve(y, row);
             self.noise.add(sequence, y as u64, row);
         }
-        let centroid = |k: usize, axis: usize| {
-            if count[k] == 0 {
-                f64::NAN
-            } else {
-                sum[k][axis] as f64 / f64::from(count[k])
-            }
-        };
-        [
-            centroid(0, 0),
-            centroid(0, 1),
-            centroid(1, 0),
-            centroid(1, 1),
-        ]
+        features
     }
 
     fn sweep(&mut self, frames: &[([f64; 3], [f64; 3])]) {
+        self.bands.clear();
         if !frames
             .iter()
             .all(|(p, t)| p.iter().chain(t).all(|v| v.is_finite()))
@@ -132,6 +115,7 @@ impl Renderer {
                 curve: &self.curve,
                 lens: &self.lens,
                 samples: &mut self.samples,
+                bands: &mut self.bands,
             }
             .draw(&self.geometry);
         }

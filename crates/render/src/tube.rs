@@ -1,6 +1,7 @@
 use crate::Error;
 use crate::curve::Curve;
 use crate::error::{checked, finite, positive};
+use crate::features::Patches;
 use crate::lens::Lens;
 use crate::material::{BAND_A, BAND_B, Material, SECTION, SHAFT, TIP, single};
 use crate::raster::{Samples, Vertex};
@@ -92,6 +93,7 @@ pub(crate) struct Sweep<'a> {
     pub(crate) curve: &'a Curve,
     pub(crate) lens: &'a Lens,
     pub(crate) samples: &'a mut Samples,
+    pub(crate) bands: &'a mut Patches,
 }
 
 impl Sweep<'_> {
@@ -125,7 +127,7 @@ impl Sweep<'_> {
             let (centre, axis) = self.curve.at(start + along);
             let (tilt, shade) = material.rib(along);
             let ring = self.ring(centre, axis, radius, 0.0, (material, tilt, shade));
-            self.join(material.tag, last.as_ref(), &ring);
+            self.join(material, last.as_ref(), &ring);
             last = Some(ring);
         }
     }
@@ -141,7 +143,7 @@ impl Sweep<'_> {
             // Rounded at its rim, flat in the middle.
             let here = radius * cos.sqrt();
             let ring = self.ring(centre, axis, here, slope, (&TIP, 0.0, 1.0));
-            self.join(TIP.tag, last.as_ref(), &ring);
+            self.join(&TIP, last.as_ref(), &ring);
             last = Some(ring);
         }
     }
@@ -185,11 +187,14 @@ impl Sweep<'_> {
         })
     }
 
-    fn join(&mut self, tag: u8, last: Option<&Ring>, ring: &Ring) {
+    fn join(&mut self, material: &Material, last: Option<&Ring>, ring: &Ring) {
         let Some(last) = last else { return };
         for (old, new) in last.windows(2).zip(ring.windows(2)) {
-            self.samples.triangle(tag, [&old[0], &old[1], &new[0]]);
-            self.samples.triangle(tag, [&old[1], &new[1], &new[0]]);
+            self.samples.triangle([&old[0], &old[1], &new[0]]);
+            self.samples.triangle([&old[1], &new[1], &new[0]]);
+            if let Some(band) = material.band {
+                self.bands.push(band, [old[0], old[1], new[1], new[0]]);
+            }
         }
     }
 }
