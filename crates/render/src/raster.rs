@@ -65,10 +65,11 @@ impl Samples {
         if top >= bottom || area == 0.0 {
             return;
         }
-        let near = Plane::through([a, b, c], area, [va.nearness, vb.nearness, vc.nearness]);
+        let scale = 1.0 / area;
+        let near = Plane::through([a, b, c], scale, [va.nearness, vb.nearness, vc.nearness]);
         let hue = [0, 1, 2].map(|k| {
             let colours = [va.colour[k], vb.colour[k], vc.colour[k]];
-            Fixed::from(Plane::through([a, b, c], area, colours))
+            Fixed::from(Plane::through([a, b, c], scale, colours))
         });
         let long = (c[0] - a[0]) / (c[1] - a[1]);
         let upper = (b[0] - a[0]) / (b[1] - a[1]);
@@ -117,9 +118,10 @@ impl Samples {
                     start.wrapping_add(i.wrapping_mul(hue[k].gradient[0])) as u32 & 0x00ff_0000
                 };
                 let new = DRAWN | level(red, 2) | level(green, 1) >> 8 | level(blue, 0) >> 16;
-                let front = here > *nearest;
-                *nearest = if front { here } else { *nearest };
-                *word = if front { new } else { *word };
+                // By mask: a branch here would be taken at random.
+                let front = u32::from(here > *nearest).wrapping_neg();
+                *word = (new & front) | (*word & !front);
+                *nearest = if here > *nearest { here } else { *nearest };
             }
         }
     }
@@ -209,13 +211,14 @@ struct Plane {
 }
 
 impl Plane {
-    /// With `values` at the three `corners` [samples] of a triangle of twice the `area`.
-    fn through(corners: [[f32; 2]; 3], area: f32, values: [f32; 3]) -> Self {
+    /// With `values` at the three `corners` [samples] of a triangle; `scale` is 1 over twice its
+    /// area.
+    fn through(corners: [[f32; 2]; 3], scale: f32, values: [f32; 3]) -> Self {
         let [a, b, c] = corners;
         let (fb, fc) = (values[1] - values[0], values[2] - values[0]);
         let gradient = [
-            (fb * (c[1] - a[1]) - fc * (b[1] - a[1])) / area,
-            (fc * (b[0] - a[0]) - fb * (c[0] - a[0])) / area,
+            (fb * (c[1] - a[1]) - fc * (b[1] - a[1])) * scale,
+            (fc * (b[0] - a[0]) - fb * (c[0] - a[0])) * scale,
         ];
         let gentle = gradient.iter().all(|g| g.abs() < STEEPEST);
         Self {
@@ -244,7 +247,7 @@ impl From<Plane> for Fixed {
         let value = plane.at(from[0] as f32, from[1] as f32);
         Self {
             from,
-            value: (f64::from(value) * 65536.0) as i64 as i32,
+            value: (value * 65536.0) as i32,
             gradient: plane.gradient.map(|g| (g * 65536.0) as i32),
         }
     }

@@ -8,11 +8,11 @@ use crate::raster::{Samples, Vertex};
 use crate::vector::{Vector, add, cross, dot, norm, perpendicular, scale, sub, unit};
 
 /// Facets across the visible side of the tube.
-const FACETS: usize = 20;
+const FACETS: usize = 16;
 /// Rings per rib of a ribbed material.
-const RINGS_PER_RIB: f64 = 5.0;
+const RINGS_PER_RIB: f64 = 4.0;
 /// Largest distance between two rings of a smooth material [m].
-const RING_STEP: f64 = 0.8e-3;
+const RING_STEP: f64 = 1.4e-3;
 /// Rings along one material at most, however long the instrument.
 const RINGS: f64 = 400.0;
 /// Rings of the rounded end.

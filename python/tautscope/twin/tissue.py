@@ -22,7 +22,7 @@ WET = (243.0, 250.0, 255.0)
 
 DEEPEST = 0.26
 
-COARSE = (200, 160)
+COARSE = (160, 128)
 """Columns and rows of rays; the wall is smooth, so the picture is enlarged from them."""
 
 
@@ -143,7 +143,7 @@ def _slope(wall: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
 
 def _enlarged(coarse: NDArray[np.float64], width: int, height: int) -> NDArray[np.float64]:
     fine = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR)
-    return np.asarray(cv2.GaussianBlur(fine, (0, 0), width / 480), dtype=np.float64)
+    return np.asarray(cv2.GaussianBlur(fine, (0, 0), 0.5 * width / COARSE[0]), dtype=np.float64)
 
 
 def _clouds(rng: np.random.Generator, width: int, height: int, cells: int) -> NDArray[np.float64]:
