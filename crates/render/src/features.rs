@@ -1,7 +1,7 @@
 use crate::raster::{Samples, Vertex};
 
 /// Cells per side into which a patch is divided to see how much of it is hidden.
-const CELLS: u8 = 3;
+const CELLS: u8 = 6;
 /// A band that shows less than this is not visible [px²].
 const LEAST: f64 = 1.0;
 

@@ -12,7 +12,7 @@ const FACETS: usize = 16;
 /// Rings per rib of a ribbed material.
 const RINGS_PER_RIB: f64 = 4.0;
 /// Largest distance between two rings of a smooth material [m].
-const RING_STEP: f64 = 1.4e-3;
+const RING_STEP: f64 = 1.0e-3;
 /// Rings along one material at most, however long the instrument.
 const RINGS: f64 = 400.0;
 /// Rings of the rounded end.
