@@ -13,6 +13,7 @@ __all__ = [
     "MarkerDetector",
     "Play",
     "Reduction",
+    "Renderer",
     "StateEstimator",
     "__version__",
     "label_regions",
@@ -180,3 +181,32 @@ class MarkerDetector:
     def mask(self, image: NDArray[np.uint8]) -> NDArray[np.bool_]: ...
 
 def label_regions(mask: NDArray[np.bool_]) -> NDArray[np.float64]: ...
+
+# The pictures of the twin: crates/render.
+
+@final
+class Renderer:
+    def __new__(
+        cls,
+        *,
+        size: tuple[int, int],
+        focal: tuple[float, float],
+        centre: tuple[float, float],
+        distortion: _Vector8,
+        translation: _Vector3,
+        rotation: _Vector3,
+        diameter: float,
+        bending_length: float,
+        tip_length: float,
+        markers: tuple[float, float],
+        band_length: float,
+        noise: float,
+        seed: int,
+    ) -> Renderer: ...
+    def draw(
+        self,
+        background: NDArray[np.uint8],
+        points: _Floats,
+        directions: _Floats,
+        sequence: int,
+    ) -> tuple[NDArray[np.uint8], _Floats]: ...

@@ -12,6 +12,7 @@ mod features;
 mod instrument;
 mod play;
 mod reduction;
+mod render;
 mod state;
 mod vision;
 
@@ -35,6 +36,8 @@ mod _core {
     use super::play::Play;
     #[pymodule_export]
     use super::reduction::Reduction;
+    #[pymodule_export]
+    use super::render::Renderer;
     #[pymodule_export]
     use super::state::StateEstimator;
     #[pymodule_export]

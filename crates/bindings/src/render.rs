@@ -1,0 +1,104 @@
+//! `tautscope._core.Renderer`: the twin's camera.
+
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
+use pyo3::prelude::*;
+use tautscope_render::{Error, Geometry, Lens, Pose};
+
+/// The picture and the features.
+type Drawing<'py> = (Bound<'py, PyArray3<u8>>, Bound<'py, PyArray1<f64>>);
+
+/// Draws the instrument over tissue; see `tautscope.twin.camera.TwinCamera`.
+#[pyclass(module = "tautscope._core")]
+pub struct Renderer {
+    inner: tautscope_render::Renderer,
+    frames: Vec<([f64; 3], [f64; 3])>,
+}
+
+#[pymethods]
+impl Renderer {
+    #[new]
+    #[pyo3(signature = (*, size, focal, centre, distortion, translation, rotation, diameter,
+                        bending_length, tip_length, markers, band_length, noise, seed))]
+    #[allow(
+        clippy::too_many_arguments,
+        reason = "keyword arguments of the Python class"
+    )]
+    fn new(
+        py: Python<'_>,
+        size: [usize; 2],
+        focal: [f64; 2],
+        centre: [f64; 2],
+        distortion: [f64; 8],
+        translation: [f64; 3],
+        rotation: [f64; 3],
+        diameter: f64,
+        bending_length: f64,
+        tip_length: f64,
+        markers: [f64; 2],
+        band_length: f64,
+        noise: f64,
+        seed: u64,
+    ) -> PyResult<Self> {
+        let geometry = Geometry {
+            diameter,
+            bending_length,
+            tip_length,
+            markers,
+            band_length,
+        };
+        Lens::new(focal, centre, distortion)
+            .and_then(|lens| {
+                let pose = Pose::new(translation, rotation)?;
+                tautscope_render::Renderer::new(size, lens, pose, geometry, noise, seed)
+            })
+            .map(|inner| Self {
+                inner,
+                frames: Vec::new(),
+            })
+            .map_err(|error| config_error(py, error))
+    }
+
+    /// Returns the picture, uint8 (h, w, 3), and the features, (4,) [px].
+    fn draw<'py>(
+        &mut self,
+        py: Python<'py>,
+        background: &Bound<'py, PyArray3<u8>>,
+        points: &Bound<'py, PyArray2<f64>>,
+        directions: &Bound<'py, PyArray2<f64>>,
+        sequence: u64,
+    ) -> PyResult<Drawing<'py>> {
+        let [width, height] = self.inner.size();
+        let image = PyArray3::zeros(py, [height, width, 3], false);
+        let mut pixels = image.readwrite();
+        let target = pixels.as_slice_mut()?;
+        let background = background.readonly();
+        let tissue = background.as_slice()?;
+        let (points, directions) = (points.readonly(), directions.readonly());
+        let (points, directions) = (points.as_array(), directions.as_array());
+        self.frames.clear();
+        self.frames.extend(
+            points
+                .rows()
+                .into_iter()
+                .zip(directions.rows())
+                .map(|(p, t)| {
+                    let row = |k: usize| (p.get(k).copied(), t.get(k).copied());
+                    let number = |x: Option<f64>| x.unwrap_or(f64::NAN);
+                    (
+                        [0, 1, 2].map(|k| number(row(k).0)),
+                        [0, 1, 2].map(|k| number(row(k).1)),
+                    )
+                }),
+        );
+        let features = py.detach(|| self.inner.draw(tissue, &self.frames, sequence, target));
+        drop(pixels);
+        Ok((image, PyArray1::from_slice(py, &features)))
+    }
+}
+
+fn config_error(py: Python<'_>, error: Error) -> PyErr {
+    let facts = (error.field, error.value, error.allowed);
+    py.import("tautscope.errors")
+        .and_then(|errors| errors.getattr("ConfigError")?.call1(facts))
+        .map_or_else(|failure| failure, PyErr::from_value)
+}

@@ -1,0 +1,123 @@
+use crate::Error;
+use crate::curve::Curve;
+use crate::features::{Features, Patches};
+use crate::lens::Lens;
+use crate::noise::Noise;
+use crate::pose::Pose;
+use crate::raster::Samples;
+use crate::tube::{Geometry, Sweep};
+
+/// Longest centreline that is drawn [m]; a longer one is a fault of the caller's physics.
+const LONGEST: f64 = 10.0;
+
+/// Draws the instrument over a picture of tissue, as a camera with light guides sees it.
+pub struct Renderer {
+    width: usize,
+    height: usize,
+    lens: Lens,
+    camera_from_guide: Pose,
+    geometry: Geometry,
+    noise: Noise,
+    curve: Curve,
+    samples: Samples,
+    bands: Patches,
+}
+
+impl Renderer {
+    /// Sets up the camera, the instrument and the sensor's noise.
+    ///
+    /// `size` is width and height [px], `noise` the standard deviation [grey levels] and `seed`
+    /// what decides every noise value.
+    ///
+    /// # Errors
+    /// A size outside 1 to 8192 px, a length that is not above zero, bands that are not on the tip, or
+    /// noise outside 0 to 255.
+    pub fn new(
+        size: [usize; 2],
+        lens: Lens,
+        camera_from_guide: Pose,
+        geometry: Geometry,
+        noise: f64,
+        seed: u64,
+    ) -> Result<Self, Error> {
+        for (field, value) in ["camera.width", "camera.height"].into_iter().zip(size) {
+            if !(1..=8192).contains(&value) {
+                return Err(Error {
+                    field,
+                    value: value as f64,
+                    allowed: "1 to 8192 px",
+                });
+            }
+        }
+        geometry.check()?;
+        let [width, height] = size;
+        Ok(Self {
+            width,
+            height,
+            lens,
+            camera_from_guide,
+            geometry,
+            noise: Noise::new(noise, seed)?,
+            curve: Curve::default(),
+            samples: Samples::new(width, height),
+            bands: Patches::default(),
+        })
+    }
+
+    /// Width and height [px].
+    pub fn size(&self) -> [usize; 2] {
+        [self.width, self.height]
+    }
+
+    /// Draws one picture into `image` (3 width height bytes, rows of blue, green, red) over
+    /// `background` (the same), and returns where the bands are in it.
+    ///
+    /// `frames` are positions [m] and tangents along the centreline in the guide's frame, proximal
+    /// to distal; the last is the distal end of the tip. The features are the centroids of
+    /// each band's visible part in the picture, before the noise. Frames with a number that is not finite,
+    /// or that make a line longer than 10 m, give a picture without instrument. Slices of another
+    /// size are filled as far as they go.
+    pub fn draw(
+        &mut self,
+        background: &[u8],
+        frames: &[([f64; 3], [f64; 3])],
+        sequence: u64,
+        image: &mut [u8],
+    ) -> Features {
+        self.sweep(frames);
+        let slack = 0.25 * self.geometry.diameter as f32;
+        let features = self.bands.centroids(&self.samples, slack);
+        let stride = 3 * self.width;
+        let rows = image.chunks_mut(stride).zip(background.chunks(stride));
+        for (y, (row, tissue)) in rows.take(self.height).enumerate() {
+            for (value, below) in row.iter_mut().zip(tissue) {
+                *value = *below;
+            }
+            self.samples.resolve(y, row);
+            self.noise.add(sequence, y as u64, row);
+        }
+        features
+    }
+
+    fn sweep(&mut self, frames: &[([f64; 3], [f64; 3])]) {
+        self.bands.clear();
+        if !frames
+            .iter()
+            .all(|(p, t)| p.iter().chain(t).all(|v| v.is_finite()))
+        {
+            return;
+        }
+        let pose = &self.camera_from_guide;
+        let moved = frames.iter().map(|&(p, t)| (pose.place(p), pose.turn(t)));
+        self.curve.fit(moved);
+        if self.curve.length() < LONGEST {
+            Sweep {
+                curve: &self.curve,
+                lens: &self.lens,
+                samples: &mut self.samples,
+                bands: &mut self.bands,
+            }
+            .draw(&self.geometry);
+        }
+    }
+}

@@ -1,0 +1,377 @@
+"""The twin's camera against OpenCV's projection and numpy's integration, never against itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from tautscope.config import Config
+from tautscope.errors import ConfigError, FieldError
+from tautscope.twin.camera import FRAMES_PER_BACKGROUND, TwinCamera
+
+Array = NDArray[Any]
+Frames = tuple[Array, Array]
+
+QUIET = {"twin.image_noise": 0.0}
+FACING = {
+    "camera.camera_from_guide.translation": (0.024, 0.0, 0.040),
+    "camera.camera_from_guide.rotation": (0.0, -1.0, 0.0),
+}
+"""The instrument comes from the right and is seen from the side."""
+NOTHING = (np.full((2, 3), np.nan), np.zeros((2, 3)))
+
+
+def make(**changes: Any) -> tuple[Config, TwinCamera]:
+    config = Config().replace(**changes)
+    return config, TwinCamera(config)
+
+
+def bent(config: Config, insertion: float, rotation: float, bending: float) -> Frames:
+    """Frames of a straight shaft, an arc and a straight tip in the guide's frame."""
+    instrument = config.instrument
+    angle = bending * np.linspace(0, 1, 21)
+    along = instrument.bending_length * np.linspace(0, 1, 21)
+    half = angle / 2
+    chord = along * np.sinc(half / np.pi)
+    axis = np.stack([np.sin(angle), 0 * angle, np.cos(angle)], axis=1)
+    place = np.stack([chord * np.sin(half), 0 * half, insertion + chord * np.cos(half)], axis=1)
+    place = np.vstack([[0, 0, 0], place, place[-1] + instrument.tip_length * axis[-1]])
+    axis = np.vstack([[0, 0, 1], axis, axis[-1]])
+    cos, sin = np.cos(rotation), np.sin(rotation)
+    turn = np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]])
+    return place @ turn.T, axis @ turn.T
+
+
+def in_camera(config: Config, vectors: Array, *, directions: bool = False) -> Array:
+    pose = config.camera.camera_from_guide
+    turned = vectors @ cv2.Rodrigues(np.array(pose.rotation))[0].T
+    return turned if directions else turned + pose.translation
+
+
+def opencv(config: Config, p_in_camera: Array) -> Array:
+    camera = config.camera
+    matrix = np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1]])
+    rest = np.zeros(3)
+    pixels = cv2.projectPoints(
+        np.asarray(p_in_camera, float).reshape(-1, 3),
+        rest,
+        rest,
+        matrix,
+        np.array(camera.distortion),
+    )[0]
+    return pixels.reshape(*np.shape(p_in_camera)[:-1], 2)
+
+
+def band_centres(config: Config, points: Array, directions: Array) -> Frames:
+    """In the camera's frame: centres of both bands on the tip's axis, and the axis."""
+    instrument = config.instrument
+    end = in_camera(config, points)[-1]
+    axis = in_camera(config, directions, directions=True)[-1]
+    markers = np.array([instrument.marker_a, instrument.marker_b])
+    return end - (instrument.tip_length - markers)[:, None] * axis, axis
+
+
+def integrated(
+    config: Config,
+    points: Array,
+    directions: Array,
+    hidden: Callable[[Array], Array] | None = None,
+) -> Array:
+    """Centroids of the bands' visible sides, by the area of small patches in the picture."""
+    instrument = config.instrument
+    centres, axis = band_centres(config, points, directions)
+    across = np.cross(axis, [0.3, 0.5, 0.8])
+    across /= np.linalg.norm(across)
+    other = np.cross(axis, across)
+    edge_s = instrument.band_length * np.linspace(-0.5, 0.5, 121)
+    edge_a = np.linspace(0, 2 * np.pi, 721)
+    features = []
+    for centre in centres:
+        s, a = np.meshgrid(edge_s, edge_a, indexing="ij")
+        normal = np.cos(a)[..., None] * across + np.sin(a)[..., None] * other
+        corner = opencv(config, centre + s[..., None] * axis + instrument.diameter / 2 * normal)
+        down, along = np.diff(corner, axis=0)[:, :-1], np.diff(corner, axis=1)[:-1]
+        area = np.abs(down[..., 0] * along[..., 1] - down[..., 1] * along[..., 0])
+        s, a = np.meshgrid(
+            (edge_s[1:] + edge_s[:-1]) / 2, (edge_a[1:] + edge_a[:-1]) / 2, indexing="ij"
+        )
+        normal = np.cos(a)[..., None] * across + np.sin(a)[..., None] * other
+        patch = centre + s[..., None] * axis + instrument.diameter / 2 * normal
+        seen = (normal * patch).sum(-1) < 0
+        if hidden is not None:
+            seen &= ~hidden(patch)
+        weight = np.where(seen, area, 0)
+        features.append((weight[..., None] * opencv(config, patch)).sum((0, 1)) / weight.sum())
+    return np.ravel(features)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_bands_lie_where_opencv_projects_them_whatever_the_lens(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    coefficients = rng.uniform(-1, 1, 8) * [0.25, 0.08, 0.01, 0.01, 0.01, 0.1, 0.05, 0.01]
+    lens = rng.uniform([350, 350, 320, 250], [600, 600, 400, 320])
+    place = np.array([0.014, 0, 0.050]) + rng.uniform(-4e-3, 4e-3, 3)
+    turn = np.array([0, -1.3, 0]) + rng.uniform(-0.3, 0.3, 3)
+    config, camera = make(
+        **QUIET,
+        **dict(
+            zip([f"camera.{key}" for key in ("fx", "fy", "cx", "cy")], lens.tolist(), strict=True)
+        ),
+        **{
+            "camera.distortion": tuple(coefficients.tolist()),
+            "camera.camera_from_guide.translation": tuple(place.tolist()),
+            "camera.camera_from_guide.rotation": tuple(turn.tolist()),
+            "instrument.diameter": 2e-3,
+        },
+    )
+    for _ in range(4):
+        state = rng.uniform([0, -3, -0.3], [4e-3, 3, 0.6])
+        frames = bent(config, *state)
+        expected = integrated(config, *frames)
+        assert ((expected > 20) & (expected < np.tile([700, 556], 2))).all(), (
+            f"bands left the view: {expected}"
+        )
+        drawn = camera.draw(*frames, 0).true_features
+        assert np.abs(drawn - expected).max() < 0.05, f"seed {seed}, state {state}"
+
+
+@pytest.mark.parametrize("rotation", [0.9, 1.9, 2.6, 3.7, 5.2])
+@pytest.mark.parametrize("bending", [0.0, 0.4, 0.9, 1.3])
+def test_bands_of_a_thick_tube_lie_at_the_centroid_of_their_visible_side(
+    rotation: float, bending: float
+) -> None:
+    config, camera = make(**QUIET, **FACING)
+    frames = bent(config, 8e-3, rotation, bending)
+    expected = integrated(config, *frames)
+    seen = camera.draw(*frames, 0).true_features
+    assert np.abs(seen - expected).max() < 0.1, (seen, expected)
+
+
+def crossing(offset: float) -> Frames:
+    """Frames, in the guide's frame, of a tip behind which its own shaft has passed to and fro."""
+    level = [
+        [40e-3, 0, 0],
+        [0, 0, 0],
+        [-25e-3, 0, 12e-3],
+        [0, offset, 25e-3],
+        [20e-3, offset, 25e-3],
+    ]
+    along = [[-1, 0, 0], [-1, 0, 0], [0, 0, 1], [1, 0, 0], [1, 0, 0]]
+    return np.array(level, float), np.array(along, float)
+
+
+CROSSED = {
+    **QUIET,
+    "camera.camera_from_guide.translation": (0.0, 0.0, 30e-3),
+    "camera.camera_from_guide.rotation": (0.0, 0.0, 0.4),
+}
+
+
+def test_bands_behind_the_shaft_are_not_visible() -> None:
+    config, camera = make(**CROSSED)
+    drawn = camera.draw(*crossing(0.0), 0).true_features
+    assert np.isnan(drawn).all()
+    free = camera.draw(*crossing(12e-3), 0).true_features
+    assert np.abs(free - integrated(config, *crossing(12e-3))).max() < 0.1
+
+
+@pytest.mark.parametrize("offset", [2.3e-3, 2.8e-3, -2.5e-3])
+def test_half_hidden_bands_lie_at_the_centroid_of_what_is_left(offset: float) -> None:
+    config, camera = make(**CROSSED)
+
+    place, along = (in_camera(config, crossing(offset)[k], directions=k == 1)[0] for k in (0, 1))
+
+    def hidden(patch: Array) -> Array:
+        # The straight shaft in front: a ray meets it where it passes its axis within the radius.
+        normal = np.cross(along, patch)
+        distance = np.abs(normal @ place) / np.linalg.norm(normal, axis=-1)
+        return np.asarray(distance < config.instrument.diameter / 2)
+
+    seen = camera.draw(*crossing(offset), 0).true_features
+    expected = integrated(config, *crossing(offset), hidden)
+    assert np.abs(seen - expected).max() < 0.25, (seen, expected)
+
+
+def test_the_drawn_green_is_where_the_features_say() -> None:
+    config, camera = make(**QUIET, **FACING)
+    for state in [(5e-3, 0, 0.0), (10e-3, 1, 0.7), (2e-3, -2, 1.0)]:
+        picture = camera.draw(*bent(config, *state), 0)
+        blue, green, red = np.moveaxis(picture.image.astype(float), -1, 0)
+        rows, columns = np.nonzero((green > 1.35 * red) & (green > 1.35 * blue))
+        pixels = np.stack([columns, rows], axis=1)
+        bands = picture.true_features.reshape(2, 2)
+        nearest = np.linalg.norm(pixels[:, None] - bands, axis=-1).argmin(axis=1)
+        for band in range(2):
+            assert (nearest == band).sum() > 100
+            # The mask is whole pixels with highlights cut out; the truth is not.
+            assert np.linalg.norm(pixels[nearest == band].mean(0) - bands[band]) < 1.0, state
+
+
+@pytest.mark.parametrize("depth", [15e-3, 30e-3, 50e-3, 80e-3])
+def test_bands_stay_bright_over_the_working_depth(depth: float) -> None:
+    config, camera = make(
+        **QUIET,
+        **{
+            "camera.camera_from_guide.translation": (0.028, 0.0, depth),
+            "camera.camera_from_guide.rotation": (0.0, -np.pi / 2, 0.0),
+        },
+    )
+    picture = camera.draw(*bent(config, 0.0, 0.0, 0.0), 0)
+    for u, v in picture.true_features.reshape(2, 2):
+        blue, green, red = picture.image[round(v), round(u)].astype(float)
+        assert 0.25 * 190 < green <= 255
+        assert green > 1.3 * max(blue, red)
+
+
+def test_same_seed_same_bytes_in_any_order() -> None:
+    config, camera = make()
+    frames = bent(config, 20e-3, 0.5, 0.9)
+    first = [camera.draw(*frames, k) for k in range(4)]
+    again = TwinCamera(config)
+    for k in (2, 0, 3, 1):
+        again.draw(*bent(config, 30e-3, -1, 0.2), 7)
+        picture = again.draw(*frames, k)
+        np.testing.assert_array_equal(picture.image, first[k].image)
+        np.testing.assert_array_equal(picture.true_features, first[k].true_features)
+
+
+def test_another_seed_or_number_another_noise() -> None:
+    config, camera = make()
+    frames = bent(config, 20e-3, 0.5, 0.9)
+    image = camera.draw(*frames, 0).image
+    other = TwinCamera(config.replace(**{"twin.seed": 1})).draw(*frames, 0).image
+    assert (image != camera.draw(*frames, 1).image).mean() > 0.5
+    assert (image != other).mean() > 0.5
+
+
+@pytest.mark.parametrize("sigma", [0.3, 1.0, 2.0, 7.5])
+def test_noise_is_white_and_as_strong_as_configured(sigma: float) -> None:
+    config, camera = make(**{"twin.image_noise": sigma})
+    clean = TwinCamera(config.replace(**QUIET)).draw(*NOTHING, 0).image.astype(float)
+    noise = np.array([camera.draw(*NOTHING, k).image - clean for k in range(2)])
+    noise = np.where((clean > 40) & (clean < 215), noise, np.nan)
+    assert np.nanstd(noise) == pytest.approx(sigma, rel=0.02)
+    assert abs(np.nanmean(noise)) < 0.02 * sigma
+    grid = np.nan_to_num(noise)
+    pairs = [
+        (grid[0], grid[1]),
+        (grid[:, 1:], grid[:, :-1]),
+        (grid[:, :, 1:], grid[:, :, :-1]),
+        (grid[..., 0], grid[..., 1]),
+    ]
+    for one, other in pairs:
+        assert abs((one * other).mean()) < 0.02 * sigma**2
+
+
+def test_nothing_behind_the_camera_is_drawn() -> None:
+    config, camera = make(**QUIET)
+    tissue = camera.draw(*NOTHING, 0).image
+    frames = bent(config, 20e-3, 0.0, 0.9)
+    pose = {"camera.camera_from_guide.translation": (0.0, 0.0, -0.1)}
+    behind = TwinCamera(config.replace(**pose)).draw(*frames, 0)
+    np.testing.assert_array_equal(behind.image, tissue)
+    assert np.isnan(behind.true_features).all()
+
+
+def test_nothing_nearer_than_two_millimetres_is_drawn() -> None:
+    near = {
+        "camera.camera_from_guide.translation": (0.030, 0.0, 1.5e-3),
+        "camera.camera_from_guide.rotation": (0.0, -np.pi / 2, 0.0),
+        "instrument.diameter": 0.4e-3,
+    }
+    config, camera = make(**QUIET, **near)
+    picture = camera.draw(*bent(config, 1e-3, 0.0, 0.0), 0)
+    np.testing.assert_array_equal(picture.image, camera.draw(*NOTHING, 0).image)
+    assert np.isnan(picture.true_features).all()
+
+
+def test_what_passes_the_camera_is_cut_off_safely() -> None:
+    config, camera = make(**QUIET)
+    tissue = camera.draw(*NOTHING, 0).image
+    pose = {
+        "camera.camera_from_guide.translation": (0.004, 0.003, -0.03),
+        "camera.camera_from_guide.rotation": (0.0, 0.0, 0.0),
+    }
+    through = TwinCamera(config.replace(**pose))
+    picture = through.draw(*bent(config, 20e-3, 0.0, 0.0), 0)
+    changed = (picture.image != tissue).any(axis=-1)
+    assert 0.001 < changed.mean() < 0.5
+    # Everything in front of the camera is right of and below the axis.
+    assert not changed[: int(config.camera.cy) - 60, : int(config.camera.cx) - 60].any()
+
+
+def test_any_numbers_give_a_picture() -> None:
+    rng = np.random.default_rng(5)
+    config, camera = make(**QUIET)
+    for trial in range(150):
+        n = int(rng.integers(2, 30))
+        scale = 10.0 ** rng.choice([-12, -3, -2, -1, 0, 3, 30, 160, 300])
+        points = scale * rng.standard_normal((n, 3))
+        directions = rng.standard_normal((n, 3)) * 10.0 ** rng.choice([-300, 0, 200])
+        if trial % 3 == 0:
+            where = rng.integers(n), rng.integers(3)
+            (points if trial % 2 else directions)[where] = rng.choice([np.nan, np.inf, -np.inf, 0])
+        if trial % 5 == 0:
+            points[:] = points[0]
+        picture = camera.draw(points, directions, trial)
+        assert picture.image.shape == (config.camera.height, config.camera.width, 3)
+        assert picture.image.dtype == np.uint8
+        assert picture.true_features.shape == (4,)
+    # No trial has left anything behind.
+    clean = TwinCamera(config).draw(*NOTHING, 0).image
+    np.testing.assert_array_equal(camera.draw(*NOTHING, 0).image, clean)
+
+
+def test_each_image_is_an_array_of_its_own() -> None:
+    _, camera = make(**QUIET)
+    first = camera.draw(*NOTHING, 0).image
+    first[:] = 0
+    assert camera.draw(*NOTHING, 0).image.any()
+
+
+@pytest.mark.parametrize(
+    ("points", "directions", "sequence", "field"),
+    [
+        (np.zeros((3, 2)), np.zeros((3, 2)), 0, "points"),
+        (np.zeros((1, 3)), np.zeros((1, 3)), 0, "points"),
+        (np.zeros(3), np.zeros(3), 0, "points"),
+        (np.zeros((3, 3)), np.zeros((2, 3)), 0, "directions"),
+        (np.zeros((3, 3)), np.zeros((3, 3)), -1, "sequence"),
+    ],
+)
+def test_frames_of_another_shape_are_refused_by_name(
+    points: Array, directions: Array, sequence: int, field: str
+) -> None:
+    _, camera = make()
+    with pytest.raises(FieldError) as caught:
+        camera.draw(points, directions, sequence)
+    assert caught.value.field == field
+
+
+def test_a_camera_that_cannot_be_made_is_refused_by_name() -> None:
+    with pytest.raises(ConfigError) as caught:
+        make(**{"twin.image_noise": 300.0})
+    assert caught.value.field == "twin.image_noise"
+
+
+@pytest.mark.parametrize("size", [(1, 1), (33, 7), (1280, 720)])
+def test_any_size_of_picture(size: tuple[int, int]) -> None:
+    config, camera = make(**{"camera.width": size[0], "camera.height": size[1]})
+    image = camera.draw(*bent(config, 20e-3, 0.3, 0.9), 0).image
+    assert image.shape == (size[1], size[0], 3)
+
+
+def test_backgrounds_are_shown_in_turn(tmp_path: Path) -> None:
+    grey = [40, 120, 200]
+    for name, level in zip(["b.png", "a.png", "c.png"], grey, strict=True):
+        cv2.imwrite(str(tmp_path / name), np.full((30, 40, 3), level, np.uint8))
+    config, camera = make(**QUIET, **{"twin.background": str(tmp_path)})
+    levels = [camera.draw(*NOTHING, k * FRAMES_PER_BACKGROUND).image for k in range(4)]
+    assert [int(image.mean().round()) for image in levels] == [120, 40, 200, 120]
+    assert camera.draw(*NOTHING, FRAMES_PER_BACKGROUND - 1).image[0, 0, 0] == 120
+    assert levels[0].shape == (config.camera.height, config.camera.width, 3)
