@@ -14,7 +14,6 @@ import time
 os.environ["OMP_NUM_THREADS"] = "1"
 
 import cv2
-
 from tautscope import HysteresisReduction, Twin, load_config
 from tautscope.references import SineSequence
 
@@ -51,8 +50,7 @@ def main() -> None:
         ("without images", False, 30.0, 40.0),
     ):
         figures = [
-            seconds_per_second(images=images, simulated=simulated)
-            for _ in range(arguments.repeats)
+            seconds_per_second(images=images, simulated=simulated) for _ in range(arguments.repeats)
         ]
         median = statistics.median(figures)
         rows.append(

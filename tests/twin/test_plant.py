@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from tautscope.config import Config, load_config
 from tautscope.dof import Dof
 from tautscope.metrics import loop_width
