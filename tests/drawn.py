@@ -14,5 +14,5 @@ __all__ = ["EXAMPLES", "SLACK", "BadFrameRig", "DrawnRig", "short_experiment"]
 class BadFrameRig(DrawnRig):
     """Its camera is not the configured one."""
 
-    def _picture(self):  # noqa: ANN202
+    def _picture(self):
         return super()._picture()[:-1]

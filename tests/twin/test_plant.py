@@ -95,7 +95,7 @@ def test_true_state_is_the_geometry_of_the_centreline():
     """Insertion, rotation and bending read off the drawn curve, not off the joints."""
     plant = plant_for()
     sweep(plant, Dof.ROTATION, periods=1)
-    plant.step(posture() + [0.004, 1.5, 0.5])
+    plant.step(posture() + np.array([0.004, 1.5, 0.5]))
     points, directions = plant.centreline()
     insertion, rotation, bending = plant.true_state
     assert points[1][2] == pytest.approx(insertion, abs=1e-9)
@@ -120,7 +120,7 @@ def test_drives_obey_their_speed_limit_and_report_whole_counts():
     plant = plant_for(**{"twin.drives.speed_limit": (0.01, 1.0, 1.0)})
     before = plant.applied
     for _ in range(100):
-        plant.step(posture() + [1.0, 10.0, 10.0])
+        plant.step(posture() + np.array([1.0, 10.0, 10.0]))
     # The servo may swing a little past the ramp it follows.
     travel = plant.applied - before
     assert np.all(travel <= 0.5 * np.array([0.01, 1.0, 1.0]) * 1.05)
@@ -132,8 +132,8 @@ def test_drives_obey_their_speed_limit_and_report_whole_counts():
 def test_drives_reach_the_command():
     plant = plant_for()
     for _ in range(400):
-        plant.step(posture() + [0.01, 0.5, 0.3])
-    assert np.allclose(plant.applied, posture() + [0.01, 0.5, 0.3], rtol=0.01)
+        plant.step(posture() + np.array([0.01, 0.5, 0.3]))
+    assert np.allclose(plant.applied, posture() + np.array([0.01, 0.5, 0.3]), rtol=0.01)
 
 
 def test_another_control_period_is_the_same_instrument():

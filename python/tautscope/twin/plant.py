@@ -71,8 +71,8 @@ class Plant:
     @property
     def applied(self) -> NDArray[np.float64]:
         """What the encoders read (3,) [m, rad, rad], in whole counts."""
-        counts: NDArray[np.float64] = np.round(self._data.qpos[self._motors] / self._encoder_step)
-        return counts * self._encoder_step
+        read: NDArray[np.float64] = self._data.qpos[self._motors]
+        return np.round(read / self._encoder_step) * self._encoder_step
 
     @property
     def true_state(self) -> NDArray[np.float64]:
