@@ -117,7 +117,7 @@ def test_without_thickness_it_is_the_articles_model() -> None:
             },
             "looked at along its axis",
         ),
-        ({"camera.distortion": [-30.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]}, "folded over"),
+        ({"camera.distortion": [-300.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]}, "folded over"),
     ],
 )
 def test_a_band_that_cannot_be_seen_has_no_features(changes: dict[str, object], why: str) -> None:

@@ -72,7 +72,8 @@ class Plant:
     def applied(self) -> NDArray[np.float64]:
         """What the encoders read (3,) [m, rad, rad], in whole counts."""
         read: NDArray[np.float64] = self._data.qpos[self._motors]
-        return np.round(read / self._encoder_step) * self._encoder_step
+        counts: NDArray[np.float64] = np.round(read / self._encoder_step)
+        return counts * self._encoder_step
 
     @property
     def true_state(self) -> NDArray[np.float64]:
