@@ -1,8 +1,11 @@
 __version__: str
 
+from typing import final
+
 from numpy import float64, uint8
 from numpy.typing import NDArray
 
+@final
 class Renderer:
     def __new__(
         cls,

@@ -47,22 +47,16 @@ pub(crate) const SECTION: Material = Material {
     pitch: 1.25e-3,
 };
 pub(crate) const TIP: Material = Material {
-    band: None,
     colour: [172.0, 174.0, 172.0],
     gloss: 120.0,
-    sharpness: 5,
-    tilt: 0.0,
-    groove: 0.0,
-    pitch: 1.0,
+    ..SHAFT
 };
 pub(crate) const BAND_A: Material = Material {
     band: Some(0),
     colour: [70.0, 190.0, 60.0],
     gloss: 70.0,
     sharpness: 6,
-    tilt: 0.0,
-    groove: 0.0,
-    pitch: 1.0,
+    ..SHAFT
 };
 pub(crate) const BAND_B: Material = Material {
     band: Some(1),

@@ -72,7 +72,7 @@ impl Renderer {
     /// Draws one picture into `image` (3 width height bytes, rows of blue, green, red) over
     /// `background` (the same), and returns where the bands are in it.
     ///
-    /// `frames` are positions [m] and tangents along the centreline in the guide's frame, proximal
+    /// `frames` are positions (in m) and tangents along the centreline in the guide's frame, proximal
     /// to distal; the last is the distal end of the tip. The features are the centroids of
     /// each band's visible part in the picture, before the noise. Frames with a number that is not finite,
     /// or that make a line longer than 10 m, give a picture without instrument. Slices of another

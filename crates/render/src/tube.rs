@@ -20,7 +20,7 @@ const CAP_RINGS: u32 = 5;
 /// Height of the rounded end over the tube's radius.
 const CAP_HEIGHT: f64 = 0.4;
 
-/// The instrument's geometry [m]: a tube with two bands, as `instrument` in the configuration.
+/// The instrument's geometry, in m: a tube with two bands, as `instrument` in the configuration.
 #[derive(Clone, Copy, Debug)]
 pub struct Geometry {
     /// Outer diameter.
