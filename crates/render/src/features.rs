@@ -5,7 +5,7 @@ const CELLS: u8 = 6;
 /// A band that shows less than this is not visible [px²].
 const LEAST: f64 = 1.0;
 
-/// Centroids of the visible part of bands A and B, u and v of each [px]; NaN where not visible.
+/// Centroids of the visible part of bands A and B, u and v of each, in px; NaN where not visible.
 pub type Features = [f64; 4];
 
 /// The bands' surface as it was drawn, patch by patch.
