@@ -77,8 +77,9 @@ impl Material {
         )
     }
 
-    /// Blue, green and red, 2 to 253 so that rounding in between cannot leave 0 to 255, of the place `p` (m) with unit normal `n`, both in the
-    /// camera's frame; `shade` is a factor on the diffuse colour.
+    /// Blue, green and red of the place `p` (m) with unit normal `n`, both in the camera's frame;
+    /// `shade` is a factor on the diffuse colour. From 2 to 253, so that rounding in between
+    /// cannot leave 0 to 255.
     pub(crate) fn lit(&self, p: [f32; 3], n: [f32; 3], shade: f32) -> [f32; 3] {
         let distance2 = dot(p, p);
         let view = scale(p, -1.0 / distance2.sqrt());
