@@ -15,7 +15,7 @@ struct Piece {
     b: Vector,
     c: Vector,
     d: Vector,
-    /// Arc length of the whole curve where t is k / `KNOTS` [m].
+    /// Arc length of the whole curve where t is k / `KNOTS` (m).
     knots: [f64; KNOTS + 1],
 }
 
@@ -81,7 +81,7 @@ pub(crate) struct Curve {
 }
 
 impl Curve {
-    /// Joins frames (positions [m] and tangents), proximal to distal. Frames on the same spot
+    /// Joins frames (positions (m) and tangents), proximal to distal. Frames on the same spot
     /// count once. The memory of an earlier curve is used again.
     pub(crate) fn fit(&mut self, frames: impl Iterator<Item = (Vector, Vector)>) {
         self.pieces.clear();
@@ -98,12 +98,12 @@ impl Curve {
         }
     }
 
-    /// Arc length [m].
+    /// Arc length (m).
     pub(crate) fn length(&self) -> f64 {
         self.pieces.last().map_or(0.0, Piece::end)
     }
 
-    /// Position [m] and unit tangent at arc length `s` from the proximal end [m]; clamped to the
+    /// Position (m) and unit tangent at arc length `s` from the proximal end (m); clamped to the
     /// curve's ends.
     pub(crate) fn at(&self, s: f64) -> (Vector, Vector) {
         let s = s.clamp(0.0, self.length());

@@ -2,10 +2,10 @@ use crate::raster::{Samples, Vertex};
 
 /// Cells per side into which a patch is divided to see how much of it is hidden.
 const CELLS: u8 = 6;
-/// A band that shows less than this is not visible [px²].
+/// A band that shows less than this is not visible (px²).
 const LEAST: f64 = 1.0;
 
-/// Centroids of the visible part of bands A and B, u and v of each [px]; NaN where not visible.
+/// Centroids of the visible part of bands A and B, u and v of each, in px; NaN where not visible.
 pub type Features = [f64; 4];
 
 /// The bands' surface as it was drawn, patch by patch.
@@ -31,7 +31,7 @@ impl Patches {
 
     /// Centroids by visible area in the picture,
     /// `sum(area of cell x place of cell) / sum(area of cell)`; a cell is hidden where something
-    /// is drawn nearer than it by more than `slack` [m], or outside the picture.
+    /// is drawn nearer than it by more than `slack` (m), or outside the picture.
     pub(crate) fn centroids(&self, samples: &Samples, slack: f32) -> Features {
         let mut sums = [[0.0_f64; 3]; 2];
         for (band, corners) in &self.patches {

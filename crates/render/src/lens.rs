@@ -1,7 +1,7 @@
 use crate::Error;
 use crate::error::{finite, positive};
 
-/// Nothing nearer than this to the camera is drawn [m].
+/// Nothing nearer than this to the camera is drawn (m).
 const NEAR: f32 = 2e-3;
 /// Largest tangent of the angle off the optical axis that is looked at: 80 degrees.
 const WIDEST: f32 = 5.7;
@@ -28,7 +28,7 @@ pub struct Lens {
 }
 
 impl Lens {
-    /// From focal lengths and principal point (2) [px] and k1, k2, p1, p2, k3, k4, k5, k6.
+    /// From focal lengths and principal point (2) (px) and k1, k2, p1, p2, k3, k4, k5, k6.
     ///
     /// # Errors
     /// A value that is not finite, or a focal length that is not above zero.
@@ -66,7 +66,7 @@ impl Lens {
         (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)))
     }
 
-    /// Pixel of a point in the camera's frame [m]; `None` when it is behind the camera, nearer
+    /// Pixel of a point in the camera's frame (m); `None` when it is behind the camera, nearer
     /// than 2 mm, or so far off the axis that the distortion polynomial no longer means anything.
     pub(crate) fn project(&self, p: [f32; 3]) -> Option<[f32; 2]> {
         if p[2] <= NEAR {

@@ -2,11 +2,11 @@
 
 use crate::vector::Vector;
 
-/// Light guides beside the lens, in the camera's frame [m].
+/// Light guides beside the lens, in the camera's frame (m).
 const LIGHTS: [[f32; 3]; 2] = [[-3.0e-3, -1.0e-3, 0.0], [3.0e-3, -1.0e-3, 0.0]];
 /// Share of the light that comes back from the tissue all around.
 const AMBIENT: f32 = 0.42;
-/// Distance over which the light falls to half [m]; the exposure control takes up the rest.
+/// Distance over which the light falls to half (m); the exposure control takes up the rest.
 const FALLOFF: f32 = 90e-3;
 const EXPOSURE: f32 = 1.15;
 
@@ -15,16 +15,16 @@ const EXPOSURE: f32 = 1.15;
 pub(crate) struct Material {
     /// Which of the bands this is, if any.
     pub(crate) band: Option<usize>,
-    /// Diffuse colour: blue, green, red [grey levels].
+    /// Diffuse colour: blue, green, red (grey levels).
     colour: [f32; 3],
-    /// Height of the highlight [grey levels].
+    /// Height of the highlight (grey levels).
     gloss: f32,
     /// log2 of the highlight's exponent.
     sharpness: i32,
-    /// Ribs around the tube: how far the normal tilts [rad], how much darker the grooves are.
+    /// Ribs around the tube: how far the normal tilts (rad), how much darker the grooves are.
     pub(crate) tilt: f32,
     groove: f32,
-    /// Distance between two ribs [m].
+    /// Distance between two ribs (m).
     pub(crate) pitch: f64,
 }
 
@@ -47,22 +47,16 @@ pub(crate) const SECTION: Material = Material {
     pitch: 1.25e-3,
 };
 pub(crate) const TIP: Material = Material {
-    band: None,
     colour: [172.0, 174.0, 172.0],
     gloss: 120.0,
-    sharpness: 5,
-    tilt: 0.0,
-    groove: 0.0,
-    pitch: 1.0,
+    ..SHAFT
 };
 pub(crate) const BAND_A: Material = Material {
     band: Some(0),
     colour: [70.0, 190.0, 60.0],
     gloss: 70.0,
     sharpness: 6,
-    tilt: 0.0,
-    groove: 0.0,
-    pitch: 1.0,
+    ..SHAFT
 };
 pub(crate) const BAND_B: Material = Material {
     band: Some(1),
@@ -71,7 +65,7 @@ pub(crate) const BAND_B: Material = Material {
 
 impl Material {
     /// Phase of the ribs at arc length `s` from the start of the material: (tilt of the normal
-    /// towards the distal end [rad], factor on the diffuse colour).
+    /// towards the distal end (rad), factor on the diffuse colour).
     pub(crate) fn rib(&self, s: f64) -> (f32, f32) {
         if self.tilt <= 0.0 {
             return (0.0, 1.0);
@@ -83,8 +77,9 @@ impl Material {
         )
     }
 
-    /// Blue, green and red, 2 to 253 so that rounding in between cannot leave 0 to 255, of the place `p` [m] with unit normal `n`, both in the
-    /// camera's frame; `shade` is a factor on the diffuse colour.
+    /// Blue, green and red of the place `p` (m) with unit normal `n`, both in the camera's frame;
+    /// `shade` is a factor on the diffuse colour. From 2 to 253, so that rounding in between
+    /// cannot leave 0 to 255.
     pub(crate) fn lit(&self, p: [f32; 3], n: [f32; 3], shade: f32) -> [f32; 3] {
         let distance2 = dot(p, p);
         let view = scale(p, -1.0 / distance2.sqrt());

@@ -15,7 +15,7 @@ pub(crate) struct Noise {
 }
 
 impl Noise {
-    /// With standard deviation `sigma` [grey levels], after rounding to whole levels.
+    /// With standard deviation `sigma` (grey levels), after rounding to whole levels.
     pub(crate) fn new(sigma: f64, seed: u64) -> Result<Self, Error> {
         checked("twin.image_noise", sigma, "a number from 0 to 255", |v| {
             (0.0..=255.0).contains(&v)

@@ -11,7 +11,7 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// From a translation (3) [m] and a rotation vector (3), axis times angle [rad].
+    /// From a translation (3) (m) and a rotation vector (3), axis times angle (rad).
     ///
     /// # Errors
     /// A component that is not finite.

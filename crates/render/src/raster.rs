@@ -8,7 +8,7 @@ const FINE: usize = 2;
 pub(crate) struct Vertex {
     /// Place [px, pixel centres at whole numbers].
     pub(crate) at: [f32; 2],
-    /// 1 / depth [1/m]; 0 marks a corner that cannot be drawn.
+    /// 1 / depth (1/m); 0 marks a corner that cannot be drawn.
     pub(crate) nearness: f32,
     /// Blue, green, red, 0 to 255.
     pub(crate) colour: [f32; 3],
@@ -16,7 +16,7 @@ pub(crate) struct Vertex {
 
 /// The picture at 2x2 samples per pixel, with the nearest surface of each.
 ///
-/// Sample (i, j) lies at x = (i + 1/2 + s) / 2 - 1/2 and y = (j + 1/2) / 2 - 1/2 [px]; the shift s
+/// Sample (i, j) lies at x = (i + 1/2 + s) / 2 - 1/2 and y = (j + 1/2) / 2 - 1/2 (px); the shift s
 /// is -1/4 in even rows and 1/4 in odd ones, so that upright edges get four steps. Memory outside the spans that were
 /// drawn to is never touched, neither to clear it nor to read it.
 pub(crate) struct Samples {
@@ -126,7 +126,7 @@ impl Samples {
         }
     }
 
-    /// Whether `at` [px] lies outside the picture or behind something nearer than `limit` [1/m].
+    /// Whether `at` (px) lies outside the picture or behind something nearer than `limit` (1/m).
     pub(crate) fn hides(&self, at: [f32; 2], limit: f32) -> bool {
         let [x, y] = at.map(|x| (FINE as f32 * (x + 0.5)).floor());
         let inside = x >= 0.0 && y >= 0.0 && x < self.width as f32 && y < self.height as f32;
@@ -193,7 +193,7 @@ impl Samples {
 /// Marks a sample that shows the instrument.
 const DRAWN: u32 = 1 << 24;
 
-/// How far the samples of a row lie off the even grid [samples].
+/// How far the samples of a row lie off the even grid (samples).
 fn shift(row: usize) -> f32 {
     if row & 1 == 0 { -0.25 } else { 0.25 }
 }
@@ -211,7 +211,7 @@ struct Plane {
 }
 
 impl Plane {
-    /// With `values` at the three `corners` [samples] of a triangle; `scale` is 1 over twice its
+    /// With `values` at the three `corners` (samples) of a triangle; `scale` is 1 over twice its
     /// area.
     fn through(corners: [[f32; 2]; 3], scale: f32, values: [f32; 3]) -> Self {
         let [a, b, c] = corners;

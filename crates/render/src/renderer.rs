@@ -7,7 +7,7 @@ use crate::pose::Pose;
 use crate::raster::Samples;
 use crate::tube::{Geometry, Sweep};
 
-/// Longest centreline that is drawn [m]; a longer one is a fault of the caller's physics.
+/// Longest centreline that is drawn (m); a longer one is a fault of the caller's physics.
 const LONGEST: f64 = 10.0;
 
 /// Draws the instrument over a picture of tissue, as a camera with light guides sees it.
@@ -26,7 +26,7 @@ pub struct Renderer {
 impl Renderer {
     /// Sets up the camera, the instrument and the sensor's noise.
     ///
-    /// `size` is width and height [px], `noise` the standard deviation [grey levels] and `seed`
+    /// `size` is width and height (px), `noise` the standard deviation (grey levels) and `seed`
     /// what decides every noise value.
     ///
     /// # Errors
@@ -64,7 +64,7 @@ impl Renderer {
         })
     }
 
-    /// Width and height [px].
+    /// Width and height (px).
     pub fn size(&self) -> [usize; 2] {
         [self.width, self.height]
     }
@@ -72,7 +72,7 @@ impl Renderer {
     /// Draws one picture into `image` (3 width height bytes, rows of blue, green, red) over
     /// `background` (the same), and returns where the bands are in it.
     ///
-    /// `frames` are positions [m] and tangents along the centreline in the guide's frame, proximal
+    /// `frames` are positions (in m) and tangents along the centreline in the guide's frame, proximal
     /// to distal; the last is the distal end of the tip. The features are the centroids of
     /// each band's visible part in the picture, before the noise. Frames with a number that is not finite,
     /// or that make a line longer than 10 m, give a picture without instrument. Slices of another

@@ -11,7 +11,7 @@ use crate::vector::{Vector, add, cross, dot, norm, perpendicular, scale, sub, un
 const FACETS: usize = 16;
 /// Rings per rib of a ribbed material.
 const RINGS_PER_RIB: f64 = 4.0;
-/// Largest distance between two rings of a smooth material [m].
+/// Largest distance between two rings of a smooth material (m).
 const RING_STEP: f64 = 1.0e-3;
 /// Rings along one material at most, however long the instrument.
 const RINGS: f64 = 400.0;
@@ -20,7 +20,7 @@ const CAP_RINGS: u32 = 5;
 /// Height of the rounded end over the tube's radius.
 const CAP_HEIGHT: f64 = 0.4;
 
-/// The instrument's geometry [m]: a tube with two bands, as `instrument` in the configuration.
+/// The instrument's geometry, in m: a tube with two bands, as `instrument` in the configuration.
 #[derive(Clone, Copy, Debug)]
 pub struct Geometry {
     /// Outer diameter.
@@ -148,7 +148,7 @@ impl Sweep<'_> {
         }
     }
 
-    /// The visible arc of one ring. `slope` is γ [rad].
+    /// The visible arc of one ring. `slope` is γ (rad).
     fn ring(
         &self,
         centre: Vector,
