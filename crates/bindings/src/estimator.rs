@@ -46,6 +46,9 @@ impl Estimator {
     }
 
     fn predict(&mut self, command: f64) -> f64 {
+        if self.output.output.is_nan() {
+            self.output.output = command;
+        }
         self.state.play().step(&mut self.output, command)
     }
 
