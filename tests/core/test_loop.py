@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+import sys
+from dataclasses import fields, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from tautscope import _core
 from tautscope.config import Config
 from tautscope.errors import ConfigError, SignalError
 from tautscope.reduction import HysteresisReduction, Report, Status, build_feature_model
+from tautscope.rig import Frame
 
 Floats = NDArray[np.float64]
 
@@ -232,3 +235,37 @@ def test_batch_run_is_step_by_step() -> None:
     np.testing.assert_array_equal(
         one.run(references, times), [other.step(reference) for reference in references]
     )
+
+
+class FakeDetector:
+    """Sees what it is told; keeps where it was told to look."""
+
+    def __init__(self, config: Config) -> None:
+        self.looked: list[Floats | None] = []
+        self.found = SimpleNamespace(features=np.zeros(4), valid=False, reason="none")
+
+    def detect(self, image: object, predicted_features: Floats | None = None) -> SimpleNamespace:
+        self.looked.append(predicted_features)
+        return self.found
+
+
+def test_a_frame_is_looked_at_where_it_was_captured(monkeypatch: pytest.MonkeyPatch) -> None:
+    vision = SimpleNamespace(MarkerDetector=FakeDetector)
+    monkeypatch.setitem(sys.modules, "tautscope.vision", vision)
+    loop = started()
+    predicted = loop.predicted_features(0.2)
+    assert predicted is not None
+    frame = Frame(np.zeros((576, 720, 3), np.uint8), captured_at=0.2, sequence=0)
+
+    lost = loop.on_frame(frame)
+    assert lost.status is Status.NO_MARKERS and lost.captured_at == 0.2
+    detector = loop._detector
+    assert isinstance(detector, FakeDetector) and lost.detection is detector.found
+    np.testing.assert_array_equal(detector.looked[0], predicted)
+
+    detector.found = SimpleNamespace(features=predicted + 1.0, valid=True, reason="")
+    seen = loop.on_frame(frame)
+    assert seen.status is Status.OK
+    np.testing.assert_allclose(seen.innovation, 1.0, atol=1e-9)
+    with pytest.raises(SignalError, match="captured_at"):
+        loop.on_frame(replace(frame, captured_at=np.nan))

@@ -7,6 +7,7 @@ use tautscope_core as core;
 use crate::arrays::{Table, Vector, fixed, rows, table};
 use crate::errors;
 
+/// Pinhole with `OpenCV`'s distortion k1, k2, p1, p2, k3, k4, k5, k6, Eq. (8). Raises `ConfigError`.
 #[pyclass(name = "Camera", module = "tautscope._core", frozen)]
 pub struct Camera(pub core::Camera);
 
@@ -27,6 +28,7 @@ impl Camera {
             .map_err(errors::config(py))
     }
 
+    /// Pixels (n, 2) of points (n, 3) in m in the camera frame; NaN at or behind the camera.
     fn project<'py>(
         &self,
         py: Python<'py>,
@@ -40,6 +42,7 @@ impl Camera {
         table(py, &pixels)
     }
 
+    /// d pixel / d point (2, 3) in px/m at a point (3,) in m in the camera frame.
     fn jacobian<'py>(
         &self,
         py: Python<'py>,

@@ -9,6 +9,11 @@ use crate::errors;
 
 type Series<'py> = Bound<'py, PyArray1<f64>>;
 
+/// On-line estimation of one DOF's contact offsets from command and output, Eqs. (4)-(6), Fig. 3.
+///
+/// `update_distance` (tau) is in the unit of the DOF; `contact_tolerance` (epsilon) and
+/// `smoothing_factor` (alpha, per `update_distance` travelled) are between 0 and 1. Command and output
+/// must be of the same instant: a delay reads as width. Raises `ConfigError`.
 #[pyclass(name = "Estimator", module = "tautscope._core")]
 pub struct Estimator {
     pub inner: core::Estimator,
@@ -40,15 +45,27 @@ impl Estimator {
         })
     }
 
+    /// Take in a command and the output measured at the same instant.
+    ///
+    /// Returns why (`delta_minus`, `delta_plus`) were updated: "contact", Eq. (4), "violation", Eq. (5),
+    /// or None. A pair that is not finite is ignored.
     fn update(&mut self, command: f64, measured: f64) -> TriggerNames {
         let triggers = self.inner.update(&mut self.state, command, measured);
         trigger_names(triggers)
     }
 
+    /// The output of the play with the offsets estimated so far, for the next command.
     fn predict(&mut self, command: f64) -> f64 {
+        if self.output.output.is_nan() {
+            self.output.output = command;
+        }
         self.state.play().step(&mut self.output, command)
     }
 
+    /// `predict` then `update` for each of commands (n,) and measured (n,).
+    ///
+    /// Returns predicted, `delta_minus` and `delta_plus`, each (n,): `predicted[k]` uses `measured[:k]` only,
+    /// the offsets are those after sample k. Raises `SignalError` for unequal lengths.
     fn run<'py>(
         &mut self,
         py: Python<'py>,
@@ -73,11 +90,13 @@ impl Estimator {
         ))
     }
 
+    /// Estimated offset at the negative contact, input minus output.
     #[getter]
     fn delta_minus(&self) -> f64 {
         self.state.play().delta_minus()
     }
 
+    /// Estimated offset at the positive contact, input minus output.
     #[getter]
     fn delta_plus(&self) -> f64 {
         self.state.play().delta_plus()

@@ -11,6 +11,10 @@ use crate::instrument::Instrument;
 
 type Prediction<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>);
 
+/// From the state to the centroids of the two marker bands: h = g after f, Eqs. (9)-(11).
+///
+/// `translation` in m and `rotation` (rotation vector, rad) are `camera_from_guide`. It predicts the
+/// centroid of the visible half of each band (decision 0002). Raises `ConfigError`.
 #[pyclass(name = "FeatureModel", module = "tautscope._core", frozen)]
 pub struct FeatureModel(pub core::FeatureModel);
 
@@ -29,6 +33,9 @@ impl FeatureModel {
         Ok(Self(core::FeatureModel::new(instrument.0, camera.0, pose)))
     }
 
+    /// Features (4,) in px and interaction matrix (4, 3) for a state (3,) [m, rad, rad].
+    ///
+    /// None where a band cannot be seen.
     fn predict<'py>(
         &self,
         py: Python<'py>,

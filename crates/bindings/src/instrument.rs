@@ -7,6 +7,10 @@ use tautscope_core as core;
 use crate::arrays::{Vector, columns, fixed, table};
 use crate::errors;
 
+/// Kinematics of the instrument, Eq. (7), Fig. 4. Lengths in m.
+///
+/// Guide frame: origin where the instrument leaves the guide, z along the channel outwards. The
+/// markers' distances count from the distal end of the bending section. Raises `ConfigError`.
 #[pyclass(name = "Instrument", module = "tautscope._core", frozen)]
 pub struct Instrument(pub core::Instrument);
 
@@ -27,6 +31,7 @@ impl Instrument {
             .map_err(errors::config(py))
     }
 
+    /// f(q): centres of bands A and B (2, 3) in m for a state (3,) [m, rad, rad].
     fn markers<'py>(
         &self,
         py: Python<'py>,

@@ -7,6 +7,11 @@ use tautscope_core as core;
 use crate::arrays::Vector;
 use crate::errors;
 
+/// The play (backlash) operator, Eq. (1): the output lags the input between two contacts.
+///
+/// `v - delta_plus <= y <= v - delta_minus`, offsets being input minus output; all in one unit. It
+/// knows no time. `output` is the output to start from. Raises `ConfigError` for offsets that are
+/// not finite or in the wrong order.
 #[pyclass(name = "Play", module = "tautscope._core")]
 pub struct Play {
     play: core::Play,
@@ -23,31 +28,37 @@ impl Play {
         Ok(Self { play, state })
     }
 
+    /// The output y for the next input v; an input that is not finite leaves it as it is.
     fn step(&mut self, input: f64) -> f64 {
         self.play.step(&mut self.state, input)
     }
 
+    /// `step` for each of inputs (n,): outputs (n,).
     fn run<'py>(&mut self, py: Python<'py>, inputs: Vector<'py>) -> Bound<'py, PyArray1<f64>> {
         let inputs = inputs.as_array();
         let outputs = inputs.iter().map(|input| self.step(*input));
         PyArray1::from_iter(py, outputs)
     }
 
+    /// The latest output y.
     #[getter]
     fn output(&self) -> f64 {
         self.state.output
     }
 
+    /// Offset at the negative contact, input minus output.
     #[getter]
     fn delta_minus(&self) -> f64 {
         self.play.delta_minus()
     }
 
+    /// Offset at the positive contact, input minus output.
     #[getter]
     fn delta_plus(&self) -> f64 {
         self.play.delta_plus()
     }
 
+    /// Travel of the input that moves nothing: `delta_plus - delta_minus`.
     #[getter]
     fn width(&self) -> f64 {
         self.play.width()

@@ -28,6 +28,7 @@ type Report<'py> = (
     Floats<'py>,
 );
 
+/// The loop of Fig. 6; `tautscope.reduction.HysteresisReduction` is its public face.
 #[pyclass(name = "Reduction", module = "tautscope._core")]
 pub struct Reduction(core::HysteresisReduction);
 
@@ -57,6 +58,7 @@ impl Reduction {
         )))
     }
 
+    /// One control tick at `time` in s: reference (3,) in, command (3,) out.
     fn step<'py>(
         &mut self,
         py: Python<'py>,
@@ -67,6 +69,7 @@ impl Reduction {
         Ok(PyArray1::from_slice(py, &command))
     }
 
+    /// `step` for references (n, 3) at times (n,): commands (n, 3).
     fn run<'py>(
         &mut self,
         py: Python<'py>,
@@ -84,6 +87,7 @@ impl Reduction {
         table(py, &commands)
     }
 
+    /// Image update. Returns the fields of `tautscope.reduction.Report` from `status` on.
     fn on_features<'py>(
         &mut self,
         py: Python<'py>,
@@ -110,21 +114,25 @@ impl Reduction {
         ))
     }
 
+    /// Features (4,) in px to expect at a capture time; None if not known.
     fn predicted_features<'py>(&self, py: Python<'py>, captured_at: f64) -> Option<Floats<'py>> {
         let features = self.0.predicted_features(captured_at)?;
         Some(PyArray1::from_slice(py, &features))
     }
 
+    /// The predicted state (3,) now.
     #[getter]
     fn predicted_state<'py>(&self, py: Python<'py>) -> Floats<'py> {
         PyArray1::from_slice(py, &self.0.predicted_state())
     }
 
+    /// The estimated offsets (3,), input minus output.
     #[getter]
     fn delta_minus<'py>(&self, py: Python<'py>) -> Floats<'py> {
         PyArray1::from_slice(py, &self.0.play().map(|play| play.delta_minus()))
     }
 
+    /// The estimated offsets (3,), input minus output.
     #[getter]
     fn delta_plus<'py>(&self, py: Python<'py>) -> Floats<'py> {
         PyArray1::from_slice(py, &self.0.play().map(|play| play.delta_plus()))

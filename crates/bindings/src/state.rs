@@ -16,6 +16,10 @@ type Estimate<'py> = (
 
 type Estimates<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<bool>>);
 
+/// One linear step from prediction to measurement with its rank watched, Eqs. (13)-(16).
+///
+/// A DOF whose standard deviation per px of marker noise exceeds its `observable_deviation`
+/// [m/px, rad/px] is held at its prediction. Raises `ConfigError`.
 #[pyclass(name = "StateEstimator", module = "tautscope._core", frozen)]
 pub struct StateEstimator(pub core::StateEstimator);
 
@@ -29,6 +33,7 @@ impl StateEstimator {
             .map_err(errors::config(py))
     }
 
+    /// State estimate (3,), observable (3,) and deviation (3,) from one measurement (4,) in px.
     fn estimate<'py>(
         &self,
         py: Python<'py>,
@@ -58,6 +63,8 @@ impl StateEstimator {
         ))
     }
 
+    /// Prediction and estimate for many: states (n, 3) and features (n, 4) in, estimates (n, 3) and
+    /// observable (n, 3) out. Where the model sees no band nothing is observable.
     fn run<'py>(
         &self,
         py: Python<'py>,

@@ -12,7 +12,7 @@ use crate::linear::{Matrix, Vector, add, rotate, sinc};
 /// v = cy + fy (y g + p1 (r2 + 2 y^2) + 2 p2 x y)
 /// ```
 ///
-/// for a point (X, Y, Z) [m] in the camera frame (x right, y down, z forward); u, v [px].
+/// for a point (X, Y, Z) in m in the camera frame (x right, y down, z forward); u, v in px.
 ///
 /// Wrong far outside the calibrated field, where the polynomial folds back into the image:
 /// [`Projection::is_folded`].
@@ -27,9 +27,9 @@ pub struct Camera {
 /// An image point and how it moves with the point in space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Projection {
-    /// u, v [px].
+    /// u, v in px.
     pub pixel: [f64; 2],
-    /// `d pixel / d p_in_camera`, two rows [px/m].
+    /// `d pixel / d p_in_camera`, two rows in px/m.
     pub pixel_by_point: [Vector; 2],
     folded: bool,
 }
@@ -42,7 +42,7 @@ impl Projection {
 }
 
 impl Camera {
-    /// A camera from focal lengths and principal point [px] and
+    /// A camera from focal lengths and principal point in px and
     /// `distortion` k1, k2, p1, p2, k3, k4, k5, k6, `OpenCV`'s order.
     ///
     /// # Errors
@@ -119,7 +119,7 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// A pose from a translation [m] and a rotation vector, axis times angle [rad] (Rodrigues).
+    /// A pose from a translation in m and a rotation vector, axis times angle in rad (Rodrigues).
     ///
     /// # Errors
     /// A value is not finite.

@@ -1,7 +1,11 @@
 //! The limited-gain inverse of the hysteresis, Eqs. (2)-(3), Fig. 2.
 
 use crate::error::{ConfigError, require};
-use crate::play::Play;
+use crate::play::{Play, PlayState};
+
+/// Share of the reference's travel by which the anchor returns to zero (ours): low enough not to
+/// be felt, high enough to outrun what the noise of the offsets adds per reversal.
+const RECOVERY: f64 = 0.1;
 
 /// Turns a reference into a command that crosses the slack faster, Eqs. (2)-(3), Fig. 2.
 ///
@@ -9,15 +13,19 @@ use crate::play::Play;
 /// dc = K du,   0 <= K <= gain_limit;   K = 1 in contact,   K = free_gain in the free zone
 /// ```
 ///
-/// with reference u, command c, position p = c - q in the play and predicted state q, all in the
-/// unit of the DOF. A tick that ends the free zone is split exactly at the contact; in closed form
+/// with reference u, command c, predicted state q (the play model driven by c) and position
+/// p = c - q, all in the unit of the DOF. A tick that ends the free zone is split exactly at the
+/// contact: the closed form below has no increments, so nothing accumulates.
 ///
 /// ```text
-/// p <- clamp(p + free_gain du, delta_minus, delta_plus)
-/// c <- u + anchor + (1 - 1 / free_gain) p
+/// c = u + anchor + (1 - 1 / free_gain) clamp(free_gain (u + anchor - q), delta_minus, delta_plus)
 /// ```
 ///
-/// so c - u - (1 - 1 / `free_gain`) p is constant and nothing drifts, however many reversals come.
+/// c - u - (1 - 1 / `free_gain`) p is the anchor: zero, and constant however many reversals come.
+/// New offsets may move p but never c, so the anchor takes up the difference. Ours: it goes back
+/// to zero by at most a tenth of the reference's further travel. Otherwise the noise of the offsets
+/// would add up in it: each inwards step in contact pushes p, no outwards step pulls it back.
+///
 /// What remains of a slack of width w is w / `free_gain`.
 ///
 /// Wrong when the width is over-estimated: the tip overshoots by
@@ -32,18 +40,18 @@ pub struct Compensator {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CompensatorState {
     play: Play,
-    position: f64,
+    tip: PlayState,
     reference: Option<f64>,
     command: f64,
     anchor: f64,
 }
 
 impl CompensatorState {
-    /// Before the first reference; the position in the play is the one nearest to zero.
-    pub fn new(play: Play) -> Self {
+    /// Before the first reference, which will find the position nearest to zero.
+    pub const fn new(play: Play) -> Self {
         Self {
             play,
-            position: play.clamp(0.0),
+            tip: PlayState { output: f64::NAN },
             reference: None,
             command: f64::NAN,
             anchor: 0.0,
@@ -55,9 +63,9 @@ impl CompensatorState {
         self.play
     }
 
-    /// p = c - q, the position between the contacts.
-    pub const fn position(&self) -> f64 {
-        self.position
+    /// p = c - q, the position between the contacts; NaN before the first reference.
+    pub fn position(&self) -> f64 {
+        self.command - self.tip.output
     }
 
     /// The command c; NaN before the first reference.
@@ -65,9 +73,14 @@ impl CompensatorState {
         self.command
     }
 
-    /// The predicted state q = c - p; NaN before the first reference.
-    pub fn predicted_state(&self) -> f64 {
-        self.command - self.position
+    /// The predicted state q; NaN before the first reference.
+    pub const fn predicted_state(&self) -> f64 {
+        self.tip.output
+    }
+
+    /// What the command leads the reference by beyond the law: 0 but for a while after `retune`.
+    pub const fn anchor(&self) -> f64 {
+        self.anchor
     }
 }
 
@@ -107,22 +120,30 @@ impl Compensator {
         }
         let Some(last) = state.reference.replace(reference) else {
             state.command = reference;
-            self.retune(state, state.play);
+            state.tip.output = reference - state.play.clamp(0.0);
+            self.hold(state, reference);
             return state.command;
         };
         let increment = reference - last;
         if increment == 0.0 {
             return state.command;
         }
-        state.position = state
-            .play
-            .clamp(state.position + self.free_gain * increment);
-        let command = reference + state.anchor + self.surplus() * state.position;
-        // Only rounding ever reaches these bounds: Eq. (2) then holds to the last bit.
+        let recovery = RECOVERY * increment.abs();
+        state.anchor -= state.anchor.max(-recovery).min(recovery);
+        let origin = reference + state.anchor;
+        let position = self.free_gain * (origin - state.tip.output);
+        let command = origin + self.surplus() * state.play.clamp(position);
+
+        // Rounding, and recovery on top of the gain, stay within Eq. (2) to the last bit.
         let farthest = state.command + self.gain_limit * increment;
-        state.command = command
+        let allowed = command
             .max(state.command.min(farthest))
             .min(state.command.max(farthest));
+        state.command = allowed;
+        state.play.step(&mut state.tip, allowed);
+        if (allowed - command).abs() > 0.0 {
+            self.hold(state, reference);
+        }
         state.command
     }
 
@@ -131,10 +152,15 @@ impl Compensator {
     /// The command does not move. The position moves only as far as the new contacts push it.
     pub fn retune(&self, state: &mut CompensatorState, play: Play) {
         state.play = play;
-        state.position = play.clamp(state.position);
         if let Some(reference) = state.reference {
-            state.anchor = state.command - reference - self.surplus() * state.position;
+            play.step(&mut state.tip, state.command);
+            self.hold(state, reference);
         }
+    }
+
+    /// Anchor the law where the command is.
+    fn hold(&self, state: &mut CompensatorState, reference: f64) {
+        state.anchor = state.command - reference - self.surplus() * state.position();
     }
 
     /// 1 - 1 / `free_gain`: the share of the position by which the command leads the reference.

@@ -12,7 +12,7 @@ use crate::linear::{Vector, add, dot, scale};
 /// Decision 0002: the camera sees the near half of a cylindrical band, so the centroid of its
 /// colour is not the image of its centre. The point that is projected, from the centre p, the
 /// axis t, the radius r, the band's length l and the distance D of the camera from the axis, all
-/// in the camera frame [m], is
+/// in m in the camera frame, is
 ///
 /// ```text
 /// m = p + r (pi/4 + (pi^2/8 - 1) r/D) n       n: unit vector from the axis to the camera, across
@@ -36,7 +36,7 @@ pub struct FeatureModel {
 /// What the camera should see, and how it changes with the state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FeaturePrediction {
-    /// h(q): u and v of band A, u and v of band B [px].
+    /// h(q): u and v of band A, u and v of band B in px.
     pub features: [f64; 4],
     /// dh/dq, Eq. (11): one column of four per DOF [px/m, px/rad, px/rad].
     pub columns: PerDof<[f64; 4]>,

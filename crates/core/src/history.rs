@@ -8,7 +8,7 @@ const CAPACITY: usize = 1024;
 /// One control tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Entry {
-    /// [s].
+    /// On the clock of the control tick, in s.
     pub time: f64,
     /// The command c [m, rad, rad].
     pub command: PerDof<f64>,
@@ -28,7 +28,7 @@ pub struct History {
 }
 
 impl History {
-    /// A history of `span` [s] for a control tick every `period` [s].
+    /// A history of `span` in s for a control tick every `period` in s.
     ///
     /// # Errors
     /// A value is not a finite number above 0.
@@ -74,7 +74,7 @@ impl History {
         jumped
     }
 
-    /// What held at `time` [s], interpolated between two ticks.
+    /// What held at `time` in s, interpolated between two ticks.
     ///
     /// None before the oldest tick within the span, more than one period after the newest, and
     /// for a time that is not finite.

@@ -4,7 +4,7 @@ use crate::dof::PerDof;
 use crate::error::{ConfigError, require_non_negative, require_positive};
 use crate::linear::{Vector, sinc, sinc_slope};
 
-/// Geometry of the instrument [m], Fig. 4.
+/// Geometry of the instrument in m, Fig. 4.
 ///
 /// Guide frame: origin where the instrument leaves the guide, z along the channel outwards.
 /// Insertion q1 is the length of straight shaft outside the guide; then comes a section of
@@ -23,7 +23,7 @@ pub struct Instrument {
 /// The centre of a marker band on the instrument's axis, and how it moves with the state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Marker {
-    /// The centre, (3,) [m].
+    /// The centre, (3,) in m.
     pub position: Vector,
     /// Unit vector along the tip, outwards.
     pub axis: Vector,
@@ -35,7 +35,7 @@ pub struct Marker {
 
 impl Instrument {
     /// An instrument from the length of its bending section, the distances of the bands' centres A
-    /// and B from that section's distal end, the radius of the tip and the bands' length [m].
+    /// and B from that section's distal end, the radius of the tip and the bands' length in m.
     ///
     /// With radius and band length 0 a band is a point on the axis.
     ///
@@ -61,12 +61,12 @@ impl Instrument {
         })
     }
 
-    /// Radius of the tip [m].
+    /// Radius of the tip in m.
     pub const fn radius(&self) -> f64 {
         self.radius
     }
 
-    /// Length of a band along the axis [m].
+    /// Length of a band along the axis in m.
     pub const fn band_length(&self) -> f64 {
         self.band_length
     }

@@ -66,7 +66,7 @@ pub struct Report {
     pub status: Status,
     /// q at the capture time [m, rad, rad].
     pub predicted_state: PerDof<f64>,
-    /// h(q) [px].
+    /// h(q) in px.
     pub predicted_features: [f64; 4],
     /// `q_hat`, innovation and what could be observed.
     pub estimate: StateEstimate,
@@ -103,7 +103,7 @@ impl HysteresisReduction {
         }
     }
 
-    /// Control tick at `time` [s]: reference (3,) in, command (3,) out [m, rad, rad].
+    /// Control tick at `time` in s: reference (3,) in, command (3,) out [m, rad, rad].
     ///
     /// A reference that is not finite holds the command, which before the first reference is NaN.
     pub fn step(&mut self, reference: PerDof<f64>, time: f64) -> PerDof<f64> {
@@ -124,7 +124,7 @@ impl HysteresisReduction {
         command
     }
 
-    /// Image update: the features (4,) [px] measured in a frame captured at `captured_at` [s].
+    /// Image update: the features (4,) in px measured in a frame captured at `captured_at` in s.
     ///
     /// None, or features that are not finite, say that the markers were not found.
     pub fn on_features(&mut self, measured: Option<[f64; 4]>, captured_at: f64) -> Report {
@@ -195,7 +195,7 @@ impl HysteresisReduction {
         }
     }
 
-    /// The features (4,) [px] to expect in a frame captured at `captured_at` [s], to look there.
+    /// The features (4,) in px to expect in a frame captured at `captured_at` in s, to look there.
     ///
     /// None beyond the history and where a band cannot be seen.
     pub fn predicted_features(&self, captured_at: f64) -> Option<[f64; 4]> {

@@ -33,7 +33,7 @@ pub struct StateEstimate {
     /// Standard deviation per px of marker noise [m/px, rad/px]; for a held DOF that for which it
     /// was held.
     pub deviation: PerDof<f64>,
-    /// `s_measured - s_predicted` [px].
+    /// `s_measured - s_predicted` in px.
     pub innovation: [f64; 4],
 }
 
@@ -51,7 +51,7 @@ impl StateEstimator {
         })
     }
 
-    /// The state estimate for measured features (4,) [px], from the predicted state and what the
+    /// The state estimate for measured features (4,) in px, from the predicted state and what the
     /// model predicts for it. With anything not finite, no DOF is observable.
     pub fn estimate(
         &self,

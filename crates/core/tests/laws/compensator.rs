@@ -52,8 +52,8 @@ proptest! {
     ) {
         let (mut compensator, mut state) = start(5.0, play);
         let mut reference = first;
-        let (mut believed, mut position) = (play, state.position());
         prop_assert_eq!(compensator.step(&mut state, reference), reference);
+        let (mut believed, mut position) = (play, state.position());
         for event in events {
             let before = state.command();
             match event {
@@ -162,6 +162,45 @@ fn nothing_drifts_over_a_hundred_thousand_reversals() {
             assert!(drift.abs() <= 1e-12, "{drift} after {reversal} reversals");
         }
     }
+}
+
+/// New offsets push the position inwards at either contact, never outwards. The law allows each
+/// push; what it must not do is add them up.
+#[test]
+fn the_noise_of_the_offsets_does_not_carry_the_command_away() {
+    let (compensator, mut state) = start(5.0, Play::new(-5.0, 5.0).unwrap());
+    for tick in 0..400_000_u32 {
+        let phase = f64::from(tick);
+        if tick % 8 == 0 {
+            let noise = 0.02 * (phase * 1.7).sin();
+            let play = Play::new(-5.0 + 0.2 * noise, 5.0 + noise).unwrap();
+            compensator.retune(&mut state, play);
+        }
+        compensator.step(&mut state, 15.0 * (phase / 500.0).sin());
+        assert!(
+            state.anchor().abs() < 0.1,
+            "{} in tick {tick}",
+            state.anchor()
+        );
+    }
+}
+
+#[test]
+fn the_anchor_goes_home_gently() {
+    let (compensator, mut state) = start(5.0, Play::new(-2.0, 2.0).unwrap());
+    for reference in path(&[0.0, 10.0], 100) {
+        compensator.step(&mut state, reference);
+    }
+    compensator.retune(&mut state, Play::new(-2.0, 1.0).unwrap());
+    assert!(close(state.anchor(), 0.8), "{}", state.anchor());
+    for reference in path(&[10.0, 17.0], 100).split_off(1) {
+        let (before, command) = (state.command(), compensator.step(&mut state, reference));
+        let gain = (command - before) / 0.07;
+        assert!((0.899..1.001).contains(&gain), "{gain}");
+    }
+    assert!(close(state.anchor(), 0.1), "{}", state.anchor());
+    compensator.step(&mut state, 19.0);
+    assert_eq!(state.anchor(), 0.0);
 }
 
 #[test]
