@@ -224,3 +224,25 @@ fn holding_the_reference_keeps_even_the_sign_of_zero() {
     let held = compensator.step(&mut state, -0.0);
     assert_eq!(held.to_bits(), (-0.0_f64).to_bits());
 }
+
+/// Where the gain limit leaves no room for it, recovery is given up, not saved for the contact.
+#[test]
+fn recovery_never_makes_a_jump_at_the_contact() {
+    let (compensator, mut state) = start(5.0, Play::new(-2.0, 2.0).unwrap());
+    for reference in path(&[0.0, -10.0], 100) {
+        compensator.step(&mut state, reference);
+    }
+    compensator.retune(&mut state, Play::new(-1.0, 2.0).unwrap());
+    assert!(close(state.anchor(), -0.8), "{}", state.anchor());
+    let mut was_in_contact = false;
+    for reference in path(&[-10.0, -5.0], 500).split_off(1) {
+        let (before, command) = (state.command(), compensator.step(&mut state, reference));
+        let gain = (command - before) / 0.01;
+        assert!(
+            gain <= if was_in_contact { 1.1 } else { 5.0 } + 1e-9,
+            "{gain}"
+        );
+        was_in_contact = state.position() >= 2.0 - 1e-9;
+    }
+    assert!(was_in_contact);
+}
