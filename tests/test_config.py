@@ -49,7 +49,7 @@ def test_a_file_names_only_what_it_changes(tmp_path: Path) -> None:
         ("[experiment]\nperiods = 2", "experiment.periods", 2),
         ("[experiment.bending]\namplitude = 0.0", "experiment.bending.amplitude", 0.0),
         ("[instrument]\nmarker_a = 14e-3", "instrument.marker_a", 14e-3),
-        ("[instrument]\ntip_length = 16e-3", "instrument.marker_b", 15e-3),
+        ("[instrument]\ntip_length = 16e-3", "instrument.marker_b", 16e-3),
         ("[control]\nperiod = 1e-4", "control.history", 2.0),
         ("insertion = 3", "insertion", 3),
     ],

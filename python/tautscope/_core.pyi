@@ -46,7 +46,13 @@ class Play:
 @final
 class Compensator:
     def __new__(
-        cls, *, free_gain: float, gain_limit: float, delta_minus: float, delta_plus: float
+        cls,
+        *,
+        free_gain: float,
+        gain_limit: float,
+        delta_minus: float,
+        delta_plus: float,
+        recovery: float = 0.0,
     ) -> Compensator: ...
     def step(self, reference: float) -> float: ...
     def run(self, references: ArrayLike) -> _Floats: ...

@@ -41,6 +41,9 @@ class DofConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """K_b: command over reference while the slack is crossed [paper]."""
     gain_limit: Gain = 5.0
     """Upper bound of every gain; free_gain may not exceed it [paper]."""
+    recovery: Annotated[float, Meta(ge=0, lt=1)] = 0.0
+    """Share of the reference's travel by which the command gives back what changed offsets have
+    left between it and the reference; 0 keeps it [paper]."""
     contact_tolerance: Fraction = 0.4
     """epsilon in Eq. (4) [ours]."""
     smoothing_factor: Fraction = 0.25
@@ -362,7 +365,7 @@ def _named(error: msgspec.ValidationError, document: dict[str, Any]) -> ConfigEr
     value: Any = document
     for key in re.findall(r"[^.\[\]]+", path):
         try:
-            value = value[int(key)] if isinstance(value, list) else value[key]
+            value = value[int(key)] if isinstance(value, list | tuple) else value[key]
         except (KeyError, TypeError, IndexError, ValueError):
             value = None
             break

@@ -170,6 +170,7 @@ def build_compensator(dof: DofConfig, compensate: bool = True) -> _core.Compensa
         gain_limit=dof.gain_limit,
         delta_minus=dof.delta_minus,
         delta_plus=dof.delta_plus,
+        recovery=dof.recovery,
     )
 
 

@@ -11,7 +11,8 @@ use crate::errors;
 ///
 /// Gain 1 in contact, `free_gain` (at least 1, at most `gain_limit`) while the slack is crossed. A
 /// slack of width w leaves w / `free_gain`; an over-estimated width overshoots beyond a margin of
-/// 1 / (`free_gain` - 1). Signals are in the unit of the DOF. Raises `ConfigError`.
+/// 1 / (`free_gain` - 1). With `recovery` above 0, what changed offsets have left between command
+/// and reference is given back by that share of the further travel. Signals are in the unit of the DOF. Raises `ConfigError`.
 #[pyclass(name = "Compensator", module = "tautscope._core")]
 pub struct Compensator {
     pub inner: core::Compensator,
@@ -21,15 +22,18 @@ pub struct Compensator {
 #[pymethods]
 impl Compensator {
     #[new]
-    #[pyo3(signature = (*, free_gain, gain_limit, delta_minus, delta_plus))]
+    #[pyo3(signature = (*, free_gain, gain_limit, delta_minus, delta_plus, recovery=0.0))]
     fn new(
         py: Python<'_>,
         free_gain: f64,
         gain_limit: f64,
         delta_minus: f64,
         delta_plus: f64,
+        recovery: f64,
     ) -> PyResult<Self> {
-        let inner = core::Compensator::new(free_gain, gain_limit).map_err(errors::config(py))?;
+        let inner = core::Compensator::new(free_gain, gain_limit)
+            .and_then(|compensator| compensator.with_recovery(recovery))
+            .map_err(errors::config(py))?;
         let play = core::Play::new(delta_minus, delta_plus).map_err(errors::config(py))?;
         let state = core::CompensatorState::new(play);
         Ok(Self { inner, state })
@@ -57,7 +61,10 @@ impl Compensator {
 
     /// Go on with another gain, 1 for no compensation: the command does not move.
     fn set_gain(&mut self, py: Python<'_>, free_gain: f64, gain_limit: f64) -> PyResult<()> {
-        self.inner = core::Compensator::new(free_gain, gain_limit).map_err(errors::config(py))?;
+        self.inner = self
+            .inner
+            .with_gain(free_gain, gain_limit)
+            .map_err(errors::config(py))?;
         let play = self.state.play();
         self.inner.retune(&mut self.state, play);
         Ok(())

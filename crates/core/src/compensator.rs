@@ -3,10 +3,6 @@
 use crate::error::{ConfigError, require};
 use crate::play::{Play, PlayState};
 
-/// Share of the reference's travel by which the anchor returns to zero (ours): low enough not to
-/// be felt, high enough to outrun what the noise of the offsets adds per reversal.
-const RECOVERY: f64 = 0.1;
-
 /// Turns a reference into a command that crosses the slack faster, Eqs. (2)-(3), Fig. 2.
 ///
 /// ```text
@@ -22,9 +18,12 @@ const RECOVERY: f64 = 0.1;
 /// ```
 ///
 /// c - u - (1 - 1 / `free_gain`) p is the anchor: zero, and constant however many reversals come.
-/// New offsets may move p but never c, so the anchor takes up the difference. Ours: it goes back
-/// to zero by at most a tenth of the reference's further travel. Otherwise the noise of the offsets
-/// would add up in it: each inwards step in contact pushes p, no outwards step pulls it back.
+/// New offsets may move p but never c, so the anchor takes up the difference.
+///
+/// As in the article, it keeps it. The noise of the offsets then adds up in it, because each
+/// inwards step in contact pushes p and no outwards step pulls it back. With a `recovery` above
+/// zero (ours) the anchor returns to zero by at most that share of the reference's further travel;
+/// the gain in contact is then within `recovery` of 1 until it has.
 ///
 /// What remains of a slack of width w is w / `free_gain`.
 ///
@@ -34,6 +33,7 @@ const RECOVERY: f64 = 0.1;
 pub struct Compensator {
     free_gain: f64,
     gain_limit: f64,
+    recovery: f64,
 }
 
 /// The memory of a [`Compensator`]: the play it believes in and where it stands.
@@ -78,7 +78,7 @@ impl CompensatorState {
         self.tip.output
     }
 
-    /// What the command leads the reference by beyond the law: 0 but for a while after `retune`.
+    /// What the command leads the reference by beyond the law: 0 until `retune` pushes p.
     pub const fn anchor(&self) -> f64 {
         self.anchor
     }
@@ -107,7 +107,26 @@ impl Compensator {
         Ok(Self {
             free_gain,
             gain_limit,
+            recovery: 0.0,
         })
+    }
+
+    /// The same with other gains.
+    ///
+    /// # Errors
+    /// As [`Compensator::new`].
+    pub fn with_gain(self, free_gain: f64, gain_limit: f64) -> Result<Self, ConfigError> {
+        Self::new(free_gain, gain_limit)?.with_recovery(self.recovery)
+    }
+
+    /// The same with the anchor's return to zero, as a share of the reference's travel.
+    ///
+    /// # Errors
+    /// The share is not at least 0 and below 1.
+    pub fn with_recovery(self, recovery: f64) -> Result<Self, ConfigError> {
+        let share = (0.0..1.0).contains(&recovery);
+        require(share, "recovery", recovery, "at least 0, below 1")?;
+        Ok(Self { recovery, ..self })
     }
 
     /// The command for the next reference.
@@ -128,7 +147,7 @@ impl Compensator {
         if increment == 0.0 {
             return state.command;
         }
-        let recovery = RECOVERY * increment.abs();
+        let recovery = self.recovery * increment.abs();
         state.anchor -= state.anchor.max(-recovery).min(recovery);
         let origin = reference + state.anchor;
         let position = self.free_gain * (origin - state.tip.output);

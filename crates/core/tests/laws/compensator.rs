@@ -10,7 +10,7 @@ enum Event {
     Move(f64),
     Hold,
     Offsets(Play),
-    Gain(f64),
+    Gain(f64, f64),
     Spoil(f64),
 }
 
@@ -20,7 +20,7 @@ fn events() -> impl Strategy<Value = Vec<Event>> {
         1 => (-1e-15..1e-15).prop_map(Event::Move),
         1 => Just(Event::Hold),
         2 => plays().prop_map(Event::Offsets),
-        1 => (1.0..5.0).prop_map(Event::Gain),
+        1 => (1.0..5.0, 0.0..0.5).prop_map(|(gain, recovery)| Event::Gain(gain, recovery)),
         1 => prop_oneof![Just(f64::NAN), Just(f64::INFINITY)].prop_map(Event::Spoil),
     ];
     prop::collection::vec(event, 1..200)
@@ -31,6 +31,11 @@ fn start(free_gain: f64, play: Play) -> (Compensator, CompensatorState) {
         Compensator::new(free_gain, 5.0).unwrap(),
         CompensatorState::new(play),
     )
+}
+
+fn start_with_recovery(play: Play) -> (Compensator, CompensatorState) {
+    let (compensator, state) = start(5.0, play);
+    (compensator.with_recovery(0.1).unwrap(), state)
 }
 
 /// The output of a true play behind a compensator that believes in another.
@@ -75,8 +80,9 @@ proptest! {
                     position = believed.clamp(position);
                     compensator.retune(&mut state, believed);
                 }
-                Event::Gain(gain) => {
+                Event::Gain(gain, recovery) => {
                     compensator = Compensator::new(gain, 5.0).unwrap();
+                    compensator = compensator.with_recovery(recovery).unwrap();
                     compensator.retune(&mut state, believed);
                 }
                 Event::Spoil(bad) => { compensator.step(&mut state, bad); }
@@ -168,7 +174,7 @@ fn nothing_drifts_over_a_hundred_thousand_reversals() {
 /// push; what it must not do is add them up.
 #[test]
 fn the_noise_of_the_offsets_does_not_carry_the_command_away() {
-    let (compensator, mut state) = start(5.0, Play::new(-5.0, 5.0).unwrap());
+    let (compensator, mut state) = start_with_recovery(Play::new(-5.0, 5.0).unwrap());
     for tick in 0..400_000_u32 {
         let phase = f64::from(tick);
         if tick % 8 == 0 {
@@ -185,9 +191,24 @@ fn the_noise_of_the_offsets_does_not_carry_the_command_away() {
     }
 }
 
+/// Eq. (2) to the letter: whatever was learnt before, K is 1 in contact.
+#[test]
+fn without_recovery_the_gain_in_contact_is_one() {
+    let (compensator, mut state) = start(5.0, Play::new(-2.0, 2.0).unwrap());
+    for reference in path(&[0.0, 10.0], 100) {
+        compensator.step(&mut state, reference);
+    }
+    compensator.retune(&mut state, Play::new(-2.0, 1.0).unwrap());
+    for reference in path(&[10.0, 17.0], 100).split_off(1) {
+        let (before, command) = (state.command(), compensator.step(&mut state, reference));
+        assert!(close(command - before, 0.07), "{}", command - before);
+    }
+    assert!(close(state.anchor(), 0.8), "{}", state.anchor());
+}
+
 #[test]
 fn the_anchor_goes_home_gently() {
-    let (compensator, mut state) = start(5.0, Play::new(-2.0, 2.0).unwrap());
+    let (compensator, mut state) = start_with_recovery(Play::new(-2.0, 2.0).unwrap());
     for reference in path(&[0.0, 10.0], 100) {
         compensator.step(&mut state, reference);
     }
@@ -211,6 +232,13 @@ fn bad_gains_are_named() {
         Compensator::new(f64::NAN, 5.0).unwrap_err().field,
         "free_gain"
     );
+    let compensator = Compensator::new(2.0, 5.0).unwrap();
+    for share in [-0.1, 1.0, f64::NAN] {
+        assert_eq!(
+            compensator.with_recovery(share).unwrap_err().field,
+            "recovery"
+        );
+    }
     assert_eq!(
         Compensator::new(2.0, f64::INFINITY).unwrap_err().field,
         "gain_limit"
@@ -228,7 +256,7 @@ fn holding_the_reference_keeps_even_the_sign_of_zero() {
 /// Where the gain limit leaves no room for it, recovery is given up, not saved for the contact.
 #[test]
 fn recovery_never_makes_a_jump_at_the_contact() {
-    let (compensator, mut state) = start(5.0, Play::new(-2.0, 2.0).unwrap());
+    let (compensator, mut state) = start_with_recovery(Play::new(-2.0, 2.0).unwrap());
     for reference in path(&[0.0, -10.0], 100) {
         compensator.step(&mut state, reference);
     }
