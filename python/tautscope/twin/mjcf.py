@@ -47,7 +47,7 @@ def build(config: Config, timestep: float) -> str:
     return f"""
 <mujoco>
 <compiler angle="radian"/>
-<option timestep="{timestep}" integrator="implicitfast" cone="elliptic"
+<option timestep="{timestep}" integrator="implicitfast" cone="elliptic" jacobian="sparse"
   impratio="{_IMPEDANCE_RATIO}" gravity="0 0 0"/>
 <default><geom size="0.001" mass="0.001" {_CONTACT}/></default>
 <worldbody>

@@ -49,7 +49,7 @@ class Plant:
         spread = 1 + cables.joint_spread * generator.standard_normal(cables.joints)
         self._model.dof_frictionloss[self._hinges] *= spread
         self._speed_limit = np.array(config.twin.drives.speed_limit)
-        self._encoder_step = np.array(config.twin.drives.encoder_step)
+        self._encoder_step: NDArray[np.float64] = np.array(config.twin.drives.encoder_step)
         self._setpoint = np.array([config.experiment[dof].centre for dof in Dof])
         self.bends = config.twin.bends
         self._start()
@@ -61,7 +61,7 @@ class Plant:
         data.qfrc_applied[self._presses] = -load * self._load_share
         limit = self._speed_limit * self._timestep
         for _ in range(self._substeps):
-            travel = np.clip(command - self._setpoint, -limit, limit)
+            travel = np.minimum(np.maximum(command - self._setpoint, -limit), limit)
             self._setpoint = self._setpoint + travel
             data.ctrl[:] = self._setpoint + travel * (SERVO_LAG / self._timestep)
             angles = data.qpos[self._turns] - shaft.set_angle
@@ -71,9 +71,8 @@ class Plant:
     @property
     def applied(self) -> NDArray[np.float64]:
         """What the encoders read (3,) [m, rad, rad], in whole counts."""
-        read: NDArray[np.float64] = self._data.qpos[self._motors]
-        counts: NDArray[np.float64] = np.round(read / self._encoder_step)
-        return counts * self._encoder_step
+        read = np.asarray(self._data.qpos[self._motors], dtype=np.float64)
+        return self._encoder_step * np.round(read / self._encoder_step)
 
     @property
     def true_state(self) -> NDArray[np.float64]:
