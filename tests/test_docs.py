@@ -1,0 +1,109 @@
+"""What the documentation names is there, and what it shows runs."""
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import tautscope
+from tautscope.cli import _parser
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+PAPER = (ROOT / "docs" / "paper.md").read_text(encoding="utf-8")
+
+REFERENCE = re.compile(r"`([\w./-]+\.(?:py|rs))::(\w+)`")
+"""`file::name`, the file from the repository's root."""
+FOLDERS = ("benchmarks", "crates", "docs", "examples", "python", "tests")
+TREE_PATH = re.compile(rf"`((?:{'|'.join(FOLDERS)})/[\w./-]+)(?:::\w+)?`")
+LINK = re.compile(r"\]\(([^)#\s]+)")
+
+pages = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+
+
+def defined(file: str, name: str) -> bool:
+    text = (ROOT / file).read_text(encoding="utf-8")
+    return re.search(rf"\b(?:fn|struct|enum|def|class) {name}\b", text) is not None
+
+
+def rows(text: str) -> list[list[str]]:
+    """The cells of every table row that names an equation, a figure or a table."""
+    lines = [line for line in text.splitlines() if re.match(r"\| (\(|Fig\.|Table)", line)]
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+
+
+def commands(text: str) -> list[str]:
+    """Every `uv run ...` in a code span or block."""
+    found = re.findall(r"uv run ([^`\n]+)", text)
+    return sorted({command.strip() for command in found})
+
+
+@pages
+def test_what_a_page_names_exists(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    for file, name in REFERENCE.findall(text):
+        assert (ROOT / file).is_file(), file
+        assert defined(file, name), f"{file}::{name}"
+    for path in TREE_PATH.findall(text):
+        assert (ROOT / path).exists(), path
+
+
+@pages
+def test_links_inside_the_repository_resolve(page: Path) -> None:
+    for target in LINK.findall(page.read_text(encoding="utf-8")):
+        if not target.startswith(("http://", "https://")):
+            assert (page.parent / target).exists(), target
+
+
+@pages
+def test_commands_are_accepted(page: Path) -> None:
+    for command in commands(page.read_text(encoding="utf-8")):
+        tool, *arguments = shlex.split(command)
+        if tool == "tautscope":
+            if "--help" not in arguments:
+                _parser().parse_args(arguments)
+        elif tool.endswith(".py") or tool == "python":
+            assert (ROOT / (arguments[0] if tool == "python" else tool)).is_file(), command
+        else:
+            assert tool in {"pytest", "ruff", "mypy", "stubtest"}, command
+
+
+def test_every_equation_figure_and_table_has_a_function_and_a_test() -> None:
+    covered: set[str] = set()
+    for first, _, function, test, _ in rows(PAPER):
+        assert REFERENCE.search(function), first
+        for file, name in REFERENCE.findall(test):
+            text = (ROOT / file).read_text(encoding="utf-8")
+            where = text.index(f" {name}(")
+            assert "test_" in name or "#[test]" in text[:where] or "proptest!" in text[:where], name
+        assert REFERENCE.search(test), first
+        kind = "" if first.startswith("(") else first.split()[0]
+        ends = [int(number) for number in re.findall(r"\d+", first)]
+        covered |= {f"{kind}{number}" for number in range(ends[0], ends[-1] + 1)}
+    expected = {f"{n}" for n in range(1, 17)} | {f"Fig.{n}" for n in range(1, 10)} | {"Table1"}
+    assert covered == expected
+
+
+def test_the_readme_has_the_two_commands() -> None:
+    blocks = re.findall(r"```sh\n(.*?)```", README, re.DOTALL)
+    assert blocks[0].strip() == "python3 -m pip install uv && uv run tautscope demo"
+    assert blocks[1].strip() == "uv run pytest"
+
+
+def test_the_readmes_loop_runs_and_finds_the_slack() -> None:
+    (code,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    assert len([line for line in code.splitlines() if line]) <= 15
+    found = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=False
+    )
+    assert found.returncode == 0, found.stderr
+    slack = float(found.stdout.split()[-1])
+    assert slack == pytest.approx(10, rel=0.25), "the twin's insertion has about 10 mm"
+
+
+def test_the_citation_is_of_this_version() -> None:
+    text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert re.search(rf"^version: {re.escape(tautscope.__version__)}$", text, re.MULTILINE)
