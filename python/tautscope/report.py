@@ -56,8 +56,8 @@ twin's widths are of its true tip. The rows &ldquo;by camera&rdquo; compare like
 parameters are not in the article; the configuration below has the ones used. The twin's friction
 is set so that the uncompensated widths resemble the article's: agreement of those rows is by
 construction, agreement of the compensated ones is not.</li>
-<li>With a gain of K while slack is crossed, 1 &minus; 1/K of the width is the most that can go:
-80&nbsp;% at 5.</li>
+<li>With a gain of K while slack is crossed and the width known exactly, 1 &minus; 1/K of it goes:
+80&nbsp;% at 5. A width estimated a little too wide removes more, one too narrow less.</li>
 </ul>
 """
 
