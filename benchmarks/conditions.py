@@ -239,7 +239,10 @@ def jobs(frames: int, seeds: Sequence[int]) -> list[Job]:
     """So many frames of each condition, over all seeds and both kinds of background."""
     each = max(1, round(frames / (2 * len(seeds))))
     return [
-        Job(name, seed, real, each) for name in CONDITIONS for seed in seeds for real in (True, False)
+        Job(name, seed, real, each)
+        for name in CONDITIONS
+        for seed in seeds
+        for real in (True, False)
     ]
 
 
@@ -335,34 +338,35 @@ def to_rows(looks: Sequence[Look]) -> list[dict[str, Any]]:
 
 
 DEFINITIONS = f"""\
-Each frame is a picture of the twin at a pose of its own: insertion {WORKSPACE[0, 0] * 1e3:.0f} to \
-{WORKSPACE[1, 0] * 1e3:.0f} mm, rotation {WORKSPACE[0, 1]:g} to {WORKSPACE[1, 1]:g} rad, bending \
-{WORKSPACE[0, 2]:g} to {WORKSPACE[1, 2]:g} rad, uniform, a section of constant curvature. Half of the
-frames have real colon frames behind the instrument, half procedural mucosa. The sequence number,
-which decides the moment of a disturbance and the background, is drawn at random.
+Each frame is a picture of the twin at a pose of its own, drawn uniformly: insertion
+{WORKSPACE[0, 0] * 1e3:.0f} to {WORKSPACE[1, 0] * 1e3:.0f} mm, rotation {WORKSPACE[0, 1]:g} to \
+{WORKSPACE[1, 1]:g} rad, bending {WORKSPACE[0, 2]:g} to {WORKSPACE[1, 2]:g} rad, constant curvature.
+Half of the frames have real colon frames behind the instrument, half procedural mucosa. The
+sequence number, which decides the moment of a disturbance and the background, is drawn at random.
 
 - **n**: frames; **visible**: those with at least half of each band visible.
 - **valid**: share of the visible frames in which the detection says it can be trusted.
-- **wrong accepted**: share of all frames in which it says so and a marker is more than {WRONG:g} px from
-  the truth, or there is no such marker in the picture.
-- **error**: RMS distance of measured and true features over all valid frames, wrong ones included
-  [px]. Markers that are not there have no distance and count as wrong accepted only.
-- **with prediction**: features of the true state plus a normal error of {STATE_ERROR[0] * 1e3:g} mm, \
-{STATE_ERROR[1]:g} rad, {STATE_ERROR[2]:g} rad
-  (standard deviations), by `FeatureModel`. **without**: the image alone.
+- **wrong accepted**: share of all frames in which it says so and a marker is more than
+  {WRONG:g} px from the truth, or there is no such marker in the picture.
+- **error**: RMS distance of measured and true features over all valid frames, wrong ones
+  included. Markers that are not there have no distance and count as wrong accepted only.
+- **with prediction**: the features, by `FeatureModel`, of the true state plus a normal error of
+  standard deviation {STATE_ERROR[0] * 1e3:g} mm, {STATE_ERROR[1]:g} rad, {STATE_ERROR[2]:g} rad. \
+**without**: the image alone.
 
-The true feature is the centroid of the *whole* near side of a band, also where debris, a highlight,
-text, the field stop, the picture's border or the instrument hides a part of it: that is what the
-loop's model predicts. The centroid of the piece that is left counts as error. The visible share is
-that of the same side, by area in the picture, that is inside it and not hidden; a saturated highlight
-hides, smoke, blur and exposure do not.
+The true feature is the centroid of the *whole* near side of a band, also where debris, a
+highlight, text, the field stop, the picture's border or the instrument hides a part of it: that is
+what the loop's model predicts. The centroid of the piece that is left counts as error. The visible
+share is that of the same side, by area in the picture, that is inside it and not hidden; a
+saturated highlight hides; smoke, blur and exposure do not.
 
-Disturbances are in `python/tautscope/twin/disturbances.py`; they vary over frames and so does their
-strength here, from nothing to the limits: debris up to 40 % of a band, smoke up to 65 % of the light,
-exposure 0.25 to 4 times the grey levels (a harder test than of the light: grey levels of a camera are
-compressed), white balance 0.8 to 1.25 per channel, motion blur up to 8 px, defocus up to 5 px,
-the black field stop over up to 45 % of a band. "Outside the picture" and "touching" are chosen by pose:
-a band cut by the border with at least half of it left, both bands one green region.
+The disturbances are those of `python/tautscope/twin/disturbances.py`. They come and go over
+frames, so their strength varies here, from nothing to the limits: debris up to 40 % of a band,
+smoke up to 65 % of the light, exposure 0.25 to 4 times the grey levels, white balance 0.8 to 1.25
+per channel, motion blur up to 8 px, defocus up to 5 px, the black field stop over up to 45 % of a
+band. Exposure is harder here than in a camera, whose grey levels are a compressed measure of light.
+"Outside the picture" and "touching" are chosen by pose: a band cut by the border with at least half
+of it left; less than {TOUCH} px between the bands.
 """
 
 
@@ -380,7 +384,11 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
         some = next(iter(mine.values()))
         cells = [profile, str(some["n"]), str(some["n_visible"])]
         for label in MODES:
-            for what, form in (("valid", ".1f"), ("wrong accepted", ".2f"), ("marker error", ".2f")):
+            for what, form in (
+                ("valid", ".1f"),
+                ("wrong accepted", ".2f"),
+                ("marker error", ".2f"),
+            ):
                 row = mine.get(f"{what}, {label}")
                 mark = "" if row is None or row["holds"] else " (!)"
                 cells.append("-" if row is None else f"{row['pooled']:{form}}{mark}")
@@ -415,13 +423,13 @@ def write(rows: Sequence[dict[str, Any]], command: str) -> Path:
     """Make docs/conditions.md."""
     path = ROOT / "docs" / "conditions.md"
     seeds = max(row["seeds"] for row in rows)
-    path.write_text(
+    text = (
         "# Conditions\n\nHow well the markers are found, condition by condition. Made by\n\n"
-        f"    {command}\n\n(seeds 0 to {seeds - 1}). (!) marks what misses its goal: valid at least "
-        "99 %, wrong accepted at most 0.1 % (none\nwithout an instrument), error at most 0.15 px "
-        f"clean and 0.5 px elsewhere.\n\n{table(rows)}\n\n## What is counted\n\n{DEFINITIONS}",
-        encoding="utf-8",
+        f"    {command}\n\n(seeds 0 to {seeds - 1}). (!) marks what misses its goal: valid at "
+        "least 99 %, wrong accepted\nat most 0.1 % (none without an instrument), error at most "
+        f"0.15 px clean and 0.5 px elsewhere.\n\n{table(rows)}\n\n## What is counted\n\n{DEFINITIONS}"
     )
+    path.write_text(text, encoding="utf-8")
     return path
 
 
@@ -441,7 +449,9 @@ def main() -> None:
     with progress_bar(f"{sum(job.frames for job in work)} frames") as tell:
         rows = to_rows(run(work, options.workers, tell))
     if options.write:
-        path = write(rows, f"uv run python benchmarks/conditions.py --frames {options.frames} --write")
+        path = write(
+            rows, f"uv run python benchmarks/conditions.py --frames {options.frames} --write"
+        )
         print(f"wrote {path}", file=sys.stderr)
     print(json.dumps({"rows": rows}, allow_nan=False) if options.json else table(rows))
 

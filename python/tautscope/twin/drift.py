@@ -100,7 +100,11 @@ class Bands:
 
     @classmethod
     def from_surface(cls, surface: Floats) -> Bands:
-        """From the rows (band, u, v, area, seen) of ``Renderer.draw_scene``."""
+        """From the rows (band, u, v, area, seen) of ``Renderer.draw_scene``.
+
+        Pieces without area, as of a band seen end on, are left out.
+        """
+        surface = surface[surface[:, 3] > 0]
         return cls(
             surface[:, 0].astype(np.intp),
             surface[:, 1:3],

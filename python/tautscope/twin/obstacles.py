@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from tautscope.twin.drift import Bands, Drift, Floats, Light, Mask
@@ -34,15 +35,15 @@ def stool(light: Light, _: Bands, drift: Drift) -> tuple[Light, Mask | None]:
     where = drift.clouds("where", width, height, 4, 0.004)
     # Always some, at times a quarter of the picture.
     edge = 0.95 - 0.30 * drift.wander("amount", 80)
-    thick = np.clip((where - edge) / 0.22, 0, 1)[..., None]
+    thick = np.clip((where - edge) / 0.30, 0, 1)[..., None]
     kind = 1 + 0.9 * drift.clouds("kind", width, height, 3, 0.0)
-    grain = drift.clouds("grain", width, height, 24, 0.0)[..., None]
+    grain = drift.clouds("grain", width, height, 40, 0.0)[..., None]
     brown, yellow, green = (np.clip(1 - np.abs(kind - k), 0, 1)[..., None] for k in range(3))
     total = np.maximum(brown + yellow + green, 1e-3)
     colour = (brown * _STOOL[0] + yellow * _STOOL[1] + green * _STOOL[2]) / total
     lit = np.clip(light.mean(axis=2, keepdims=True) / 130, 0.12, 1.35)
-    opaque = thick * (0.80 + 0.12 * np.clip(grain, -1, 1))
-    return light + opaque * (colour * lit * (1 + 0.10 * grain) - light), None
+    opaque = thick * (0.84 + 0.08 * np.clip(grain, -1, 1))
+    return light + opaque * (colour * lit * (1 + 0.07 * grain) - light), None
 
 
 def highlights(light: Light, bands: Bands, drift: Drift) -> tuple[Light, Mask | None]:
@@ -59,23 +60,17 @@ def highlights(light: Light, bands: Bands, drift: Drift) -> tuple[Light, Mask | 
                 continue
             shift = drift.wander(f"shift {kind}{k}", 30)
             if kind == "along":
-                place = 0.1 * shift * along * length + chance.uniform(-0.3, 0.3) * girth * across
-                half = np.array(
-                    [chance.uniform(0.35, 0.65) * length, chance.uniform(0.03, 0.09) * girth]
-                )
+                place = 0.1 * shift * length * along + chance.uniform(-0.3, 0.3) * girth * across
+                half = chance.uniform([0.35, 0.03], [0.65, 0.09])
             elif kind == "across":
-                place = (0.28 * shift) * along * length
-                half = np.array(
-                    [chance.uniform(0.03, 0.10) * length, chance.uniform(0.4, 0.6) * girth]
-                )
+                place = 0.28 * shift * length * along
+                half = chance.uniform([0.03, 0.30], [0.10, 0.44])
             else:
-                place = 0.35 * (shift * along * length + chance.uniform(-1, 1) * across * girth)
-                half = np.array(
-                    [chance.uniform(0.06, 0.16) * length, chance.uniform(0.05, 0.14) * girth]
-                )
-            tilt = np.arctan2(along[1], along[0]) + chance.normal(0, 0.15)
-            streak = _Streak(bands.centre(k) + place, np.maximum(half, 0.8), tilt, level)
-            streak.shine(light, hidden)
+                place = 0.30 * (shift * length * along + chance.uniform(-1, 1) * girth * across)
+                half = chance.uniform([0.06, 0.05], [0.16, 0.14])
+            half = np.maximum(half * [length, girth], 0.8)
+            tilt = float(np.arctan2(along[1], along[0]) + chance.normal(0, 0.1))
+            _Streak(bands.centre(k) + place, half, tilt, level).shine(light, hidden)
     return light, hidden
 
 
@@ -105,12 +100,13 @@ class _Streak:
         u, v = x * cos + y * sin, y * cos - x * sin
         a, b = self.half
         ripple = 1 + 0.22 * np.sin(0.35 * u + a) + 0.12 * np.sin(0.83 * u + b)
-        distance = np.hypot(u / a, v / (b * ripple))
-        thin = min(a, b)
-        edge = (1 - distance) * thin / 0.9
-        sharp = 1 / (1 + np.exp(-3 * np.clip(edge, -8, 8)))
-        glow = 0.10 * np.exp(-0.5 * (np.maximum(distance - 1, 0) * thin / 2.5) ** 2)
-        share = (self.level * np.maximum(sharp, glow)).astype(np.float32)[..., None]
+        b = b * ripple
+        # Distance inside the ellipse, to first order.
+        level_set = np.hypot(u / a, v / b)
+        edge = (1 - level_set) * level_set / np.maximum(np.hypot(u / a**2, v / b**2), 1e-6)
+        sharp = (1 / (1 + np.exp(-3.3 * np.clip(edge, -8, 8)))).astype(np.float32)
+        glow = 0.12 * np.asarray(cv2.GaussianBlur(sharp, (0, 0), 2.5))
+        share = (np.float32(self.level) * np.maximum(sharp, glow))[..., None]
         part = light[box]
         part += share * (np.array(REFLECTION, dtype=np.float32) - part)
         hidden[box] |= share[..., 0] > 0.4
@@ -124,40 +120,46 @@ def debris(light: Light, bands: Bands, drift: Drift) -> tuple[Light, Mask | None
         return light, None
     chance = drift.generator("lump", number)
     target = drawn[int(chance.integers(len(drawn)))]
-    share = DEBRIS_SHARE * level * chance.uniform(0.4, 1.0)
-    angle = chance.uniform(0, 2 * np.pi) + 0.6 * drift.wander("angle", 60)
+    share = DEBRIS_SHARE * level * chance.uniform(0.5, 1.0)
+    # From the side, so that it meets the other band only where that lies right behind.
+    along = bands.axis()
+    angle = float(np.arctan2(along[1], along[0])) + chance.choice([-1, 1]) * np.pi / 2
+    angle += chance.uniform(-0.4, 0.4) + 0.4 * drift.wander("angle", 60)
     way = np.array([np.cos(angle), np.sin(angle)])
     size = float(np.sqrt(bands.area[bands.band == target].sum())) * chance.uniform(0.5, 0.85)
-    wobble = np.stack([chance.uniform(0.03, 0.11, 5), chance.uniform(0, 2 * np.pi, 5)])
+    orders = np.arange(1, 9)
+    wobble = 0.15 * chance.standard_normal((2, len(orders))) / orders**1.1
+    tilt, stretch = chance.uniform(0, np.pi), chance.uniform(1.0, 1.45)
 
     def depth(x: Floats, y: Floats) -> Floats:
         """How far inside the lump a place relative to its middle is [px]."""
-        turn = np.arctan2(y, x)
-        orders = np.arange(2, 7)
-        radius = 1 + (wobble[0] * np.cos(orders * turn[..., None] + wobble[1])).sum(-1)
-        return np.asarray(size * radius - np.hypot(x, y))
+        x, y = x * np.cos(tilt) + y * np.sin(tilt), y * np.cos(tilt) - x * np.sin(tilt)
+        x, y = x / stretch, y * stretch
+        turn = orders * np.arctan2(y, x)[..., None]
+        radius = 1 + np.cos(turn) @ wobble[0] + np.sin(turn) @ wobble[1]
+        return np.asarray(size * np.maximum(radius, 0.3) - np.hypot(x, y))
 
     def covered(offset: float) -> float:
         x, y = (bands.at - bands.centre(target) - offset * way).T
         inside = depth(x, y) > 0
         return max(bands.share(k, inside) for k in (0, 1))
 
-    far, near = 2 * size + bands.extent(target, way), 0.0
+    far, near = 2.5 * size + bands.extent(target, way), 0.0
     for _ in range(14):
         middle = 0.5 * (far + near)
         far, near = (far, middle) if covered(middle) > share else (middle, near)
     centre = bands.centre(target) + far * way
-    box = _box(light, centre, 1.7 * size)
+    box = _box(light, centre, 2.2 * size)
     if box is None:
         return light, None
     x, y = _grid(box, centre)
     inside = depth(x, y)
     part = light[box]
-    wet = 1 + 0.16 * np.sin(x * 0.21 + wobble[1, 0]) * np.sin(y * 0.26 + wobble[1, 1])
+    wet = 1 + 0.16 * np.sin(x * 0.21 + 9 * wobble[1, 0]) * np.sin(y * 0.26 + 9 * wobble[1, 1])
     round_off = 0.62 + 0.38 * np.clip(inside / (0.45 * size), 0, 1)
     colour = _DEBRIS[int(chance.integers(len(_DEBRIS)))] * (wet * round_off)[..., None]
     glint = np.exp(-((x / size + 0.25) ** 2 / 0.010 + (y / size + 0.30) ** 2 / 0.004))
-    colour = colour + (230 * glint)[..., None]
+    colour = colour + (150 * glint)[..., None]
     opaque = np.clip(0.5 + inside / 1.6, 0, 1)[..., None].astype(np.float32)
     part += opaque * (colour.astype(np.float32) - part)
     hidden = np.zeros(light.shape[:2], dtype=bool)
