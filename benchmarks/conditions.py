@@ -427,7 +427,8 @@ def write(rows: Sequence[dict[str, Any]], command: str) -> Path:
         "# Conditions\n\nHow well the markers are found, condition by condition. Made by\n\n"
         f"    {command}\n\n(seeds 0 to {seeds - 1}). (!) marks what misses its goal: valid at "
         "least 99 %, wrong accepted\nat most 0.1 % (none without an instrument), error at most "
-        f"0.15 px clean and 0.5 px elsewhere.\n\n{table(rows)}\n\n## What is counted\n\n{DEFINITIONS}"
+        f"0.15 px clean\nand 0.5 px elsewhere.\n\n{table(rows)}\n\n"
+        f"## What is counted\n\n{DEFINITIONS}"
     )
     path.write_text(text, encoding="utf-8")
     return path

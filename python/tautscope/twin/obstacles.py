@@ -160,10 +160,12 @@ def debris(light: Light, bands: Bands, drift: Drift) -> tuple[Light, Mask | None
     colour = _DEBRIS[int(chance.integers(len(_DEBRIS)))] * (wet * round_off)[..., None]
     glint = np.exp(-((x / size + 0.25) ** 2 / 0.010 + (y / size + 0.30) ** 2 / 0.004))
     colour = colour + (150 * glint)[..., None]
-    opaque = np.clip(0.5 + inside / 1.6, 0, 1)[..., None].astype(np.float32)
+    # A lump appears thinly, beside the band.
+    thick = min(1.0, level / 0.15)
+    opaque = (thick * np.clip(0.5 + inside / 1.6, 0, 1))[..., None].astype(np.float32)
     part += opaque * (colour.astype(np.float32) - part)
     hidden = np.zeros(light.shape[:2], dtype=bool)
-    hidden[box] = inside > 0
+    hidden[box] = (inside > 0) & (thick > 0.5)
     return light, hidden
 
 
