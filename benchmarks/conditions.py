@@ -74,7 +74,7 @@ CONDITIONS = {
     "exposure": Condition(("exposure",)),
     "white balance": Condition(("white_balance",)),
     "motion blur": Condition(("motion_blur",)),
-    "outside the picture": Condition(poses="partial"),
+    "outside the picture": Condition(poses="outside"),
     "behind the field stop": Condition(("partial",)),
     "touching": Condition(poses="touching"),
     "touching, defocused": Condition(("touching",), poses="touching"),
@@ -167,32 +167,39 @@ def shots(job: Job) -> Iterator[tuple[Config, Floats, int, Picture]]:
 
 def suitable(config: Config, plain: TwinCamera, poses: str, rng: np.random.Generator) -> Floats:
     """A state of the workspace, drawn until it is what the condition asks for."""
-    for _ in range(3000):
+    model = build_feature_model(config)
+    for _ in range(100_000):
         state = rng.uniform(*WORKSPACE)
         if poses == "any":
             return state
+        # The model only saves drawing what will not do.
+        guess = model.predict(state)
+        if guess is None or not promising(config, poses, guess[0]):
+            continue
         picture = plain.draw(*centreline(config, state), 0)
-        visible, features = picture.true_visible, picture.true_features
-        if poses == "partial" and HALF <= visible.min() < 0.97 and near_border(config, features):
+        share = picture.true_visible.min()
+        if poses == "outside" and HALF <= share < 0.97:
             return state
-        if poses == "touching" and visible.min() > 0.3 and bands_touch(picture):
+        if poses == "touching" and share > 0.3 and bands_touch(picture):
             return state
     raise RuntimeError(f"no pose is {poses}")
 
 
-def near_border(config: Config, features: Floats) -> bool:
-    """Whether a band's centre is within 45 px of the picture's border, or beyond it."""
+def promising(config: Config, poses: str, features: Floats) -> bool:
+    """Whether a band's centre is within 45 px of the picture's border; or the bands' centres are
+    within 40 px of each other.
+    """  # noqa: D205
     u, v = features.reshape(2, 2).T
+    if poses == "touching":
+        return bool(np.hypot(u[1] - u[0], v[1] - v[0]) < 40)
     camera = config.camera
     room = np.minimum.reduce([u, v, camera.width - 1 - u, camera.height - 1 - v])
-    return bool(room.min() < 45)
+    return bool(-45 < room.min() < 45)
 
 
 def bands_touch(picture: Picture) -> bool:
     """Whether less than `TOUCH` lies between the green of one band and that of the other."""
     a, b = picture.true_features.reshape(2, 2)
-    if not np.hypot(*(b - a)) < 40:
-        return False
     left, top = np.maximum(0, np.rint((a + b) / 2).astype(int) - 60)
     blue, green, red = np.moveaxis(
         picture.image[top : top + 120, left : left + 120].astype(np.int16), 2, 0
@@ -309,6 +316,8 @@ def to_rows(looks: Sequence[Look]) -> list[dict[str, Any]]:
     for profile in (*CONDITIONS, "all"):
         mine = [look for look in looks if profile in (look.condition, "all")]
         seeds = sorted({look.seed for look in mine})
+        if not mine:
+            continue
         for mode, label in enumerate(MODES):
             for figure in figures(profile):
                 pooled = figure.of(mine, mode)

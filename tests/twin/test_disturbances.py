@@ -7,6 +7,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -26,10 +27,20 @@ Array = NDArray[Any]
 
 STATE = np.array([22e-3, 0.3, 0.9])
 QUIET = {"twin.image_noise": 0.0}
+SMALL = {
+    "camera.width": 360,
+    "camera.height": 288,
+    "camera.fx": 212.0,
+    "camera.fy": 227.0,
+    "camera.cx": 174.8,
+    "camera.cy": 142.5,
+}
+"""Half the size of the article's camera, the same view."""
+LARGE = {key: getattr(Config().camera, key.removeprefix("camera.")) for key in SMALL}
 
 
 def camera(*names: str, **changes: Any) -> TwinCamera:
-    return TwinCamera(Config().replace(**{"twin.disturb": names, **changes}))
+    return TwinCamera(Config().replace(**{**SMALL, "twin.disturb": names, **changes}))
 
 
 def drawn(by: TwinCamera, sequence: int = 0, state: Array = STATE) -> Picture:
@@ -75,20 +86,20 @@ def test_it_changes_the_picture_but_not_where_the_bands_are(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", [name for name in DISTURBANCES if name != EMPTY])
-def test_another_seed_another_disturbance(name: str) -> None:
-    one, other = (camera(name, **QUIET, **{"twin.seed": seed}) for seed in (0, 1))
-    plain = [camera(**QUIET, **{"twin.seed": seed}) for seed in (0, 1)]
-
-    def difference(which: int, by: TwinCamera) -> Array:
-        return level(drawn(by, 30).image) - level(drawn(plain[which], 30).image)
-
-    assert (difference(0, one) != difference(1, other)).any()
+def test_another_seed_another_disturbance(name: str, tmp_path: Path) -> None:
+    grey = np.full((288, 360, 3), 120, np.uint8)
+    grey[::2, ::2] = 60
+    cv2.imwrite(str(tmp_path / "same.png"), grey)
+    same = {**QUIET, "twin.background": str(tmp_path)}
+    one, other = (camera(name, **same, **{"twin.seed": seed}) for seed in (0, 1))
+    differ = [(drawn(one, k).image != drawn(other, k).image).any() for k in range(0, 300, 60)]
+    assert sum(differ) >= 3
 
 
 @pytest.mark.parametrize("name", [each.name for each in TABLE if each.name != "text"])
 def test_it_varies_smoothly_over_frames(name: str) -> None:
     by = camera(name, **QUIET)
-    images = [level(drawn(by, k).image) for k in range(60)]
+    images = [level(drawn(by, k).image) for k in range(45)]
     steps = [np.abs(b - a).mean() for a, b in pairwise(images)]
     span = max(np.abs(image - images[0]).mean() for image in images)
     assert span > 0
@@ -118,7 +129,7 @@ def test_debris_hides_no_more_than_forty_percent_of_a_band_and_gets_there() -> N
 
 def test_hidden_pieces_are_where_the_picture_has_changed() -> None:
     # The share of the band's green that is gone, counted in pixels, is what `true_visible` says.
-    clean, by = camera(**QUIET), camera("debris", **QUIET)
+    clean, by = camera(**QUIET, **LARGE), camera("debris", **QUIET, **LARGE)
     state = np.array([15e-3, -0.5, 0.3])
 
     def green(image: Array) -> Array:
@@ -130,7 +141,7 @@ def test_hidden_pieces_are_where_the_picture_has_changed() -> None:
     rows, columns = np.nonzero(green(whole.image))
     nearest = np.linalg.norm(np.stack([columns, rows], 1)[:, None] - place, axis=-1).argmin(1)
     compared = 0
-    for k in range(5, 600, 25):
+    for k in range(5, 420, 30):
         picture = drawn(by, k, state)
         left = green(picture.image)[rows, columns]
         for band in (0, 1):
@@ -225,8 +236,8 @@ def test_highlights_are_saturated_and_lie_on_the_bands() -> None:
 
 def test_overlays_have_no_noise_and_the_tissue_does() -> None:
     one, other = (drawn(camera("inset", **{"twin.image_noise": 3.0}), k).image for k in (100, 101))
-    assert (one[460:470, 20:60] == one[460, 20]).all()
-    assert (one[:200] != other[:200]).mean() > 0.5
+    assert (one[230:235, 10:30] == one[230, 10]).all()
+    assert (one[:100] != other[:100]).mean() > 0.5
 
 
 def test_no_instrument_is_empty() -> None:
@@ -286,7 +297,7 @@ def test_frames_of_the_twin_carry_the_visible_share() -> None:
         assert ((frame.true_visible >= 0) & (frame.true_visible <= 1)).all()
 
 
-def test_the_benchmark_counts_what_it_says(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_benchmark_counts_what_it_says() -> None:
     names = ("clean", "debris", "no instrument")
     looks = [
         look

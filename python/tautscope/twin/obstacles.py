@@ -32,18 +32,19 @@ DENSEST = 0.65
 def stool(light: Light, _: Bands, drift: Drift) -> tuple[Light, Mask | None]:
     """Brown, yellow and green patches that stick to the tissue and slide slowly over it."""
     height, width = light.shape[:2]
-    where = drift.clouds("where", width, height, 4, 0.004)
+    size = max(1, width // 3), max(1, height // 3)
+    where = drift.clouds("where", *size, 4, 0.004)
     # Always some, at times a quarter of the picture.
     edge = 0.95 - 0.30 * drift.wander("amount", 80)
-    thick = np.clip((where - edge) / 0.30, 0, 1)[..., None]
-    kind = 1 + 0.9 * drift.clouds("kind", width, height, 3, 0.0)
-    grain = drift.clouds("grain", width, height, 40, 0.0)[..., None]
-    brown, yellow, green = (np.clip(1 - np.abs(kind - k), 0, 1)[..., None] for k in range(3))
-    total = np.maximum(brown + yellow + green, 1e-3)
-    colour = (brown * _STOOL[0] + yellow * _STOOL[1] + green * _STOOL[2]) / total
-    lit = np.clip(light.mean(axis=2, keepdims=True) / 130, 0.12, 1.35)
-    opaque = thick * (0.84 + 0.08 * np.clip(grain, -1, 1))
-    return light + opaque * (colour * lit * (1 + 0.07 * grain) - light), None
+    kind = 1 + 0.9 * drift.clouds("kind", *size, 3, 0.0)
+    grain = drift.clouds("grain", *size, 40, 0.0)
+    thick = np.clip((where - edge) / 0.30, 0, 1) * (0.84 + 0.08 * np.clip(grain, -1, 1))
+    parts = np.stack([np.clip(1 - np.abs(kind - k), 0, 1) for k in range(3)], axis=-1)
+    colour = parts @ _STOOL / np.maximum(parts.sum(axis=-1, keepdims=True), 1e-3)
+    colour *= (1 + 0.07 * grain)[..., None] / 130
+    thick = _enlarged(thick, light)[..., None]
+    lit = np.clip(light @ np.full((3, 1), 1 / 3, dtype=np.float32), 16, 175)
+    return light + thick * (_enlarged(colour, light) * lit - light), None
 
 
 def highlights(light: Light, bands: Bands, drift: Drift) -> tuple[Light, Mask | None]:
@@ -139,16 +140,18 @@ def debris(light: Light, bands: Bands, drift: Drift) -> tuple[Light, Mask | None
         radius = 1 + np.cos(turn) @ wobble[0] + np.sin(turn) @ wobble[1]
         return np.asarray(size * np.maximum(radius, 0.3) - np.hypot(x, y))
 
+    pieces, middle_of_band = bands.some(500), bands.centre(target)
+
     def covered(offset: float) -> float:
-        x, y = (bands.at - bands.centre(target) - offset * way).T
+        x, y = (pieces.at - middle_of_band - offset * way).T
         inside = depth(x, y) > 0
-        return max(bands.share(k, inside) for k in (0, 1))
+        return max(pieces.share(k, inside) for k in (0, 1))
 
     far, near = 2.5 * size + bands.extent(target, way), 0.0
-    for _ in range(14):
+    for _ in range(12):
         middle = 0.5 * (far + near)
         far, near = (far, middle) if covered(middle) > share else (middle, near)
-    centre = bands.centre(target) + far * way
+    centre = middle_of_band + far * way
     box = _box(light, centre, 2.2 * size)
     if box is None:
         return light, None
@@ -173,9 +176,19 @@ def smoke(light: Light, _: Bands, drift: Drift) -> tuple[Light, Mask | None]:
     """A drifting veil, light = (1 - t) light + t veil; t up to 0.65, uneven over the picture."""
     height, width = light.shape[:2]
     amount = 0.5 + 0.5 * drift.wander("amount", 60)
-    swirl = drift.clouds("swirl", width, height, 3, 0.05)
-    dense = np.clip(DENSEST * amount * (0.78 + 0.22 * swirl), 0, DENSEST)[..., None]
-    return light + dense * (VEIL - light), None
+    size = max(1, width // 6), max(1, height // 6)
+    swirl = drift.clouds("swirl", *size, 3, 0.05)
+    dense = np.clip(DENSEST * amount * (0.78 + 0.22 * swirl), 0, DENSEST)
+    veiled = light - VEIL
+    veiled *= 1 - _enlarged(dense, light)[..., None]
+    veiled += VEIL
+    return veiled, None
+
+
+def _enlarged(coarse: Light, light: Light) -> Light:
+    height, width = light.shape[:2]
+    fine = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR)
+    return np.asarray(fine, dtype=np.float32)
 
 
 def _box(light: Light, centre: Floats, reach: float) -> tuple[slice, slice] | None:

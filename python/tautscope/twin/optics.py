@@ -69,11 +69,13 @@ def partial(light: Light, bands: Bands, drift: Drift) -> tuple[Light, Mask | Non
     stays as it is, so that the loop's model still holds.
     """
     drawn = bands.drawn()
-    number, level = drift.episode("stop", 60)
-    if not drawn or level < 0.02:
+    number, level = drift.episode("stop", 150)
+    if not drawn:
         return light, None
+    # First from the picture's border to the band, then over it.
+    come, over = min(1.0, 2 * level), max(0.0, 2 * level - 1)
     height, width = light.shape[:2]
-    share = STOPPED_SHARE * level * drift.generator("stop", number).uniform(0.4, 1.0)
+    share = STOPPED_SHARE * over * drift.generator("stop", number).uniform(0.4, 1.0)
     corners = np.array([[0, 0], [width, 0], [0, height], [width, height]], dtype=np.float64)
     best: tuple[float, Floats, float] | None = None
     for turn in np.arange(8) * np.pi / 4:
@@ -89,8 +91,9 @@ def partial(light: Light, bands: Bands, drift: Drift) -> tuple[Light, Mask | Non
             if best is None or place - border < best[0]:
                 best = (place - border, inwards, place)
     assert best is not None
-    _, inwards, place = best
-    x, y = np.arange(width) - 0.0, np.arange(height) - 0.0
-    distance = (inwards[0] * x[None, :] + inwards[1] * y[:, None]) - place
+    travel, inwards, place = best
+    place -= (1 - come) * travel
+    x, y = np.arange(width), np.arange(height)
+    distance = inwards[0] * x[None, :] + inwards[1] * y[:, None] - place
     inside = np.clip(0.5 + distance / 1.5, 0, 1).astype(np.float32)[..., None]
     return light * inside, np.asarray(distance < 0)
