@@ -416,7 +416,7 @@ def montage(path: Path, seed: int, columns: int = 6) -> None:
                 for u, v in picture.true_features.reshape(2, 2):
                     if np.isfinite(u + v):
                         at = (round(float(u)), round(float(v)))
-                        cv2.drawMarker(image, at, (255, 0, 255), cv2.MARKER_CROSS, 16, 1)
+                        cv2.drawMarker(image, at, (255, 0, 255), cv2.MARKER_CROSS, 7, 1)
                 seen = " ".join(f"{share:.2f}" for share in picture.true_visible)
                 small = cv2.resize(image, (480, 384), interpolation=cv2.INTER_AREA)
                 label = f"{name} #{sequence} visible {seen}"

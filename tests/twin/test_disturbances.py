@@ -240,6 +240,19 @@ def test_overlays_have_no_noise_and_the_tissue_does() -> None:
     assert (one[:100] != other[:100]).mean() > 0.5
 
 
+def test_a_band_under_the_inset_has_no_features() -> None:
+    u, v = drawn(camera()).true_features[2:]
+    # The view shifts so that band B comes to lie in the middle of the inset.
+    shift = {
+        "camera.cx": SMALL["camera.cx"] + 0.16 * 360 - u,
+        "camera.cy": SMALL["camera.cy"] + 0.83 * 288 - v,
+    }
+    assert drawn(camera(**shift)).true_visible[1] > 0.9
+    hidden = drawn(camera("inset", **shift))
+    assert hidden.true_visible[1] == 0
+    assert np.isnan(hidden.true_features[2:]).all()
+
+
 def test_no_instrument_is_empty() -> None:
     picture = drawn(camera("no_instrument", **QUIET))
     assert np.isnan(picture.true_features).all()
