@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tautscope import demo
 from tautscope.cli import main
 from tautscope.config import DISTURBANCES, Config, dump_config, load_config
 from tautscope.errors import ConfigError
@@ -286,6 +287,22 @@ def test_an_unknown_name_is_refused_with_those_there_are(
     assert main(["demo", "--disturb", "smoke,smog"]) == 2
     message = capsys.readouterr().err
     assert "'smog'" in message and "white_balance" in message
+
+
+def test_the_command_line_takes_several_names_and_a_background(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    seen: list[Config] = []
+
+    def stop(config: Config, *_: object) -> None:
+        seen.append(config)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(demo, "run_demo", stop)
+    monkeypatch.chdir(tmp_path)
+    assert main(["demo", "--background", str(tmp_path), "--disturb", "smoke, debris"]) == 130
+    assert seen[0].twin.disturb == ("smoke", "debris")
+    assert seen[0].twin.background == str(tmp_path)
 
 
 def test_a_configuration_with_disturbances_is_read_back(tmp_path: Path) -> None:
