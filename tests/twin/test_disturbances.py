@@ -22,6 +22,7 @@ from tautscope.twin.disturbances import EMPTY, TABLE
 from tautscope.twin.drift import Bands, Drift
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+import condition_frames as frames_of
 import conditions
 
 Array = NDArray[Any]
@@ -45,7 +46,7 @@ def camera(*names: str, **changes: Any) -> TwinCamera:
 
 
 def drawn(by: TwinCamera, sequence: int = 0, state: Array = STATE) -> Picture:
-    return by.draw(*conditions.centreline(Config(), state), sequence)
+    return by.draw(*frames_of.centreline(Config(), state), sequence)
 
 
 def level(image: Array) -> Array:
@@ -332,7 +333,7 @@ def test_the_benchmark_counts_what_it_says() -> None:
     looks = [
         look
         for name in names
-        for look in conditions.judge(conditions.Job(name, seed=0, real=False, frames=4))
+        for look in frames_of.judge(frames_of.Job(name, seed=0, real=False, frames=4))
     ]
     assert len(looks) == 12
     rows = conditions.to_rows(looks)
@@ -351,7 +352,7 @@ def test_the_benchmark_counts_what_it_says() -> None:
     assert rms == pytest.approx(np.sqrt(np.mean(np.square(errors))))
     assert conditions.table(rows).count("\n") == 1 + len(names) + 1
     # Something reported where there is nothing is wrong, however near.
-    wrong = conditions.Look(
+    wrong = frames_of.Look(
         "no instrument", 0, False, 0, STATE, 0.0, (True, False), (np.full(2, np.inf),) * 2
     )
     assert wrong.wrong(0) and not wrong.wrong(1)
