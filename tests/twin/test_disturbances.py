@@ -243,7 +243,7 @@ def test_overlays_have_no_noise_and_the_tissue_does() -> None:
 
 
 def test_a_band_under_the_inset_has_no_features() -> None:
-    u, v = drawn(camera()).true_features[2:]
+    u, v = drawn(camera()).true_features[2:].tolist()
     # The view shifts so that band B comes to lie in the middle of the inset.
     shift = {
         "camera.cx": SMALL["camera.cx"] + 0.16 * 360 - u,
