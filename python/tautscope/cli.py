@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tautscope._core import __version__
-from tautscope.config import Config, dump_config, load_config
+from tautscope.config import DISTURBANCES, Config, dump_config, load_config
 from tautscope.errors import MissingPathError, TautscopeError
 
 if TYPE_CHECKING:
@@ -67,6 +67,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     demo.add_argument(
         "--background", metavar="DIR", help="folder of images to use as tissue [procedural mucosa]"
+    )
+    demo.add_argument(
+        "--disturb",
+        metavar="NAME[,NAME]",
+        help=f"disturb the pictures: {', '.join(DISTURBANCES)} [twin.disturb of the configuration]",
     )
     demo.add_argument(
         "--out", type=Path, metavar="DIR", help="run folder, new or empty [runs/<date-time>-demo]"
@@ -171,6 +176,8 @@ def _demo_config(options: argparse.Namespace) -> Config:
         changes["twin.seed"] = options.seed
     if options.background is not None:
         changes["twin.background"] = options.background
+    if options.disturb is not None:
+        changes["twin.disturb"] = [name.strip() for name in options.disturb.split(",")]
     config = config.replace(**changes)
     background = config.twin.background
     if background is not None and not Path(background).is_dir():

@@ -28,6 +28,22 @@ Gain = Annotated[float, Meta(ge=1)]
 Vector3 = tuple[float, float, float]
 Vector8 = tuple[float, float, float, float, float, float, float, float]
 
+DISTURBANCES = (
+    "highlights",
+    "debris",
+    "smoke",
+    "inset",
+    "stool",
+    "text",
+    "exposure",
+    "white_balance",
+    "motion_blur",
+    "partial",
+    "touching",
+    "no_instrument",
+)
+"""What `twin.disturb` may name; `tautscope.twin.disturbances` says what each does."""
+
 
 class DofConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """One degree of freedom: its compensator, Eqs. (2)-(3), and estimator, Eqs. (4)-(6)."""
@@ -242,6 +258,8 @@ class TwinConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Standard deviation of the sensor noise [grey levels]."""
     background: str | None = None
     """Folder of images to use as tissue instead of procedural mucosa."""
+    disturb: tuple[str, ...] = ()
+    """Disturbances of the pictures, by name; their order does not matter."""
     shaft: ShaftConfig = field(default_factory=ShaftConfig)
     cables: CableConfig = field(default_factory=CableConfig)
     drives: DriveConfig = field(default_factory=DriveConfig)
@@ -420,6 +438,9 @@ def _check_relations(config: Config) -> None:
         raise ConfigError(
             "twin.latency_jitter", twin.latency_jitter, f"at most twin.latency = {twin.latency}"
         )
+    for index, name in enumerate(twin.disturb):
+        if name not in DISTURBANCES:
+            raise ConfigError(f"twin.disturb[{index}]", name, "one of " + ", ".join(DISTURBANCES))
     ticks = config.control.history / config.control.period
     if not 1 <= ticks <= 1024:
         raise ConfigError(

@@ -20,14 +20,16 @@ class Frame:
         image: Pixels, uint8 (height, width, 3), BGR.
         captured_at: When it was taken [s, the rig's clock], not when it arrived.
         sequence: Counts the camera's frames; a gap is a dropped frame.
-        true_features: (4,) [px] what an ideal segmentation would measure, twin only; the loop
-            never reads it.
+        true_features: (4,) [px] what an ideal segmentation would measure were each band wholly
+            visible, twin only; the loop never reads it.
+        true_visible: (2,) visible share of bands A and B, 0 to 1, twin only; likewise.
     """
 
     image: NDArray[np.uint8]
     captured_at: float
     sequence: int
     true_features: NDArray[np.float64] | None = None
+    true_visible: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,16 +2,28 @@
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
-use tautscope_render::{Error, Geometry, Lens, Pose};
+use tautscope_render::{Error, Geometry, Lens, Piece, Pose, Truth};
 
-/// The picture and the features.
-type Drawing<'py> = (Bound<'py, PyArray3<u8>>, Bound<'py, PyArray1<f64>>);
+/// The picture, the features and the visible shares.
+type Drawing<'py> = (
+    Bound<'py, PyArray3<u8>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+);
+/// The same, and the bands' surface.
+type Scene<'py> = (
+    Bound<'py, PyArray3<u8>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray2<f64>>,
+);
 
 /// Draws the instrument over tissue; see `tautscope.twin.camera.TwinCamera`.
 #[pyclass(module = "tautscope._core")]
 pub struct Renderer {
     inner: tautscope_render::Renderer,
     frames: Vec<([f64; 3], [f64; 3])>,
+    surface: Vec<Piece>,
 }
 
 #[pymethods]
@@ -54,11 +66,12 @@ impl Renderer {
             .map(|inner| Self {
                 inner,
                 frames: Vec::new(),
+                surface: Vec::new(),
             })
             .map_err(|error| config_error(py, error))
     }
 
-    /// Returns the picture, uint8 (h, w, 3), and the features, (4,) [px].
+    /// Returns the picture, uint8 (h, w, 3), the features, (4,) [px], and the visible shares, (2,).
     fn draw<'py>(
         &mut self,
         py: Python<'py>,
@@ -67,6 +80,62 @@ impl Renderer {
         directions: &Bound<'py, PyArray2<f64>>,
         sequence: u64,
     ) -> PyResult<Drawing<'py>> {
+        let (image, truth) = self.paint(py, background, points, directions, Some(sequence))?;
+        let [features, visible] = arrays(py, &truth);
+        Ok((image, features, visible))
+    }
+
+    /// As `draw` without the noise. Also returns the bands' near sides, float64 (n, 5), in small
+    /// pieces: band (0 or 1), u, v [px], area [px^2], and whether it is seen (0 or 1).
+    fn draw_scene<'py>(
+        &mut self,
+        py: Python<'py>,
+        background: &Bound<'py, PyArray3<u8>>,
+        points: &Bound<'py, PyArray2<f64>>,
+        directions: &Bound<'py, PyArray2<f64>>,
+    ) -> PyResult<Scene<'py>> {
+        let (image, truth) = self.paint(py, background, points, directions, None)?;
+        let [features, visible] = arrays(py, &truth);
+        let surface = PyArray2::zeros(py, [self.surface.len(), 5], false);
+        let mut table = surface.readwrite();
+        let rows = table.as_slice_mut()?.chunks_exact_mut(5);
+        for (row, piece) in rows.zip(&self.surface) {
+            row.copy_from_slice(&[
+                f64::from(u8::from(piece.band == 1)),
+                f64::from(piece.at[0]),
+                f64::from(piece.at[1]),
+                f64::from(piece.area),
+                f64::from(u8::from(piece.seen)),
+            ]);
+        }
+        drop(table);
+        Ok((image, features, visible, surface))
+    }
+
+    /// Adds the sensor's noise of picture `sequence` to the image, uint8 (h, w, 3), in place.
+    fn add_noise(
+        &self,
+        py: Python<'_>,
+        image: &Bound<'_, PyArray3<u8>>,
+        sequence: u64,
+    ) -> PyResult<()> {
+        let mut pixels = image.readwrite();
+        let target = pixels.as_slice_mut()?;
+        py.detach(|| self.inner.add_noise(sequence, target));
+        Ok(())
+    }
+}
+
+impl Renderer {
+    /// With the noise of a sequence number, or without noise and with the surface kept.
+    fn paint<'py>(
+        &mut self,
+        py: Python<'py>,
+        background: &Bound<'py, PyArray3<u8>>,
+        points: &Bound<'py, PyArray2<f64>>,
+        directions: &Bound<'py, PyArray2<f64>>,
+        sequence: Option<u64>,
+    ) -> PyResult<(Bound<'py, PyArray3<u8>>, Truth)> {
         let [width, height] = self.inner.size();
         let image = PyArray3::zeros(py, [height, width, 3], false);
         let mut pixels = image.readwrite();
@@ -90,10 +159,21 @@ impl Renderer {
                     )
                 }),
         );
-        let features = py.detach(|| self.inner.draw(tissue, &self.frames, sequence, target));
+        let (inner, frames, surface) = (&mut self.inner, &self.frames, &mut self.surface);
+        let truth = py.detach(|| match sequence {
+            Some(sequence) => inner.draw(tissue, frames, sequence, target),
+            None => inner.draw_scene(tissue, frames, target, surface),
+        });
         drop(pixels);
-        Ok((image, PyArray1::from_slice(py, &features)))
+        Ok((image, truth))
     }
+}
+
+fn arrays<'py>(py: Python<'py>, truth: &Truth) -> [Bound<'py, PyArray1<f64>>; 2] {
+    [
+        PyArray1::from_slice(py, &truth.features),
+        PyArray1::from_slice(py, &truth.visible),
+    ]
 }
 
 fn config_error(py: Python<'_>, error: Error) -> PyErr {

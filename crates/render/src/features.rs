@@ -5,8 +5,29 @@ const CELLS: u8 = 6;
 /// A band that shows less than this is not visible (px²).
 const LEAST: f64 = 1.0;
 
-/// Centroids of the visible part of bands A and B, u and v of each, in px; NaN where not visible.
-pub type Features = [f64; 4];
+/// What a picture shows of bands A and B.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Truth {
+    /// Centroids of the bands' near sides, u and v of each, in px; NaN where nothing of a band is
+    /// visible.
+    pub features: [f64; 4],
+    /// Share of each near side, by area in the picture, that is inside the picture with nothing in
+    /// front of it, 0 to 1.
+    pub visible: [f64; 2],
+}
+
+/// A small piece of a band's near side.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Piece {
+    /// 0 for band A, 1 for band B.
+    pub band: usize,
+    /// Place (px).
+    pub at: [f32; 2],
+    /// Area in the picture (px²).
+    pub area: f32,
+    /// Inside the picture with nothing in front of it.
+    pub seen: bool,
+}
 
 /// The bands' surface as it was drawn, patch by patch.
 ///
@@ -29,11 +50,18 @@ impl Patches {
         }
     }
 
-    /// Centroids by visible area in the picture,
-    /// `sum(area of cell x place of cell) / sum(area of cell)`; a cell is hidden where something
-    /// is drawn nearer than it by more than `slack` (m), or outside the picture.
-    pub(crate) fn centroids(&self, samples: &Samples, slack: f32) -> Features {
-        let mut sums = [[0.0_f64; 3]; 2];
+    /// Centroids by area in the picture, `sum(area of cell x place of cell) / sum(area of cell)`,
+    /// and the share of it that is seen. A cell is hidden where something is drawn nearer than it
+    /// by more than `slack` (m), or outside the picture. Hidden cells count for the centroid: the
+    /// loop's model predicts that of the whole near side, and what hides a part moves no band.
+    /// Every cell is handed to `keep`.
+    pub(crate) fn truth(
+        &self,
+        samples: &Samples,
+        slack: f32,
+        mut keep: impl FnMut(Piece),
+    ) -> Truth {
+        let mut sums = [[0.0_f64; 4]; 2];
         for (band, corners) in &self.patches {
             let Some(sum) = sums.get_mut(*band) else {
                 continue;
@@ -42,22 +70,38 @@ impl Patches {
                 let [s, t] = [s, t].map(|i| (f32::from(i) + 0.5) / f32::from(CELLS));
                 let cell = Cell::of(corners, s, t);
                 let limit = cell.nearness / (1.0 - slack * cell.nearness).max(1e-3);
-                if !samples.hides(cell.at, limit) {
-                    let area = f64::from(cell.area);
-                    sum[0] += area;
-                    sum[1] += area * f64::from(cell.at[0]);
-                    sum[2] += area * f64::from(cell.at[1]);
-                }
+                let seen = !samples.hides(cell.at, limit);
+                let area = f64::from(cell.area);
+                sum[0] += area;
+                sum[1] += area * f64::from(cell.at[0]);
+                sum[2] += area * f64::from(cell.at[1]);
+                sum[3] += if seen { area } else { 0.0 };
+                keep(Piece {
+                    band: *band,
+                    at: cell.at,
+                    area: cell.area / f32::from(CELLS).powi(2),
+                    seen,
+                });
             }
         }
-        let [a, b] = sums.map(|[area, x, y]| {
-            if area < LEAST * f64::from(CELLS).powi(2) {
-                [f64::NAN; 2]
+        let visible = sums.map(|[area, _, _, seen]| {
+            if seen < LEAST * f64::from(CELLS).powi(2) {
+                0.0
             } else {
-                [x / area, y / area]
+                seen / area
             }
         });
-        [a[0], a[1], b[0], b[1]]
+        let centre = |band: usize, k: usize| {
+            if visible[band] > 0.0 {
+                sums[band][k] / sums[band][0]
+            } else {
+                f64::NAN
+            }
+        };
+        Truth {
+            features: [centre(0, 1), centre(0, 2), centre(1, 1), centre(1, 2)],
+            visible,
+        }
     }
 }
 

@@ -24,7 +24,7 @@ mod tube;
 mod vector;
 
 pub use error::Error;
-pub use features::Features;
+pub use features::{Piece, Truth};
 pub use lens::Lens;
 pub use pose::Pose;
 pub use renderer::Renderer;

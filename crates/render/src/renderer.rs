@@ -1,6 +1,6 @@
 use crate::Error;
 use crate::curve::Curve;
-use crate::features::{Features, Patches};
+use crate::features::{Patches, Piece, Truth};
 use crate::lens::Lens;
 use crate::noise::Noise;
 use crate::pose::Pose;
@@ -73,8 +73,7 @@ impl Renderer {
     /// `background` (the same), and returns where the bands are in it.
     ///
     /// `frames` are positions (in m) and tangents along the centreline in the guide's frame, proximal
-    /// to distal; the last is the distal end of the tip. The features are the centroids of
-    /// each band's visible part in the picture, before the noise. Frames with a number that is not finite,
+    /// to distal; the last is the distal end of the tip. Frames with a number that is not finite,
     /// or that make a line longer than 10 m, give a picture without instrument. Slices of another
     /// size are filled as far as they go.
     pub fn draw(
@@ -83,10 +82,42 @@ impl Renderer {
         frames: &[([f64; 3], [f64; 3])],
         sequence: u64,
         image: &mut [u8],
-    ) -> Features {
+    ) -> Truth {
+        self.paint(background, frames, Some(sequence), image, |_| ())
+    }
+
+    /// As [`Renderer::draw`] without the sensor's noise, for a picture to which more happens before
+    /// it reaches the sensor; [`Renderer::add_noise`] completes it. `surface` is filled with the
+    /// bands' near sides, piece by piece.
+    pub fn draw_scene(
+        &mut self,
+        background: &[u8],
+        frames: &[([f64; 3], [f64; 3])],
+        image: &mut [u8],
+        surface: &mut Vec<Piece>,
+    ) -> Truth {
+        surface.clear();
+        self.paint(background, frames, None, image, |piece| surface.push(piece))
+    }
+
+    /// Adds the sensor's noise of picture `sequence` to `image`, saturating at 0 and 255.
+    pub fn add_noise(&self, sequence: u64, image: &mut [u8]) {
+        for (y, row) in image.chunks_mut(3 * self.width).enumerate() {
+            self.noise.add(sequence, y as u64, row);
+        }
+    }
+
+    fn paint(
+        &mut self,
+        background: &[u8],
+        frames: &[([f64; 3], [f64; 3])],
+        noise: Option<u64>,
+        image: &mut [u8],
+        keep: impl FnMut(Piece),
+    ) -> Truth {
         self.sweep(frames);
         let slack = 0.25 * self.geometry.diameter as f32;
-        let features = self.bands.centroids(&self.samples, slack);
+        let truth = self.bands.truth(&self.samples, slack, keep);
         let stride = 3 * self.width;
         let rows = image.chunks_mut(stride).zip(background.chunks(stride));
         for (y, (row, tissue)) in rows.take(self.height).enumerate() {
@@ -94,9 +125,11 @@ impl Renderer {
                 *value = *below;
             }
             self.samples.resolve(y, row);
-            self.noise.add(sequence, y as u64, row);
+            if let Some(sequence) = noise {
+                self.noise.add(sequence, y as u64, row);
+            }
         }
-        features
+        truth
     }
 
     fn sweep(&mut self, frames: &[([f64; 3], [f64; 3])]) {

@@ -14,6 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from tautscope._core import Renderer
 from tautscope.config import Config
 from tautscope.errors import FieldError
+from tautscope.twin.disturbances import Disturbances
+from tautscope.twin.drift import Bands
 from tautscope.twin.tissue import load_backgrounds, mucosa
 
 FRAMES_PER_BACKGROUND = 25
@@ -26,14 +28,18 @@ class Picture:
 
     Attributes:
         image: Pixels, uint8 (height, width, 3), BGR.
-        true_features: (4,) [px] u and v of the centroids of bands A and B: the mean place of the
-            pixels that show the band, by the share of each pixel that does, before noise; what an
-            ideal segmentation would measure. Pixel centres are at whole numbers. NaN for a band
-            that is not visible.
+        true_features: (4,) [px] u and v of the centroids of bands A and B: the mean place, by area
+            in the picture, of the side of the band that faces the camera, *all* of it, also what
+            is outside the picture or hidden; what an ideal segmentation would measure were it
+            all visible. Pixel centres are at whole numbers. NaN for a band of which nothing is
+            visible.
+        true_visible: (2,) share of that side of A and of B that is inside the picture and hidden
+            neither by the instrument nor by a disturbance, by area in the picture, 0 to 1.
     """
 
     image: NDArray[np.uint8]
     true_features: NDArray[np.float64]
+    true_visible: NDArray[np.float64]
 
 
 class TwinCamera:
@@ -45,8 +51,11 @@ class TwinCamera:
     ``config.twin.seed`` and sequence number give the same bytes, in whatever order pictures are
     drawn.
 
+    With ``config.twin.disturb``, disturbances act between tissue, lens, sensor and video processor;
+    `tautscope.twin.disturbances` has their order and what they do to the truth.
+
     Wrong where: parts nearer than 2 mm to the camera are left out; tissue is a flat picture behind
-    the instrument, which throws no shadow on it; no motion blur.
+    the instrument, which throws no shadow on it; grey levels are proportional to light (no gamma).
 
     Args:
         config: camera, instrument and twin are read.
@@ -73,6 +82,7 @@ class TwinCamera:
             noise=twin.image_noise,
             seed=twin.seed % 2**64,
         )
+        self._disturbances = Disturbances(twin.disturb, twin.seed)
         if twin.background is None:
             self._backgrounds = [mucosa(camera.width, camera.height, twin.seed)]
         else:
@@ -91,7 +101,8 @@ class TwinCamera:
                 least 2. The last is the distal end of the tip. Numbers that are not finite give a
                 picture without instrument.
             directions: (n, 3) tangents at the points, towards the tip, in the guide's frame.
-            sequence: Number of the picture, 0 or more: chooses the noise and the background.
+            sequence: Number of the picture, 0 or more: chooses the noise, the background and the
+                state of the disturbances.
 
         Raises:
             FieldError: An array of the wrong shape, or a negative sequence number.
@@ -103,7 +114,30 @@ class TwinCamera:
         if not 0 <= sequence < 2**63:
             raise FieldError("sequence", sequence, "a whole number from 0 to 2^63 - 1")
         shown = sequence // FRAMES_PER_BACKGROUND % len(self._backgrounds)
-        return Picture(*self._renderer.draw(self._backgrounds[shown], places, tangents, sequence))
+        background = self._backgrounds[shown]
+        if self._disturbances.any:
+            return self._disturbed(background, places, tangents, sequence)
+        return Picture(*self._renderer.draw(background, places, tangents, sequence))
+
+    def _disturbed(
+        self,
+        background: NDArray[np.uint8],
+        places: NDArray[np.float64],
+        tangents: NDArray[np.float64],
+        sequence: int,
+    ) -> Picture:
+        disturb = self._disturbances
+        if disturb.no_instrument:
+            places = np.full_like(places, np.nan)
+        tissue = disturb.on_tissue(background, sequence)
+        drawn, features, _, surface = self._renderer.draw_scene(tissue, places, tangents)
+        bands = Bands.from_surface(surface)
+        image, hidden = disturb.on_light(drawn, bands, sequence)
+        self._renderer.add_noise(image, sequence)
+        image, written = disturb.on_video(image, bands, sequence)
+        visible = bands.visible(hidden | written)
+        features[np.repeat(visible, 2) == 0] = np.nan
+        return Picture(image, features, visible)
 
 
 def _frames(field: str, values: ArrayLike) -> NDArray[np.float64]:

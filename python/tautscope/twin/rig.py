@@ -100,7 +100,8 @@ class Twin:
         ):
             return
         picture = self._camera.draw(*plant.centreline(), self._sequence)
-        frame = Frame(picture.image, time, self._sequence, picture.true_features)
+        truth = picture.true_features, picture.true_visible
+        frame = Frame(picture.image, time, self._sequence, *truth)
         delay = twin.latency + twin.latency_jitter * self._timing.uniform(-1, 1)
         self._under_way.append((time + delay, frame))
         self._sequence += 1
