@@ -138,13 +138,23 @@ pub(crate) enum Row<'a> {
     I420(&'a [u8], &'a [u8], &'a [u8]),
 }
 
-/// What is done with pixels; a trait, because a closure cannot be generic over the group's size.
+/// Pixels that share bytes, `P` of them.
+///
+/// Byte by byte: a pixel that is gathered into an array first is no longer seen by the compiler as
+/// the three streams that it can take apart with vectors.
+pub(crate) trait Group<const P: usize>: Copy {
+    /// One of the three channels that the discriminant weighs, of one of the pixels.
+    fn channel(self, pixel: usize, channel: usize) -> u8;
+}
+
+/// What is done with pixels; a trait, because a closure cannot be generic over the group.
 pub(crate) trait Consumer {
     /// What comes of it.
     type Outcome;
 
-    /// Takes the pixels, `P` at a time, as the three channels that the discriminant weighs.
-    fn consume<const P: usize>(self, groups: impl Iterator<Item = [[u8; 3]; P]>) -> Self::Outcome;
+    /// Takes the pixels, left to right.
+    fn consume<const P: usize, G: Group<P>>(self, groups: impl Iterator<Item = G>)
+    -> Self::Outcome;
 }
 
 impl<'a> Row<'a> {
@@ -195,41 +205,83 @@ impl<'a> Row<'a> {
     #[inline(always)]
     pub(crate) fn feed<C: Consumer>(self, consumer: C) -> C::Outcome {
         match self {
-            Self::Triples(bytes) => consumer.consume(triples(bytes)),
-            Self::Quadruples(bytes) => {
-                consumer.consume(quadruples(bytes).map(|[b, g, r, _]| [[b, g, r]]))
+            Self::Triples(bytes) => consumer.consume(groups(bytes).map(Triple)),
+            Self::Quadruples(bytes) => consumer.consume(groups(bytes).map(Quadruple)),
+            Self::Yuyv(bytes) => consumer.consume(groups(bytes).map(Yuyv)),
+            Self::Uyvy(bytes) => consumer.consume(groups(bytes).map(Uyvy)),
+            Self::Nv12(y, uv) => {
+                let pairs = groups(y).zip(groups(uv));
+                consumer.consume(pairs.map(|(y, uv)| Nv12(y, uv)))
             }
-            Self::Yuyv(bytes) => {
-                consumer.consume(quadruples(bytes).map(|[y, u, z, v]| [[y, u, v], [z, u, v]]))
+            Self::I420(y, u, v) => {
+                let pairs = groups(y).zip(u.iter().zip(v));
+                consumer.consume(pairs.map(|(y, (u, v))| I420(y, u, v)))
             }
-            Self::Uyvy(bytes) => {
-                consumer.consume(quadruples(bytes).map(|[u, y, v, z]| [[y, u, v], [z, u, v]]))
-            }
-            Self::Nv12(y, uv) => consumer.consume(
-                pairs(y)
-                    .zip(pairs(uv))
-                    .map(|([y, z], [u, v])| [[y, u, v], [z, u, v]]),
-            ),
-            Self::I420(y, u, v) => consumer.consume(
-                pairs(y)
-                    .zip(u.iter().zip(v))
-                    .map(|([y, z], (u, v))| [[y, *u, *v], [z, *u, *v]]),
-            ),
         }
     }
 }
 
 #[inline(always)]
-fn pairs(bytes: &[u8]) -> impl Iterator<Item = [u8; 2]> {
-    bytes.as_chunks::<2>().0.iter().copied()
+fn groups<const N: usize>(bytes: &[u8]) -> impl Iterator<Item = &[u8; N]> {
+    bytes.as_chunks().0.iter()
 }
 
-#[inline(always)]
-fn triples(bytes: &[u8]) -> impl Iterator<Item = [[u8; 3]; 1]> {
-    bytes.as_chunks::<3>().0.iter().map(|pixel| [*pixel])
+#[derive(Clone, Copy)]
+struct Triple<'a>(&'a [u8; 3]);
+
+#[derive(Clone, Copy)]
+struct Quadruple<'a>(&'a [u8; 4]);
+
+#[derive(Clone, Copy)]
+struct Yuyv<'a>(&'a [u8; 4]);
+
+#[derive(Clone, Copy)]
+struct Uyvy<'a>(&'a [u8; 4]);
+
+#[derive(Clone, Copy)]
+struct Nv12<'a>(&'a [u8; 2], &'a [u8; 2]);
+
+#[derive(Clone, Copy)]
+struct I420<'a>(&'a [u8; 2], &'a u8, &'a u8);
+
+impl Group<1> for Triple<'_> {
+    #[inline(always)]
+    fn channel(self, _: usize, channel: usize) -> u8 {
+        self.0[channel]
+    }
 }
 
-#[inline(always)]
-fn quadruples(bytes: &[u8]) -> impl Iterator<Item = [u8; 4]> {
-    bytes.as_chunks::<4>().0.iter().copied()
+impl Group<1> for Quadruple<'_> {
+    #[inline(always)]
+    fn channel(self, _: usize, channel: usize) -> u8 {
+        self.0[channel]
+    }
+}
+
+impl Group<2> for Yuyv<'_> {
+    #[inline(always)]
+    fn channel(self, pixel: usize, channel: usize) -> u8 {
+        self.0[[2 * pixel, 1, 3][channel]]
+    }
+}
+
+impl Group<2> for Uyvy<'_> {
+    #[inline(always)]
+    fn channel(self, pixel: usize, channel: usize) -> u8 {
+        self.0[[2 * pixel + 1, 0, 2][channel]]
+    }
+}
+
+impl Group<2> for Nv12<'_> {
+    #[inline(always)]
+    fn channel(self, pixel: usize, channel: usize) -> u8 {
+        [self.0[pixel], self.1[0], self.1[1]][channel]
+    }
+}
+
+impl Group<2> for I420<'_> {
+    #[inline(always)]
+    fn channel(self, pixel: usize, channel: usize) -> u8 {
+        [self.0[pixel], *self.1, *self.2][channel]
+    }
 }

@@ -1,6 +1,6 @@
 //! The discriminant in fixed point, for one pixel format.
 
-use crate::format::{Consumer, Row};
+use crate::format::{Consumer, Group, Row};
 
 /// Largest magnitude of a projected pixel: four of them still fit an `i16`, which the low-pass needs.
 pub(crate) const RANGE: f64 = 8190.0;
@@ -81,13 +81,15 @@ impl Consumer for Project<'_> {
     type Outcome = ();
 
     #[inline(always)]
-    fn consume<const P: usize>(self, groups: impl Iterator<Item = [[u8; 3]; P]>) {
+    fn consume<const P: usize, G: Group<P>>(self, groups: impl Iterator<Item = G>) {
         let Self(projection, projected) = self;
         let [first, second, third] = projection.weights.map(i32::from);
         for (values, group) in projected.as_chunks_mut::<P>().0.iter_mut().zip(groups) {
-            for (value, pixel) in values.iter_mut().zip(group) {
-                let [x, y, z] = pixel.map(i32::from);
-                let sum = first * x + second * y + third * z + projection.offset;
+            for (pixel, value) in values.iter_mut().enumerate() {
+                let sum = first * i32::from(group.channel(pixel, 0))
+                    + second * i32::from(group.channel(pixel, 1))
+                    + third * i32::from(group.channel(pixel, 2))
+                    + projection.offset;
                 #[expect(clippy::cast_possible_truncation, reason = "within +-8191")]
                 {
                     *value = (sum >> FRACTION_BITS) as i16;
@@ -104,21 +106,19 @@ impl Consumer for Peak {
     type Outcome = i16;
 
     #[inline(always)]
-    fn consume<const P: usize>(self, groups: impl Iterator<Item = [[u8; 3]; P]>) -> i16 {
+    fn consume<const P: usize, G: Group<P>>(self, groups: impl Iterator<Item = G>) -> i16 {
         let [first, second, third] = self.0;
-        let mut peak = i16::MIN;
-        for group in groups {
-            for pixel in group {
-                let [x, y, z] = pixel.map(i16::from);
+        groups.fold(i16::MIN, |mut peak, group| {
+            for pixel in 0..P {
                 // The sum fits; a part of it may not, and comes back.
                 let sum = first
-                    .wrapping_mul(x)
-                    .wrapping_add(second.wrapping_mul(y))
-                    .wrapping_add(third.wrapping_mul(z));
+                    .wrapping_mul(i16::from(group.channel(pixel, 0)))
+                    .wrapping_add(second.wrapping_mul(i16::from(group.channel(pixel, 1))))
+                    .wrapping_add(third.wrapping_mul(i16::from(group.channel(pixel, 2))));
                 peak = peak.max(sum);
             }
-        }
-        peak
+            peak
+        })
     }
 }
 
