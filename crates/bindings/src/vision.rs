@@ -16,7 +16,7 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2, PyReadonlyArrayDy
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use tautscope_vision::frame::MAX_SIDE;
-use tautscope_vision::segment::each_run;
+use tautscope_vision::runs::each_run;
 use tautscope_vision::{
     ColorDiscriminant, Detector, Error, Frame, Labeller, PixelFormat, Region, Segmenter, Settings,
     Window,

@@ -16,6 +16,7 @@ mod lowpass;
 pub mod markers;
 mod projection;
 pub mod regions;
+pub mod runs;
 pub mod segment;
 
 pub use detector::{Detection, Detector, Settings};

@@ -28,9 +28,9 @@ impl LowPass {
 
     /// Forgets the rows so far in these columns: as if they had been far below any threshold.
     #[inline(always)]
-    pub(crate) fn forget(&mut self, columns: Range<usize>) {
+    pub(crate) fn forget(&mut self, columns: &Range<usize>) {
         for row in [&mut self.above, &mut self.here] {
-            cut(row, &columns).fill(NEVER);
+            cut(row, columns).fill(NEVER);
         }
     }
 
@@ -41,10 +41,15 @@ impl LowPass {
     /// call leaves nothing of use, and the last, which asks for the bottom row, does not read `row`.
     /// Nor do calls beyond that, which leave nothing of use.
     #[inline(always)]
-    pub(crate) fn step(&mut self, row: &mut [i16], columns: Range<usize>, n: usize, height: usize) {
+    pub(crate) fn step(
+        &mut self,
+        row: &mut [i16],
+        columns: &Range<usize>,
+        n: usize,
+        height: usize,
+    ) {
         let [above, here, below] =
-            [&mut self.above, &mut self.here, &mut self.below].map(|row| cut(row, &columns));
-        let row = cut(row, &columns);
+            [&mut self.above, &mut self.here, &mut self.below].map(|row| cut(row, columns));
         if n < height {
             along(row, below);
         } else {
@@ -115,7 +120,7 @@ mod tests {
             pass.prepare(width);
             for n in 0..=height {
                 let mut row = rows.get(n).map_or_else(|| vec![0; width], |row| row.to_vec());
-                pass.step(&mut row, 0..width, n, height);
+                pass.step(&mut row, &(0..width), n, height);
                 pass.advance();
                 let Some(v) = n.checked_sub(1) else { continue };
                 for (u, filtered) in row.iter().enumerate() {

@@ -8,19 +8,17 @@
 
 use std::ops::Range;
 
-use fearless_simd::{Level, Simd, dispatch};
+use fearless_simd::{Level, dispatch, prelude::*};
 
 use crate::columns::{BLOCK, Columns};
 use crate::format::Row;
 use crate::lowpass::LowPass;
 use crate::projection::Projection;
+use crate::runs::Runs;
 use crate::{ColorDiscriminant, Frame, Window};
 
-/// Pixels scanned together.
-const CHUNK: usize = 2 * BLOCK;
-
-/// Pixels of a row looked at together while nothing changes.
-const STRETCH: usize = 32;
+/// Pixels scanned together: whole blocks.
+const CHUNK: usize = 4 * BLOCK;
 
 /// Gives the rows of a frame as marker or not, top to bottom, in memory that does not grow with the
 /// image's height.
@@ -28,9 +26,17 @@ const STRETCH: usize = 32;
 pub struct Segmenter {
     level: Level,
     discriminant: ColorDiscriminant,
-    passes: Vec<LowPass>,
     columns: Columns,
-    row: Vec<i16>,
+    rows: Rows,
+}
+
+/// What becomes of a row on its way.
+#[derive(Clone, Debug)]
+struct Rows {
+    passes: Vec<LowPass>,
+    projected: Vec<i16>,
+    /// By block, a bit for each pixel: which are marker; kept up within the spans alone.
+    marker: Vec<u64>,
 }
 
 impl Segmenter {
@@ -39,9 +45,12 @@ impl Segmenter {
         Self {
             level: Level::new(),
             discriminant,
-            passes: vec![LowPass::default(); smoothing],
             columns: Columns::default(),
-            row: Vec::new(),
+            rows: Rows {
+                passes: vec![LowPass::default(); smoothing],
+                projected: Vec::new(),
+                marker: Vec::new(),
+            },
         }
     }
 
@@ -68,200 +77,151 @@ impl Segmenter {
         if window.left == window.right || window.top == window.bottom {
             return;
         }
-        let delay = self.passes.len();
+        let delay = self.rows.passes.len();
         // What is wrong at the edge of what is read comes one pixel farther in with each pass.
         let read = window.grown(delay, frame);
         let columns = frame.format().whole_groups(read.left..read.right);
+        let columns = whole_blocks(columns, frame.width());
         let (width, height) = (columns.len(), read.bottom - read.top);
         let line = |n: usize| Row::of(frame, read.top + n, columns.clone());
         let projection = self.discriminant.projection(frame.format());
-        self.prepare(width);
+        self.columns.start(width);
+        self.rows.start(width);
         // A pixel seen in row n matters to the filtered rows n - delay to n + delay, and these need the
         // rows from n - 2 delay to n + 2 delay: scanning goes so far ahead.
         let reach = 2 * delay;
         for n in 0..height + delay + reach {
             if n < height {
-                self.scan(line(n), n + reach + 1, &projection);
+                let (row, seen) = (line(n), &mut self.columns);
+                let found = |block| seen.see(block, n + reach + 1);
+                dispatch!(self.level, simd => scan(simd, row, width, &projection, found));
             }
             let Some(step) = n.checked_sub(reach) else {
                 continue;
             };
-            let source = (step < height).then(|| line(step));
-            self.filter(source, step, height, &projection);
+            let Self { columns: seen, rows, .. } = self;
+            seen.find_spans(step, |fresh| rows.forget(&fresh));
+            if !seen.spans().is_empty() {
+                let place = Place {
+                    source: (step < height).then(|| line(step)),
+                    step,
+                    height,
+                };
+                let spans = seen.spans();
+                dispatch!(self.level, simd => filter(simd, rows, spans, place, &projection));
+            }
+            rows.advance();
             let Some(v) = step.checked_sub(delay).map(|v| v + read.top) else {
                 continue;
             };
             if (window.top..window.bottom).contains(&v) {
-                visit(
-                    v,
-                    Runs {
-                        row: &self.row,
-                        spans: self.columns.spans(),
-                        threshold: projection.threshold(),
-                        origin: columns.start,
-                        within: [window.left, window.right],
-                    },
-                );
+                let within = [window.left, window.right];
+                visit(v, Runs::new(&rows.marker, seen.spans(), columns.start, within));
             }
         }
     }
+}
 
-    fn prepare(&mut self, width: usize) {
-        self.row.resize(width, 0);
-        self.columns.start(width);
+impl Rows {
+    fn start(&mut self, width: usize) {
+        self.projected.resize(width, 0);
+        self.marker.resize(width.div_ceil(BLOCK), 0);
         for pass in &mut self.passes {
             pass.prepare(width);
         }
     }
 
-    /// Finds the blocks of a row in which a pixel exceeds the threshold; they matter until then.
-    fn scan(&mut self, row: Row<'_>, until: usize, projection: &Projection) {
-        let Self {
-            level,
-            columns,
-            row: projected,
-            ..
-        } = self;
-        dispatch!(*level, simd => scan(simd, row, projected, projection, |block| columns.see(block, until)));
+    fn forget(&mut self, columns: &Range<usize>) {
+        for pass in &mut self.passes {
+            pass.forget(columns);
+        }
     }
 
-    /// Projects a row where it matters and takes it through the low-passes; pass k is k rows behind.
-    fn filter(
-        &mut self,
-        source: Option<Row<'_>>,
-        step: usize,
-        height: usize,
-        projection: &Projection,
-    ) {
-        let Self {
-            level,
-            passes,
-            columns,
-            row,
-            ..
-        } = self;
-        columns.find_spans(step, |fresh| {
-            for pass in &mut *passes {
-                pass.forget(fresh.clone());
-            }
-        });
-        let spans = columns.spans();
-        if !spans.is_empty() {
-            dispatch!(*level, simd => filter(simd, source, row, spans, passes, step, height, projection));
-        }
-        for pass in passes {
+    fn advance(&mut self) {
+        for pass in &mut self.passes {
             pass.advance();
         }
     }
 }
 
+/// These columns and as many more as make whole blocks, if the frame has them.
+fn whole_blocks(columns: Range<usize>, width: usize) -> Range<usize> {
+    let wanted = columns.len().next_multiple_of(BLOCK).min(width);
+    let start = columns.start.min(width - wanted);
+    start..start + wanted
+}
+
+/// Finds the blocks of a row in which a pixel may exceed the threshold.
 #[inline(always)]
 fn scan<S: Simd>(
     _: S,
     row: Row<'_>,
-    scratch: &mut [i16],
+    width: usize,
     projection: &Projection,
     mut found: impl FnMut(usize),
 ) {
-    let width = scratch.len();
     for start in (0..width).step_by(CHUNK) {
         let end = (start + CHUNK).min(width);
-        let chunk = row.columns(start..end);
-        if !projection.may_exceed(chunk) {
-            continue;
-        }
-        let Some(values) = scratch.get_mut(start..end) else {
-            continue;
-        };
-        projection.project(chunk, values);
-        for (block, values) in (start / BLOCK..).zip(values.chunks(BLOCK)) {
-            if values.iter().fold(i16::MIN, |most, value| most.max(*value)) > projection.threshold()
-            {
-                found(block);
-            }
+        // A chunk that is cut short costs more than one that was looked at in part before.
+        if projection.may_exceed(row.columns(end.saturating_sub(CHUNK)..end)) {
+            (start / BLOCK..end.div_ceil(BLOCK)).for_each(&mut found);
         }
     }
 }
 
-#[expect(
-    clippy::too_many_arguments,
-    reason = "a closure may not be inlined where it counts"
-)]
-#[inline(always)]
-fn filter<S: Simd>(
-    _: S,
-    source: Option<Row<'_>>,
-    row: &mut [i16],
-    spans: &[Range<usize>],
-    passes: &mut [LowPass],
+/// Where the pass over the frame is.
+#[derive(Clone, Copy)]
+struct Place<'a> {
+    /// The row that comes in, unless all of them have.
+    source: Option<Row<'a>>,
     step: usize,
     height: usize,
+}
+
+/// Projects a row where it matters, takes it through the low-passes, of which pass k is k rows
+/// behind, and holds what comes out against the threshold.
+#[inline(always)]
+fn filter<S: Simd>(
+    simd: S,
+    rows: &mut Rows,
+    spans: &[Range<usize>],
+    Place {
+        source,
+        step,
+        height,
+    }: Place<'_>,
     projection: &Projection,
 ) {
     for span in spans {
-        if let (Some(source), Some(values)) = (source, row.get_mut(span.clone())) {
+        let Some(values) = rows.projected.get_mut(span.clone()) else {
+            continue;
+        };
+        if let Some(source) = source {
             projection.project(source.columns(span.clone()), values);
         }
-        for (n, pass) in (0..=step).rev().zip(&mut *passes) {
-            pass.step(row, span.clone(), n, height);
+        for (n, pass) in (0..=step).rev().zip(&mut rows.passes) {
+            pass.step(values, span, n, height);
+        }
+        let words = rows.marker.iter_mut().skip(span.start / BLOCK);
+        for (word, values) in words.zip(values.chunks(BLOCK)) {
+            *word = above(simd, values, projection.threshold());
         }
     }
 }
 
-/// One row of a window, projected and low-passed where it may be marker.
-#[derive(Clone, Copy, Debug)]
-pub struct Runs<'a> {
-    row: &'a [i16],
-    spans: &'a [Range<usize>],
-    threshold: i16,
-    /// The frame's column that is the first of `row`.
-    origin: usize,
-    /// The window's first column and the first after it.
-    within: [usize; 2],
-}
-
-impl Runs<'_> {
-    /// Calls `found(start, end)` for each run of marker pixels; `end` is the first pixel after it.
-    pub fn each(self, mut found: impl FnMut(usize, usize)) {
-        let [left, right] = self.within;
-        for span in self.spans {
-            let start = (span.start + self.origin).max(left);
-            let end = (span.end + self.origin).min(right);
-            let values = self
-                .row
-                .get(start - self.origin..end.saturating_sub(self.origin));
-            each_run(
-                values.unwrap_or_default(),
-                |value| *value > self.threshold,
-                |from, to| found(start + from, start + to),
-            );
-        }
+/// Bit i is whether value i exceeds the threshold.
+#[inline(always)]
+fn above<S: Simd>(simd: S, values: &[i16], threshold: i16) -> u64 {
+    let level = S::i16s::splat(simd, threshold);
+    let lanes = S::i16s::LEN;
+    let vectors = values.chunks_exact(lanes);
+    let mut word = 0;
+    for (value, u) in vectors.remainder().iter().zip(values.len() / lanes * lanes..) {
+        word |= u64::from(*value > threshold) << u;
     }
-}
-
-/// Calls `found(start, end)` for each maximal run of items that are `inside`.
-pub fn each_run<T>(row: &[T], inside: impl Fn(&T) -> bool, mut found: impl FnMut(usize, usize)) {
-    let mut start = None;
-    for (index, stretch) in row.chunks(STRETCH).enumerate() {
-        // Counting a stretch costs far less than walking it, and most are all one.
-        let count: i16 = stretch.iter().map(|item| i16::from(inside(item))).sum();
-        if count == 0 && start.is_none()
-            || usize::try_from(count) == Ok(stretch.len()) && start.is_some()
-        {
-            continue;
-        }
-        for (u, item) in (index * STRETCH..).zip(stretch) {
-            match (start, inside(item)) {
-                (None, true) => start = Some(u),
-                (Some(begun), false) => {
-                    found(begun, u);
-                    start = None;
-                }
-                _ => {}
-            }
-        }
+    for (index, vector) in vectors.enumerate() {
+        let bits = S::i16s::from_slice(simd, vector).simd_gt(level).to_bitmask();
+        word |= bits << (index * lanes);
     }
-    if let Some(begun) = start {
-        found(begun, row.len());
-    }
+    word
 }
