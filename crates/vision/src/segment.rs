@@ -99,7 +99,11 @@ impl Segmenter {
             let Some(step) = n.checked_sub(reach) else {
                 continue;
             };
-            let Self { columns: seen, rows, .. } = self;
+            let Self {
+                columns: seen,
+                rows,
+                ..
+            } = self;
             seen.find_spans(step, |fresh| rows.forget(&fresh));
             if !seen.spans().is_empty() {
                 let place = Place {
@@ -116,7 +120,10 @@ impl Segmenter {
             };
             if (window.top..window.bottom).contains(&v) {
                 let within = [window.left, window.right];
-                visit(v, Runs::new(&rows.marker, seen.spans(), columns.start, within));
+                visit(
+                    v,
+                    Runs::new(&rows.marker, seen.spans(), columns.start, within),
+                );
             }
         }
     }
@@ -161,10 +168,15 @@ fn scan<S: Simd>(
     mut found: impl FnMut(usize),
 ) {
     for start in (0..width).step_by(CHUNK) {
-        let end = (start + CHUNK).min(width);
         // A chunk that is cut short costs more than one that was looked at in part before.
-        if projection.may_exceed(row.columns(end.saturating_sub(CHUNK)..end)) {
-            (start / BLOCK..end.div_ceil(BLOCK)).for_each(&mut found);
+        let chunk = if width < CHUNK {
+            row
+        } else {
+            let start = start.min(width - CHUNK);
+            row.columns(start..start + CHUNK)
+        };
+        if projection.may_exceed(chunk) {
+            (start / BLOCK..(start + CHUNK).min(width).div_ceil(BLOCK)).for_each(&mut found);
         }
     }
 }
@@ -216,11 +228,17 @@ fn above<S: Simd>(simd: S, values: &[i16], threshold: i16) -> u64 {
     let lanes = S::i16s::LEN;
     let vectors = values.chunks_exact(lanes);
     let mut word = 0;
-    for (value, u) in vectors.remainder().iter().zip(values.len() / lanes * lanes..) {
+    for (value, u) in vectors
+        .remainder()
+        .iter()
+        .zip(values.len() / lanes * lanes..)
+    {
         word |= u64::from(*value > threshold) << u;
     }
     for (index, vector) in vectors.enumerate() {
-        let bits = S::i16s::from_slice(simd, vector).simd_gt(level).to_bitmask();
+        let bits = S::i16s::from_slice(simd, vector)
+            .simd_gt(level)
+            .to_bitmask();
         word |= bits << (index * lanes);
     }
     word
