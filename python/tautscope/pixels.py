@@ -6,7 +6,7 @@
 | bgra | (h, w, 4) | per pixel; the last is not looked at |
 | yuyv, uyvy | (h, w, 2) | per two pixels Y U Y V, or U Y V Y |
 | nv12 | (3 h / 2, w) | h rows of Y, then for every two rows a line U V U V ... |
-| i420 | (3 h / 2, w) | h rows of Y, then the rows of U, then those of V, half as long, two to a line |
+| i420 | (3 h / 2, w) | h rows of Y, then those of U, then of V, half as long, two to a line |
 
 The shapes are those of OpenCV's `cvtColor` codes, so that a frame grabbed with
 ``CAP_PROP_CONVERT_RGB`` off goes in as it is. Y, U, V are ITU-R BT.601 with limited range.
@@ -54,8 +54,8 @@ class FrameLayout:
         """The image, if it can be read where it lies.
 
         Raises:
-            FrameError: It is not a uint8 array of this shape, or the bytes of a line do not lie side
-                by side from left to right, or the lines not from top to bottom.
+            FrameError: It is not a uint8 array of this shape, or the bytes of a line do not lie
+                side by side from left to right, or the lines not from top to bottom.
         """
         wanted = f"uint8 array {self.shape}, {self.pixel_format}"
         if (

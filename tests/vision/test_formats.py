@@ -41,8 +41,7 @@ def muted(pixel_format: str, seed: int) -> Image:
         low, high = 0, 256
     else:
         low, high = 108, 149
-    image = rng.integers(low, high, shape(pixel_format), dtype=np.uint8)
-    return image
+    return rng.integers(low, high, shape(pixel_format), dtype=np.uint8)
 
 
 @pytest.mark.parametrize("pixel_format", TO_BGR)

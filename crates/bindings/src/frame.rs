@@ -8,6 +8,8 @@ use tautscope_vision::{Frame, PixelFormat};
 
 /// An array seen as a frame: the pixels of a line are contiguous, the lines at an even distance.
 pub struct ArrayFrame<'a> {
+    /// All of the bytes, if no line is padded: the shorter way to one of them.
+    whole: Option<&'a [u8]>,
     lines: Lines<'a>,
     format: PixelFormat,
     width: usize,
@@ -30,6 +32,7 @@ impl<'a> ArrayFrame<'a> {
             PyValueError::new_err(allowed)
         };
         let view = image.as_array();
+        let whole = view.to_slice();
         let upwards = view.strides().first().is_some_and(|stride| *stride < 0);
         let lines = if format.shares_rows() {
             view.into_dimensionality::<Ix2>().map(Lines::Bytes)
@@ -47,6 +50,7 @@ impl<'a> ArrayFrame<'a> {
             count
         };
         let frame = Self {
+            whole,
             lines,
             format,
             width,
@@ -78,6 +82,12 @@ impl Frame for ArrayFrame<'_> {
     }
 
     fn line(&self, index: usize) -> &[u8] {
+        if let Some(bytes) = self.whole {
+            let length = self.format.line_bytes(self.width);
+            return bytes
+                .get(index * length..(index + 1) * length)
+                .unwrap_or_default();
+        }
         let line = match &self.lines {
             Lines::Bytes(view) => view.index_axis_move(Axis(0), index).to_slice(),
             Lines::Pixels(view) => view.index_axis_move(Axis(0), index).to_slice(),

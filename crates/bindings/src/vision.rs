@@ -35,6 +35,7 @@ pub struct MarkerDetector {
 #[pymethods]
 impl MarkerDetector {
     #[new]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
     #[pyo3(signature = (*, pixel_format, weights, threshold, smoothing, minimum_area, gate, entry_point))]
     fn new(
         py: Python<'_>,

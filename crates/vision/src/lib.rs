@@ -6,6 +6,9 @@
 //!
 //! Pixel coordinates are those of `OpenCV`: u to the right, v down, the centre of the first pixel is (0, 0).
 
+// Kernels are compiled once for each instruction set, which they are only if they are inlined.
+#![allow(clippy::inline_always)]
+
 mod columns;
 pub mod detector;
 pub mod discriminant;

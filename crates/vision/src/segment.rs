@@ -167,16 +167,17 @@ fn scan<S: Simd>(
     projection: &Projection,
     mut found: impl FnMut(usize),
 ) {
+    if width < CHUNK {
+        // So narrow a window is mostly marker: looking first would cost more than it spares.
+        (0..width.div_ceil(BLOCK)).for_each(found);
+        return;
+    }
     for start in (0..width).step_by(CHUNK) {
         // A chunk that is cut short costs more than one that was looked at in part before.
-        let chunk = if width < CHUNK {
-            row
-        } else {
-            let start = start.min(width - CHUNK);
-            row.columns(start..start + CHUNK)
-        };
-        if projection.may_exceed(chunk) {
-            (start / BLOCK..(start + CHUNK).min(width).div_ceil(BLOCK)).for_each(&mut found);
+        let tested = start.min(width - CHUNK);
+        if projection.may_exceed(row.columns(tested..tested + CHUNK)) {
+            let end = (start + CHUNK).min(width);
+            (start / BLOCK..end.div_ceil(BLOCK)).for_each(&mut found);
         }
     }
 }
