@@ -3,7 +3,8 @@
 One thread, all peers in turn in one process, so that a busy machine slows all of them. Each finds
 the centroids of the regions in a B, G, R frame; ViSP gets a grey image that already shows the
 blobs, and finds one. Every timed call follows an untimed one of the same kind: the frame is where
-a grabber that has just written it leaves it, in the cache as far as it fits. A plain read is the fastest of numpy's vectorised reductions over all bytes.
+a grabber that has just written it leaves it, in the cache as far as it fits. A plain read is the
+fastest of numpy's vectorised reductions over all bytes.
 """
 
 from __future__ import annotations
@@ -171,8 +172,9 @@ class Visp:
 
 
 def measured(calls: dict[str, Callable[[], object]], repeats: int) -> dict[str, list[float]]:
-    """Seconds per call, the calls in turn; each once untimed before, so that none pays for the
-    caches that the one before it has emptied.
+    """Seconds per call, the calls in turn.
+
+    Each is called once untimed before, so that none pays for the caches that another has emptied.
     """
     times: dict[str, list[float]] = {name: [] for name in calls}
     for _ in range(repeats):
