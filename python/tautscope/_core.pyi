@@ -174,6 +174,7 @@ class MarkerDetector:
     def __new__(
         cls,
         *,
+        pixel_format: str,
         weights: Sequence[float],
         threshold: float,
         smoothing: int,
@@ -184,6 +185,9 @@ class MarkerDetector:
     def detect(
         self, image: NDArray[np.uint8], predicted: Sequence[float] | NDArray[np.float64] | None
     ) -> tuple[NDArray[np.float64], str, NDArray[np.float64]]: ...
+    def regions_in(
+        self, image: NDArray[np.uint8], windows: Sequence[tuple[int, int, int, int]]
+    ) -> NDArray[np.float64]: ...
     def mask(self, image: NDArray[np.uint8]) -> NDArray[np.bool_]: ...
 
 def label_regions(mask: NDArray[np.bool_]) -> NDArray[np.float64]: ...

@@ -12,7 +12,7 @@ import re
 import tomllib
 from os import PathLike
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import msgspec
 import tomli_w
@@ -25,6 +25,7 @@ Positive = Annotated[float, Meta(gt=0)]
 NonNegative = Annotated[float, Meta(ge=0)]
 Fraction = Annotated[float, Meta(gt=0, lt=1)]
 Gain = Annotated[float, Meta(ge=1)]
+PixelFormat = Literal["bgr", "rgb", "bgra", "yuyv", "uyvy", "nv12", "i420"]
 Vector3 = tuple[float, float, float]
 Vector8 = tuple[float, float, float, float, float, float, float, float]
 
@@ -104,6 +105,9 @@ class CameraConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """[px], PAL DV [paper]."""
     height: Annotated[int, Meta(ge=1, le=8192)] = 576
     """[px], PAL DV [paper]."""
+    pixel_format: PixelFormat = "bgr"
+    """Layout of the 8-bit pixels; the YUV formats in BT.601 with limited range, the width even, in
+    nv12 and i420 the height too."""
     fx: Positive = 424.0
     """Focal length along x [px] [public colonoscope calibration]."""
     fy: Positive = 454.0

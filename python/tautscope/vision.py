@@ -5,6 +5,7 @@ Pixel coordinates are OpenCV's: u to the right, v down, the centre of the first 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from tautscope import _core
 from tautscope.config import CameraConfig, Config
-from tautscope.errors import FieldError, FrameError
+from tautscope.errors import FieldError
+from tautscope.pixels import FrameLayout
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,8 +83,9 @@ class MarkerDetector:
 
     def __init__(self, config: Config) -> None:
         vision = config.vision
-        self._shape = (config.camera.height, config.camera.width, 3)
+        self._layout = FrameLayout(config.camera)
         self._core = _core.MarkerDetector(
+            pixel_format=config.camera.pixel_format,
             weights=vision.weights,
             threshold=vision.threshold,
             smoothing=vision.smoothing,
@@ -97,7 +100,8 @@ class MarkerDetector:
         """Find the markers in one image.
 
         Args:
-            image: uint8 (height, width, 3), B, G, R; a cropped view of a larger array is read in
+            image: uint8, as ``camera.pixel_format`` says: (height, width, 3) B, G, R by default;
+                `tautscope.pixels` has the shapes. A cropped view of a larger array is read in
                 place.
             predicted_features: (4,) [px] where the bands should be, u_A, v_A, u_B, v_B. Features
                 that are not finite (the model looks behind the camera, say) are no prediction.
@@ -111,9 +115,31 @@ class MarkerDetector:
             FieldError: The prediction is not four numbers.
         """
         features, reason, regions = self._core.detect(
-            self._checked(image), _checked_prediction(predicted_features)
+            self._layout.checked(image), _checked_prediction(predicted_features)
         )
         return Detection(features, reason, tuple(_region(row) for row in regions.tolist()))
+
+    def regions_in(
+        self, image: NDArray[np.uint8], windows: Sequence[tuple[int, int, int, int]]
+    ) -> tuple[Region, ...]:
+        """The regions in parts of an image, the rest of which is not read.
+
+        A pixel is marker here exactly if it is in the whole image; a region ends where its window
+        does.
+
+        Args:
+            image: As `detect`.
+            windows: Left, top, and first column and row after the window [px]; what of it lies
+                outside the image is left out.
+
+        Returns:
+            The regions of all windows, the largest first, at most 16.
+
+        Raises:
+            FrameError: As `detect`.
+        """
+        regions = self._core.regions_in(self._layout.checked(image), windows)
+        return tuple(_region(row) for row in regions.tolist())
 
     def mask(self, image: NDArray[np.uint8]) -> NDArray[np.bool_]:
         """What is above the threshold after the low-pass, for figures: bool (height, width).
@@ -121,17 +147,7 @@ class MarkerDetector:
         Raises:
             FrameError: As `detect`.
         """
-        return self._core.mask(self._checked(image))
-
-    def _checked(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        if (
-            not isinstance(image, np.ndarray)
-            or image.dtype != np.uint8
-            or image.shape != self._shape
-        ):
-            raise FrameError("image", _described(image), f"uint8 array {self._shape}, B, G, R")
-        # Pixels must be contiguous in a row; the rows may lie anywhere.
-        return image if image.strides[1:] == (3, 1) else np.ascontiguousarray(image)
+        return self._core.mask(self._layout.checked(image))
 
 
 def entry_point(camera: CameraConfig) -> tuple[float, float]:
@@ -166,9 +182,3 @@ def _checked_prediction(predicted: ArrayLike | None) -> NDArray[np.float64] | No
 def _region(row: list[float]) -> Region:
     area, u, v, left, top, width, height = row
     return Region((u, v), int(area), (int(left), int(top), int(width), int(height)))
-
-
-def _described(image: object) -> str:
-    if isinstance(image, np.ndarray):
-        return f"{image.dtype} array {image.shape}"
-    return type(image).__name__

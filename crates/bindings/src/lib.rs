@@ -9,6 +9,7 @@ mod compensator;
 mod errors;
 mod estimator;
 mod features;
+mod frame;
 mod instrument;
 mod play;
 mod reduction;

@@ -11,19 +11,23 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use numpy::ndarray::{Array2, ArrayView3, Axis};
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2, PyReadonlyArray3};
+use numpy::ndarray::Array2;
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2, PyReadonlyArrayDyn};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use tautscope_vision::frame::MAX_SIDE;
-use tautscope_vision::segment::each_run;
+use tautscope_vision::runs::each_run;
 use tautscope_vision::{
-    ColorDiscriminant, Detector, Error, Frame, Labeller, Region, Segmenter, Settings,
+    ColorDiscriminant, Detector, Error, Frame, Labeller, PixelFormat, Region, Segmenter, Settings,
+    Window,
 };
+
+use crate::frame::ArrayFrame;
 
 /// The markers in frames; `tautscope.vision.MarkerDetector` is its public face.
 #[pyclass(frozen, module = "tautscope._core")]
 pub struct MarkerDetector {
+    format: PixelFormat,
     segmenter: Segmenter,
     detector: Mutex<Detector>,
 }
@@ -31,9 +35,11 @@ pub struct MarkerDetector {
 #[pymethods]
 impl MarkerDetector {
     #[new]
-    #[pyo3(signature = (*, weights, threshold, smoothing, minimum_area, gate, entry_point))]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
+    #[pyo3(signature = (*, pixel_format, weights, threshold, smoothing, minimum_area, gate, entry_point))]
     fn new(
         py: Python<'_>,
+        pixel_format: &str,
         weights: [f64; 3],
         threshold: f64,
         smoothing: usize,
@@ -50,6 +56,7 @@ impl MarkerDetector {
             entry_point,
         });
         Ok(Self {
+            format: PixelFormat::named(pixel_format).map_err(refused(py))?,
             segmenter: Segmenter::new(discriminant, smoothing),
             detector: Mutex::new(detector.map_err(refused(py))?),
         })
@@ -59,10 +66,10 @@ impl MarkerDetector {
     fn detect<'py>(
         &self,
         py: Python<'py>,
-        image: PyReadonlyArray3<'py, u8>,
+        image: PyReadonlyArrayDyn<'py, u8>,
         predicted: Option<[f64; 4]>,
     ) -> PyResult<Measured<'py>> {
-        let frame = ArrayFrame::new(image.as_array())?;
+        let frame = ArrayFrame::new(&image, self.format)?;
         let (features, regions) = py.detach(|| {
             let mut detector = self.detector.lock().unwrap_or_else(PoisonError::into_inner);
             let detection = detector.detect(&frame, predicted);
@@ -75,13 +82,29 @@ impl MarkerDetector {
         Ok((features, reason, regions.into_pyarray(py)))
     }
 
+    /// The regions in windows (left, top, right, bottom): (n, 7).
+    fn regions_in<'py>(
+        &self,
+        py: Python<'py>,
+        image: PyReadonlyArrayDyn<'py, u8>,
+        windows: Vec<[usize; 4]>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let frame = ArrayFrame::new(&image, self.format)?;
+        let windows: Vec<Window> = windows.into_iter().map(window).collect();
+        let regions = py.detach(|| {
+            let mut detector = self.detector.lock().unwrap_or_else(PoisonError::into_inner);
+            rows(detector.regions_in(&frame, &windows).iter().copied())
+        });
+        Ok(regions.into_pyarray(py))
+    }
+
     /// What passes the threshold after the low-pass, (h, w).
     fn mask<'py>(
         &self,
         py: Python<'py>,
-        image: PyReadonlyArray3<'py, u8>,
+        image: PyReadonlyArrayDyn<'py, u8>,
     ) -> PyResult<Bound<'py, PyArray2<bool>>> {
-        let frame = ArrayFrame::new(image.as_array())?;
+        let frame = ArrayFrame::new(&image, self.format)?;
         let mut mask = Array2::from_elem((frame.height(), frame.width()), false);
         py.detach(|| {
             self.segmenter.clone().each_row(&frame, |v, runs| {
@@ -95,6 +118,15 @@ impl MarkerDetector {
             });
         });
         Ok(mask.into_pyarray(py))
+    }
+}
+
+fn window([left, top, right, bottom]: [usize; 4]) -> Window {
+    Window {
+        left,
+        top,
+        right,
+        bottom,
     }
 }
 
@@ -128,40 +160,6 @@ pub fn label_regions<'py>(
         rows(regions.into_iter())
     });
     Ok(regions.into_pyarray(py))
-}
-
-/// An array seen as a frame: the pixels of a row are contiguous, the rows may lie anywhere.
-struct ArrayFrame<'a>(ArrayView3<'a, u8>);
-
-impl<'a> ArrayFrame<'a> {
-    fn new(image: ArrayView3<'a, u8>) -> PyResult<Self> {
-        let (height, width, channels) = image.dim();
-        let sides = 1..=MAX_SIDE;
-        let frame = Self(image);
-        if !(sides.contains(&height) && sides.contains(&width) && channels == 3)
-            || frame.row(0).len() != 3 * width
-        {
-            return Err(PyValueError::new_err(
-                "image: expected (height, width, 3), sides 1 to 65536, pixels contiguous in a row",
-            ));
-        }
-        Ok(frame)
-    }
-}
-
-impl Frame for ArrayFrame<'_> {
-    fn width(&self) -> usize {
-        self.0.dim().1
-    }
-
-    fn height(&self) -> usize {
-        self.0.dim().0
-    }
-
-    fn row(&self, v: usize) -> &[u8] {
-        let row = self.0.index_axis_move(Axis(0), v);
-        row.to_slice().unwrap_or_default()
-    }
 }
 
 /// One row per region: area, centroid u, v, then left, top, width, height of its box [px].

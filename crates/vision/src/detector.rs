@@ -1,7 +1,7 @@
 //! Frame to markers: Fig. 5 as a whole.
 
 use crate::markers::{near_prediction, two_largest};
-use crate::{ColorDiscriminant, Error, Frame, Labeller, Region, Rejection, Segmenter};
+use crate::{ColorDiscriminant, Error, Frame, Labeller, Region, Rejection, Segmenter, Window};
 
 /// Only so many regions, the largest, are considered: it bounds the time on a noisy frame.
 pub const CANDIDATES: usize = 16;
@@ -81,7 +81,7 @@ impl Detector {
     ///
     /// Allocates only when a frame is larger than those before.
     pub fn detect(&mut self, frame: &impl Frame, predicted: Option<[f64; 4]>) -> Detection<'_> {
-        self.find_regions(frame);
+        self.regions_in(frame, &[Window::whole(frame)]);
         let regions = self.regions.as_slice();
         let predicted = predicted.filter(|values| values.iter().all(|value| value.is_finite()));
         let features = match predicted {
@@ -91,7 +91,11 @@ impl Detector {
         Detection { features, regions }
     }
 
-    fn find_regions(&mut self, frame: &impl Frame) {
+    /// The regions in some windows, the largest first, at most [`CANDIDATES`]; each ends where its
+    /// window does.
+    ///
+    /// Allocates only when a frame is larger than those before.
+    pub fn regions_in(&mut self, frame: &impl Frame, windows: &[Window]) -> &[Region] {
         let Self {
             segmenter,
             labeller,
@@ -106,11 +110,14 @@ impl Detector {
                 regions.insert(place, region);
             }
         };
-        labeller.start(frame.width());
-        segmenter.each_row(frame, |v, runs| {
-            runs.each(|start, end| labeller.add(v, start, end));
+        for window in windows {
+            labeller.start(frame.width());
+            segmenter.each_row_in(frame, *window, |v, runs| {
+                runs.each(|start, end| labeller.add(v, start, end));
+                labeller.end_row(&mut keep);
+            });
             labeller.end_row(&mut keep);
-        });
-        labeller.end_row(&mut keep);
+        }
+        regions
     }
 }

@@ -1,24 +1,32 @@
 //! Image to markers: Eq. (12) and Fig. 5 of Reilink et al. 2013.
 //!
 //! One pass over the frame. Each row is projected onto the colour discriminant ([`discriminant`]),
-//! low-passed ([`lowpass`]) and thresholded into runs ([`segment`]); the runs join into regions
+//! low-passed and thresholded into runs ([`segment`]); the runs join into regions
 //! ([`regions`]); two regions are the markers A and B ([`markers`]). [`detector`] holds it together.
 //!
 //! Pixel coordinates are those of `OpenCV`: u to the right, v down, the centre of the first pixel is (0, 0).
 
+// Kernels are compiled once for each instruction set, which they are only if they are inlined.
+#![allow(clippy::inline_always)]
+
+mod columns;
 pub mod detector;
 pub mod discriminant;
 pub mod error;
+pub mod format;
 pub mod frame;
-pub mod lowpass;
+mod lowpass;
 pub mod markers;
+mod projection;
 pub mod regions;
+pub mod runs;
 pub mod segment;
 
 pub use detector::{Detection, Detector, Settings};
 pub use discriminant::ColorDiscriminant;
 pub use error::Error;
-pub use frame::{BgrFrame, Frame};
+pub use format::PixelFormat;
+pub use frame::{Frame, Image, Window};
 pub use markers::Rejection;
 pub use regions::{Labeller, Region};
 pub use segment::Segmenter;

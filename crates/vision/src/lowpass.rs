@@ -1,5 +1,7 @@
 //! The low-pass of Fig. 5, on a stream of rows.
 
+use std::ops::Range;
+
 /// One pass of the separable 3x3 binomial filter, `[1 2 1] / 4` along rows and along columns, the
 /// image's edges replicated.
 ///
@@ -13,35 +15,65 @@ pub(crate) struct LowPass {
     below: Vec<i16>,
 }
 
+/// Below every projected value, and still four of it fit an `i16`.
+const NEVER: i16 = -8191;
+
 impl LowPass {
     /// Makes room for rows of this width; allocates only when they grow.
     pub(crate) fn prepare(&mut self, width: usize) {
         for row in [&mut self.above, &mut self.here, &mut self.below] {
-            row.resize(width, 0);
+            row.resize(width, NEVER);
         }
     }
 
-    /// Takes row `n` of an image of `height` rows and leaves the filtered row `n - 1` in its place.
+    /// Forgets the rows so far in these columns: as if they had been far below any threshold.
+    #[inline(always)]
+    pub(crate) fn forget(&mut self, columns: &Range<usize>) {
+        for row in [&mut self.above, &mut self.here] {
+            cut(row, columns).fill(NEVER);
+        }
+    }
+
+    /// Takes these columns of row `n` of an image of `height` rows and leaves those of the filtered
+    /// row `n - 1` in their place, the columns' ends treated as the image's edges.
     ///
-    /// To be called for `n` = 0, 1, ..., `height`. The first call leaves nothing of use, and the
-    /// last, which asks for the bottom row, does not read `row`. Nor do calls beyond that, which
-    /// leave nothing of use.
-    pub(crate) fn step(&mut self, row: &mut [i16], n: usize, height: usize) {
+    /// To be called for `n` = 0, 1, ..., `height`, each followed by [`advance`](Self::advance). The first
+    /// call leaves nothing of use, and the last, which asks for the bottom row, does not read `row`.
+    /// Nor do calls beyond that, which leave nothing of use.
+    #[inline(always)]
+    pub(crate) fn step(
+        &mut self,
+        row: &mut [i16],
+        columns: &Range<usize>,
+        n: usize,
+        height: usize,
+    ) {
+        let [above, here, below] =
+            [&mut self.above, &mut self.here, &mut self.below].map(|row| cut(row, columns));
         if n < height {
-            along(row, &mut self.below);
+            along(row, below);
         } else {
-            self.below.copy_from_slice(&self.here);
+            below.copy_from_slice(here);
         }
         if n == 0 {
-            self.here.copy_from_slice(&self.below);
+            here.copy_from_slice(below);
         }
-        combine(&self.above, &self.here, &self.below, row);
+        combine(above, here, below, row);
+    }
+
+    /// Row `n` becomes row `n - 1`.
+    pub(crate) fn advance(&mut self) {
         std::mem::swap(&mut self.above, &mut self.here);
         std::mem::swap(&mut self.here, &mut self.below);
     }
 }
 
+fn cut<'a>(row: &'a mut [i16], columns: &Range<usize>) -> &'a mut [i16] {
+    row.get_mut(columns.clone()).unwrap_or_default()
+}
+
 /// Filters along a row.
+#[inline(always)]
 fn along(row: &[i16], filtered: &mut [i16]) {
     let Some(last) = row.len().checked_sub(1) else {
         return;
@@ -56,6 +88,7 @@ fn along(row: &[i16], filtered: &mut [i16]) {
 }
 
 /// Filters across three rows.
+#[inline(always)]
 fn combine(above: &[i16], here: &[i16], below: &[i16], filtered: &mut [i16]) {
     for (((a, b), c), mean_of_three) in above.iter().zip(here).zip(below).zip(filtered) {
         *mean_of_three = mean(*a, *b, *c);
@@ -63,6 +96,9 @@ fn combine(above: &[i16], here: &[i16], below: &[i16], filtered: &mut [i16]) {
 }
 
 /// `(a + 2 b + c) / 4` to the nearest; the values are within +-8191, so no sum leaves an `i16`.
+///
+/// Never more than the largest of the three, nor less than the least.
+#[inline(always)]
 fn mean(a: i16, b: i16, c: i16) -> i16 {
     (a + 2 * b + c + 2) >> 2
 }
@@ -84,7 +120,8 @@ mod tests {
             pass.prepare(width);
             for n in 0..=height {
                 let mut row = rows.get(n).map_or_else(|| vec![0; width], |row| row.to_vec());
-                pass.step(&mut row, n, height);
+                pass.step(&mut row, &(0..width), n, height);
+                pass.advance();
                 let Some(v) = n.checked_sub(1) else { continue };
                 for (u, filtered) in row.iter().enumerate() {
                     let mut exact = 0;

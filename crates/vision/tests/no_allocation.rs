@@ -1,7 +1,7 @@
 //! After the first frame of a size, no frame of that size allocates.
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
-use tautscope_vision::{BgrFrame, ColorDiscriminant, Detector, Settings};
+use tautscope_vision::{ColorDiscriminant, Detector, Image, PixelFormat, Settings};
 
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;
@@ -45,7 +45,7 @@ fn after_the_first_frame_nothing_is_allocated() {
         .unwrap();
         let mut found = 0;
         for (index, data) in frames.iter().enumerate() {
-            let frame = BgrFrame::new(data, WIDTH, HEIGHT, 3 * WIDTH).unwrap();
+            let frame = Image::new(data, PixelFormat::Bgr, [WIDTH, HEIGHT], 3 * WIDTH).unwrap();
             let mut detect = |predicted| detector.detect(&frame, predicted).features.is_ok();
             if index == 0 {
                 detect(None);

@@ -1,0 +1,341 @@
+"""How fast the markers are found, against OpenCV, scikit-image, ViSP and a plain read of the frame.
+
+One thread, all peers in turn in one process, so that a busy machine slows all of them. Each finds
+the centroids of the regions in a B, G, R frame; ViSP gets a grey image that already shows the
+blobs, and finds one. Every timed call follows an untimed one of the same kind: the frame is where
+a grabber that has just written it leaves it, in the cache as far as it fits. A plain read is the
+fastest of numpy's vectorised reductions over all bytes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import statistics
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+os.environ["OMP_NUM_THREADS"] = "1"
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from tautscope import Twin, load_config
+from tautscope.config import Config
+from tautscope.vision import MarkerDetector, Region
+
+try:
+    from skimage import filters, measure
+except ImportError:
+    measure = filters = None
+
+Image = NDArray[np.uint8]
+SIZES = ((720, 576), (1920, 1080), (3840, 2160))
+MARGIN = 20  # px at 1920x1080: how far a window reaches beyond its band
+MINIMUM_AREA = 40
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def twins_picture() -> Image:
+    """The instrument before procedural mucosa, near the camera."""
+    twin = Twin(load_config())
+    image, sample = None, twin.reset()
+    while sample.time < 2.0:
+        sample = twin.step(np.array([0.012, 0.0, 0.5]))
+        image = image if sample.frame is None else sample.frame.image
+    assert image is not None
+    return image
+
+
+def colon_picture(drawn: Image) -> Image | None:
+    """The same instrument before a real frame, if the shared data are there."""
+    folder = Path(os.environ.get("TAUTSCOPE_DATA", ROOT.parent / "shared" / "data"))
+    files = sorted((folder / "colon_frames").glob("*.jpg"))
+    if not files:
+        return None
+    real = cv2.resize(cv2.imread(str(files[1])), (drawn.shape[1], drawn.shape[0]))
+    green = drawn.astype(int) @ np.array([-1, 2, -1]) > 0
+    band = cv2.dilate(green.astype(np.uint8), np.ones((5, 5))) > 0
+    real[band] = drawn[band]
+    return real
+
+
+def detector_for(size: tuple[int, int], **changes: object) -> MarkerDetector:
+    camera = {"camera.width": size[0], "camera.height": size[1]}
+    return MarkerDetector(Config().replace(**camera, **changes))
+
+
+def windows_of(regions: tuple[Region, ...], width: int) -> list[tuple[int, int, int, int]]:
+    margin = MARGIN * width // 1920
+    boxes = [region.box for region in regions[:2]]
+    return [
+        (max(u - margin, 0), max(v - margin, 0), u + w + margin, v + h + margin)
+        for u, v, w, h in boxes
+    ]
+
+
+def opencv_textbook(image: Image, config: Config) -> int:
+    blurred = cv2.GaussianBlur(image, (3, 3), 0)
+    projected = cv2.transform(blurred, np.array([config.vision.weights]))
+    _, mask = cv2.threshold(projected, config.vision.threshold, 255, cv2.THRESH_BINARY)
+    count, _, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
+    return int((stats[1:count, cv2.CC_STAT_AREA] >= MINIMUM_AREA).sum())
+
+
+def _projected(image: Image, config: Config) -> Image:
+    projected = cv2.transform(image, np.array([config.vision.weights], np.float32))
+    return cv2.GaussianBlur(projected, (3, 3), 0)
+
+
+def _by_contours(mask: Image) -> int:
+    contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    return sum(cv2.moments(contour)["m00"] >= MINIMUM_AREA for contour in contours)
+
+
+def _by_components(mask: Image) -> int:
+    count, _, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
+    return int((stats[1:count, cv2.CC_STAT_AREA] >= MINIMUM_AREA).sum())
+
+
+def _thresholded(image: Image, config: Config) -> Image:
+    return cv2.threshold(
+        _projected(image, config), config.vision.threshold, 255, cv2.THRESH_BINARY
+    )[1]
+
+
+def opencv_contours(image: Image, config: Config) -> int:
+    return _by_contours(_thresholded(image, config))
+
+
+def opencv_components(image: Image, config: Config) -> int:
+    return _by_components(_thresholded(image, config))
+
+
+def opencv_planes(image: Image, config: Config) -> int:
+    """Channels apart, weighted in saturating 8-bit arithmetic."""
+    blue, green, red = cv2.split(image)
+    weights = config.vision.weights
+    other = cv2.addWeighted(blue, -weights[0], red, -weights[2], 0)
+    projected = cv2.blur(cv2.subtract(green, other), (3, 3))
+    mask = cv2.threshold(projected, config.vision.threshold, 255, cv2.THRESH_BINARY)[1]
+    return _by_contours(mask)
+
+
+def scikit_image(image: Image, config: Config) -> int:
+    projected = image @ np.array(config.vision.weights, np.float32)
+    mask = filters.gaussian(projected, 0.7, preserve_range=True) > config.vision.threshold
+    table = measure.regionprops_table(measure.label(mask), properties=("area", "centroid"))
+    return int((table["area"] >= MINIMUM_AREA).sum())
+
+
+class Visp:
+    """A program that tracks one blob with vpDot2, compiled when the headers are there."""
+
+    def __init__(self, folder: Path) -> None:
+        self.program = folder / "visp_dot"
+        self.missing = ""
+        flags = ["-I/usr/include/eigen3", "-lvisp_blob", "-lvisp_core"]
+        source = Path(__file__).with_name("visp_dot.cpp")
+        if shutil.which("c++") is None:
+            self.missing = "no C++ compiler"
+        elif not [*Path("/usr/include").glob("**/visp3/blob/vpDot2.h")]:
+            self.missing = "ViSP is not installed (Debian: libvisp-dev)"
+        else:
+            command = ["c++", "-O2", "-o", str(self.program), str(source), *flags]
+            built = subprocess.run(command, capture_output=True, text=True, check=False)
+            if built.returncode:
+                self.missing = "visp_dot.cpp does not compile: " + built.stderr.strip()[:200]
+
+    def microseconds(self, image: Image, regions: tuple[Region, ...], repeats: int) -> float | None:
+        """Per track of the first region, or None."""
+        if self.missing or not regions:
+            return None
+        height, width = image.shape[:2]
+        u, v, box_width, box_height = regions[0].box
+        grey = np.zeros((height, width), np.uint8)
+        centre = (u + box_width // 2, v + box_height // 2)
+        cv2.ellipse(grey, centre, (box_width // 2, box_height // 2), 0, 0, 360, 255, cv2.FILLED)
+        file = self.program.with_name("grey.raw")
+        grey.tofile(file)
+        numbers = [width, height, *centre, repeats]
+        command = [str(self.program), str(file), *map(str, numbers)]
+        run = subprocess.run(command, capture_output=True, text=True, check=False)
+        if run.returncode:
+            self.missing = "vpDot2 fails: " + run.stderr.strip()[:200]
+            return None
+        return float(run.stdout.split()[0])
+
+
+def measured(calls: dict[str, Callable[[], object]], repeats: int) -> dict[str, list[float]]:
+    """Seconds per call, the calls in turn.
+
+    Each is called once untimed before, so that none pays for the caches that another has emptied.
+    """
+    times: dict[str, list[float]] = {name: [] for name in calls}
+    for _ in range(repeats):
+        for name, call in calls.items():
+            call()
+            start = time.perf_counter()
+            call()
+            times[name].append(time.perf_counter() - start)
+    return times
+
+
+def compared(image: Image, repeats: int, visp: Visp) -> dict[str, float]:
+    """Median milliseconds (windows and ViSP: microseconds) of each way to find the markers."""
+    size = (image.shape[1], image.shape[0])
+    config, detector = Config(), detector_for(size)
+    regions = detector.detect(image).regions
+    windows = windows_of(regions, size[0])
+    flat = image.reshape(-1)
+    words = flat.view(np.uint64)
+    calls: dict[str, Callable[[], object]] = {
+        "full_ms": lambda: detector.detect(image),
+        "windows_us": lambda: detector.regions_in(image, windows),
+        "read max": flat.max,
+        "read sum": words.sum,
+        "read xor": lambda: np.bitwise_xor.reduce(words),
+        "opencv_textbook_ms": lambda: opencv_textbook(image, config),
+        "contours": lambda: opencv_contours(image, config),
+        "components": lambda: opencv_components(image, config),
+        "planes": lambda: opencv_planes(image, config),
+    }
+    if measure is not None:
+        calls["scikit_image_ms"] = lambda: scikit_image(image, config)
+    times = measured(calls, repeats)
+    middle = {name: 1e3 * statistics.median(values) for name, values in times.items()}
+    best = min(("contours", "components", "planes"), key=middle.__getitem__)
+    read = min(("read max", "read sum", "read xor"), key=middle.__getitem__)
+    figures = {
+        "full_ms": middle["full_ms"],
+        "full_min_ms": 1e3 * min(times["full_ms"]),
+        "read_ms": middle[read],
+        "read_min_ms": 1e3 * min(times[read]),
+        "opencv_textbook_ms": middle["opencv_textbook_ms"],
+        "opencv_best_ms": middle[best],
+        "windows_us": 1e3 * middle["windows_us"],
+        "windows_min_us": 1e6 * min(times["windows_us"]),
+        "window_px": sum((r - lft) * (b - t) for lft, t, r, b in windows),
+    }
+    if measure is not None:
+        figures["scikit_image_ms"] = middle["scikit_image_ms"]
+    one_blob = visp.microseconds(image, regions, repeats)
+    if one_blob is not None:
+        figures["visp_one_blob_us"] = one_blob
+    return figures
+
+
+def worst_frames(repeats: int) -> dict[str, float]:
+    """Milliseconds at 1920x1080 of frames that hold nothing that can be skipped."""
+    rng = np.random.default_rng(0)
+    height, width = 1080, 1920
+    checks = (np.indices((height, width)).sum(axis=0) % 2).astype(np.uint8)
+    frames = {
+        "noise": rng.integers(0, 256, (height, width, 3), dtype=np.uint8),
+        "all marker": np.full((height, width, 3), (70, 190, 60), np.uint8),
+        "checkerboard": checks[..., None] * np.array([0, 255, 0], np.uint8),
+        "black": np.zeros((height, width, 3), np.uint8),
+    }
+    worst = {}
+    for smoothing in (0, 1):
+        detector = detector_for((width, height), **{"vision.smoothing": smoothing})
+        calls = {
+            f"{name}, {smoothing} passes": lambda d=detector, f=frame: d.detect(f)
+            for name, frame in frames.items()
+        }
+        times = measured(calls, max(5, repeats // 5))
+        worst |= {name: 1e3 * statistics.median(values) for name, values in times.items()}
+    return worst
+
+
+def rows_of(name: str, figures: dict[str, float], repeats: int) -> list[dict[str, object]]:
+    """The goals, at 1920x1080."""
+    full = figures["full_ms"]
+    goals = (
+        ("full frame in plain reads", "reads", full / figures["read_ms"], 3.0, "max"),
+        ("fastest OpenCV over ours", "x", figures["opencv_best_ms"] / full, 10.0, "min"),
+        ("textbook OpenCV over ours", "x", figures["opencv_textbook_ms"] / full, 40.0, "min"),
+        ("both windows", "us", figures["windows_us"], 20.0, "max"),
+    )
+    return [
+        {
+            "what": what,
+            "dof": None,
+            "profile": name,
+            "unit": unit,
+            "median": value,
+            "worst": value,
+            "n": repeats,
+            "goal": goal,
+            "sense": sense,
+            "holds": bool(value <= goal if sense == "max" else value >= goal),
+        }
+        for what, unit, value, goal, sense in goals
+    ]
+
+
+def printed(figures: dict[str, dict[str, float]]) -> None:
+    names = list(dict.fromkeys(name for column in figures.values() for name in column))
+    print(f"{'':22}" + "".join(f"{size:>20}" for size in figures))
+    for name in names:
+        values = (column.get(name) for column in figures.values())
+        print(f"{name:22}" + "".join(f"{'' if v is None else f'{v:.3f}':>20}" for v in values))
+    for name, over in (
+        ("full / read", "read_ms"),
+        ("best OpenCV / full", "opencv_best_ms"),
+        ("textbook / full", "opencv_textbook_ms"),
+    ):
+        ratios = (column["full_ms"] / column[over] for column in figures.values())
+        values = (ratio if over == "read_ms" else 1 / ratio for ratio in ratios)
+        print(f"{name:22}" + "".join(f"{value:>20.1f}" for value in values))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--repeats", type=int, default=60)
+    parser.add_argument("--json", action="store_true")
+    arguments = parser.parse_args()
+    cv2.setNumThreads(1)
+    drawn = twins_picture()
+    colon = colon_picture(drawn)
+    figures: dict[str, dict[str, float]] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        visp = Visp(Path(folder))
+        for size in SIZES:
+            name = f"{size[0]}x{size[1]}"
+            figures[name] = compared(cv2.resize(drawn, size), arguments.repeats, visp)
+            if colon is not None:
+                scaled = cv2.resize(colon, size)
+                figures[f"{name} colon"] = compared(scaled, arguments.repeats, visp)
+    worst = worst_frames(arguments.repeats)
+    rows = [
+        row
+        for name in figures
+        if name.startswith("1920x1080")
+        for row in rows_of(name, figures[name], arguments.repeats)
+    ]
+    left_out = {"ViSP": visp.missing, "scikit-image": "" if measure else "not installed"}
+    left_out = {name: why for name, why in left_out.items() if why}
+    if arguments.json:
+        print(json.dumps({**figures, "worst_ms": worst, "left_out": left_out, "rows": rows}))
+        return
+    printed(figures)
+    for name, milliseconds in worst.items():
+        print(f"{name:26} {milliseconds:8.2f} ms at 1920x1080")
+    for name, why in left_out.items():
+        print(f"left out: {name}: {why}")
+    for row in rows:
+        verdict = "holds" if row["holds"] else "MISSED"
+        print(
+            f"{row['what']:28} {row['profile']:18} {row['median']:7.2f} {row['unit']:6} "
+            f"(goal {row['goal']:.0f}: {verdict})"
+        )
+
+
+if __name__ == "__main__":
+    main()

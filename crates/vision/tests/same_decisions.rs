@@ -1,0 +1,82 @@
+//! What is skipped, vectorised and windowed decides as the definitions do, in every format.
+
+mod support;
+
+use proptest::prelude::*;
+use support::{Memory, memory, weights};
+use tautscope_vision::{ColorDiscriminant, Segmenter, Window};
+
+/// By row of the window: its runs.
+fn segmented(
+    segmenter: &mut Segmenter,
+    memory: &Memory,
+    window: Window,
+) -> Vec<(usize, Vec<usize>)> {
+    let mut rows = Vec::new();
+    segmenter.each_row_in(&memory.frame(), window, |v, runs| {
+        let mut inside = Vec::new();
+        runs.each(|start, end| inside.extend(start..end));
+        rows.push((v, inside));
+    });
+    rows
+}
+
+fn expected(mask: &[Vec<bool>], window: Window) -> Vec<(usize, Vec<usize>)> {
+    let rows = window.top..window.bottom.min(mask.len());
+    if window.left >= window.right.min(mask[0].len()) {
+        return Vec::new();
+    }
+    rows.map(|v| {
+        let columns = window.left..window.right.min(mask[v].len());
+        (v, columns.filter(|u| mask[v][*u]).collect())
+    })
+    .collect()
+}
+
+fn window() -> impl Strategy<Value = Window> {
+    let side = || (0..420_usize, 0..420_usize);
+    (side(), prop_oneof![(0..60_usize, 0..60_usize), side()]).prop_map(
+        |((left, right), (top, bottom))| Window {
+            left: left.min(right),
+            top: top.min(bottom),
+            right: left.max(right),
+            bottom: top.max(bottom),
+        },
+    )
+}
+
+/// Thresholds at and around values that occur, so that ties and near misses do.
+fn threshold(memory: &Memory, weights: [f64; 3], pick: usize, shift: f64) -> f64 {
+    let (weights, constant) = memory.weights(weights);
+    let (u, v) = (pick % memory.width, pick / memory.width % memory.height);
+    let terms = weights.iter().zip(memory.pixel(u, v));
+    terms.map(|(w, x)| w * f64::from(x)).sum::<f64>() + constant + shift
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+
+    #[test]
+    fn as_the_definitions(
+        memories in prop::collection::vec(memory([400, 50]), 1..3),
+        weights in weights(),
+        pick in any::<usize>(),
+        shift in prop_oneof![Just(0.0), -3.0..3.0_f64, -300.0..300.0_f64],
+        passes in prop_oneof![0..3_usize, 0..9_usize],
+        window in window(),
+    ) {
+        let threshold = threshold(&memories[0], weights, pick, shift);
+        let Ok(discriminant) = ColorDiscriminant::new(weights, threshold) else {
+            return Ok(());
+        };
+        let mut segmenter = Segmenter::new(discriminant, passes);
+        for memory in &memories {
+            let mask = memory.mask(weights, threshold, passes);
+            let whole = Window::whole(&memory.frame());
+            for window in [whole, window] {
+                let found = segmented(&mut segmenter, memory, window);
+                prop_assert_eq!(found, expected(&mask, window), "{:?}", window);
+            }
+        }
+    }
+}
