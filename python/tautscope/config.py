@@ -37,6 +37,9 @@ class DofConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     observable_deviation: Positive
     """Largest standard deviation of the state per px of marker noise [m/px or rad/px] at which
     the DOF counts as observable; beyond it the DOF is held."""
+    start_deviation: Positive
+    """How far the tip may be from the reference before the first image: standard deviation [m or
+    rad]; about half the slack [ours]."""
     free_gain: Gain = 5.0
     """K_b: command over reference while the slack is crossed [paper]."""
     gain_limit: Gain = 5.0
@@ -111,6 +114,19 @@ class VisionConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """Regions below this are dropped [px]."""
     gate: Positive = 120.0
     """A marker is not sought farther than this from where it is predicted [px]."""
+    model_deviation: Positive = 2.5
+    """How far a band may be from where the instrument's model has it: standard deviation [px] [ours]."""
+    least_inside: Fraction = 0.5
+    """A band of which less is in the image is refused [share of its area] [ours]."""
+    least_coverage: Fraction = 0.35
+    """A band of which less has the markers' colour is refused [share of its area] [ours]."""
+    largest_spill: Fraction = 0.25
+    """A band around which more has the markers' colour is refused [share of a ring] [ours]."""
+    least_edges: Fraction = 0.4
+    """A band at less of whose outline the colour ends is refused [share of it] [ours]."""
+    largest_surprise: Positive = 30.0
+    """Largest squared Mahalanobis distance of the bands from where they are expected; chi squared
+    with 4 degrees of freedom exceeds it 5 times in a million [ours]."""
 
 
 class ControlConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -248,13 +264,19 @@ class Config(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Everything a run depends on. The defaults are the article's experiment."""
 
     insertion: DofConfig = field(
-        default_factory=lambda: DofConfig(update_distance=0.4e-3, observable_deviation=2e-3)
+        default_factory=lambda: DofConfig(
+            update_distance=0.4e-3, observable_deviation=2e-3, start_deviation=5e-3
+        )
     )
     rotation: DofConfig = field(
-        default_factory=lambda: DofConfig(update_distance=0.04, observable_deviation=0.1)
+        default_factory=lambda: DofConfig(
+            update_distance=0.04, observable_deviation=0.1, start_deviation=0.6
+        )
     )
     bending: DofConfig = field(
-        default_factory=lambda: DofConfig(update_distance=0.02, observable_deviation=0.1)
+        default_factory=lambda: DofConfig(
+            update_distance=0.02, observable_deviation=0.1, start_deviation=0.5
+        )
     )
     instrument: InstrumentConfig = field(default_factory=InstrumentConfig)
     camera: CameraConfig = field(default_factory=CameraConfig)

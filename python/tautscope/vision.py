@@ -5,6 +5,7 @@ Pixel coordinates are OpenCV's: u to the right, v down, the centre of the first 
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from tautscope import _core
 from tautscope.config import CameraConfig, Config
+from tautscope.dof import Dof
 from tautscope.errors import FieldError, FrameError
+from tautscope.reduction import build_feature_model
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,24 +34,77 @@ class Region:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Expectation:
+    """Where the instrument is believed to be when a frame was captured.
+
+    Attributes:
+        state: (3,) [m, rad, rad].
+        deviation: (3,) standard deviations [m, rad, rad].
+    """
+
+    state: NDArray[np.float64]
+    deviation: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """What speaks for a band.
+
+    Attributes:
+        inside: Share of its outline's area that is in the image.
+        coverage: Share of that which has the markers' colour.
+        spill: Share of a ring around it that has the markers' colour.
+        edges: Share of its outline at which the colour ends.
+        bloom: How much the outline had to grow [px].
+        centroid: Where the outline was laid, u, v [px].
+    """
+
+    inside: float
+    coverage: float
+    spill: float
+    edges: float
+    bloom: float
+    centroid: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Detection:
     """What a frame shows.
 
     Attributes:
         features: (4,) [px] the measured features: centroids of the bands, u_A, v_A, u_B, v_B, A the
-            proximal band. NaN where `valid` is false.
-        reason: Why there are no features; empty if there are.
+            proximal band. NaN for a band that was not found.
+        covariance: (4, 4) [px^2] of the features; NaN likewise.
+        reasons: Per band why it was not found; empty if it was.
+        evidence: Per band what speaks for it.
         regions: What has the markers' colour, the largest first, at most 16.
     """
 
     features: NDArray[np.float64]
-    reason: str
+    covariance: NDArray[np.float64]
+    reasons: tuple[str, str]
+    evidence: tuple[Evidence, Evidence]
     regions: tuple[Region, ...]
 
     @property
+    def found(self) -> tuple[bool, bool]:
+        """Which bands were found."""
+        a, b = self.reasons
+        return not a, not b
+
+    @property
     def valid(self) -> bool:
-        """Whether both markers were found."""
-        return not self.reason
+        """Whether both markers were found and can be trusted."""
+        return all(self.found)
+
+    @property
+    def reason(self) -> str:
+        """Why it is not valid; empty if it is."""
+        a, b = self.reasons
+        if a == b:
+            return a
+        named = (("A", a), ("B", b))
+        return "; ".join(f"band {name}: {reason}" for name, reason in named if reason)
 
 
 class MarkerDetector:
@@ -82,17 +138,32 @@ class MarkerDetector:
     def __init__(self, config: Config) -> None:
         vision = config.vision
         self._shape = (config.camera.height, config.camera.width, 3)
+        self._model = build_feature_model(config)
+        self._starts = _starts(config)
+        self._start_deviation = np.array([config[dof].start_deviation for dof in Dof])
         self._core = _core.MarkerDetector(
+            self._model,
             weights=vision.weights,
             threshold=vision.threshold,
             smoothing=vision.smoothing,
             minimum_area=vision.minimum_area,
             gate=vision.gate,
             entry_point=entry_point(config.camera),
+            model_deviation=vision.model_deviation,
+            demands=(
+                vision.least_inside,
+                vision.least_coverage,
+                vision.largest_spill,
+                vision.least_edges,
+                vision.largest_surprise,
+            ),
         )
 
     def detect(
-        self, image: NDArray[np.uint8], predicted_features: ArrayLike | None = None
+        self,
+        image: NDArray[np.uint8],
+        predicted_features: ArrayLike | None = None,
+        expectation: Expectation | None = None,
     ) -> Detection:
         """Find the markers in one image.
 
@@ -110,10 +181,29 @@ class MarkerDetector:
             FrameError: The image is not what the configured camera gives.
             FieldError: The prediction is not four numbers.
         """
-        features, reason, regions = self._core.detect(
-            self._checked(image), _checked_prediction(predicted_features)
+        pixels, predicted = self._checked(image), _checked_prediction(predicted_features)
+        states, deviation = self._beliefs(predicted, expectation)
+        features, covariance, evidence, reasons, regions = self._core.detect(
+            pixels, states, deviation
         )
-        return Detection(features, reason, tuple(_region(row) for row in regions.tolist()))
+        a, b = (Evidence(*row[:5], (row[5], row[6])) for row in evidence.tolist())
+        found = tuple(_region(row) for row in regions.tolist())
+        return Detection(features, covariance, reasons, (a, b), found)
+
+    def _beliefs(
+        self, predicted: NDArray[np.float64] | None, expectation: Expectation | None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Where the instrument may be: states (n, 3) and their common deviations (3,)."""
+        if expectation is not None:
+            return np.asarray(expectation.state)[None], np.asarray(expectation.deviation)
+        starts, broad = self._starts
+        if predicted is None or not np.isfinite(predicted).all():
+            return starts, broad
+        fits = [
+            self._model.nearest_state(start, broad, predicted, np.full(4, 5.0)) for start in starts
+        ]
+        state, _ = min((fit for fit in fits if fit is not None), key=lambda fit: fit[1])
+        return state[None], self._start_deviation
 
     def mask(self, image: NDArray[np.uint8]) -> NDArray[np.bool_]:
         """What is above the threshold after the low-pass, for figures: bool (height, width).
@@ -132,6 +222,19 @@ class MarkerDetector:
             raise FrameError("image", _described(image), f"uint8 array {self._shape}, B, G, R")
         # Pixels must be contiguous in a row; the rows may lie anywhere.
         return image if image.strides[1:] == (3, 1) else np.ascontiguousarray(image)
+
+
+def _starts(config: Config) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """States that cover the workspace of the experiment, and deviations that fill the gaps."""
+    sines = [config.experiment[dof] for dof in Dof]
+    grid = itertools.product(
+        *(
+            sine.centre + sine.amplitude * np.linspace(-1 + 1 / n, 1 - 1 / n, n)
+            for sine, n in zip(sines, (2, 5, 2), strict=True)
+        )
+    )
+    states = np.array(list(grid))
+    return states, np.array([sine.amplitude for sine in sines])
 
 
 def entry_point(camera: CameraConfig) -> tuple[float, float]:

@@ -17,13 +17,21 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use tautscope_vision::frame::MAX_SIDE;
 use tautscope_vision::segment::each_run;
+use tautscope_core as core;
 use tautscope_vision::{
-    ColorDiscriminant, Detector, Error, Frame, Labeller, Region, Segmenter, Settings,
+    ColorDiscriminant, Demands, Detector, Error, Expect, Expectation, Frame, Labeller, Outline,
+    Region, Segmenter, Settings,
 };
+
+use crate::arrays::table;
+use crate::features::FeatureModel;
 
 /// The markers in frames; `tautscope.vision.MarkerDetector` is its public face.
 #[pyclass(frozen, module = "tautscope._core")]
 pub struct MarkerDetector {
+    model: core::FeatureModel,
+    model_deviation: f64,
+    demands: Demands,
     segmenter: Segmenter,
     detector: Mutex<Detector>,
 }
@@ -31,15 +39,19 @@ pub struct MarkerDetector {
 #[pymethods]
 impl MarkerDetector {
     #[new]
-    #[pyo3(signature = (*, weights, threshold, smoothing, minimum_area, gate, entry_point))]
+    #[pyo3(signature = (model, *, weights, threshold, smoothing, minimum_area, gate, entry_point, model_deviation, demands))]
+    #[expect(clippy::too_many_arguments, reason = "named in Python")]
     fn new(
         py: Python<'_>,
+        model: &FeatureModel,
         weights: [f64; 3],
         threshold: f64,
         smoothing: usize,
         minimum_area: u64,
         gate: f64,
         entry_point: [f64; 2],
+        model_deviation: f64,
+        demands: [f64; 5],
     ) -> PyResult<Self> {
         let discriminant = ColorDiscriminant::new(weights, threshold).map_err(refused(py))?;
         let detector = Detector::new(Settings {
@@ -49,30 +61,52 @@ impl MarkerDetector {
             gate,
             entry_point,
         });
+        let [inside, coverage, spill, edges, surprise] = demands;
         Ok(Self {
+            model: model.0,
+            model_deviation,
+            demands: Demands { inside, coverage, spill, edges, surprise },
             segmenter: Segmenter::new(discriminant, smoothing),
             detector: Mutex::new(detector.map_err(refused(py))?),
         })
     }
 
-    /// Features (4,), NaN if there are none; why there are none, else empty; regions (n, 7).
+    /// Features (4,), covariance (4, 4), evidence (2, 7), a reason per marker, regions (n, 7).
+    ///
+    /// `states` (n, 3): where the instrument may be, each with the standard deviations `deviation` (3,).
     fn detect<'py>(
         &self,
         py: Python<'py>,
         image: PyReadonlyArray3<'py, u8>,
-        predicted: Option<[f64; 4]>,
+        states: Vec<[f64; 3]>,
+        deviation: [f64; 3],
     ) -> PyResult<Measured<'py>> {
         let frame = ArrayFrame::new(image.as_array())?;
-        let (features, regions) = py.detach(|| {
+        let expect = Believed {
+            model: &self.model,
+            states: &states,
+            deviation,
+            model_deviation: self.model_deviation,
+        };
+        let (verdict, regions) = py.detach(|| {
             let mut detector = self.detector.lock().unwrap_or_else(PoisonError::into_inner);
-            let detection = detector.detect(&frame, predicted);
-            (detection.features, rows(detection.regions.iter().copied()))
+            let (verdict, regions) = detector.recognise(&frame, &expect, &self.demands);
+            (verdict, rows(regions.iter().copied()))
         });
-        let reason = features
-            .err()
-            .map_or_else(String::new, |rejection| rejection.to_string());
-        let features = PyArray1::from_slice(py, &features.unwrap_or([f64::NAN; 4]));
-        Ok((features, reason, regions.into_pyarray(py)))
+        let [a, b] = verdict
+            .reasons
+            .map(|reason| reason.map_or_else(String::new, |reason| reason.to_string()));
+        let evidence = verdict.bands.map(|band| {
+            let [u, v] = band.centroid;
+            [band.inside, band.coverage, band.spill, band.edges, band.bloom, u, v]
+        });
+        Ok((
+            PyArray1::from_slice(py, &verdict.features),
+            table(py, &verdict.covariance)?,
+            table(py, &evidence)?,
+            (a, b),
+            regions.into_pyarray(py),
+        ))
     }
 
     /// What passes the threshold after the low-pass, (h, w).
@@ -98,7 +132,58 @@ impl MarkerDetector {
     }
 }
 
-type Measured<'py> = (Bound<'py, PyArray1<f64>>, String, Bound<'py, PyArray2<f64>>);
+type Measured<'py> = (
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    (String, String),
+    Bound<'py, PyArray2<f64>>,
+);
+
+/// What the core's model says of where the instrument may be.
+struct Believed<'a> {
+    model: &'a core::FeatureModel,
+    states: &'a [[f64; 3]],
+    deviation: [f64; 3],
+    model_deviation: f64,
+}
+
+impl Expect for Believed<'_> {
+    fn expect(&self, seen: [f64; 4], deviation: [f64; 4]) -> Option<Expectation> {
+        let found = self.states.iter().filter_map(|state| {
+            let belief = core::Belief { state: *state, deviation: self.deviation };
+            let (nearest, misfit) = self.model.nearest_state(&belief, seen, deviation)?;
+            Some((*state, nearest, misfit))
+        });
+        let (believed, nearest, _) = found.min_by(|a, b| a.2.total_cmp(&b.2))?;
+        let prediction = self.model.predict(nearest)?;
+        let bands = self.model.bands(nearest)?;
+        let [a, b] = bands.map(|band| band.centroid);
+        let mut features = [a[0], a[1], b[0], b[1]];
+        let mut covariance = [[0.0; 4]; 4];
+        for dof in 0..3 {
+            let column = prediction.columns[dof];
+            for i in 0..4 {
+                features[i] += column[i] * (believed[dof] - nearest[dof]);
+                for j in 0..4 {
+                    covariance[i][j] += column[i] * column[j] * self.deviation[dof].powi(2);
+                }
+            }
+        }
+        for (index, row) in covariance.iter_mut().enumerate() {
+            row[index] += self.model_deviation.powi(2);
+        }
+        Some(Expectation {
+            features,
+            covariance,
+            bands: bands.map(|band| Outline {
+                corners: band.outline,
+                centroid: band.centroid,
+                area: band.area,
+            }),
+        })
+    }
+}
 
 /// The 8-connected regions of a mask (h, w), in the order of their last rows: (n, 7).
 #[pyfunction]

@@ -28,7 +28,9 @@ mod features;
 mod history;
 mod instrument;
 mod linear;
+mod outline;
 mod play;
+mod posture;
 mod reduction;
 mod state;
 
@@ -40,6 +42,8 @@ pub use estimator::{Estimator, EstimatorState, Trigger, Triggers};
 pub use features::{FeatureModel, FeaturePrediction};
 pub use history::{Entry, History};
 pub use instrument::{Instrument, Marker};
+pub use outline::{BandImage, OUTLINE};
 pub use play::{ContactMode, Play, PlayState};
+pub use posture::Belief;
 pub use reduction::{Axis, HysteresisReduction, Report, Status};
 pub use state::{StateEstimate, StateEstimator};

@@ -1,7 +1,8 @@
 //! Frame to markers: Fig. 5 as a whole.
 
 use crate::markers::{near_prediction, two_largest};
-use crate::{ColorDiscriminant, Error, Frame, Labeller, Region, Rejection, Segmenter};
+use crate::judge::{Demands, Verdict, judge};
+use crate::{ColorDiscriminant, Error, Expect, Frame, Labeller, Region, Rejection, RunMap, Segmenter};
 
 /// Only so many regions, the largest, are considered: it bounds the time on a noisy frame.
 pub const CANDIDATES: usize = 16;
@@ -27,6 +28,7 @@ pub struct Detector {
     settings: Settings,
     segmenter: Segmenter,
     labeller: Labeller,
+    map: RunMap,
     regions: Vec<Region>,
 }
 
@@ -72,6 +74,7 @@ impl Detector {
             settings,
             segmenter: Segmenter::new(settings.discriminant, smoothing),
             labeller: Labeller::default(),
+            map: RunMap::default(),
             regions: Vec::with_capacity(CANDIDATES),
         })
     }
@@ -91,10 +94,25 @@ impl Detector {
         Detection { features, regions }
     }
 
+    /// Recognises the markers by what `expect` says of them.
+    ///
+    /// Allocates only when a frame is larger than those before.
+    pub fn recognise(
+        &mut self,
+        frame: &impl Frame,
+        expect: &impl Expect,
+        demands: &Demands,
+    ) -> (Verdict, &[Region]) {
+        self.find_regions(frame);
+        let verdict = judge(&self.regions, &self.map, expect, demands);
+        (verdict, &self.regions)
+    }
+
     fn find_regions(&mut self, frame: &impl Frame) {
         let Self {
             segmenter,
             labeller,
+            map,
             regions,
             settings,
         } = self;
@@ -107,9 +125,14 @@ impl Detector {
             }
         };
         labeller.start(frame.width());
+        map.start(frame.width(), frame.height());
         segmenter.each_row(frame, |v, runs| {
-            runs.each(|start, end| labeller.add(v, start, end));
+            runs.each(|start, end| {
+                labeller.add(v, start, end);
+                map.add(start, end);
+            });
             labeller.end_row(&mut keep);
+            map.end_row();
         });
         labeller.end_row(&mut keep);
     }

@@ -9,16 +9,24 @@
 pub mod detector;
 pub mod discriminant;
 pub mod error;
+pub mod expectation;
+pub mod fit;
 pub mod frame;
+pub mod judge;
+mod linear;
 pub mod lowpass;
 pub mod markers;
 pub mod regions;
+pub mod runs;
 pub mod segment;
 
 pub use detector::{Detection, Detector, Settings};
 pub use discriminant::ColorDiscriminant;
 pub use error::Error;
+pub use expectation::{Expect, Expectation, OUTLINE, Outline};
 pub use frame::{BgrFrame, Frame};
+pub use judge::{Demands, Evidence, Verdict};
 pub use markers::Rejection;
 pub use regions::{Labeller, Region};
+pub use runs::RunMap;
 pub use segment::Segmenter;

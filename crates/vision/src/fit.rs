@@ -1,0 +1,177 @@
+//! The bands' outlines laid over what was segmented.
+
+use crate::linear::{Square, apply, inverse};
+use crate::{Expectation, Outline, RunMap};
+
+/// Places along an outline where its edge is sought.
+const SAMPLES: usize = 32;
+/// How far from the outline an edge is sought (px), at most.
+const REACH: f64 = 9.0;
+/// Standard deviation of an edge (px), neighbours taken as independent.
+const EDGE: f64 = 0.7;
+/// Edges farther than this from where they should be have no say in the end (px); at first, four times.
+const TOLERANCE: f64 = 1.8;
+/// Standard deviation of the growth of an outline: blur and threshold (px), and unknown scale (1).
+const BLOOM: f64 = 0.6;
+const SCALE: f64 = 0.06;
+const ROUNDS: [f64; 5] = [4.0, 2.0, 1.4, 1.0, 1.0];
+
+/// Two outlines in place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fit {
+    /// Centroids `[u_A, v_A, u_B, v_B]` (px).
+    pub features: [f64; 4],
+    /// (4, 4) (px^2).
+    pub covariance: Square<4>,
+    /// How much each outline had to grow (px).
+    pub bloom: [f64; 2],
+    /// Share of each outline at which an edge was where it should be, of that in the image.
+    pub edges: [f64; 2],
+    /// Mean square of those edges' misfits (px^2).
+    pub misfit: [f64; 2],
+    /// (d - expected)' inverse covariance (d - expected), 4 degrees of freedom.
+    pub surprise: f64,
+}
+
+#[derive(Clone, Copy)]
+struct Edge {
+    band: usize,
+    normal: [f64; 2],
+    /// How far out the edge is from the outline where it was first laid (px); none if none is in reach.
+    offset: Option<f64>,
+}
+
+/// Lays the outlines of `expected` over `map`, from centroids `start` on.
+///
+/// Robust least squares for the two places d and a growth b of each outline: with n the outward normal and
+/// r the distance at which the markers' colour ends,
+///
+/// ```text
+/// sum_k w(r_k - n_k d - b) (r_k - n_k d - b)^2 / EDGE^2 + (d - d0)' P^-1 (d - d0) + b^2 / B^2
+/// ```
+///
+/// w is Tukey's weight, its width narrowing. So what hides a part of a band does not pull at it, and each
+/// band says by the covariance P of the expectation where the other is. `seen` says which band has a say.
+pub fn fit(expected: &Expectation, start: [f64; 4], seen: [bool; 2], map: &RunMap) -> Option<Fit> {
+    let prior = inverse(expected.covariance)?;
+    let [a, b] = &expected.bands;
+    let mut place = start;
+    let mut bloom = [0.0; 2];
+    let mut result = None;
+    for width in ROUNDS {
+        let [ua, va, ub, vb] = place;
+        let laid = [settle(a, [ua, va]), settle(b, [ub, vb])];
+        let mut normal = [[0.0; 6]; 6];
+        let mut right = [0.0; 6];
+        let away = difference(expected.features, place);
+        for (row, pull) in apply(&prior, away).into_iter().enumerate() {
+            right[row] = pull;
+            normal[row][..4].copy_from_slice(&prior[row]);
+        }
+        for (band, outline) in laid.iter().enumerate() {
+            let spread = BLOOM + SCALE * outline.radius();
+            normal[4 + band][4 + band] = 1.0 / (spread * spread);
+        }
+        let (mut edges, mut inside, mut misfit) = ([0.0; 2], [0.0; 2], [0.0; 2]);
+        for (band, outline) in laid.iter().enumerate().filter(|(band, _)| seen[*band]) {
+            each_edge(band, outline, map, |edge| {
+                inside[band] += 1.0;
+                let Some(offset) = edge.offset else { return };
+                let left = offset - bloom[band];
+                let share = left / (TOLERANCE * width);
+                if share.abs() >= 1.0 {
+                    return;
+                }
+                let weight = (1.0 - share * share).powi(2);
+                edges[band] += weight;
+                misfit[band] += weight * left * left;
+                let mut row = [0.0; 6];
+                row[2 * band..2 * band + 2].copy_from_slice(&edge.normal);
+                row[4 + band] = 1.0;
+                let weight = weight / (EDGE * EDGE);
+                for (i, own) in row.iter().enumerate() {
+                    right[i] += weight * own * offset;
+                    for (j, other) in row.iter().enumerate() {
+                        normal[i][j] += weight * own * other;
+                    }
+                }
+            });
+        }
+        let covariance = inverse(normal)?;
+        let [du_a, dv_a, du_b, dv_b, bloom_a, bloom_b] = apply(&covariance, right);
+        bloom = [bloom_a, bloom_b];
+        for (value, step) in place.iter_mut().zip([du_a, dv_a, du_b, dv_b]) {
+            *value += step;
+        }
+        let away = difference(expected.features, place);
+        let pull = apply(&prior, away);
+        result = Some(Fit {
+            features: place,
+            covariance: [0, 1, 2, 3].map(|i| [0, 1, 2, 3].map(|j| covariance[i][j])),
+            bloom,
+            edges: [0, 1].map(|band| edges[band] / f64::max(inside[band], 1.0)),
+            misfit: [0, 1].map(|band| misfit[band] / f64::max(edges[band], 1.0)),
+            surprise: pull.iter().zip(away).map(|(a, b)| a * b).sum(),
+        });
+    }
+    result
+}
+
+/// The outline with its centroid there.
+pub fn settle(outline: &Outline, [u, v]: [f64; 2]) -> Outline {
+    let [cu, cv] = outline.centroid;
+    outline.moved([u - cu, v - cv])
+}
+
+/// At equal steps around an outline, where they are in the image.
+fn each_edge(band: usize, outline: &Outline, map: &RunMap, mut found: impl FnMut(Edge)) {
+    let (width, height) = map.size();
+    let corners = &outline.corners;
+    let sides = || corners.iter().zip(corners.iter().cycle().skip(1));
+    let side = |([u0, v0], [u1, v1]): (&[f64; 2], &[f64; 2])| [u1 - u0, v1 - v0];
+    let length = |[u, v]: [f64; 2]| u.hypot(v);
+    let around: f64 = sides().map(|pair| length(side(pair))).sum();
+    let signed: f64 = sides().map(|([u0, v0], [u1, v1])| u0 * v1 - u1 * v0).sum();
+    let reach = REACH.min(0.8 * outline.radius());
+    #[expect(clippy::cast_precision_loss, reason = "a few samples")]
+    let step = around / SAMPLES as f64;
+    let mut due = step / 2.0;
+    for (from, to) in sides() {
+        let [du, dv] = side((from, to));
+        let long = length([du, dv]);
+        let outward = if signed > 0.0 { [dv / long, -du / long] } else { [-dv / long, du / long] };
+        while due < long {
+            let at = [from[0] + du * due / long, from[1] + dv * due / long];
+            due += step;
+            if (2.0..width - 3.0).contains(&at[0]) && (2.0..height - 3.0).contains(&at[1]) {
+                found(Edge {
+                    band,
+                    normal: outward,
+                    offset: crossing(map, at, outward, reach),
+                });
+            }
+        }
+        due -= long;
+    }
+}
+
+/// How far from `at` along `normal` the markers' colour ends, within `reach` (px).
+fn crossing(map: &RunMap, at: [f64; 2], [nu, nv]: [f64; 2], reach: f64) -> Option<f64> {
+    let marker = |along: f64| map.marker([at[0] + along * nu, at[1] + along * nv]);
+    let inside = marker(0.0);
+    let step: f64 = if inside { 0.5 } else { -0.5 };
+    let mut along = step;
+    while along.abs() <= reach {
+        if marker(along) != inside {
+            let middle = along - step / 2.0;
+            let beyond = marker(middle) != inside;
+            return Some(if beyond { middle - step / 4.0 } else { middle + step / 4.0 });
+        }
+        along += step;
+    }
+    None
+}
+
+fn difference([a0, a1, a2, a3]: [f64; 4], [b0, b1, b2, b3]: [f64; 4]) -> [f64; 4] {
+    [a0 - b0, a1 - b1, a2 - b2, a3 - b3]
+}

@@ -1,0 +1,264 @@
+//! Which of what has the markers' colour is a band: by place, size, outline, and both together.
+
+use crate::fit::{Fit, fit, settle};
+use crate::regions::real;
+use crate::{Expect, Expectation, Region, Rejection, RunMap};
+
+/// How the two bands were recognised, or why not.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Verdict {
+    /// Centroids `[u_A, v_A, u_B, v_B]` (px); NaN for a band that is not found.
+    pub features: [f64; 4],
+    /// Their covariance (4, 4) (px^2); NaN likewise.
+    pub covariance: [[f64; 4]; 4],
+    /// What each band looks like; none of it counts for a band that nothing was compared with.
+    pub bands: [Evidence; 2],
+    /// Why a band is not found.
+    pub reasons: [Option<Rejection>; 2],
+}
+
+/// What speaks for a band.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Evidence {
+    /// Share of its outline's area that is in the image.
+    pub inside: f64,
+    /// Share of that which has the markers' colour.
+    pub coverage: f64,
+    /// Share of a ring around it that has the markers' colour.
+    pub spill: f64,
+    /// Share of its outline at which the colour ends.
+    pub edges: f64,
+    /// How much its outline had to grow (px).
+    pub bloom: f64,
+    /// Centroid of the outline, u, v (px).
+    pub centroid: [f64; 2],
+}
+
+/// What a band must show.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Demands {
+    /// Least [`Evidence::inside`].
+    pub inside: f64,
+    /// Least [`Evidence::coverage`].
+    pub coverage: f64,
+    /// Largest [`Evidence::spill`].
+    pub spill: f64,
+    /// Least [`Evidence::edges`].
+    pub edges: f64,
+    /// Largest squared Mahalanobis distance of both from where they are expected.
+    pub surprise: f64,
+}
+
+const NOWHERE: [f64; 4] = [f64::NAN; 4];
+/// Pairs of regions that are tried, the likeliest first.
+const TRIALS: usize = 4;
+/// A trial this good ends the search: share of edges.
+const ENOUGH: f64 = 0.7;
+
+/// Recognises the bands among `regions` and `map`.
+pub fn judge(regions: &[Region], map: &RunMap, expect: &impl Expect, demands: &Demands) -> Verdict {
+    let Some(blind) = expect.expect(NOWHERE, [f64::INFINITY; 4]) else {
+        return nothing(Rejection::Unseen);
+    };
+    if regions.is_empty() {
+        return nothing(Rejection::NoRegion);
+    }
+    let mut best: Option<(f64, Verdict)> = None;
+    for pair in likely(regions, &blind).into_iter().flatten() {
+        let Some(verdict) = attempt(pair, regions, map, expect, demands) else { continue };
+        let score = verdict.score();
+        if best.is_none_or(|(most, _)| score > most) {
+            best = Some((score, verdict));
+        }
+        if score >= 2.0 + 2.0 * ENOUGH {
+            break;
+        }
+    }
+    best.map_or_else(|| nothing(Rejection::NoRegion), |(_, verdict)| verdict)
+}
+
+impl Verdict {
+    /// Each band found counts one, and its edges.
+    fn score(&self) -> f64 {
+        let bands = self.bands.iter().zip(&self.reasons);
+        bands
+            .map(|(band, reason)| if reason.is_none() { 1.0 + band.edges } else { 0.1 * band.edges })
+            .sum()
+    }
+}
+
+/// A region for A and one for B; none: not among the regions.
+type Pair = [Option<usize>; 2];
+
+/// The likeliest pairs, the likeliest first: squared Mahalanobis distance of each pair's centroids, where a
+/// centroid may be off by a third of the band's size, and squared logarithm of the ratios of areas. A band without a region
+/// costs as much as one four deviations off.
+fn likely(regions: &[Region], expected: &Expectation) -> [Option<Pair>; TRIALS] {
+    let mut kept: [Option<(f64, Pair)>; TRIALS] = [None; TRIALS];
+    let slack = expected.bands.each_ref().map(|band| (0.35 * band.radius()).powi(2));
+    let mut covariance = expected.covariance;
+    for (index, row) in covariance.iter_mut().enumerate() {
+        row[index] += slack[index / 2];
+    }
+    let choices = || (0..regions.len()).map(Some).chain([None]);
+    let inverse = crate::linear::inverse(covariance).unwrap_or([[0.0; 4]; 4]);
+    let single = [0, 2].map(|at| {
+        let part = [0, 1].map(|i| [0, 1].map(|j| covariance[at + i][at + j]));
+        crate::linear::inverse(part).unwrap_or([[0.0; 2]; 2])
+    });
+    let away = |index: usize, band: usize| {
+        let [u, v] = regions[index].centroid();
+        [u - expected.features[2 * band], v - expected.features[2 * band + 1]]
+    };
+    let size = |index: usize, band: usize| {
+        (real(regions[index].area) / expected.bands[band].area).ln().powi(2)
+    };
+    for a in choices() {
+        for b in choices() {
+            let cost = match (a, b) {
+                (Some(a), Some(b)) if a != b => {
+                    let ([ua, va], [ub, vb]) = (away(a, 0), away(b, 1));
+                    crate::linear::quadratic(&inverse, [ua, va, ub, vb]) + size(a, 0) + size(b, 1)
+                }
+                (Some(a), None) => 16.0 + crate::linear::quadratic(&single[0], away(a, 0)) + size(a, 0),
+                (None, Some(b)) => 16.0 + crate::linear::quadratic(&single[1], away(b, 1)) + size(b, 1),
+                (None, None) => 24.0,
+                _ => continue,
+            };
+            let place = kept.iter().position(|one| one.is_none_or(|(less, _)| cost < less));
+            if let Some(place) = place {
+                kept[place..].rotate_right(1);
+                kept[place] = Some((cost, [a, b]));
+            }
+        }
+    }
+    kept.map(|one| one.map(|(_, pair)| pair))
+}
+
+fn attempt(
+    pair: Pair,
+    regions: &[Region],
+    map: &RunMap,
+    expect: &impl Expect,
+    demands: &Demands,
+) -> Option<Verdict> {
+    let mut seen = NOWHERE;
+    for (band, region) in pair.into_iter().enumerate() {
+        if let Some(region) = region.and_then(|index| regions.get(index)) {
+            [seen[2 * band], seen[2 * band + 1]] = region.centroid();
+        }
+    }
+    let (laid, coarse) = lay(seen, 4.0, [true; 2], map, expect)?;
+    let (laid, found) = lay(coarse.features, 1.5, [true; 2], map, expect).unwrap_or((laid, coarse));
+    let verdict = weigh(&laid, &found, map, demands);
+    match verdict.reasons {
+        [None, None] | [Some(_), Some(_)] => Some(verdict),
+        reasons => {
+            // Alone: the one that is not there must not say where the other is.
+            let alone = [reasons[0].is_none(), reasons[1].is_none()];
+            let mut seen = found.features;
+            for band in (0..2).filter(|band| !alone[*band]) {
+                seen[2 * band..2 * band + 2].fill(f64::NAN);
+            }
+            let (laid, found) = lay(seen, 1.5, alone, map, expect)?;
+            let mut last = weigh(&laid, &found, map, demands);
+            for band in (0..2).filter(|band| !alone[*band]) {
+                last.reasons[band] = reasons[band];
+                last.bands[band] = verdict.bands[band];
+            }
+            last.conceal();
+            Some(last)
+        }
+    }
+}
+
+fn lay(
+    seen: [f64; 4],
+    deviation: f64,
+    bands: [bool; 2],
+    map: &RunMap,
+    expect: &impl Expect,
+) -> Option<(Expectation, Fit)> {
+    let laid = expect.expect(seen, [deviation; 4])?;
+    let [a, b] = &laid.bands;
+    let mut start = [a.centroid[0], a.centroid[1], b.centroid[0], b.centroid[1]];
+    for (start, seen) in start.iter_mut().zip(seen) {
+        if seen.is_finite() {
+            *start = seen;
+        }
+    }
+    let found = fit(&laid, start, bands, map)?;
+    Some((laid, found))
+}
+
+fn weigh(laid: &Expectation, found: &Fit, map: &RunMap, demands: &Demands) -> Verdict {
+    let [ua, va, ub, vb] = found.features;
+    let places = [[ua, va], [ub, vb]];
+    let outlines = [0, 1].map(|band| settle(&laid.bands[band], places[band]).grown(found.bloom[band]));
+    let bands = [0, 1].map(|band| {
+        let (own, other) = (&outlines[band], &outlines[1 - band]);
+        let whole = own.count(map, other);
+        let radius = own.radius();
+        let inner = own.grown(f64::max(1.5, 0.1 * radius)).count(map, other);
+        let outer = own.grown(f64::max(4.0, 0.4 * radius)).count(map, other);
+        let ring = f64::max(outer.pixels - inner.pixels, 1.0);
+        let marker = outer.marker - inner.marker - (outer.shared - inner.shared);
+        Evidence {
+            inside: whole.pixels / own.area,
+            coverage: whole.marker / f64::max(whole.pixels, 1.0),
+            spill: marker / ring,
+            edges: found.edges[band],
+            bloom: found.bloom[band],
+            centroid: places[band],
+        }
+    });
+    let reasons = bands.map(|band| refusal(&band, found.surprise, demands));
+    let mut verdict = Verdict {
+        features: found.features,
+        covariance: found.covariance,
+        bands,
+        reasons,
+    };
+    verdict.conceal();
+    verdict
+}
+
+fn refusal(band: &Evidence, surprise: f64, demands: &Demands) -> Option<Rejection> {
+    if band.inside < demands.inside {
+        Some(Rejection::Outside { share: 1.0 - band.inside })
+    } else if band.coverage < demands.coverage {
+        Some(Rejection::Hidden { share: band.coverage })
+    } else if band.spill > demands.spill {
+        Some(Rejection::Larger { share: band.spill })
+    } else if band.edges < demands.edges {
+        Some(Rejection::Shape { share: band.edges })
+    } else if surprise.is_nan() || surprise > demands.surprise {
+        Some(Rejection::Elsewhere { distance: surprise.sqrt() })
+    } else {
+        None
+    }
+}
+
+impl Verdict {
+    /// What is not found has no features.
+    fn conceal(&mut self) {
+        for band in (0..2).filter(|band| self.reasons[*band].is_some()) {
+            for index in [2 * band, 2 * band + 1] {
+                self.features[index] = f64::NAN;
+                self.covariance[index] = NOWHERE;
+                for row in &mut self.covariance {
+                    row[index] = f64::NAN;
+                }
+            }
+        }
+    }
+}
+
+fn nothing(reason: Rejection) -> Verdict {
+    Verdict {
+        features: NOWHERE,
+        covariance: [NOWHERE; 4],
+        bands: [Evidence { centroid: [f64::NAN; 2], ..Evidence::default() }; 2],
+        reasons: [Some(reason); 2],
+    }
+}
