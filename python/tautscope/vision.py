@@ -65,6 +65,7 @@ class Evidence:
     edges: float
     bloom: float
     centroid: tuple[float, float]
+    filled: tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -186,7 +187,7 @@ class MarkerDetector:
         features, covariance, evidence, reasons, regions = self._core.detect(
             pixels, states, deviation
         )
-        a, b = (Evidence(*row[:5], (row[5], row[6])) for row in evidence.tolist())
+        a, b = (Evidence(*row[:5], (row[5], row[6]), (row[7], row[8])) for row in evidence.tolist())
         found = tuple(_region(row) for row in regions.tolist())
         return Detection(features, covariance, reasons, (a, b), found)
 

@@ -98,7 +98,8 @@ impl MarkerDetector {
             .map(|reason| reason.map_or_else(String::new, |reason| reason.to_string()));
         let evidence = verdict.bands.map(|band| {
             let [u, v] = band.centroid;
-            [band.inside, band.coverage, band.spill, band.edges, band.bloom, u, v]
+            let [x, y] = band.filled;
+            [band.inside, band.coverage, band.spill, band.edges, band.bloom, u, v, x, y]
         });
         Ok((
             PyArray1::from_slice(py, &verdict.features),

@@ -1,10 +1,10 @@
 //! The bands' outlines laid over what was segmented.
 
 use crate::linear::{Square, apply, inverse};
-use crate::{Expectation, Outline, RunMap};
+use crate::{Expectation, OUTLINE, Outline, RunMap};
 
 /// Places along an outline where its edge is sought.
-const SAMPLES: usize = 32;
+const SAMPLES: usize = 48;
 /// How far from the outline an edge is sought (px), at most.
 const REACH: f64 = 9.0;
 /// Standard deviation of an edge (px), neighbours taken as independent.
@@ -14,6 +14,10 @@ const TOLERANCE: f64 = 1.8;
 /// Standard deviation of the growth of an outline: blur and threshold (px), and unknown scale (1).
 const BLOOM: f64 = 0.6;
 const SCALE: f64 = 0.06;
+/// Nearer than this to where a rim meets a side the low-pass rounds the outline off (px).
+const CORNER: f64 = 2.5;
+/// Where they meet.
+const CORNERS: [usize; 4] = [0, OUTLINE / 2 - 1, OUTLINE / 2, OUTLINE - 1];
 const ROUNDS: [f64; 5] = [4.0, 2.0, 1.4, 1.0, 1.0];
 
 /// Two outlines in place.
@@ -23,8 +27,8 @@ pub struct Fit {
     pub features: [f64; 4],
     /// (4, 4) (px^2).
     pub covariance: Square<4>,
-    /// How much each outline had to grow (px).
-    pub bloom: [f64; 2],
+    /// How much each outline had to grow.
+    pub bloom: [Bloom; 2],
     /// Share of each outline at which an edge was where it should be, of that in the image.
     pub edges: [f64; 2],
     /// Mean square of those edges' misfits (px^2).
@@ -33,9 +37,20 @@ pub struct Fit {
     pub surprise: f64,
 }
 
+/// How much an outline had to grow (px): blur and threshold move the rims, beyond which the tip goes on, and the
+/// sides, beyond which there is tissue, differently.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Bloom {
+    /// Along the axis.
+    pub rims: f64,
+    /// Across it.
+    pub sides: f64,
+}
+
 #[derive(Clone, Copy)]
 struct Edge {
-    band: usize,
+    /// On a side, not on a rim.
+    side: bool,
     normal: [f64; 2],
     /// How far out the edge is from the outline where it was first laid (px); none if none is in reach.
     offset: Option<f64>,
@@ -56,13 +71,13 @@ pub fn fit(expected: &Expectation, start: [f64; 4], seen: [bool; 2], map: &RunMa
     let prior = inverse(expected.covariance)?;
     let [a, b] = &expected.bands;
     let mut place = start;
-    let mut bloom = [0.0; 2];
+    let mut bloom = [0.0; 4];
     let mut result = None;
     for width in ROUNDS {
         let [ua, va, ub, vb] = place;
         let laid = [settle(a, [ua, va]), settle(b, [ub, vb])];
-        let mut normal = [[0.0; 6]; 6];
-        let mut right = [0.0; 6];
+        let mut normal = [[0.0; 8]; 8];
+        let mut right = [0.0; 8];
         let away = difference(expected.features, place);
         for (row, pull) in apply(&prior, away).into_iter().enumerate() {
             right[row] = pull;
@@ -70,24 +85,29 @@ pub fn fit(expected: &Expectation, start: [f64; 4], seen: [bool; 2], map: &RunMa
         }
         for (band, outline) in laid.iter().enumerate() {
             let spread = BLOOM + SCALE * outline.radius();
-            normal[4 + band][4 + band] = 1.0 / (spread * spread);
+            for index in [4 + 2 * band, 5 + 2 * band] {
+                normal[index][index] = 1.0 / (spread * spread);
+            }
         }
-        let (mut edges, mut inside, mut misfit) = ([0.0; 2], [0.0; 2], [0.0; 2]);
+        let (mut edges, mut inside) = ([0.0; 2], [0.0; 2]);
+        let (mut weights, mut misfit) = ([0.0; 2], [0.0; 2]);
         for (band, outline) in laid.iter().enumerate().filter(|(band, _)| seen[*band]) {
-            each_edge(band, outline, map, |edge| {
+            each_edge(outline, map, |edge| {
                 inside[band] += 1.0;
                 let Some(offset) = edge.offset else { return };
-                let left = offset - bloom[band];
+                let grown = 2 * band + usize::from(edge.side);
+                let left = offset - bloom[grown];
                 let share = left / (TOLERANCE * width);
                 if share.abs() >= 1.0 {
                     return;
                 }
                 let weight = (1.0 - share * share).powi(2);
-                edges[band] += weight;
+                edges[band] += 1.0;
+                weights[band] += weight;
                 misfit[band] += weight * left * left;
-                let mut row = [0.0; 6];
+                let mut row = [0.0; 8];
                 row[2 * band..2 * band + 2].copy_from_slice(&edge.normal);
-                row[4 + band] = 1.0;
+                row[4 + grown] = 1.0;
                 let weight = weight / (EDGE * EDGE);
                 for (i, own) in row.iter().enumerate() {
                     right[i] += weight * own * offset;
@@ -98,8 +118,8 @@ pub fn fit(expected: &Expectation, start: [f64; 4], seen: [bool; 2], map: &RunMa
             });
         }
         let covariance = inverse(normal)?;
-        let [du_a, dv_a, du_b, dv_b, bloom_a, bloom_b] = apply(&covariance, right);
-        bloom = [bloom_a, bloom_b];
+        let [du_a, dv_a, du_b, dv_b, rims_a, sides_a, rims_b, sides_b] = apply(&covariance, right);
+        bloom = [rims_a, sides_a, rims_b, sides_b];
         for (value, step) in place.iter_mut().zip([du_a, dv_a, du_b, dv_b]) {
             *value += step;
         }
@@ -108,9 +128,12 @@ pub fn fit(expected: &Expectation, start: [f64; 4], seen: [bool; 2], map: &RunMa
         result = Some(Fit {
             features: place,
             covariance: [0, 1, 2, 3].map(|i| [0, 1, 2, 3].map(|j| covariance[i][j])),
-            bloom,
+            bloom: [
+                Bloom { rims: rims_a, sides: sides_a },
+                Bloom { rims: rims_b, sides: sides_b },
+            ],
             edges: [0, 1].map(|band| edges[band] / f64::max(inside[band], 1.0)),
-            misfit: [0, 1].map(|band| misfit[band] / f64::max(edges[band], 1.0)),
+            misfit: [0, 1].map(|band| misfit[band] / f64::max(weights[band], 1.0)),
             surprise: pull.iter().zip(away).map(|(a, b)| a * b).sum(),
         });
     }
@@ -124,7 +147,7 @@ pub fn settle(outline: &Outline, [u, v]: [f64; 2]) -> Outline {
 }
 
 /// At equal steps around an outline, where they are in the image.
-fn each_edge(band: usize, outline: &Outline, map: &RunMap, mut found: impl FnMut(Edge)) {
+fn each_edge(outline: &Outline, map: &RunMap, mut found: impl FnMut(Edge)) {
     let (width, height) = map.size();
     let corners = &outline.corners;
     let sides = || corners.iter().zip(corners.iter().cycle().skip(1));
@@ -136,16 +159,20 @@ fn each_edge(band: usize, outline: &Outline, map: &RunMap, mut found: impl FnMut
     #[expect(clippy::cast_precision_loss, reason = "a few samples")]
     let step = around / SAMPLES as f64;
     let mut due = step / 2.0;
-    for (from, to) in sides() {
+    for (index, (from, to)) in sides().enumerate() {
         let [du, dv] = side((from, to));
         let long = length([du, dv]);
         let outward = if signed > 0.0 { [dv / long, -du / long] } else { [-dv / long, du / long] };
         while due < long {
             let at = [from[0] + du * due / long, from[1] + dv * due / long];
             due += step;
-            if (2.0..width - 3.0).contains(&at[0]) && (2.0..height - 3.0).contains(&at[1]) {
+            let image = (2.0..width - 3.0).contains(&at[0]) && (2.0..height - 3.0).contains(&at[1]);
+            let cut_off = CORNERS.iter().filter_map(|corner| corners.get(*corner)).any(|[u, v]| {
+                length([u - at[0], v - at[1]]) < CORNER
+            });
+            if image && !cut_off {
                 found(Edge {
-                    band,
+                    side: index % (OUTLINE / 2) == OUTLINE / 2 - 1,
                     normal: outward,
                     offset: crossing(map, at, outward, reach),
                 });

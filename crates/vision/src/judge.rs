@@ -32,6 +32,8 @@ pub struct Evidence {
     pub bloom: f64,
     /// Centroid of the outline, u, v (px).
     pub centroid: [f64; 2],
+    /// Centroid of what is in it, holes filled, u, v (px).
+    pub filled: [f64; 2],
 }
 
 /// What a band must show.
@@ -194,7 +196,7 @@ fn lay(
 fn weigh(laid: &Expectation, found: &Fit, map: &RunMap, demands: &Demands) -> Verdict {
     let [ua, va, ub, vb] = found.features;
     let places = [[ua, va], [ub, vb]];
-    let outlines = [0, 1].map(|band| settle(&laid.bands[band], places[band]).grown(found.bloom[band]));
+    let outlines = [0, 1].map(|band| settle(&laid.bands[band], places[band]).grown(f64::midpoint(found.bloom[band].rims, found.bloom[band].sides)));
     let bands = [0, 1].map(|band| {
         let (own, other) = (&outlines[band], &outlines[1 - band]);
         let whole = own.count(map, other);
@@ -208,8 +210,9 @@ fn weigh(laid: &Expectation, found: &Fit, map: &RunMap, demands: &Demands) -> Ve
             coverage: whole.marker / f64::max(whole.pixels, 1.0),
             spill: marker / ring,
             edges: found.edges[band],
-            bloom: found.bloom[band],
+            bloom: found.bloom[band].rims,
             centroid: places[band],
+            filled: own.grown(2.0).filled_centroid(3.5, map),
         }
     });
     let reasons = bands.map(|band| refusal(&band, found.surprise, demands));
