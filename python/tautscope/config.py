@@ -104,9 +104,9 @@ class CameraConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 class VisionConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Eq. (12) and Fig. 5."""
 
-    weights: Vector3 = (-0.2, 1.0, -0.8)
+    weights: Vector3 = (-0.525, 1.0, -0.648)
     """Fisher's discriminant: weight of blue, green, red [ours, fitted on labelled pixels]."""
-    threshold: float = 10.0
+    threshold: float = 5.0
     """A pixel whose weighted sum exceeds this is marker [grey levels]."""
     smoothing: Annotated[int, Meta(ge=0, le=8)] = 1
     """Passes of the 3x3 binomial low-pass over the projected channel; 0 is none [ours]."""

@@ -15,7 +15,7 @@ from tautscope import _core
 from tautscope.config import CameraConfig, Config
 from tautscope.dof import Dof
 from tautscope.errors import FieldError, FrameError
-from tautscope.reduction import build_feature_model
+from tautscope.reduction import Expectation, build_feature_model
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,19 +31,6 @@ class Region:
     centroid: tuple[float, float]
     area: int
     box: tuple[int, int, int, int]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Expectation:
-    """Where the instrument is believed to be when a frame was captured.
-
-    Attributes:
-        state: (3,) [m, rad, rad].
-        deviation: (3,) standard deviations [m, rad, rad].
-    """
-
-    state: NDArray[np.float64]
-    deviation: NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,7 +221,8 @@ def _starts(config: Config) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
             for sine, n in zip(sines, (2, 5, 2), strict=True)
         )
     )
-    states = np.array(list(grid))
+    centre = [sine.centre for sine in sines]
+    states = np.array([centre, *grid])
     return states, np.array([sine.amplitude for sine in sines])
 
 

@@ -141,6 +141,9 @@ type Measured<'py> = (
     Bound<'py, PyArray2<f64>>,
 );
 
+/// States from which the best is sought.
+const STARTS: usize = 3;
+
 /// What the core's model says of where the instrument may be.
 struct Believed<'a> {
     model: &'a core::FeatureModel,
@@ -151,9 +154,24 @@ struct Believed<'a> {
 
 impl Expect for Believed<'_> {
     fn expect(&self, seen: [f64; 4], deviation: [f64; 4]) -> Option<Expectation> {
-        let found = self.states.iter().filter_map(|state| {
-            let belief = core::Belief { state: *state, deviation: self.deviation };
-            let (nearest, misfit) = self.model.nearest_state(&belief, seen, deviation)?;
+        let belief = |state: &[f64; 3]| core::Belief {
+            state: *state,
+            deviation: self.deviation,
+        };
+        // The states that explain the features best as they are; one of them leads to the best of all.
+        let mut starts = [(f64::INFINITY, None); STARTS];
+        for state in self.states {
+            let misfit = self.model.misfit(&belief(state), *state, seen, deviation);
+            let misfit = misfit.unwrap_or(f64::INFINITY);
+            if let Some(place) = starts.iter().position(|(less, _)| misfit < *less) {
+                starts[place..].rotate_right(1);
+                starts[place] = (misfit, Some(state));
+            }
+        }
+        let found = starts.iter().filter_map(|(_, state)| {
+            let state = (*state)?;
+            let found = self.model.nearest_state(&belief(state), seen, deviation);
+            let (nearest, misfit) = found?;
             Some((*state, nearest, misfit))
         });
         let (believed, nearest, _) = found.min_by(|a, b| a.2.total_cmp(&b.2))?;

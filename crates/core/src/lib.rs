@@ -33,6 +33,7 @@ mod play;
 mod posture;
 mod reduction;
 mod state;
+mod whereabouts;
 
 pub use camera::{Camera, Pose, Projection};
 pub use compensator::{Compensator, CompensatorState};
@@ -47,3 +48,4 @@ pub use play::{ContactMode, Play, PlayState};
 pub use posture::Belief;
 pub use reduction::{Axis, HysteresisReduction, Report, Status};
 pub use state::{StateEstimate, StateEstimator};
+pub use whereabouts::Whereabouts;

@@ -61,7 +61,8 @@ impl FeatureModel {
         Some((state, cost))
     }
 
-    fn misfit(
+    /// What `nearest_state` minimises, for a state.
+    pub fn misfit(
         &self,
         belief: &Belief,
         state: PerDof<f64>,

@@ -150,8 +150,9 @@ fn attempt(
             [seen[2 * band], seen[2 * band + 1]] = region.centroid();
         }
     }
-    let (laid, coarse) = lay(seen, 4.0, [true; 2], map, expect)?;
-    let (laid, found) = lay(coarse.features, 1.5, [true; 2], map, expect).unwrap_or((laid, coarse));
+    let (laid, coarse) = lay(seen, [4.0; 4], [true; 2], map, expect)?;
+    let again = lay(coarse.features, sureness(&coarse), [true; 2], map, expect);
+    let (laid, found) = again.unwrap_or((laid, coarse));
     let verdict = weigh(&laid, &found, map, demands);
     match verdict.reasons {
         [None, None] | [Some(_), Some(_)] => Some(verdict),
@@ -162,7 +163,7 @@ fn attempt(
             for band in (0..2).filter(|band| !alone[*band]) {
                 seen[2 * band..2 * band + 2].fill(f64::NAN);
             }
-            let (laid, found) = lay(seen, 1.5, alone, map, expect)?;
+            let (laid, found) = lay(seen, sureness(&found), alone, map, expect)?;
             let mut last = weigh(&laid, &found, map, demands);
             for band in (0..2).filter(|band| !alone[*band]) {
                 last.reasons[band] = reasons[band];
@@ -174,14 +175,19 @@ fn attempt(
     }
 }
 
+/// Standard deviations of a fit's features, not quite as it believes: its outlines were not yet right.
+fn sureness(found: &Fit) -> [f64; 4] {
+    [0, 1, 2, 3].map(|index: usize| 0.3 + 2.0 * found.covariance[index][index].max(0.0).sqrt())
+}
+
 fn lay(
     seen: [f64; 4],
-    deviation: f64,
+    deviation: [f64; 4],
     bands: [bool; 2],
     map: &RunMap,
     expect: &impl Expect,
 ) -> Option<(Expectation, Fit)> {
-    let laid = expect.expect(seen, [deviation; 4])?;
+    let laid = expect.expect(seen, deviation)?;
     let [a, b] = &laid.bands;
     let mut start = [a.centroid[0], a.centroid[1], b.centroid[0], b.centroid[1]];
     for (start, seen) in start.iter_mut().zip(seen) {
