@@ -108,6 +108,12 @@ class VisionConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """Fisher's discriminant: weight of blue, green, red [ours, fitted on labelled pixels]."""
     threshold: float = 5.0
     """A pixel whose weighted sum exceeds this is marker [grey levels]."""
+    alternatives: tuple[tuple[Vector3, float], ...] = (
+        ((-0.8, 1.0, -0.8), 5.0),
+        ((-0.45, 1.0, -0.55), 8.0),
+    )
+    """Weights and threshold to try in turn where the first give no clear verdict: one for a white
+    balance so green that grey looks green, one for light so bright that green looks white [ours]."""
     smoothing: Annotated[int, Meta(ge=0, le=8)] = 1
     """Passes of the 3x3 binomial low-pass over the projected channel; 0 is none [ours]."""
     minimum_area: Annotated[int, Meta(ge=1)] = 40

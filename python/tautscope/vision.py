@@ -43,6 +43,7 @@ class Evidence:
         spill: Share of a ring around it that has the markers' colour.
         edges: Share of its outline at which the colour ends.
         bloom: How much the outline had to grow [px].
+        surprise: Squared Mahalanobis distance of both bands from where they were expected.
         centroid: Where the outline was laid, u, v [px].
     """
 
@@ -51,6 +52,7 @@ class Evidence:
     spill: float
     edges: float
     bloom: float
+    surprise: float
     centroid: tuple[float, float]
     filled: tuple[float, float]
 
@@ -137,6 +139,7 @@ class MarkerDetector:
             minimum_area=vision.minimum_area,
             gate=vision.gate,
             entry_point=entry_point(config.camera),
+            alternatives=[(weights, threshold) for weights, threshold in vision.alternatives],
             model_deviation=vision.model_deviation,
             demands=(
                 vision.least_inside,
@@ -174,7 +177,7 @@ class MarkerDetector:
         features, covariance, evidence, reasons, regions = self._core.detect(
             pixels, states, deviation
         )
-        a, b = (Evidence(*row[:5], (row[5], row[6]), (row[7], row[8])) for row in evidence.tolist())
+        a, b = (Evidence(*row[:6], (row[6], row[7]), (row[8], row[9])) for row in evidence.tolist())
         found = tuple(_region(row) for row in regions.tolist())
         return Detection(features, covariance, reasons, (a, b), found)
 
@@ -191,7 +194,7 @@ class MarkerDetector:
             self._model.nearest_state(start, broad, predicted, np.full(4, 5.0)) for start in starts
         ]
         state, _ = min((fit for fit in fits if fit is not None), key=lambda fit: fit[1])
-        return state[None], self._start_deviation
+        return state[None], self._start_deviation / 2
 
     def mask(self, image: NDArray[np.uint8]) -> NDArray[np.bool_]:
         """What is above the threshold after the low-pass, for figures: bool (height, width).

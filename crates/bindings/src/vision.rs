@@ -39,7 +39,7 @@ pub struct MarkerDetector {
 #[pymethods]
 impl MarkerDetector {
     #[new]
-    #[pyo3(signature = (model, *, weights, threshold, smoothing, minimum_area, gate, entry_point, model_deviation, demands))]
+    #[pyo3(signature = (model, *, weights, threshold, smoothing, minimum_area, gate, entry_point, model_deviation, demands, alternatives))]
     #[expect(clippy::too_many_arguments, reason = "named in Python")]
     fn new(
         py: Python<'_>,
@@ -52,6 +52,7 @@ impl MarkerDetector {
         entry_point: [f64; 2],
         model_deviation: f64,
         demands: [f64; 5],
+        alternatives: Vec<([f64; 3], f64)>,
     ) -> PyResult<Self> {
         let discriminant = ColorDiscriminant::new(weights, threshold).map_err(refused(py))?;
         let detector = Detector::new(Settings {
@@ -61,13 +62,21 @@ impl MarkerDetector {
             gate,
             entry_point,
         });
+        let others: Result<Vec<_>, _> = alternatives
+            .into_iter()
+            .map(|(weights, threshold)| ColorDiscriminant::new(weights, threshold))
+            .collect();
         let [inside, coverage, spill, edges, surprise] = demands;
         Ok(Self {
             model: model.0,
             model_deviation,
             demands: Demands { inside, coverage, spill, edges, surprise },
             segmenter: Segmenter::new(discriminant, smoothing),
-            detector: Mutex::new(detector.map_err(refused(py))?),
+            detector: Mutex::new(
+                detector
+                    .map_err(refused(py))?
+                    .with_alternatives(&others.map_err(refused(py))?),
+            ),
         })
     }
 
@@ -99,7 +108,7 @@ impl MarkerDetector {
         let evidence = verdict.bands.map(|band| {
             let [u, v] = band.centroid;
             let [x, y] = band.filled;
-            [band.inside, band.coverage, band.spill, band.edges, band.bloom, u, v, x, y]
+            [band.inside, band.coverage, band.spill, band.edges, band.bloom, band.surprise, u, v, x, y]
         });
         Ok((
             PyArray1::from_slice(py, &verdict.features),

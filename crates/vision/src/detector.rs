@@ -30,6 +30,8 @@ pub struct Detector {
     labeller: Labeller,
     map: RunMap,
     regions: Vec<Region>,
+    alternatives: Vec<Segmenter>,
+    best: Vec<Region>,
 }
 
 /// What a frame shows.
@@ -76,7 +78,17 @@ impl Detector {
             labeller: Labeller::default(),
             map: RunMap::default(),
             regions: Vec::with_capacity(CANDIDATES),
+            alternatives: Vec::new(),
+            best: Vec::with_capacity(CANDIDATES),
         })
+    }
+
+    /// Discriminants to try in turn where the first does not give a clear verdict.
+    #[must_use]
+    pub fn with_alternatives(mut self, discriminants: &[ColorDiscriminant]) -> Self {
+        let segmenter = |one: &ColorDiscriminant| Segmenter::new(*one, self.settings.smoothing);
+        self.alternatives = discriminants.iter().map(segmenter).collect();
+        self
     }
 
     /// Finds the markers, near `predicted` `[u_A, v_A, u_B, v_B]` (px) if that is given and finite,
@@ -104,8 +116,29 @@ impl Detector {
         demands: &Demands,
     ) -> (Verdict, &[Region]) {
         self.find_regions(frame);
-        let verdict = judge(&self.regions, &self.map, expect, demands);
+        let mut verdict = judge(&self.regions, &self.map, expect, demands);
+        for index in 0..self.alternatives.len() {
+            if verdict.is_clear() {
+                break;
+            }
+            std::mem::swap(&mut self.best, &mut self.regions);
+            self.exchange(index);
+            self.find_regions(frame);
+            self.exchange(index);
+            let other = judge(&self.regions, &self.map, expect, demands);
+            if other.score() > verdict.score() {
+                verdict = other;
+            } else {
+                std::mem::swap(&mut self.best, &mut self.regions);
+            }
+        }
         (verdict, &self.regions)
+    }
+
+    fn exchange(&mut self, index: usize) {
+        if let Some(other) = self.alternatives.get_mut(index) {
+            std::mem::swap(&mut self.segmenter, other);
+        }
     }
 
     fn find_regions(&mut self, frame: &impl Frame) {
@@ -115,6 +148,7 @@ impl Detector {
             map,
             regions,
             settings,
+            ..
         } = self;
         regions.clear();
         let mut keep = |region: Region| {

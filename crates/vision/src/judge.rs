@@ -1,6 +1,7 @@
 //! Which of what has the markers' colour is a band: by place, size, outline, and both together.
 
 use crate::fit::{Fit, fit, settle};
+use crate::linear::{inverse, quadratic};
 use crate::regions::real;
 use crate::{Expect, Expectation, Region, Rejection, RunMap};
 
@@ -30,6 +31,8 @@ pub struct Evidence {
     pub edges: f64,
     /// How much its outline had to grow (px).
     pub bloom: f64,
+    /// Squared Mahalanobis distance of both bands from where they were expected.
+    pub surprise: f64,
     /// Centroid of the outline, u, v (px).
     pub centroid: [f64; 2],
     /// Centroid of what is in it, holes filled, u, v (px).
@@ -53,9 +56,9 @@ pub struct Demands {
 
 const NOWHERE: [f64; 4] = [f64::NAN; 4];
 /// Pairs of regions that are tried, the likeliest first.
-const TRIALS: usize = 4;
-/// A trial this good ends the search: share of edges.
-const ENOUGH: f64 = 0.7;
+const TRIALS: usize = 6;
+/// [`Verdict::score`] of a verdict that needs no other: both bands, with this share of edges.
+const ENOUGH: f64 = 2.0 + 2.0 * 0.75;
 
 /// Recognises the bands among `regions` and `map`.
 pub fn judge(regions: &[Region], map: &RunMap, expect: &impl Expect, demands: &Demands) -> Verdict {
@@ -67,12 +70,12 @@ pub fn judge(regions: &[Region], map: &RunMap, expect: &impl Expect, demands: &D
     }
     let mut best: Option<(f64, Verdict)> = None;
     for pair in likely(regions, &blind).into_iter().flatten() {
-        let Some(verdict) = attempt(pair, regions, map, expect, demands) else { continue };
+        let Some(verdict) = attempt(pair, &blind, regions, map, expect, demands) else { continue };
         let score = verdict.score();
         if best.is_none_or(|(most, _)| score > most) {
             best = Some((score, verdict));
         }
-        if score >= 2.0 + 2.0 * ENOUGH {
+        if verdict.is_clear() {
             break;
         }
     }
@@ -81,7 +84,7 @@ pub fn judge(regions: &[Region], map: &RunMap, expect: &impl Expect, demands: &D
 
 impl Verdict {
     /// Each band found counts one, and its edges.
-    fn score(&self) -> f64 {
+    pub(crate) fn score(&self) -> f64 {
         let bands = self.bands.iter().zip(&self.reasons);
         bands
             .map(|(band, reason)| if reason.is_none() { 1.0 + band.edges } else { 0.1 * band.edges })
@@ -89,7 +92,7 @@ impl Verdict {
     }
 }
 
-/// A region for A and one for B; none: not among the regions.
+/// A region for A and one for B; none: not among the regions; one for both: they run into each other.
 type Pair = [Option<usize>; 2];
 
 /// The likeliest pairs, the likeliest first: squared Mahalanobis distance of each pair's centroids, where a
@@ -103,11 +106,18 @@ fn likely(regions: &[Region], expected: &Expectation) -> [Option<Pair>; TRIALS] 
         row[index] += slack[index / 2];
     }
     let choices = || (0..regions.len()).map(Some).chain([None]);
-    let inverse = crate::linear::inverse(covariance).unwrap_or([[0.0; 4]; 4]);
+    let both = inverse(covariance).unwrap_or([[0.0; 4]; 4]);
     let single = [0, 2].map(|at| {
         let part = [0, 1].map(|i| [0, 1].map(|j| covariance[at + i][at + j]));
-        crate::linear::inverse(part).unwrap_or([[0.0; 2]; 2])
+        inverse(part).unwrap_or([[0.0; 2]; 2])
     });
+    let middle = [0, 1].map(|i| {
+        [0, 1].map(|j| {
+            let across = covariance[i][j + 2] + covariance[i + 2][j];
+            (covariance[i][j] + covariance[i + 2][j + 2] + across) / 4.0
+        })
+    });
+    let middle = inverse(middle).unwrap_or([[0.0; 2]; 2]);
     let away = |index: usize, band: usize| {
         let [u, v] = regions[index].centroid();
         [u - expected.features[2 * band], v - expected.features[2 * band + 1]]
@@ -120,12 +130,16 @@ fn likely(regions: &[Region], expected: &Expectation) -> [Option<Pair>; TRIALS] 
             let cost = match (a, b) {
                 (Some(a), Some(b)) if a != b => {
                     let ([ua, va], [ub, vb]) = (away(a, 0), away(b, 1));
-                    crate::linear::quadratic(&inverse, [ua, va, ub, vb]) + size(a, 0) + size(b, 1)
+                    quadratic(&both, [ua, va, ub, vb]) + size(a, 0) + size(b, 1)
                 }
-                (Some(a), None) => 16.0 + crate::linear::quadratic(&single[0], away(a, 0)) + size(a, 0),
-                (None, Some(b)) => 16.0 + crate::linear::quadratic(&single[1], away(b, 1)) + size(b, 1),
+                (Some(a), None) => 16.0 + quadratic(&single[0], away(a, 0)) + size(a, 0),
+                (None, Some(b)) => 16.0 + quadratic(&single[1], away(b, 1)) + size(b, 1),
+                (Some(one), Some(_)) => {
+                    let both = expected.bands[0].area + expected.bands[1].area;
+                    let shift = shift(regions[one].centroid(), expected);
+                    quadratic(&middle, shift) + (real(regions[one].area) / both).ln().powi(2)
+                }
                 (None, None) => 24.0,
-                _ => continue,
             };
             let place = kept.iter().position(|one| one.is_none_or(|(less, _)| cost < less));
             if let Some(place) = place {
@@ -137,8 +151,15 @@ fn likely(regions: &[Region], expected: &Expectation) -> [Option<Pair>; TRIALS] 
     kept.map(|one| one.map(|(_, pair)| pair))
 }
 
+/// From the middle of the two expected bands to a region over both.
+fn shift([u, v]: [f64; 2], expected: &Expectation) -> [f64; 2] {
+    let [ua, va, ub, vb] = expected.features;
+    [u - f64::midpoint(ua, ub), v - f64::midpoint(va, vb)]
+}
+
 fn attempt(
     pair: Pair,
+    blind: &Expectation,
     regions: &[Region],
     map: &RunMap,
     expect: &impl Expect,
@@ -149,6 +170,13 @@ fn attempt(
         if let Some(region) = region.and_then(|index| regions.get(index)) {
             [seen[2 * band], seen[2 * band + 1]] = region.centroid();
         }
+    }
+    if let [Some(one), Some(other)] = pair
+        && one == other
+    {
+        let [u, v] = shift(regions[one].centroid(), blind);
+        let [ua, va, ub, vb] = blind.features;
+        seen = [ua + u, va + v, ub + u, vb + v];
     }
     let (laid, coarse) = lay(seen, [4.0; 4], [true; 2], map, expect)?;
     let again = lay(coarse.features, sureness(&coarse), [true; 2], map, expect);
@@ -217,11 +245,12 @@ fn weigh(laid: &Expectation, found: &Fit, map: &RunMap, demands: &Demands) -> Ve
             spill: marker / ring,
             edges: found.edges[band],
             bloom: found.bloom[band].rims,
+            surprise: found.surprise,
             centroid: places[band],
             filled: own.grown(2.0).filled_centroid(3.5, map),
         }
     });
-    let reasons = bands.map(|band| refusal(&band, found.surprise, demands));
+    let reasons = bands.map(|band| refusal(&band, demands));
     let mut verdict = Verdict {
         features: found.features,
         covariance: found.covariance,
@@ -232,7 +261,7 @@ fn weigh(laid: &Expectation, found: &Fit, map: &RunMap, demands: &Demands) -> Ve
     verdict
 }
 
-fn refusal(band: &Evidence, surprise: f64, demands: &Demands) -> Option<Rejection> {
+fn refusal(band: &Evidence, demands: &Demands) -> Option<Rejection> {
     if band.inside < demands.inside {
         Some(Rejection::Outside { share: 1.0 - band.inside })
     } else if band.coverage < demands.coverage {
@@ -241,14 +270,19 @@ fn refusal(band: &Evidence, surprise: f64, demands: &Demands) -> Option<Rejectio
         Some(Rejection::Larger { share: band.spill })
     } else if band.edges < demands.edges {
         Some(Rejection::Shape { share: band.edges })
-    } else if surprise.is_nan() || surprise > demands.surprise {
-        Some(Rejection::Elsewhere { distance: surprise.sqrt() })
+    } else if band.surprise.is_nan() || band.surprise > demands.surprise {
+        Some(Rejection::Elsewhere { distance: band.surprise.sqrt() })
     } else {
         None
     }
 }
 
 impl Verdict {
+    /// Whether there is no need to look further.
+    pub(crate) fn is_clear(&self) -> bool {
+        self.score() >= ENOUGH
+    }
+
     /// What is not found has no features.
     fn conceal(&mut self) {
         for band in (0..2).filter(|band| self.reasons[*band].is_some()) {
