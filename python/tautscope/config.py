@@ -124,15 +124,15 @@ class VisionConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """How far a band may be from where the instrument's model has it: standard deviation [px] [ours]."""
     least_inside: Fraction = 0.5
     """A band of which less is in the image is refused [share of its area] [ours]."""
-    least_coverage: Fraction = 0.35
+    least_coverage: Fraction = 0.4
     """A band of which less has the markers' colour is refused [share of its area] [ours]."""
     largest_spill: Fraction = 0.25
     """A band around which more has the markers' colour is refused [share of a ring] [ours]."""
-    least_edges: Fraction = 0.4
+    least_edges: Fraction = 0.45
     """A band at less of whose outline the colour ends is refused [share of it] [ours]."""
-    largest_surprise: Positive = 30.0
+    largest_surprise: Positive = 18.5
     """Largest squared Mahalanobis distance of the bands from where they are expected; chi squared
-    with 4 degrees of freedom exceeds it 5 times in a million [ours]."""
+    with 4 degrees of freedom exceeds it once in a thousand [ours]."""
 
 
 class ControlConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -40,6 +40,7 @@ class Evidence:
     Attributes:
         inside: Share of its outline's area that is in the image.
         coverage: Share of that which has the markers' colour.
+        own: Share of that which the other band's outline does not have too.
         spill: Share of a ring around it that has the markers' colour.
         edges: Share of its outline at which the colour ends.
         bloom: How much the outline had to grow [px].
@@ -49,6 +50,7 @@ class Evidence:
 
     inside: float
     coverage: float
+    own: float
     spill: float
     edges: float
     bloom: float
@@ -177,7 +179,7 @@ class MarkerDetector:
         features, covariance, evidence, reasons, regions = self._core.detect(
             pixels, states, deviation
         )
-        a, b = (Evidence(*row[:6], (row[6], row[7]), (row[8], row[9])) for row in evidence.tolist())
+        a, b = (Evidence(*row[:7], (row[7], row[8]), (row[9], row[10])) for row in evidence.tolist())
         found = tuple(_region(row) for row in regions.tolist())
         return Detection(features, covariance, reasons, (a, b), found)
 

@@ -108,7 +108,7 @@ impl MarkerDetector {
         let evidence = verdict.bands.map(|band| {
             let [u, v] = band.centroid;
             let [x, y] = band.filled;
-            [band.inside, band.coverage, band.spill, band.edges, band.bloom, band.surprise, u, v, x, y]
+            [band.inside, band.coverage, band.own, band.spill, band.edges, band.bloom, band.surprise, u, v, x, y]
         });
         Ok((
             PyArray1::from_slice(py, &verdict.features),

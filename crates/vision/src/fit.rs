@@ -11,9 +11,12 @@ const REACH: f64 = 9.0;
 const EDGE: f64 = 0.7;
 /// Edges farther than this from where they should be have no say in the end (px); at first, four times.
 const TOLERANCE: f64 = 1.8;
-/// Standard deviation of the growth of an outline: blur and threshold (px), and unknown scale (1).
-const BLOOM: f64 = 0.6;
+/// Standard deviation of the growth of the outlines: blur and threshold (px), and unknown scale (1).
+const BLOOM: f64 = 1.2;
 const SCALE: f64 = 0.06;
+/// The same for the difference of the two bands: they are blurred alike.
+const BLOOM_APART: f64 = 0.4;
+const SCALE_APART: f64 = 0.03;
 /// Nearer than this to where a rim meets a side the low-pass rounds the outline off (px).
 const CORNER: f64 = 2.5;
 /// Where they meet.
@@ -83,11 +86,13 @@ pub fn fit(expected: &Expectation, start: [f64; 4], seen: [bool; 2], map: &RunMa
             right[row] = pull;
             normal[row][..4].copy_from_slice(&prior[row]);
         }
-        for (band, outline) in laid.iter().enumerate() {
-            let spread = BLOOM + SCALE * outline.radius();
-            for index in [4 + 2 * band, 5 + 2 * band] {
-                normal[index][index] = 1.0 / (spread * spread);
-            }
+        let size = f64::midpoint(a.radius(), b.radius());
+        let common = (BLOOM + SCALE * size).powi(-2);
+        let apart = (BLOOM_APART + SCALE_APART * size).powi(-2);
+        for index in 4..8 {
+            let other = if index < 6 { index + 2 } else { index - 2 };
+            normal[index][index] = common + apart;
+            normal[index][other] = -apart;
         }
         let (mut edges, mut inside) = ([0.0; 2], [0.0; 2]);
         let (mut weights, mut misfit) = ([0.0; 2], [0.0; 2]);

@@ -25,6 +25,8 @@ pub struct Evidence {
     pub inside: f64,
     /// Share of that which has the markers' colour.
     pub coverage: f64,
+    /// Share of it that has the markers' colour and is not in the other band's outline.
+    pub own: f64,
     /// Share of a ring around it that has the markers' colour.
     pub spill: f64,
     /// Share of its outline at which the colour ends.
@@ -242,6 +244,7 @@ fn weigh(laid: &Expectation, found: &Fit, map: &RunMap, demands: &Demands) -> Ve
         Evidence {
             inside: whole.pixels / own.area,
             coverage: whole.marker / f64::max(whole.pixels, 1.0),
+            own: (whole.marker - whole.shared) / f64::max(whole.pixels, 1.0),
             spill: marker / ring,
             edges: found.edges[band],
             bloom: found.bloom[band].rims,
@@ -264,8 +267,8 @@ fn weigh(laid: &Expectation, found: &Fit, map: &RunMap, demands: &Demands) -> Ve
 fn refusal(band: &Evidence, demands: &Demands) -> Option<Rejection> {
     if band.inside < demands.inside {
         Some(Rejection::Outside { share: 1.0 - band.inside })
-    } else if band.coverage < demands.coverage {
-        Some(Rejection::Hidden { share: band.coverage })
+    } else if band.coverage < demands.coverage || band.own < 0.75 * demands.coverage {
+        Some(Rejection::Hidden { share: band.own })
     } else if band.spill > demands.spill {
         Some(Rejection::Larger { share: band.spill })
     } else if band.edges < demands.edges {
