@@ -111,9 +111,11 @@ class VisionConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     alternatives: tuple[tuple[Vector3, float], ...] = (
         ((-0.8, 1.0, -0.8), 5.0),
         ((-0.45, 1.0, -0.55), 8.0),
+        ((-0.525, 1.0, -0.648), 40.0),
     )
-    """Weights and threshold to try in turn where the first give no clear verdict: one for a white
-    balance so green that grey looks green, one for light so bright that green looks white [ours]."""
+    """Weights and threshold to try in turn where the first give no clear verdict: for a white
+    balance so green that grey looks green, for light so bright that green looks white, and for
+    bands that run into each other in a blurred picture [ours]."""
     smoothing: Annotated[int, Meta(ge=0, le=8)] = 1
     """Passes of the 3x3 binomial low-pass over the projected channel; 0 is none [ours]."""
     minimum_area: Annotated[int, Meta(ge=1)] = 40
@@ -128,8 +130,10 @@ class VisionConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """A band of which less has the markers' colour is refused [share of its area] [ours]."""
     largest_spill: Fraction = 0.25
     """A band around which more has the markers' colour is refused [share of a ring] [ours]."""
-    least_edges: Fraction = 0.45
+    least_edges: Fraction = 0.4
     """A band at less of whose outline the colour ends is refused [share of it] [ours]."""
+    least_edges_on_average: Fraction = 0.6
+    """The same for the mean of both bands, and for a band that is found alone [ours]."""
     largest_surprise: Positive = 18.5
     """Largest squared Mahalanobis distance of the bands from where they are expected; chi squared
     with 4 degrees of freedom exceeds it once in a thousand [ours]."""

@@ -148,6 +148,7 @@ class MarkerDetector:
                 vision.least_coverage,
                 vision.largest_spill,
                 vision.least_edges,
+                vision.least_edges_on_average,
                 vision.largest_surprise,
             ),
         )

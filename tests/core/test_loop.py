@@ -126,7 +126,7 @@ def test_report_shows_its_working() -> None:
     }
     four = {"predicted_features", "innovation"}
     assert shapes == {name: (4,) if name in four else (3,) for name in shapes}
-    assert len(shapes) == 8 and len(report.triggers) == 3
+    assert len(shapes) == 9 and len(report.triggers) == 3
 
 
 def test_frames_that_teach_nothing_say_why() -> None:

@@ -113,7 +113,9 @@ impl Reduction {
             }
             None => None,
         };
-        let report = self.0.on_features(features, covariance.as_ref(), captured_at);
+        let report = self
+            .0
+            .on_features(features, covariance.as_ref(), captured_at);
         let estimate = &report.estimate;
         let [insertion, rotation, bending] = report.triggers.map(trigger_names);
         Ok((

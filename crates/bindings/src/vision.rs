@@ -15,9 +15,9 @@ use numpy::ndarray::{Array2, ArrayView3, Axis};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use tautscope_core as core;
 use tautscope_vision::frame::MAX_SIDE;
 use tautscope_vision::segment::each_run;
-use tautscope_core as core;
 use tautscope_vision::{
     ColorDiscriminant, Demands, Detector, Error, Expect, Expectation, Frame, Labeller, Outline,
     Region, Segmenter, Settings,
@@ -51,7 +51,7 @@ impl MarkerDetector {
         gate: f64,
         entry_point: [f64; 2],
         model_deviation: f64,
-        demands: [f64; 5],
+        demands: [f64; 6],
         alternatives: Vec<([f64; 3], f64)>,
     ) -> PyResult<Self> {
         let discriminant = ColorDiscriminant::new(weights, threshold).map_err(refused(py))?;
@@ -66,11 +66,18 @@ impl MarkerDetector {
             .into_iter()
             .map(|(weights, threshold)| ColorDiscriminant::new(weights, threshold))
             .collect();
-        let [inside, coverage, spill, edges, surprise] = demands;
+        let [inside, coverage, spill, edges, edges_on_average, surprise] = demands;
         Ok(Self {
             model: model.0,
             model_deviation,
-            demands: Demands { inside, coverage, spill, edges, surprise },
+            demands: Demands {
+                inside,
+                coverage,
+                spill,
+                edges,
+                edges_on_average,
+                surprise,
+            },
             segmenter: Segmenter::new(discriminant, smoothing),
             detector: Mutex::new(
                 detector
@@ -108,7 +115,19 @@ impl MarkerDetector {
         let evidence = verdict.bands.map(|band| {
             let [u, v] = band.centroid;
             let [x, y] = band.filled;
-            [band.inside, band.coverage, band.own, band.spill, band.edges, band.bloom, band.surprise, u, v, x, y]
+            [
+                band.inside,
+                band.coverage,
+                band.own,
+                band.spill,
+                band.edges,
+                band.bloom,
+                band.surprise,
+                u,
+                v,
+                x,
+                y,
+            ]
         });
         Ok((
             PyArray1::from_slice(py, &verdict.features),
@@ -184,6 +203,12 @@ impl Expect for Believed<'_> {
             Some((*state, nearest, misfit))
         });
         let (believed, nearest, _) = found.min_by(|a, b| a.2.total_cmp(&b.2))?;
+        // Where several states cover the workspace, no place in it is surprising.
+        let believed = if self.states.len() > 1 {
+            nearest
+        } else {
+            believed
+        };
         let prediction = self.model.predict(nearest)?;
         let bands = self.model.bands(nearest)?;
         let [a, b] = bands.map(|band| band.centroid);

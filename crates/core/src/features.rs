@@ -84,10 +84,7 @@ impl FeatureModel {
     pub(crate) fn axes(&self, state: PerDof<f64>) -> [(Vector, Vector); 2] {
         self.instrument.markers(state).map(|marker| {
             let pose = &self.camera_from_guide;
-            (
-                pose.transform(marker.position),
-                pose.rotate(marker.axis),
-            )
+            (pose.transform(marker.position), pose.rotate(marker.axis))
         })
     }
 

@@ -70,13 +70,13 @@ impl FeatureModel {
             let projection = self.project(point)?;
             *corner = projection;
         }
-        enclosed(outline)
+        enclosed(&outline)
     }
 }
 
 /// Area, centroid and second moments of what an outline encloses; None if that is nothing.
-fn enclosed(outline: [[f64; 2]; OUTLINE]) -> Option<BandImage> {
-    let [first, ..] = outline;
+fn enclosed(outline: &[[f64; 2]; OUTLINE]) -> Option<BandImage> {
+    let [first, ..] = *outline;
     let (mut area, mut sum, mut square) = (0.0, [0.0; 2], [0.0; 3]);
     let next = outline.iter().skip(1).chain([&first]);
     // About the first corner: far from the origin the sums would cancel.
@@ -94,7 +94,7 @@ fn enclosed(outline: [[f64; 2]; OUTLINE]) -> Option<BandImage> {
     let [x, y] = sum.map(|sum| sum / area);
     let [xx, xy, yy] = square.map(|square| square / area);
     let image = BandImage {
-        outline,
+        outline: *outline,
         area: area.abs(),
         centroid: [first[0] + x, first[1] + y],
         moments: [xx - x * x, xy - x * y, yy - y * y],

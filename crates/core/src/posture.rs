@@ -72,10 +72,15 @@ impl FeatureModel {
         let features = self.predict(state)?.features;
         let seen = features.iter().zip(measured).zip(deviation);
         let misfit: f64 = seen
-            .map(|((h, s), deviation)| square(weight(s, deviation) * (h - if s.is_finite() { s } else { *h })))
+            .map(|((h, s), deviation)| {
+                square(weight(s, deviation) * (h - if s.is_finite() { s } else { *h }))
+            })
             .sum();
         let believed = state.iter().zip(belief.state).zip(belief.deviation);
-        let cost = misfit + believed.map(|((q, q0), d)| square((q - q0) / d)).sum::<f64>();
+        let cost = misfit
+            + believed
+                .map(|((q, q0), d)| square((q - q0) / d))
+                .sum::<f64>();
         cost.is_finite().then_some(cost)
     }
 
@@ -91,7 +96,12 @@ impl FeatureModel {
         let [s1, s2, s3] = belief.deviation;
         let mut normal = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let mut right = [0.0; 3];
-        for (((right, q), q0), scale) in right.iter_mut().zip(state).zip(belief.state).zip(belief.deviation) {
+        for (((right, q), q0), scale) in right
+            .iter_mut()
+            .zip(state)
+            .zip(belief.state)
+            .zip(belief.deviation)
+        {
             *right = (q0 - q) / scale;
         }
         let [c1, c2, c3] = prediction.columns;
@@ -118,5 +128,9 @@ impl FeatureModel {
 }
 
 fn weight(measured: f64, deviation: f64) -> f64 {
-    if measured.is_finite() { 1.0 / deviation } else { 0.0 }
+    if measured.is_finite() {
+        1.0 / deviation
+    } else {
+        0.0
+    }
 }

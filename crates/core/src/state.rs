@@ -209,7 +209,10 @@ fn solve_and_hold_one(axes: &mut [Unknown; 3], innovation: Column) -> bool {
     let mut best: Option<(f64, [Unknown; 3])> = None;
     for index in 0..axes.len() {
         let mut trial = *axes;
-        let Some(axis) = trial.get_mut(index).filter(|axis| axis.active && axis.ratio > 1.0) else {
+        let Some(axis) = trial
+            .get_mut(index)
+            .filter(|axis| axis.active && axis.ratio > 1.0)
+        else {
             continue;
         };
         axis.active = false;

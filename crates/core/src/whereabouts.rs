@@ -53,7 +53,11 @@ impl Whereabouts {
             deviation: self.start_deviation,
         };
         let known = self.correction.iter().zip(self.deviation).zip(self.travel);
-        let now = belief.state.iter_mut().zip(&mut belief.deviation).zip(past.travel);
+        let now = belief
+            .state
+            .iter_mut()
+            .zip(&mut belief.deviation)
+            .zip(past.travel);
         for (((state, deviation), travel), ((correction, last), travel_last)) in now.zip(known) {
             *state += correction;
             let moved = (travel - travel_last).abs();
@@ -64,11 +68,21 @@ impl Whereabouts {
 
     /// Takes in what an image determined.
     pub(crate) fn learn(&mut self, past: &Entry, estimate: &StateEstimate, deviation: PerDof<f64>) {
-        let seen = estimate.observable.iter().zip(estimate.state).zip(deviation);
+        let seen = estimate
+            .observable
+            .iter()
+            .zip(estimate.state)
+            .zip(deviation);
         let then = past.predicted_state.iter().zip(past.travel);
-        let known = self.correction.iter_mut().zip(&mut self.deviation).zip(&mut self.travel);
-        for ((((correction, last), travel_last), (predicted, travel)), ((observable, state), own)) in
-            known.zip(then).zip(seen)
+        let known = self
+            .correction
+            .iter_mut()
+            .zip(&mut self.deviation)
+            .zip(&mut self.travel);
+        for (
+            (((correction, last), travel_last), (predicted, travel)),
+            ((observable, state), own),
+        ) in known.zip(then).zip(seen)
         {
             if *observable && own.is_finite() {
                 *correction = state - predicted;

@@ -1,8 +1,10 @@
 //! Frame to markers: Fig. 5 as a whole.
 
-use crate::markers::{near_prediction, two_largest};
 use crate::judge::{Demands, Verdict, judge};
-use crate::{ColorDiscriminant, Error, Expect, Frame, Labeller, Region, Rejection, RunMap, Segmenter};
+use crate::markers::{near_prediction, two_largest};
+use crate::{
+    ColorDiscriminant, Error, Expect, Frame, Labeller, Region, Rejection, RunMap, Segmenter,
+};
 
 /// Only so many regions, the largest, are considered: it bounds the time on a noisy frame.
 pub const CANDIDATES: usize = 16;

@@ -123,7 +123,10 @@ impl Outline {
             self.corners.iter().map(|[_, v]| *v).fold(start, pick)
         };
         let first = extreme(f64::min, f64::INFINITY).ceil().max(0.0);
-        (first, extreme(f64::max, f64::NEG_INFINITY).min(height - 1.0))
+        (
+            first,
+            extreme(f64::max, f64::NEG_INFINITY).min(height - 1.0),
+        )
     }
 
     /// Where row `v` is inside: pixels, whole numbers.
@@ -170,7 +173,11 @@ impl Spans {
         let crossings = self.crossings.get_mut(..self.len).unwrap_or_default();
         crossings.sort_by(f64::total_cmp);
         for (index, u) in crossings.iter_mut().enumerate() {
-            *u = if index % 2 == 0 { u.ceil().max(0.0) } else { (u.ceil() - 1.0).min(width - 1.0) };
+            *u = if index % 2 == 0 {
+                u.ceil().max(0.0)
+            } else {
+                (u.ceil() - 1.0).min(width - 1.0)
+            };
         }
     }
 

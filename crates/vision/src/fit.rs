@@ -17,6 +17,8 @@ const SCALE: f64 = 0.06;
 /// The same for the difference of the two bands: they are blurred alike.
 const BLOOM_APART: f64 = 0.4;
 const SCALE_APART: f64 = 0.03;
+/// Edges nearer than this to the border of the image say nothing (px).
+const BORDER: f64 = 2.0;
 /// Nearer than this to where a rim meets a side the low-pass rounds the outline off (px).
 const CORNER: f64 = 2.5;
 /// Where they meet.
@@ -89,10 +91,10 @@ pub fn fit(expected: &Expectation, start: [f64; 4], seen: [bool; 2], map: &RunMa
         let size = f64::midpoint(a.radius(), b.radius());
         let common = (BLOOM + SCALE * size).powi(-2);
         let apart = (BLOOM_APART + SCALE_APART * size).powi(-2);
-        for index in 4..8 {
+        for (index, row) in normal.iter_mut().enumerate().skip(4) {
             let other = if index < 6 { index + 2 } else { index - 2 };
-            normal[index][index] = common + apart;
-            normal[index][other] = -apart;
+            row[index] = common + apart;
+            row[other] = -apart;
         }
         let (mut edges, mut inside) = ([0.0; 2], [0.0; 2]);
         let (mut weights, mut misfit) = ([0.0; 2], [0.0; 2]);
@@ -134,8 +136,14 @@ pub fn fit(expected: &Expectation, start: [f64; 4], seen: [bool; 2], map: &RunMa
             features: place,
             covariance: [0, 1, 2, 3].map(|i| [0, 1, 2, 3].map(|j| covariance[i][j])),
             bloom: [
-                Bloom { rims: rims_a, sides: sides_a },
-                Bloom { rims: rims_b, sides: sides_b },
+                Bloom {
+                    rims: rims_a,
+                    sides: sides_a,
+                },
+                Bloom {
+                    rims: rims_b,
+                    sides: sides_b,
+                },
             ],
             edges: [0, 1].map(|band| edges[band] / f64::max(inside[band], 1.0)),
             misfit: [0, 1].map(|band| misfit[band] / f64::max(weights[band], 1.0)),
@@ -154,6 +162,9 @@ pub fn settle(outline: &Outline, [u, v]: [f64; 2]) -> Outline {
 /// At equal steps around an outline, where they are in the image.
 fn each_edge(outline: &Outline, map: &RunMap, mut found: impl FnMut(Edge)) {
     let (width, height) = map.size();
+    let within = |[u, v]: [f64; 2]| {
+        (BORDER..width - 1.0 - BORDER).contains(&u) && (BORDER..height - 1.0 - BORDER).contains(&v)
+    };
     let corners = &outline.corners;
     let sides = || corners.iter().zip(corners.iter().cycle().skip(1));
     let side = |([u0, v0], [u1, v1]): (&[f64; 2], &[f64; 2])| [u1 - u0, v1 - v0];
@@ -167,19 +178,29 @@ fn each_edge(outline: &Outline, map: &RunMap, mut found: impl FnMut(Edge)) {
     for (index, (from, to)) in sides().enumerate() {
         let [du, dv] = side((from, to));
         let long = length([du, dv]);
-        let outward = if signed > 0.0 { [dv / long, -du / long] } else { [-dv / long, du / long] };
+        let outward = if signed > 0.0 {
+            [dv / long, -du / long]
+        } else {
+            [-dv / long, du / long]
+        };
         while due < long {
             let at = [from[0] + du * due / long, from[1] + dv * due / long];
             due += step;
-            let image = (2.0..width - 3.0).contains(&at[0]) && (2.0..height - 3.0).contains(&at[1]);
-            let cut_off = CORNERS.iter().filter_map(|corner| corners.get(*corner)).any(|[u, v]| {
-                length([u - at[0], v - at[1]]) < CORNER
-            });
-            if image && !cut_off {
+            let cut_off = CORNERS
+                .iter()
+                .filter_map(|corner| corners.get(*corner))
+                .any(|[u, v]| length([u - at[0], v - at[1]]) < CORNER);
+            if cut_off || !within(at) {
+                continue;
+            }
+            let offset = crossing(map, at, outward, reach);
+            // At the border of the image the colour ends whether the band does or not.
+            let there = offset.unwrap_or_default();
+            if within([at[0] + there * outward[0], at[1] + there * outward[1]]) {
                 found(Edge {
                     side: index % (OUTLINE / 2) == OUTLINE / 2 - 1,
                     normal: outward,
-                    offset: crossing(map, at, outward, reach),
+                    offset,
                 });
             }
         }
@@ -197,7 +218,11 @@ fn crossing(map: &RunMap, at: [f64; 2], [nu, nv]: [f64; 2], reach: f64) -> Optio
         if marker(along) != inside {
             let middle = along - step / 2.0;
             let beyond = marker(middle) != inside;
-            return Some(if beyond { middle - step / 4.0 } else { middle + step / 4.0 });
+            return Some(if beyond {
+                middle - step / 4.0
+            } else {
+                middle + step / 4.0
+            });
         }
         along += step;
     }

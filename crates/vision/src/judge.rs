@@ -52,6 +52,8 @@ pub struct Demands {
     pub spill: f64,
     /// Least [`Evidence::edges`].
     pub edges: f64,
+    /// Least mean of the edges of both bands, or of the one that is found alone.
+    pub edges_on_average: f64,
     /// Largest squared Mahalanobis distance of both from where they are expected.
     pub surprise: f64,
 }
@@ -59,8 +61,14 @@ pub struct Demands {
 const NOWHERE: [f64; 4] = [f64::NAN; 4];
 /// Pairs of regions that are tried, the likeliest first.
 const TRIALS: usize = 6;
-/// [`Verdict::score`] of a verdict that needs no other: both bands, with this share of edges.
-const ENOUGH: f64 = 2.0 + 2.0 * 0.75;
+/// A lone band must be nearer to its place than to the other's by this squared Mahalanobis distance.
+const AMBIGUOUS: f64 = 9.0;
+/// Share of edges of both bands with which a verdict needs no other.
+const ENOUGH: f64 = 0.75;
+/// And the squared Mahalanobis distance.
+const UNSURPRISING: f64 = 8.0;
+/// What a unit of that distance takes from a score that edges make.
+const DOUBT: f64 = 0.02;
 
 /// Recognises the bands among `regions` and `map`.
 pub fn judge(regions: &[Region], map: &RunMap, expect: &impl Expect, demands: &Demands) -> Verdict {
@@ -72,7 +80,9 @@ pub fn judge(regions: &[Region], map: &RunMap, expect: &impl Expect, demands: &D
     }
     let mut best: Option<(f64, Verdict)> = None;
     for pair in likely(regions, &blind).into_iter().flatten() {
-        let Some(verdict) = attempt(pair, &blind, regions, map, expect, demands) else { continue };
+        let Some(verdict) = attempt(pair, &blind, regions, map, expect, demands) else {
+            continue;
+        };
         let score = verdict.score();
         if best.is_none_or(|(most, _)| score > most) {
             best = Some((score, verdict));
@@ -81,16 +91,55 @@ pub fn judge(regions: &[Region], map: &RunMap, expect: &impl Expect, demands: &D
             break;
         }
     }
-    best.map_or_else(|| nothing(Rejection::NoRegion), |(_, verdict)| verdict)
+    let Some((_, verdict)) = best else {
+        return nothing(Rejection::NoRegion);
+    };
+    match verdict.reasons {
+        [None, Some(_)] => alone(verdict, 0, &blind, regions, map, expect, demands),
+        [Some(_), None] => alone(verdict, 1, &blind, regions, map, expect, demands),
+        _ => verdict,
+    }
+}
+
+/// A band found alone, unless the same would do as well for the other band.
+fn alone(
+    mut verdict: Verdict,
+    band: usize,
+    blind: &Expectation,
+    regions: &[Region],
+    map: &RunMap,
+    expect: &impl Expect,
+    demands: &Demands,
+) -> Verdict {
+    let [u, v] = verdict.bands[band].centroid;
+    let away = |region: &Region| {
+        let [ru, rv] = region.centroid();
+        (ru - u).hypot(rv - v)
+    };
+    let order = (0..regions.len()).min_by(|a, b| away(&regions[*a]).total_cmp(&away(&regions[*b])));
+    let mut pair = [None; 2];
+    pair[1 - band] = order;
+    let other = attempt(pair, blind, regions, map, expect, demands);
+    let as_good = other.is_some_and(|other| {
+        other.reasons[1 - band].is_none()
+            && other.bands[1 - band].surprise < verdict.bands[band].surprise + AMBIGUOUS
+    });
+    if as_good {
+        verdict.reasons[band] = Some(Rejection::Either);
+        verdict.conceal();
+    }
+    verdict
 }
 
 impl Verdict {
-    /// Each band found counts one, and its edges.
+    /// Each band found counts one and its edges; where they are surprising counts against it.
     pub(crate) fn score(&self) -> f64 {
         let bands = self.bands.iter().zip(&self.reasons);
-        bands
-            .map(|(band, reason)| if reason.is_none() { 1.0 + band.edges } else { 0.1 * band.edges })
-            .sum()
+        let shown = |(band, reason): (&Evidence, &Option<Rejection>)| match reason {
+            None => 1.0 + band.edges - DOUBT * band.surprise,
+            Some(_) => 0.1 * band.edges,
+        };
+        bands.map(shown).sum()
     }
 }
 
@@ -102,7 +151,10 @@ type Pair = [Option<usize>; 2];
 /// costs as much as one four deviations off.
 fn likely(regions: &[Region], expected: &Expectation) -> [Option<Pair>; TRIALS] {
     let mut kept: [Option<(f64, Pair)>; TRIALS] = [None; TRIALS];
-    let slack = expected.bands.each_ref().map(|band| (0.35 * band.radius()).powi(2));
+    let slack = expected
+        .bands
+        .each_ref()
+        .map(|band| (0.35 * band.radius()).powi(2));
     let mut covariance = expected.covariance;
     for (index, row) in covariance.iter_mut().enumerate() {
         row[index] += slack[index / 2];
@@ -122,10 +174,15 @@ fn likely(regions: &[Region], expected: &Expectation) -> [Option<Pair>; TRIALS] 
     let middle = inverse(middle).unwrap_or([[0.0; 2]; 2]);
     let away = |index: usize, band: usize| {
         let [u, v] = regions[index].centroid();
-        [u - expected.features[2 * band], v - expected.features[2 * band + 1]]
+        [
+            u - expected.features[2 * band],
+            v - expected.features[2 * band + 1],
+        ]
     };
     let size = |index: usize, band: usize| {
-        (real(regions[index].area) / expected.bands[band].area).ln().powi(2)
+        (real(regions[index].area) / expected.bands[band].area)
+            .ln()
+            .powi(2)
     };
     for a in choices() {
         for b in choices() {
@@ -143,7 +200,9 @@ fn likely(regions: &[Region], expected: &Expectation) -> [Option<Pair>; TRIALS] 
                 }
                 (None, None) => 24.0,
             };
-            let place = kept.iter().position(|one| one.is_none_or(|(less, _)| cost < less));
+            let place = kept
+                .iter()
+                .position(|one| one.is_none_or(|(less, _)| cost < less));
             if let Some(place) = place {
                 kept[place..].rotate_right(1);
                 kept[place] = Some((cost, [a, b]));
@@ -196,7 +255,7 @@ fn attempt(
             let (laid, found) = lay(seen, sureness(&found), alone, map, expect)?;
             let mut last = weigh(&laid, &found, map, demands);
             for band in (0..2).filter(|band| !alone[*band]) {
-                last.reasons[band] = reasons[band];
+                last.reasons[band] = reasons[band].or(Some(Rejection::NoRegion));
                 last.bands[band] = verdict.bands[band];
             }
             last.conceal();
@@ -232,7 +291,12 @@ fn lay(
 fn weigh(laid: &Expectation, found: &Fit, map: &RunMap, demands: &Demands) -> Verdict {
     let [ua, va, ub, vb] = found.features;
     let places = [[ua, va], [ub, vb]];
-    let outlines = [0, 1].map(|band| settle(&laid.bands[band], places[band]).grown(f64::midpoint(found.bloom[band].rims, found.bloom[band].sides)));
+    let outlines = [0, 1].map(|band| {
+        settle(&laid.bands[band], places[band]).grown(f64::midpoint(
+            found.bloom[band].rims,
+            found.bloom[band].sides,
+        ))
+    });
     let bands = [0, 1].map(|band| {
         let (own, other) = (&outlines[band], &outlines[1 - band]);
         let whole = own.count(map, other);
@@ -253,7 +317,21 @@ fn weigh(laid: &Expectation, found: &Fit, map: &RunMap, demands: &Demands) -> Ve
             filled: own.grown(2.0).filled_centroid(3.5, map),
         }
     });
-    let reasons = bands.map(|band| refusal(&band, demands));
+    let mut reasons = bands.map(|band| refusal(&band, demands));
+    // The weaker of two weak ones falls, and with it the other.
+    let weaker = usize::from(bands[1].edges < bands[0].edges);
+    let average = |band: usize| match reasons[1 - band] {
+        None => f64::midpoint(bands[0].edges, bands[1].edges),
+        Some(_) => bands[band].edges,
+    };
+    for band in [weaker, 1 - weaker] {
+        if reasons[band].is_none() && average(band) < demands.edges_on_average {
+            reasons[band] = Some(Rejection::Shape {
+                share: bands[band].edges,
+            });
+            break;
+        }
+    }
     let mut verdict = Verdict {
         features: found.features,
         covariance: found.covariance,
@@ -266,7 +344,9 @@ fn weigh(laid: &Expectation, found: &Fit, map: &RunMap, demands: &Demands) -> Ve
 
 fn refusal(band: &Evidence, demands: &Demands) -> Option<Rejection> {
     if band.inside < demands.inside {
-        Some(Rejection::Outside { share: 1.0 - band.inside })
+        Some(Rejection::Outside {
+            share: 1.0 - band.inside,
+        })
     } else if band.coverage < demands.coverage || band.own < 0.75 * demands.coverage {
         Some(Rejection::Hidden { share: band.own })
     } else if band.spill > demands.spill {
@@ -274,7 +354,9 @@ fn refusal(band: &Evidence, demands: &Demands) -> Option<Rejection> {
     } else if band.edges < demands.edges {
         Some(Rejection::Shape { share: band.edges })
     } else if band.surprise.is_nan() || band.surprise > demands.surprise {
-        Some(Rejection::Elsewhere { distance: band.surprise.sqrt() })
+        Some(Rejection::Elsewhere {
+            distance: band.surprise.sqrt(),
+        })
     } else {
         None
     }
@@ -283,7 +365,10 @@ fn refusal(band: &Evidence, demands: &Demands) -> Option<Rejection> {
 impl Verdict {
     /// Whether there is no need to look further.
     pub(crate) fn is_clear(&self) -> bool {
-        self.score() >= ENOUGH
+        let mut bands = self.bands.iter().zip(&self.reasons);
+        bands.all(|(band, reason)| {
+            reason.is_none() && band.edges >= ENOUGH && band.surprise <= UNSURPRISING
+        })
     }
 
     /// What is not found has no features.
@@ -304,7 +389,10 @@ fn nothing(reason: Rejection) -> Verdict {
     Verdict {
         features: NOWHERE,
         covariance: [NOWHERE; 4],
-        bands: [Evidence { centroid: [f64::NAN; 2], ..Evidence::default() }; 2],
+        bands: [Evidence {
+            centroid: [f64::NAN; 2],
+            ..Evidence::default()
+        }; 2],
         reasons: [Some(reason); 2],
     }
 }

@@ -36,5 +36,9 @@ pub fn apply<const N: usize>(matrix: &Square<N>, vector: [f64; N]) -> [f64; N] {
 
 /// x' M x.
 pub fn quadratic<const N: usize>(matrix: &Square<N>, vector: [f64; N]) -> f64 {
-    apply(matrix, vector).iter().zip(vector).map(|(a, b)| a * b).sum()
+    apply(matrix, vector)
+        .iter()
+        .zip(vector)
+        .map(|(a, b)| a * b)
+        .sum()
 }

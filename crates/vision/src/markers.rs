@@ -42,6 +42,8 @@ pub enum Rejection {
         /// Share of its outline where it does.
         share: f64,
     },
+    /// What could be it could as well be the other one.
+    Either,
     /// The two are not where they may be.
     Elsewhere {
         /// Mahalanobis distance from the expectation.
@@ -58,16 +60,32 @@ impl fmt::Display for Rejection {
                 write!(formatter, "no pair within {gate} px of the prediction")
             }
             Self::Unseen => formatter.write_str("cannot be seen where it is expected"),
-            Self::Outside { share } => write!(formatter, "{:.0} % outside the image", 100.0 * share),
-            Self::Hidden { share } => write!(formatter, "only {:.0} % has its colour", 100.0 * share),
+            Self::Outside { share } => {
+                write!(formatter, "{:.0} % outside the image", 100.0 * share)
+            }
+            Self::Hidden { share } => {
+                write!(formatter, "only {:.0} % has its colour", 100.0 * share)
+            }
             Self::Larger { share } => {
-                write!(formatter, "its colour goes on around it over {:.0} %", 100.0 * share)
+                write!(
+                    formatter,
+                    "its colour goes on around it over {:.0} %",
+                    100.0 * share
+                )
             }
             Self::Shape { share } => {
-                write!(formatter, "only {:.0} % of its outline is there", 100.0 * share)
+                write!(
+                    formatter,
+                    "only {:.0} % of its outline is there",
+                    100.0 * share
+                )
             }
+            Self::Either => formatter.write_str("what could be it could be the other one"),
             Self::Elsewhere { distance } => {
-                write!(formatter, "{distance:.1} deviations from where it is expected")
+                write!(
+                    formatter,
+                    "{distance:.1} deviations from where it is expected"
+                )
             }
         }
     }

@@ -60,10 +60,15 @@ impl RunMap {
         };
         let runs = self.row(row);
         let first = runs.partition_point(|run| float32(run.1) <= from);
-        let touching = runs.iter().skip(first).take_while(|run| float32(run.0) <= to);
+        let touching = runs
+            .iter()
+            .skip(first)
+            .take_while(|run| float32(run.0) <= to);
         touching
             .map(|run| whole(float32(run.0).max(from), (float32(run.1) - 1.0).min(to)))
-            .fold([0.0; 2], |[count, sum], [more, columns]| [count + more, sum + columns])
+            .fold([0.0; 2], |[count, sum], [more, columns]| {
+                [count + more, sum + columns]
+            })
     }
 
     fn row(&self, v: f64) -> &[(u32, u32)] {
@@ -77,7 +82,9 @@ impl RunMap {
             return &[];
         };
         let start = v.checked_sub(1).and_then(|above| self.ends.get(above));
-        self.runs.get(*start.unwrap_or(&0)..*end).unwrap_or_default()
+        self.runs
+            .get(*start.unwrap_or(&0)..*end)
+            .unwrap_or_default()
     }
 }
 
