@@ -129,11 +129,14 @@ class VisionConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     least_coverage: Fraction = 0.4
     """A band of which less has the markers' colour is refused [share of its area] [ours]."""
     largest_spill: Fraction = 0.25
-    """A band around which more has the markers' colour is refused [share of a ring] [ours]."""
+    """A band around which more has the markers' colour is refused [share of a ring, relative to its
+    coverage] [ours]."""
     least_edges: Fraction = 0.4
     """A band at less of whose outline the colour ends is refused [share of it] [ours]."""
     least_edges_on_average: Fraction = 0.6
-    """The same for the mean of both bands, and for a band that is found alone [ours]."""
+    """The same for the mean of both bands [ours]."""
+    least_edges_alone: Fraction = 0.85
+    """The same for a band that is found alone, and 4/3 of its coverage [ours]."""
     largest_surprise: Positive = 18.5
     """Largest squared Mahalanobis distance of the bands from where they are expected; chi squared
     with 4 degrees of freedom exceeds it once in a thousand [ours]."""

@@ -149,6 +149,7 @@ class MarkerDetector:
                 vision.largest_spill,
                 vision.least_edges,
                 vision.least_edges_on_average,
+                vision.least_edges_alone,
                 vision.largest_surprise,
             ),
         )

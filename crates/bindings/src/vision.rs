@@ -51,7 +51,7 @@ impl MarkerDetector {
         gate: f64,
         entry_point: [f64; 2],
         model_deviation: f64,
-        demands: [f64; 6],
+        demands: [f64; 7],
         alternatives: Vec<([f64; 3], f64)>,
     ) -> PyResult<Self> {
         let discriminant = ColorDiscriminant::new(weights, threshold).map_err(refused(py))?;
@@ -66,7 +66,15 @@ impl MarkerDetector {
             .into_iter()
             .map(|(weights, threshold)| ColorDiscriminant::new(weights, threshold))
             .collect();
-        let [inside, coverage, spill, edges, edges_on_average, surprise] = demands;
+        let [
+            inside,
+            coverage,
+            spill,
+            edges,
+            edges_on_average,
+            edges_alone,
+            surprise,
+        ] = demands;
         Ok(Self {
             model: model.0,
             model_deviation,
@@ -76,6 +84,7 @@ impl MarkerDetector {
                 spill,
                 edges,
                 edges_on_average,
+                edges_alone,
                 surprise,
             },
             segmenter: Segmenter::new(discriminant, smoothing),
@@ -104,9 +113,14 @@ impl MarkerDetector {
             deviation,
             model_deviation: self.model_deviation,
         };
+        let demands = if states.len() > 1 {
+            self.demands.without_a_place()
+        } else {
+            self.demands
+        };
         let (verdict, regions) = py.detach(|| {
             let mut detector = self.detector.lock().unwrap_or_else(PoisonError::into_inner);
-            let (verdict, regions) = detector.recognise(&frame, &expect, &self.demands);
+            let (verdict, regions) = detector.recognise(&frame, &expect, &demands);
             (verdict, rows(regions.iter().copied()))
         });
         let [a, b] = verdict
@@ -180,27 +194,52 @@ struct Believed<'a> {
     model_deviation: f64,
 }
 
+impl Believed<'_> {
+    fn belief(&self, state: [f64; 3]) -> core::Belief {
+        core::Belief {
+            state,
+            deviation: self.deviation,
+        }
+    }
+
+    /// Of a state as it is; infinite if no band can be seen in it.
+    fn misfit(&self, state: [f64; 3], seen: [f64; 4], deviation: [f64; 4]) -> f64 {
+        let misfit = self
+            .model
+            .misfit(&self.belief(state), state, seen, deviation);
+        misfit.unwrap_or(f64::INFINITY)
+    }
+}
+
 impl Expect for Believed<'_> {
     fn expect(&self, seen: [f64; 4], deviation: [f64; 4]) -> Option<Expectation> {
-        let belief = |state: &[f64; 3]| core::Belief {
-            state: *state,
-            deviation: self.deviation,
-        };
         // The states that explain the features best as they are; one of them leads to the best of all.
         let mut starts = [(f64::INFINITY, None); STARTS];
-        for state in self.states {
-            let misfit = self.model.misfit(&belief(state), *state, seen, deviation);
-            let misfit = misfit.unwrap_or(f64::INFINITY);
+        let mut consider = |state: [f64; 3]| {
+            let misfit = self.misfit(state, seen, deviation);
             if let Some(place) = starts.iter().position(|(less, _)| misfit < *less) {
                 starts[place..].rotate_right(1);
                 starts[place] = (misfit, Some(state));
             }
+        };
+        self.states.iter().copied().for_each(&mut consider);
+        if let [state] = self.states
+            && self.misfit(*state, seen, deviation).is_infinite()
+        {
+            // No band can be seen from there; but it need not be exactly there.
+            for (dof, spread) in self.deviation.into_iter().enumerate() {
+                for step in [-spread, spread] {
+                    let mut near = *state;
+                    near[dof] += step;
+                    consider(near);
+                }
+            }
         }
         let found = starts.iter().filter_map(|(_, state)| {
             let state = (*state)?;
-            let found = self.model.nearest_state(&belief(state), seen, deviation);
-            let (nearest, misfit) = found?;
-            Some((*state, nearest, misfit))
+            let belief = self.belief(state);
+            let (nearest, misfit) = self.model.nearest_state(&belief, seen, deviation)?;
+            Some((state, nearest, misfit))
         });
         let (believed, nearest, _) = found.min_by(|a, b| a.2.total_cmp(&b.2))?;
         // Where several states cover the workspace, no place in it is surprising.

@@ -8,8 +8,8 @@ const SAMPLES: usize = 48;
 /// How far from the outline an edge is sought (px), at most.
 const REACH: f64 = 9.0;
 /// Standard deviation of an edge (px), neighbours taken as independent.
-const EDGE: f64 = 0.7;
-/// Edges farther than this from where they should be have no say in the end (px); at first, four times.
+const EDGE: f64 = 0.45;
+/// Edges farther than this from where they should be have no say in the end (px).
 const TOLERANCE: f64 = 1.8;
 /// Standard deviation of the growth of the outlines: blur and threshold (px), and unknown scale (1).
 const BLOOM: f64 = 1.2;
@@ -23,7 +23,10 @@ const BORDER: f64 = 2.0;
 const CORNER: f64 = 2.5;
 /// Where they meet.
 const CORNERS: [usize; 4] = [0, OUTLINE / 2 - 1, OUTLINE / 2, OUTLINE - 1];
-const ROUNDS: [f64; 5] = [4.0, 2.0, 1.4, 1.0, 1.0];
+/// The tolerance, round by round: from a region's centroid, and from where the outlines have lain before.
+pub const COARSE: [f64; 3] = [4.0, 2.0, 1.4];
+/// See [`COARSE`].
+pub const FINE: [f64; 3] = [1.4, 1.0, 1.0];
 
 /// Two outlines in place.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,13 +75,19 @@ struct Edge {
 ///
 /// w is Tukey's weight, its width narrowing. So what hides a part of a band does not pull at it, and each
 /// band says by the covariance P of the expectation where the other is. `seen` says which band has a say.
-pub fn fit(expected: &Expectation, start: [f64; 4], seen: [bool; 2], map: &RunMap) -> Option<Fit> {
+pub fn fit(
+    expected: &Expectation,
+    start: [f64; 4],
+    seen: [bool; 2],
+    rounds: [f64; 3],
+    map: &RunMap,
+) -> Option<Fit> {
     let prior = inverse(expected.covariance)?;
     let [a, b] = &expected.bands;
     let mut place = start;
     let mut bloom = [0.0; 4];
     let mut result = None;
-    for width in ROUNDS {
+    for width in rounds {
         let [ua, va, ub, vb] = place;
         let laid = [settle(a, [ua, va]), settle(b, [ub, vb])];
         let mut normal = [[0.0; 8]; 8];

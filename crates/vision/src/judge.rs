@@ -1,6 +1,6 @@
 //! Which of what has the markers' colour is a band: by place, size, outline, and both together.
 
-use crate::fit::{Fit, fit, settle};
+use crate::fit::{COARSE, FINE, Fit, fit, settle};
 use crate::linear::{inverse, quadratic};
 use crate::regions::real;
 use crate::{Expect, Expectation, Region, Rejection, RunMap};
@@ -48,19 +48,39 @@ pub struct Demands {
     pub inside: f64,
     /// Least [`Evidence::coverage`].
     pub coverage: f64,
-    /// Largest [`Evidence::spill`].
+    /// Largest [`Evidence::spill`] over [`Evidence::coverage`].
     pub spill: f64,
     /// Least [`Evidence::edges`].
     pub edges: f64,
-    /// Least mean of the edges of both bands, or of the one that is found alone.
+    /// Least mean of the edges of both bands.
     pub edges_on_average: f64,
+    /// Least edges, and three quarters of it the least coverage, of a band that is found alone.
+    pub edges_alone: f64,
     /// Largest squared Mahalanobis distance of both from where they are expected.
     pub surprise: f64,
+}
+
+impl Demands {
+    /// Where nothing is known of the place, only what is all but whole is a band.
+    #[must_use]
+    pub fn without_a_place(&self) -> Self {
+        Self {
+            inside: self.inside.max(0.9),
+            coverage: self.coverage.max(0.75),
+            edges: self.edges.max(0.75),
+            edges_on_average: self.edges_on_average.max(0.85),
+            edges_alone: f64::INFINITY,
+            ..*self
+        }
+    }
 }
 
 const NOWHERE: [f64; 4] = [f64::NAN; 4];
 /// Pairs of regions that are tried, the likeliest first.
 const TRIALS: usize = 6;
+/// Outlines are laid again at most so often, and until they stay within so much (px).
+const LAYS: usize = 4;
+const STILL: f64 = 0.2;
 /// A lone band must be nearer to its place than to the other's by this squared Mahalanobis distance.
 const AMBIGUOUS: f64 = 9.0;
 /// Share of edges of both bands with which a verdict needs no other.
@@ -120,6 +140,14 @@ fn alone(
     let mut pair = [None; 2];
     pair[1 - band] = order;
     let other = attempt(pair, blind, regions, map, expect, demands);
+    let Evidence {
+        edges, coverage, ..
+    } = verdict.bands[band];
+    if edges < demands.edges_alone || coverage < 0.75 * demands.edges_alone {
+        verdict.reasons[band] = Some(Rejection::Shape { share: edges });
+        verdict.conceal();
+        return verdict;
+    }
     let as_good = other.is_some_and(|other| {
         other.reasons[1 - band].is_none()
             && other.bands[1 - band].surprise < verdict.bands[band].surprise + AMBIGUOUS
@@ -239,9 +267,18 @@ fn attempt(
         let [ua, va, ub, vb] = blind.features;
         seen = [ua + u, va + v, ub + u, vb + v];
     }
-    let (laid, coarse) = lay(seen, [4.0; 4], [true; 2], map, expect)?;
-    let again = lay(coarse.features, sureness(&coarse), [true; 2], map, expect);
-    let (laid, found) = again.unwrap_or((laid, coarse));
+    let (mut laid, mut found) = lay(seen, [4.0; 4], [true; 2], COARSE, map, expect)?;
+    // The better the place is known, the better the outlines.
+    for _ in 0..LAYS {
+        let before = found.features;
+        let again = lay(before, sureness(&found), [true; 2], FINE, map, expect);
+        let Some(again) = again else { break };
+        (laid, found) = again;
+        let moved = before.iter().zip(found.features);
+        if moved.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) < STILL {
+            break;
+        }
+    }
     let verdict = weigh(&laid, &found, map, demands);
     match verdict.reasons {
         [None, None] | [Some(_), Some(_)] => Some(verdict),
@@ -252,7 +289,7 @@ fn attempt(
             for band in (0..2).filter(|band| !alone[*band]) {
                 seen[2 * band..2 * band + 2].fill(f64::NAN);
             }
-            let (laid, found) = lay(seen, sureness(&found), alone, map, expect)?;
+            let (laid, found) = lay(seen, sureness(&found), alone, FINE, map, expect)?;
             let mut last = weigh(&laid, &found, map, demands);
             for band in (0..2).filter(|band| !alone[*band]) {
                 last.reasons[band] = reasons[band].or(Some(Rejection::NoRegion));
@@ -273,6 +310,7 @@ fn lay(
     seen: [f64; 4],
     deviation: [f64; 4],
     bands: [bool; 2],
+    rounds: [f64; 3],
     map: &RunMap,
     expect: &impl Expect,
 ) -> Option<(Expectation, Fit)> {
@@ -284,7 +322,7 @@ fn lay(
             *start = seen;
         }
     }
-    let found = fit(&laid, start, bands, map)?;
+    let found = fit(&laid, start, bands, rounds, map)?;
     Some((laid, found))
 }
 
@@ -322,7 +360,7 @@ fn weigh(laid: &Expectation, found: &Fit, map: &RunMap, demands: &Demands) -> Ve
     let weaker = usize::from(bands[1].edges < bands[0].edges);
     let average = |band: usize| match reasons[1 - band] {
         None => f64::midpoint(bands[0].edges, bands[1].edges),
-        Some(_) => bands[band].edges,
+        Some(_) => f64::INFINITY,
     };
     for band in [weaker, 1 - weaker] {
         if reasons[band].is_none() && average(band) < demands.edges_on_average {
@@ -349,7 +387,7 @@ fn refusal(band: &Evidence, demands: &Demands) -> Option<Rejection> {
         })
     } else if band.coverage < demands.coverage || band.own < 0.75 * demands.coverage {
         Some(Rejection::Hidden { share: band.own })
-    } else if band.spill > demands.spill {
+    } else if band.spill > demands.spill * band.coverage {
         Some(Rejection::Larger { share: band.spill })
     } else if band.edges < demands.edges {
         Some(Rejection::Shape { share: band.edges })
