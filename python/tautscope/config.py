@@ -123,7 +123,7 @@ class VisionConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     gate: Positive = 120.0
     """A marker is not sought farther than this from where it is predicted [px]."""
     model_deviation: Positive = 2.5
-    """How far a band may be from where the instrument's model has it: standard deviation [px] [ours]."""
+    """Of where a band is from where the instrument's model has it: standard deviation [px] [ours]."""
     least_inside: Fraction = 0.5
     """A band of which less is in the image is refused [share of its area] [ours]."""
     least_coverage: Fraction = 0.4

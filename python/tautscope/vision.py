@@ -56,7 +56,6 @@ class Evidence:
     bloom: float
     surprise: float
     centroid: tuple[float, float]
-    filled: tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,14 +104,16 @@ class MarkerDetector:
     Each pixel is projected, w_b B + w_g G + w_r R, the projection low-passed and thresholded, the
     pixels above the threshold joined into 8-connected regions. `config.vision` has the numbers.
 
-    - With predicted features, A and B are the two regions that lie nearest to them, within
-      ``vision.gate``, and that have comparable areas; crates/vision/src/markers.rs has the cost.
-    - Without, they are the two largest regions, as in the article, and A, the proximal band, is the
-      one nearer to where the instrument enters the picture.
+    What has the markers' colour is a band only if it looks like one (decision 0003): the outlines
+    of both bands, as the model of the instrument draws them, are laid over the regions, and the
+    place, the size, the outline's edges and what is around must agree. A part that is hidden,
+    split by a highlight or outside the image is no part of the measurement: the features are the
+    centroids of the whole bands. One band alone is found only where it is surely not the other.
 
-    The centroid of a region is not exactly the image of the band's centre: the camera sees the near
-    side of a cylinder, and a highlight takes pixels away. Without a prediction anything green that
-    is larger than a band is taken for one.
+    - With an expectation, both are sought around it.
+    - With predicted features alone, the same around the posture that explains them, with half of
+      each DOF's `start_deviation`.
+    - With neither, in the whole workspace of the experiment, and only what is all but whole counts.
 
     The arithmetic is in fixed point. With the largest sum of weights of one sign s, a low-passed
     value is within (1.25 + smoothing) * 255 * s / 8190 of the exact one: 0.07 grey levels by
@@ -167,6 +168,8 @@ class MarkerDetector:
                 place.
             predicted_features: (4,) [px] where the bands should be, u_A, v_A, u_B, v_B. Features
                 that are not finite (the model looks behind the camera, say) are no prediction.
+            expectation: Where the instrument is believed to be and how sure that is; with it the
+                predicted features are not looked at.
 
         Returns:
             The features, or the reason why there are none: never an exception for what the image
@@ -181,7 +184,7 @@ class MarkerDetector:
         features, covariance, evidence, reasons, regions = self._core.detect(
             pixels, states, deviation
         )
-        a, b = (Evidence(*row[:7], (row[7], row[8]), (row[9], row[10])) for row in evidence.tolist())
+        a, b = (Evidence(*row[:7], (row[7], row[8])) for row in evidence.tolist())
         found = tuple(_region(row) for row in regions.tolist())
         return Detection(features, covariance, reasons, (a, b), found)
 
@@ -260,6 +263,11 @@ def _checked_prediction(predicted: ArrayLike | None) -> NDArray[np.float64] | No
     if features.shape != (4,):
         raise FieldError("predicted_features", predicted, "four numbers u_A, v_A, u_B, v_B [px]")
     return features
+
+
+def _evidence(row: list[float]) -> Evidence:
+    inside, coverage, own, spill, edges, bloom, surprise, u, v = row
+    return Evidence(inside, coverage, own, spill, edges, bloom, surprise, (u, v))
 
 
 def _region(row: list[float]) -> Region:

@@ -170,7 +170,7 @@ def test_exposure_and_white_balance(seed: int) -> None:
 
 def test_what_is_believed_elsewhere_is_not_found_there() -> None:
     for scene in (scene for scene in SCENES if scene.state[2] > 0.5):
-        elsewhere = Expectation(scene.state + [0.0, 1.5, 0.0], DEVIATION / 3)
+        elsewhere = Expectation(scene.state + np.array([0.0, 1.5, 0.0]), DEVIATION / 3)
         assert not DETECTOR.detect(scene.image, expectation=elsewhere).valid
 
 

@@ -96,7 +96,7 @@ impl MarkerDetector {
         })
     }
 
-    /// Features (4,), covariance (4, 4), evidence (2, 7), a reason per marker, regions (n, 7).
+    /// Features (4,), covariance (4, 4), evidence (2, 9), a reason per marker, regions (n, 7).
     ///
     /// `states` (n, 3): where the instrument may be, each with the standard deviations `deviation` (3,).
     fn detect<'py>(
@@ -128,7 +128,6 @@ impl MarkerDetector {
             .map(|reason| reason.map_or_else(String::new, |reason| reason.to_string()));
         let evidence = verdict.bands.map(|band| {
             let [u, v] = band.centroid;
-            let [x, y] = band.filled;
             [
                 band.inside,
                 band.coverage,
@@ -139,8 +138,6 @@ impl MarkerDetector {
                 band.surprise,
                 u,
                 v,
-                x,
-                y,
             ]
         });
         Ok((

@@ -1,7 +1,6 @@
 //! What the loop expects to see: where, how large, how sure. Plain numbers, whoever made them.
 
 use crate::RunMap;
-use crate::runs::whole;
 
 /// Corners of an outline.
 pub const OUTLINE: usize = 26;
@@ -78,43 +77,17 @@ impl Outline {
             let theirs = other.spans(v, width);
             for (from, to) in mine.each() {
                 count.pixels += to - from + 1.0;
-                count.marker += map.count(v, from, to)[0];
+                count.marker += map.count(v, from, to);
                 for (first, last) in theirs.each() {
                     let (from, to) = (from.max(first), to.min(last));
                     if from <= to {
-                        count.shared += map.count(v, from, to)[0];
+                        count.shared += map.count(v, from, to);
                     }
                 }
             }
             v += 1.0;
         }
         count
-    }
-
-    /// Centroid of the marker pixels in it, those that it has without its `rim` all counted as marker.
-    ///
-    /// A highlight or a hole inside does not pull at it; what is missing at the rim does.
-    pub fn filled_centroid(&self, rim: f64, map: &RunMap) -> [f64; 2] {
-        let core = self.grown(-rim);
-        let (width, height) = map.size();
-        let mut sums = [0.0; 3];
-        let (mut v, last) = self.rows(height);
-        while v <= last {
-            let mut add = |[count, columns]: [f64; 2], sign: f64| {
-                sums[0] += sign * count;
-                sums[1] += sign * columns;
-                sums[2] += sign * count * v;
-            };
-            for (from, to) in self.spans(v, width).each() {
-                add(map.count(v, from, to), 1.0);
-            }
-            for (from, to) in core.spans(v, width).each() {
-                add(map.count(v, from, to), -1.0);
-                add(whole(from, to), 1.0);
-            }
-            v += 1.0;
-        }
-        [sums[1] / sums[0], sums[2] / sums[0]]
     }
 
     /// First and last row of an image so high that it may touch.

@@ -37,8 +37,6 @@ pub struct Evidence {
     pub surprise: f64,
     /// Centroid of the outline, u, v (px).
     pub centroid: [f64; 2],
-    /// Centroid of what is in it, holes filled, u, v (px).
-    pub filled: [f64; 2],
 }
 
 /// What a band must show.
@@ -352,7 +350,6 @@ fn weigh(laid: &Expectation, found: &Fit, map: &RunMap, demands: &Demands) -> Ve
             bloom: found.bloom[band].rims,
             surprise: found.surprise,
             centroid: places[band],
-            filled: own.grown(2.0).filled_centroid(3.5, map),
         }
     });
     let mut reasons = bands.map(|band| refusal(&band, demands));

@@ -52,11 +52,10 @@ impl RunMap {
         runs.get(after).is_some_and(|run| float32(run.0) <= column)
     }
 
-    /// How many marker pixels row `v` has from `from` to `to`, both included (px), and the sum of
-    /// their columns.
-    pub fn count(&self, v: f64, from: f64, to: f64) -> [f64; 2] {
+    /// How many marker pixels row `v` has from `from` to `to`, both included (px).
+    pub fn count(&self, v: f64, from: f64, to: f64) -> f64 {
         let Some(row) = pixel(v) else {
-            return [0.0; 2];
+            return 0.0;
         };
         let runs = self.row(row);
         let first = runs.partition_point(|run| float32(run.1) <= from);
@@ -65,10 +64,8 @@ impl RunMap {
             .skip(first)
             .take_while(|run| float32(run.0) <= to);
         touching
-            .map(|run| whole(float32(run.0).max(from), (float32(run.1) - 1.0).min(to)))
-            .fold([0.0; 2], |[count, sum], [more, columns]| {
-                [count + more, sum + columns]
-            })
+            .map(|run| (float32(run.1) - 1.0).min(to) - float32(run.0).max(from) + 1.0)
+            .sum()
     }
 
     fn row(&self, v: f64) -> &[(u32, u32)] {
@@ -86,12 +83,6 @@ impl RunMap {
             .get(*start.unwrap_or(&0)..*end)
             .unwrap_or_default()
     }
-}
-
-/// How many pixels there are from `from` to `to`, both included, and the sum of their columns.
-pub(crate) fn whole(from: f64, to: f64) -> [f64; 2] {
-    let count = to - from + 1.0;
-    [count, count * (from + to) / 2.0]
 }
 
 /// The nearest pixel, if it can be one.
