@@ -123,7 +123,7 @@ class VisionConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     gate: Positive = 120.0
     """A marker is not sought farther than this from where it is predicted [px]."""
     model_deviation: Positive = 2.5
-    """Of where a band is from where the instrument's model has it: standard deviation [px] [ours]."""
+    """Of a band from where the instrument's model has it: standard deviation [px] [ours]."""
     least_inside: Fraction = 0.5
     """A band of which less is in the image is refused [share of its area] [ours]."""
     least_coverage: Fraction = 0.4
@@ -133,7 +133,7 @@ class VisionConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     coverage] [ours]."""
     least_edges: Fraction = 0.4
     """A band at less of whose outline the colour ends is refused [share of it] [ours]."""
-    least_edges_on_average: Fraction = 0.6
+    least_edges_on_average: Fraction = 0.65
     """The same for the mean of both bands [ours]."""
     least_edges_alone: Fraction = 0.85
     """The same for a band that is found alone, and 4/3 of its coverage [ours]."""

@@ -184,7 +184,7 @@ class MarkerDetector:
         features, covariance, evidence, reasons, regions = self._core.detect(
             pixels, states, deviation
         )
-        a, b = (Evidence(*row[:7], (row[7], row[8])) for row in evidence.tolist())
+        a, b = (_evidence(row) for row in evidence.tolist())
         found = tuple(_region(row) for row in regions.tolist())
         return Detection(features, covariance, reasons, (a, b), found)
 
