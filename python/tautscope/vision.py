@@ -198,9 +198,13 @@ class MarkerDetector:
         if predicted is None or not np.isfinite(predicted).all():
             return starts, broad
         fits = [
-            self._model.nearest_state(start, broad, predicted, np.full(4, 5.0)) for start in starts
+            fit
+            for start in starts
+            if (fit := self._model.nearest_state(start, broad, predicted, np.full(4, 5.0)))
         ]
-        state, _ = min((fit for fit in fits if fit is not None), key=lambda fit: fit[1])
+        if not fits:
+            return starts, broad
+        state, _ = min(fits, key=lambda fit: fit[1])
         return state[None], self._start_deviation / 2
 
     def mask(self, image: NDArray[np.uint8]) -> NDArray[np.bool_]:
