@@ -17,7 +17,7 @@ mod linear;
 pub mod lowpass;
 pub mod markers;
 pub mod regions;
-pub mod runs;
+pub mod runmap;
 pub mod segment;
 
 pub use detector::{Detection, Detector, Settings};
@@ -28,5 +28,5 @@ pub use frame::{BgrFrame, Frame};
 pub use judge::{Demands, Evidence, Verdict};
 pub use markers::Rejection;
 pub use regions::{Labeller, Region};
-pub use runs::RunMap;
+pub use runmap::RunMap;
 pub use segment::Segmenter;
