@@ -27,6 +27,7 @@ _Floats = NDArray[np.float64]
 _Flags = NDArray[np.bool_]
 _Vector3 = tuple[float, float, float]
 _Vector8 = tuple[float, float, float, float, float, float, float, float]
+_Band = tuple[float, _Floats, _Floats, _Floats]
 _Triggers = tuple[str | None, str | None]
 
 @final
@@ -116,6 +117,14 @@ class FeatureModel:
         cls, instrument: Instrument, camera: Camera, *, translation: _Vector3, rotation: _Vector3
     ) -> FeatureModel: ...
     def predict(self, state: ArrayLike) -> tuple[_Floats, _Floats] | None: ...
+    def bands(self, state: ArrayLike) -> tuple[_Band, _Band] | None: ...
+    def nearest_state(
+        self,
+        state: ArrayLike,
+        state_deviation: ArrayLike,
+        features: ArrayLike,
+        deviation: ArrayLike,
+    ) -> tuple[_Floats, float] | None: ...
 
 @final
 class StateEstimator:
@@ -142,11 +151,12 @@ class Reduction:
         *,
         span: float,
         period: float,
+        start_deviation: _Vector3,
     ) -> Reduction: ...
     def step(self, reference: ArrayLike, time: float) -> _Floats: ...
     def run(self, references: ArrayLike, times: ArrayLike) -> _Floats: ...
     def on_features(
-        self, features: ArrayLike | None, captured_at: float
+        self, features: ArrayLike | None, captured_at: float, covariance: ArrayLike | None = None
     ) -> tuple[
         str,
         _Floats,
@@ -155,11 +165,13 @@ class Reduction:
         _Floats,
         _Flags,
         _Floats,
+        _Floats,
         tuple[_Triggers, _Triggers, _Triggers],
         _Floats,
         _Floats,
     ]: ...
     def predicted_features(self, captured_at: float) -> _Floats | None: ...
+    def expectation(self, captured_at: float) -> tuple[_Floats, _Floats] | None: ...
     @property
     def predicted_state(self) -> _Floats: ...
     @property
@@ -173,6 +185,7 @@ class Reduction:
 class MarkerDetector:
     def __new__(
         cls,
+        model: FeatureModel,
         *,
         pixel_format: str,
         weights: Sequence[float],
@@ -181,10 +194,13 @@ class MarkerDetector:
         minimum_area: int,
         gate: float,
         entry_point: Sequence[float],
+        model_deviation: float,
+        demands: tuple[float, float, float, float, float, float, float],
+        alternatives: Sequence[tuple[_Vector3, float]],
     ) -> Self: ...
     def detect(
-        self, image: NDArray[np.uint8], predicted: Sequence[float] | NDArray[np.float64] | None
-    ) -> tuple[NDArray[np.float64], str, NDArray[np.float64]]: ...
+        self, image: NDArray[np.uint8], states: NDArray[np.float64], deviation: NDArray[np.float64]
+    ) -> tuple[_Floats, _Floats, _Floats, tuple[str, str], _Floats]: ...
     def regions_in(
         self, image: NDArray[np.uint8], windows: Sequence[tuple[int, int, int, int]]
     ) -> NDArray[np.float64]: ...

@@ -30,12 +30,27 @@ class Status(StrEnum):
     """Every DOF was measured."""
     HELD = "held"
     """Some DOF could not be observed and was held at its prediction."""
+    PARTIAL = "partial"
+    """Only one marker was found; what it does not determine was held."""
     NO_MARKERS = "no_markers"
     """The markers were not found."""
     STALE = "stale"
     """Captured at a time the command history does not reach."""
     DUPLICATE = "duplicate"
     """Captured no later than a frame already used."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Expectation:
+    """Where the instrument is believed to be when a frame was captured.
+
+    Attributes:
+        state: (3,) [m, rad, rad].
+        deviation: (3,) standard deviations [m, rad, rad], each DOF by itself.
+    """
+
+    state: NDArray[np.float64]
+    deviation: NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,10 +63,13 @@ class Report:
         status: What became of it.
         state_estimate: q_hat (3,), Eq. (16); the prediction where a DOF is not observable.
         predicted_state: q (3,) at the capture time.
-        predicted_features: h(q) (4,) [px], Eq. (9).
-        innovation: Measured minus predicted features (4,) [px].
+        predicted_features: h(q) (4,) [px], Eq. (9); with one band alone, of the state the step
+            started from.
+        innovation: Measured minus predicted features (4,) [px]; NaN for a band not found.
         observable: (3,) which DOFs the image determined.
         deviation: (3,) standard deviation per px of marker noise [m/px, rad/px].
+        state_deviation: (3,) standard deviation of `state_estimate` from the detection's
+            covariance, or for 1 px of noise without one; NaN for a DOF that was held.
         triggers: Per DOF why (delta_minus, delta_plus) were updated: "contact", Eq. (4),
             "violation", Eq. (5), or None.
         delta_minus: (3,) contact offsets after this frame, input minus output.
@@ -67,6 +85,7 @@ class Report:
     innovation: NDArray[np.float64]
     observable: NDArray[np.bool_]
     deviation: NDArray[np.float64]
+    state_deviation: NDArray[np.float64]
     triggers: tuple[Triggers, Triggers, Triggers]
     delta_minus: NDArray[np.float64]
     delta_plus: NDArray[np.float64]
@@ -112,23 +131,39 @@ class HysteresisReduction:
             SignalError: The capture time is not finite.
         """
         captured_at = _time("captured_at", frame.captured_at)
-        predicted = self._loop.predicted_features(captured_at)
-        detection = self._detector.detect(frame.image, predicted)
-        features = detection.features if detection.valid else None
-        return self._report(features, captured_at, detection)
+        detection = self._detector.detect(
+            frame.image,
+            self._loop.predicted_features(captured_at),
+            self.expectation(captured_at),
+        )
+        if not any(detection.found):
+            return self._report(None, captured_at, detection)
+        return self._report(detection.features, captured_at, detection, detection.covariance)
 
     def on_features(self, features: ArrayLike | None, captured_at: float) -> Report:
         """Image update from a marker detector of your own.
 
         Args:
-            features: u and v of band A, u and v of band B (4,) [px]; None if not found.
+            features: u and v of band A, u and v of band B (4,) [px]; NaN for both of a band that
+                was not found, None if neither was.
             captured_at: When the frame was taken [s, the clock of `step`].
 
         Raises:
-            SignalError: The features are not four finite numbers, or the time is not finite.
+            SignalError: The features are not four numbers, finite for each band but for one that
+                was not found, or the time is not finite.
         """
-        values = None if features is None else _finite("features", features, (4,))
+        values = None if features is None else _features(features)
         return self._report(values, _time("captured_at", captured_at), None)
+
+    def expectation(self, captured_at: float) -> Expectation | None:
+        """Where the instrument should be in a frame captured at this time, to the best knowledge.
+
+        The model's state with the correction of the last images, and how sure that is
+        (crates/core/src/whereabouts.rs). It says where to look, never what to learn. None if not
+        known.
+        """
+        belief = self._loop.expectation(captured_at)
+        return None if belief is None else Expectation(*belief)
 
     def predicted_features(self, captured_at: float) -> NDArray[np.float64] | None:
         """Where to look in a frame captured at this time: h(q) (4,) [px], None if not known."""
@@ -157,9 +192,13 @@ class HysteresisReduction:
         return MarkerDetector(self._config)
 
     def _report(
-        self, features: NDArray[np.float64] | None, captured_at: float, detection: Detection | None
+        self,
+        features: NDArray[np.float64] | None,
+        captured_at: float,
+        detection: Detection | None,
+        covariance: NDArray[np.float64] | None = None,
     ) -> Report:
-        facts = self._loop.on_features(features, captured_at)
+        facts = self._loop.on_features(features, captured_at, covariance)
         return Report(detection, captured_at, Status(facts[0]), *facts[1:])
 
 
@@ -236,7 +275,22 @@ def build_loop(config: Config, compensate: bool = True) -> _core.Reduction:
         build_state_estimator(config),
         span=config.control.history,
         period=config.control.period,
+        start_deviation=(
+            insertion.start_deviation,
+            rotation.start_deviation,
+            bending.start_deviation,
+        ),
     )
+
+
+def _features(values: ArrayLike) -> NDArray[np.float64]:
+    """Four numbers, both of a band NaN or both finite, and not all NaN."""
+    features = np.asarray(values, dtype=np.float64) if np.shape(values) == (4,) else np.empty(0)
+    lost = np.isnan(features).reshape(-1, 2).all(axis=1).repeat(2)
+    if features.shape != (4,) or lost.all():
+        return _finite("features", values, (4,))
+    _finite("features", np.where(lost, 0.0, features), (4,))
+    return features
 
 
 def _finite(field: str, values: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:

@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from tautscope import _core
 from tautscope.config import Config
+from tautscope.dof import Dof
 from tautscope.errors import ConfigError, SignalError
 from tautscope.reduction import HysteresisReduction, Report, Status, build_feature_model
 from tautscope.rig import Frame
@@ -126,7 +127,7 @@ def test_report_shows_its_working() -> None:
     }
     four = {"predicted_features", "innovation"}
     assert shapes == {name: (4,) if name in four else (3,) for name in shapes}
-    assert len(shapes) == 8 and len(report.triggers) == 3
+    assert len(shapes) == 9 and len(report.triggers) == 3
 
 
 def test_frames_that_teach_nothing_say_why() -> None:
@@ -242,9 +243,13 @@ class FakeDetector:
 
     def __init__(self, config: Config) -> None:
         self.looked: list[Floats | None] = []
-        self.found = SimpleNamespace(features=np.zeros(4), valid=False, reason="none")
+        self.found = SimpleNamespace(
+            features=np.zeros(4), covariance=np.eye(4), valid=False, found=(False, False)
+        )
 
-    def detect(self, image: object, predicted_features: Floats | None = None) -> SimpleNamespace:
+    def detect(
+        self, image: object, predicted_features: Floats | None, expectation: object
+    ) -> SimpleNamespace:
         self.looked.append(predicted_features)
         return self.found
 
@@ -263,9 +268,65 @@ def test_a_frame_is_looked_at_where_it_was_captured(monkeypatch: pytest.MonkeyPa
     assert isinstance(detector, FakeDetector) and lost.detection is detector.found
     np.testing.assert_array_equal(detector.looked[0], predicted)
 
-    detector.found = SimpleNamespace(features=predicted + 1.0, valid=True, reason="")
+    detector.found = SimpleNamespace(
+        features=predicted + 1.0, covariance=np.eye(4), valid=True, found=(True, True)
+    )
     seen = loop.on_frame(frame)
     assert seen.status is Status.OK
     np.testing.assert_allclose(seen.innovation, 1.0, atol=1e-9)
     with pytest.raises(SignalError, match="captured_at"):
         loop.on_frame(replace(frame, captured_at=np.nan))
+
+
+def test_where_to_look_follows_the_images_and_widens_with_travel() -> None:
+    loop = started()
+    before = loop.expectation(0.3)
+    assert before is not None
+    np.testing.assert_array_equal(before.state, REST)
+    start = [CONFIG[dof].start_deviation for dof in Dof]
+    np.testing.assert_array_equal(before.deviation, start)
+
+    off = REST + np.array([1e-3, 0.05, -0.03])
+    seen = build_feature_model(CONFIG).predict(off)
+    assert seen is not None
+    report = loop.on_features(seen[0], 0.3)
+    after = loop.expectation(0.3)
+    assert after is not None
+    np.testing.assert_allclose(after.state, report.state_estimate)
+    assert (after.deviation < before.deviation).all()
+
+    for _ in range(20):
+        loop.step(REST + np.array([2e-3, 0.0, 0.0]))
+    later = loop.expectation(0.55)
+    assert later is not None
+    assert later.deviation[0] > 1.5 * after.deviation[0]
+    np.testing.assert_allclose(later.deviation[1:], after.deviation[1:])
+
+
+@pytest.mark.parametrize("lost", [0, 1])
+def test_one_band_alone_informs_and_is_called_partial(lost: int) -> None:
+    loop = started()
+    seen = build_feature_model(CONFIG).predict(REST)
+    assert seen is not None
+    features = seen[0].copy()
+    features[2 * lost : 2 * lost + 2] = np.nan
+    report = loop.on_features(features, 0.3)
+    assert report.status is Status.PARTIAL
+    assert 1 <= report.observable.sum() <= 2
+    np.testing.assert_allclose(report.state_estimate, REST, atol=1e-9)
+    np.testing.assert_array_equal(np.isnan(report.state_deviation), ~report.observable)
+    with pytest.raises(SignalError, match="features"):
+        loop.on_features([np.nan] * 4, 0.31)
+
+
+def test_the_states_deviation_is_the_covariance_through_the_pseudo_inverse() -> None:
+    loop = started()
+    prediction = build_feature_model(CONFIG).predict(REST)
+    assert prediction is not None
+    features, matrix = prediction
+    root = np.random.default_rng(0).normal(size=(4, 4))
+    covariance = root @ root.T
+    report = loop._report(features, 0.3, None, covariance)
+    inverse = np.linalg.pinv(matrix, rcond=1e-15)
+    expected = np.sqrt(np.diag(inverse @ covariance @ inverse.T))
+    np.testing.assert_allclose(report.state_deviation, expected, rtol=1e-8)

@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use tautscope_core as core;
 
-use crate::arrays::{Vector, columns, fixed};
+use crate::arrays::{Vector, columns, fixed, table};
 use crate::camera::Camera;
 use crate::errors;
 use crate::instrument::Instrument;
@@ -47,4 +47,55 @@ impl FeatureModel {
         let features = PyArray1::from_slice(py, &prediction.features);
         Ok(Some((features, columns(py, &prediction.columns)?)))
     }
+
+    /// Per band area in px^2, centroid (2,) in px, second moments (2, 2) in px^2 and outline (26, 2) in px.
+    ///
+    /// None where a band cannot be seen.
+    fn bands<'py>(&self, py: Python<'py>, state: Vector<'py>) -> PyResult<Option<Bands<'py>>> {
+        let Some([a, b]) = self.0.bands(fixed("state", &state)?) else {
+            return Ok(None);
+        };
+        Ok(Some((band(py, &a)?, band(py, &b)?)))
+    }
+
+    /// The most probable state (3,) for features (4,) in px of standard deviations (4,), from a belief
+    /// (3,) of standard deviations (3,); None where the model sees no band.
+    fn nearest_state<'py>(
+        &self,
+        py: Python<'py>,
+        state: Vector<'py>,
+        state_deviation: Vector<'py>,
+        features: Vector<'py>,
+        deviation: Vector<'py>,
+    ) -> PyResult<Option<(Bound<'py, PyArray1<f64>>, f64)>> {
+        let belief = core::Belief {
+            state: fixed("state", &state)?,
+            deviation: fixed("state_deviation", &state_deviation)?,
+        };
+        let found = self.0.nearest_state(
+            &belief,
+            fixed("features", &features)?,
+            fixed("deviation", &deviation)?,
+        );
+        Ok(found.map(|(state, misfit)| (PyArray1::from_slice(py, &state), misfit)))
+    }
+}
+
+type Band<'py> = (
+    f64,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<f64>>,
+);
+
+type Bands<'py> = (Band<'py>, Band<'py>);
+
+fn band<'py>(py: Python<'py>, image: &core::BandImage) -> PyResult<Band<'py>> {
+    let [uu, uv, vv] = image.moments;
+    Ok((
+        image.area,
+        PyArray1::from_slice(py, &image.centroid),
+        table(py, &[[uu, uv], [uv, vv]])?,
+        table(py, &image.outline)?,
+    ))
 }

@@ -14,7 +14,7 @@ use crate::state::StateEstimator;
 type Floats<'py> = Bound<'py, PyArray1<f64>>;
 
 /// status, `state_estimate`, `predicted_state`, `predicted_features`, innovation, observable,
-/// deviation, triggers, `delta_minus`, `delta_plus`.
+/// deviation, `state_deviation`, triggers, `delta_minus`, `delta_plus`.
 type Report<'py> = (
     &'static str,
     Floats<'py>,
@@ -22,6 +22,7 @@ type Report<'py> = (
     Floats<'py>,
     Floats<'py>,
     Bound<'py, PyArray1<bool>>,
+    Floats<'py>,
     Floats<'py>,
     (TriggerNames, TriggerNames, TriggerNames),
     Floats<'py>,
@@ -35,7 +36,8 @@ pub struct Reduction(core::HysteresisReduction);
 #[pymethods]
 impl Reduction {
     #[new]
-    #[pyo3(signature = (compensators, estimators, model, state_estimator, *, span, period))]
+    #[expect(clippy::too_many_arguments, reason = "named in Python")]
+    #[pyo3(signature = (compensators, estimators, model, state_estimator, *, span, period, start_deviation))]
     fn new(
         py: Python<'_>,
         compensators: [PyRef<'_, Compensator>; 3],
@@ -44,17 +46,20 @@ impl Reduction {
         state_estimator: &StateEstimator,
         span: f64,
         period: f64,
+        start_deviation: [f64; 3],
     ) -> PyResult<Self> {
         let axes = [0, 1, 2].map(|dof| {
             let (compensator, estimator) = (&compensators[dof], &estimators[dof]);
             core::Axis::new(compensator.inner, estimator.inner, estimator.state.play())
         });
         let history = core::History::new(span, period).map_err(errors::config(py))?;
+        let whereabouts = core::Whereabouts::new(start_deviation).map_err(errors::config(py))?;
         Ok(Self(core::HysteresisReduction::new(
             axes,
             model.0,
             state_estimator.0,
             history,
+            whereabouts,
         )))
     }
 
@@ -87,17 +92,30 @@ impl Reduction {
         table(py, &commands)
     }
 
-    /// Image update. Returns the fields of `tautscope.reduction.Report` from `status` on.
+    /// Image update: features (4,) in px, NaN for a band that was not found, and their covariance (4, 4) in
+    /// px^2. Returns the fields of `tautscope.reduction.Report` from `status` on.
+    #[pyo3(signature = (features, captured_at, covariance=None))]
     fn on_features<'py>(
         &mut self,
         py: Python<'py>,
         features: Option<Vector<'py>>,
         captured_at: f64,
+        covariance: Option<Table<'py>>,
     ) -> PyResult<Report<'py>> {
         let features = features
             .map(|features| fixed("features", &features))
             .transpose()?;
-        let report = self.0.on_features(features, captured_at);
+        let covariance: Option<[[f64; 4]; 4]> = match covariance {
+            Some(covariance) => {
+                let lines: Vec<[f64; 4]> = rows("covariance", &covariance)?;
+                same_length(py, "covariance", lines.len(), 4)?;
+                lines.try_into().ok()
+            }
+            None => None,
+        };
+        let report = self
+            .0
+            .on_features(features, covariance.as_ref(), captured_at);
         let estimate = &report.estimate;
         let [insertion, rotation, bending] = report.triggers.map(trigger_names);
         Ok((
@@ -108,6 +126,7 @@ impl Reduction {
             PyArray1::from_slice(py, &estimate.innovation),
             PyArray1::from_slice(py, &estimate.observable),
             PyArray1::from_slice(py, &estimate.deviation),
+            PyArray1::from_slice(py, &report.state_deviation),
             (insertion, rotation, bending),
             self.delta_minus(py),
             self.delta_plus(py),
@@ -118,6 +137,18 @@ impl Reduction {
     fn predicted_features<'py>(&self, py: Python<'py>, captured_at: f64) -> Option<Floats<'py>> {
         let features = self.0.predicted_features(captured_at)?;
         Some(PyArray1::from_slice(py, &features))
+    }
+
+    /// Where the instrument should be at a capture time: state (3,) and standard deviations (3,)
+    /// [m, rad, rad]; None if not known.
+    fn expectation<'py>(
+        &self,
+        py: Python<'py>,
+        captured_at: f64,
+    ) -> Option<(Floats<'py>, Floats<'py>)> {
+        let belief = self.0.expectation(captured_at)?;
+        let array = |values| PyArray1::from_slice(py, values);
+        Some((array(&belief.state), array(&belief.deviation)))
     }
 
     /// The predicted state (3,) now.
@@ -143,6 +174,7 @@ fn status_name(status: core::Status) -> &'static str {
     match status {
         core::Status::Ok => "ok",
         core::Status::Held => "held",
+        core::Status::Partial => "partial",
         core::Status::NoMarkers => "no_markers",
         core::Status::Stale => "stale",
         core::Status::Duplicate => "duplicate",

@@ -33,7 +33,8 @@ impl StateEstimator {
             .map_err(errors::config(py))
     }
 
-    /// State estimate (3,), observable (3,) and deviation (3,) from one measurement (4,) in px.
+    /// State estimate (3,), observable (3,) and deviation (3,) from one measurement (4,) in px, two NaN for
+    /// a band that was not found.
     fn estimate<'py>(
         &self,
         py: Python<'py>,

@@ -15,19 +15,25 @@ use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2, PyReadonlyArrayDyn};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use tautscope_core as core;
 use tautscope_vision::frame::MAX_SIDE;
 use tautscope_vision::runs::each_run;
 use tautscope_vision::{
-    ColorDiscriminant, Detector, Error, Frame, Labeller, PixelFormat, Region, Segmenter, Settings,
-    Window,
+    ColorDiscriminant, Demands, Detector, Error, Expect, Expectation, Frame, Labeller, Outline,
+    PixelFormat, Region, Segmenter, Settings, Window,
 };
 
+use crate::arrays::table;
+use crate::features::FeatureModel;
 use crate::frame::ArrayFrame;
 
 /// The markers in frames; `tautscope.vision.MarkerDetector` is its public face.
 #[pyclass(frozen, module = "tautscope._core")]
 pub struct MarkerDetector {
     format: PixelFormat,
+    model: core::FeatureModel,
+    model_deviation: f64,
+    demands: Demands,
     segmenter: Segmenter,
     detector: Mutex<Detector>,
 }
@@ -36,9 +42,10 @@ pub struct MarkerDetector {
 impl MarkerDetector {
     #[new]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
-    #[pyo3(signature = (*, pixel_format, weights, threshold, smoothing, minimum_area, gate, entry_point))]
+    #[pyo3(signature = (model, *, pixel_format, weights, threshold, smoothing, minimum_area, gate, entry_point, model_deviation, demands, alternatives))]
     fn new(
         py: Python<'_>,
+        model: &FeatureModel,
         pixel_format: &str,
         weights: [f64; 3],
         threshold: f64,
@@ -46,6 +53,9 @@ impl MarkerDetector {
         minimum_area: u64,
         gate: f64,
         entry_point: [f64; 2],
+        model_deviation: f64,
+        demands: [f64; 7],
+        alternatives: Vec<([f64; 3], f64)>,
     ) -> PyResult<Self> {
         let discriminant = ColorDiscriminant::new(weights, threshold).map_err(refused(py))?;
         let detector = Detector::new(Settings {
@@ -55,31 +65,92 @@ impl MarkerDetector {
             gate,
             entry_point,
         });
+        let others: Result<Vec<_>, _> = alternatives
+            .into_iter()
+            .map(|(weights, threshold)| ColorDiscriminant::new(weights, threshold))
+            .collect();
+        let [
+            inside,
+            coverage,
+            spill,
+            edges,
+            edges_on_average,
+            edges_alone,
+            surprise,
+        ] = demands;
         Ok(Self {
             format: PixelFormat::named(pixel_format).map_err(refused(py))?,
+            model: model.0,
+            model_deviation,
+            demands: Demands {
+                inside,
+                coverage,
+                spill,
+                edges,
+                edges_on_average,
+                edges_alone,
+                surprise,
+            },
             segmenter: Segmenter::new(discriminant, smoothing),
-            detector: Mutex::new(detector.map_err(refused(py))?),
+            detector: Mutex::new(
+                detector
+                    .map_err(refused(py))?
+                    .with_alternatives(&others.map_err(refused(py))?),
+            ),
         })
     }
 
-    /// Features (4,), NaN if there are none; why there are none, else empty; regions (n, 7).
+    /// Features (4,), covariance (4, 4), evidence (2, 9), a reason per marker, regions (n, 7).
+    ///
+    /// `states` (n, 3): where the instrument may be, each with the standard deviations `deviation` (3,).
     fn detect<'py>(
         &self,
         py: Python<'py>,
         image: PyReadonlyArrayDyn<'py, u8>,
-        predicted: Option<[f64; 4]>,
+        states: Vec<[f64; 3]>,
+        deviation: [f64; 3],
     ) -> PyResult<Measured<'py>> {
         let frame = ArrayFrame::new(&image, self.format)?;
-        let (features, regions) = py.detach(|| {
+        let expect = Believed {
+            model: &self.model,
+            states: &states,
+            deviation,
+            model_deviation: self.model_deviation,
+        };
+        let demands = if states.len() > 1 {
+            self.demands.without_a_place()
+        } else {
+            self.demands
+        };
+        let (verdict, regions) = py.detach(|| {
             let mut detector = self.detector.lock().unwrap_or_else(PoisonError::into_inner);
-            let detection = detector.detect(&frame, predicted);
-            (detection.features, rows(detection.regions.iter().copied()))
+            let (verdict, regions) = detector.recognise(&frame, &expect, &demands);
+            (verdict, rows(regions.iter().copied()))
         });
-        let reason = features
-            .err()
-            .map_or_else(String::new, |rejection| rejection.to_string());
-        let features = PyArray1::from_slice(py, &features.unwrap_or([f64::NAN; 4]));
-        Ok((features, reason, regions.into_pyarray(py)))
+        let [a, b] = verdict
+            .reasons
+            .map(|reason| reason.map_or_else(String::new, |reason| reason.to_string()));
+        let evidence = verdict.bands.map(|band| {
+            let [u, v] = band.centroid;
+            [
+                band.inside,
+                band.coverage,
+                band.own,
+                band.spill,
+                band.edges,
+                band.bloom,
+                band.surprise,
+                u,
+                v,
+            ]
+        });
+        Ok((
+            PyArray1::from_slice(py, &verdict.features),
+            table(py, &verdict.covariance)?,
+            table(py, &evidence)?,
+            (a, b),
+            regions.into_pyarray(py),
+        ))
     }
 
     /// The regions in windows (left, top, right, bottom): (n, 7).
@@ -130,7 +201,107 @@ fn window([left, top, right, bottom]: [usize; 4]) -> Window {
     }
 }
 
-type Measured<'py> = (Bound<'py, PyArray1<f64>>, String, Bound<'py, PyArray2<f64>>);
+type Measured<'py> = (
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    (String, String),
+    Bound<'py, PyArray2<f64>>,
+);
+
+/// States from which the best is sought.
+const STARTS: usize = 3;
+
+/// What the core's model says of where the instrument may be.
+struct Believed<'a> {
+    model: &'a core::FeatureModel,
+    states: &'a [[f64; 3]],
+    deviation: [f64; 3],
+    model_deviation: f64,
+}
+
+impl Believed<'_> {
+    fn belief(&self, state: [f64; 3]) -> core::Belief {
+        core::Belief {
+            state,
+            deviation: self.deviation,
+        }
+    }
+
+    /// Of a state as it is; infinite if no band can be seen in it.
+    fn misfit(&self, state: [f64; 3], seen: [f64; 4], deviation: [f64; 4]) -> f64 {
+        let misfit = self
+            .model
+            .misfit(&self.belief(state), state, seen, deviation);
+        misfit.unwrap_or(f64::INFINITY)
+    }
+}
+
+impl Expect for Believed<'_> {
+    fn expect(&self, seen: [f64; 4], deviation: [f64; 4]) -> Option<Expectation> {
+        // The states that explain the features best as they are; one of them leads to the best of all.
+        let mut starts = [(f64::INFINITY, None); STARTS];
+        let mut consider = |state: [f64; 3]| {
+            let misfit = self.misfit(state, seen, deviation);
+            if let Some(place) = starts.iter().position(|(less, _)| misfit < *less) {
+                starts[place..].rotate_right(1);
+                starts[place] = (misfit, Some(state));
+            }
+        };
+        self.states.iter().copied().for_each(&mut consider);
+        if let [state] = self.states
+            && self.misfit(*state, seen, deviation).is_infinite()
+        {
+            // No band can be seen from there; but it need not be exactly there.
+            for (dof, spread) in self.deviation.into_iter().enumerate() {
+                for step in [-spread, spread] {
+                    let mut near = *state;
+                    near[dof] += step;
+                    consider(near);
+                }
+            }
+        }
+        let found = starts.iter().filter_map(|(_, state)| {
+            let state = (*state)?;
+            let belief = self.belief(state);
+            let (nearest, misfit) = self.model.nearest_state(&belief, seen, deviation)?;
+            Some((state, nearest, misfit))
+        });
+        let (believed, nearest, _) = found.min_by(|a, b| a.2.total_cmp(&b.2))?;
+        // Where several states cover the workspace, no place in it is surprising.
+        let believed = if self.states.len() > 1 {
+            nearest
+        } else {
+            believed
+        };
+        let prediction = self.model.predict(nearest)?;
+        let bands = self.model.bands(nearest)?;
+        let [a, b] = bands.map(|band| band.centroid);
+        let mut features = [a[0], a[1], b[0], b[1]];
+        let mut covariance = [[0.0; 4]; 4];
+        for dof in 0..3 {
+            let column = prediction.columns[dof];
+            for i in 0..4 {
+                features[i] += column[i] * (believed[dof] - nearest[dof]);
+                for j in 0..4 {
+                    covariance[i][j] += column[i] * column[j] * self.deviation[dof].powi(2);
+                }
+            }
+        }
+        for (index, row) in covariance.iter_mut().enumerate() {
+            row[index] += self.model_deviation.powi(2);
+        }
+        Some(Expectation {
+            features,
+            covariance,
+            bands: bands.map(|band| Outline {
+                corners: band.outline,
+                centroid: band.centroid,
+                area: band.area,
+            }),
+        })
+    }
+}
 
 /// The 8-connected regions of a mask (h, w), in the order of their last rows: (n, 7).
 #[pyfunction]

@@ -75,6 +75,25 @@ impl FeatureModel {
         finite.then_some(prediction)
     }
 
+    /// Radius and length of the bands in m.
+    pub(crate) const fn size(&self) -> (f64, f64) {
+        (self.instrument.radius(), self.instrument.band_length())
+    }
+
+    /// Centre and axis of each band in the camera frame.
+    pub(crate) fn axes(&self, state: PerDof<f64>) -> [(Vector, Vector); 2] {
+        self.instrument.markers(state).map(|marker| {
+            let pose = &self.camera_from_guide;
+            (pose.transform(marker.position), pose.rotate(marker.axis))
+        })
+    }
+
+    /// The image of a point in the camera frame; None where there is none.
+    pub(crate) fn project(&self, point: Vector) -> Option<[f64; 2]> {
+        let projection = self.camera.project(point)?;
+        (!projection.is_folded()).then_some(projection.pixel)
+    }
+
     /// The image of one band: u and v, and each by DOF.
     fn centroid(&self, marker: &Marker) -> Option<([f64; 2], [PerDof<f64>; 2])> {
         let centre = Moving {

@@ -14,6 +14,8 @@ pub struct Entry {
     pub command: PerDof<f64>,
     /// The predicted state q [m, rad, rad].
     pub predicted_state: PerDof<f64>,
+    /// How far the command has gone so far, forth and back [m, rad, rad].
+    pub travel: PerDof<f64>,
 }
 
 /// The latest control ticks, at most 1024; it never allocates.
@@ -39,6 +41,7 @@ impl History {
             time: 0.0,
             command: [0.0; 3],
             predicted_state: [0.0; 3],
+            travel: [0.0; 3],
         };
         Ok(Self {
             ring: core::array::from_fn(|_| blank),
@@ -107,6 +110,7 @@ impl History {
             time,
             command: between(before.command, after.command, share),
             predicted_state: between(before.predicted_state, after.predicted_state, share),
+            travel: between(before.travel, after.travel, share),
         })
     }
 

@@ -3,10 +3,12 @@
 use crate::compensator::{Compensator, CompensatorState};
 use crate::dof::{PerDof, all_finite};
 use crate::estimator::{Estimator, EstimatorState, Triggers};
-use crate::features::{FeatureModel, FeaturePrediction};
+use crate::features::FeatureModel;
 use crate::history::{Entry, History};
 use crate::play::Play;
-use crate::state::{StateEstimate, StateEstimator};
+use crate::posture::Belief;
+use crate::state::{StateEstimate, StateEstimator, found};
+use crate::whereabouts::Whereabouts;
 
 /// One DOF of the loop: its compensator and its estimator, each with its memory.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,6 +53,8 @@ pub enum Status {
     Ok,
     /// Some DOF could not be observed and was held.
     Held,
+    /// Only one marker was found; what it does not determine was held.
+    Partial,
     /// The markers were not found.
     NoMarkers,
     /// Captured at a time the history does not reach.
@@ -70,6 +74,8 @@ pub struct Report {
     pub predicted_features: [f64; 4],
     /// `q_hat`, innovation and what could be observed.
     pub estimate: StateEstimate,
+    /// Standard deviation of each DOF of `q_hat` [m, rad, rad].
+    pub state_deviation: PerDof<f64>,
     /// Which offsets were updated, and why.
     pub triggers: PerDof<Triggers>,
     /// The offsets from now on [m, rad, rad].
@@ -83,6 +89,8 @@ pub struct HysteresisReduction {
     feature_model: FeatureModel,
     state_estimator: StateEstimator,
     history: History,
+    whereabouts: Whereabouts,
+    travel: PerDof<f64>,
     last_used: f64,
 }
 
@@ -93,12 +101,15 @@ impl HysteresisReduction {
         feature_model: FeatureModel,
         state_estimator: StateEstimator,
         history: History,
+        whereabouts: Whereabouts,
     ) -> Self {
         Self {
             axes,
             feature_model,
             state_estimator,
             history,
+            whereabouts,
+            travel: [0.0; 3],
             last_used: f64::NEG_INFINITY,
         }
     }
@@ -108,8 +119,11 @@ impl HysteresisReduction {
     /// A reference that is not finite holds the command, which before the first reference is NaN.
     pub fn step(&mut self, reference: PerDof<f64>, time: f64) -> PerDof<f64> {
         if all_finite(reference) {
-            for (axis, reference) in self.axes.iter_mut().zip(reference) {
-                axis.command(reference);
+            let axes = self.axes.iter_mut().zip(&mut self.travel);
+            for ((axis, travel), reference) in axes.zip(reference) {
+                let before = axis.compensation.command();
+                let moved = (axis.command(reference) - before).abs();
+                *travel += if moved.is_finite() { moved } else { 0.0 };
             }
         }
         let command = self.axes.map(|axis| axis.compensation.command());
@@ -117,6 +131,7 @@ impl HysteresisReduction {
             time,
             command,
             predicted_state: self.predicted_state(),
+            travel: self.travel,
         });
         if jumped_back {
             self.last_used = f64::NEG_INFINITY;
@@ -124,35 +139,57 @@ impl HysteresisReduction {
         command
     }
 
-    /// Image update: the features (4,) in px measured in a frame captured at `captured_at` in s.
+    /// Image update: the features (4,) in px measured in a frame captured at `captured_at` in s, and their
+    /// covariance (4, 4) in px^2; None is 1 px^2 for each.
     ///
-    /// None, or features that are not finite, say that the markers were not found.
-    pub fn on_features(&mut self, measured: Option<[f64; 4]>, captured_at: f64) -> Report {
+    /// Two NaN for a band say that it was not found; None, or features that are not finite
+    /// otherwise, that neither was. With one band the step starts from `expectation` and not from
+    /// the prediction: what is held must be as right as is known.
+    pub fn on_features(
+        &mut self,
+        measured: Option<[f64; 4]>,
+        covariance: Option<&[[f64; 4]; 4]>,
+        captured_at: f64,
+    ) -> Report {
         if captured_at <= self.last_used {
             return self.unused(Status::Duplicate, None);
         }
         let Some(past) = self.history.at(captured_at) else {
             return self.unused(Status::Stale, None);
         };
-        let Some(measured) = measured.filter(|features| all_finite(*features)) else {
+        let Some(measured) = measured.filter(|features| usable(*features)) else {
             return self.unused(Status::NoMarkers, Some(past));
         };
-        let Some(prediction) = self.feature_model.predict(past.predicted_state) else {
+        let complete = found(measured) == [true; 2];
+        let start = if complete {
+            past.predicted_state
+        } else {
+            self.whereabouts.at(&past).state
+        };
+        let Some(prediction) = self.feature_model.predict(start) else {
             return self.unused(Status::Held, Some(past));
         };
         self.last_used = captured_at;
-        self.learn(&past, &prediction, measured)
+        let estimate = self.state_estimator.estimate(start, &prediction, measured);
+        let state_deviation = estimate.state_deviation(covariance.unwrap_or(&UNIT));
+        self.whereabouts.learn(&past, &estimate, state_deviation);
+        let seen = estimate.observable == [true; 3];
+        Report {
+            status: match (complete, seen) {
+                (false, _) => Status::Partial,
+                (true, false) => Status::Held,
+                (true, true) => Status::Ok,
+            },
+            predicted_state: past.predicted_state,
+            predicted_features: prediction.features,
+            triggers: self.learn(&past, &estimate),
+            estimate,
+            state_deviation,
+            play: self.play(),
+        }
     }
 
-    fn learn(
-        &mut self,
-        past: &Entry,
-        prediction: &FeaturePrediction,
-        measured: [f64; 4],
-    ) -> Report {
-        let estimate = self
-            .state_estimator
-            .estimate(past.predicted_state, prediction, measured);
+    fn learn(&mut self, past: &Entry, estimate: &StateEstimate) -> PerDof<Triggers> {
         let mut triggers = [Triggers::default(); 3];
         let signals = estimate
             .observable
@@ -165,15 +202,7 @@ impl HysteresisReduction {
                 *triggers = axis.learn(command, measured);
             }
         }
-        let complete = estimate.observable.iter().all(|observable| *observable);
-        Report {
-            status: if complete { Status::Ok } else { Status::Held },
-            predicted_state: past.predicted_state,
-            predicted_features: prediction.features,
-            estimate,
-            triggers,
-            play: self.play(),
-        }
+        triggers
     }
 
     /// The report on a frame that taught nothing.
@@ -189,7 +218,9 @@ impl HysteresisReduction {
                 observable: [false; 3],
                 deviation: [f64::NAN; 3],
                 innovation: [f64::NAN; 4],
+                inverse: [[0.0; 4]; 3],
             },
+            state_deviation: [f64::NAN; 3],
             triggers: [Triggers::default(); 3],
             play: self.play(),
         }
@@ -204,6 +235,14 @@ impl HysteresisReduction {
         Some(prediction.features)
     }
 
+    /// Where the instrument should be in a frame captured at `captured_at` in s, and how sure that
+    /// is: the prediction and what the last images corrected it by. It says where to look and no more.
+    ///
+    /// None beyond the history.
+    pub fn expectation(&self, captured_at: f64) -> Option<Belief> {
+        Some(self.whereabouts.at(&self.history.at(captured_at)?))
+    }
+
     /// The predicted state q now [m, rad, rad]; NaN before the first reference.
     pub fn predicted_state(&self) -> PerDof<f64> {
         self.axes.map(|axis| axis.compensation.predicted_state())
@@ -213,4 +252,18 @@ impl HysteresisReduction {
     pub fn play(&self) -> PerDof<Play> {
         self.axes.map(|axis| axis.estimation.play())
     }
+}
+
+/// Px^2.
+const UNIT: [[f64; 4]; 4] = [
+    [1.0, 0.0, 0.0, 0.0],
+    [0.0, 1.0, 0.0, 0.0],
+    [0.0, 0.0, 1.0, 0.0],
+    [0.0, 0.0, 0.0, 1.0],
+];
+
+/// Whether there is a band, and what there is is finite.
+fn usable([ua, va, ub, vb]: [f64; 4]) -> bool {
+    let [a, b] = found([ua, va, ub, vb]);
+    (a || b) && (!a || all_finite([ua, va])) && (!b || all_finite([ub, vb]))
 }

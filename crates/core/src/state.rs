@@ -14,8 +14,12 @@ type Column = [f64; 4];
 /// ```
 ///
 /// with the interaction matrix L (4, 3). While a DOF's deviation exceeds its
-/// `observable_deviation`, the worst (as a ratio, so that m and rad compare) is held at its
-/// prediction and the rest is solved for again: rotation, for example, near zero bend.
+/// `observable_deviation`, one of these is held at its prediction, the one without which the rest
+/// is best determined (by the worst ratio of the two, so that m and rad compare), and the rest is solved
+/// for again: rotation, for example, near zero bend.
+///
+/// A band that was not found has no say: its two rows of L are left out, so that at least one DOF
+/// is held.
 ///
 /// Wrong far from the prediction: the step is linear and there is one of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,8 +37,35 @@ pub struct StateEstimate {
     /// Standard deviation per px of marker noise [m/px, rad/px]; for a held DOF that for which it
     /// was held.
     pub deviation: PerDof<f64>,
-    /// `s_measured - s_predicted` in px.
+    /// `s_measured - s_predicted` in px; NaN for a band that was not found.
     pub innovation: [f64; 4],
+    /// pinv(L) as it was used, one row per DOF [m/px, rad/px]; zeros for a DOF that was held.
+    pub inverse: PerDof<[f64; 4]>,
+}
+
+impl StateEstimate {
+    /// Standard deviations (3,) [m, rad, rad] of what was estimated from features of this covariance
+    /// (4, 4) in px^2: `sqrt((pinv(L) covariance pinv(L)')_jj)`. NaN for a DOF that was held.
+    ///
+    /// The step is not weighted with the covariance, Eq. (16): this is how sure it is, not how
+    /// sure it could be. What a held DOF is off by is not in it.
+    pub fn state_deviation(&self, covariance: &[[f64; 4]; 4]) -> PerDof<f64> {
+        let mut deviations = [f64::NAN; 3];
+        let rows = self.inverse.iter().zip(self.observable);
+        for (deviation, (row, observable)) in deviations.iter_mut().zip(rows) {
+            if observable {
+                let each = covariance.iter().zip(row).filter(|(_, own)| **own != 0.0);
+                let variance: f64 = each
+                    .map(|(line, own)| {
+                        let used = line.iter().zip(row).filter(|(_, other)| **other != 0.0);
+                        own * used.map(|(entry, other)| entry * other).sum::<f64>()
+                    })
+                    .sum();
+                *deviation = libm::sqrt(variance);
+            }
+        }
+        deviations
+    }
 }
 
 impl StateEstimator {
@@ -52,7 +83,8 @@ impl StateEstimator {
     }
 
     /// The state estimate for measured features (4,) in px, from the predicted state and what the
-    /// model predicts for it. With anything not finite, no DOF is observable.
+    /// model predicts for it. Two NaN for a band say that it was not found. With anything else not
+    /// finite, no DOF is observable.
     pub fn estimate(
         &self,
         predicted_state: PerDof<f64>,
@@ -60,9 +92,12 @@ impl StateEstimator {
         measured_features: [f64; 4],
     ) -> StateEstimate {
         let innovation = subtract(measured_features, prediction.features);
-        let [insertion, rotation, bending] = prediction.columns;
+        let found = found(measured_features);
+        let seen = |column: Column| only(found, column);
+        let [insertion, rotation, bending] = prediction.columns.map(seen);
         let [insertion_unit, rotation_unit, bending_unit] = self.observable_deviation;
-        let finite = all_finite(innovation)
+        let step = seen(innovation);
+        let finite = all_finite(step)
             && all_finite(predicted_state)
             && prediction.columns.iter().all(|column| all_finite(*column));
 
@@ -72,7 +107,7 @@ impl StateEstimator {
             Unknown::new(rotation, rotation_unit, finite),
             Unknown::new(bending, bending_unit, finite),
         ];
-        while finite && solve_and_hold_worst(&mut axes, innovation) {}
+        while finite && solve_and_hold_one(&mut axes, step) {}
 
         let [insertion, rotation, bending] = axes;
         let [q1, q2, q3] = predicted_state;
@@ -89,8 +124,21 @@ impl StateEstimator {
                 bending.ratio * bending_unit,
             ],
             innovation,
+            inverse: [insertion.row(), rotation.row(), bending.row()],
         }
     }
+}
+
+/// Which bands were found: not those with two NaN.
+pub fn found([ua, va, ub, vb]: [f64; 4]) -> [bool; 2] {
+    [!(ua.is_nan() && va.is_nan()), !(ub.is_nan() && vb.is_nan())]
+}
+
+/// Zeros for a band that was not found.
+fn only([a, b]: [bool; 2], [ua, va, ub, vb]: Column) -> Column {
+    let part = |found: bool, u: f64, v: f64| if found { (u, v) } else { (0.0, 0.0) };
+    let ((ua, va), (ub, vb)) = (part(a, ua, va), part(b, ub, vb));
+    [ua, va, ub, vb]
 }
 
 /// A DOF being solved for.
@@ -103,6 +151,8 @@ struct Unknown {
     ratio: f64,
     /// In `unit`.
     solution: f64,
+    /// Its row of the pseudo-inverse, in `unit`.
+    inverse: Column,
 }
 
 impl Unknown {
@@ -113,6 +163,7 @@ impl Unknown {
             active,
             ratio: f64::INFINITY,
             solution: 0.0,
+            inverse: [0.0; 4],
         }
     }
 
@@ -121,6 +172,14 @@ impl Unknown {
             self.solution * self.unit
         } else {
             0.0
+        }
+    }
+
+    fn row(&self) -> Column {
+        if self.active {
+            self.inverse.map(|value| value * self.unit)
+        } else {
+            [0.0; 4]
         }
     }
 
@@ -135,6 +194,7 @@ impl Unknown {
         let own = without(without(own, first), second);
         let square = dot(own, own);
         self.solution = dot(own, innovation) / square;
+        self.inverse = own.map(|value| value / square);
         self.ratio = if square.is_finite() && self.solution.is_finite() {
             1.0 / libm::sqrt(square)
         } else {
@@ -143,8 +203,33 @@ impl Unknown {
     }
 }
 
-/// Solve for the active DOFs; hold the least observable one and say so if it is not observable.
-fn solve_and_hold_worst(axes: &mut [Unknown; 3], innovation: Column) -> bool {
+/// Solve for the active DOFs; hold one that is not observable and say so if there is one.
+fn solve_and_hold_one(axes: &mut [Unknown; 3], innovation: Column) -> bool {
+    solve(axes, innovation);
+    let mut best: Option<(f64, [Unknown; 3])> = None;
+    for index in 0..axes.len() {
+        let mut trial = *axes;
+        let Some(axis) = trial
+            .get_mut(index)
+            .filter(|axis| axis.active && axis.ratio > 1.0)
+        else {
+            continue;
+        };
+        axis.active = false;
+        solve(&mut trial, innovation);
+        let active = trial.iter().filter(|axis| axis.active);
+        let worst = active.map(|axis| axis.ratio).fold(0.0, f64::max);
+        if best.is_none_or(|(least, _)| worst < least) {
+            best = Some((worst, trial));
+        }
+    }
+    best.is_some_and(|(_, held)| {
+        *axes = held;
+        true
+    })
+}
+
+fn solve(axes: &mut [Unknown; 3], innovation: Column) {
     let [first, second, third] = axes;
     if first.active {
         first.solve([second, third], innovation);
@@ -155,14 +240,6 @@ fn solve_and_hold_worst(axes: &mut [Unknown; 3], innovation: Column) -> bool {
     if third.active {
         third.solve([first, second], innovation);
     }
-    let worst = axes
-        .iter_mut()
-        .filter(|axis| axis.active && axis.ratio > 1.0)
-        .max_by(|a, b| a.ratio.total_cmp(&b.ratio));
-    worst.is_some_and(|axis| {
-        axis.active = false;
-        true
-    })
 }
 
 fn dot([a0, a1, a2, a3]: Column, [b0, b1, b2, b3]: Column) -> f64 {

@@ -3,7 +3,7 @@
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use tautscope_core::{
     Axis, Camera, Compensator, Estimator, FeatureModel, History, HysteresisReduction, Instrument,
-    Play, Pose, StateEstimator, Status, Triggers,
+    Play, Pose, StateEstimator, Status, Triggers, Whereabouts,
 };
 
 #[global_allocator]
@@ -28,6 +28,7 @@ fn reduction() -> HysteresisReduction {
         model,
         StateEstimator::new([1.0; 3]).unwrap(),
         History::new(2.0, 0.005).unwrap(),
+        Whereabouts::new([5e-3, 0.6, 0.5]).unwrap(),
     )
 }
 
@@ -45,13 +46,13 @@ fn step_and_image_update_do_not_allocate() {
                 let captured_at = time - 0.08;
                 let seen = reduction.predicted_features(captured_at);
                 let shifted = seen.map(|features| features.map(|value| value + 3.0 * wave));
-                let report = reduction.on_features(shifted, captured_at);
+                let report = reduction.on_features(shifted, None, captured_at);
                 used += u32::from(report.status == Status::Ok);
                 learnt += u32::from(report.triggers.iter().any(Triggers::any));
             }
         }
         reduction.step([f64::NAN; 3], 20.0);
-        reduction.on_features(None, 20.0);
+        reduction.on_features(None, None, 20.0);
     });
     assert!(
         used > 400 && learnt > 40,

@@ -1,7 +1,10 @@
 //! Frame to markers: Fig. 5 as a whole.
 
+use crate::judge::{Demands, Verdict, judge};
 use crate::markers::{near_prediction, two_largest};
-use crate::{ColorDiscriminant, Error, Frame, Labeller, Region, Rejection, Segmenter, Window};
+use crate::{
+    ColorDiscriminant, Error, Expect, Frame, Labeller, Region, Rejection, RunMap, Segmenter, Window,
+};
 
 /// Only so many regions, the largest, are considered: it bounds the time on a noisy frame.
 pub const CANDIDATES: usize = 16;
@@ -27,7 +30,10 @@ pub struct Detector {
     settings: Settings,
     segmenter: Segmenter,
     labeller: Labeller,
+    map: RunMap,
     regions: Vec<Region>,
+    alternatives: Vec<Segmenter>,
+    best: Vec<Region>,
 }
 
 /// What a frame shows.
@@ -72,8 +78,19 @@ impl Detector {
             settings,
             segmenter: Segmenter::new(settings.discriminant, smoothing),
             labeller: Labeller::default(),
+            map: RunMap::default(),
             regions: Vec::with_capacity(CANDIDATES),
+            alternatives: Vec::new(),
+            best: Vec::with_capacity(CANDIDATES),
         })
+    }
+
+    /// Discriminants to try in turn where the first does not give a clear verdict.
+    #[must_use]
+    pub fn with_alternatives(mut self, discriminants: &[ColorDiscriminant]) -> Self {
+        let segmenter = |one: &ColorDiscriminant| Segmenter::new(*one, self.settings.smoothing);
+        self.alternatives = discriminants.iter().map(segmenter).collect();
+        self
     }
 
     /// Finds the markers, near `predicted` `[u_A, v_A, u_B, v_B]` (px) if that is given and finite,
@@ -91,18 +108,76 @@ impl Detector {
         Detection { features, regions }
     }
 
+    /// Recognises the markers by what `expect` says of them: in the window where they should be if
+    /// that is small, and in the whole frame if they are not clear there.
+    ///
+    /// Allocates only when a frame is larger than those before.
+    pub fn recognise(
+        &mut self,
+        frame: &impl Frame,
+        expect: &impl Expect,
+        demands: &Demands,
+    ) -> (Verdict, &[Region]) {
+        let before = expect.expect([0.0; 4], [f64::INFINITY; 4]);
+        if let Some(window) = before.and_then(|expectation| expectation.window(frame)) {
+            self.find(frame, window);
+            let verdict = judge(&self.regions, &self.map, expect, demands);
+            if verdict.is_clear() {
+                return (verdict, &self.regions);
+            }
+        }
+        self.find(frame, Window::whole(frame));
+        let mut verdict = judge(&self.regions, &self.map, expect, demands);
+        for index in 0..self.alternatives.len() {
+            if verdict.is_clear() {
+                break;
+            }
+            std::mem::swap(&mut self.best, &mut self.regions);
+            self.exchange(index);
+            self.find(frame, Window::whole(frame));
+            self.exchange(index);
+            let other = judge(&self.regions, &self.map, expect, demands);
+            if other.score() > verdict.score() {
+                verdict = other;
+            } else {
+                std::mem::swap(&mut self.best, &mut self.regions);
+            }
+        }
+        (verdict, &self.regions)
+    }
+
     /// The regions in some windows, the largest first, at most [`CANDIDATES`]; each ends where its
     /// window does.
     ///
     /// Allocates only when a frame is larger than those before.
     pub fn regions_in(&mut self, frame: &impl Frame, windows: &[Window]) -> &[Region] {
+        self.regions.clear();
+        for window in windows {
+            self.collect(frame, *window, None);
+        }
+        &self.regions
+    }
+
+    /// Regions and runs of one window.
+    fn find(&mut self, frame: &impl Frame, window: Window) {
+        self.regions.clear();
+        let mut map = std::mem::take(&mut self.map);
+        let window = window.within(frame);
+        map.start(frame.width(), frame.height());
+        map.end_rows(window.top);
+        self.collect(frame, window, Some(&mut map));
+        map.end_rows(frame.height());
+        self.map = map;
+    }
+
+    fn collect(&mut self, frame: &impl Frame, window: Window, mut map: Option<&mut RunMap>) {
         let Self {
             segmenter,
             labeller,
             regions,
             settings,
+            ..
         } = self;
-        regions.clear();
         let mut keep = |region: Region| {
             let place = regions.partition_point(|kept| kept.area >= region.area);
             if region.area >= settings.minimum_area && place < CANDIDATES {
@@ -110,14 +185,25 @@ impl Detector {
                 regions.insert(place, region);
             }
         };
-        for window in windows {
-            labeller.start(frame.width());
-            segmenter.each_row_in(frame, *window, |v, runs| {
-                runs.each(|start, end| labeller.add(v, start, end));
-                labeller.end_row(&mut keep);
+        labeller.start(frame.width());
+        segmenter.each_row_in(frame, window, |v, runs| {
+            runs.each(|start, end| {
+                labeller.add(v, start, end);
+                if let Some(map) = &mut map {
+                    map.add(start, end);
+                }
             });
             labeller.end_row(&mut keep);
+            if let Some(map) = &mut map {
+                map.end_rows(v + 1);
+            }
+        });
+        labeller.end_row(&mut keep);
+    }
+
+    fn exchange(&mut self, index: usize) {
+        if let Some(other) = self.alternatives.get_mut(index) {
+            std::mem::swap(&mut self.segmenter, other);
         }
-        regions
     }
 }

@@ -2,10 +2,65 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tautscope.errors import FieldError
+
+
+@dataclass(frozen=True, slots=True)
+class ColorDiscriminant:
+    """Which colours are marker: those with w . x > threshold, x = (B, G, R) [grey levels].
+
+    Attributes:
+        weights: Of B, G, R; `vision.weights`.
+        threshold: `vision.threshold` [grey levels].
+        training_margin: `margin` of the marker pixels it was fitted to.
+    """
+
+    weights: tuple[float, float, float]
+    threshold: float
+    training_margin: float
+
+    @classmethod
+    def fit(cls, marker: ArrayLike, background: ArrayLike) -> ColorDiscriminant:
+        """Fisher's discriminant with equal priors from labelled pixels, see `fit_discriminant`.
+
+        Args:
+            marker: (n, 3) B, G, R of pixels on the bands.
+            background: (m, 3) B, G, R of pixels of everything else.
+
+        Raises:
+            FieldError: As `fit_discriminant`.
+        """
+        weights, threshold = fit_discriminant(marker, background)
+        unfitted = cls(weights, threshold, 0.0)
+        return cls(weights, threshold, unfitted.margin(marker))
+
+    def is_marker(self, pixels: ArrayLike) -> NDArray[np.bool_]:
+        """Which of pixels (n, 3) are marker (n,)."""
+        values: NDArray[np.float64] = _checked("pixels", pixels) @ np.array(self.weights)
+        return values > self.threshold
+
+    def margin(self, marker: ArrayLike) -> float:
+        """How far pixels (n, 3) are on the markers' side: median of (w . x - threshold) / |x|.
+
+        The division by the pixel's brightness makes it independent of the exposure, but for the
+        threshold. 0 is on the boundary.
+        """
+        pixels = _checked("marker", marker)
+        brightness = np.maximum(np.linalg.norm(pixels, axis=1), 1.0)
+        return float(np.median((pixels @ np.array(self.weights) - self.threshold) / brightness))
+
+    def has_drifted(self, marker: ArrayLike) -> bool:
+        """Whether a scene's marker pixels have lost half of the training's margin: fit anew.
+
+        Args:
+            marker: (n, 3) pixels within the bands of a trusted detection.
+        """
+        return self.margin(marker) < 0.5 * self.training_margin
 
 
 def fit_discriminant(

@@ -1,0 +1,216 @@
+//! What the loop expects to see: where, how large, how sure. Plain numbers, whoever made them.
+
+use crate::{Frame, RunMap, Window};
+
+/// How far a band's colour may reach beyond its outline, motion and defocus included (px).
+const BLUR: f64 = 12.0;
+
+/// Corners of an outline.
+pub const OUTLINE: usize = 26;
+
+/// What is expected of a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Expectation {
+    /// Where the bands' centroids should be before anything is seen: `[u_A, v_A, u_B, v_B]` (px).
+    pub features: [f64; 4],
+    /// How sure that is: covariance (4, 4) (px^2), symmetric, positive definite.
+    pub covariance: [[f64; 4]; 4],
+    /// What the bands look like there, or where they were seen.
+    pub bands: [Outline; 2],
+}
+
+impl Expectation {
+    /// The part of a frame that holds both bands but for 3 standard deviations and their blur.
+    ///
+    /// None if that is more than a quarter of it: then the whole frame may as well be read.
+    pub fn window(&self, frame: &impl Frame) -> Option<Window> {
+        let [size_u, size_v] = [frame.width(), frame.height()].map(pixels);
+        let [mut left, mut top, mut right, mut bottom] = [size_u, size_v, 0.0, 0.0];
+        for (band, outline) in self.bands.iter().enumerate() {
+            let spread = |axis: usize| {
+                let variance = self.covariance[2 * band + axis][2 * band + axis];
+                3.0 * variance.sqrt() + BLUR
+            };
+            let [away_u, away_v] = [0, 1].map(spread);
+            let [shift_u, shift_v] =
+                [0, 1].map(|axis| self.features[2 * band + axis] - outline.centroid[axis]);
+            for [u, v] in outline.corners {
+                left = left.min(u + shift_u - away_u);
+                right = right.max(u + shift_u + away_u);
+                top = top.min(v + shift_v - away_v);
+                bottom = bottom.max(v + shift_v + away_v);
+            }
+        }
+        let place = |value: f64, size: f64| whole(value.clamp(0.0, size));
+        let window = Window {
+            left: place(left.floor(), size_u),
+            top: place(top.floor(), size_v),
+            right: place(right.ceil(), size_u),
+            bottom: place(bottom.ceil(), size_v),
+        };
+        let area = (right - left) * (bottom - top);
+        let is_small = 4.0 * area <= size_u * size_v;
+        (is_small && window.left < window.right && window.top < window.bottom).then_some(window)
+    }
+}
+
+/// A frame's side is at most [`crate::frame::MAX_SIDE`], so that nothing is lost.
+fn pixels(side: usize) -> f64 {
+    u32::try_from(side).map_or(f64::INFINITY, f64::from)
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "clamped to a frame's side; NaN becomes 0"
+)]
+fn whole(place: f64) -> usize {
+    place as usize
+}
+
+/// Whoever can say what to expect.
+pub trait Expect {
+    /// The expectation, its bands drawn in the posture that best explains the features `seen` (4,) (px)
+    /// with standard deviations `deviation` (4,) (px; infinite: not seen).
+    ///
+    /// None if the bands cannot be seen.
+    fn expect(&self, seen: [f64; 4], deviation: [f64; 4]) -> Option<Expectation>;
+}
+
+/// The outline of a band.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outline {
+    /// Corners u, v, once around (px).
+    pub corners: [[f64; 2]; OUTLINE],
+    /// Mean place of what it encloses, u, v (px).
+    pub centroid: [f64; 2],
+    /// (px^2).
+    pub area: f64,
+}
+
+impl Outline {
+    /// Moved by `[u, v]` (px).
+    #[must_use]
+    pub fn moved(&self, [du, dv]: [f64; 2]) -> Self {
+        let [u, v] = self.centroid;
+        Self {
+            corners: self.corners.map(|[u, v]| [u + du, v + dv]),
+            centroid: [u + du, v + dv],
+            area: self.area,
+        }
+    }
+
+    /// Grown by `reach` px on average, about its centroid.
+    #[must_use]
+    pub fn grown(&self, reach: f64) -> Self {
+        let factor = 1.0 + reach / self.radius();
+        let [cu, cv] = self.centroid;
+        Self {
+            corners: self
+                .corners
+                .map(|[u, v]| [cu + factor * (u - cu), cv + factor * (v - cv)]),
+            centroid: self.centroid,
+            area: self.area * factor * factor,
+        }
+    }
+
+    /// Radius of the circle of its area (px).
+    pub fn radius(&self) -> f64 {
+        (self.area / std::f64::consts::PI).sqrt()
+    }
+
+    /// Pixels of the image in it, those of them that are marker, and those of these that `other` has too.
+    pub fn count(&self, map: &RunMap, other: &Self) -> Count {
+        let (width, height) = map.size();
+        let mut count = Count::default();
+        let (mut v, last) = self.rows(height);
+        while v <= last {
+            let mine = self.spans(v, width);
+            let theirs = other.spans(v, width);
+            for (from, to) in mine.each() {
+                count.pixels += to - from + 1.0;
+                count.marker += map.count(v, from, to);
+                for (first, last) in theirs.each() {
+                    let (from, to) = (from.max(first), to.min(last));
+                    if from <= to {
+                        count.shared += map.count(v, from, to);
+                    }
+                }
+            }
+            v += 1.0;
+        }
+        count
+    }
+
+    /// First and last row of an image so high that it may touch.
+    fn rows(&self, height: f64) -> (f64, f64) {
+        let extreme = |pick: fn(f64, f64) -> f64, start| {
+            self.corners.iter().map(|[_, v]| *v).fold(start, pick)
+        };
+        let first = extreme(f64::min, f64::INFINITY).ceil().max(0.0);
+        (
+            first,
+            extreme(f64::max, f64::NEG_INFINITY).min(height - 1.0),
+        )
+    }
+
+    /// Where row `v` is inside: pixels, whole numbers.
+    fn spans(&self, v: f64, width: f64) -> Spans {
+        let mut spans = Spans::default();
+        let next = self.corners.iter().cycle().skip(1);
+        for ([u0, v0], [u1, v1]) in self.corners.iter().zip(next) {
+            if (*v0 <= v) != (*v1 <= v) {
+                spans.add(u0 + (v - v0) / (v1 - v0) * (u1 - u0));
+            }
+        }
+        spans.sort(width);
+        spans
+    }
+}
+
+/// See [`Outline::count`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Count {
+    /// In the outline and in the image (px).
+    pub pixels: f64,
+    /// Marker among them (px).
+    pub marker: f64,
+    /// Marker in the other outline as well (px).
+    pub shared: f64,
+}
+
+/// Where a row crosses an outline; no more crossings than an outline of two arcs can have.
+#[derive(Default)]
+struct Spans {
+    crossings: [f64; 8],
+    len: usize,
+}
+
+impl Spans {
+    fn add(&mut self, u: f64) {
+        if let Some(slot) = self.crossings.get_mut(self.len) {
+            *slot = u;
+            self.len += 1;
+        }
+    }
+
+    fn sort(&mut self, width: f64) {
+        let crossings = self.crossings.get_mut(..self.len).unwrap_or_default();
+        crossings.sort_by(f64::total_cmp);
+        for (index, u) in crossings.iter_mut().enumerate() {
+            *u = if index % 2 == 0 {
+                u.ceil().max(0.0)
+            } else {
+                (u.ceil() - 1.0).min(width - 1.0)
+            };
+        }
+    }
+
+    fn each(&self) -> impl Iterator<Item = (f64, f64)> {
+        let pairs = self.crossings.chunks_exact(2).take(self.len / 2);
+        pairs.filter_map(|pair| match pair {
+            [from, to] if from <= to => Some((*from, *to)),
+            _ => None,
+        })
+    }
+}

@@ -1,0 +1,243 @@
+//! The bands' outlines laid over what was segmented.
+
+use crate::linear::{Square, apply, inverse};
+use crate::{Expectation, OUTLINE, Outline, RunMap};
+
+/// Places along an outline where its edge is sought.
+const SAMPLES: usize = 48;
+/// How far from the outline an edge is sought (px), at most.
+const REACH: f64 = 9.0;
+/// Standard deviation of an edge (px), neighbours taken as independent.
+const EDGE: f64 = 0.6;
+/// Edges farther than this from where they should be have no say in the end (px).
+const TOLERANCE: f64 = 1.8;
+/// Standard deviation of the growth of the outlines: blur and threshold (px), and unknown scale (1).
+const BLOOM: f64 = 1.2;
+const SCALE: f64 = 0.06;
+/// The same for the difference of the two bands: they are blurred alike.
+const BLOOM_APART: f64 = 0.4;
+const SCALE_APART: f64 = 0.03;
+/// Edges nearer than this to the border of the image say nothing (px).
+const BORDER: f64 = 2.0;
+/// Nearer than this to where a rim meets a side the low-pass rounds the outline off (px).
+const CORNER: f64 = 2.5;
+/// Where they meet.
+const CORNERS: [usize; 4] = [0, OUTLINE / 2 - 1, OUTLINE / 2, OUTLINE - 1];
+/// The tolerance, round by round: from a region's centroid, and from where the outlines have lain before.
+pub const COARSE: [f64; 3] = [4.0, 2.0, 1.4];
+/// See [`COARSE`].
+pub const FINE: [f64; 3] = [1.4, 1.0, 1.0];
+
+/// Two outlines in place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fit {
+    /// Centroids `[u_A, v_A, u_B, v_B]` (px).
+    pub features: [f64; 4],
+    /// (4, 4) (px^2).
+    pub covariance: Square<4>,
+    /// How much each outline had to grow.
+    pub bloom: [Bloom; 2],
+    /// Share of each outline at which an edge was where it should be, of that in the image.
+    pub edges: [f64; 2],
+    /// Mean square of those edges' misfits (px^2).
+    pub misfit: [f64; 2],
+    /// (d - expected)' inverse covariance (d - expected), 4 degrees of freedom.
+    pub surprise: f64,
+}
+
+/// How much an outline had to grow (px): blur and threshold move the rims, beyond which the tip goes on, and the
+/// sides, beyond which there is tissue, differently.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Bloom {
+    /// Along the axis.
+    pub rims: f64,
+    /// Across it.
+    pub sides: f64,
+}
+
+#[derive(Clone, Copy)]
+struct Edge {
+    /// On a side, not on a rim.
+    side: bool,
+    normal: [f64; 2],
+    /// How far out the edge is from the outline where it was first laid (px); none if none is in reach.
+    offset: Option<f64>,
+}
+
+/// Lays the outlines of `expected` over `map`, from centroids `start` on.
+///
+/// Robust least squares for the two places d and a growth b of each outline: with n the outward normal and
+/// r the distance at which the markers' colour ends,
+///
+/// ```text
+/// sum_k w(r_k - n_k d - b) (r_k - n_k d - b)^2 / EDGE^2 + (d - d0)' P^-1 (d - d0) + b^2 / B^2
+/// ```
+///
+/// w is Tukey's weight, its width narrowing. So what hides a part of a band does not pull at it, and each
+/// band says by the covariance P of the expectation where the other is. `seen` says which band has a say.
+pub fn fit(
+    expected: &Expectation,
+    start: [f64; 4],
+    seen: [bool; 2],
+    rounds: [f64; 3],
+    map: &RunMap,
+) -> Option<Fit> {
+    let prior = inverse(expected.covariance)?;
+    let [a, b] = &expected.bands;
+    let mut place = start;
+    let mut bloom = [0.0; 4];
+    let mut result = None;
+    for width in rounds {
+        let [ua, va, ub, vb] = place;
+        let laid = [settle(a, [ua, va]), settle(b, [ub, vb])];
+        let mut normal = [[0.0; 8]; 8];
+        let mut right = [0.0; 8];
+        let away = difference(expected.features, place);
+        for (row, pull) in apply(&prior, away).into_iter().enumerate() {
+            right[row] = pull;
+            normal[row][..4].copy_from_slice(&prior[row]);
+        }
+        let size = f64::midpoint(a.radius(), b.radius());
+        let common = (BLOOM + SCALE * size).powi(-2);
+        let apart = (BLOOM_APART + SCALE_APART * size).powi(-2);
+        for (index, row) in normal.iter_mut().enumerate().skip(4) {
+            let other = if index < 6 { index + 2 } else { index - 2 };
+            row[index] = common + apart;
+            row[other] = -apart;
+        }
+        let (mut edges, mut inside) = ([0.0; 2], [0.0; 2]);
+        let (mut weights, mut misfit) = ([0.0; 2], [0.0; 2]);
+        for (band, outline) in laid.iter().enumerate().filter(|(band, _)| seen[*band]) {
+            each_edge(outline, map, |edge| {
+                inside[band] += 1.0;
+                let Some(offset) = edge.offset else { return };
+                let grown = 2 * band + usize::from(edge.side);
+                let left = offset - bloom[grown];
+                let share = left / (TOLERANCE * width);
+                if share.abs() >= 1.0 {
+                    return;
+                }
+                let weight = (1.0 - share * share).powi(2);
+                edges[band] += 1.0;
+                weights[band] += weight;
+                misfit[band] += weight * left * left;
+                let mut row = [0.0; 8];
+                row[2 * band..2 * band + 2].copy_from_slice(&edge.normal);
+                row[4 + grown] = 1.0;
+                let weight = weight / (EDGE * EDGE);
+                for (i, own) in row.iter().enumerate() {
+                    right[i] += weight * own * offset;
+                    for (j, other) in row.iter().enumerate() {
+                        normal[i][j] += weight * own * other;
+                    }
+                }
+            });
+        }
+        let covariance = inverse(normal)?;
+        let [du_a, dv_a, du_b, dv_b, rims_a, sides_a, rims_b, sides_b] = apply(&covariance, right);
+        bloom = [rims_a, sides_a, rims_b, sides_b];
+        for (value, step) in place.iter_mut().zip([du_a, dv_a, du_b, dv_b]) {
+            *value += step;
+        }
+        let away = difference(expected.features, place);
+        let pull = apply(&prior, away);
+        result = Some(Fit {
+            features: place,
+            covariance: [0, 1, 2, 3].map(|i| [0, 1, 2, 3].map(|j| covariance[i][j])),
+            bloom: [
+                Bloom {
+                    rims: rims_a,
+                    sides: sides_a,
+                },
+                Bloom {
+                    rims: rims_b,
+                    sides: sides_b,
+                },
+            ],
+            edges: [0, 1].map(|band| edges[band] / f64::max(inside[band], 1.0)),
+            misfit: [0, 1].map(|band| misfit[band] / f64::max(weights[band], 1.0)),
+            surprise: pull.iter().zip(away).map(|(a, b)| a * b).sum(),
+        });
+    }
+    result
+}
+
+/// The outline with its centroid there.
+pub fn settle(outline: &Outline, [u, v]: [f64; 2]) -> Outline {
+    let [cu, cv] = outline.centroid;
+    outline.moved([u - cu, v - cv])
+}
+
+/// At equal steps around an outline, where they are in the image.
+fn each_edge(outline: &Outline, map: &RunMap, mut found: impl FnMut(Edge)) {
+    let (width, height) = map.size();
+    let within = |[u, v]: [f64; 2]| {
+        (BORDER..width - 1.0 - BORDER).contains(&u) && (BORDER..height - 1.0 - BORDER).contains(&v)
+    };
+    let corners = &outline.corners;
+    let sides = || corners.iter().zip(corners.iter().cycle().skip(1));
+    let side = |([u0, v0], [u1, v1]): (&[f64; 2], &[f64; 2])| [u1 - u0, v1 - v0];
+    let length = |[u, v]: [f64; 2]| u.hypot(v);
+    let around: f64 = sides().map(|pair| length(side(pair))).sum();
+    let signed: f64 = sides().map(|([u0, v0], [u1, v1])| u0 * v1 - u1 * v0).sum();
+    let reach = REACH.min(0.8 * outline.radius());
+    #[expect(clippy::cast_precision_loss, reason = "a few samples")]
+    let step = around / SAMPLES as f64;
+    let mut due = step / 2.0;
+    for (index, (from, to)) in sides().enumerate() {
+        let [du, dv] = side((from, to));
+        let long = length([du, dv]);
+        let outward = if signed > 0.0 {
+            [dv / long, -du / long]
+        } else {
+            [-dv / long, du / long]
+        };
+        while due < long {
+            let at = [from[0] + du * due / long, from[1] + dv * due / long];
+            due += step;
+            let cut_off = CORNERS
+                .iter()
+                .filter_map(|corner| corners.get(*corner))
+                .any(|[u, v]| length([u - at[0], v - at[1]]) < CORNER);
+            if cut_off || !within(at) {
+                continue;
+            }
+            let offset = crossing(map, at, outward, reach);
+            // At the border of the image the colour ends whether the band does or not.
+            let there = offset.unwrap_or_default();
+            if within([at[0] + there * outward[0], at[1] + there * outward[1]]) {
+                found(Edge {
+                    side: index % (OUTLINE / 2) == OUTLINE / 2 - 1,
+                    normal: outward,
+                    offset,
+                });
+            }
+        }
+        due -= long;
+    }
+}
+
+/// How far from `at` along `normal` the markers' colour ends, within `reach` (px).
+fn crossing(map: &RunMap, at: [f64; 2], [nu, nv]: [f64; 2], reach: f64) -> Option<f64> {
+    let marker = |along: f64| map.marker([at[0] + along * nu, at[1] + along * nv]);
+    let inside = marker(0.0);
+    let step: f64 = if inside { 0.5 } else { -0.5 };
+    let mut along = step;
+    while along.abs() <= reach {
+        if marker(along) != inside {
+            let middle = along - step / 2.0;
+            let beyond = marker(middle) != inside;
+            return Some(if beyond {
+                middle - step / 4.0
+            } else {
+                middle + step / 4.0
+            });
+        }
+        along += step;
+    }
+    None
+}
+
+fn difference([a0, a1, a2, a3]: [f64; 4], [b0, b1, b2, b3]: [f64; 4]) -> [f64; 4] {
+    [a0 - b0, a1 - b1, a2 - b2, a3 - b3]
+}
