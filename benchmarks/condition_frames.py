@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 from tautscope.config import Config
-from tautscope.reduction import build_feature_model
+from tautscope.reduction import Expectation, build_feature_model
 from tautscope.twin.camera import FRAMES_PER_BACKGROUND, Picture, TwinCamera
 from tautscope.vision import MarkerDetector
 
@@ -213,9 +213,14 @@ def judge(job: Job) -> list[Look]:
     detector = MarkerDetector(Config())
     model = build_feature_model(Config())
     for _, state, sequence, picture in shots(job):
-        prediction = model.predict(state + rng.normal(0, STATE_ERROR))
+        believed = state + rng.normal(0, STATE_ERROR)
+        prediction = model.predict(believed)
         found = [
-            detector.detect(picture.image, None if prediction is None else prediction[0]),
+            detector.detect(
+                picture.image,
+                None if prediction is None else prediction[0],
+                Expectation(believed, STATE_ERROR),
+            ),
             detector.detect(picture.image),
         ]
         truth = np.where(np.isfinite(picture.true_features), picture.true_features, np.inf)

@@ -4,7 +4,10 @@
 
 use arbitrary::Arbitrary;
 use libfuzzer_sys::fuzz_target;
-use tautscope_vision::{ColorDiscriminant, Detector, Image, PixelFormat, Settings, Window};
+use tautscope_vision::{
+    ColorDiscriminant, Demands, Detector, Expect, Expectation, Image, OUTLINE, Outline,
+    PixelFormat, Settings, Window,
+};
 
 #[derive(Arbitrary, Debug)]
 struct Input<'a> {
@@ -15,11 +18,29 @@ struct Input<'a> {
     threshold: f32,
     smoothing: u8,
     minimum_area: u8,
-    gate: f64,
-    entry_point: [f64; 2],
-    predicted: Option<[f64; 4]>,
+    predicted: [f64; 4],
+    covariance: [[f64; 4]; 4],
+    outlines: [[[f64; 2]; OUTLINE]; 2],
+    areas: [f64; 2],
+    demands: [f64; 7],
     windows: [[u16; 4]; 2],
     data: &'a [u8],
+}
+
+impl Expect for Input<'_> {
+    fn expect(&self, _seen: [f64; 4], _deviation: [f64; 4]) -> Option<Expectation> {
+        let [ua, va, ub, vb] = self.predicted;
+        let outline = |band: usize, centroid| Outline {
+            corners: self.outlines[band],
+            centroid,
+            area: self.areas[band],
+        };
+        Some(Expectation {
+            features: self.predicted,
+            covariance: self.covariance,
+            bands: [outline(0, [ua, va]), outline(1, [ub, vb])],
+        })
+    }
 }
 
 fuzz_target!(|input: Input<'_>| {
@@ -44,8 +65,6 @@ fuzz_target!(|input: Input<'_>| {
         discriminant,
         smoothing: usize::from(input.smoothing % 9),
         minimum_area: u64::from(input.minimum_area),
-        gate: input.gate,
-        entry_point: input.entry_point,
     }) else {
         return;
     };
@@ -61,6 +80,16 @@ fuzz_target!(|input: Input<'_>| {
         .map(|region| region.area)
         .sum();
     assert!(whole <= (width * height) as u64);
-    detector.detect(&frame, input.predicted);
+    let [inside, coverage, spill, edges, edges_on_average, edges_alone, surprise] = input.demands;
+    let demands = Demands {
+        inside,
+        coverage,
+        spill,
+        edges,
+        edges_on_average,
+        edges_alone,
+        surprise,
+    };
+    detector.recognise(&frame, &input, &demands);
     detector.regions_in(&frame, &windows);
 });

@@ -192,15 +192,13 @@ class MarkerDetector:
         threshold: float,
         smoothing: int,
         minimum_area: int,
-        gate: float,
-        entry_point: Sequence[float],
         model_deviation: float,
         demands: tuple[float, float, float, float, float, float, float],
         alternatives: Sequence[tuple[_Vector3, float]],
     ) -> Self: ...
     def detect(
         self, image: NDArray[np.uint8], states: NDArray[np.float64], deviation: NDArray[np.float64]
-    ) -> tuple[_Floats, _Floats, _Floats, tuple[str, str], _Floats]: ...
+    ) -> tuple[_Floats, _Floats, _Floats, tuple[str, str], _Floats, int]: ...
     def regions_in(
         self, image: NDArray[np.uint8], windows: Sequence[tuple[int, int, int, int]]
     ) -> NDArray[np.float64]: ...

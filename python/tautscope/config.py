@@ -143,8 +143,6 @@ class VisionConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """Passes of the 3x3 binomial low-pass over the projected channel; 0 is none [ours]."""
     minimum_area: Annotated[int, Meta(ge=1)] = 40
     """Regions below this are dropped [px]."""
-    gate: Positive = 120.0
-    """A marker is not sought farther than this from where it is predicted [px]."""
     model_deviation: Positive = 2.5
     """Of a band from where the instrument's model has it: standard deviation [px] [ours]."""
     least_inside: Fraction = 0.5

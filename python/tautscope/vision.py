@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tautscope import _core
-from tautscope.config import CameraConfig, Config
+from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import FieldError
 from tautscope.pixels import FrameLayout
@@ -71,6 +71,8 @@ class Detection:
         reasons: Per band why it was not found; empty if it was.
         evidence: Per band what speaks for it.
         regions: What has the markers' colour, the largest first, at most 16.
+        discriminant: Which discriminant it rests on: 0 is the trained one, `vision.weights` and
+            `vision.threshold`; others count `vision.alternatives` from 1.
     """
 
     features: NDArray[np.float64]
@@ -78,6 +80,7 @@ class Detection:
     reasons: tuple[str, str]
     evidence: tuple[Evidence, Evidence]
     regions: tuple[Region, ...]
+    discriminant: int
 
     @property
     def found(self) -> tuple[bool, bool]:
@@ -89,6 +92,13 @@ class Detection:
     def valid(self) -> bool:
         """Whether both markers were found and can be trusted."""
         return all(self.found)
+
+    @property
+    def colours_drifted(self) -> bool:
+        """Whether a band was found, but not by the trained discriminant: exposure or white balance
+        have left the training, and `ColorDiscriminant.fit` should be given new pixels.
+        """  # noqa: D205
+        return self.discriminant > 0 and any(self.found)
 
     @property
     def reason(self) -> str:
@@ -143,8 +153,6 @@ class MarkerDetector:
             threshold=vision.threshold,
             smoothing=vision.smoothing,
             minimum_area=vision.minimum_area,
-            gate=vision.gate,
-            entry_point=entry_point(config.camera),
             alternatives=[(weights, threshold) for weights, threshold in vision.alternatives],
             model_deviation=vision.model_deviation,
             demands=(
@@ -185,12 +193,12 @@ class MarkerDetector:
         """
         predicted = _checked_prediction(predicted_features)
         states, deviation = self._beliefs(predicted, expectation)
-        features, covariance, evidence, reasons, regions = self._core.detect(
+        features, covariance, evidence, reasons, regions, discriminant = self._core.detect(
             self._layout.checked(image), states, deviation
         )
         a, b = (_evidence(row) for row in evidence.tolist())
         found = tuple(_region(row) for row in regions.tolist())
-        return Detection(features, covariance, reasons, (a, b), found)
+        return Detection(features, covariance, reasons, (a, b), found, discriminant)
 
     def _beliefs(
         self, predicted: NDArray[np.float64] | None, expectation: Expectation | None
@@ -254,23 +262,6 @@ def _starts(config: Config) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     centre = [sine.centre for sine in sines]
     states = np.array([centre, *grid])
     return states, np.array([sine.amplitude for sine in sines])
-
-
-def entry_point(camera: CameraConfig) -> tuple[float, float]:
-    """Where the instrument enters the picture, u, v [px], possibly outside it.
-
-    u = cx + fx x / z, v = cy + fy y / z, with (x, y, z) the guide's origin in the camera's frame
-    [m]. Lens distortion is left out: that far from the axis its polynomial folds back. A guide
-    beside or behind the camera counts as 84 degrees off its axis: only the direction matters then.
-
-    Args:
-        camera: Intrinsics and `camera_from_guide`.
-    """
-    x, y, z = camera.camera_from_guide.translation
-    depth = max(z, float(np.hypot(x, y)) / 10)
-    if depth == 0:
-        return camera.cx, camera.cy
-    return camera.cx + camera.fx * x / depth, camera.cy + camera.fy * y / depth
 
 
 def _checked_prediction(predicted: ArrayLike | None) -> NDArray[np.float64] | None:

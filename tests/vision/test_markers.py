@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scenes import CONFIG, DEVIATION, MODEL, Scene, scenes
-from tautscope.config import CameraConfig, PoseConfig
 from tautscope.reduction import Expectation
-from tautscope.vision import Detection, MarkerDetector, entry_point
+from tautscope.vision import Detection, MarkerDetector
 
 Image = NDArray[np.uint8]
 
@@ -172,26 +171,3 @@ def test_what_is_believed_elsewhere_is_not_found_there() -> None:
     for scene in (scene for scene in SCENES if scene.state[2] > 0.5):
         elsewhere = Expectation(scene.state + np.array([0.0, 1.5, 0.0]), DEVIATION / 3)
         assert not DETECTOR.detect(scene.image, expectation=elsewhere).valid
-
-
-def test_entry_point_is_opencvs_projection_without_distortion() -> None:
-    for seed in range(20):
-        rng = np.random.default_rng(seed)
-        x, y, z = (float(value) for value in rng.uniform((-5e-3, -5e-3, 5e-3), 9e-3))
-        camera = CameraConfig(camera_from_guide=PoseConfig(translation=(x, y, z)))
-        intrinsics = np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1]])
-        point = np.array([[[x, y, z]]])
-        expected, _ = cv2.projectPoints(point, np.zeros(3), np.zeros(3), intrinsics, np.zeros(5))
-        np.testing.assert_allclose(
-            entry_point(camera), expected.ravel(), rtol=1e-12, err_msg=f"{seed=}"
-        )
-
-
-def test_entry_point_of_a_guide_beside_or_behind_the_camera_keeps_its_direction() -> None:
-    for z in (0.0, -8e-3):
-        camera = CameraConfig(camera_from_guide=PoseConfig(translation=(3e-3, -4e-3, z)))
-        u, v = entry_point(camera)
-        assert (u - camera.cx) / camera.fx == pytest.approx(6)
-        assert (v - camera.cy) / camera.fy == pytest.approx(-8)
-    on_axis = CameraConfig(camera_from_guide=PoseConfig(translation=(0.0, 0.0, -1e-3)))
-    assert entry_point(on_axis) == (on_axis.cx, on_axis.cy)

@@ -42,7 +42,7 @@ pub struct MarkerDetector {
 impl MarkerDetector {
     #[new]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
-    #[pyo3(signature = (model, *, pixel_format, weights, threshold, smoothing, minimum_area, gate, entry_point, model_deviation, demands, alternatives))]
+    #[pyo3(signature = (model, *, pixel_format, weights, threshold, smoothing, minimum_area, model_deviation, demands, alternatives))]
     fn new(
         py: Python<'_>,
         model: &FeatureModel,
@@ -51,8 +51,6 @@ impl MarkerDetector {
         threshold: f64,
         smoothing: usize,
         minimum_area: u64,
-        gate: f64,
-        entry_point: [f64; 2],
         model_deviation: f64,
         demands: [f64; 7],
         alternatives: Vec<([f64; 3], f64)>,
@@ -62,8 +60,6 @@ impl MarkerDetector {
             discriminant,
             smoothing,
             minimum_area,
-            gate,
-            entry_point,
         });
         let others: Result<Vec<_>, _> = alternatives
             .into_iter()
@@ -150,6 +146,7 @@ impl MarkerDetector {
             table(py, &evidence)?,
             (a, b),
             regions.into_pyarray(py),
+            verdict.discriminant,
         ))
     }
 
@@ -207,6 +204,7 @@ type Measured<'py> = (
     Bound<'py, PyArray2<f64>>,
     (String, String),
     Bound<'py, PyArray2<f64>>,
+    usize,
 );
 
 /// States from which the best is sought.

@@ -1,10 +1,7 @@
 //! Frame to markers: Fig. 5 as a whole.
 
 use crate::judge::{Demands, Verdict, judge};
-use crate::markers::{near_prediction, two_largest};
-use crate::{
-    ColorDiscriminant, Error, Expect, Frame, Labeller, Region, Rejection, RunMap, Segmenter, Window,
-};
+use crate::{ColorDiscriminant, Error, Expect, Frame, Labeller, Region, RunMap, Segmenter, Window};
 
 /// Only so many regions, the largest, are considered: it bounds the time on a noisy frame.
 pub const CANDIDATES: usize = 16;
@@ -18,10 +15,6 @@ pub struct Settings {
     pub smoothing: usize,
     /// Regions below this are dropped (px), at least 1.
     pub minimum_area: u64,
-    /// A marker is not sought farther than this from where it is predicted (px), positive.
-    pub gate: f64,
-    /// Where the instrument enters the picture, `[u, v]` (px); may lie outside it.
-    pub entry_point: [f64; 2],
 }
 
 /// Finds the two markers in frames. It carries memory from frame to frame, never information.
@@ -36,15 +29,6 @@ pub struct Detector {
     best: Vec<Region>,
 }
 
-/// What a frame shows.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Detection<'a> {
-    /// Measured features, centroids `[u_A, v_A, u_B, v_B]` (px), or why there are none.
-    pub features: Result<[f64; 4], Rejection>,
-    /// The regions considered, the largest first; at most [`CANDIDATES`].
-    pub regions: &'a [Region],
-}
-
 impl Detector {
     /// Ready for the first frame.
     ///
@@ -54,8 +38,6 @@ impl Detector {
         let Settings {
             smoothing,
             minimum_area,
-            gate,
-            entry_point,
             ..
         } = settings;
         if smoothing > 8 {
@@ -63,16 +45,6 @@ impl Detector {
         }
         if minimum_area < 1 {
             return Err(Error::new("minimum_area", &minimum_area, "at least 1 px"));
-        }
-        if !(gate.is_finite() && gate > 0.0) {
-            return Err(Error::new("gate", &gate, "a finite distance above 0 px"));
-        }
-        if !entry_point.iter().all(|value| value.is_finite()) {
-            return Err(Error::new(
-                "entry_point",
-                &entry_point,
-                "two finite numbers",
-            ));
         }
         Ok(Self {
             settings,
@@ -91,21 +63,6 @@ impl Detector {
         let segmenter = |one: &ColorDiscriminant| Segmenter::new(*one, self.settings.smoothing);
         self.alternatives = discriminants.iter().map(segmenter).collect();
         self
-    }
-
-    /// Finds the markers, near `predicted` `[u_A, v_A, u_B, v_B]` (px) if that is given and finite,
-    /// else as the two largest regions.
-    ///
-    /// Allocates only when a frame is larger than those before.
-    pub fn detect(&mut self, frame: &impl Frame, predicted: Option<[f64; 4]>) -> Detection<'_> {
-        self.regions_in(frame, &[Window::whole(frame)]);
-        let regions = self.regions.as_slice();
-        let predicted = predicted.filter(|values| values.iter().all(|value| value.is_finite()));
-        let features = match predicted {
-            Some(predicted) => near_prediction(regions, predicted, self.settings.gate),
-            None => two_largest(regions, self.settings.entry_point),
-        };
-        Detection { features, regions }
     }
 
     /// Recognises the markers by what `expect` says of them: in the window where they should be if
@@ -138,7 +95,10 @@ impl Detector {
             self.exchange(index);
             let other = judge(&self.regions, &self.map, expect, demands);
             if other.score() > verdict.score() {
-                verdict = other;
+                verdict = Verdict {
+                    discriminant: index + 1,
+                    ..other
+                };
             } else {
                 std::mem::swap(&mut self.best, &mut self.regions);
             }

@@ -16,6 +16,8 @@ pub struct Verdict {
     pub bands: [Evidence; 2],
     /// Why a band is not found.
     pub reasons: [Option<Rejection>; 2],
+    /// Which discriminant it rests on: 0 is the trained one, others are its alternatives.
+    pub discriminant: usize,
 }
 
 /// What speaks for a band.
@@ -372,6 +374,7 @@ fn weigh(laid: &Expectation, found: &Fit, map: &RunMap, demands: &Demands) -> Ve
         covariance: found.covariance,
         bands,
         reasons,
+        discriminant: 0,
     };
     verdict.conceal();
     verdict
@@ -429,5 +432,6 @@ fn nothing(reason: Rejection) -> Verdict {
             ..Evidence::default()
         }; 2],
         reasons: [Some(reason); 2],
+        discriminant: 0,
     }
 }

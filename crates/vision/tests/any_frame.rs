@@ -3,36 +3,27 @@
 mod support;
 
 use proptest::prelude::*;
-use support::memory;
+use support::{DEMANDS, Discs, memory};
 use tautscope_vision::detector::CANDIDATES;
 use tautscope_vision::{ColorDiscriminant, Detector, Frame, Image, Labeller, Segmenter, Settings};
 
 fn settings() -> impl Strategy<Value = Settings> {
     let weights = prop::array::uniform3(-2.0..2.0_f64);
-    (
-        weights,
-        -300.0..300.0_f64,
-        0..9_usize,
-        1..50_u64,
-        1.0..500.0_f64,
+    (weights, -300.0..300.0_f64, 0..9_usize, 1..50_u64).prop_filter_map(
+        "weights all but zero",
+        |(weights, threshold, smoothing, minimum_area)| {
+            Some(Settings {
+                discriminant: ColorDiscriminant::new(weights, threshold).ok()?,
+                smoothing,
+                minimum_area,
+            })
+        },
     )
-        .prop_filter_map(
-            "weights all but zero",
-            |(weights, threshold, smoothing, minimum_area, gate)| {
-                Some(Settings {
-                    discriminant: ColorDiscriminant::new(weights, threshold).ok()?,
-                    smoothing,
-                    minimum_area,
-                    gate,
-                    entry_point: [30.0, 20.0],
-                })
-            },
-        )
 }
 
-fn prediction() -> impl Strategy<Value = Option<[f64; 4]>> {
+fn prediction() -> impl Strategy<Value = [f64; 4]> {
     let inside = prop::array::uniform4(0.0..70.0_f64);
-    prop::option::of(prop_oneof![inside, prop::array::uniform4(any::<f64>())])
+    prop_oneof![inside, prop::array::uniform4(any::<f64>())]
 }
 
 /// `first <= value <= end - 1`
@@ -86,15 +77,17 @@ proptest! {
     ) {
         let mut used = Detector::new(settings).unwrap();
         for (image, predicted) in &images {
+            let discs = Discs::at(*predicted);
             let mut fresh = Detector::new(settings).unwrap();
-            let answer = used.detect(&image.frame(), *predicted);
-            prop_assert_eq!(answer, fresh.detect(&image.frame(), *predicted));
-            prop_assert!(answer.regions.len() <= CANDIDATES);
-            prop_assert!(answer.regions.is_sorted_by(|one, next| one.area >= next.area));
-            if let Ok([u_a, v_a, u_b, v_b]) = answer.features {
-                let centroids = || answer.regions.iter().map(tautscope_vision::Region::centroid);
-                prop_assert!(centroids().any(|centroid| centroid.as_slice() == [u_a, v_a]));
-                prop_assert!(centroids().any(|centroid| centroid.as_slice() == [u_b, v_b]));
+            let (verdict, regions) = used.recognise(&image.frame(), &discs, &DEMANDS);
+            let (again, same) = fresh.recognise(&image.frame(), &discs, &DEMANDS);
+            prop_assert_eq!(format!("{verdict:?}"), format!("{again:?}"));
+            prop_assert_eq!(regions, same);
+            prop_assert!(regions.len() <= CANDIDATES);
+            prop_assert!(regions.is_sorted_by(|one, next| one.area >= next.area));
+            for band in 0..2 {
+                let seen = verdict.features[2 * band].is_finite();
+                prop_assert_eq!(seen, verdict.reasons[band].is_none());
             }
         }
     }
@@ -125,8 +118,6 @@ fn senseless_settings_are_refused_by_name() {
         discriminant: ColorDiscriminant::new([-0.5, 1.0, -0.6], 10.0).unwrap(),
         smoothing: 1,
         minimum_area: 40,
-        gate: 120.0,
-        entry_point: [0.0, 0.0],
     };
     assert!(Detector::new(good).is_ok());
     let refused = |settings| Detector::new(settings).unwrap_err().field;
@@ -143,21 +134,5 @@ fn senseless_settings_are_refused_by_name() {
             ..good
         }),
         "minimum_area"
-    );
-    assert_eq!(refused(Settings { gate: 0.0, ..good }), "gate");
-    assert_eq!(
-        refused(Settings {
-            gate: f64::NAN,
-            ..good
-        }),
-        "gate"
-    );
-    let entry_point = [f64::INFINITY, 0.0];
-    assert_eq!(
-        refused(Settings {
-            entry_point,
-            ..good
-        }),
-        "entry_point"
     );
 }

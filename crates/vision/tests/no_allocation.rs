@@ -1,6 +1,9 @@
 //! After the first frame of a size, no frame of that size allocates.
 
+mod support;
+
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
+use support::{DEMANDS, Discs};
 use tautscope_vision::{ColorDiscriminant, Detector, Image, PixelFormat, Settings};
 
 #[global_allocator]
@@ -39,20 +42,19 @@ fn after_the_first_frame_nothing_is_allocated() {
             discriminant: ColorDiscriminant::new([-0.5, 1.0, -0.6], 10.0).unwrap(),
             smoothing,
             minimum_area: 1,
-            gate: 100.0,
-            entry_point: [0.0, 0.0],
         })
-        .unwrap();
+        .unwrap()
+        .with_alternatives(&[ColorDiscriminant::new([-0.4, 1.0, -0.7], 5.0).unwrap()]);
         let mut found = 0;
         for (index, data) in frames.iter().enumerate() {
             let frame = Image::new(data, PixelFormat::Bgr, [WIDTH, HEIGHT], 3 * WIDTH).unwrap();
-            let mut detect = |predicted| detector.detect(&frame, predicted).features.is_ok();
+            let mut detect = |discs| detector.recognise(&frame, &discs, &DEMANDS).0.reasons;
+            let near = Discs::at([14.5, 9.5, 34.5, 9.5]);
             if index == 0 {
-                detect(None);
+                detect(near);
             } else {
-                let near = [15.0, 10.0, 35.0, 10.0];
-                found +=
-                    assert_no_alloc(|| usize::from(detect(None)) + usize::from(detect(Some(near))));
+                let reasons = assert_no_alloc(|| detect(near));
+                found += reasons.iter().filter(|reason| reason.is_none()).count();
             }
         }
         assert!(

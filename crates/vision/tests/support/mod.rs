@@ -2,8 +2,10 @@
 
 #![allow(dead_code, reason = "each test uses its part")]
 
+use std::f64::consts::{PI, TAU};
+
 use proptest::prelude::*;
-use tautscope_vision::{Image, PixelFormat};
+use tautscope_vision::{Demands, Expect, Expectation, Image, OUTLINE, Outline, PixelFormat};
 
 /// An image and the memory it lies in.
 #[derive(Clone, Debug)]
@@ -179,4 +181,51 @@ pub fn weights() -> impl Strategy<Value = [f64; 3]> {
         Just([1.0, 1.0, 1.0]),
         Just([0.0, -1.0, 0.0]),
     ]
+}
+
+/// Demands a band of any size and shape can meet.
+pub const DEMANDS: Demands = Demands {
+    inside: 0.5,
+    coverage: 0.4,
+    spill: 0.6,
+    edges: 0.4,
+    edges_on_average: 0.5,
+    edges_alone: 0.7,
+    surprise: 30.0,
+};
+
+/// Two discs of 5 px where they are told to be, give or take 5 px.
+#[derive(Clone, Copy, Debug)]
+pub struct Discs([f64; 4]);
+
+impl Discs {
+    pub fn at(features: [f64; 4]) -> Self {
+        Self(features)
+    }
+}
+
+impl Expect for Discs {
+    fn expect(&self, _seen: [f64; 4], _deviation: [f64; 4]) -> Option<Expectation> {
+        let [ua, va, ub, vb] = self.0;
+        let disc = |[u, v]: [f64; 2]| Outline {
+            corners: std::array::from_fn(|index| {
+                let angle = TAU * f64::from(u8::try_from(index).unwrap())
+                    / f64::from(u8::try_from(OUTLINE).unwrap());
+                [u + 5.0 * angle.cos(), v + 5.0 * angle.sin()]
+            }),
+            centroid: [u, v],
+            area: 25.0 * PI,
+        };
+        let covariance = std::array::from_fn(|row| {
+            std::array::from_fn(|column| f64::from(u8::from(row == column)) * 25.0)
+        });
+        self.0
+            .iter()
+            .all(|value| value.is_finite())
+            .then_some(Expectation {
+                features: self.0,
+                covariance,
+                bands: [disc([ua, va]), disc([ub, vb])],
+            })
+    }
 }
