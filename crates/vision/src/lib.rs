@@ -21,6 +21,7 @@ mod projection;
 pub mod regions;
 pub mod runs;
 pub mod segment;
+mod triples;
 
 pub use detector::{Detection, Detector, Settings};
 pub use discriminant::ColorDiscriminant;

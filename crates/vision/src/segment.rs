@@ -161,7 +161,7 @@ fn whole_blocks(columns: Range<usize>, width: usize) -> Range<usize> {
 /// Finds the blocks of a row in which a pixel may exceed the threshold.
 #[inline(always)]
 fn scan<S: Simd>(
-    _: S,
+    simd: S,
     row: Row<'_>,
     width: usize,
     projection: &Projection,
@@ -175,7 +175,7 @@ fn scan<S: Simd>(
     for start in (0..width).step_by(CHUNK) {
         // A chunk that is cut short costs more than one that was looked at in part before.
         let tested = start.min(width - CHUNK);
-        if projection.may_exceed(row.columns(tested..tested + CHUNK)) {
+        if projection.may_exceed(simd, row.columns(tested..tested + CHUNK)) {
             let end = (start + CHUNK).min(width);
             (start / BLOCK..end.div_ceil(BLOCK)).for_each(&mut found);
         }
