@@ -93,7 +93,7 @@ impl Segmenter {
         for n in 0..height + delay + reach {
             if n < height {
                 let (row, seen) = (line(n), &mut self.columns);
-                let found = |block| seen.see(block, n + reach + 1);
+                let found = |block| seen.see(block, n.saturating_sub(reach), n + reach + 1);
                 dispatch!(self.level, simd => scan(simd, row, width, &projection, found));
             }
             let Some(step) = n.checked_sub(reach) else {
