@@ -77,8 +77,7 @@ impl Projection {
         if let Row::Triples(bytes) = row
             && triples::are_quick(simd)
         {
-            let (found, rest) =
-                triples::reach(simd, bytes, self.coarse_weights, self.coarse_level);
+            let (found, rest) = triples::reach(simd, bytes, self.coarse_weights, self.coarse_level);
             if found || rest.is_empty() {
                 return found;
             }

@@ -20,7 +20,12 @@ pub(crate) fn are_quick<S: Simd>(_: S) -> bool {
 /// Whether `weights . x >= level` for a pixel x, and the bytes behind the last 64 whole pixels. No
 /// sum may leave an `i16`.
 #[inline(always)]
-pub(crate) fn reach<S: Simd>(simd: S, bytes: &[u8], weights: [i16; 3], level: i16) -> (bool, &[u8]) {
+pub(crate) fn reach<S: Simd>(
+    simd: S,
+    bytes: &[u8],
+    weights: [i16; 3],
+    level: i16,
+) -> (bool, &[u8]) {
     let (groups, rest) = bytes.as_chunks::<{ 3 * PIXELS }>();
     let [first, second, third] = weights.map(|weight| i16x32::splat(simd, weight));
     let picks = PICKS.map(|both| both.map(|indices| u8x64::from_slice(simd, &indices)));
@@ -76,4 +81,39 @@ const fn picks() -> [[[u8; PIXELS]; 2]; 3] {
         channel += 1;
     }
     picks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fearless_simd::{Level, dispatch};
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn decides_as_pixel_by_pixel(
+            bytes in prop::collection::vec(any::<u8>(), 0..3 * 3 * PIXELS),
+            weights in [-64..64_i16, -64..64_i16, -64..64_i16],
+            pick in any::<prop::sample::Index>(),
+            above in 0..2_i16,
+        ) {
+            let (pixels, _) = bytes[..bytes.len() / (3 * PIXELS) * 3 * PIXELS].as_chunks::<3>();
+            let sum = |pixel: &[u8; 3]| -> i16 {
+                pixel.iter().zip(weights).map(|(x, weight)| i16::from(*x) / 2 * weight).sum()
+            };
+            let halves: Vec<u8> = bytes.iter().map(|byte| byte / 2).collect();
+            // At the largest sum the answer changes.
+            let largest = pixels.iter().map(sum).max().unwrap_or(0);
+            let level = if pick.index(2) == 0 { largest + above } else { above };
+            let expected = pixels.iter().any(|pixel| sum(pixel) >= level);
+            for simd in [Level::new(), Level::baseline()] {
+                let (found, rest) = dispatch!(simd, simd => {
+                    let (found, rest) = reach(simd, &halves, weights, level);
+                    (found, rest.len())
+                });
+                prop_assert_eq!(found, expected);
+                prop_assert_eq!(rest, bytes.len() % (3 * PIXELS));
+            }
+        }
+    }
 }
