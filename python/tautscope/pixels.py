@@ -22,6 +22,7 @@ from tautscope.errors import ConfigError, FrameError
 
 _CHANNELS = {"bgr": 3, "rgb": 3, "bgra": 4, "yuyv": 2, "uyvy": 2}
 _PLANAR = ("nv12", "i420")
+_BYTE = np.dtype(np.uint8)
 
 
 class FrameLayout:
@@ -49,6 +50,7 @@ class FrameLayout:
             if planar
             else (camera.height, camera.width, _CHANNELS[self.pixel_format])
         )
+        self._in_line = (1,) if planar else (_CHANNELS[self.pixel_format], 1)
 
     def checked(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """The image, if it can be read where it lies.
@@ -58,16 +60,15 @@ class FrameLayout:
                 side by side from left to right, or the lines not from top to bottom.
         """
         wanted = f"uint8 array {self.shape}, {self.pixel_format}"
-        if (
-            not isinstance(image, np.ndarray)
-            or image.dtype != np.uint8
-            or image.shape != self.shape
-        ):
+        if not isinstance(image, np.ndarray) or image.dtype != _BYTE or image.shape != self.shape:
             raise FrameError("image", _described(image), wanted)
-        if not image[0].flags.c_contiguous or image.strides[0] < 0:
+        strides = image.strides
+        # A side of one pixel may have any stride.
+        side_by_side = strides[1:] == self._in_line or image[0].flags.c_contiguous
+        if not side_by_side or strides[0] < 0:
             raise FrameError(
                 "image",
-                f"{_described(image)} with strides {image.strides}",
+                f"{_described(image)} with strides {strides}",
                 f"{wanted}, contiguous in each line and top to bottom; np.ascontiguousarray copies",
             )
         return image

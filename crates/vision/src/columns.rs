@@ -11,10 +11,10 @@ pub(crate) struct Columns {
     width: usize,
     /// By block: the first step at which it no longer matters; 0 if nothing was seen yet.
     until: Vec<usize>,
-    /// By block: the step after the last one at which it was in a span.
-    worked: Vec<usize>,
-    /// The largest of `until`.
-    until_any: usize,
+    /// By block: whether it is in a span.
+    worked: Vec<bool>,
+    /// The step at which the spans have to be found anew, unless something is seen before.
+    change: usize,
     spans: Vec<Range<usize>>,
 }
 
@@ -23,42 +23,50 @@ impl Columns {
     pub(crate) fn start(&mut self, width: usize) {
         self.width = width;
         let blocks = width.div_ceil(BLOCK);
-        for steps in [&mut self.until, &mut self.worked] {
-            steps.clear();
-            steps.resize(blocks, 0);
-        }
-        self.until_any = 0;
+        self.until.clear();
+        self.until.resize(blocks, 0);
+        self.worked.clear();
+        self.worked.resize(blocks, false);
+        self.change = usize::MAX;
         self.spans.clear();
         self.spans.reserve(blocks.div_ceil(2));
     }
 
-    /// Something was seen in this block; it matters to the steps before `until`, which never falls.
-    pub(crate) fn see(&mut self, block: usize, until: usize) {
+    /// Something was seen in this block; it matters to `step` and those after it before `until`, which
+    /// never falls.
+    pub(crate) fn see(&mut self, block: usize, step: usize, until: usize) {
         if let Some(old) = self.until.get_mut(block) {
+            if *old <= step {
+                self.change = step;
+            }
             *old = until;
-            self.until_any = until;
         }
     }
 
     /// Finds the spans of this step, maximal and left to right: the blocks that matter and their
     /// neighbours. `fresh` gets the columns that were in no span of the step before.
     pub(crate) fn find_spans(&mut self, step: usize, mut fresh: impl FnMut(Range<usize>)) {
-        self.spans.clear();
-        if self.until_any <= step {
+        if step < self.change {
             return;
         }
+        self.spans.clear();
+        self.change = usize::MAX;
         let matters = |block: usize| self.until.get(block).is_some_and(|until| *until > step);
         for (block, worked) in self.worked.iter_mut().enumerate() {
-            if !(matters(block) || matters(block + 1) || block > 0 && matters(block - 1)) {
+            let before = *worked;
+            *worked = matters(block) || matters(block + 1) || block > 0 && matters(block - 1);
+            if !*worked {
                 continue;
+            }
+            if let Some(until) = self.until.get(block).filter(|until| **until > step) {
+                self.change = self.change.min(*until);
             }
             let columns = block * BLOCK..((block + 1) * BLOCK).min(self.width);
             match self.spans.last_mut() {
                 Some(span) if span.end == columns.start => span.end = columns.end,
                 _ => self.spans.push(columns.clone()),
             }
-            // Steps are counted from 0, so that 0 is never "the step before".
-            if std::mem::replace(worked, step + 1) != step || step == 0 {
+            if !before {
                 fresh(columns);
             }
         }

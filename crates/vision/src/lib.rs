@@ -26,6 +26,7 @@ pub mod rejection;
 pub mod runmap;
 pub mod runs;
 pub mod segment;
+mod triples;
 
 pub use detector::{Detector, Settings};
 pub use discriminant::ColorDiscriminant;

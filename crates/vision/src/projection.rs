@@ -1,6 +1,9 @@
 //! The discriminant in fixed point, for one pixel format.
 
+use fearless_simd::Simd;
+
 use crate::format::{Consumer, Group, Row};
+use crate::triples;
 
 /// Largest magnitude of a projected pixel: four of them still fit an `i16`, which the low-pass needs.
 pub(crate) const RANGE: f64 = 8190.0;
@@ -70,7 +73,16 @@ impl Projection {
     /// is not below `level / D` is not below its ceiling. D is the least for which the sum fits an
     /// `i16`, which is what makes it quick.
     #[inline(always)]
-    pub(crate) fn may_exceed(&self, row: Row<'_>) -> bool {
+    pub(crate) fn may_exceed<S: Simd>(&self, simd: S, mut row: Row<'_>) -> bool {
+        if let Row::Triples(bytes) = row
+            && triples::are_quick(simd)
+        {
+            let (found, rest) = triples::reach(simd, bytes, self.coarse_weights, self.coarse_level);
+            if found || rest.is_empty() {
+                return found;
+            }
+            row = Row::Triples(rest);
+        }
         row.feed(Peak(self.coarse_weights)) >= self.coarse_level
     }
 }

@@ -90,10 +90,15 @@ impl Segmenter {
         // A pixel seen in row n matters to the filtered rows n - delay to n + delay, and these need the
         // rows from n - 2 delay to n + 2 delay: scanning goes so far ahead.
         let reach = 2 * delay;
-        for n in 0..height + delay + reach {
-            if n < height {
+        // So narrow a window is mostly marker: looking first would cost more than it spares.
+        let looks = width >= CHUNK;
+        if !looks {
+            (0..width.div_ceil(BLOCK)).for_each(|block| self.columns.see(block, 0, usize::MAX));
+        }
+        for n in (if looks { 0 } else { reach })..height + delay + reach {
+            if looks && n < height {
                 let (row, seen) = (line(n), &mut self.columns);
-                let found = |block| seen.see(block, n + reach + 1);
+                let found = |block| seen.see(block, n.saturating_sub(reach), n + reach + 1);
                 dispatch!(self.level, simd => scan(simd, row, width, &projection, found));
             }
             let Some(step) = n.checked_sub(reach) else {
@@ -161,21 +166,16 @@ fn whole_blocks(columns: Range<usize>, width: usize) -> Range<usize> {
 /// Finds the blocks of a row in which a pixel may exceed the threshold.
 #[inline(always)]
 fn scan<S: Simd>(
-    _: S,
+    simd: S,
     row: Row<'_>,
     width: usize,
     projection: &Projection,
     mut found: impl FnMut(usize),
 ) {
-    if width < CHUNK {
-        // So narrow a window is mostly marker: looking first would cost more than it spares.
-        (0..width.div_ceil(BLOCK)).for_each(found);
-        return;
-    }
     for start in (0..width).step_by(CHUNK) {
         // A chunk that is cut short costs more than one that was looked at in part before.
         let tested = start.min(width - CHUNK);
-        if projection.may_exceed(row.columns(tested..tested + CHUNK)) {
+        if projection.may_exceed(simd, row.columns(tested..tested + CHUNK)) {
             let end = (start + CHUNK).min(width);
             (start / BLOCK..end.div_ceil(BLOCK)).for_each(&mut found);
         }
