@@ -158,7 +158,8 @@ sequence number, which decides the moment of a disturbance and the background, i
   included. Markers that are not there have no distance and count as wrong accepted only.
 - **with prediction**: as the loop asks, with the features by `FeatureModel` of a believed state and
   how sure it is: the true state plus a normal error of standard deviation
-  {STATE_ERROR[0] * 1e3:g} mm, {STATE_ERROR[1]:g} rad, {STATE_ERROR[2]:g} rad. **without**: the image alone.
+  {STATE_ERROR[0] * 1e3:g} mm, {STATE_ERROR[1]:g} rad, {STATE_ERROR[2]:g} rad.
+- **without**: the image alone.
 
 The true feature is the centroid of the *whole* near side of a band, also where debris, a
 highlight, text, the field stop, the picture's border or the instrument hides a part of it: that is

@@ -116,7 +116,7 @@ class MarkerDetector:
     Each pixel is projected, w_b B + w_g G + w_r R, the projection low-passed and thresholded, the
     pixels above the threshold joined into 8-connected regions. `config.vision` has the numbers.
 
-    What has the markers' colour is a band only if it looks like one (decision 0003): the outlines
+    What has the markers' colour is a band only if it looks like one (decision 0011): the outlines
     of both bands, as the model of the instrument draws them, are laid over the regions, and the
     place, the size, the outline's edges and what is around must agree. A part that is hidden,
     split by a highlight or outside the image is no part of the measurement: the features are the
