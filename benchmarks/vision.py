@@ -1,7 +1,8 @@
 """How fast the markers are found, against OpenCV, scikit-image, ViSP and a plain read of the frame.
 
 One thread, all peers in turn in one process, so that a busy machine slows all of them. Each finds
-the centroids of the regions in a B, G, R frame; ViSP gets a grey image that already shows the
+the centroids of the regions in a B, G, R frame ("recognised" also judges which are the bands, as
+the loop asks, by windows first); ViSP gets a grey image that already shows the
 blobs, and finds one. Every timed call follows an untimed one of the same kind: the frame is where
 a grabber that has just written it leaves it, in the cache as far as it fits. A plain read is the
 fastest of numpy's vectorised reductions over all bytes.
@@ -27,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tautscope import Twin, load_config
 from tautscope.config import Config
+from tautscope.reduction import Expectation
 from tautscope.vision import MarkerDetector, Region
 
 try:
@@ -38,6 +40,8 @@ Image = NDArray[np.uint8]
 SIZES = ((720, 576), (1920, 1080), (3840, 2160))
 MARGIN = 20  # px at 1920x1080: how far a window reaches beyond its band
 MINIMUM_AREA = 40
+POSTURE = np.array([0.012, 0.0, 0.5])
+EXPECTATION = Expectation(POSTURE, np.array([2e-3, 0.1, 0.1]))
 ROOT = Path(__file__).resolve().parents[1]
 
 
@@ -46,7 +50,7 @@ def twins_picture() -> Image:
     twin = Twin(load_config())
     image, sample = None, twin.reset()
     while sample.time < 2.0:
-        sample = twin.step(np.array([0.012, 0.0, 0.5]))
+        sample = twin.step(POSTURE)
         image = image if sample.frame is None else sample.frame.image
     assert image is not None
     return image
@@ -190,12 +194,13 @@ def compared(image: Image, repeats: int, visp: Visp) -> dict[str, float]:
     """Median milliseconds (windows and ViSP: microseconds) of each way to find the markers."""
     size = (image.shape[1], image.shape[0])
     config, detector = Config(), detector_for(size)
-    regions = detector.detect(image).regions
+    whole = [(0, 0, *size)]
+    regions = detector.regions_in(image, whole)
     windows = windows_of(regions, size[0])
     flat = image.reshape(-1)
     words = flat.view(np.uint64)
     calls: dict[str, Callable[[], object]] = {
-        "full_ms": lambda: detector.detect(image),
+        "full_ms": lambda: detector.regions_in(image, whole),
         "windows_us": lambda: detector.regions_in(image, windows),
         "read max": flat.max,
         "read sum": words.sum,
@@ -207,6 +212,10 @@ def compared(image: Image, repeats: int, visp: Visp) -> dict[str, float]:
     }
     if measure is not None:
         calls["scikit_image_ms"] = lambda: scikit_image(image, config)
+    if size == SIZES[0]:
+        # Only this is the size of the configured camera, of which the model knows the lens.
+        calls["recognised_ms"] = lambda: detector.detect(image, expectation=EXPECTATION)
+        assert detector.detect(image, expectation=EXPECTATION).valid
     times = measured(calls, repeats)
     middle = {name: 1e3 * statistics.median(values) for name, values in times.items()}
     best = min(("contours", "components", "planes"), key=middle.__getitem__)
@@ -222,6 +231,8 @@ def compared(image: Image, repeats: int, visp: Visp) -> dict[str, float]:
         "windows_min_us": 1e6 * min(times["windows_us"]),
         "window_px": sum((r - lft) * (b - t) for lft, t, r, b in windows),
     }
+    if "recognised_ms" in middle:
+        figures["recognised_ms"] = middle["recognised_ms"]
     if measure is not None:
         figures["scikit_image_ms"] = middle["scikit_image_ms"]
     one_blob = visp.microseconds(image, regions, repeats)
@@ -245,7 +256,9 @@ def worst_frames(repeats: int) -> dict[str, float]:
     for smoothing in (0, 1):
         detector = detector_for((width, height), **{"vision.smoothing": smoothing})
         calls = {
-            f"{name}, {smoothing} passes": lambda d=detector, f=frame: d.detect(f)
+            f"{name}, {smoothing} passes": lambda d=detector, f=frame: d.regions_in(
+                f, [(0, 0, width, height)]
+            )
             for name, frame in frames.items()
         }
         times = measured(calls, max(5, repeats // 5))
