@@ -150,6 +150,7 @@ class AdaptiveAxis:
         correlation: float,
         level_drift: float,
         local_drift: float,
+        symmetry: float,
         contact_distance: float,
         contact_moved: float,
         slope_tolerance: float,

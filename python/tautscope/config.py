@@ -85,10 +85,12 @@ class AdaptiveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """Standard deviation of an offset's variation with position."""
     correlation: Positive = 40.0
     """Distance over which that variation is alike."""
-    level_drift: NonNegative = 0.1
+    level_drift: NonNegative = 0.15
     """Standard deviation of the offset's change while the command travels 1."""
     local_drift: NonNegative = 0.03
     """The same of its variation with position."""
+    symmetry: Annotated[float, Meta(ge=0, lt=1)] = 0.8
+    """Minus the correlation of the two offsets: friction moves both contacts outwards alike."""
     contact_distance: Positive = 3.0
     """Travel of the command over which it is seen whether the tip follows."""
     contact_moved: NonNegative = 3.0

@@ -196,6 +196,7 @@ def build_adaptive_axis(config: Config, dof: Dof, compensate: bool = True) -> _c
         # A deviation per square root of travel.
         level_drift=math.sqrt(unit) * shared.level_drift,
         local_drift=math.sqrt(unit) * shared.local_drift,
+        symmetry=shared.symmetry,
         contact_distance=unit * shared.contact_distance,
         contact_moved=unit * shared.contact_moved,
         slope_tolerance=shared.slope_tolerance,

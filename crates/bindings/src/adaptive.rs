@@ -20,7 +20,7 @@ impl AdaptiveAxis {
     #[pyo3(signature = (
         *, free_gain, contact_gain, cautious_gain, cautious_deviation, gain_limit, taper, settling,
         caution, node_spacing, level_deviation, local_deviation, correlation, level_drift,
-        local_drift, contact_distance, contact_moved, slope_tolerance, marker_deviation,
+        local_drift, symmetry, contact_distance, contact_moved, slope_tolerance, marker_deviation,
         model_deviation, tremor_time, period, delta_minus, delta_plus
     ))]
     // One argument per setting, by keyword only.
@@ -41,6 +41,7 @@ impl AdaptiveAxis {
         correlation: f64,
         level_drift: f64,
         local_drift: f64,
+        symmetry: f64,
         contact_distance: f64,
         contact_moved: f64,
         slope_tolerance: f64,
@@ -68,6 +69,7 @@ impl AdaptiveAxis {
                 correlation,
                 level_drift,
                 local_drift,
+                symmetry,
             },
             contact: core::ContactTest {
                 distance: contact_distance,

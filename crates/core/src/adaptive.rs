@@ -4,7 +4,7 @@ use crate::contact::{ContactTest, Stroke};
 use crate::error::{ConfigError, require, require_non_negative, require_positive};
 use crate::estimator::{Trigger, Triggers};
 use crate::lead::LeadLaw;
-use crate::offset_map::{OffsetMap, OffsetPrior};
+use crate::offset_map::{OffsetMap, OffsetPrior, Side};
 use crate::play::{Play, PlayState};
 use crate::smoother::Smoother;
 
@@ -44,8 +44,7 @@ pub struct AdaptiveSettings {
 #[derive(Debug, Clone, PartialEq)]
 pub struct AdaptiveAxis {
     settings: AdaptiveSettings,
-    minus: OffsetMap,
-    plus: OffsetMap,
+    offsets: OffsetMap,
     smoother: Smoother,
     stroke: Stroke,
     reference: Option<f64>,
@@ -92,8 +91,7 @@ impl AdaptiveAxis {
         require_positive("period", settings.period)?;
         Ok(Self {
             settings,
-            minus: OffsetMap::new(prior, play.delta_minus(), 0.0),
-            plus: OffsetMap::new(prior, play.delta_plus(), 0.0),
+            offsets: OffsetMap::new(prior, play.delta_minus(), play.delta_plus()),
             smoother: Smoother::new(settings.tremor_time, settings.period),
             stroke: Stroke::new(),
             reference: None,
@@ -125,8 +123,8 @@ impl AdaptiveAxis {
     /// Standard deviation of (`delta_minus`, `delta_plus`) where the reference is now.
     pub fn deviation(&self) -> (f64, f64) {
         let at = self.reference.unwrap_or(0.0);
-        let root = |map: &OffsetMap| libm::sqrt(map.variance(at));
-        (root(&self.minus), root(&self.plus))
+        let root = |side| libm::sqrt(self.offsets.variance(side, at));
+        (root(Side::Minus), root(Side::Plus))
     }
 
     /// The command for the next reference.
@@ -139,8 +137,7 @@ impl AdaptiveAxis {
         }
         let smooth = self.smoother.step(reference);
         let Some(last) = self.reference.replace(reference) else {
-            self.minus.centre(reference);
-            self.plus.centre(reference);
+            self.offsets.centre(reference);
             (self.intended, self.command) = (smooth, reference);
             self.tip = self.carried(reference, reference);
             return self.command;
@@ -166,12 +163,12 @@ impl AdaptiveAxis {
     fn move_lead(&mut self, reference: f64, intention: f64) {
         let settings = &self.settings;
         let upwards = intention > 0.0;
-        let (map, sign) = if upwards {
-            (&self.plus, 1.0)
+        let (side, sign) = if upwards {
+            (Side::Plus, 1.0)
         } else {
-            (&self.minus, -1.0)
+            (Side::Minus, -1.0)
         };
-        let deviation = libm::sqrt(map.variance(reference));
+        let deviation = libm::sqrt(self.offsets.variance(side, reference));
         if self.upwards != Some(upwards) {
             self.upwards = Some(upwards);
             self.landed = false;
@@ -218,20 +215,20 @@ impl AdaptiveAxis {
         }
         let motion = self.stroke.follow(&settings.contact, command, measured);
         if let Some(motion) = motion {
-            self.minus.travel(motion.travel);
-            self.plus.travel(motion.travel);
+            self.offsets.travel(motion.travel);
             let offset = command - measured;
-            let (map, sign, trigger) = if motion.upwards {
-                (&mut self.plus, 1.0, &mut triggers.plus)
+            let (side, sign, trigger) = if motion.upwards {
+                (Side::Plus, 1.0, &mut triggers.plus)
             } else {
-                (&mut self.minus, -1.0, &mut triggers.minus)
+                (Side::Minus, -1.0, &mut triggers.minus)
             };
-            let beyond = sign * (offset - map.offset(measured)) > libm::sqrt(variance);
+            let beyond =
+                sign * (offset - self.offsets.offset(side, measured)) > libm::sqrt(variance);
             if motion.together {
-                map.measure(measured, offset, variance);
+                self.offsets.measure(side, measured, offset, variance);
                 *trigger = Some(Trigger::Contact);
             } else if beyond {
-                map.bound(measured, offset, variance);
+                self.offsets.bound(side, measured, offset, variance);
                 *trigger = Some(Trigger::Violation);
             }
         }
@@ -252,11 +249,9 @@ impl AdaptiveAxis {
             tip = self.carried(tip, command);
         }
         let model = self.settings.model_deviation;
-        let own = model * model
-            + self
-                .minus
-                .variance(measured)
-                .min(self.plus.variance(measured));
+        let [minus, plus] =
+            [Side::Minus, Side::Plus].map(|side| self.offsets.variance(side, measured));
+        let own = model * model + minus.min(plus);
         self.tip += own / (own + variance) * (tip - self.tip);
         self.tip = self.carried(self.tip, self.command);
     }
@@ -267,7 +262,8 @@ impl AdaptiveAxis {
     }
 
     fn play_at(&self, position: f64) -> Play {
-        let (minus, plus) = (self.minus.offset(position), self.plus.offset(position));
+        let [minus, plus] =
+            [Side::Minus, Side::Plus].map(|side| self.offsets.offset(side, position));
         Play::from_ordered(minus.min(plus), minus.max(plus))
     }
 }

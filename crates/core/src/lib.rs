@@ -50,7 +50,7 @@ pub use features::{FeatureModel, FeaturePrediction};
 pub use history::{Entry, History};
 pub use instrument::{Instrument, Marker};
 pub use lead::LeadLaw;
-pub use offset_map::{OffsetMap, OffsetPrior};
+pub use offset_map::{OffsetMap, OffsetPrior, Side};
 pub use play::{ContactMode, Play, PlayState};
 pub use reduction::{HysteresisReduction, Report, Status};
 pub use smoother::Smoother;
