@@ -143,7 +143,6 @@ class AdaptiveAxis:
         gain_limit: float,
         taper: float,
         settling: float,
-        caution: float,
         node_spacing: float,
         level_deviation: float,
         local_deviation: float,

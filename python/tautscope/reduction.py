@@ -188,7 +188,6 @@ def build_adaptive_axis(config: Config, dof: Dof, compensate: bool = True) -> _c
         gain_limit=own.gain_limit,
         taper=unit * shared.taper,
         settling=unit * shared.settling,
-        caution=shared.caution,
         node_spacing=unit * shared.node_spacing,
         level_deviation=unit * shared.level_deviation,
         local_deviation=unit * shared.local_deviation,

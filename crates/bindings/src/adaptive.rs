@@ -18,8 +18,7 @@ pub struct AdaptiveAxis(pub core::AdaptiveAxis);
 impl AdaptiveAxis {
     #[new]
     #[pyo3(signature = (
-        *, free_gain, contact_gain, cautious_gain, cautious_deviation, gain_limit, taper, settling,
-        caution, node_spacing, level_deviation, local_deviation, correlation, level_drift,
+        *, free_gain, contact_gain, cautious_gain, cautious_deviation, gain_limit, taper, settling, node_spacing, level_deviation, local_deviation, correlation, level_drift,
         local_drift, symmetry, contact_distance, contact_moved, slope_tolerance, marker_deviation,
         model_deviation, tremor_time, period, delta_minus, delta_plus
     ))]
@@ -34,7 +33,6 @@ impl AdaptiveAxis {
         gain_limit: f64,
         taper: f64,
         settling: f64,
-        caution: f64,
         node_spacing: f64,
         level_deviation: f64,
         local_deviation: f64,
@@ -61,7 +59,6 @@ impl AdaptiveAxis {
             },
             cautious_gain,
             cautious_deviation,
-            caution,
             prior: core::OffsetPrior {
                 spacing: node_spacing,
                 level: level_deviation,

@@ -16,10 +16,9 @@ pub struct AdaptiveSettings {
     /// `contact_gain` of a stroke that began with an offset uncertain by more than
     /// `cautious_deviation`.
     pub cautious_gain: f64,
-    /// See `cautious_gain`.
+    /// See `cautious_gain`. The free zone ends deviation^2 / `cautious_deviation` before the
+    /// contact: hardly at all where the offset is known, well before it where it is not.
     pub cautious_deviation: f64,
-    /// How many standard deviations of the offset before the contact the free zone ends.
-    pub caution: f64,
     /// What is known beforehand of the offsets.
     pub prior: OffsetPrior,
     /// When tip and command move together.
@@ -81,7 +80,6 @@ impl AdaptiveAxis {
             "at least 1, at most contact_gain",
         )?;
         require_positive("cautious_deviation", settings.cautious_deviation)?;
-        require_non_negative("caution", settings.caution)?;
         require_positive("contact_distance", settings.contact.distance)?;
         require_non_negative("contact_moved", settings.contact.moved)?;
         require_positive("slope_tolerance", settings.contact.tolerance)?;
@@ -185,7 +183,7 @@ impl AdaptiveAxis {
         let position = self.command - self.tip;
         let gap = sign * (contact(self.play_at(self.tip)) - position);
         // Up to where the contact may already be.
-        let sure = gap - settings.caution * deviation;
+        let sure = gap - deviation * deviation / settings.cautious_deviation;
         self.landed |= sure <= 0.0;
         let mut law = settings.law;
         law.settling += deviation;

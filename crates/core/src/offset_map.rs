@@ -81,6 +81,8 @@ pub struct OffsetMap {
 
 impl OffsetMap {
     /// A map that believes these offsets everywhere, as much as the prior says.
+    // Without an allocator it has nowhere else to be.
+    #[allow(clippy::large_stack_arrays)]
     pub fn new(prior: OffsetPrior, delta_minus: f64, delta_plus: f64) -> Self {
         let mut distance = -prior.spacing;
         let alike = [0.0; NODES].map(|_: f64| {
