@@ -165,7 +165,7 @@ def _demo(options: argparse.Namespace) -> None:
                 found.results,
                 found.sim_seconds,
                 found.wall_seconds,
-                found.article_results,
+                article_results=found.article_results,
             )
         )
     else:

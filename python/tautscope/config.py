@@ -84,7 +84,7 @@ class AdaptiveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """Standard deviation of an offset's variation with position."""
     correlation: Positive = 40.0
     """Distance over which that variation is alike."""
-    level_drift: NonNegative = 0.15
+    level_drift: NonNegative = 0.2
     """Standard deviation of the offset's change while the command travels 1."""
     local_drift: NonNegative = 0.03
     """The same of its variation with position."""
@@ -339,9 +339,7 @@ class Config(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
         return from_document(document)
 
 
-def load_config(
-    path: str | PathLike[str] | None = None, profile: Profile | None = None
-) -> Config:
+def load_config(path: str | PathLike[str] | None = None, profile: Profile | None = None) -> Config:
     """Read a TOML configuration; keys that are not named keep their defaults.
 
     Args:

@@ -124,6 +124,7 @@ def to_json(
     results: Sequence[Results],
     sim_seconds: float,
     wall_seconds: float,
+    *,
     article_results: Sequence[Results] = (),
 ) -> dict[str, Any]:
     """What ``tautscope demo --json`` prints; a figure that is not known is None.

@@ -30,8 +30,8 @@ def run(
     config = CONFIG
     for dof in Dof:
         config = config.replace(
-            **{f"{dof.label}.delta_minus": start * MINUS[dof]},
-            **{f"{dof.label}.delta_plus": start * PLUS[dof]},
+            **{f"{dof.label}.delta_minus": start * float(MINUS[dof])},
+            **{f"{dof.label}.delta_plus": start * float(PLUS[dof])},
         )
     loop, model = HysteresisReduction(config, compensate), build_feature_model(config)
     noise, seen = np.random.default_rng(seed), deque[tuple[int, Floats]]()
@@ -81,7 +81,7 @@ def test_tremor_is_not_amplified() -> None:
     rest = np.array([CONFIG.experiment[dof].centre for dof in Dof])
     times = np.arange(0, 5, CONFIG.control.period)
     shake = 1e-3 * np.sin(2 * np.pi * 10 * times)
-    moved = [loop.step(rest + [value, 0, 0])[Dof.INSERTION] for value in shake]
+    moved = [loop.step(rest + np.array([value, 0, 0]))[Dof.INSERTION] for value in shake]
     assert np.ptp(moved[200:]) < 4e-3
 
 

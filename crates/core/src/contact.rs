@@ -71,7 +71,7 @@ impl Stroke {
             .find(|(past, _)| (command - past).abs() >= test.distance);
         let together = before.is_some_and(|(past, then)| {
             let slope = (measured - then) / (command - past);
-            slope > 1.0 - test.tolerance && (measured - self.start).abs() > test.moved
+            (slope - 1.0).abs() < test.tolerance && (measured - self.start).abs() > test.moved
         });
         self.remember(command, measured);
         Some(Motion {

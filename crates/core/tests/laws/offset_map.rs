@@ -49,7 +49,7 @@ proptest! {
         for (plus, position, offset, variance) in measurements {
             for both in [Side::Minus, Side::Plus] {
                 let before = map.variance(both, probe);
-                prop_assert!(before >= 0.0 && before <= 1.01 * (1.0 + 1e-9));
+                prop_assert!((0.0..=1.01 * (1.0 + 1e-9)).contains(&before));
                 let mut later = map.clone();
                 later.travel(0.5);
                 let most = later.variance(both, probe);
