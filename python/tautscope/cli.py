@@ -210,7 +210,7 @@ def _print_json(document: dict[str, Any]) -> None:
 def _console() -> Console:
     from rich.console import Console  # noqa: PLC0415
 
-    width = None if sys.stdout.isatty() else 120
+    width = None if sys.stdout.isatty() else 160
     return Console(highlight=False, markup=False, width=width)
 
 
@@ -232,9 +232,11 @@ def _print_table1(demo: Demo, folder: Path) -> None:
     table = Table(title=title, box=None, title_justify="left", title_style="bold", pad_edge=False)
     table.add_column("", no_wrap=True)
     for dof in demo.results[0]:
-        table.add_column(f"{tables.heading(dof)}\narticle", justify="right", style="dim")
+        table.add_column(
+            f"{tables.heading(dof)}\narticle", justify="right", style="dim", no_wrap=True
+        )
         for name in profiles:
-            table.add_column(f"\n{name}", justify="right", no_wrap=True)
+            table.add_column(f"\n{name}", justify="right")
     for row in tables.ROWS:
         cells = []
         for dof in demo.results[0]:
