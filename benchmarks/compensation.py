@@ -331,7 +331,7 @@ def table(found: Sequence[tuple[Profile, Found]]) -> list[dict[str, Any]]:
     figures: dict[tuple[str, str, Profile], list[float]] = defaultdict(list)
     for profile, figures_of_run in found:
         for what, dof, value in figures_of_run:
-            figures[what, dof, profile].append(value)
+            figures[what, dof, profile].append(float(value))
     rows = []
     for (what, dof, profile), values in figures.items():
         goal = GOALS[what]
@@ -348,7 +348,9 @@ def table(found: Sequence[tuple[Profile, Found]]) -> list[dict[str, Any]]:
                 "n": len(values),
                 "goal": goal.value,
                 "sense": goal.sense,
-                "holds": middle <= goal.value + slack if most else middle >= goal.value - slack,
+                "holds": bool(
+                    middle <= goal.value + slack if most else middle >= goal.value - slack
+                ),
             }
         )
     order = list(GOALS)
