@@ -333,8 +333,10 @@ def table(found: Sequence[tuple[Profile, Found]]) -> list[dict[str, Any]]:
         for what, dof, value in figures_of_run:
             figures[what, dof, profile].append(float(value))
     rows = []
-    for (what, dof, profile), values in figures.items():
-        goal = GOALS[what]
+    for (what, dof, profile), every in figures.items():
+        goal, values = GOALS[what], [value for value in every if not np.isnan(value)]
+        if not values:
+            continue
         middle, most = median(values), goal.sense == "max"
         slack = 1e-9 * abs(goal.value)  # of rounding
         rows.append(
