@@ -68,6 +68,7 @@ def test_demo_fills_a_run_folder_and_prints_one_object(
 ) -> None:
     out = tmp_path / "run"
     arguments = ["demo", "--config", config_file, "--seed", "3", "--seeds", "2", "--json"]
+    arguments += ["--profile", "paper"]
     assert main([*arguments, "--out", str(out)]) == 0
     captured = capsys.readouterr()
     assert "4 runs: 100 %" in captured.err
@@ -119,6 +120,9 @@ def test_demo_prints_the_article_beside_ours(
 ) -> None:
     assert main(["demo", "--config", config_file, "--out", str(tmp_path / "run")]) == 0
     out = capsys.readouterr().out
+    assert next(line.split() for line in out.splitlines() if "article" in line and "paper" in line)[
+        :3
+    ] == ["article", "paper", "best"]
     reduction = next(line for line in out.splitlines() if line.startswith("reduction "))
     assert [cell for cell in reduction.split("  ") if cell.strip()][1].strip() == "75 %"
     assert "rotation [rad]" in out

@@ -141,11 +141,65 @@ class StateEstimator:
     ) -> tuple[_Floats, _Flags]: ...
 
 @final
+class AdaptiveAxis:
+    def __new__(
+        cls,
+        *,
+        free_gain: float,
+        contact_gain: float,
+        cautious_gain: float,
+        cautious_deviation: float,
+        gain_limit: float,
+        taper: float,
+        settling: float,
+        node_spacing: float,
+        level_deviation: float,
+        local_deviation: float,
+        correlation: float,
+        level_drift: float,
+        local_drift: float,
+        symmetry: float,
+        contact_distance: float,
+        contact_moved: float,
+        slope_tolerance: float,
+        marker_deviation: float,
+        model_deviation: float,
+        tremor_time: float,
+        period: float,
+        delta_minus: float,
+        delta_plus: float,
+    ) -> AdaptiveAxis: ...
+    def step(self, reference: float) -> float: ...
+    def run(self, references: ArrayLike) -> _Floats: ...
+    def learn(
+        self, command: float, measured: float, deviation: float, since: ArrayLike
+    ) -> _Triggers: ...
+    @property
+    def command(self) -> float: ...
+    @property
+    def predicted_state(self) -> float: ...
+    @property
+    def delta_minus(self) -> float: ...
+    @property
+    def delta_plus(self) -> float: ...
+    @property
+    def deviation(self) -> tuple[float, float]: ...
+
 class Reduction:
     def __new__(
         cls,
         compensators: Sequence[Compensator],
         estimators: Sequence[Estimator],
+        model: FeatureModel,
+        state_estimator: StateEstimator,
+        *,
+        span: float,
+        period: float,
+        start_deviation: _Vector3,
+    ) -> Reduction: ...
+    @staticmethod
+    def adaptive(
+        axes: Sequence[AdaptiveAxis],
         model: FeatureModel,
         state_estimator: StateEstimator,
         *,

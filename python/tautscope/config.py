@@ -26,6 +26,7 @@ NonNegative = Annotated[float, Meta(ge=0)]
 Fraction = Annotated[float, Meta(gt=0, lt=1)]
 Gain = Annotated[float, Meta(ge=1)]
 PixelFormat = Literal["bgr", "rgb", "bgra", "yuyv", "uyvy", "nv12", "i420"]
+Profile = Literal["paper", "best"]
 Vector3 = tuple[float, float, float]
 Vector8 = tuple[float, float, float, float, float, float, float, float]
 
@@ -72,6 +73,53 @@ class DofConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Contact offset at the start [m or rad] [paper]."""
     delta_plus: float = 0.0
     """Contact offset at the start [m or rad], not below delta_minus [paper]."""
+
+
+class AdaptiveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Profile ``best``: lead law, contact and offsets over position. All [ours].
+
+    Lengths are in units of the DOF's update_distance, so that one set serves all three.
+    free_gain, gain_limit, delta_minus and delta_plus are those of `DofConfig`.
+    """
+
+    contact_gain: Gain = 2.1
+    """Largest command over reference in contact, until the lead is what it should be."""
+    cautious_gain: Gain = 1.4
+    """The same for a stroke that begins with an offset hardly known."""
+    cautious_deviation: Positive = 3.0
+    """Standard deviation of an offset from which on it counts as hardly known. The free zone ends
+    deviation^2 / cautious_deviation before the contact."""
+    taper: Positive = 1.5
+    """End of the gap over which free_gain falls to contact_gain."""
+    settling: Positive = 1.5
+    """Lead yet missing below which the gain in contact falls to 1; an offset's standard deviation
+    comes on top."""
+    tremor_time: NonNegative = 0.15
+    """Time constant of the smoothing that tells tremor from intention [s]."""
+    node_spacing: Positive = 6.0
+    """Distance of two of the 33 positions at which an offset is held."""
+    level_deviation: Positive = 20.0
+    """Standard deviation of an offset at the start, the same error at all positions."""
+    local_deviation: NonNegative = 0.7
+    """Standard deviation of an offset's variation with position."""
+    correlation: Positive = 40.0
+    """Distance over which that variation is alike."""
+    level_drift: NonNegative = 0.2
+    """Standard deviation of the offset's change while the command travels 1."""
+    local_drift: NonNegative = 0.03
+    """The same of its variation with position."""
+    symmetry: Annotated[float, Meta(ge=0, lt=1)] = 0.8
+    """Minus the correlation of the two offsets: friction moves both contacts outwards alike."""
+    contact_distance: Positive = 3.0
+    """Travel of the command over which it is seen whether the tip follows."""
+    contact_moved: NonNegative = 3.0
+    """How far the tip must have come in a stroke before contact counts."""
+    slope_tolerance: Fraction = 0.25
+    """Largest deviation from 1 of tip over command travel in contact."""
+    model_deviation: Positive = 0.5
+    """Standard deviation of a measured offset beyond the markers' noise."""
+    marker_deviation: NonNegative = 0.3
+    """Standard deviation of a marker's position [px]."""
 
 
 class InstrumentConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -299,6 +347,10 @@ class TwinConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 class Config(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Everything a run depends on. The defaults are the article's experiment."""
 
+    profile: Profile = "paper"
+    """How slack is compensated and learnt: ``paper`` as in the article, ``best`` as in
+    `AdaptiveConfig`."""
+    adaptive: AdaptiveConfig = field(default_factory=AdaptiveConfig)
     insertion: DofConfig = field(
         default_factory=lambda: DofConfig(
             update_distance=0.4e-3, observable_deviation=2e-3, start_deviation=5e-3
@@ -342,19 +394,21 @@ class Config(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
         return from_document(document)
 
 
-def load_config(path: str | PathLike[str] | None = None) -> Config:
+def load_config(path: str | PathLike[str] | None = None, profile: Profile | None = None) -> Config:
     """Read a TOML configuration; keys that are not named keep their defaults.
 
     Args:
         path: TOML file; without it, the article's experiment.
+        profile: ``"paper"`` or ``"best"``; without it, what the file says, else ``"paper"``.
 
     Raises:
         MissingPathError: The file is not there.
         ConfigError: It is not TOML, or a key is unknown, of the wrong type or out of range; the
             error names the key, what came and what may come.
     """
+    changes = {} if profile is None else {"profile": profile}
     if path is None:
-        return Config()
+        return from_document(changes)
     file = Path(path)
     try:
         document = tomllib.loads(file.read_text(encoding="utf-8"))
@@ -362,7 +416,7 @@ def load_config(path: str | PathLike[str] | None = None) -> Config:
         raise MissingPathError("config", str(file), "a TOML file") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ConfigError("config", str(file), f"TOML ({error})") from None
-    return from_document(document)
+    return from_document(document | changes)
 
 
 def from_document(document: dict[str, Any]) -> Config:
@@ -458,6 +512,13 @@ def _check_relations(config: Config) -> None:
                 settings.delta_minus,
                 f"at most {dof.label}.delta_plus = {settings.delta_plus}",
             )
+    adaptive = config.adaptive
+    if adaptive.cautious_gain > adaptive.contact_gain:
+        raise ConfigError(
+            "adaptive.cautious_gain",
+            adaptive.cautious_gain,
+            f"at most adaptive.contact_gain = {adaptive.contact_gain}",
+        )
     instrument = config.instrument
     half = instrument.band_length / 2
     if not half <= instrument.marker_a <= instrument.marker_b - 2 * half:

@@ -213,6 +213,40 @@ def build_compensator(dof: DofConfig, compensate: bool = True) -> _core.Compensa
     )
 
 
+def build_adaptive_axis(config: Config, dof: Dof, compensate: bool = True) -> _core.AdaptiveAxis:
+    """One DOF of profile ``best``; without compensation its gains are 1."""
+    own, shared = config[dof], config.adaptive
+    unit = own.update_distance
+    free = own.free_gain if compensate else 1.0
+    contact = min(shared.contact_gain, free)
+    return _core.AdaptiveAxis(
+        free_gain=free,
+        contact_gain=contact,
+        cautious_gain=min(shared.cautious_gain, contact),
+        cautious_deviation=unit * shared.cautious_deviation,
+        gain_limit=own.gain_limit,
+        taper=unit * shared.taper,
+        settling=unit * shared.settling,
+        node_spacing=unit * shared.node_spacing,
+        level_deviation=unit * shared.level_deviation,
+        local_deviation=unit * shared.local_deviation,
+        correlation=unit * shared.correlation,
+        # A deviation per square root of travel.
+        level_drift=math.sqrt(unit) * shared.level_drift,
+        local_drift=math.sqrt(unit) * shared.local_drift,
+        symmetry=shared.symmetry,
+        contact_distance=unit * shared.contact_distance,
+        contact_moved=unit * shared.contact_moved,
+        slope_tolerance=shared.slope_tolerance,
+        marker_deviation=shared.marker_deviation,
+        model_deviation=unit * shared.model_deviation,
+        tremor_time=shared.tremor_time,
+        period=config.control.period,
+        delta_minus=own.delta_minus,
+        delta_plus=own.delta_plus,
+    )
+
+
 def build_estimator(dof: DofConfig) -> _core.Estimator:
     """The hysteresis estimator of one DOF, Eqs. (4)-(6)."""
     return _core.Estimator(
@@ -264,6 +298,26 @@ def build_state_estimator(config: Config) -> _core.StateEstimator:
 def build_loop(config: Config, compensate: bool = True) -> _core.Reduction:
     """The whole loop, Fig. 6, without checks of what goes in: `HysteresisReduction` has those."""
     insertion, rotation, bending = (config[dof] for dof in Dof)
+    model, state_estimator = build_feature_model(config), build_state_estimator(config)
+    span, period = config.control.history, config.control.period
+    start_deviation = (
+        insertion.start_deviation,
+        rotation.start_deviation,
+        bending.start_deviation,
+    )
+    if config.profile == "best":
+        return _core.Reduction.adaptive(
+            (
+                build_adaptive_axis(config, Dof.INSERTION, compensate),
+                build_adaptive_axis(config, Dof.ROTATION, compensate),
+                build_adaptive_axis(config, Dof.BENDING, compensate),
+            ),
+            model,
+            state_estimator,
+            span=span,
+            period=period,
+            start_deviation=start_deviation,
+        )
     return _core.Reduction(
         (
             build_compensator(insertion, compensate),
@@ -271,15 +325,11 @@ def build_loop(config: Config, compensate: bool = True) -> _core.Reduction:
             build_compensator(bending, compensate),
         ),
         (build_estimator(insertion), build_estimator(rotation), build_estimator(bending)),
-        build_feature_model(config),
-        build_state_estimator(config),
-        span=config.control.history,
-        period=config.control.period,
-        start_deviation=(
-            insertion.start_deviation,
-            rotation.start_deviation,
-            bending.start_deviation,
-        ),
+        model,
+        state_estimator,
+        span=span,
+        period=period,
+        start_deviation=start_deviation,
     )
 
 

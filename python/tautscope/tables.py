@@ -124,25 +124,33 @@ def to_json(
     results: Sequence[Results],
     sim_seconds: float,
     wall_seconds: float,
+    *,
+    article_results: Sequence[Results] = (),
 ) -> dict[str, Any]:
     """What ``tautscope demo --json`` prints; a figure that is not known is None.
 
     Medians over the seeds; under ``worst`` the worst seed of each figure. Insertion in mm.
+    Under ``paper`` the same for the article's scheme, if it was run beside another.
     """
-    middle, bad = median(results), worst(results)
     return {
         "profile": profile,
         "seeds": list(seeds),
-        "dof": {
-            dof.label: {
-                "unit": dof.display_unit,
-                **_summary(dof, middle[dof]),
-                "worst": _summary(dof, bad[dof]),
-            }
-            for dof in results[0]
-        },
+        "dof": _by_dof(results),
+        **({"paper": _by_dof(article_results)} if article_results else {}),
         "sim_seconds": sim_seconds,
         "wall_seconds": wall_seconds,
+    }
+
+
+def _by_dof(results: Sequence[Results]) -> dict[str, Any]:
+    middle, bad = median(results), worst(results)
+    return {
+        dof.label: {
+            "unit": dof.display_unit,
+            **_summary(dof, middle[dof]),
+            "worst": _summary(dof, bad[dof]),
+        }
+        for dof in results[0]
     }
 
 

@@ -3,6 +3,7 @@
 // PyO3 hands arguments over by value.
 #![allow(clippy::needless_pass_by_value)]
 
+mod adaptive;
 mod arrays;
 mod camera;
 mod compensator;
@@ -23,6 +24,8 @@ use pyo3::prelude::*;
 mod _core {
     use super::{Bound, PyModule, PyModuleMethods, PyResult};
 
+    #[pymodule_export]
+    use super::adaptive::AdaptiveAxis;
     #[pymodule_export]
     use super::camera::Camera;
     #[pymodule_export]

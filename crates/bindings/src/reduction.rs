@@ -4,6 +4,7 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use tautscope_core as core;
 
+use crate::adaptive::AdaptiveAxis;
 use crate::arrays::{Table, Vector, fixed, rows, same_length, table};
 use crate::compensator::Compensator;
 use crate::errors;
@@ -52,6 +53,30 @@ impl Reduction {
             let (compensator, estimator) = (&compensators[dof], &estimators[dof]);
             core::Axis::new(compensator.inner, estimator.inner, estimator.state.play())
         });
+        let history = core::History::new(span, period).map_err(errors::config(py))?;
+        let whereabouts = core::Whereabouts::new(start_deviation).map_err(errors::config(py))?;
+        Ok(Self(core::HysteresisReduction::new(
+            axes,
+            model.0,
+            state_estimator.0,
+            history,
+            whereabouts,
+        )))
+    }
+
+    /// The loop of profile `best`, from its three axes.
+    #[staticmethod]
+    #[pyo3(signature = (axes, model, state_estimator, *, span, period, start_deviation))]
+    fn adaptive(
+        py: Python<'_>,
+        axes: [PyRef<'_, AdaptiveAxis>; 3],
+        model: &FeatureModel,
+        state_estimator: &StateEstimator,
+        span: f64,
+        period: f64,
+        start_deviation: [f64; 3],
+    ) -> PyResult<Self> {
+        let axes = axes.map(|axis| core::Axis::Adaptive(axis.0.clone()));
         let history = core::History::new(span, period).map_err(errors::config(py))?;
         let whereabouts = core::Whereabouts::new(start_deviation).map_err(errors::config(py))?;
         Ok(Self(core::HysteresisReduction::new(

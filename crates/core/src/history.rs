@@ -114,6 +114,14 @@ impl History {
         })
     }
 
+    /// The ticks after `time`, oldest first.
+    pub fn since(&self, time: f64) -> impl Iterator<Item = &Entry> {
+        let count = (0..self.len)
+            .take_while(|age| self.aged(*age).is_some_and(|entry| entry.time > time))
+            .count();
+        (0..count).rev().filter_map(|age| self.aged(age))
+    }
+
     fn newest(&self) -> Option<&Entry> {
         self.aged(0)
     }

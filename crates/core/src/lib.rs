@@ -19,33 +19,45 @@
     )
 )]
 
+mod adaptive;
+mod axis;
 mod camera;
 mod compensator;
+mod contact;
 mod dof;
 mod error;
 mod estimator;
 mod features;
 mod history;
 mod instrument;
+mod lead;
 mod linear;
+mod offset_map;
 mod outline;
 mod play;
 mod posture;
 mod reduction;
+mod smoother;
 mod state;
 mod whereabouts;
 
+pub use adaptive::{AdaptiveAxis, AdaptiveSettings};
+pub use axis::{ArticleAxis, Axis};
 pub use camera::{Camera, Pose, Projection};
 pub use compensator::{Compensator, CompensatorState};
+pub use contact::ContactTest;
 pub use dof::{PerDof, all_finite};
 pub use error::ConfigError;
 pub use estimator::{Estimator, EstimatorState, Trigger, Triggers};
 pub use features::{FeatureModel, FeaturePrediction};
 pub use history::{Entry, History};
 pub use instrument::{Instrument, Marker};
+pub use lead::LeadLaw;
+pub use offset_map::{OffsetMap, OffsetPrior, Side};
 pub use outline::{BandImage, OUTLINE};
 pub use play::{ContactMode, Play, PlayState};
 pub use posture::Belief;
-pub use reduction::{Axis, HysteresisReduction, Report, Status};
+pub use reduction::{HysteresisReduction, Report, Status};
+pub use smoother::Smoother;
 pub use state::{StateEstimate, StateEstimator};
 pub use whereabouts::Whereabouts;

@@ -1,50 +1,14 @@
 //! The whole loop, Fig. 6.
 
-use crate::compensator::{Compensator, CompensatorState};
+use crate::axis::Axis;
 use crate::dof::{PerDof, all_finite};
-use crate::estimator::{Estimator, EstimatorState, Triggers};
+use crate::estimator::Triggers;
 use crate::features::FeatureModel;
 use crate::history::{Entry, History};
 use crate::play::Play;
 use crate::posture::Belief;
 use crate::state::{StateEstimate, StateEstimator, found};
 use crate::whereabouts::Whereabouts;
-
-/// One DOF of the loop: its compensator and its estimator, each with its memory.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Axis {
-    compensator: Compensator,
-    estimator: Estimator,
-    compensation: CompensatorState,
-    estimation: EstimatorState,
-}
-
-impl Axis {
-    /// A DOF that starts from the offsets of `play`.
-    pub fn new(compensator: Compensator, estimator: Estimator, play: Play) -> Self {
-        Self {
-            compensator,
-            estimator,
-            compensation: CompensatorState::new(play),
-            estimation: EstimatorState::new(play),
-        }
-    }
-
-    fn command(&mut self, reference: f64) -> f64 {
-        self.compensator.step(&mut self.compensation, reference)
-    }
-
-    fn learn(&mut self, command: f64, measured: f64) -> Triggers {
-        let triggers = self
-            .estimator
-            .update(&mut self.estimation, command, measured);
-        if triggers.any() {
-            self.compensator
-                .retune(&mut self.compensation, self.estimation.play());
-        }
-        triggers
-    }
-}
 
 /// What became of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -121,12 +85,13 @@ impl HysteresisReduction {
         if all_finite(reference) {
             let axes = self.axes.iter_mut().zip(&mut self.travel);
             for ((axis, travel), reference) in axes.zip(reference) {
-                let before = axis.compensation.command();
-                let moved = (axis.command(reference) - before).abs();
+                let before = axis.command();
+                axis.step(reference);
+                let moved = (axis.command() - before).abs();
                 *travel += if moved.is_finite() { moved } else { 0.0 };
             }
         }
-        let command = self.axes.map(|axis| axis.compensation.command());
+        let command = self.axes.each_ref().map(Axis::command);
         let jumped_back = self.history.push(Entry {
             time,
             command,
@@ -191,15 +156,22 @@ impl HysteresisReduction {
 
     fn learn(&mut self, past: &Entry, estimate: &StateEstimate) -> PerDof<Triggers> {
         let mut triggers = [Triggers::default(); 3];
+        let history = &self.history;
         let signals = estimate
             .observable
             .iter()
             .zip(past.command)
-            .zip(estimate.state);
-        let axes = self.axes.iter_mut().zip(&mut triggers);
-        for ((axis, triggers), ((observable, command), measured)) in axes.zip(signals) {
+            .zip(estimate.state)
+            .zip(estimate.deviation);
+        let axes = self.axes.iter_mut().zip(&mut triggers).enumerate();
+        for ((dof, (axis, triggers)), (((observable, command), measured), deviation)) in
+            axes.zip(signals)
+        {
             if *observable {
-                *triggers = axis.learn(command, measured);
+                let since = history
+                    .since(past.time)
+                    .filter_map(|entry| entry.command.get(dof).copied());
+                *triggers = axis.learn(command, measured, deviation, since);
             }
         }
         triggers
@@ -245,12 +217,12 @@ impl HysteresisReduction {
 
     /// The predicted state q now [m, rad, rad]; NaN before the first reference.
     pub fn predicted_state(&self) -> PerDof<f64> {
-        self.axes.map(|axis| axis.compensation.predicted_state())
+        self.axes.each_ref().map(Axis::predicted_state)
     }
 
     /// The estimated play of each DOF now.
     pub fn play(&self) -> PerDof<Play> {
-        self.axes.map(|axis| axis.estimation.play())
+        self.axes.each_ref().map(Axis::play)
     }
 }
 

@@ -3,9 +3,12 @@
 // Where these compare floats for equality, equality to the last bit is what they claim.
 #![allow(clippy::float_cmp)]
 
+mod adaptive;
 mod compensator;
 mod estimator;
 mod history;
+mod lead;
+mod offset_map;
 mod play;
 mod state;
 

@@ -1,0 +1,267 @@
+//! One DOF of profile `best`: lead law, offsets over position, and a play state that images correct.
+
+use crate::contact::{ContactTest, Stroke};
+use crate::error::{ConfigError, require, require_non_negative, require_positive};
+use crate::estimator::{Trigger, Triggers};
+use crate::lead::LeadLaw;
+use crate::offset_map::{OffsetMap, OffsetPrior, Side};
+use crate::play::{Play, PlayState};
+use crate::smoother::Smoother;
+
+/// What an [`AdaptiveAxis`] is set to; lengths in the unit of the DOF.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AdaptiveSettings {
+    /// How the lead is brought about.
+    pub law: LeadLaw,
+    /// `contact_gain` of a stroke that began with an offset uncertain by more than
+    /// `cautious_deviation`.
+    pub cautious_gain: f64,
+    /// See `cautious_gain`. The free zone ends deviation^2 / `cautious_deviation` before the
+    /// contact: hardly at all where the offset is known, well before it where it is not.
+    pub cautious_deviation: f64,
+    /// What is known beforehand of the offsets.
+    pub prior: OffsetPrior,
+    /// When tip and command move together.
+    pub contact: ContactTest,
+    /// Standard deviation of a marker's position in px.
+    pub marker_deviation: f64,
+    /// Deviation of a measured offset beyond that of the markers.
+    pub model_deviation: f64,
+    /// Bound of every gain.
+    pub gain_limit: f64,
+    /// Time constant of the smoothing that tells tremor from intention, in s.
+    pub tremor_time: f64,
+    /// Control period, in s.
+    pub period: f64,
+}
+
+/// Compensates one DOF and learns its offsets; every quantity in the unit of the DOF.
+///
+/// `step` moves the command, `learn` takes in the image. The lead law runs on the smoothed
+/// reference, so tremor passes with a gain near 1; what the command may do in a tick is bounded by
+/// `0 <= dc / du <= gain_limit` last of all.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AdaptiveAxis {
+    settings: AdaptiveSettings,
+    offsets: OffsetMap,
+    smoother: Smoother,
+    stroke: Stroke,
+    reference: Option<f64>,
+    /// The smoothed reference up to which the lead has been worked out.
+    intended: f64,
+    lead: f64,
+    command: f64,
+    tip: f64,
+    upwards: Option<bool>,
+    landed: bool,
+    cautious: bool,
+}
+
+impl AdaptiveAxis {
+    /// A DOF that starts from the offsets of `play`, which it trusts as far as the prior says.
+    ///
+    /// # Errors
+    /// A setting is out of range.
+    pub fn new(settings: AdaptiveSettings, play: Play) -> Result<Self, ConfigError> {
+        let law = settings.law.checked()?;
+        let prior = settings.prior.checked()?;
+        let limit = settings.gain_limit.is_finite() && settings.gain_limit >= law.free_gain;
+        require(
+            limit,
+            "gain_limit",
+            settings.gain_limit,
+            "finite, at least free_gain",
+        )?;
+        let cautious = (1.0..=law.contact_gain).contains(&settings.cautious_gain);
+        require(
+            cautious,
+            "cautious_gain",
+            settings.cautious_gain,
+            "at least 1, at most contact_gain",
+        )?;
+        require_positive("cautious_deviation", settings.cautious_deviation)?;
+        require_positive("contact_distance", settings.contact.distance)?;
+        require_non_negative("contact_moved", settings.contact.moved)?;
+        require_positive("slope_tolerance", settings.contact.tolerance)?;
+        require_non_negative("marker_deviation", settings.marker_deviation)?;
+        require_positive("model_deviation", settings.model_deviation)?;
+        require_non_negative("tremor_time", settings.tremor_time)?;
+        require_positive("period", settings.period)?;
+        Ok(Self {
+            settings,
+            offsets: OffsetMap::new(prior, play.delta_minus(), play.delta_plus()),
+            smoother: Smoother::new(settings.tremor_time, settings.period),
+            stroke: Stroke::new(),
+            reference: None,
+            intended: f64::NAN,
+            lead: 0.0,
+            command: f64::NAN,
+            tip: f64::NAN,
+            upwards: None,
+            landed: false,
+            cautious: false,
+        })
+    }
+
+    /// The command c; NaN before the first reference.
+    pub const fn command(&self) -> f64 {
+        self.command
+    }
+
+    /// The predicted state q; NaN before the first reference.
+    pub const fn predicted_state(&self) -> f64 {
+        self.tip
+    }
+
+    /// The offsets where the reference is now.
+    pub fn play(&self) -> Play {
+        self.play_at(self.reference.unwrap_or(0.0))
+    }
+
+    /// Standard deviation of (`delta_minus`, `delta_plus`) where the reference is now.
+    pub fn deviation(&self) -> (f64, f64) {
+        let at = self.reference.unwrap_or(0.0);
+        let root = |side| libm::sqrt(self.offsets.variance(side, at));
+        (root(Side::Minus), root(Side::Plus))
+    }
+
+    /// The command for the next reference.
+    ///
+    /// The first reference is passed through. A reference that has not changed, or is not finite,
+    /// gives the same command again, bit for bit.
+    pub fn step(&mut self, reference: f64) -> f64 {
+        if !reference.is_finite() {
+            return self.command;
+        }
+        let smooth = self.smoother.step(reference);
+        let Some(last) = self.reference.replace(reference) else {
+            self.offsets.centre(reference);
+            (self.intended, self.command) = (smooth, reference);
+            self.tip = self.carried(reference, reference);
+            return self.command;
+        };
+        let increment = reference - last;
+        if increment == 0.0 {
+            return self.command;
+        }
+        let intention = smooth - self.intended;
+        self.intended = smooth;
+        if intention != 0.0 {
+            self.move_lead(reference, intention);
+        }
+        // Eq. (2), to the last bit.
+        let farthest = self.command + self.settings.gain_limit * increment;
+        self.command = (reference + self.lead)
+            .max(self.command.min(farthest))
+            .min(self.command.max(farthest));
+        self.tip = self.carried(self.tip, self.command);
+        self.command
+    }
+
+    fn move_lead(&mut self, reference: f64, intention: f64) {
+        let settings = &self.settings;
+        let upwards = intention > 0.0;
+        let (side, sign) = if upwards {
+            (Side::Plus, 1.0)
+        } else {
+            (Side::Minus, -1.0)
+        };
+        let deviation = libm::sqrt(self.offsets.variance(side, reference));
+        if self.upwards != Some(upwards) {
+            self.upwards = Some(upwards);
+            self.landed = false;
+            self.cautious = deviation > settings.cautious_deviation;
+        }
+        let contact = |play: Play| {
+            if upwards {
+                play.delta_plus()
+            } else {
+                play.delta_minus()
+            }
+        };
+        let missing = sign * (contact(self.play_at(reference)) - self.lead);
+        let position = self.command - self.tip;
+        let gap = sign * (contact(self.play_at(self.tip)) - position);
+        // Up to where the contact may already be.
+        let sure = gap - deviation * deviation / settings.cautious_deviation;
+        self.landed |= sure <= 0.0;
+        let mut law = settings.law;
+        law.settling += deviation;
+        if self.cautious {
+            law.contact_gain = settings.cautious_gain;
+        }
+        let gap = if self.landed { 0.0 } else { sure };
+        self.lead += sign * law.gain(intention.abs(), gap, missing);
+    }
+
+    /// Learn from command and output of one instant, the output's standard deviation per px of
+    /// marker noise, and the commands since, oldest first.
+    pub fn learn(
+        &mut self,
+        command: f64,
+        measured: f64,
+        deviation: f64,
+        since: impl Iterator<Item = f64>,
+    ) -> Triggers {
+        let settings = self.settings;
+        let model = settings.model_deviation;
+        let seen = deviation * settings.marker_deviation;
+        let variance = seen * seen + model * model;
+        let mut triggers = Triggers::default();
+        if !(command.is_finite() && measured.is_finite() && variance.is_finite()) {
+            return triggers;
+        }
+        let motion = self.stroke.follow(&settings.contact, command, measured);
+        if let Some(motion) = motion {
+            self.offsets.travel(motion.travel);
+            let offset = command - measured;
+            let (side, sign, trigger) = if motion.upwards {
+                (Side::Plus, 1.0, &mut triggers.plus)
+            } else {
+                (Side::Minus, -1.0, &mut triggers.minus)
+            };
+            let beyond =
+                sign * (offset - self.offsets.offset(side, measured)) > libm::sqrt(variance);
+            if motion.together {
+                self.offsets.measure(side, measured, offset, variance);
+                *trigger = Some(Trigger::Contact);
+            } else if beyond {
+                self.offsets.bound(side, measured, offset, variance);
+                *trigger = Some(Trigger::Violation);
+            }
+        }
+        self.observe(command, measured, variance, since);
+        triggers
+    }
+
+    /// Carry the measured output to now and move the play state there, by the ratio of variances.
+    fn observe(
+        &mut self,
+        command: f64,
+        measured: f64,
+        variance: f64,
+        since: impl Iterator<Item = f64>,
+    ) {
+        let mut tip = self.carried(measured, command);
+        for command in since {
+            tip = self.carried(tip, command);
+        }
+        let model = self.settings.model_deviation;
+        let [minus, plus] =
+            [Side::Minus, Side::Plus].map(|side| self.offsets.variance(side, measured));
+        let own = model * model + minus.min(plus);
+        self.tip += own / (own + variance) * (tip - self.tip);
+        self.tip = self.carried(self.tip, self.command);
+    }
+
+    fn carried(&self, tip: f64, command: f64) -> f64 {
+        let mut state = PlayState { output: tip };
+        self.play_at(tip).step(&mut state, command)
+    }
+
+    fn play_at(&self, position: f64) -> Play {
+        let [minus, plus] =
+            [Side::Minus, Side::Plus].map(|side| self.offsets.offset(side, position));
+        Play::from_ordered(minus.min(plus), minus.max(plus))
+    }
+}

@@ -1,0 +1,235 @@
+//! The two contact offsets as functions of position, with their uncertainty.
+
+use crate::error::{ConfigError, require, require_non_negative, require_positive};
+
+const NODES: usize = 33;
+const SIZE: usize = 2 * NODES;
+const MIDDLE: f64 = 16.0;
+
+/// What is known beforehand of how a contact offset varies; all in the unit of the DOF.
+///
+/// The offset at position y is a level, common to all positions, plus a local deviation that
+/// is alike at neighbouring positions. Both are normal and wander as the command travels:
+///
+/// ```text
+/// cov(delta(y), delta(y')) = level^2 + local^2 exp(-|y - y'| / correlation)
+/// drift per travel d:        d (level_drift^2 + local_drift^2 exp(-|y - y'| / correlation))
+/// ```
+///
+/// Friction moves both contacts outwards alike, so the levels of the two offsets are correlated
+/// with -`symmetry`, and so are their drifts. The local parts are not.
+///
+/// A change of the level is what a straightened scope does. What is local is a stretched cable, a
+/// shaft that has taken a set, or one cable handing over to the other.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OffsetPrior {
+    /// Distance of two nodes; 33 of them, centred where the run starts, hold the function.
+    pub spacing: f64,
+    /// Standard deviation of the level before the first measurement, and the largest ever.
+    pub level: f64,
+    /// Standard deviation of the local part.
+    pub local: f64,
+    /// Distance over which the local part is alike.
+    pub correlation: f64,
+    /// Standard deviation of the level's change over a travel of 1, in the DOF's unit.
+    pub level_drift: f64,
+    /// The same of the local part.
+    pub local_drift: f64,
+    /// Minus the correlation of the two levels: 0, independent, to 1.
+    pub symmetry: f64,
+}
+
+impl OffsetPrior {
+    /// The same, checked.
+    ///
+    /// # Errors
+    /// A deviation is negative, a distance not above 0, or one of them is not finite.
+    pub fn checked(self) -> Result<Self, ConfigError> {
+        require_positive("spacing", self.spacing)?;
+        require_positive("level", self.level)?;
+        require_non_negative("local", self.local)?;
+        require_positive("correlation", self.correlation)?;
+        require_non_negative("level_drift", self.level_drift)?;
+        require_non_negative("local_drift", self.local_drift)?;
+        let share = (0.0..1.0).contains(&self.symmetry);
+        require(share, "symmetry", self.symmetry, "at least 0, below 1")?;
+        Ok(self)
+    }
+}
+
+/// Which of the two contacts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    /// Of `delta_minus`.
+    Minus,
+    /// Of `delta_plus`.
+    Plus,
+}
+
+/// Both contact offsets over position: mean and joint covariance at nodes, linear between them,
+/// constant beyond the outermost. A Kalman filter, one scalar measurement at a time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OffsetMap {
+    prior: OffsetPrior,
+    origin: f64,
+    /// Of the nodes of `delta_minus`, then of `delta_plus`.
+    mean: [f64; SIZE],
+    covariance: [[f64; SIZE]; SIZE],
+    /// By distance in nodes, of the local part: exp(-distance / correlation).
+    alike: [f64; NODES],
+}
+
+impl OffsetMap {
+    /// A map that believes these offsets everywhere, as much as the prior says.
+    // Without an allocator it has nowhere else to be.
+    #[allow(clippy::large_stack_arrays)]
+    pub fn new(prior: OffsetPrior, delta_minus: f64, delta_plus: f64) -> Self {
+        let mut distance = -prior.spacing;
+        let alike = [0.0; NODES].map(|_: f64| {
+            distance += prior.spacing;
+            libm::exp(-distance / prior.correlation)
+        });
+        let mut mean = [delta_minus; SIZE];
+        for value in mean.iter_mut().skip(NODES) {
+            *value = delta_plus;
+        }
+        let mut map = Self {
+            prior,
+            origin: 0.0,
+            mean,
+            covariance: [[0.0; SIZE]; SIZE],
+            alike,
+        };
+        map.add(prior.level * prior.level, prior.local * prior.local);
+        map
+    }
+
+    /// The same map centred on another position: before anything is measured.
+    pub const fn centre(&mut self, origin: f64) {
+        self.origin = origin;
+    }
+
+    /// An offset at a position.
+    pub fn offset(&self, side: Side, position: f64) -> f64 {
+        self.node(side, position).pick(&self.mean)
+    }
+
+    /// The variance of an offset at a position.
+    pub fn variance(&self, side: Side, position: f64) -> f64 {
+        let node = self.node(side, position);
+        let [first, second] = [node.below, node.below + 1].map(|index| {
+            let row = self.covariance.get(index);
+            row.map_or(f64::NAN, |row| node.pick(row))
+        });
+        (first + node.share * (second - first)).max(0.0)
+    }
+
+    /// The command has travelled so far: what is known grows old, up to what the prior says.
+    pub fn travel(&mut self, distance: f64) {
+        let prior = self.prior;
+        let distance = distance.abs();
+        self.add(
+            distance * prior.level_drift * prior.level_drift,
+            distance * prior.local_drift * prior.local_drift,
+        );
+        let most = prior.level * prior.level + prior.local * prior.local;
+        let largest = self
+            .covariance
+            .iter()
+            .enumerate()
+            .filter_map(|(index, row)| row.get(index))
+            .fold(0.0, |a: f64, b| a.max(*b));
+        if largest > most {
+            let share = most / largest;
+            for value in self.covariance.iter_mut().flatten() {
+                *value *= share;
+            }
+        }
+    }
+
+    /// An offset was measured at a position, with this variance.
+    pub fn measure(&mut self, side: Side, position: f64, offset: f64, variance: f64) {
+        let node = self.node(side, position);
+        let column = self.column(&node);
+        let total = self.shift(&node, &column, offset, variance);
+        for (row, own) in self.covariance.iter_mut().zip(column) {
+            for (value, other) in row.iter_mut().zip(column) {
+                *value -= own * other / total;
+            }
+        }
+    }
+
+    /// An offset is at least so far out: the mean follows, and is as uncertain as before.
+    ///
+    /// It says nothing about the other contact.
+    pub fn bound(&mut self, side: Side, position: f64, offset: f64, variance: f64) {
+        let node = self.node(side, position);
+        let mut column = self.column(&node);
+        for (index, value) in column.iter_mut().enumerate() {
+            if (index < NODES) != (side == Side::Minus) {
+                *value = 0.0;
+            }
+        }
+        self.shift(&node, &column, offset, variance);
+    }
+
+    fn shift(&mut self, node: &Node, column: &[f64; SIZE], offset: f64, variance: f64) -> f64 {
+        let total = node.pick(column) + variance;
+        let surprise = offset - node.pick(&self.mean);
+        for (mean, gain) in self.mean.iter_mut().zip(column) {
+            *mean += gain / total * surprise;
+        }
+        total
+    }
+
+    /// Covariance of every node with the offset at a place.
+    fn column(&self, node: &Node) -> [f64; SIZE] {
+        let mut column = [0.0; SIZE];
+        for (value, row) in column.iter_mut().zip(&self.covariance) {
+            *value = node.pick(row);
+        }
+        column
+    }
+
+    /// Add a variance of the levels and one of the local parts.
+    fn add(&mut self, level: f64, local: f64) {
+        for (i, row) in self.covariance.iter_mut().enumerate() {
+            for (j, value) in row.iter_mut().enumerate() {
+                *value += if (i < NODES) == (j < NODES) {
+                    level + local * self.alike.get(i.abs_diff(j)).unwrap_or(&0.0)
+                } else {
+                    -self.prior.symmetry * level
+                };
+            }
+        }
+    }
+
+    fn node(&self, side: Side, position: f64) -> Node {
+        let place = (position - self.origin) / self.prior.spacing + MIDDLE;
+        let place = place.clamp(0.0, 2.0 * MIDDLE);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let below = (place as usize).min(NODES - 2);
+        #[allow(clippy::cast_precision_loss)]
+        let share = place - below as f64;
+        let first = if side == Side::Minus { 0 } else { NODES };
+        Node {
+            below: first + below,
+            share,
+        }
+    }
+}
+
+/// A place between two nodes.
+struct Node {
+    below: usize,
+    share: f64,
+}
+
+impl Node {
+    fn pick(&self, values: &[f64; SIZE]) -> f64 {
+        match values.get(self.below..self.below + 2) {
+            Some([a, b]) => a + self.share * (b - a),
+            _ => f64::NAN,
+        }
+    }
+}
