@@ -5,6 +5,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
+    "AdaptiveAxis",
     "Camera",
     "Compensator",
     "Estimator",
@@ -185,6 +186,7 @@ class AdaptiveAxis:
     @property
     def deviation(self) -> tuple[float, float]: ...
 
+@final
 class Reduction:
     def __new__(
         cls,
