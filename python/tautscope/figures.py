@@ -17,6 +17,7 @@ from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from tautscope.config import Config
+from tautscope.models.registry import NO_MODEL
 from tautscope.recording import Recording, Snapshot
 from tautscope.references import Segment
 from tautscope.results import estimated_loop, used_frames
@@ -200,30 +201,38 @@ def _magnify(axes: Axes, points: NDArray[np.float64], shape: tuple[int, ...]) ->
 def analysis_figure(found: Analysis) -> Figure:
     """A row per model: its error over the record, and its loop over the measured one.
 
-    The horizontal axis is the record's time if it was read, and counts samples if not. All errors
-    have one scale, wide enough for all but the largest hundredth. Loops are of the second half.
+    The horizontal axis is the record's time if it was read, and counts samples if not. Loops are
+    of the second half. Errors have one scale, wide enough for all but the largest hundredth; "no
+    model", usually far larger, has its own.
     """
-    record, half = found.record, found.half
+    record = found.record
     at = np.arange(len(record.rows)) if record.time is None else record.time
     tip = np.isfinite(record.measured)
     errors = [entry.prediction.tip - record.measured for entry in found.entries]
-    reach = 1.05 * max(float(np.quantile(np.abs(error[found.scored]), 0.99)) for error in errors)
+    reach = [1.1 * float(np.quantile(np.abs(error[found.scored]), 0.99)) for error in errors]
+    plain = [entry.model is NO_MODEL for entry in found.entries]
+    common = max((size for size, own in zip(reach, plain, strict=True) if not own), default=0.0)
     with style():
         count = len(found.entries)
         figure = Figure(figsize=(PAGE, 1.15 * count + 0.5), layout="constrained")
-        axes = figure.subplots(
-            count, 2, sharex="col", sharey="col", squeeze=False, width_ratios=(3.2, 1)
-        )
-        for (strip, loop), entry, error in zip(axes, found.entries, errors, strict=True):
-            strip.axvspan(at[0], at[half], color="#f0f0f0", linewidth=0)
+        axes = figure.subplots(count, 2, sharex="col", squeeze=False, width_ratios=(3.2, 1))
+        for row, entry in enumerate(found.entries):
+            strip, loop = axes[row]
+            strip.axvspan(at[0], at[found.half], color="#f0f0f0", linewidth=0)
             strip.axhline(0, color=GREY, linewidth=0.5)
-            strip.plot(at[tip], error[tip], color=BLUE, linewidth=0.7)
+            strip.plot(at[tip], errors[row][tip], color=BLUE, linewidth=0.7)
             strip.set_title(f"{entry.model.title}: {entry.rmse:.3g}")
             strip.set_ylabel("error")
-            loop.plot(record.command[half:], record.measured[half:], color=GREY, linewidth=1.6)
-            loop.plot(record.command[half:], entry.prediction.tip[half:], color=BLUE, linewidth=0.7)
+            limit = reach[row] if plain[row] else common
+            if limit > 0:
+                strip.set_ylim(-limit, limit)
+            command = record.command[found.scored]
+            for values, colour, width in (
+                (record.measured, GREY, 1.6),
+                (entry.prediction.tip, BLUE, 0.7),
+            ):
+                loop.plot(command, values[found.scored], color=colour, linewidth=width)
             loop.set_ylabel("tip")
-        axes[0, 0].set_ylim(-reach, reach)
         axes[0, 0].set_xlim(at[0], at[-1])
         axes[-1, 0].set_xlabel("sample" if record.time is None else "time [s]")
         axes[-1, 1].set_xlabel("command")
