@@ -308,4 +308,6 @@ def test_analyze_names_what_it_cannot_use(
     assert "m2: got 'no such column', expected one of c" in failed(capsys, *arguments, "m2", *out)
     file.write_text("c,m\n1,2\n1,3\n")
     assert "command: got '1 throughout the first half'" in failed(capsys, *arguments, "m", *out)
+    file.write_text("c,m\n" + "".join(f"{c},7\n" for c in range(9)))
+    assert "measured: got '7 throughout the first half'" in failed(capsys, *arguments, "m", *out)
     assert [path.name for path in tmp_path.iterdir()] == ["log.csv"]

@@ -2,9 +2,11 @@
 
 from dataclasses import replace
 from itertools import pairwise
+from runpy import run_path
 
 import numpy as np
 import pytest
+from drawn import EXAMPLES
 from numpy.typing import NDArray
 from play_model import play
 from scipy.integrate import solve_ivp
@@ -18,7 +20,6 @@ from tautscope.models.prandtl_ishlinskii import PrandtlIshlinskii
 from tautscope.models.registry import MODELS, Model
 from tautscope.models.task import Task
 from tautscope.replay import Cleaning, Record
-from tautscope.twin.plant import Plant
 
 Floats = NDArray[np.float64]
 
@@ -243,18 +244,9 @@ def test_a_tip_seen_now_and_then_is_enough(model: Model) -> None:
 @pytest.fixture(scope="module")
 def insertion_record() -> Record:
     """Motor and true tip of the twin's insertion, four periods, no images."""
-    config = load_config()
-    sine, period = config.experiment.insertion, config.control.period
-    plant = Plant(config, np.random.default_rng(0))
-    command = np.array([config.experiment[dof].centre for dof in Dof])
-    rows = []
-    for tick in range(round(4 * sine.period / period)):
-        command[0] = sine.centre + sine.amplitude * np.sin(2 * np.pi * tick * period / sine.period)
-        plant.step(command)
-        if tick % 8 == 0:
-            rows.append((plant.applied[0], plant.true_state[0]))
-    motor, tip = np.array(rows).T
-    return Record(motor, tip, None, np.arange(len(motor)), Cleaning())
+    lines = run_path(str(EXAMPLES / "twin_record.py"))["lines"]
+    time, motor, tip = np.array(list(lines(Dof.INSERTION, 4))).T
+    return Record(motor, tip, time, np.arange(len(motor)), Cleaning())
 
 
 def test_every_model_beats_none_on_the_twin(insertion_record: Record) -> None:

@@ -98,13 +98,14 @@ def analyze(
         models: Those of the registry.
 
     Raises:
-        RecordError: The command does not move in the first half.
+        RecordError: Command or tip does not move in the first half.
     """
     with_tip = np.flatnonzero(np.isfinite(record.measured))
     half = int(with_tip[len(with_tip) // 2])
-    if np.ptp(record.command[:half]) == 0:
-        what = f"{record.command[0]:g} throughout the first half"
-        raise RecordError("command", what, "a command that moves")
+    first = with_tip[with_tip < half]
+    for name, values in (("command", record.command[:half]), ("measured", record.measured[first])):
+        if np.ptp(values) == 0:
+            raise RecordError(name, f"{values[0]:g} throughout the first half", "one that moves")
     settings = config[Dof.INSERTION]
     task = Task(record.command, record.measured, half, gain, update_distance, settings)
     counted = with_tip[with_tip >= half]
