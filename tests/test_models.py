@@ -45,6 +45,12 @@ def finer(command: Floats) -> tuple[Floats, NDArray[np.intp]]:
     return np.interp(at, np.arange(len(command)), command), np.flatnonzero(at == np.floor(at))
 
 
+def forgotten(command: Floats) -> int:
+    """First sample at which the command has crossed nine tenths of its range."""
+    span = 0.9 * (command.max() - command.min())
+    return next(k for k in range(len(command)) if np.ptp(command[: k + 1]) >= span)
+
+
 def task(command: Floats, measured: Floats, gain: float | None = None) -> Task:
     settings = load_config()[Dof.INSERTION]
     return Task(command, measured, len(command) // 2, gain, None, settings)
@@ -140,7 +146,27 @@ def test_a_plays_gain_and_offsets_are_found_again(seed: int, gain: float) -> Non
     low, high = sorted([-5.0 * gain, 3.0 * gain])
     assert found.delta_minus == pytest.approx(low - 40 * gain, rel=0.01), f"seed {seed}"
     assert found.delta_plus == pytest.approx(high - 40 * gain, rel=0.01), f"seed {seed}"
-    assert rms(found.predict(command) - tip) < 0.02 * abs(gain), f"seed {seed}"
+    late = slice(400, None)  # one sweep; what was before it is not told
+    assert rms((found.predict(command) - tip)[late]) < 0.02 * abs(gain), f"seed {seed}"
+
+
+@pytest.mark.parametrize("fit", [constant_play.fit, prandtl_ishlinskii.fit, bouc_wen.fit])
+def test_what_was_before_the_record_does_not_show_in_a_fit(fit) -> None:
+    command = wander()
+    measured = play(command, -5.0, 3.0)
+    late = forgotten(command)
+    other = measured.copy()
+    other[:late] += 2
+    assert fit(command, other) == fit(command, measured)
+    other[late] += 2
+    assert fit(command, other) != fit(command, measured)
+
+
+def test_a_record_of_little_more_than_one_stroke_is_fitted_whole() -> None:
+    command = np.concatenate([np.linspace(0, 20, 300), np.linspace(20, 15, 80)])
+    found = constant_play.fit(command, play(command, -2.0, 2.0, start=0.0))
+    assert found.width == pytest.approx(4, rel=0.01)
+    assert found.gain == pytest.approx(1, rel=0.01)
 
 
 def test_a_plays_given_gain_is_kept() -> None:
@@ -167,7 +193,9 @@ def test_prandtl_ishlinskiis_offset_is_that_of_plain_least_squares() -> None:
     measured = PI.predict(command) + noise + 2.0
     found = prandtl_ishlinskii.fit(command, measured, radii=radii)
     plays = [play(command, -r, r, start=command[0]) for r in radii]
-    expected = np.linalg.lstsq(np.column_stack([*plays, np.ones(len(command))]), measured)[0]
+    columns = np.column_stack([*plays, np.ones(len(command))])
+    late = forgotten(command)
+    expected = np.linalg.lstsq(columns[late:], measured[late:])[0]
     assert min(expected[:3]) > 0, "else the bound would matter"
     np.testing.assert_allclose([*found.weights, found.offset], expected, atol=1e-9)
 

@@ -233,6 +233,7 @@ def analysis_figure(found: Analysis) -> Figure:
             ):
                 loop.plot(command, values[found.scored], color=colour, linewidth=width)
             loop.set_ylabel("tip")
+            loop.locator_params(axis="x", nbins=3)
         axes[0, 0].set_xlim(at[0], at[-1])
         axes[-1, 0].set_xlabel("sample" if record.time is None else "time [s]")
         axes[-1, 1].set_xlabel("command")

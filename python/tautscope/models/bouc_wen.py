@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from tautscope.models.task import Floats, Prediction, Task, seen
+from tautscope.models.task import Floats, Prediction, Task, fitted, seen
 
 _REACH = 18.0
 """atanh of the largest |w| told from 1 in double precision."""
@@ -111,7 +111,7 @@ def fit(command: Floats, measured: Floats) -> BoucWen:
         some = np.flatnonzero(seen(measured))
         some = some[:: -(-len(some) // _SAMPLES)]
         command, measured = command[some], measured[some]
-    where = seen(measured)
+    where = fitted(command, measured)
     target = measured[where]
     extent = float(np.ptp(command))
 

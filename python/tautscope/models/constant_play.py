@@ -7,10 +7,12 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from tautscope._core import Play
-from tautscope.models.task import Floats, Prediction, Task, line, seen
+from tautscope.models.task import SWEEP, Floats, Prediction, Task, fitted, line
 
-_LARGEST = 0.45
+_LARGEST = SWEEP / 2
 """Largest radius tried, as a share of the command's range; at 0.5 the play never moves."""
+STARTS = (0.0, -1.0, 1.0)
+"""Starts tried, the first kept if the record does not tell; see `operator`."""
 _GRID = 32
 """Radii tried before the best of them is refined."""
 
@@ -72,7 +74,7 @@ def fit(command: Floats, measured: Floats, gain: float | None = None) -> Constan
     """
     from scipy.optimize import least_squares  # noqa: PLC0415  takes a third of a second
 
-    where = seen(measured)
+    where = fitted(command, measured)
     target = measured[where]
     extent = float(np.ptp(command))
 
@@ -85,9 +87,7 @@ def fit(command: Floats, measured: Floats, gain: float | None = None) -> Constan
         return scaled(extent * parameters[0], parameters[1])[2]
 
     tried = [
-        np.array([share, start])
-        for share in np.linspace(0, _LARGEST, _GRID)
-        for start in (-1.0, 0.0, 1.0)
+        np.array([share, start]) for share in np.linspace(0, _LARGEST, _GRID) for start in STARTS
     ]
     best = min(tried, key=lambda parameters: float(np.sum(residual(parameters) ** 2)))
     bounds = (np.array([0.0, -1.0]), np.array([_LARGEST, 1.0]))

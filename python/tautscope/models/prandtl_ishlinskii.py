@@ -6,8 +6,8 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from tautscope.models.constant_play import operator
-from tautscope.models.task import Floats, Prediction, Task, seen
+from tautscope.models.constant_play import STARTS, operator
+from tautscope.models.task import Floats, Prediction, Task, fitted
 
 OPERATORS = 32
 """Plays superposed; radii evenly from 0 to just below half the command's range."""
@@ -56,10 +56,10 @@ def fit(
     if radii is None:
         largest = float(np.ptp(command)) / 2
         radii = tuple(largest * i / OPERATORS for i in range(OPERATORS))
-    where = seen(measured)
+    where = fitted(command, measured)
     target = measured[where]
     found: list[tuple[float, PrandtlIshlinskii]] = []
-    for start in (-1.0, 0.0, 1.0):
+    for start in STARTS:
         outputs = _operators(command, radii, start)[where]
         means = outputs.mean(axis=0)
         centred = np.column_stack([outputs - means, target - target.mean()])

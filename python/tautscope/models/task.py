@@ -13,6 +13,9 @@ from tautscope.config import DofConfig
 
 Floats = NDArray[np.float64]
 
+SWEEP = 0.9
+"""Share of the command's range after which the start of a record counts as forgotten."""
+
 
 @dataclass(frozen=True, eq=False)
 class Task:
@@ -58,6 +61,19 @@ class Prediction:
 def seen(measured: Floats) -> NDArray[np.bool_]:
     """(n,) where the tip was seen."""
     return np.isfinite(measured)
+
+
+def fitted(command: Floats, measured: Floats) -> NDArray[np.bool_]:
+    """(n,) samples an off-line fit of hysteresis goes by: tip seen, start forgotten.
+
+    What the instrument did before the record still shows until the command has crossed its range
+    once: a play of radius r has forgotten it after a sweep of 2 r. So the samples before the
+    command has swept `SWEEP` of its range are left out, unless more than half would be.
+    """
+    swept = np.maximum.accumulate(command) - np.minimum.accumulate(command)
+    where = seen(measured)
+    after = where & (swept >= SWEEP * np.ptp(command))
+    return after if 2 * np.count_nonzero(after) >= np.count_nonzero(where) else where
 
 
 def line(x: Floats, y: Floats, gain: float | None = None) -> tuple[float, float]:
