@@ -249,7 +249,7 @@ def test_analyze_prints_a_row_per_model(capsys: pytest.CaptureFixture[str], tmp_
     for model in MODELS:
         assert f"\n{model.title} " in text
         assert model.learns in text
-    assert "2999 samples, 1500 of them scored; 1 lines without a command left out" in text
+    assert "2999 samples, 1500 of them scored; lines without a command, left out: 1;" in text
     assert "not checked without --time" in text
 
 

@@ -24,7 +24,7 @@ from tautscope.replay import Cleaning, Record
 Floats = NDArray[np.float64]
 
 PI = PrandtlIshlinskii(
-    radii=(0.0, 1.5, 4.0, 6.0), weights=(0.2, 0.0, 0.5, 0.3), direction=1.0, offset=0.0, start=0.0
+    radii=(0.0, 1.5, 4.0, 6.0), weights=(0.2, 0.0, 0.5, 0.3), direction=1.0, offset=0.0
 )
 BOUC_WEN = BoucWen(
     gain=1.2, hysteresis=-4.0, offset=3.0, rho=0.4, sigma=0.9, exponent=1.6, start=0.0
@@ -76,7 +76,7 @@ def test_prandtl_ishlinskii_is_odd() -> None:
 
 def test_prandtl_ishlinskii_with_one_operator_is_a_play() -> None:
     command = wander()
-    one = PrandtlIshlinskii((2.5,), (1.0,), 1.0, 0.0, 0.0)
+    one = PrandtlIshlinskii((2.5,), (1.0,), 1.0, 0.0)
     expected = play(command, -2.5, 2.5, start=command[0])
     np.testing.assert_allclose(one.predict(command), expected, atol=1e-12)
 
@@ -162,11 +162,11 @@ def test_what_was_before_the_record_does_not_show_in_a_fit(fit) -> None:
     assert fit(command, other) != fit(command, measured)
 
 
-def test_a_record_of_little_more_than_one_stroke_is_fitted_whole() -> None:
-    command = np.concatenate([np.linspace(0, 20, 300), np.linspace(20, 15, 80)])
-    found = constant_play.fit(command, play(command, -2.0, 2.0, start=0.0))
-    assert found.width == pytest.approx(4, rel=0.01)
-    assert found.gain == pytest.approx(1, rel=0.01)
+def test_a_record_of_one_stroke_is_fitted_whole() -> None:
+    command = np.linspace(0, 20, 300)
+    measured = play(command, -2.0, 2.0, start=0.0)
+    found = constant_play.fit(command, measured)
+    assert rms(found.predict(command) - measured) < 0.02
 
 
 def test_a_plays_given_gain_is_kept() -> None:
@@ -180,7 +180,7 @@ def test_prandtl_ishlinskiis_weights_are_found_again(direction: float) -> None:
     truth = replace(PI, direction=direction, offset=-7.0)
     noise = np.random.default_rng(1).normal(0, 0.05, len(command))
     found = prandtl_ishlinskii.fit(command, truth.predict(command) + noise, radii=PI.radii)
-    assert (found.direction, found.start) == (direction, 0.0)
+    assert found.direction == direction
     assert found.offset == pytest.approx(-7, abs=0.02)
     np.testing.assert_allclose(found.weights, PI.weights, atol=0.01)
     assert min(found.weights) >= 0

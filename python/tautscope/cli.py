@@ -287,14 +287,14 @@ def _cleaning(found: Analysis) -> str:
     record = found.record
     done = record.cleaning
     counts = {
-        "lines without a command left out": done.blank,
-        "without a tip kept, unscored": done.unseen,
-        "duplicate lines left out": done.duplicates,
-        "lines put in order of time": done.reordered,
-        "times the clock was set back": done.clock_steps,
-        f"gaps, the longest {done.longest_gap:.3g} s": done.gaps,
+        "lines without a command, left out": done.blank,
+        "lines without a tip, kept but not scored": done.unseen,
+        "duplicate lines, left out": done.duplicates,
+        "late lines, put in order": done.reordered,
+        "clock set back, later times shifted": done.clock_steps,
+        f"gaps in time, the longest {done.longest_gap:.3g} s": done.gaps,
     }
-    said = [f"{number} {what}" for what, number in counts.items() if number]
+    said = [f"{what}: {number}" for what, number in counts.items() if number]
     scored = f"{len(record.rows)} samples, {found.scored.sum()} of them scored"
     if record.time is None:
         said.append("order and duplicates not checked without --time")

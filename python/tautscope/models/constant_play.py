@@ -11,8 +11,6 @@ from tautscope.models.task import SWEEP, Floats, Prediction, Task, fitted, line
 
 _LARGEST = SWEEP / 2
 """Largest radius tried, as a share of the command's range; at 0.5 the play never moves."""
-STARTS = (0.0, -1.0, 1.0)
-"""Starts tried, the first kept if the record does not tell; see `operator`."""
 _GRID = 32
 """Radii tried before the best of them is refined."""
 
@@ -87,7 +85,9 @@ def fit(command: Floats, measured: Floats, gain: float | None = None) -> Constan
         return scaled(extent * parameters[0], parameters[1])[2]
 
     tried = [
-        np.array([share, start]) for share in np.linspace(0, _LARGEST, _GRID) for start in STARTS
+        np.array([share, start])
+        for share in np.linspace(0, _LARGEST, _GRID)
+        for start in (0.0, -1.0, 1.0)  # the first if the record does not tell
     ]
     best = min(tried, key=lambda parameters: float(np.sum(residual(parameters) ** 2)))
     bounds = (np.array([0.0, -1.0]), np.array([_LARGEST, 1.0]))

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from tautscope.models.constant_play import STARTS, operator
+from tautscope.models.constant_play import operator
 from tautscope.models.task import Floats, Prediction, Task, fitted
 
 OPERATORS = 32
@@ -17,23 +17,23 @@ OPERATORS = 32
 class PrandtlIshlinskii:
     """Tip = offset + direction * sum_i weights_i * P_i(command), P_i the play of radius r_i.
 
+    Every play begins in the middle of its slack.
+
     Attributes:
         radii: r_i, half the widths, the first 0 [command's unit].
         weights: Not below 0 [tip's unit per command's unit].
         direction: 1, or -1 where command and tip run against each other.
         offset: [tip's unit].
-        start: In [-1, 1]: each play begins at command + start * r_i.
     """
 
     radii: tuple[float, ...]
     weights: tuple[float, ...]
     direction: float
     offset: float
-    start: float
 
     def predict(self, command: Floats) -> Floats:
         """Tip (n,) for a command (n,)."""
-        outputs = _operators(command, self.radii, self.start)
+        outputs = _operators(command, self.radii)
         tip: Floats = self.offset + self.direction * (outputs @ np.array(self.weights))
         return tip
 
@@ -41,7 +41,7 @@ class PrandtlIshlinskii:
 def fit(
     command: Floats, measured: Floats, radii: tuple[float, ...] | None = None
 ) -> PrandtlIshlinskii:
-    """Weights and offset of least squares, weights not below 0, for the best start and direction.
+    """Weights and offset of least squares, weights not below 0, for the better direction.
 
     The offset is taken out by removing means, which is exact; a QR decomposition then makes the
     problem as small as the number of plays without changing its solution.
@@ -58,22 +58,18 @@ def fit(
         radii = tuple(largest * i / OPERATORS for i in range(OPERATORS))
     where = fitted(command, measured)
     target = measured[where]
-    found: list[tuple[float, PrandtlIshlinskii]] = []
-    for start in STARTS:
-        outputs = _operators(command, radii, start)[where]
-        means = outputs.mean(axis=0)
-        centred = np.column_stack([outputs - means, target - target.mean()])
-        small = np.asarray(np.linalg.qr(centred, mode="r"))
-        for direction in (1.0, -1.0):
-            weights, error = nnls(direction * small[:, :-1], small[:, -1])
-            offset = float(target.mean() - direction * (means @ weights))
-            model = PrandtlIshlinskii(radii, tuple(weights.tolist()), direction, offset, start)
-            found.append((float(error), model))
-    return min(found, key=lambda pair: pair[0])[1]
+    outputs = _operators(command, radii)[where]
+    means = outputs.mean(axis=0)
+    centred = np.column_stack([outputs - means, target - target.mean()])
+    small = np.asarray(np.linalg.qr(centred, mode="r"))
+    ways = [(nnls(way * small[:, :-1], small[:, -1]), way) for way in (1.0, -1.0)]
+    (weights, _), direction = min(ways, key=lambda found: float(found[0][1]))
+    offset = float(target.mean() - direction * (means @ weights))
+    return PrandtlIshlinskii(radii, tuple(weights.tolist()), direction, offset)
 
 
-def _operators(command: Floats, radii: tuple[float, ...], start: float) -> Floats:
-    return np.column_stack([operator(command, radius, start) for radius in radii])
+def _operators(command: Floats, radii: tuple[float, ...]) -> Floats:
+    return np.column_stack([operator(command, radius, 0.0) for radius in radii])
 
 
 def run(task: Task) -> Prediction:
