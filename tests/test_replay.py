@@ -68,12 +68,84 @@ def test_a_file_is_read_by_column_name(tmp_path: Path) -> None:
     file = tmp_path / "log.csv"
     file.write_text("﻿t, motor ,tip\n0,1,2\n\n0.1,,3\n0.3,3,nan\n0.7,4,5\n", encoding="utf-8")
     found = replay.read_record(file, "motor", "tip", "t")
-    np.testing.assert_array_equal(found.command, [1, 4])
-    np.testing.assert_array_equal(found.measured, [2, 5])
+    np.testing.assert_array_equal(found.command, [1, 3, 4])
+    np.testing.assert_array_equal(found.measured, [2, np.nan, 5])
     assert found.time is not None
-    np.testing.assert_array_equal(found.time, [0, 0.7])
-    np.testing.assert_array_equal(found.rows, [2, 6])
-    assert found.dropped == 2
+    np.testing.assert_array_equal(found.time, [0, 0.3, 0.7])
+    np.testing.assert_array_equal(found.rows, [2, 5, 6])
+    assert found.cleaning == replay.Cleaning(blank=1, unseen=1)
+    assert replay.read_record(file, "motor", "tip").cleaning == found.cleaning
+
+
+Line = tuple[float, float, float]
+
+
+def clean_lines(seed: int) -> list[Line]:
+    command, measured = record(seed)
+    time = np.cumsum(np.random.default_rng(seed).uniform(0.01, 0.03, len(command)))
+    return list(zip(time.tolist(), command.tolist(), measured.tolist(), strict=True))
+
+
+def read_lines(folder: Path, lines: list[Line]) -> replay.Record:
+    file = folder / "log.csv"
+    file.write_text("t,c,m\n" + "".join(f"{t!r},{c!r},{m!r}\n" for t, c, m in lines))
+    return replay.read_record(file, "c", "m", "t")
+
+
+def assert_same_signals(found: replay.Record, lines: list[Line]) -> None:
+    _, command, measured = np.array(lines).T
+    np.testing.assert_array_equal(found.command, command)
+    np.testing.assert_array_equal(found.measured, measured)
+    assert found.time is not None
+    assert np.all(np.diff(found.time) >= 0)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_late_and_repeated_lines_are_put_right_and_counted(tmp_path: Path, seed: int) -> None:
+    lines = clean_lines(seed)
+    messy = lines.copy()
+    for at in (200, 900, 2500):
+        messy.insert(at + 4, messy.pop(at))  # a line written four lines late
+    messy[1500:1500] = messy[1480:1500]  # a block written twice
+    messy.insert(40, messy[39])
+    found = read_lines(tmp_path, messy)
+    assert_same_signals(found, lines)
+    assert found.cleaning == replay.Cleaning(reordered=3, duplicates=21), f"seed {seed}"
+    np.testing.assert_array_equal(np.array(messy)[found.rows - 2], lines)
+
+
+def test_repeated_lines_without_a_tip_are_repeated_lines(tmp_path: Path) -> None:
+    nan = float("nan")
+    found = read_lines(tmp_path, [(0, 1, 2), (1, 2, nan), (1, 2, nan), (2, 3, 4)])
+    assert found.cleaning == replay.Cleaning(duplicates=1, unseen=1)
+
+
+@pytest.mark.parametrize("back", [0.5, 20.0, 1e6])
+def test_a_clock_set_back_keeps_the_order(tmp_path: Path, back: float) -> None:
+    lines = clean_lines(0)
+    messy = [(t - back if at >= 1700 else t, c, m) for at, (t, c, m) in enumerate(lines)]
+    messy.insert(2404, messy.pop(2400))
+    found = read_lines(tmp_path, messy)
+    assert_same_signals(found, lines)
+    assert found.cleaning == replay.Cleaning(reordered=1, clock_steps=1)
+
+
+def test_gaps_are_counted(tmp_path: Path) -> None:
+    lines = clean_lines(0)
+    del lines[500:600], lines[1000:1200]
+    found = read_lines(tmp_path, lines)
+    assert_same_signals(found, lines)
+    assert found.cleaning.gaps == 2
+    assert found.cleaning.longest_gap == pytest.approx(200 * 0.02, rel=0.1)
+
+
+def test_without_time_the_order_stays(tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    file.write_text("t,c,m\n1,1,1\n1,1,1\n0,2,2\n")
+    found = replay.read_record(file, "c", "m")
+    np.testing.assert_array_equal(found.command, [1, 1, 2])
+    assert found.time is None
+    assert found.cleaning == replay.Cleaning()
 
 
 @pytest.mark.parametrize(
@@ -84,7 +156,7 @@ def test_a_file_is_read_by_column_name(tmp_path: Path) -> None:
         ("a,c\n1,2\n", r"log\.csv: b: got 'no such column', expected one of a, c"),
         ("a,b,b\n1,2,3\n", r"2 columns of this name"),
         ("", r"no header"),
-        ("a,b\n1,2\n,3\n", r"got '1 samples', expected at least 2"),
+        ("a,b\n1,2\n,3\n4,\n", r"got '1 samples', expected at least 2"),
     ],
     ids=["text", "infinite", "column", "twice", "empty", "short"],
 )

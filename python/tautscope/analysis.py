@@ -1,9 +1,10 @@
-"""``tautscope analyze``: the estimator on a record of any actuator and its tip."""
+"""``tautscope analyze``: models of hysteresis compared on a record of any actuator and its tip."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from os import PathLike
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,105 +13,109 @@ from tautscope import metrics
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import RecordError
+from tautscope.models.registry import MODELS, NO_MODEL, Model
+from tautscope.models.task import Floats, Prediction, Task
 from tautscope.output import new_folder
-from tautscope.replay import Record, predict_tip
+from tautscope.replay import Record
 from tautscope.tables import finite_or_none
 
-Floats = NDArray[np.float64]
 
-UPDATE_SHARE = 0.01
-"""Update distance, as a share of the command's range, if none is given."""
+@dataclass(frozen=True, eq=False)
+class Entry:
+    """One model on the record.
+
+    Attributes:
+        model: Which.
+        prediction: What it said.
+        rmse: Of its prediction over the samples of the second half with a tip [tip's unit].
+    """
+
+    model: Model
+    prediction: Prediction
+    rmse: float
 
 
 @dataclass(frozen=True, eq=False)
 class Analysis:
-    """What the estimator makes of a record, in the record's unit.
+    """All models on one record.
 
     Attributes:
         record: What was read.
-        update_distance: tau of Eqs. (4)-(6).
-        predicted: (n,) tip, each sample predicted before it is seen.
-        delta_minus: (n,) contact offset after each sample.
-        delta_plus: (n,) contact offset after each sample.
-        rmse: Of the prediction, over the second half.
-        rmse_no_model: Of taking the tip to be where the command is, over the second half.
-        rmse_constant: Of command less a constant, the mean difference in the first half; over the
-            second half.
-        slope: Of measured over command by least squares; far from 1 the two are not in one unit.
+        half: First sample of the second half: as many samples with a tip before it as after.
+        entries: One per model, in the order of the registry.
     """
 
     record: Record
-    update_distance: float
-    predicted: Floats
-    delta_minus: Floats
-    delta_plus: Floats
-    rmse: float
-    rmse_no_model: float
-    rmse_constant: float
-    slope: float
+    half: int
+    entries: tuple[Entry, ...]
 
     @property
-    def width(self) -> float:
-        """Estimated backlash width at the end."""
-        return float(self.delta_plus[-1] - self.delta_minus[-1])
+    def scored(self) -> NDArray[np.bool_]:
+        """(n,) samples that count: those of the second half with a tip."""
+        return np.isfinite(self.record.measured) & (np.arange(len(self.record.rows)) >= self.half)
 
-    def to_json(self) -> dict[str, float | int | None]:
+    def share(self, entry: Entry) -> float:
+        """RMSE over that without a model; NaN where a straight line is exact."""
+        (none,) = [other.rmse for other in self.entries if other.model is NO_MODEL]
+        return entry.rmse / none if none > 0 else float("nan")
+
+    def to_json(self) -> dict[str, Any]:
         """What ``tautscope analyze --json`` prints."""
         return {
-            "samples": len(self.predicted),
-            "dropped": self.record.dropped,
-            "update_distance": self.update_distance,
-            "delta_minus": float(self.delta_minus[-1]),
-            "delta_plus": float(self.delta_plus[-1]),
-            "width": self.width,
-            "rmse": finite_or_none(self.rmse),
-            "rmse_no_model": finite_or_none(self.rmse_no_model),
-            "rmse_constant": finite_or_none(self.rmse_constant),
-            "slope": finite_or_none(self.slope),
+            "samples": len(self.record.rows),
+            "scored": int(np.count_nonzero(self.scored)),
+            "cleaning": asdict(self.record.cleaning),
+            "models": [
+                {
+                    "name": entry.model.name,
+                    "title": entry.model.title,
+                    "learns": entry.model.learns,
+                    "rmse": finite_or_none(entry.rmse),
+                    "share_of_no_model": finite_or_none(self.share(entry)),
+                    "parameters": dict(entry.prediction.parameters),
+                }
+                for entry in self.entries
+            ],
         }
 
 
-def analyze(record: Record, config: Config, update_distance: float | None = None) -> Analysis:
-    """Run the estimator over a record.
+def analyze(
+    record: Record,
+    config: Config,
+    update_distance: float | None = None,
+    gain: float | None = None,
+    models: tuple[Model, ...] = MODELS,
+) -> Analysis:
+    """Fit every model to a record and score its prediction over the second half.
 
     Args:
-        record: Actuator and tip in one unit.
+        record: Actuator and tip, each in any unit.
         config: Contact tolerance and smoothing factor are those of its insertion.
-        update_distance: tau in the record's unit; without it 1 % of the command's range.
+        update_distance: tau of the on-line estimators in the tip's unit; without it 1 % of the
+            command's range in the first half.
+        gain: Tip travel per command travel in contact, 1 for one unit; without it learnt from the
+            first half.
+        models: Those of the registry.
 
     Raises:
-        RecordError: The command never moves.
+        RecordError: Command or tip does not move in the first half.
     """
-    from tautscope._core import Estimator  # noqa: PLC0415
-
-    extent = float(np.ptp(record.command))
-    if extent == 0:
-        raise RecordError("command", f"{record.command[0]:g} throughout", "a command that moves")
-    tau = UPDATE_SHARE * extent if update_distance is None else update_distance
+    with_tip = np.flatnonzero(np.isfinite(record.measured))
+    half = int(with_tip[len(with_tip) // 2])
+    first = with_tip[with_tip < half]
+    for name, values in (("command", record.command[:half]), ("measured", record.measured[first])):
+        if np.ptp(values) == 0:
+            raise RecordError(name, f"{values[0]:g} throughout the first half", "one that moves")
     settings = config[Dof.INSERTION]
-    estimator = Estimator(
-        update_distance=tau,
-        contact_tolerance=settings.contact_tolerance,
-        smoothing_factor=settings.smoothing_factor,
-        delta_minus=0.0,
-        delta_plus=0.0,
-    )
-    predicted, delta_minus, delta_plus = predict_tip(record.command, record.measured, estimator)
-    half = len(predicted) // 2
-    constant = np.mean(record.command[:half] - record.measured[:half])
-    command, measured = record.command[half:], record.measured[half:]
-    slope = np.polyfit(record.command, record.measured, 1)[0]
-    return Analysis(
-        record=record,
-        update_distance=tau,
-        predicted=predicted,
-        delta_minus=delta_minus,
-        delta_plus=delta_plus,
-        rmse=metrics.rms(predicted[half:] - measured),
-        rmse_no_model=metrics.rms(command - measured),
-        rmse_constant=metrics.rms(command - constant - measured),
-        slope=float(slope),
-    )
+    task = Task(record.command, record.measured, half, gain, update_distance, settings)
+    counted = with_tip[with_tip >= half]
+
+    def entry(model: Model) -> Entry:
+        prediction = model.run(task)
+        errors = (prediction.tip - record.measured)[counted]
+        return Entry(model, prediction, metrics.rms(errors))
+
+    return Analysis(record, half, tuple(entry(model) for model in models))
 
 
 def write_analysis(analysis: Analysis, folder: str | PathLike[str]) -> None:
@@ -121,17 +126,29 @@ def write_analysis(analysis: Analysis, folder: str | PathLike[str]) -> None:
     """
     from tautscope import figures  # noqa: PLC0415  matplotlib takes half a second
 
-    record = analysis.record
-    columns = (record.command, record.measured, analysis.predicted)
-    deltas = (analysis.delta_minus, analysis.delta_plus)
+    columns = _columns(analysis)
     figure = figures.analysis_figure(analysis)
     with new_folder(folder) as place, figures.style():
         np.savetxt(
             place / "analysis.csv",
-            np.column_stack([record.rows, *columns, *deltas]),
+            np.column_stack(list(columns.values())),
             delimiter=",",
-            header="line,command,measured,predicted,delta_minus,delta_plus",
+            header=",".join(columns),
             comments="",
-            fmt=["%d", *["%.9g"] * 5],
+            fmt=["%d", *["%.9g"] * (len(columns) - 1)],
         )
         figure.savefig(place / "analyze.png")
+
+
+def _columns(analysis: Analysis) -> dict[str, Floats | NDArray[np.int64]]:
+    """Line of the file, time if it was read, signals, then what each model said and knew."""
+    record = analysis.record
+    columns: dict[str, Floats | NDArray[np.int64]] = {"line": record.rows}
+    if record.time is not None:
+        columns["time"] = record.time
+    columns |= {"command": record.command, "measured": record.measured}
+    for entry in analysis.entries:
+        columns[entry.model.name] = entry.prediction.tip
+        for name, trace in entry.prediction.traces.items():
+            columns[f"{entry.model.name}_{name}"] = trace
+    return columns

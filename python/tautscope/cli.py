@@ -93,20 +93,28 @@ def _parser() -> argparse.ArgumentParser:
     analyze = verbs.add_parser(
         "analyze",
         allow_abbrev=False,
-        help="run the estimator on a recorded file",
-        description="Run the on-line hysteresis estimator over a CSV file of an actuator's and its "
-        "tip's position, in one unit. Each sample is predicted before it is learnt from. Lines "
-        "with a blank or NaN in one of the columns are left out and counted.",
+        help="compare models of hysteresis on a recorded file",
+        description="Compare models of hysteresis on a CSV file of an actuator's and its tip's "
+        "position, each in any unit: RMS error of the predicted tip over the second half. The "
+        "estimators that learn on-line predict each sample before they see it. Lines without a "
+        "command are left out, and with --time duplicates too; all is counted and said.",
     )
     analyze.add_argument("file", type=Path, metavar="FILE.csv", help="CSV with a header line")
     analyze.add_argument("--command", required=True, metavar="COL", help="column: actuator")
     analyze.add_argument("--measured", required=True, metavar="COL", help="column: tip")
-    analyze.add_argument("--time", metavar="COL", help="column: time, for the figure only")
+    analyze.add_argument("--time", metavar="COL", help="column: time, to clean and draw by")
     analyze.add_argument(
         "--update-distance",
         type=_distance,
         metavar="X",
-        help="command travel between two updates, the record's unit [1 %% of the command's range]",
+        help="command travel between two updates of the on-line estimators, the tip's unit "
+        "[1 %% of the command's range]",
+    )
+    analyze.add_argument(
+        "--gain",
+        type=_gain,
+        metavar="G",
+        help="tip travel per command travel in contact, 1 for one unit [learnt from first half]",
     )
     analyze.add_argument(
         "--out", type=Path, metavar="DIR", help="folder, new or empty [runs/<date-time>-analyze]"
@@ -136,13 +144,26 @@ def _integer(text: str, least: int) -> int:
 
 
 def _distance(text: str) -> float:
+    value = _number(text)
+    if not value > 0:
+        raise argparse.ArgumentTypeError(f"got {text!r}, expected a number above 0")
+    return value
+
+
+def _gain(text: str) -> float:
+    value = _number(text)
+    if math.isnan(value) or value == 0:
+        raise argparse.ArgumentTypeError(f"got {text!r}, expected a number other than 0")
+    return value
+
+
+def _number(text: str) -> float:
+    """The finite number in a text, or NaN."""
     try:
         value = float(text)
     except ValueError:
-        value = math.nan
-    if not (value > 0 and math.isfinite(value)):
-        raise argparse.ArgumentTypeError(f"got {text!r}, expected a number above 0")
-    return value
+        return math.nan
+    return value if math.isfinite(value) else math.nan
 
 
 def _config(options: argparse.Namespace) -> None:
@@ -202,7 +223,7 @@ def _analyze(options: argparse.Namespace) -> None:
     config = load_config(options.config)
     folder = check_free(options.out or default_folder("analyze"))
     record = read_record(options.file, options.command, options.measured, options.time)
-    found = analysis.analyze(record, config, options.update_distance)
+    found = analysis.analyze(record, config, options.update_distance, options.gain)
     analysis.write_analysis(found, folder)
     if options.json:
         _print_json(found.to_json())
@@ -265,27 +286,41 @@ def _print_table1(demo: Demo, folder: Path) -> None:
 def _print_analysis(found: Analysis, folder: Path) -> None:
     from rich.table import Table  # noqa: PLC0415
 
-    dropped = found.record.dropped
-    table = Table(box=None, show_header=False, pad_edge=False)
-    table.add_column("")
-    table.add_column("", justify="right")
-    lines = {
-        "samples": f"{len(found.predicted)}" + (f" ({dropped} lines left out)" if dropped else ""),
-        "update distance": f"{found.update_distance:.4g}",
-        "delta_minus, at the end": f"{found.delta_minus[-1]:.4g}",
-        "delta_plus, at the end": f"{found.delta_plus[-1]:.4g}",
-        "backlash width": f"{found.width:.4g}",
-        "prediction error, second half (RMS)": f"{found.rmse:.4g}",
-        "... of the command itself": f"{found.rmse_no_model:.4g}",
-        "... of the command less a constant": f"{found.rmse_constant:.4g}",
-    }
-    for name, value in lines.items():
-        table.add_row(name, value)
+    table = Table(box=None, pad_edge=False, title_justify="left", title_style="bold")
+    table.title = "Error of the predicted tip, RMS over the second half [tip's unit]"
+    table.add_column("model", no_wrap=True)
+    table.add_column("learns from", no_wrap=True)
+    for heading in ("RMS", "of no model", "gain", "width"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    for entry in found.entries:
+        known = entry.prediction.parameters
+        share = found.share(entry)
+        table.add_row(
+            entry.model.title,
+            entry.model.learns,
+            f"{entry.rmse:.4g}",
+            "" if math.isnan(share) else f"{100 * share:.1f} %",
+            *(f"{known[name]:.4g}" if name in known else "" for name in ("gain", "width")),
+        )
     console = _console()
     console.print(table)
-    if not 0.5 < found.slope < 2:
-        console.print(
-            f"The tip moves {found.slope:.3g} per unit of command: are both in one unit and one "
-            "direction? The model takes a scale of one."
-        )
+    console.print(f"\n{_cleaning(found)}", soft_wrap=True)
     console.print(f"Figure and samples: {folder / 'analyze.png'}", soft_wrap=True)
+
+
+def _cleaning(found: Analysis) -> str:
+    record = found.record
+    done = record.cleaning
+    counts = {
+        "lines without a command, left out": done.blank,
+        "lines without a tip, kept but not scored": done.unseen,
+        "duplicate lines, left out": done.duplicates,
+        "late lines, put in order": done.reordered,
+        "clock set back, later times shifted": done.clock_steps,
+        f"gaps in time, the longest {done.longest_gap:.3g} s": done.gaps,
+    }
+    said = [f"{what}: {number}" for what, number in counts.items() if number]
+    scored = f"{len(record.rows)} samples, {found.scored.sum()} of them scored"
+    if record.time is None:
+        said.append("order and duplicates not checked without --time")
+    return "; ".join([scored, *said]) + "."

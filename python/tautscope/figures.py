@@ -17,6 +17,7 @@ from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from tautscope.config import Config
+from tautscope.models.registry import NO_MODEL
 from tautscope.recording import Recording, Snapshot
 from tautscope.references import Segment
 from tautscope.results import estimated_loop, used_frames
@@ -198,37 +199,45 @@ def _magnify(axes: Axes, points: NDArray[np.float64], shape: tuple[int, ...]) ->
 
 
 def analysis_figure(found: Analysis) -> Figure:
-    """A record and what the estimator made of it: signals and offsets in order, and the loop.
+    """A row per model: its error over the record, and its loop over the measured one.
 
-    The horizontal axis is the record's time if it was read, and counts samples if not.
+    The horizontal axis is the record's time if it was read, and counts samples if not. Loops are
+    of the second half. Errors have one scale, wide enough for all but the largest hundredth; "no
+    model", usually far larger, has its own.
     """
-    command, measured, time = found.record.command, found.record.measured, found.record.time
-    at = np.arange(len(command)) if time is None else time
+    record = found.record
+    at = np.arange(len(record.rows)) if record.time is None else record.time
+    tip = np.isfinite(record.measured)
+    errors = [entry.prediction.tip - record.measured for entry in found.entries]
+    reach = [1.1 * float(np.quantile(np.abs(error[found.scored]), 0.99)) for error in errors]
+    plain = [entry.model is NO_MODEL for entry in found.entries]
+    common = max((size for size, own in zip(reach, plain, strict=True) if not own), default=0.0)
     with style():
-        figure = Figure(figsize=(PAGE, 3.6), layout="constrained")
-        grid = figure.add_gridspec(2, 2, width_ratios=(2, 1.15), height_ratios=(1.6, 1))
-        signals = figure.add_subplot(grid[0, 0])
-        offsets = figure.add_subplot(grid[1, 0], sharex=signals)
-        loop = figure.add_subplot(grid[:, 1])
-        signals.plot(at, command, color=ORANGE, linewidth=0.8, label="command")
-        signals.plot(at, measured, color=BLACK, linewidth=0.9, label="measured")
-        signals.plot(at, found.predicted, color=BLUE, linewidth=0.9, label="predicted")
-        signals.set_title("Signals")
-        signals.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=3, borderaxespad=0.2)
-        signals.tick_params(labelbottom=False)
-        signals.margins(x=0)
-        offsets.plot(at, found.delta_plus, color=GREEN, label="δ⁺")
-        offsets.plot(at, found.delta_minus, color=PURPLE, label="δ⁻")
-        offsets.set_title("Contact offsets, input minus output")
-        offsets.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, borderaxespad=0.2)
-        offsets.set_xlabel("sample" if time is None else "time [s]")
-        half = len(command) // 2
-        loop.plot(command[half:], measured[half:], color=BLACK, linewidth=0.8, label="measured")
-        loop.plot(
-            command[half:], found.predicted[half:], color=BLUE, linewidth=0.8, label="predicted"
-        )
-        loop.set_title("Loop, second half")
-        loop.legend(loc="upper left")
-        loop.set_xlabel("command")
-        loop.set_ylabel("tip")
+        count = len(found.entries)
+        figure = Figure(figsize=(PAGE, 1.15 * count + 0.5), layout="constrained")
+        axes = figure.subplots(count, 2, sharex="col", squeeze=False, width_ratios=(3.2, 1))
+        for row, entry in enumerate(found.entries):
+            strip, loop = axes[row]
+            strip.axvspan(at[0], at[found.half], color="#f0f0f0", linewidth=0)
+            strip.axhline(0, color=GREY, linewidth=0.5)
+            strip.plot(at[tip], errors[row][tip], color=BLUE, linewidth=0.7)
+            strip.set_title(f"{entry.model.title}: {entry.rmse:.3g}")
+            strip.set_ylabel("error")
+            limit = reach[row] if plain[row] else common
+            if limit > 0:
+                strip.set_ylim(-limit, limit)
+            command = record.command[found.scored]
+            for values, colour, width in (
+                (record.measured, GREY, 1.6),
+                (entry.prediction.tip, BLUE, 0.7),
+            ):
+                loop.plot(command, values[found.scored], color=colour, linewidth=width)
+            loop.set_ylabel("tip")
+            loop.locator_params(axis="x", nbins=3)
+        axes[0, 0].set_xlim(at[0], at[-1])
+        axes[-1, 0].set_xlabel("sample" if record.time is None else "time [s]")
+        axes[-1, 1].set_xlabel("command")
+        axes[0, 0].set_title("RMS over the second half (white)", loc="right", fontweight="normal")
+        axes[0, 1].set_title("measured", color=GREY, loc="left")
+        axes[0, 1].set_title("model", color=BLUE, loc="right", fontweight="bold")
     return figure

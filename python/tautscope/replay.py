@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike
@@ -21,23 +22,51 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 
+GAP = 10.0
+"""A distance between two samples above this many medians is a gap."""
+
+
+@dataclass(frozen=True)
+class Cleaning:
+    """What was done to the lines of a file, so that nothing is done silently.
+
+    Attributes:
+        blank: Lines left out: no command, or no time, in them.
+        unseen: Lines kept with a command but no tip: nothing is learnt from or scored on them.
+        duplicates: Lines left out: time, command and tip are those of an earlier line.
+        reordered: Lines put where their time says.
+        clock_steps: Places where the clock was set back: order kept, later times shifted.
+        gaps: Distances in time above ten medians. The command is taken to have gone straight
+            across; if it turned there, every model is wrong until both contacts were met again.
+        longest_gap: [s], 0 without gaps.
+    """
+
+    blank: int = 0
+    unseen: int = 0
+    duplicates: int = 0
+    reordered: int = 0
+    clock_steps: int = 0
+    gaps: int = 0
+    longest_gap: float = 0.0
+
+
 @dataclass(frozen=True, eq=False)
 class Record:
-    """Columns of a recorded file.
+    """Columns of a recorded file, cleaned.
 
     Attributes:
         command: (n,) actuator position, the user's unit.
-        measured: (n,) tip position, the same unit.
-        time: (n,) [s] if it was asked for; the estimator does not read it.
+        measured: (n,) tip position, the user's unit; NaN where it was not seen.
+        time: (n,) [s], never falling, if it was asked for; no model reads it.
         rows: (n,) line of the file each sample is from.
-        dropped: Lines left out because one of the columns was blank or NaN there.
+        cleaning: What was left out or put right.
     """
 
     command: Floats
     measured: Floats
     time: Floats | None
     rows: NDArray[np.int64]
-    dropped: int
+    cleaning: Cleaning
 
 
 def predict_tip(
@@ -74,21 +103,23 @@ def predict_tip(
 def read_record(
     path: str | PathLike[str], command: str, measured: str, time: str | None = None
 ) -> Record:
-    """Read columns of a CSV file with a header line.
+    """Read columns of a CSV file with a header line, and clean them.
 
-    A line in which one of the columns is blank or NaN is left out and counted: loggers write such
-    lines where a sensor had no news. Any other text is an error.
+    Blank and NaN are what loggers write where a sensor had no news. A line without a command is
+    left out; one without a tip is kept, because the command says how the slack was crossed
+    meanwhile. Any other text is an error. With a time column, duplicates are left out and lines
+    put in order, see `Cleaning`; without one the file's order is taken as it is.
 
     Raises:
         MissingPathError: There is no such file.
-        RecordError: A column is not there, a cell is not a number, or fewer than two samples are
-            left; the error names file, line and column.
+        RecordError: A column is not there, a cell is not a number, or fewer than two samples with
+            a tip are left; the error names file, line and column.
     """
     file = Path(path)
     names = [command, measured] + ([] if time is None else [time])
     samples: list[list[float]] = []
     rows: list[int] = []
-    dropped = 0
+    blank = 0
     try:
         with file.open(newline="", encoding="utf-8-sig") as stream:
             reader = csv.reader(stream)
@@ -98,8 +129,8 @@ def read_record(
                 if not line:
                     continue
                 values = _numbers(file, reader.line_num, line, places, names)
-                if any(math.isnan(value) for value in values):
-                    dropped += 1
+                if any(math.isnan(value) for value in values[:1] + values[2:]):
+                    blank += 1
                     continue
                 samples.append(values)
                 rows.append(reader.line_num)
@@ -107,12 +138,77 @@ def read_record(
         raise MissingPathError("record", str(file), "a CSV file with a header line") from None
     except (UnicodeDecodeError, csv.Error) as error:
         raise RecordError(str(file), str(error), "a CSV file with a header line") from None
-    if len(samples) < 2:
-        raise RecordError(str(file), f"{len(samples)} samples", "at least 2")
-    columns = np.array(samples).T
-    return Record(
-        columns[0], columns[1], None if time is None else columns[2], np.array(rows), dropped
+    table = np.array(samples).reshape(-1, len(names))
+    seen = int(np.count_nonzero(np.isfinite(table[:, 1])))
+    if seen < 2:
+        raise RecordError(str(file), f"{seen} samples", "at least 2")
+    return _cleaned(table, np.array(rows, dtype=np.int64), blank)
+
+
+def _cleaned(table: Floats, rows: NDArray[np.int64], blank: int) -> Record:
+    """A record from columns command, measured and, if there is one, time."""
+    if table.shape[1] == 2:
+        unseen = int(np.count_nonzero(np.isnan(table[:, 1])))
+        return Record(table[:, 0], table[:, 1], None, rows, Cleaning(blank=blank, unseen=unseen))
+    comparable = np.where(np.isnan(table), np.inf, table)  # NaN equals nothing, itself included
+    kept = np.sort(np.unique(comparable, axis=0, return_index=True)[1])
+    duplicates = len(table) - len(kept)
+    order, time, reordered, clock_steps = _in_order(table[kept, 2], table[kept, 0])
+    rows, table = rows[kept][order], table[kept][order]
+    steps = np.diff(time)
+    usual = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
+    gaps = steps[steps > GAP * usual]
+    cleaning = Cleaning(
+        blank=blank,
+        unseen=int(np.count_nonzero(np.isnan(table[:, 1]))),
+        duplicates=duplicates,
+        reordered=reordered,
+        clock_steps=clock_steps,
+        gaps=len(gaps),
+        longest_gap=float(gaps.max()) if len(gaps) else 0.0,
     )
+    return Record(table[:, 0], table[:, 1], time, rows, cleaning)
+
+
+def _in_order(time: Floats, command: Floats) -> tuple[NDArray[np.intp], Floats, int, int]:
+    """Order of samples, their times in that order, lines moved, and times the clock was set back.
+
+    Time that runs backwards has two causes: lines written late, and a clock set back. Where it
+    does, the samples between the line that came too early and the one that is past it again are
+    put in the order of time if the command then travels no farther; otherwise the clock was set.
+    """
+    order, time = np.arange(len(time)), time.copy()
+    usual = float(np.median(np.abs(np.diff(time))))
+    reordered = clock_steps = 0
+    backward = np.flatnonzero(np.diff(time) < 0)
+    while len(backward):
+        late = int(backward[0]) + 1
+        past = np.flatnonzero(time[late:] > time[late - 1])
+        end = late + int(past[0]) if len(past) else len(time)
+        begin = int(np.searchsorted(time[:late], time[late:end].min(), side="right"))
+        block = slice(begin, end)
+        by_time = begin + np.argsort(time[block], kind="stable")
+        around = slice(max(begin - 1, 0), end + 1)
+        sorted_order = order.copy()
+        sorted_order[block] = order[by_time]
+        travels = [np.abs(np.diff(command[way[around]])).sum() for way in (sorted_order, order)]
+        if travels[0] <= travels[1]:
+            reordered += _moved(by_time)
+            order, time[block] = sorted_order, time[by_time]
+        else:
+            clock_steps += 1
+            time[late:] += time[late - 1] - time[late] + usual
+        backward = np.flatnonzero(np.diff(time) < 0)
+    return order, time, reordered, clock_steps
+
+
+def _moved(by_time: NDArray[np.intp]) -> int:
+    """Fewest lines that have to move: all but the longest rising run through the block."""
+    tails: list[int] = []
+    for place in by_time.tolist():
+        at = bisect_left(tails, place)
+        tails[at : at + 1] = [place]
+    return len(by_time) - len(tails)
 
 
 def _signal(name: str, values: ArrayLike) -> Floats:
