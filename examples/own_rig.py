@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from tautscope import Config, Frame, Sample, run_experiment
-from tautscope.config import ControlConfig, DofConfig, ExperimentConfig, Sine
+from tautscope.config import ControlConfig, ExperimentConfig, Sine
 from tautscope.reduction import build_feature_model
 from tautscope.references import SineSequence
 from tautscope.results import evaluate
@@ -56,10 +56,9 @@ class DrawnRig:
 
     def _picture(self) -> NDArray[np.uint8]:
         image = np.full(self._shape, (60, 60, 150), np.uint8)
-        prediction = self._model.predict(self._tip)
-        if prediction is not None:
-            for x, y in np.round(prediction[0]).astype(int).reshape(2, 2).tolist():
-                cv2.circle(image, (x, y), 8, (60, 190, 60), -1)
+        for *_, outline in self._model.bands(self._tip) or ():
+            corners = np.round(16 * outline).astype(np.int32)
+            cv2.fillPoly(image, [corners], (60, 190, 60), cv2.LINE_AA, 4)
         return image
 
 
@@ -67,7 +66,6 @@ def short_experiment() -> Config:
     """The article's protocol, three periods of 4 s."""
     return Config(
         control=ControlConfig(period=DrawnRig.control_period),
-        insertion=DofConfig(update_distance=0.4e-3, observable_deviation=3e-3),
         experiment=ExperimentConfig(
             periods=3,
             insertion=Sine(centre=25e-3, amplitude=15e-3, period=4.0),

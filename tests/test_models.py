@@ -52,8 +52,7 @@ def forgotten(command: Floats) -> int:
 
 
 def task(command: Floats, measured: Floats, gain: float | None = None) -> Task:
-    settings = load_config()[Dof.INSERTION]
-    return Task(command, measured, len(command) // 2, gain, None, settings)
+    return Task(command, measured, len(command) // 2, gain, None, load_config())
 
 
 @pytest.mark.parametrize(

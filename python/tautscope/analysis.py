@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from tautscope import metrics
 from tautscope.config import Config
-from tautscope.dof import Dof
 from tautscope.errors import RecordError
 from tautscope.models.registry import MODELS, NO_MODEL, Model
 from tautscope.models.task import Floats, Prediction, Task
@@ -106,8 +105,7 @@ def analyze(
     for name, values in (("command", record.command[:half]), ("measured", record.measured[first])):
         if np.ptp(values) == 0:
             raise RecordError(name, f"{values[0]:g} throughout the first half", "one that moves")
-    settings = config[Dof.INSERTION]
-    task = Task(record.command, record.measured, half, gain, update_distance, settings)
+    task = Task(record.command, record.measured, half, gain, update_distance, config)
     counted = with_tip[with_tip >= half]
 
     def entry(model: Model) -> Entry:

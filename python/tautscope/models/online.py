@@ -8,10 +8,12 @@ from typing import Protocol
 
 import numpy as np
 
-from tautscope._core import Estimator
-from tautscope.config import DofConfig
+from tautscope._core import AdaptiveAxis, Estimator
+from tautscope.config import Config
+from tautscope.dof import Dof
 from tautscope.models import constant_play
 from tautscope.models.task import Floats, Prediction, Task, seen
+from tautscope.reduction import build_adaptive_axis
 
 UPDATE_SHARE = 0.01
 """Update distance, as a share of the command's range in the first half, if none is given."""
@@ -28,8 +30,8 @@ class OnlineEstimator(Protocol):
         """
 
 
-Make = Callable[[DofConfig, float], OnlineEstimator]
-"""From settings and update distance [tip's unit] to a fresh estimator."""
+Make = Callable[[Config, float], OnlineEstimator]
+"""From a configuration and update distance [tip's unit] to a fresh estimator."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ def predict(task: Task, make: Make) -> Prediction:
     distance = task.update_distance
     if distance is None:
         distance = UPDATE_SHARE * abs(scale.gain) * float(np.ptp(task.first_half[0]))
-    estimator = make(task.settings, distance)
+    estimator = make(task.config, distance)
     scaled = scale.gain * task.command + scale.offset
     tip, minus, plus = estimator.run(scaled, task.measured)
     tip[: scale.used] = np.nan
@@ -85,8 +87,9 @@ def predict(task: Task, make: Make) -> Prediction:
     return Prediction(tip, parameters, {"delta_minus": minus, "delta_plus": plus})
 
 
-def paper(settings: DofConfig, update_distance: float) -> OnlineEstimator:
+def paper(config: Config, update_distance: float) -> OnlineEstimator:
     """The article's estimator, offsets 0 at the start."""
+    settings = config.insertion
     return Estimator(
         update_distance=update_distance,
         contact_tolerance=settings.contact_tolerance,
@@ -94,3 +97,28 @@ def paper(settings: DofConfig, update_distance: float) -> OnlineEstimator:
         delta_minus=0.0,
         delta_plus=0.0,
     )
+
+
+def best(config: Config, update_distance: float) -> OnlineEstimator:
+    """That of profile ``best``: offsets over position, and a play state corrected by the tip."""
+    unit = config.replace(**{"insertion.update_distance": update_distance})
+    return _Adaptive(build_adaptive_axis(unit, Dof.INSERTION, compensate=False))
+
+
+@dataclass(frozen=True)
+class _Adaptive:
+    """An axis of profile ``best`` that follows the commands of a record and leads none of them."""
+
+    axis: AdaptiveAxis
+
+    def run(self, commands: Floats, measured: Floats) -> tuple[Floats, Floats, Floats]:
+        """As `OnlineEstimator.run`; what is measured has `adaptive.model_deviation`."""
+        found = np.empty((3, len(commands)))
+        axis, nothing = self.axis, np.empty(0)
+        for k, (command, tip) in enumerate(zip(commands.tolist(), measured.tolist(), strict=True)):
+            axis.step(command)
+            found[0, k] = axis.predicted_state
+            axis.learn(command, tip, 0.0, nothing)
+            found[1:, k] = axis.delta_minus, axis.delta_plus
+        predicted, delta_minus, delta_plus = found
+        return predicted, delta_minus, delta_plus

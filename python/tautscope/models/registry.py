@@ -36,4 +36,5 @@ MODELS = (
     Model("prandtl_ishlinskii", "Prandtl-Ishlinskii", "first half", prandtl_ishlinskii.run),
     Model("bouc_wen", "Bouc-Wen", "first half", bouc_wen.run),
     Model("paper", "article's estimator", "on-line", partial(online.predict, make=online.paper)),
+    Model("best", "profile best", "on-line", partial(online.predict, make=online.best)),
 )

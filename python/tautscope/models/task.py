@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope.config import DofConfig
+from tautscope.config import Config
 
 Floats = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ class Task:
         half: First sample of the second half, which is the one that counts.
         gain: Tip travel per command travel in contact, if it is known.
         update_distance: tau of Eqs. (4)-(6) in the tip's unit, if it is given.
-        settings: Contact tolerance and smoothing factor of the on-line estimators.
+        config: Of the on-line estimators; they are set as those of insertion.
     """
 
     command: Floats
@@ -35,7 +35,7 @@ class Task:
     half: int
     gain: float | None
     update_distance: float | None
-    settings: DofConfig
+    config: Config
 
     @property
     def first_half(self) -> tuple[Floats, Floats]:
