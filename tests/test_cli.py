@@ -71,7 +71,6 @@ def test_demo_fills_a_run_folder_and_prints_one_object(
 ) -> None:
     out = tmp_path / "run"
     arguments = ["demo", "--config", config_file, "--seed", "3", "--seeds", "2", "--json"]
-    arguments += ["--profile", "paper"]
     assert main([*arguments, "--out", str(out)]) == 0
     captured = capsys.readouterr()
     assert "4 runs: 100 %" in captured.err
@@ -121,7 +120,8 @@ def test_demo_fills_a_run_folder_and_prints_one_object(
 def test_demo_prints_the_article_beside_ours(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, config_file: str
 ) -> None:
-    assert main(["demo", "--config", config_file, "--out", str(tmp_path / "run")]) == 0
+    arguments = ["demo", "--config", config_file, "--profile", "best"]
+    assert main([*arguments, "--out", str(tmp_path / "run")]) == 0
     out = capsys.readouterr().out
     assert next(line.split() for line in out.splitlines() if "article" in line and "paper" in line)[
         :3

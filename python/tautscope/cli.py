@@ -58,7 +58,7 @@ def _parser() -> argparse.ArgumentParser:
     demo.add_argument(
         "--profile",
         choices=PROFILES,
-        default="best",
+        default="paper",
         help="how slack is compensated: as in the article, or ours beside it [%(default)s]",
     )
     demo.add_argument(
@@ -238,7 +238,7 @@ def _print_json(document: dict[str, Any]) -> None:
 def _console() -> Console:
     from rich.console import Console  # noqa: PLC0415
 
-    width = None if sys.stdout.isatty() else 160
+    width = None if sys.stdout.isatty() else 200
     return Console(highlight=False, markup=False, width=width)
 
 
