@@ -21,3 +21,9 @@ def shared_data(*parts: str) -> Path:
             pytest.fail(reason)
         pytest.skip(reason)
     return path
+
+
+@pytest.fixture(scope="session")
+def colon_folder() -> Path:
+    """The folder of the real colonoscopy frames."""
+    return shared_data("colon_frames")

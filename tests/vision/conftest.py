@@ -1,6 +1,5 @@
 """Real colon frames at the size of the camera."""
 
-import os
 from pathlib import Path
 
 import cv2
@@ -10,18 +9,12 @@ from numpy.typing import NDArray
 
 
 @pytest.fixture(scope="session")
-def colon_frames() -> dict[str, tuple[NDArray[np.uint8], NDArray[np.bool_]]]:
+def colon_frames(colon_folder: Path) -> dict[str, tuple[NDArray[np.uint8], NDArray[np.bool_]]]:
     """By name: the image, uint8 (576, 720, 3), B, G, R, and which of its pixels are tissue.
 
     Not tissue is the corner with the scope guide's green inset, in the frames that have it.
     """
-    folder = Path(os.environ.get("TAUTSCOPE_DATA", "../shared/data")) / "colon_frames"
-    files = sorted(folder.glob("*.jpg"))
-    if not files:
-        reason = f"no frames in {folder}; set TAUTSCOPE_DATA"
-        if os.environ.get("CI") == "true":
-            pytest.fail(reason)
-        pytest.skip(reason)
+    files = sorted(colon_folder.glob("*.jpg"))
     images = [cv2.imread(str(file)) for file in files]
     resized = [cv2.resize(image, (720, 576), interpolation=cv2.INTER_AREA) for image in images]
     return {file.stem: (image, _tissue(image)) for file, image in zip(files, resized, strict=True)}

@@ -1,6 +1,5 @@
 """The instrument over real mucosa, with the traps that are in it."""
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -13,10 +12,9 @@ Frames = dict[str, tuple[NDArray[np.uint8], NDArray[np.bool_]]]
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_bands_are_found(colon_frames: Frames, seed: int) -> None:
-    folder = Path(os.environ.get("TAUTSCOPE_DATA", "../shared/data")) / "colon_frames"
+def test_bands_are_found(colon_frames: Frames, colon_folder: Path, seed: int) -> None:
     detector = MarkerDetector(CONFIG)
-    for number, scene in enumerate(scenes(2 * len(colon_frames), seed, str(folder))):
+    for number, scene in enumerate(scenes(2 * len(colon_frames), seed, str(colon_folder))):
         known = detector.detect(scene.image, expectation=scene.expectation(number))
         assert known.valid, f"{number}, {seed=}: {known.reason}"
         for detection in (known, detector.detect(scene.image)):

@@ -2,7 +2,7 @@
 //!
 //! One pass over the frame. Each row is projected onto the colour discriminant ([`discriminant`]),
 //! low-passed and thresholded into runs ([`segment`]); the runs join into regions
-//! ([`regions`]); two regions are the markers A and B ([`markers`]). [`detector`] holds it together.
+//! ([`regions`]); what looks like a band where one is expected is a marker ([`judge`]). [`detector`] holds it together.
 //!
 //! Pixel coordinates are those of `OpenCV`: u to the right, v down, the centre of the first pixel is (0, 0).
 
