@@ -2,6 +2,8 @@
 
 #![no_main]
 
+use std::f64::consts::{PI, TAU};
+
 use arbitrary::Arbitrary;
 use libfuzzer_sys::fuzz_target;
 use tautscope_vision::{
@@ -18,27 +20,35 @@ struct Input<'a> {
     threshold: f32,
     smoothing: u8,
     minimum_area: u8,
-    predicted: [f64; 4],
-    covariance: [[f64; 4]; 4],
-    outlines: [[[f64; 2]; OUTLINE]; 2],
-    areas: [f64; 2],
-    demands: [f64; 7],
+    predicted: [f32; 4],
+    deviation: f32,
+    radii: [f32; 2],
+    demands: [u8; 7],
     windows: [[u16; 4]; 2],
     data: &'a [u8],
 }
 
 impl Expect for Input<'_> {
     fn expect(&self, _seen: [f64; 4], _deviation: [f64; 4]) -> Option<Expectation> {
-        let [ua, va, ub, vb] = self.predicted;
-        let outline = |band: usize, centroid| Outline {
-            corners: self.outlines[band],
-            centroid,
-            area: self.areas[band],
+        let features = self.predicted.map(f64::from);
+        let [ua, va, ub, vb] = features;
+        let [radius_a, radius_b] = self.radii.map(f64::from);
+        let outline = |[u, v]: [f64; 2], radius: f64| Outline {
+            corners: std::array::from_fn(|index| {
+                let angle = TAU * index as f64 / OUTLINE as f64;
+                [u + radius * angle.cos(), v + radius * angle.sin()]
+            }),
+            centroid: [u, v],
+            area: PI * radius * radius,
         };
+        let mut covariance = [[0.0; 4]; 4];
+        for (index, row) in covariance.iter_mut().enumerate() {
+            row[index] = f64::from(self.deviation).powi(2);
+        }
         Some(Expectation {
-            features: self.predicted,
-            covariance: self.covariance,
-            bands: [outline(0, [ua, va]), outline(1, [ub, vb])],
+            features,
+            covariance,
+            bands: [outline([ua, va], radius_a), outline([ub, vb], radius_b)],
         })
     }
 }
@@ -80,7 +90,15 @@ fuzz_target!(|input: Input<'_>| {
         .map(|region| region.area)
         .sum();
     assert!(whole <= (width * height) as u64);
-    let [inside, coverage, spill, edges, edges_on_average, edges_alone, surprise] = input.demands;
+    let [
+        inside,
+        coverage,
+        spill,
+        edges,
+        edges_on_average,
+        edges_alone,
+        surprise,
+    ] = input.demands.map(|demand| f64::from(demand) / 128.0);
     let demands = Demands {
         inside,
         coverage,
