@@ -148,6 +148,7 @@ class WeightedEstimator:
         cls,
         watch: StateEstimator,
         *,
+        marker_deviation: float,
         model_deviation: float,
         sideways_deviation: float,
         outlier_distance: float,
@@ -159,7 +160,7 @@ class WeightedEstimator:
         belief: ArrayLike,
         deviation: ArrayLike,
         measured_features: ArrayLike,
-        covariance: ArrayLike,
+        covariance: ArrayLike | None = None,
     ) -> tuple[_Floats, _Floats, _Flags, _Flags, _Floats, _Floats] | None: ...
     def run(
         self,
@@ -167,7 +168,7 @@ class WeightedEstimator:
         beliefs: ArrayLike,
         deviation: ArrayLike,
         measured_features: ArrayLike,
-        covariance: ArrayLike,
+        covariance: ArrayLike | None = None,
     ) -> tuple[_Floats, _Floats, _Flags]: ...
 
 @final

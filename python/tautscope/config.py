@@ -123,6 +123,8 @@ class AdaptiveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 class StateEstimationConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """State estimation of profile ``best``, decision 0018. All [ours]."""
 
+    marker_deviation: Positive = 0.3
+    """Of a marker that comes without a covariance: standard deviation [px]."""
     model_deviation: NonNegative = 0.3
     """What the model of the features is off by beyond the markers' covariance: standard deviation
     [px]."""
@@ -131,9 +133,9 @@ class StateEstimationConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_
     standard deviation [m]."""
     outlier_distance: Positive = 4.0
     """Mahalanobis distance beyond which a marker is left out."""
-    steps: Annotated[int, Meta(ge=1, le=100)] = 8
+    steps: Annotated[int, Meta(ge=1, le=100)] = 12
     """Gauss-Newton steps, at most."""
-    rest_deviation: NonNegative = 0.5
+    rest_deviation: NonNegative = 0.25
     """How far a tip moves between two images while its command rests: standard deviation [in units
     of the DOF's update_distance]."""
 

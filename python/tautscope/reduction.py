@@ -301,6 +301,7 @@ def build_weighted_estimator(config: Config) -> _core.WeightedEstimator:
     settings = config.state_estimation
     return _core.WeightedEstimator(
         build_state_estimator(config),
+        marker_deviation=settings.marker_deviation,
         model_deviation=settings.model_deviation,
         sideways_deviation=settings.sideways_deviation,
         outlier_distance=settings.outlier_distance,

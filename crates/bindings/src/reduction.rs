@@ -136,7 +136,7 @@ impl Reduction {
             .map(|features| fixed("features", &features))
             .transpose()?;
         let covariance = covariance
-            .map(|covariance| square(py, "covariance", &covariance))
+            .map(|covariance| square("covariance", &covariance))
             .transpose()?;
         let report = self
             .0

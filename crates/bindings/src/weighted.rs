@@ -26,23 +26,25 @@ type Estimates<'py> = (
 
 /// The state estimate of profile `best`: weighted, iterated, outliers left out; decision 0018.
 ///
-/// `model_deviation` in px, `sideways_deviation` in m. Raises `ConfigError`.
+/// `marker_deviation` and `model_deviation` in px, `sideways_deviation` in m. Raises `ConfigError`.
 #[pyclass(name = "WeightedEstimator", module = "tautscope._core", frozen)]
 pub struct WeightedEstimator(pub core::WeightedEstimator);
 
 #[pymethods]
 impl WeightedEstimator {
     #[new]
-    #[pyo3(signature = (watch, *, model_deviation, sideways_deviation, outlier_distance, steps))]
+    #[pyo3(signature = (watch, *, marker_deviation, model_deviation, sideways_deviation, outlier_distance, steps))]
     fn new(
         py: Python<'_>,
         watch: &StateEstimator,
+        marker_deviation: f64,
         model_deviation: f64,
         sideways_deviation: f64,
         outlier_distance: f64,
         steps: u32,
     ) -> PyResult<Self> {
         let settings = core::WeightedSettings {
+            marker_deviation,
             model_deviation,
             sideways_deviation,
             outlier_distance,
@@ -58,6 +60,7 @@ impl WeightedEstimator {
     /// observable (3,), markers used (2,), and state (3,) and deviation (3,) by the image alone.
     ///
     /// None where the model sees no band.
+    #[pyo3(signature = (model, belief, deviation, measured_features, covariance=None))]
     fn estimate<'py>(
         &self,
         py: Python<'py>,
@@ -65,8 +68,11 @@ impl WeightedEstimator {
         belief: Vector<'py>,
         deviation: Vector<'py>,
         measured_features: Vector<'py>,
-        covariance: Table<'py>,
+        covariance: Option<Table<'py>>,
     ) -> PyResult<Option<Estimate<'py>>> {
+        let covariance = covariance
+            .map(|covariance| square("covariance", &covariance))
+            .transpose()?;
         let belief = core::Belief {
             state: fixed("belief", &belief)?,
             deviation: fixed("deviation", &deviation)?,
@@ -75,7 +81,7 @@ impl WeightedEstimator {
             &model.0,
             &belief,
             fixed("measured_features", &measured_features)?,
-            &square(py, "covariance", &covariance)?,
+            covariance.as_ref(),
         );
         Ok(found.map(|found| {
             let floats = |values| PyArray1::from_slice(py, values);
@@ -93,6 +99,7 @@ impl WeightedEstimator {
     /// `estimate` for many beliefs (n, 3), all with one deviation (3,) and covariance (4, 4), and
     /// features (n, 4): states (n, 3), deviations (n, 3), observable (n, 3). Where the model sees no band
     /// the belief is given back.
+    #[pyo3(signature = (model, beliefs, deviation, measured_features, covariance=None))]
     fn run<'py>(
         &self,
         py: Python<'py>,
@@ -100,28 +107,28 @@ impl WeightedEstimator {
         beliefs: Table<'py>,
         deviation: Vector<'py>,
         measured_features: Table<'py>,
-        covariance: Table<'py>,
+        covariance: Option<Table<'py>>,
     ) -> PyResult<Estimates<'py>> {
+        let covariance = covariance
+            .map(|covariance| square("covariance", &covariance))
+            .transpose()?;
         let states: Vec<[f64; 3]> = rows("beliefs", &beliefs)?;
         let measured: Vec<[f64; 4]> = rows("measured_features", &measured_features)?;
         same_length(py, "measured_features", measured.len(), states.len())?;
         let deviation = fixed("deviation", &deviation)?;
-        let covariance = square(py, "covariance", &covariance)?;
         let mut found = (Vec::new(), Vec::new(), Vec::new());
         for (state, measured) in states.into_iter().zip(measured) {
             let belief = core::Belief { state, deviation };
-            match self.0.estimate(&model.0, &belief, measured, &covariance) {
-                Some(one) => {
-                    found.0.push(one.estimate.state);
-                    found.1.push(one.deviation);
-                    found.2.push(one.estimate.observable);
-                }
-                None => {
-                    found.0.push(state);
-                    found.1.push(deviation);
-                    found.2.push([false; 3]);
-                }
-            }
+            let one = self
+                .0
+                .estimate(&model.0, &belief, measured, covariance.as_ref());
+            let nothing = (state, deviation, [false; 3]);
+            let (state, deviation, observable) = one.map_or(nothing, |one| {
+                (one.estimate.state, one.deviation, one.estimate.observable)
+            });
+            found.0.push(state);
+            found.1.push(deviation);
+            found.2.push(observable);
         }
         Ok((
             table(py, &found.0)?,

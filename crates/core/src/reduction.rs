@@ -118,7 +118,8 @@ impl HysteresisReduction {
     }
 
     /// Image update: the features (4,) in px measured in a frame captured at `captured_at` in s, and their
-    /// covariance (4, 4) in px^2; None is 1 px^2 for each.
+    /// covariance (4, 4) in px^2; None is 1 px^2 for each, or what the
+    /// weighted estimation is set to.
     ///
     /// Two NaN for a band say that it was not found; None, or features that are not finite
     /// otherwise, that neither was. With one band the article's step too starts from `expectation` and not
@@ -143,7 +144,7 @@ impl HysteresisReduction {
                 self.linear_step(&estimator, &past, measured, covariance.unwrap_or(&UNIT))
             }
             StateEstimation::Weighted(estimator) => {
-                self.most_probable(&estimator, &past, measured, covariance.unwrap_or(&UNIT))
+                self.most_probable(&estimator, &past, measured, covariance)
             }
         };
         let Some(seen) = seen else {
@@ -198,7 +199,7 @@ impl HysteresisReduction {
         estimator: &WeightedEstimator,
         past: &Entry,
         measured: [f64; 4],
-        covariance: &[[f64; 4]; 4],
+        covariance: Option<&[[f64; 4]; 4]>,
     ) -> Option<Seen> {
         let belief = self.whereabouts.at(past);
         let seen = estimator.estimate(&self.feature_model, &belief, measured, covariance)?;

@@ -1,7 +1,7 @@
 //! The state estimate of profile `best`: weighted, iterated, and not led astray by a wrong marker.
 
 use crate::dof::{PerDof, all_finite};
-use crate::error::{ConfigError, require, require_non_negative};
+use crate::error::{ConfigError, require, require_non_negative, require_positive};
 use crate::features::FeatureModel;
 use crate::linear::{
     Matrix, add, diagonal_of_inverse, dot, rotate, scale, solve_symmetric, square,
@@ -9,15 +9,29 @@ use crate::linear::{
 use crate::posture::Belief;
 use crate::state::{StateEstimate, StateEstimator, found};
 
+/// A step goes no farther, in the belief's standard deviations: bent to the other side and turned by half a turn the
+/// instrument looks the same, and a long step may end there.
+const FARTHEST: f64 = 0.7;
 /// A step is halved at most so often.
 const HALVINGS: usize = 5;
 /// Squared size of a step, in posterior standard deviations, below which there is no other.
 const SMALL: f64 = 1e-10;
+/// Where else to start, from the belief in its standard deviations, while the cost is that of a wrong marker.
+const STARTS: [PerDof<f64>; 6] = [
+    [0.0, 0.0, 1.0],
+    [0.0, 0.0, -1.0],
+    [0.0, 1.0, 0.0],
+    [0.0, -1.0, 0.0],
+    [1.0, 0.0, 0.0],
+    [-1.0, 0.0, 0.0],
+];
 const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 /// What a [`WeightedEstimator`] is set to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WeightedSettings {
+    /// Of a marker that comes without a covariance: standard deviation in px.
+    pub marker_deviation: f64,
     /// What the model of the features is off by beyond the markers' covariance: standard deviation
     /// in px.
     pub model_deviation: f64,
@@ -39,7 +53,7 @@ pub struct WeightedSettings {
 ///   + outlier_distance^2 for each marker that is not used
 /// ```
 ///
-/// h as in Eqs. (9)-(11), C_m (2, 2) the marker's own covariance, and g_m how its image moves when the tip is
+/// h as in Eqs. (9)-(11), C (2, 2) each marker's own covariance, and g how its image moves when the tip is
 /// displaced by w across the bend: two markers on a straight tip tell how far it turned,
 /// but hardly where along the section. With two markers every choice is tried, if the first, both, costs more
 /// than leaving one out, so the least is found and not a local one. By Gauss-Newton, each step halved while it
@@ -96,6 +110,7 @@ impl WeightedEstimator {
     /// # Errors
     /// A setting is out of range.
     pub fn new(watch: StateEstimator, settings: WeightedSettings) -> Result<Self, ConfigError> {
+        require_positive("marker_deviation", settings.marker_deviation)?;
         require_non_negative("model_deviation", settings.model_deviation)?;
         require_non_negative("sideways_deviation", settings.sideways_deviation)?;
         let outlier = settings.outlier_distance;
@@ -111,7 +126,7 @@ impl WeightedEstimator {
     }
 
     /// The state estimate for features (4,) in px and their covariance (4, 4) in px^2, of which the
-    /// part between two markers is not used. Two NaN for a band say that it was not found.
+    /// part between two markers is not used; None is `marker_deviation` for each. Two NaN for a band say that it was not found.
     ///
     /// None where the model sees no band for the belief, or something else is not finite.
     pub fn estimate(
@@ -119,7 +134,7 @@ impl WeightedEstimator {
         model: &FeatureModel,
         belief: &Belief,
         measured: [f64; 4],
-        covariance: &[[f64; 4]; 4],
+        covariance: Option<&[[f64; 4]; 4]>,
     ) -> Option<WeightedEstimate> {
         let sights = self.sights(measured, covariance);
         let (state, used) = self.most_probable(model, belief, sights)?;
@@ -152,9 +167,15 @@ impl WeightedEstimator {
         })
     }
 
-    fn sights(&self, measured: [f64; 4], covariance: &[[f64; 4]; 4]) -> [Option<Sight>; 2] {
+    fn sights(&self, measured: [f64; 4], covariance: Option<&[[f64; 4]; 4]>) -> [Option<Sight>; 2] {
         let model = square(self.settings.model_deviation);
-        let [[a, b, _, _], [_, c, _, _], [_, _, d, e], [_, _, _, f]] = *covariance;
+        let own = square(self.settings.marker_deviation);
+        let ((a, b, c), (d, e, f)) = match covariance {
+            Some(&[[a, b, _, _], [_, c, _, _], [_, _, d, e], [_, _, _, f]]) => {
+                ((a, b, c), (d, e, f))
+            }
+            None => ((own, 0.0, own), (own, 0.0, own)),
+        };
         let [ua, va, ub, vb] = measured;
         let [found_a, found_b] = found(measured);
         let sight = |place: [f64; 2], uu: f64, uv: f64, vv: f64| {
@@ -188,7 +209,18 @@ impl WeightedEstimator {
     ) -> Option<(PerDof<f64>, [bool; 2])> {
         let seen = sights.map(|sight| sight.is_some());
         let price = square(self.settings.outlier_distance);
-        let (mut state, mut cost) = self.minimum(model, belief, sights)?;
+        let (mut state, mut cost) = self.minimum(model, belief, belief.state, sights)?;
+        for start in STARTS {
+            if cost <= price {
+                break;
+            }
+            let start = add(belief.state, 1.0, times(start, belief.deviation));
+            if let Some((other, less)) = self.minimum(model, belief, start, sights)
+                && less < cost
+            {
+                (state, cost) = (other, less);
+            }
+        }
         let mut used = seen;
         let fewer = [[true, false], [false, true], [false, false]];
         for choice in fewer {
@@ -199,7 +231,8 @@ impl WeightedEstimator {
             if kept == seen || cost <= fine {
                 continue;
             }
-            if let Some((other, rest)) = self.minimum(model, belief, only(kept, sights))
+            if let Some((other, rest)) =
+                self.minimum(model, belief, belief.state, only(kept, sights))
                 && rest + fine < cost
             {
                 (state, cost, used) = (other, rest + fine, kept);
@@ -212,14 +245,18 @@ impl WeightedEstimator {
         &self,
         model: &FeatureModel,
         belief: &Belief,
+        start: PerDof<f64>,
         sights: [Option<Sight>; 2],
     ) -> Option<(PerDof<f64>, f64)> {
-        let mut state = belief.state;
+        let mut state = start;
         let mut here = self.linear(model, belief, state, sights)?;
         for _ in 0..self.settings.steps {
             let Some(step) = here.step() else { break };
             let size = dot(step, rotate(&here.whole(), step));
-            let mut share = 1.0;
+            let longest = step
+                .iter()
+                .fold(0.0, |most: f64, value| most.max(value.abs()));
+            let mut share = 1.0_f64.min(FARTHEST / longest);
             let better = (0..HALVINGS).find_map(|_| {
                 let trial = add(state, share, times(step, belief.deviation));
                 share /= 2.0;

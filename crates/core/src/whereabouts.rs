@@ -28,7 +28,7 @@ const DOUBT: f64 = 1.25;
 pub struct Whereabouts {
     start_deviation: PerDof<f64>,
     rest_deviation: PerDof<f64>,
-    /// q_hat - q, and what images had moved q by when it was taken.
+    /// `q_hat - q`, and what images had moved q by when it was taken.
     correction: PerDof<f64>,
     /// At the last image that determined the DOF.
     deviation: PerDof<f64>,

@@ -63,6 +63,7 @@ fn adaptive() -> PerDof<Axis> {
 fn weighted(outlier_distance: f64) -> StateEstimation {
     let watch = StateEstimator::new([1.0; 3]).unwrap();
     let settings = WeightedSettings {
+        marker_deviation: 0.3,
         model_deviation: 0.3,
         sideways_deviation: 0.3e-3,
         outlier_distance,
