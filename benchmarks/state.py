@@ -196,7 +196,9 @@ def measure(seeds: Sequence[int], count: int) -> list[dict[str, Any]]:
             sure = [look.normalised for look in found if look.normalised is not None]
             if sure:
                 nees = [float(np.mean(values[:, dof] ** 2)) for values in sure]
-                rows.append(row(f"squared error over variance, {case_name}", dof, name, "1", nees, 1.5, n))
+                rows.append(
+                    row(f"squared error over variance, {case_name}", dof, name, "1", nees, 1.5, n)
+                )
             held = [float(1 - look.observable[:, dof].mean()) for look in found]
             rows.append(row(f"held, {case_name}", dof, name, "share", held, 1.0, n))
     return rows
@@ -218,7 +220,15 @@ def with_images(seeds: Sequence[int]) -> list[dict[str, Any]]:
             unit, scale = ("mm", 1e3) if dof is Dof.INSERTION else ("rad", 1.0)
             values = [float(scale * error[dof]) for error in errors]
             rows.append(
-                row("state error, images", dof, profile, unit, values, scale * GOALS[dof], len(seeds))
+                row(
+                    "state error, images",
+                    dof,
+                    profile,
+                    unit,
+                    values,
+                    scale * GOALS[dof],
+                    len(seeds),
+                )
             )
     return rows
 
@@ -250,7 +260,9 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=5, help="number of seeds [%(default)s]")
     parser.add_argument("--first", type=int, default=0, help="the first of them [%(default)s]")
     parser.add_argument("--poses", type=int, default=400, help="per seed [%(default)s]")
-    parser.add_argument("--images", action="store_true", help="also the whole loop, with its vision")
+    parser.add_argument(
+        "--images", action="store_true", help="also the whole loop, with its vision"
+    )
     parser.add_argument("--json", action="store_true", help="one JSON object on stdout")
     options = parser.parse_args()
     seeds = range(options.first, options.first + options.seeds)

@@ -10,8 +10,8 @@ use crate::weighted::WeightedEstimate;
 
 /// One linear step from far away misses by a part of itself.
 const STEP_ERROR: f64 = 0.25;
-/// What a marker that was left out does to the deviation: were the belief wrong, it would otherwise refuse
-/// every image to come.
+/// What an image does to the belief's deviation of which a marker was left out: it makes nothing surer. Were the
+/// belief wrong, it would otherwise refuse every image to come.
 const DOUBT: f64 = 1.25;
 
 /// What the last images said, per DOF, and how it has aged.
@@ -95,8 +95,11 @@ impl Whereabouts {
 
     /// Takes in what was most probable.
     pub(crate) fn settle(&mut self, past: &Entry, seen: &WeightedEstimate, left_out: bool) {
-        let factor = if left_out { DOUBT } else { 1.0 };
-        let deviation = seen.deviation.map(|value| factor * value);
+        let deviation = if left_out {
+            self.at(past).deviation.map(|value| DOUBT * value)
+        } else {
+            seen.deviation
+        };
         self.set(past, seen.estimate.state, deviation, [true; 3]);
     }
 
