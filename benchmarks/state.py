@@ -159,7 +159,7 @@ def looks(config: Config, case: Case, seen: Poses) -> dict[str, Look]:
 
 
 def row(
-    what: str, dof: Dof, profile: str, unit: str, values: Sequence[float], goal: float, n: int
+    what: str, dof: Dof, profile: str, *, unit: str, values: Sequence[float], goal: float, n: int
 ) -> dict[str, Any]:
     return {
         "what": what,
@@ -192,15 +192,27 @@ def measure(seeds: Sequence[int], count: int) -> list[dict[str, Any]]:
             unit, scale = ("mm", 1e3) if dof is Dof.INSERTION else ("rad", 1.0)
             rms = [scale * float(np.sqrt(np.mean(look.errors[:, dof] ** 2))) for look in found]
             goal = scale * GOALS[dof]
-            rows.append(row(f"state error, {case_name}", dof, name, unit, rms, goal, n))
+            rows.append(
+                row(f"state error, {case_name}", dof, name, unit=unit, values=rms, goal=goal, n=n)
+            )
             sure = [look.normalised for look in found if look.normalised is not None]
             if sure:
                 nees = [float(np.mean(values[:, dof] ** 2)) for values in sure]
                 rows.append(
-                    row(f"squared error over variance, {case_name}", dof, name, "1", nees, 1.5, n)
+                    row(
+                        f"squared error over variance, {case_name}",
+                        dof,
+                        name,
+                        unit="1",
+                        values=nees,
+                        goal=1.5,
+                        n=n,
+                    )
                 )
             held = [float(1 - look.observable[:, dof].mean()) for look in found]
-            rows.append(row(f"held, {case_name}", dof, name, "share", held, 1.0, n))
+            rows.append(
+                row(f"held, {case_name}", dof, name, unit="share", values=held, goal=1.0, n=n)
+            )
     return rows
 
 
@@ -224,10 +236,10 @@ def with_images(seeds: Sequence[int]) -> list[dict[str, Any]]:
                     "state error, images",
                     dof,
                     profile,
-                    unit,
-                    values,
-                    scale * GOALS[dof],
-                    len(seeds),
+                    unit=unit,
+                    values=values,
+                    goal=scale * GOALS[dof],
+                    n=len(seeds),
                 )
             )
     return rows

@@ -244,7 +244,7 @@ def test_a_wrong_belief_gives_way_in_the_end() -> None:
     loop, model = HysteresisReduction(CONFIG), build_feature_model(CONFIG)
     reference = np.array([0.025, 0.0, 0.9])
     tick = 0
-    for truth in (reference, reference + [4e-3, 0.4, 0.4]):
+    for truth in (reference, reference + np.array([4e-3, 0.4, 0.4])):
         prediction = model.predict(truth)
         assert prediction is not None
         for _ in range(40):
