@@ -16,6 +16,7 @@ __all__ = [
     "Reduction",
     "Renderer",
     "StateEstimator",
+    "WeightedEstimator",
     "__version__",
     "label_regions",
 ]
@@ -142,6 +143,35 @@ class StateEstimator:
     ) -> tuple[_Floats, _Flags]: ...
 
 @final
+class WeightedEstimator:
+    def __new__(
+        cls,
+        watch: StateEstimator,
+        *,
+        marker_deviation: float,
+        model_deviation: float,
+        sideways_deviation: float,
+        outlier_distance: float,
+        steps: int,
+    ) -> WeightedEstimator: ...
+    def estimate(
+        self,
+        model: FeatureModel,
+        belief: ArrayLike,
+        deviation: ArrayLike,
+        measured_features: ArrayLike,
+        covariance: ArrayLike | None = None,
+    ) -> tuple[_Floats, _Floats, _Flags, _Flags, _Floats, _Floats] | None: ...
+    def run(
+        self,
+        model: FeatureModel,
+        beliefs: ArrayLike,
+        deviation: ArrayLike,
+        measured_features: ArrayLike,
+        covariance: ArrayLike | None = None,
+    ) -> tuple[_Floats, _Floats, _Flags]: ...
+
+@final
 class AdaptiveAxis:
     def __new__(
         cls,
@@ -163,7 +193,6 @@ class AdaptiveAxis:
         contact_distance: float,
         contact_moved: float,
         slope_tolerance: float,
-        marker_deviation: float,
         model_deviation: float,
         tremor_time: float,
         period: float,
@@ -203,11 +232,12 @@ class Reduction:
     def adaptive(
         axes: Sequence[AdaptiveAxis],
         model: FeatureModel,
-        state_estimator: StateEstimator,
+        state_estimator: WeightedEstimator,
         *,
         span: float,
         period: float,
         start_deviation: _Vector3,
+        rest_deviation: _Vector3,
     ) -> Reduction: ...
     def step(self, reference: ArrayLike, time: float) -> _Floats: ...
     def run(self, references: ArrayLike, times: ArrayLike) -> _Floats: ...

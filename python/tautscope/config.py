@@ -118,8 +118,26 @@ class AdaptiveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """Largest deviation from 1 of tip over command travel in contact."""
     model_deviation: Positive = 0.5
     """Standard deviation of a measured offset beyond the markers' noise."""
-    marker_deviation: NonNegative = 0.3
-    """Standard deviation of a marker's position [px]."""
+
+
+class StateEstimationConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """State estimation of profile ``best``, decision 0018. All [ours]."""
+
+    marker_deviation: Positive = 0.3
+    """Of a marker that comes without a covariance: standard deviation [px]."""
+    model_deviation: NonNegative = 0.3
+    """What the model of the features is off by beyond the markers' covariance: standard deviation
+    [px]."""
+    sideways_deviation: NonNegative = 0.3e-3
+    """How far the tip is displaced across the bend because the section does not bend evenly:
+    standard deviation [m]."""
+    outlier_distance: Positive = 4.0
+    """Mahalanobis distance beyond which a marker is left out."""
+    steps: Annotated[int, Meta(ge=1, le=100)] = 12
+    """Gauss-Newton steps, at most."""
+    rest_deviation: NonNegative = 0.25
+    """How far a tip moves between two images while its command rests: standard deviation [in units
+    of the DOF's update_distance]."""
 
 
 class InstrumentConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -348,9 +366,10 @@ class Config(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Everything a run depends on. The defaults are the article's experiment."""
 
     profile: Profile = "paper"
-    """How slack is compensated and learnt: ``paper`` as in the article, ``best`` as in
-    `AdaptiveConfig`."""
+    """How slack is compensated and learnt, and the state estimated: ``paper`` as in the article,
+    ``best`` as in `AdaptiveConfig` and `StateEstimationConfig`."""
     adaptive: AdaptiveConfig = field(default_factory=AdaptiveConfig)
+    state_estimation: StateEstimationConfig = field(default_factory=StateEstimationConfig)
     insertion: DofConfig = field(
         default_factory=lambda: DofConfig(
             update_distance=0.4e-3, observable_deviation=2e-3, start_deviation=5e-3

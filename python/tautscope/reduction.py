@@ -61,15 +61,17 @@ class Report:
         detection: What the vision saw, if it was asked.
         captured_at: When the frame was taken [s].
         status: What became of it.
-        state_estimate: q_hat (3,), Eq. (16); the prediction where a DOF is not observable.
+        state_estimate: q_hat (3,), with profile ``paper`` by Eq. (16), the prediction where a DOF
+            is not observable; with ``best`` the most probable state, decision 0018.
         predicted_state: q (3,) at the capture time.
-        predicted_features: h(q) (4,) [px], Eq. (9); with one band alone, of the state the step
-            started from.
+        predicted_features: h (4,) [px], Eq. (9), of the state the estimate started from: q; with
+            one band alone, or profile ``best``, what the last images said.
         innovation: Measured minus predicted features (4,) [px]; NaN for a band not found.
         observable: (3,) which DOFs the image determined.
         deviation: (3,) standard deviation per px of marker noise [m/px, rad/px].
         state_deviation: (3,) standard deviation of `state_estimate` from the detection's
-            covariance, or for 1 px of noise without one; NaN for a DOF that was held.
+            covariance, or for 1 px of noise without one; with profile ``paper`` NaN for a DOF
+            that was held.
         triggers: Per DOF why (delta_minus, delta_plus) were updated: "contact", Eq. (4),
             "violation", Eq. (5), or None.
         delta_minus: (3,) contact offsets after this frame, input minus output.
@@ -238,7 +240,6 @@ def build_adaptive_axis(config: Config, dof: Dof, compensate: bool = True) -> _c
         contact_distance=unit * shared.contact_distance,
         contact_moved=unit * shared.contact_moved,
         slope_tolerance=shared.slope_tolerance,
-        marker_deviation=shared.marker_deviation,
         model_deviation=unit * shared.model_deviation,
         tremor_time=shared.tremor_time,
         period=config.control.period,
@@ -295,10 +296,23 @@ def build_state_estimator(config: Config) -> _core.StateEstimator:
     return _core.StateEstimator(observable_deviation=(insertion, rotation, bending))
 
 
+def build_weighted_estimator(config: Config) -> _core.WeightedEstimator:
+    """The state estimation of profile ``best``, decision 0018."""
+    settings = config.state_estimation
+    return _core.WeightedEstimator(
+        build_state_estimator(config),
+        marker_deviation=settings.marker_deviation,
+        model_deviation=settings.model_deviation,
+        sideways_deviation=settings.sideways_deviation,
+        outlier_distance=settings.outlier_distance,
+        steps=settings.steps,
+    )
+
+
 def build_loop(config: Config, compensate: bool = True) -> _core.Reduction:
     """The whole loop, Fig. 6, without checks of what goes in: `HysteresisReduction` has those."""
     insertion, rotation, bending = (config[dof] for dof in Dof)
-    model, state_estimator = build_feature_model(config), build_state_estimator(config)
+    model = build_feature_model(config)
     span, period = config.control.history, config.control.period
     start_deviation = (
         insertion.start_deviation,
@@ -306,6 +320,10 @@ def build_loop(config: Config, compensate: bool = True) -> _core.Reduction:
         bending.start_deviation,
     )
     if config.profile == "best":
+
+        def rest(dof: DofConfig) -> float:
+            return dof.update_distance * config.state_estimation.rest_deviation
+
         return _core.Reduction.adaptive(
             (
                 build_adaptive_axis(config, Dof.INSERTION, compensate),
@@ -313,10 +331,11 @@ def build_loop(config: Config, compensate: bool = True) -> _core.Reduction:
                 build_adaptive_axis(config, Dof.BENDING, compensate),
             ),
             model,
-            state_estimator,
+            build_weighted_estimator(config),
             span=span,
             period=period,
             start_deviation=start_deviation,
+            rest_deviation=(rest(insertion), rest(rotation), rest(bending)),
         )
     return _core.Reduction(
         (
@@ -326,7 +345,7 @@ def build_loop(config: Config, compensate: bool = True) -> _core.Reduction:
         ),
         (build_estimator(insertion), build_estimator(rotation), build_estimator(bending)),
         model,
-        state_estimator,
+        build_state_estimator(config),
         span=span,
         period=period,
         start_deviation=start_deviation,

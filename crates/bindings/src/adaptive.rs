@@ -19,7 +19,7 @@ impl AdaptiveAxis {
     #[new]
     #[pyo3(signature = (
         *, free_gain, contact_gain, cautious_gain, cautious_deviation, gain_limit, taper, settling, node_spacing, level_deviation, local_deviation, correlation, level_drift,
-        local_drift, symmetry, contact_distance, contact_moved, slope_tolerance, marker_deviation,
+        local_drift, symmetry, contact_distance, contact_moved, slope_tolerance,
         model_deviation, tremor_time, period, delta_minus, delta_plus
     ))]
     // One argument per setting, by keyword only.
@@ -43,7 +43,6 @@ impl AdaptiveAxis {
         contact_distance: f64,
         contact_moved: f64,
         slope_tolerance: f64,
-        marker_deviation: f64,
         model_deviation: f64,
         tremor_time: f64,
         period: f64,
@@ -73,7 +72,6 @@ impl AdaptiveAxis {
                 moved: contact_moved,
                 tolerance: slope_tolerance,
             },
-            marker_deviation,
             model_deviation,
             gain_limit,
             tremor_time,

@@ -68,3 +68,12 @@ fn row<const N: usize>(view: ArrayView1<'_, f64>) -> Option<[f64; N]> {
     }
     Some(values)
 }
+
+/// A covariance (4, 4).
+pub fn square(field: &str, table: &Table<'_>) -> PyResult<[[f64; 4]; 4]> {
+    let lines = rows(field, table)?;
+    let found = lines.len();
+    lines
+        .try_into()
+        .map_err(|_| errors::length(table.py(), field, found, "4 rows"))
+}

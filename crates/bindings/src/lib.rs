@@ -17,6 +17,7 @@ mod reduction;
 mod render;
 mod state;
 mod vision;
+mod weighted;
 
 use pyo3::prelude::*;
 
@@ -46,6 +47,8 @@ mod _core {
     use super::state::StateEstimator;
     #[pymodule_export]
     use super::vision::{MarkerDetector, label_regions};
+    #[pymodule_export]
+    use super::weighted::WeightedEstimator;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -5,12 +5,13 @@ use pyo3::prelude::*;
 use tautscope_core as core;
 
 use crate::adaptive::AdaptiveAxis;
-use crate::arrays::{Table, Vector, fixed, rows, same_length, table};
+use crate::arrays::{Table, Vector, fixed, rows, same_length, square, table};
 use crate::compensator::Compensator;
 use crate::errors;
 use crate::estimator::{Estimator, TriggerNames, trigger_names};
 use crate::features::FeatureModel;
 use crate::state::StateEstimator;
+use crate::weighted::WeightedEstimator;
 
 type Floats<'py> = Bound<'py, PyArray1<f64>>;
 
@@ -54,11 +55,12 @@ impl Reduction {
             core::Axis::new(compensator.inner, estimator.inner, estimator.state.play())
         });
         let history = core::History::new(span, period).map_err(errors::config(py))?;
-        let whereabouts = core::Whereabouts::new(start_deviation).map_err(errors::config(py))?;
+        let whereabouts =
+            core::Whereabouts::new(start_deviation, [0.0; 3]).map_err(errors::config(py))?;
         Ok(Self(core::HysteresisReduction::new(
             axes,
             model.0,
-            state_estimator.0,
+            core::StateEstimation::Article(state_estimator.0),
             history,
             whereabouts,
         )))
@@ -66,23 +68,26 @@ impl Reduction {
 
     /// The loop of profile `best`, from its three axes.
     #[staticmethod]
-    #[pyo3(signature = (axes, model, state_estimator, *, span, period, start_deviation))]
+    #[expect(clippy::too_many_arguments, reason = "named in Python")]
+    #[pyo3(signature = (axes, model, state_estimator, *, span, period, start_deviation, rest_deviation))]
     fn adaptive(
         py: Python<'_>,
         axes: [PyRef<'_, AdaptiveAxis>; 3],
         model: &FeatureModel,
-        state_estimator: &StateEstimator,
+        state_estimator: &WeightedEstimator,
         span: f64,
         period: f64,
         start_deviation: [f64; 3],
+        rest_deviation: [f64; 3],
     ) -> PyResult<Self> {
         let axes = axes.map(|axis| core::Axis::Adaptive(axis.0.clone()));
         let history = core::History::new(span, period).map_err(errors::config(py))?;
-        let whereabouts = core::Whereabouts::new(start_deviation).map_err(errors::config(py))?;
+        let whereabouts =
+            core::Whereabouts::new(start_deviation, rest_deviation).map_err(errors::config(py))?;
         Ok(Self(core::HysteresisReduction::new(
             axes,
             model.0,
-            state_estimator.0,
+            core::StateEstimation::Weighted(state_estimator.0),
             history,
             whereabouts,
         )))
@@ -130,14 +135,9 @@ impl Reduction {
         let features = features
             .map(|features| fixed("features", &features))
             .transpose()?;
-        let covariance: Option<[[f64; 4]; 4]> = match covariance {
-            Some(covariance) => {
-                let lines: Vec<[f64; 4]> = rows("covariance", &covariance)?;
-                same_length(py, "covariance", lines.len(), 4)?;
-                lines.try_into().ok()
-            }
-            None => None,
-        };
+        let covariance = covariance
+            .map(|covariance| square("covariance", &covariance))
+            .transpose()?;
         let report = self
             .0
             .on_features(features, covariance.as_ref(), captured_at);

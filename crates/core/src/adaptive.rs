@@ -23,9 +23,7 @@ pub struct AdaptiveSettings {
     pub prior: OffsetPrior,
     /// When tip and command move together.
     pub contact: ContactTest,
-    /// Standard deviation of a marker's position in px.
-    pub marker_deviation: f64,
-    /// Deviation of a measured offset beyond that of the markers.
+    /// Deviation of a measured offset beyond that of the output.
     pub model_deviation: f64,
     /// Bound of every gain.
     pub gain_limit: f64,
@@ -83,7 +81,6 @@ impl AdaptiveAxis {
         require_positive("contact_distance", settings.contact.distance)?;
         require_non_negative("contact_moved", settings.contact.moved)?;
         require_positive("slope_tolerance", settings.contact.tolerance)?;
-        require_non_negative("marker_deviation", settings.marker_deviation)?;
         require_positive("model_deviation", settings.model_deviation)?;
         require_non_negative("tremor_time", settings.tremor_time)?;
         require_positive("period", settings.period)?;
@@ -194,8 +191,8 @@ impl AdaptiveAxis {
         self.lead += sign * law.gain(intention.abs(), gap, missing);
     }
 
-    /// Learn from command and output of one instant, the output's standard deviation per px of
-    /// marker noise, and the commands since, oldest first.
+    /// Learn from command and output of one instant, the output's standard deviation, and the
+    /// commands since, oldest first.
     pub fn learn(
         &mut self,
         command: f64,
@@ -205,8 +202,7 @@ impl AdaptiveAxis {
     ) -> Triggers {
         let settings = self.settings;
         let model = settings.model_deviation;
-        let seen = deviation * settings.marker_deviation;
-        let variance = seen * seen + model * model;
+        let variance = deviation * deviation + model * model;
         let mut triggers = Triggers::default();
         if !(command.is_finite() && measured.is_finite() && variance.is_finite()) {
             return triggers;

@@ -48,8 +48,8 @@ impl Axis {
         }
     }
 
-    /// Learn from command and output of one instant, the output's standard deviation per px of
-    /// marker noise, and the commands since, oldest first.
+    /// Learn from command and output of one instant, the output's standard deviation, and the
+    /// commands since, oldest first.
     pub(crate) fn learn(
         &mut self,
         command: f64,

@@ -75,6 +75,28 @@ impl FeatureModel {
         finite.then_some(prediction)
     }
 
+    /// How the features move, (4,) in px/m, when the tip is displaced across the bend and not
+    /// turned, towards the side it bends to: what a section that does not bend evenly does.
+    ///
+    /// None where [`FeatureModel::predict`] gives none.
+    pub(crate) fn sideways(&self, state: PerDof<f64>) -> Option<[f64; 4]> {
+        let [_, rotation, bending] = state;
+        let (along, across) = (libm::sin(bending / 2.0), libm::cos(bending / 2.0));
+        let direction = [
+            across * libm::cos(rotation),
+            across * libm::sin(rotation),
+            -along,
+        ];
+        let [marker_a, marker_b] = self.instrument.markers(state).map(|marker| Marker {
+            position_by_dof: [direction, [0.0; 3], [0.0; 3]],
+            axis_by_dof: [[0.0; 3]; 3],
+            ..marker
+        });
+        let (_, [[ua, _, _], [va, _, _]]) = self.centroid(&marker_a)?;
+        let (_, [[ub, _, _], [vb, _, _]]) = self.centroid(&marker_b)?;
+        Some([ua, va, ub, vb])
+    }
+
     /// Radius and length of the bands in m.
     pub(crate) const fn size(&self) -> (f64, f64) {
         (self.instrument.radius(), self.instrument.band_length())

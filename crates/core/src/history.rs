@@ -14,6 +14,8 @@ pub struct Entry {
     pub command: PerDof<f64>,
     /// The predicted state q [m, rad, rad].
     pub predicted_state: PerDof<f64>,
+    /// The part of it by which images have moved the model so far [m, rad, rad].
+    pub corrected: PerDof<f64>,
     /// How far the command has gone so far, forth and back [m, rad, rad].
     pub travel: PerDof<f64>,
 }
@@ -41,6 +43,7 @@ impl History {
             time: 0.0,
             command: [0.0; 3],
             predicted_state: [0.0; 3],
+            corrected: [0.0; 3],
             travel: [0.0; 3],
         };
         Ok(Self {
@@ -110,6 +113,7 @@ impl History {
             time,
             command: between(before.command, after.command, share),
             predicted_state: between(before.predicted_state, after.predicted_state, share),
+            corrected: between(before.corrected, after.corrected, share),
             travel: between(before.travel, after.travel, share),
         })
     }

@@ -39,6 +39,7 @@ mod posture;
 mod reduction;
 mod smoother;
 mod state;
+mod weighted;
 mod whereabouts;
 
 pub use adaptive::{AdaptiveAxis, AdaptiveSettings};
@@ -57,7 +58,8 @@ pub use offset_map::{OffsetMap, OffsetPrior, Side};
 pub use outline::{BandImage, OUTLINE};
 pub use play::{ContactMode, Play, PlayState};
 pub use posture::Belief;
-pub use reduction::{HysteresisReduction, Report, Status};
+pub use reduction::{HysteresisReduction, Report, StateEstimation, Status};
 pub use smoother::Smoother;
 pub use state::{StateEstimate, StateEstimator};
+pub use weighted::{WeightedEstimate, WeightedEstimator, WeightedSettings};
 pub use whereabouts::Whereabouts;

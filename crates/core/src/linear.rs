@@ -66,3 +66,11 @@ pub fn solve_symmetric(
     let x = x / a - m10 * y - m20 * z;
     (a > 0.0 && p1 > 0.0 && p2 > 0.0).then_some([x, y, z])
 }
+
+/// The diagonal of the inverse of a symmetric, positive definite matrix; None where it is not.
+pub fn diagonal_of_inverse(rows: Matrix) -> Option<Vector> {
+    let [x, _, _] = solve_symmetric(rows, [1.0, 0.0, 0.0])?;
+    let [_, y, _] = solve_symmetric(rows, [0.0, 1.0, 0.0])?;
+    let [_, _, z] = solve_symmetric(rows, [0.0, 0.0, 1.0])?;
+    Some([x, y, z])
+}

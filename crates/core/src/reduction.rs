@@ -8,6 +8,7 @@ use crate::history::{Entry, History};
 use crate::play::Play;
 use crate::posture::Belief;
 use crate::state::{StateEstimate, StateEstimator, found};
+use crate::weighted::WeightedEstimator;
 use crate::whereabouts::Whereabouts;
 
 /// What became of a frame.
@@ -17,7 +18,7 @@ pub enum Status {
     Ok,
     /// Some DOF could not be observed and was held.
     Held,
-    /// Only one marker was found; what it does not determine was held.
+    /// Only one marker was found, or could be believed; what it does not determine was held.
     Partial,
     /// The markers were not found.
     NoMarkers,
@@ -27,6 +28,15 @@ pub enum Status {
     Duplicate,
 }
 
+/// How an image becomes a state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum StateEstimation {
+    /// The article's one linear step from the prediction, Eqs. (13)-(16).
+    Article(StateEstimator),
+    /// From what the last images said; profile `best`.
+    Weighted(WeightedEstimator),
+}
+
 /// What the loop made of a frame; NaN is what is not known.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Report {
@@ -34,7 +44,7 @@ pub struct Report {
     pub status: Status,
     /// q at the capture time [m, rad, rad].
     pub predicted_state: PerDof<f64>,
-    /// h(q) in px.
+    /// h of the state the estimate started from in px: q, or what the last images said.
     pub predicted_features: [f64; 4],
     /// `q_hat`, innovation and what could be observed.
     pub estimate: StateEstimate,
@@ -51,10 +61,11 @@ pub struct Report {
 pub struct HysteresisReduction {
     axes: PerDof<Axis>,
     feature_model: FeatureModel,
-    state_estimator: StateEstimator,
+    state_estimation: StateEstimation,
     history: History,
     whereabouts: Whereabouts,
     travel: PerDof<f64>,
+    corrected: PerDof<f64>,
     last_used: f64,
 }
 
@@ -63,17 +74,18 @@ impl HysteresisReduction {
     pub const fn new(
         axes: PerDof<Axis>,
         feature_model: FeatureModel,
-        state_estimator: StateEstimator,
+        state_estimation: StateEstimation,
         history: History,
         whereabouts: Whereabouts,
     ) -> Self {
         Self {
             axes,
             feature_model,
-            state_estimator,
+            state_estimation,
             history,
             whereabouts,
             travel: [0.0; 3],
+            corrected: [0.0; 3],
             last_used: f64::NEG_INFINITY,
         }
     }
@@ -96,6 +108,7 @@ impl HysteresisReduction {
             time,
             command,
             predicted_state: self.predicted_state(),
+            corrected: self.corrected,
             travel: self.travel,
         });
         if jumped_back {
@@ -105,11 +118,12 @@ impl HysteresisReduction {
     }
 
     /// Image update: the features (4,) in px measured in a frame captured at `captured_at` in s, and their
-    /// covariance (4, 4) in px^2; None is 1 px^2 for each.
+    /// covariance (4, 4) in px^2; None is 1 px^2 for each, or what the
+    /// weighted estimation is set to.
     ///
     /// Two NaN for a band say that it was not found; None, or features that are not finite
-    /// otherwise, that neither was. With one band the step starts from `expectation` and not from
-    /// the prediction: what is held must be as right as is known.
+    /// otherwise, that neither was. With one band the article's step too starts from `expectation` and not
+    /// from the prediction: what is held must be as right as is known.
     pub fn on_features(
         &mut self,
         measured: Option<[f64; 4]>,
@@ -125,53 +139,109 @@ impl HysteresisReduction {
         let Some(measured) = measured.filter(|features| usable(*features)) else {
             return self.unused(Status::NoMarkers, Some(past));
         };
-        let complete = found(measured) == [true; 2];
-        let start = if complete {
-            past.predicted_state
-        } else {
-            self.whereabouts.at(&past).state
+        let seen = match self.state_estimation {
+            StateEstimation::Article(estimator) => {
+                self.linear_step(&estimator, &past, measured, covariance.unwrap_or(&UNIT))
+            }
+            StateEstimation::Weighted(estimator) => {
+                self.most_probable(&estimator, &past, measured, covariance)
+            }
         };
-        let Some(prediction) = self.feature_model.predict(start) else {
+        let Some(seen) = seen else {
             return self.unused(Status::Held, Some(past));
         };
         self.last_used = captured_at;
-        let estimate = self.state_estimator.estimate(start, &prediction, measured);
-        let state_deviation = estimate.state_deviation(covariance.unwrap_or(&UNIT));
-        self.whereabouts.learn(&past, &estimate, state_deviation);
-        let seen = estimate.observable == [true; 3];
+        let estimate = seen.estimate;
         Report {
-            status: match (complete, seen) {
-                (false, _) => Status::Partial,
-                (true, false) => Status::Held,
-                (true, true) => Status::Ok,
+            status: match (seen.used, estimate.observable) {
+                ([true, false] | [false, true], _) => Status::Partial,
+                ([true, true], [true, true, true]) => Status::Ok,
+                _ => Status::Held,
             },
             predicted_state: past.predicted_state,
-            predicted_features: prediction.features,
-            triggers: self.learn(&past, &estimate),
+            predicted_features: seen.predicted_features,
+            triggers: self.learn(&past, &seen),
             estimate,
-            state_deviation,
+            state_deviation: seen.state_deviation,
             play: self.play(),
         }
     }
 
-    fn learn(&mut self, past: &Entry, estimate: &StateEstimate) -> PerDof<Triggers> {
+    fn linear_step(
+        &mut self,
+        estimator: &StateEstimator,
+        past: &Entry,
+        measured: [f64; 4],
+        covariance: &[[f64; 4]; 4],
+    ) -> Option<Seen> {
+        let used = found(measured);
+        let start = if used == [true; 2] {
+            past.predicted_state
+        } else {
+            self.whereabouts.at(past).state
+        };
+        let prediction = self.feature_model.predict(start)?;
+        let estimate = estimator.estimate(start, &prediction, measured);
+        let state_deviation = estimate.state_deviation(covariance);
+        self.whereabouts.learn(past, &estimate, state_deviation);
+        Some(Seen {
+            estimate,
+            used,
+            predicted_features: prediction.features,
+            state_deviation,
+            output: estimate.state,
+            output_deviation: state_deviation,
+        })
+    }
+
+    fn most_probable(
+        &mut self,
+        estimator: &WeightedEstimator,
+        past: &Entry,
+        measured: [f64; 4],
+        covariance: Option<&[[f64; 4]; 4]>,
+    ) -> Option<Seen> {
+        let belief = self.whereabouts.at(past);
+        let seen = estimator.estimate(&self.feature_model, &belief, measured, covariance)?;
+        let left_out = seen.used != found(measured);
+        self.whereabouts.settle(past, &seen, left_out);
+        Some(Seen {
+            estimate: seen.estimate,
+            used: seen.used,
+            predicted_features: seen.predicted_features,
+            state_deviation: seen.deviation,
+            output: seen.image_state,
+            output_deviation: seen.image_deviation,
+        })
+    }
+
+    fn learn(&mut self, past: &Entry, seen: &Seen) -> PerDof<Triggers> {
         let mut triggers = [Triggers::default(); 3];
         let history = &self.history;
-        let signals = estimate
+        let outputs = seen.output.iter().zip(seen.output_deviation);
+        let signals = seen
+            .estimate
             .observable
             .iter()
             .zip(past.command)
-            .zip(estimate.state)
-            .zip(estimate.deviation);
-        let axes = self.axes.iter_mut().zip(&mut triggers).enumerate();
-        for ((dof, (axis, triggers)), (((observable, command), measured), deviation)) in
+            .zip(outputs);
+        let axes = self
+            .axes
+            .iter_mut()
+            .zip(&mut triggers)
+            .zip(&mut self.corrected)
+            .enumerate();
+        for ((dof, ((axis, triggers), corrected)), ((observable, command), (output, deviation))) in
             axes.zip(signals)
         {
             if *observable {
                 let since = history
                     .since(past.time)
                     .filter_map(|entry| entry.command.get(dof).copied());
-                *triggers = axis.learn(command, measured, deviation, since);
+                let before = axis.predicted_state();
+                *triggers = axis.learn(command, *output, deviation, since);
+                let moved = axis.predicted_state() - before;
+                *corrected += if moved.is_finite() { moved } else { 0.0 };
             }
         }
         triggers
@@ -208,7 +278,8 @@ impl HysteresisReduction {
     }
 
     /// Where the instrument should be in a frame captured at `captured_at` in s, and how sure that
-    /// is: the prediction and what the last images corrected it by. It says where to look and no more.
+    /// is: the prediction and what the last images corrected it by. It says where to look, and to the weighted
+    /// estimation where to start.
     ///
     /// None beyond the history.
     pub fn expectation(&self, captured_at: f64) -> Option<Belief> {
@@ -224,6 +295,17 @@ impl HysteresisReduction {
     pub fn play(&self) -> PerDof<Play> {
         self.axes.each_ref().map(Axis::play)
     }
+}
+
+/// What an image said.
+struct Seen {
+    estimate: StateEstimate,
+    used: [bool; 2],
+    predicted_features: [f64; 4],
+    state_deviation: PerDof<f64>,
+    /// What the estimators of the slack are told, and its standard deviation.
+    output: PerDof<f64>,
+    output_deviation: PerDof<f64>,
 }
 
 /// Px^2.

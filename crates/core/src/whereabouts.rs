@@ -1,28 +1,34 @@
 //! Where the instrument is, to the best of the loop's knowledge: for looking, not for learning.
 
 use crate::dof::PerDof;
-use crate::error::{ConfigError, require_positive};
+use crate::error::{ConfigError, require_non_negative, require_positive};
 use crate::history::Entry;
 use crate::linear::square;
 use crate::posture::Belief;
 use crate::state::StateEstimate;
+use crate::weighted::WeightedEstimate;
 
 /// One linear step from far away misses by a part of itself.
 const STEP_ERROR: f64 = 0.25;
+/// What an image does to the belief's deviation of which a marker was left out: it makes nothing surer. Were the
+/// belief wrong, it would otherwise refuse every image to come.
+const DOUBT: f64 = 1.25;
 
 /// What the last images said, per DOF, and how it has aged.
 ///
 /// ```text
-/// state = q + (q_hat - q)_last
-/// deviation^2 = deviation_last^2 + (travel - travel_last)^2,  at most start_deviation^2
+/// state = q + (q_hat - q)_last - (what images have moved q by since)
+/// deviation^2 = deviation_last^2 + rest_deviation^2 + (travel - travel_last)^2,  at most start_deviation^2
 /// ```
 ///
 /// with the travel of the command, forth and back: whatever the slack does, the tip has moved no
-/// farther than the command. `deviation_last` has the image's own and a quarter of the correction, which was
-/// one linear step.
+/// farther than the command, but for `rest_deviation`. `deviation_last` has the image's own and, of the linear
+/// step of Eq. (16), a quarter of the correction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Whereabouts {
     start_deviation: PerDof<f64>,
+    rest_deviation: PerDof<f64>,
+    /// `q_hat - q`, and what images had moved q by when it was taken.
     correction: PerDof<f64>,
     /// At the last image that determined the DOF.
     deviation: PerDof<f64>,
@@ -30,16 +36,22 @@ pub struct Whereabouts {
 }
 
 impl Whereabouts {
-    /// Before the first image: at the prediction, with these standard deviations (3,) [m, rad, rad].
+    /// Before the first image: at the prediction, with `start_deviation` (3,); between two images an
+    /// idle tip moves by `rest_deviation` (3,); standard deviations [m, rad, rad].
     ///
     /// # Errors
-    /// A value is not a finite number above 0.
-    pub fn new(start_deviation: PerDof<f64>) -> Result<Self, ConfigError> {
-        for value in start_deviation {
-            require_positive("start_deviation", value)?;
+    /// A start deviation is not a finite number above 0, or another not one from 0 on.
+    pub fn new(
+        start_deviation: PerDof<f64>,
+        rest_deviation: PerDof<f64>,
+    ) -> Result<Self, ConfigError> {
+        for (start, rest) in start_deviation.into_iter().zip(rest_deviation) {
+            require_positive("start_deviation", start)?;
+            require_non_negative("rest_deviation", rest)?;
         }
         Ok(Self {
             start_deviation,
+            rest_deviation,
             correction: [0.0; 3],
             deviation: start_deviation,
             travel: [0.0; 3],
@@ -53,40 +65,65 @@ impl Whereabouts {
             deviation: self.start_deviation,
         };
         let known = self.correction.iter().zip(self.deviation).zip(self.travel);
+        let then = past.corrected.iter().zip(past.travel);
         let now = belief
             .state
             .iter_mut()
             .zip(&mut belief.deviation)
-            .zip(past.travel);
-        for (((state, deviation), travel), ((correction, last), travel_last)) in now.zip(known) {
-            *state += correction;
-            let moved = (travel - travel_last).abs();
-            *deviation = deviation.min(libm::sqrt(square(last) + square(moved)));
+            .zip(self.rest_deviation);
+        for (
+            (((state, deviation), rest), (corrected, travel)),
+            ((correction, last), travel_last),
+        ) in now.zip(then).zip(known)
+        {
+            *state += correction - corrected;
+            let moved = square(rest) + square(travel - travel_last);
+            *deviation = deviation.min(libm::sqrt(square(last) + moved));
         }
         belief
     }
 
-    /// Takes in what an image determined.
+    /// Takes in what one linear step determined.
     pub(crate) fn learn(&mut self, past: &Entry, estimate: &StateEstimate, deviation: PerDof<f64>) {
-        let seen = estimate
-            .observable
-            .iter()
-            .zip(estimate.state)
-            .zip(deviation);
-        let then = past.predicted_state.iter().zip(past.travel);
-        let known = self
+        let mut own = deviation;
+        let seen = estimate.state.iter().zip(past.predicted_state);
+        for (own, (state, predicted)) in own.iter_mut().zip(seen) {
+            *own = libm::sqrt(square(*own) + square(STEP_ERROR * (state - predicted)));
+        }
+        self.set(past, estimate.state, own, estimate.observable);
+    }
+
+    /// Takes in what was most probable.
+    pub(crate) fn settle(&mut self, past: &Entry, seen: &WeightedEstimate, left_out: bool) {
+        let deviation = if left_out {
+            self.at(past).deviation.map(|value| DOUBT * value)
+        } else {
+            seen.deviation
+        };
+        self.set(past, seen.estimate.state, deviation, [true; 3]);
+    }
+
+    fn set(
+        &mut self,
+        past: &Entry,
+        state: PerDof<f64>,
+        deviation: PerDof<f64>,
+        known: PerDof<bool>,
+    ) {
+        let now = state.iter().zip(deviation).zip(known);
+        let then = past.predicted_state.iter().zip(past.corrected);
+        let mine = self
             .correction
             .iter_mut()
             .zip(&mut self.deviation)
-            .zip(&mut self.travel);
-        for (
-            (((correction, last), travel_last), (predicted, travel)),
-            ((observable, state), own),
-        ) in known.zip(then).zip(seen)
+            .zip(self.travel.iter_mut().zip(past.travel));
+        for ((((correction, last), (travel_last, travel)), (predicted, corrected)), new) in
+            mine.zip(then).zip(now)
         {
-            if *observable && own.is_finite() {
-                *correction = state - predicted;
-                *last = libm::sqrt(square(own) + square(STEP_ERROR * *correction));
+            let ((state, deviation), known) = new;
+            if known && deviation.is_finite() {
+                *correction = state - predicted + corrected;
+                *last = deviation;
                 *travel_last = travel;
             }
         }

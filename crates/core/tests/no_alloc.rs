@@ -7,7 +7,8 @@ use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use tautscope_core::{
     AdaptiveAxis, AdaptiveSettings, Axis, Camera, Compensator, ContactTest, Estimator,
     FeatureModel, History, HysteresisReduction, Instrument, LeadLaw, OffsetPrior, PerDof, Play,
-    Pose, StateEstimator, Status, Triggers, Whereabouts,
+    Pose, StateEstimation, StateEstimator, Status, Triggers, WeightedEstimator, WeightedSettings,
+    Whereabouts,
 };
 
 #[global_allocator]
@@ -49,7 +50,6 @@ fn adaptive() -> PerDof<Axis> {
                 moved: 3.0 * unit,
                 tolerance: 0.25,
             },
-            marker_deviation: 0.3,
             model_deviation: unit,
             gain_limit: 5.0,
             tremor_time: 0.15,
@@ -60,7 +60,19 @@ fn adaptive() -> PerDof<Axis> {
     [axis(0.4e-3), axis(0.04), axis(0.02)]
 }
 
-fn reduction(axes: PerDof<Axis>) -> HysteresisReduction {
+fn weighted(outlier_distance: f64) -> StateEstimation {
+    let watch = StateEstimator::new([1.0; 3]).unwrap();
+    let settings = WeightedSettings {
+        marker_deviation: 0.3,
+        model_deviation: 0.3,
+        sideways_deviation: 0.3e-3,
+        outlier_distance,
+        steps: 8,
+    };
+    StateEstimation::Weighted(WeightedEstimator::new(watch, settings).unwrap())
+}
+
+fn reduction(axes: PerDof<Axis>, estimation: StateEstimation) -> HysteresisReduction {
     let distortion = [-0.18, 0.05, 0.001, -0.001, -0.005, 0.0, 0.0, 0.0];
     let model = FeatureModel::new(
         Instrument::new(18.5e-3, 5e-3, 15e-3, 1.75e-3, 4e-3).unwrap(),
@@ -70,16 +82,18 @@ fn reduction(axes: PerDof<Axis>) -> HysteresisReduction {
     HysteresisReduction::new(
         axes,
         model,
-        StateEstimator::new([1.0; 3]).unwrap(),
+        estimation,
         History::new(2.0, 0.005).unwrap(),
-        Whereabouts::new([5e-3, 0.6, 0.5]).unwrap(),
+        Whereabouts::new([5e-3, 0.6, 0.5], [2e-4, 0.02, 0.01]).unwrap(),
     )
 }
 
 #[test]
 fn step_and_image_update_do_not_allocate() {
-    run(reduction(article()));
-    run(reduction(adaptive()));
+    let step = StateEstimation::Article(StateEstimator::new([1.0; 3]).unwrap());
+    run(reduction(article(), step));
+    run(reduction(adaptive(), weighted(4.0)));
+    run(reduction(adaptive(), weighted(f64::INFINITY)));
 }
 
 fn run(mut reduction: HysteresisReduction) {
@@ -94,6 +108,8 @@ fn run(mut reduction: HysteresisReduction) {
                 let captured_at = time - 0.08;
                 let seen = reduction.predicted_features(captured_at);
                 let shifted = seen.map(|features| features.map(|value| value + 3.0 * wave));
+                let wrong = if tick % 80 == 0 { 300.0 } else { 0.0 };
+                let shifted = shifted.map(|[ua, va, ub, vb]| [ua, va, ub + wrong, vb]);
                 let report = reduction.on_features(shifted, None, captured_at);
                 used += u32::from(report.status == Status::Ok);
                 learnt += u32::from(report.triggers.iter().any(Triggers::any));

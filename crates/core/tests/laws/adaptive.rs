@@ -24,7 +24,6 @@ fn settings(tremor_time: f64, period: f64) -> AdaptiveSettings {
             moved: 0.1,
             tolerance: 0.25,
         },
-        marker_deviation: 0.3,
         model_deviation: 0.02,
         gain_limit: 5.0,
         tremor_time,

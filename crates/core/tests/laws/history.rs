@@ -12,6 +12,7 @@ fn entry(time: f64) -> Entry {
         time,
         command: [time, 2.0 * time, -time],
         predicted_state: [3.0 * time, time, 0.5],
+        corrected: [0.5 * time; 3],
         travel: [time; 3],
     }
 }

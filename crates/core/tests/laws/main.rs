@@ -11,6 +11,7 @@ mod lead;
 mod offset_map;
 mod play;
 mod state;
+mod weighted;
 
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;

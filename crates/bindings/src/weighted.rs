@@ -1,0 +1,139 @@
+//! `WeightedEstimator`.
+
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use tautscope_core as core;
+
+use crate::arrays::{Table, Vector, fixed, rows, same_length, square, table};
+use crate::errors;
+use crate::features::FeatureModel;
+use crate::state::StateEstimator;
+
+type Estimate<'py> = (
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<bool>>,
+    Bound<'py, PyArray1<bool>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+);
+
+type Estimates<'py> = (
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<bool>>,
+);
+
+/// The state estimate of profile `best`: weighted, iterated, outliers left out; decision 0018.
+///
+/// `marker_deviation` and `model_deviation` in px, `sideways_deviation` in m. Raises `ConfigError`.
+#[pyclass(name = "WeightedEstimator", module = "tautscope._core", frozen)]
+pub struct WeightedEstimator(pub core::WeightedEstimator);
+
+#[pymethods]
+impl WeightedEstimator {
+    #[new]
+    #[pyo3(signature = (watch, *, marker_deviation, model_deviation, sideways_deviation, outlier_distance, steps))]
+    fn new(
+        py: Python<'_>,
+        watch: &StateEstimator,
+        marker_deviation: f64,
+        model_deviation: f64,
+        sideways_deviation: f64,
+        outlier_distance: f64,
+        steps: u32,
+    ) -> PyResult<Self> {
+        let settings = core::WeightedSettings {
+            marker_deviation,
+            model_deviation,
+            sideways_deviation,
+            outlier_distance,
+            steps,
+        };
+        core::WeightedEstimator::new(watch.0, settings)
+            .map(Self)
+            .map_err(errors::config(py))
+    }
+
+    /// From a belief, state (3,) and standard deviations (3,), and features (4,) in px, two NaN for
+    /// a band that was not found, with covariance (4, 4) in `px^2`: state (3,), its deviation (3,),
+    /// observable (3,), markers used (2,), and state (3,) and deviation (3,) by the image alone.
+    ///
+    /// None where the model sees no band.
+    #[pyo3(signature = (model, belief, deviation, measured_features, covariance=None))]
+    fn estimate<'py>(
+        &self,
+        py: Python<'py>,
+        model: &FeatureModel,
+        belief: Vector<'py>,
+        deviation: Vector<'py>,
+        measured_features: Vector<'py>,
+        covariance: Option<Table<'py>>,
+    ) -> PyResult<Option<Estimate<'py>>> {
+        let covariance = covariance
+            .map(|covariance| square("covariance", &covariance))
+            .transpose()?;
+        let belief = core::Belief {
+            state: fixed("belief", &belief)?,
+            deviation: fixed("deviation", &deviation)?,
+        };
+        let found = self.0.estimate(
+            &model.0,
+            &belief,
+            fixed("measured_features", &measured_features)?,
+            covariance.as_ref(),
+        );
+        Ok(found.map(|found| {
+            let floats = |values| PyArray1::from_slice(py, values);
+            (
+                floats(&found.estimate.state),
+                floats(&found.deviation),
+                PyArray1::from_slice(py, &found.estimate.observable),
+                PyArray1::from_slice(py, &found.used),
+                floats(&found.image_state),
+                floats(&found.image_deviation),
+            )
+        }))
+    }
+
+    /// `estimate` for many beliefs (n, 3), all with one deviation (3,) and covariance (4, 4), and
+    /// features (n, 4): states (n, 3), deviations (n, 3), observable (n, 3). Where the model sees no band
+    /// the belief is given back.
+    #[pyo3(signature = (model, beliefs, deviation, measured_features, covariance=None))]
+    fn run<'py>(
+        &self,
+        py: Python<'py>,
+        model: &FeatureModel,
+        beliefs: Table<'py>,
+        deviation: Vector<'py>,
+        measured_features: Table<'py>,
+        covariance: Option<Table<'py>>,
+    ) -> PyResult<Estimates<'py>> {
+        let covariance = covariance
+            .map(|covariance| square("covariance", &covariance))
+            .transpose()?;
+        let states: Vec<[f64; 3]> = rows("beliefs", &beliefs)?;
+        let measured: Vec<[f64; 4]> = rows("measured_features", &measured_features)?;
+        same_length(py, "measured_features", measured.len(), states.len())?;
+        let deviation = fixed("deviation", &deviation)?;
+        let mut found = (Vec::new(), Vec::new(), Vec::new());
+        for (state, measured) in states.into_iter().zip(measured) {
+            let belief = core::Belief { state, deviation };
+            let one = self
+                .0
+                .estimate(&model.0, &belief, measured, covariance.as_ref());
+            let nothing = (state, deviation, [false; 3]);
+            let (state, deviation, observable) = one.map_or(nothing, |one| {
+                (one.estimate.state, one.deviation, one.estimate.observable)
+            });
+            found.0.push(state);
+            found.1.push(deviation);
+            found.2.push(observable);
+        }
+        Ok((
+            table(py, &found.0)?,
+            table(py, &found.1)?,
+            table(py, &found.2)?,
+        ))
+    }
+}

@@ -1,0 +1,383 @@
+//! The state estimate of profile `best`: weighted, iterated, and not led astray by a wrong marker.
+
+use crate::dof::{PerDof, all_finite};
+use crate::error::{ConfigError, require, require_non_negative, require_positive};
+use crate::features::FeatureModel;
+use crate::linear::{
+    Matrix, add, diagonal_of_inverse, dot, rotate, scale, solve_symmetric, square,
+};
+use crate::posture::Belief;
+use crate::state::{StateEstimate, StateEstimator, found};
+
+/// A step goes no farther, in the belief's standard deviations: bent to the other side and turned by half a turn the
+/// instrument looks the same, and a long step may end there.
+const FARTHEST: f64 = 0.7;
+/// A step is halved at most so often.
+const HALVINGS: usize = 5;
+/// Squared size of a step, in posterior standard deviations, below which there is no other.
+const SMALL: f64 = 1e-10;
+/// Where else to start, from the belief in its standard deviations, while the cost is that of a wrong marker.
+const STARTS: [PerDof<f64>; 6] = [
+    [0.0, 0.0, 1.0],
+    [0.0, 0.0, -1.0],
+    [0.0, 1.0, 0.0],
+    [0.0, -1.0, 0.0],
+    [1.0, 0.0, 0.0],
+    [-1.0, 0.0, 0.0],
+];
+const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+/// What a [`WeightedEstimator`] is set to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WeightedSettings {
+    /// Of a marker that comes without a covariance: standard deviation in px.
+    pub marker_deviation: f64,
+    /// What the model of the features is off by beyond the markers' covariance: standard deviation
+    /// in px.
+    pub model_deviation: f64,
+    /// How far the tip is displaced across the bend because the section does not bend evenly:
+    /// standard deviation in m.
+    pub sideways_deviation: f64,
+    /// Mahalanobis distance beyond which a marker is an outlier; infinite: never.
+    pub outlier_distance: f64,
+    /// Gauss-Newton steps, at most.
+    pub steps: u32,
+}
+
+/// The most probable state, given a belief and an image.
+///
+/// ```text
+/// argmin over q, w and which markers m are used
+///   sum_used |s_m - h_m(q) - g_m w|^2 / (C_m + model_deviation^2 I)
+///   + sum_j ((q_j - belief_j) / deviation_j)^2 + (w / sideways_deviation)^2
+///   + outlier_distance^2 for each marker that is not used
+/// ```
+///
+/// h as in Eqs. (9)-(11), C (2, 2) each marker's own covariance, and g how its image moves when the tip is
+/// displaced by w across the bend: two markers on a straight tip tell how far it turned,
+/// but hardly where along the section. With two markers every choice is tried, if the first, both, costs more
+/// than leaving one out, so the least is found and not a local one. By Gauss-Newton, each step halved while it
+/// makes things worse.
+///
+/// With one step, equal covariances, a belief that knows nothing, no w and no outliers it is Eq. (16).
+///
+/// Wrong in another valley than the belief's, and where both markers are wrong alike.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WeightedEstimator {
+    watch: StateEstimator,
+    settings: WeightedSettings,
+}
+
+/// What a belief and an image say together, and what the image says alone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WeightedEstimate {
+    /// The most probable state, of all DOFs; which the image determined, as [`StateEstimator`] has
+    /// it for the markers used; the innovation against the belief.
+    pub estimate: StateEstimate,
+    /// Standard deviation of the state [m, rad, rad].
+    pub deviation: PerDof<f64>,
+    /// The state without the belief [m, rad, rad]; NaN where the image does not determine it.
+    pub image_state: PerDof<f64>,
+    /// Standard deviation of that.
+    pub image_deviation: PerDof<f64>,
+    /// h(belief) in px.
+    pub predicted_features: [f64; 4],
+    /// Which markers were used.
+    pub used: [bool; 2],
+}
+
+/// A marker's place, and the rows that make its error white.
+#[derive(Clone, Copy)]
+struct Sight {
+    place: [f64; 2],
+    whitener: [[f64; 2]; 2],
+}
+
+/// The problem about one state, in units of the belief's deviations, w eliminated.
+#[derive(Clone, Copy)]
+struct Linear {
+    /// Of the image alone.
+    normal: Matrix,
+    right: PerDof<f64>,
+    /// (q - belief) / deviation.
+    away: PerDof<f64>,
+    cost: f64,
+}
+
+impl WeightedEstimator {
+    /// An estimator that watches the rank by `watch`.
+    ///
+    /// # Errors
+    /// A setting is out of range.
+    pub fn new(watch: StateEstimator, settings: WeightedSettings) -> Result<Self, ConfigError> {
+        require_positive("marker_deviation", settings.marker_deviation)?;
+        require_non_negative("model_deviation", settings.model_deviation)?;
+        require_non_negative("sideways_deviation", settings.sideways_deviation)?;
+        let outlier = settings.outlier_distance;
+        require(outlier > 0.0, "outlier_distance", outlier, "above 0")?;
+        let steps = settings.steps;
+        require(
+            (1..=100).contains(&steps),
+            "steps",
+            f64::from(steps),
+            "1 to 100",
+        )?;
+        Ok(Self { watch, settings })
+    }
+
+    /// The state estimate for features (4,) in px and their covariance (4, 4) in px^2, of which the
+    /// part between two markers is not used; None is `marker_deviation` for each. Two NaN for a band say that it was not found.
+    ///
+    /// None where the model sees no band for the belief, or something else is not finite.
+    pub fn estimate(
+        &self,
+        model: &FeatureModel,
+        belief: &Belief,
+        measured: [f64; 4],
+        covariance: Option<&[[f64; 4]; 4]>,
+    ) -> Option<WeightedEstimate> {
+        let sights = self.sights(measured, covariance);
+        let (state, used) = self.most_probable(model, belief, sights)?;
+        let [a, b] = used;
+        let [ua, va, ub, vb] = measured;
+        let shown = |used: bool, value: f64| if used { value } else { f64::NAN };
+        let kept = [shown(a, ua), shown(a, va), shown(b, ub), shown(b, vb)];
+
+        let prediction = model.predict(state)?;
+        let watched = self.watch.estimate(state, &prediction, kept);
+        let linear = self.linear(model, belief, state, only(used, sights))?;
+        let variance = diagonal_of_inverse(linear.whole())?;
+        let (image_state, image_deviation) = linear.alone(belief, state, watched.observable);
+        let start = model.predict(belief.state)?;
+        let mut innovation = measured;
+        for (value, predicted) in innovation.iter_mut().zip(start.features) {
+            *value -= predicted;
+        }
+        Some(WeightedEstimate {
+            estimate: StateEstimate {
+                state,
+                innovation,
+                ..watched
+            },
+            deviation: times(variance.map(libm::sqrt), belief.deviation),
+            image_state,
+            image_deviation,
+            predicted_features: start.features,
+            used,
+        })
+    }
+
+    fn sights(&self, measured: [f64; 4], covariance: Option<&[[f64; 4]; 4]>) -> [Option<Sight>; 2] {
+        let model = square(self.settings.model_deviation);
+        let own = square(self.settings.marker_deviation);
+        let ((a, b, c), (d, e, f)) = match covariance {
+            Some(&[[a, b, _, _], [_, c, _, _], [_, _, d, e], [_, _, _, f]]) => {
+                ((a, b, c), (d, e, f))
+            }
+            None => ((own, 0.0, own), (own, 0.0, own)),
+        };
+        let [ua, va, ub, vb] = measured;
+        let [found_a, found_b] = found(measured);
+        let sight = |place: [f64; 2], uu: f64, uv: f64, vv: f64| {
+            // The inverse of Cholesky's factor.
+            let first = 1.0 / libm::sqrt(uu + model);
+            let mixed = uv * first;
+            let second = 1.0 / libm::sqrt(vv + model - mixed * mixed);
+            let whitener = [[first, 0.0], [-second * mixed * first, second]];
+            let finite = all_finite(place) && first.is_finite() && second.is_finite();
+            finite.then_some(Sight { place, whitener })
+        };
+        let seen_a = if found_a {
+            sight([ua, va], a, b, c)
+        } else {
+            None
+        };
+        let seen_b = if found_b {
+            sight([ub, vb], d, e, f)
+        } else {
+            None
+        };
+        [seen_a, seen_b]
+    }
+
+    /// The state, and which markers it rests on.
+    fn most_probable(
+        &self,
+        model: &FeatureModel,
+        belief: &Belief,
+        sights: [Option<Sight>; 2],
+    ) -> Option<(PerDof<f64>, [bool; 2])> {
+        let seen = sights.map(|sight| sight.is_some());
+        let price = square(self.settings.outlier_distance);
+        let (mut state, mut cost) = self.minimum(model, belief, belief.state, sights)?;
+        for start in STARTS {
+            if cost <= price {
+                break;
+            }
+            let start = add(belief.state, 1.0, times(start, belief.deviation));
+            if let Some((other, less)) = self.minimum(model, belief, start, sights)
+                && less < cost
+            {
+                (state, cost) = (other, less);
+            }
+        }
+        let mut used = seen;
+        let fewer = [[true, false], [false, true], [false, false]];
+        for choice in fewer {
+            let kept = both(seen, choice);
+            let left_out = seen.iter().zip(kept).filter(|(seen, kept)| *seen != kept);
+            let fine = left_out.fold(0.0, |sum, _| sum + price);
+            // A choice that leaves nothing out is the first once more.
+            if kept == seen || cost <= fine {
+                continue;
+            }
+            if let Some((other, rest)) =
+                self.minimum(model, belief, belief.state, only(kept, sights))
+                && rest + fine < cost
+            {
+                (state, cost, used) = (other, rest + fine, kept);
+            }
+        }
+        Some((state, used))
+    }
+
+    fn minimum(
+        &self,
+        model: &FeatureModel,
+        belief: &Belief,
+        start: PerDof<f64>,
+        sights: [Option<Sight>; 2],
+    ) -> Option<(PerDof<f64>, f64)> {
+        let mut state = start;
+        let mut here = self.linear(model, belief, state, sights)?;
+        for _ in 0..self.settings.steps {
+            let Some(step) = here.step() else { break };
+            let size = dot(step, rotate(&here.whole(), step));
+            let longest = step
+                .iter()
+                .fold(0.0, |most: f64, value| most.max(value.abs()));
+            let mut share = 1.0_f64.min(FARTHEST / longest);
+            let better = (0..HALVINGS).find_map(|_| {
+                let trial = add(state, share, times(step, belief.deviation));
+                share /= 2.0;
+                let there = self.linear(model, belief, trial, sights)?;
+                (there.cost <= here.cost).then_some((trial, there))
+            });
+            let Some((trial, there)) = better else { break };
+            (state, here) = (trial, there);
+            if size < SMALL {
+                break;
+            }
+        }
+        Some((state, here.cost))
+    }
+
+    fn linear(
+        &self,
+        model: &FeatureModel,
+        belief: &Belief,
+        state: PerDof<f64>,
+        sights: [Option<Sight>; 2],
+    ) -> Option<Linear> {
+        let prediction = model.predict(state)?;
+        let sideways = scaled(self.settings.sideways_deviation, model.sideways(state)?);
+        let [q1, q2, q3] = state;
+        let [b1, b2, b3] = belief.state;
+        let [d1, d2, d3] = belief.deviation;
+        let away = [(q1 - b1) / d1, (q2 - b2) / d2, (q3 - b3) / d3];
+        let [c1, c2, c3] = prediction.columns;
+        let [c1, c2, c3] = [scaled(d1, c1), scaled(d2, c2), scaled(d3, c3)];
+
+        let mut normal = [[0.0; 3]; 3];
+        let mut right = [0.0; 3];
+        let mut cost = dot(away, away);
+        // Of w: its own normal entry, those with q, and its right side.
+        let (mut own, mut with, mut pull) = (1.0, [0.0; 3], 0.0);
+        let halves = |[a0, a1, b0, b1]: [f64; 4]| [[a0, a1], [b0, b1]];
+        let [features, c1, c2, c3, sideways] =
+            [prediction.features, c1, c2, c3, sideways].map(halves);
+        let columns = c1.iter().zip(c2).zip(c3).zip(sideways);
+        for ((sight, predicted), (((c1, c2), c3), g)) in sights.iter().zip(features).zip(columns) {
+            let Some(Sight { place, whitener }) = sight else {
+                continue;
+            };
+            let ([u, v], [pu, pv]) = (*place, predicted);
+            for [first, second] in *whitener {
+                let white = |[u, v]: [f64; 2]| first * u + second * v;
+                let row = [white(*c1), white(c2), white(c3)];
+                let (misfit, g) = (white([u - pu, v - pv]), white(g));
+                for (line, entry) in normal.iter_mut().zip(row) {
+                    *line = add(*line, entry, row);
+                }
+                right = add(right, misfit, row);
+                with = add(with, g, row);
+                own += g * g;
+                pull += g * misfit;
+                cost += misfit * misfit;
+            }
+        }
+        for (line, entry) in normal.iter_mut().zip(with) {
+            *line = add(*line, -entry / own, with);
+        }
+        Some(Linear {
+            normal,
+            right: add(right, -pull / own, with),
+            away,
+            cost: cost - pull * pull / own,
+        })
+        .filter(|linear| linear.cost.is_finite())
+    }
+}
+
+impl Linear {
+    /// Of image and belief.
+    fn whole(&self) -> Matrix {
+        let mut whole = self.normal;
+        for (line, unit) in whole.iter_mut().zip(IDENTITY) {
+            *line = add(*line, 1.0, unit);
+        }
+        whole
+    }
+
+    fn step(&self) -> Option<PerDof<f64>> {
+        solve_symmetric(self.whole(), add(self.right, -1.0, self.away))
+    }
+
+    /// State and deviation from the image alone, the DOFs it does not determine left where they are.
+    fn alone(
+        &self,
+        belief: &Belief,
+        state: PerDof<f64>,
+        observable: PerDof<bool>,
+    ) -> (PerDof<f64>, PerDof<f64>) {
+        let mask = observable.map(|seen| if seen { 1.0 } else { 0.0 });
+        let mut normal = self.normal;
+        for ((line, unit), own) in normal.iter_mut().zip(IDENTITY).zip(mask) {
+            *line = add(scale(own, times(*line, mask)), 1.0 - own, unit);
+        }
+        let solved = solve_symmetric(normal, times(self.right, mask));
+        let (Some(step), Some(variance)) = (solved, diagonal_of_inverse(normal)) else {
+            return ([f64::NAN; 3], [f64::NAN; 3]);
+        };
+        let seen = observable.map(|seen| if seen { 1.0 } else { f64::NAN });
+        let moved = add(state, 1.0, times(step, belief.deviation));
+        let deviation = times(variance.map(libm::sqrt), belief.deviation);
+        (times(moved, seen), times(deviation, seen))
+    }
+}
+
+fn only([a, b]: [bool; 2], [sight_a, sight_b]: [Option<Sight>; 2]) -> [Option<Sight>; 2] {
+    [sight_a.filter(|_| a), sight_b.filter(|_| b)]
+}
+
+fn both([a, b]: [bool; 2], [c, d]: [bool; 2]) -> [bool; 2] {
+    [a && c, b && d]
+}
+
+fn scaled(factor: f64, column: [f64; 4]) -> [f64; 4] {
+    column.map(|value| factor * value)
+}
+
+fn times([a, b, c]: PerDof<f64>, [x, y, z]: PerDof<f64>) -> PerDof<f64> {
+    [a * x, b * y, c * z]
+}
