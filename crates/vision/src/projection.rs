@@ -1,9 +1,15 @@
 //! The discriminant in fixed point, for one pixel format.
 
+use std::ops::Range;
+
 use fearless_simd::Simd;
 
+use crate::columns::BLOCK;
 use crate::format::{Consumer, Group, Row};
-use crate::triples;
+use crate::triples::{self, Pairs};
+
+/// Pixels that are scanned together where the compiler vectorises: whole blocks.
+pub(crate) const AT_ONCE: usize = 4 * BLOCK;
 
 /// Largest magnitude of a projected pixel: four of them still fit an `i16`, which the low-pass needs.
 pub(crate) const RANGE: f64 = 8190.0;
@@ -18,7 +24,7 @@ pub(crate) struct Projection {
     weights: [i16; 3],
     offset: i32,
     threshold: i16,
-    /// What [`may_exceed`](Self::may_exceed) goes by.
+    /// What [`Scan`] goes by.
     coarse_weights: [i16; 3],
     coarse_level: i16,
 }
@@ -62,28 +68,69 @@ impl Projection {
 
     /// Projects a row; the result stays within +-8191.
     #[inline(always)]
-    pub(crate) fn project(&self, row: Row<'_>, projected: &mut [i16]) {
-        row.feed(Project(self, projected));
+    pub(crate) fn project<S: Simd>(&self, simd: S, row: Row<'_>, projected: &mut [i16]) {
+        let done = if let Row::Triples(bytes) = row {
+            let rounding = (self.offset, FRACTION_BITS);
+            triples::project(simd, bytes, self.weights, rounding, projected)
+        } else {
+            0
+        };
+        if let Some(rest) = projected.get_mut(done..)
+            && !rest.is_empty()
+        {
+            let columns = done..done + rest.len();
+            row.columns(columns).feed(Project(self, rest));
+        }
     }
 
-    /// Whether a pixel of a row may exceed the threshold: never false if one does.
-    ///
-    /// With W the weights, x a pixel, D > 0: a projected value exceeds the threshold exactly if
-    /// `W . x >= level`. Channels are not negative, so `ceil(W / D) . x >= W . x / D`, and a whole number that
-    /// is not below `level / D` is not below its ceiling. D is the least for which the sum fits an
-    /// `i16`, which is what makes it quick.
-    #[inline(always)]
-    pub(crate) fn may_exceed<S: Simd>(&self, simd: S, mut row: Row<'_>) -> bool {
-        if let Row::Triples(bytes) = row
-            && triples::are_quick(simd)
-        {
-            let (found, rest) = triples::reach(simd, bytes, self.coarse_weights, self.coarse_level);
-            if found || rest.is_empty() {
-                return found;
-            }
-            row = Row::Triples(rest);
+    /// Ready to look quickly for pixels that may exceed the threshold.
+    pub(crate) fn scan(&self) -> Scan {
+        Scan {
+            pairs: Pairs::new(self.coarse_weights),
+            weights: self.coarse_weights,
+            level: self.coarse_level,
         }
-        row.feed(Peak(self.coarse_weights)) >= self.coarse_level
+    }
+}
+
+/// Looks for blocks of pixels of which one may exceed the threshold: it misses none.
+///
+/// With W the weights, x a pixel, D > 0: a projected value exceeds the threshold exactly if
+/// `W . x >= level`. Channels are not negative, so `ceil(W / D) . x >= W . x / D`, and a whole number that
+/// is not below `level / D` is not below its ceiling. D is the least for which the sum fits an
+/// `i16`, which is what makes it quick; then the weights fit a byte.
+#[derive(Clone, Debug)]
+pub(crate) struct Scan {
+    pairs: Pairs,
+    weights: [i16; 3],
+    level: i16,
+}
+
+impl Scan {
+    /// Sets the bits of such blocks of a row of at least [`AT_ONCE`] pixels, in words that are 0.
+    #[inline(always)]
+    pub(crate) fn mark<S: Simd>(&self, simd: S, row: Row<'_>, width: usize, hot: &mut [u64]) {
+        if let Row::Triples(bytes) = row
+            && self.pairs.mark(simd, bytes, self.level, hot)
+        {
+            return;
+        }
+        let reaches =
+            |columns: Range<usize>| row.columns(columns).feed(Peak(self.weights)) >= self.level;
+        for start in (0..width).step_by(AT_ONCE) {
+            // What is cut short costs more than what was looked at in part before.
+            let tested = start.min(width - AT_ONCE);
+            if !reaches(tested..tested + AT_ONCE) {
+                continue;
+            }
+            for start in (start..width.min(start + AT_ONCE)).step_by(BLOCK) {
+                if reaches(start..width.min(start + BLOCK))
+                    && let Some(word) = hot.get_mut(start / BLOCK / 64)
+                {
+                    *word |= 1 << (start / BLOCK % 64);
+                }
+            }
+        }
     }
 }
 

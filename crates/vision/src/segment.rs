@@ -13,12 +13,9 @@ use fearless_simd::{Level, dispatch, prelude::*};
 use crate::columns::{BLOCK, Columns};
 use crate::format::Row;
 use crate::lowpass::LowPass;
-use crate::projection::Projection;
+use crate::projection::{AT_ONCE, Projection};
 use crate::runs::Runs;
 use crate::{ColorDiscriminant, Frame, Window};
-
-/// Pixels scanned together: whole blocks.
-const CHUNK: usize = 4 * BLOCK;
 
 /// Gives the rows of a frame as marker or not, top to bottom, in memory that does not grow with the
 /// image's height.
@@ -34,6 +31,7 @@ pub struct Segmenter {
 #[derive(Clone, Debug)]
 struct Rows {
     passes: Vec<LowPass>,
+    /// With a value more on either side.
     projected: Vec<i16>,
     /// By block, a bit for each pixel: which are marker; kept up within the spans alone.
     marker: Vec<u64>,
@@ -71,72 +69,78 @@ impl Segmenter {
         &mut self,
         frame: &impl Frame,
         window: Window,
-        mut visit: impl FnMut(usize, Runs<'_>),
+        visit: impl FnMut(usize, Runs<'_>),
     ) {
         let window = window.within(frame);
-        if window.left == window.right || window.top == window.bottom {
-            return;
+        if window.left < window.right && window.top < window.bottom {
+            let projection = self.discriminant.projection(frame.format());
+            let Self { columns, rows, .. } = self;
+            dispatch!(self.level, simd => sweep(simd, columns, rows, frame, window, &projection, visit));
         }
-        let delay = self.rows.passes.len();
-        // What is wrong at the edge of what is read comes one pixel farther in with each pass.
-        let read = window.grown(delay, frame);
-        let columns = frame.format().whole_groups(read.left..read.right);
-        let columns = whole_blocks(columns, frame.width());
-        let (width, height) = (columns.len(), read.bottom - read.top);
-        let line = |n: usize| Row::of(frame, read.top + n, columns.clone());
-        let projection = self.discriminant.projection(frame.format());
-        self.columns.start(width);
-        self.rows.start(width);
-        // A pixel seen in row n matters to the filtered rows n - delay to n + delay, and these need the
-        // rows from n - 2 delay to n + 2 delay: scanning goes so far ahead.
-        let reach = 2 * delay;
-        // So narrow a window is mostly marker: looking first would cost more than it spares.
-        let looks = width >= CHUNK;
-        if !looks {
-            (0..width.div_ceil(BLOCK)).for_each(|block| self.columns.see(block, 0, usize::MAX));
-        }
-        for n in (if looks { 0 } else { reach })..height + delay + reach {
-            if looks && n < height {
-                let (row, seen) = (line(n), &mut self.columns);
-                let found = |block| seen.see(block, n.saturating_sub(reach), n + reach + 1);
-                dispatch!(self.level, simd => scan(simd, row, width, &projection, found));
-            }
-            let Some(step) = n.checked_sub(reach) else {
-                continue;
+    }
+}
+
+/// Takes the rows of a window that is not empty through the scan and the filters.
+#[inline(always)]
+fn sweep<S: Simd>(
+    simd: S,
+    seen: &mut Columns,
+    rows: &mut Rows,
+    frame: &impl Frame,
+    window: Window,
+    projection: &Projection,
+    mut visit: impl FnMut(usize, Runs<'_>),
+) {
+    let delay = rows.passes.len();
+    // What is wrong at the edge of what is read comes one pixel farther in with each pass.
+    let read = window.grown(delay, frame);
+    let columns = frame.format().whole_groups(read.left..read.right);
+    let columns = whole_blocks(columns, frame.width());
+    let (width, height) = (columns.len(), read.bottom - read.top);
+    let line = |n: usize| Row::of(frame, read.top + n, columns.clone());
+    // A pixel seen in row n matters to the filtered rows n - delay to n + delay, and these need the
+    // rows from n - 2 delay to n + 2 delay: scanning goes so far ahead.
+    let reach = 2 * delay;
+    seen.start(width, 2 * reach + 1);
+    rows.start(width);
+    // So narrow a window is mostly marker: looking first would cost more than it spares.
+    let scan = (width >= AT_ONCE).then(|| projection.scan());
+    let ahead = if scan.is_some() { reach } else { 0 };
+    for n in 0..height + delay + ahead {
+        seen.add_row(|hot| match &scan {
+            Some(scan) if n < height => scan.mark(simd, line(n), width, hot),
+            Some(_) => {}
+            None => hot.fill(u64::MAX),
+        });
+        let Some(step) = n.checked_sub(ahead) else {
+            continue;
+        };
+        seen.find_spans(|fresh| rows.forget(&fresh));
+        if !seen.spans().is_empty() {
+            let place = Place {
+                source: (step < height).then(|| line(step)),
+                step,
+                height,
             };
-            let Self {
-                columns: seen,
-                rows,
-                ..
-            } = self;
-            seen.find_spans(step, |fresh| rows.forget(&fresh));
-            if !seen.spans().is_empty() {
-                let place = Place {
-                    source: (step < height).then(|| line(step)),
-                    step,
-                    height,
-                };
-                let spans = seen.spans();
-                dispatch!(self.level, simd => filter(simd, rows, spans, place, &projection));
-            }
+            filter(simd, rows, seen.spans(), place, projection);
             rows.advance();
-            let Some(v) = step.checked_sub(delay).map(|v| v + read.top) else {
-                continue;
-            };
-            if (window.top..window.bottom).contains(&v) {
-                let within = [window.left, window.right];
-                visit(
-                    v,
-                    Runs::new(&rows.marker, seen.spans(), columns.start, within),
-                );
-            }
+        }
+        let Some(v) = step.checked_sub(delay).map(|v| v + read.top) else {
+            continue;
+        };
+        if (window.top..window.bottom).contains(&v) {
+            let within = [window.left, window.right];
+            visit(
+                v,
+                Runs::new(&rows.marker, seen.spans(), columns.start, within),
+            );
         }
     }
 }
 
 impl Rows {
     fn start(&mut self, width: usize) {
-        self.projected.resize(width, 0);
+        self.projected.resize(width + 2, 0);
         self.marker.resize(width.div_ceil(BLOCK), 0);
         for pass in &mut self.passes {
             pass.prepare(width);
@@ -163,25 +167,6 @@ fn whole_blocks(columns: Range<usize>, width: usize) -> Range<usize> {
     start..start + wanted
 }
 
-/// Finds the blocks of a row in which a pixel may exceed the threshold.
-#[inline(always)]
-fn scan<S: Simd>(
-    simd: S,
-    row: Row<'_>,
-    width: usize,
-    projection: &Projection,
-    mut found: impl FnMut(usize),
-) {
-    for start in (0..width).step_by(CHUNK) {
-        // A chunk that is cut short costs more than one that was looked at in part before.
-        let tested = start.min(width - CHUNK);
-        if projection.may_exceed(simd, row.columns(tested..tested + CHUNK)) {
-            let end = (start + CHUNK).min(width);
-            (start / BLOCK..end.div_ceil(BLOCK)).for_each(&mut found);
-        }
-    }
-}
-
 /// Where the pass over the frame is.
 #[derive(Clone, Copy)]
 struct Place<'a> {
@@ -206,15 +191,18 @@ fn filter<S: Simd>(
     projection: &Projection,
 ) {
     for span in spans {
-        let Some(values) = rows.projected.get_mut(span.clone()) else {
+        let padded = rows.projected.get_mut(span.start..span.end + 2);
+        let Some(padded) = padded else { continue };
+        let Some(values) = padded.get_mut(1..=span.len()) else {
             continue;
         };
         if let Some(source) = source {
-            projection.project(source.columns(span.clone()), values);
+            projection.project(simd, source.columns(span.clone()), values);
         }
         for (n, pass) in (0..=step).rev().zip(&mut rows.passes) {
-            pass.step(values, span, n, height);
+            pass.step(simd, padded, span, n, height);
         }
+        let values = padded.get(1..=span.len()).unwrap_or_default();
         let words = rows.marker.iter_mut().skip(span.start / BLOCK);
         for (word, values) in words.zip(values.chunks(BLOCK)) {
             *word = above(simd, values, projection.threshold());
