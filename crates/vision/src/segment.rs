@@ -12,7 +12,7 @@ use fearless_simd::{Level, dispatch, prelude::*};
 
 use crate::columns::{BLOCK, Columns};
 use crate::format::Row;
-use crate::lowpass::LowPass;
+use crate::lowpass::{At, LowPass, repeat_ends};
 use crate::projection::{AT_ONCE, Projection};
 use crate::runs::Runs;
 use crate::{ColorDiscriminant, Frame, Window};
@@ -31,8 +31,8 @@ pub struct Segmenter {
 #[derive(Clone, Debug)]
 struct Rows {
     passes: Vec<LowPass>,
-    /// With a value more on either side.
-    projected: Vec<i16>,
+    /// What goes into a pass and what comes out, with a value more on either side.
+    values: [Vec<i16>; 2],
     /// By block, a bit for each pixel: which are marker; kept up within the spans alone.
     marker: Vec<u64>,
 }
@@ -46,7 +46,7 @@ impl Segmenter {
             columns: Columns::default(),
             rows: Rows {
                 passes: vec![LowPass::default(); smoothing],
-                projected: Vec::new(),
+                values: [const { Vec::new() }; 2],
                 marker: Vec::new(),
             },
         }
@@ -106,16 +106,24 @@ fn sweep<S: Simd>(
     // So narrow a window is mostly marker: looking first would cost more than it spares.
     let scan = (width >= AT_ONCE).then(|| projection.scan());
     let ahead = if scan.is_some() { reach } else { 0 };
+    if scan.is_none() {
+        seen.add_row(|hot| hot.fill(u64::MAX));
+        seen.find_spans(|fresh| rows.forget(&fresh));
+    }
     for n in 0..height + delay + ahead {
-        seen.add_row(|hot| match &scan {
-            Some(scan) if n < height => scan.mark(simd, line(n), width, hot),
-            Some(_) => {}
-            None => hot.fill(u64::MAX),
-        });
+        if let Some(scan) = &scan {
+            seen.add_row(|hot| {
+                if n < height {
+                    scan.mark(simd, line(n), width, hot);
+                }
+            });
+        }
         let Some(step) = n.checked_sub(ahead) else {
             continue;
         };
-        seen.find_spans(|fresh| rows.forget(&fresh));
+        if scan.is_some() {
+            seen.find_spans(|fresh| rows.forget(&fresh));
+        }
         if !seen.spans().is_empty() {
             let place = Place {
                 source: (step < height).then(|| line(step)),
@@ -140,16 +148,19 @@ fn sweep<S: Simd>(
 
 impl Rows {
     fn start(&mut self, width: usize) {
-        self.projected.resize(width + 2, 0);
-        self.marker.resize(width.div_ceil(BLOCK), 0);
+        let blocks = width.div_ceil(BLOCK);
+        for values in &mut self.values {
+            values.resize(blocks * BLOCK + 2, 0);
+        }
+        self.marker.resize(blocks, 0);
         for pass in &mut self.passes {
-            pass.prepare(width);
+            pass.prepare(blocks);
         }
     }
 
     fn forget(&mut self, columns: &Range<usize>) {
         for pass in &mut self.passes {
-            pass.forget(columns);
+            pass.forget(&blocks_of(columns));
         }
     }
 
@@ -191,44 +202,49 @@ fn filter<S: Simd>(
     projection: &Projection,
 ) {
     for span in spans {
-        let padded = rows.projected.get_mut(span.start..span.end + 2);
-        let Some(padded) = padded else { continue };
-        let Some(values) = padded.get_mut(1..=span.len()) else {
+        let blocks = blocks_of(span);
+        let padded = span.start..blocks.end * BLOCK + 2;
+        let [values, filtered] = rows.values.each_mut();
+        let Some(mut values) = values.get_mut(padded.clone()) else {
             continue;
         };
-        if let Some(source) = source {
+        let Some(mut filtered) = filtered.get_mut(padded) else {
+            continue;
+        };
+        if let (Some(source), Some(values)) = (source, values.get_mut(1..=span.len())) {
             projection.project(simd, source.columns(span.clone()), values);
         }
         for (n, pass) in (0..=step).rev().zip(&mut rows.passes) {
-            pass.step(simd, padded, span, n, height);
+            repeat_ends(values, span.len());
+            pass.step(simd, values, filtered, &blocks, At { n, height });
+            (values, filtered) = (filtered, values);
         }
-        let values = padded.get(1..=span.len()).unwrap_or_default();
-        let words = rows.marker.iter_mut().skip(span.start / BLOCK);
-        for (word, values) in words.zip(values.chunks(BLOCK)) {
+        let values = values.get(1..).unwrap_or_default().as_chunks().0;
+        let words = rows.marker.get_mut(blocks).unwrap_or_default();
+        for (word, values) in words.iter_mut().zip(values) {
             *word = above(simd, values, projection.threshold());
+        }
+        // What lies beyond the image is no pixel.
+        let beyond = words.len() * BLOCK - span.len();
+        if let Some(word) = words.last_mut() {
+            *word &= u64::MAX >> beyond;
         }
     }
 }
 
+/// The blocks of columns that begin with one.
+fn blocks_of(columns: &Range<usize>) -> Range<usize> {
+    columns.start / BLOCK..columns.end.div_ceil(BLOCK)
+}
+
 /// Bit i is whether value i exceeds the threshold.
 #[inline(always)]
-fn above<S: Simd>(simd: S, values: &[i16], threshold: i16) -> u64 {
+fn above<S: Simd>(simd: S, values: &[i16; BLOCK], threshold: i16) -> u64 {
     let level = S::i16s::splat(simd, threshold);
     let lanes = S::i16s::LEN;
-    let vectors = values.chunks_exact(lanes);
-    let mut word = 0;
-    for (value, u) in vectors
-        .remainder()
-        .iter()
-        .zip(values.len() / lanes * lanes..)
-    {
-        word |= u64::from(*value > threshold) << u;
-    }
-    for (index, vector) in vectors.enumerate() {
-        let bits = S::i16s::from_slice(simd, vector)
-            .simd_gt(level)
-            .to_bitmask();
-        word |= bits << (index * lanes);
-    }
-    word
+    let vectors = values.chunks_exact(lanes).enumerate();
+    vectors.fold(0, |word, (index, vector)| {
+        let vector = S::i16s::from_slice(simd, vector);
+        word | vector.simd_gt(level).to_bitmask() << (index * lanes)
+    })
 }

@@ -95,16 +95,12 @@ fn mark<S: Simd, const N: usize>(
 ) {
     let weights = weights.map(|both| both.map(|one| S::i8s::from_slice(simd, &one)));
     let level = S::i16s::splat(simd, level);
-    let reaches = |block: &[u8; BYTES]| {
-        let mut peak = S::i16s::splat(simd, i16::MIN);
-        for part in block.chunks_exact(3 * N) {
-            for (start, [here, further]) in starts(N).into_iter().zip(weights) {
-                let load = |at: usize| S::u8s::from_slice(simd, &part[at..at + N]);
-                let sum = dot(load(start), here) + dot(load(start + 2), further);
-                peak = peak.max(sum);
-            }
-        }
-        u64::from(peak.simd_ge(level).any_true())
+    let reaches = |block| {
+        u64::from(
+            peak::<S, N>(simd, block, &weights, &dot)
+                .simd_ge(level)
+                .any_true(),
+        )
     };
     let (blocks, rest) = bytes.as_chunks::<BYTES>();
     for (word, blocks) in hot.iter_mut().zip(blocks.chunks(64)) {
@@ -118,6 +114,25 @@ fn mark<S: Simd, const N: usize>(
     {
         *word |= reaches(last) << (blocks.len() % 64);
     }
+}
+
+/// By lane the largest sum of a block's pixels.
+#[inline(always)]
+fn peak<S: Simd, const N: usize>(
+    simd: S,
+    block: &[u8; BYTES],
+    weights: &[[S::i8s; 2]; 3],
+    dot: &impl Fn(S::u8s, S::i8s) -> S::i16s,
+) -> S::i16s {
+    let mut peak = S::i16s::splat(simd, i16::MIN);
+    for part in block.chunks_exact(3 * N) {
+        for (start, [here, further]) in starts(N).into_iter().zip(weights) {
+            let load = |at: usize| S::u8s::from_slice(simd, &part[at..at + N]);
+            let sum = dot(load(start), *here) + dot(load(start + 2), *further);
+            peak = peak.max(sum);
+        }
+    }
+    peak
 }
 
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
