@@ -88,21 +88,23 @@ fn cut<'a>(row: &'a mut [Block], blocks: &Range<usize>) -> &'a mut [Block] {
 #[inline(always)]
 fn step<S: Simd>(simd: S, row: &[i16], [above, here, below, filtered]: [&mut Block; 4], at: At) {
     let lanes = S::i16s::LEN;
-    let load = |values: &[i16]| S::i16s::from_slice(simd, values);
     for start in (0..BLOCK).step_by(lanes) {
-        let place = start..start + lanes;
-        let side = |by: usize| load(&row[start + by..start + by + lanes]);
+        let end = start + lanes;
+        let at_it = S::i16s::from_slice(simd, &here[start..end]);
         let under = if at.n < at.height {
-            mean::<S>(side(0), side(1), side(2))
+            let left = S::i16s::from_slice(simd, &row[start..end]);
+            let middle = S::i16s::from_slice(simd, &row[start + 1..end + 1]);
+            let right = S::i16s::from_slice(simd, &row[start + 2..end + 2]);
+            mean::<S>(left, middle, right)
         } else {
-            load(&here[place.clone()])
+            at_it
         };
+        under.store_slice(&mut below[start..end]);
         if at.n == 0 {
-            under.store_slice(&mut here[place.clone()]);
+            under.store_slice(&mut here[start..end]);
         }
-        under.store_slice(&mut below[place.clone()]);
-        let (over, at_it) = (load(&above[place.clone()]), load(&here[place.clone()]));
-        mean::<S>(over, at_it, under).store_slice(&mut filtered[place]);
+        let over = S::i16s::from_slice(simd, &above[start..end]);
+        mean::<S>(over, at_it, under).store_slice(&mut filtered[start..end]);
     }
 }
 

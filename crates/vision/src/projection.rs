@@ -4,12 +4,13 @@ use std::ops::Range;
 
 use fearless_simd::Simd;
 
+use crate::PixelFormat;
 use crate::columns::BLOCK;
 use crate::format::{Consumer, Group, Row};
 use crate::triples::{self, Pairs};
 
 /// Pixels that are scanned together where the compiler vectorises: whole blocks.
-pub(crate) const AT_ONCE: usize = 4 * BLOCK;
+const AT_ONCE: usize = 4 * BLOCK;
 
 /// Largest magnitude of a projected pixel: four of them still fit an `i16`, which the low-pass needs.
 pub(crate) const RANGE: f64 = 8190.0;
@@ -19,13 +20,14 @@ const FRACTION_BITS: u32 = 9;
 
 /// `(w . x + offset) / 512` to the nearest, halves upwards, for the three channels x of a pixel, and
 /// the threshold it is held against.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(crate) struct Projection {
     weights: [i16; 3],
     offset: i32,
     threshold: i16,
-    /// What [`Scan`] goes by.
+    /// What [`mark`](Self::mark) goes by.
     coarse_weights: [i16; 3],
+    pairs: Pairs,
     coarse_level: i16,
 }
 
@@ -52,11 +54,13 @@ impl Projection {
         // Upward rounding adds less than 1 to each of the three.
         let divisor = 255 * side(1).max(side(-1)) / (limit - 3 * 255) + 1;
         let level = ((i32::from(threshold) + 1) << FRACTION_BITS) - offset;
+        let coarse_weights = wide.map(|weight| clamped_i16(div_ceil(weight, divisor)));
         Self {
             weights,
             offset,
             threshold,
-            coarse_weights: wide.map(|weight| clamped_i16(div_ceil(weight, divisor))),
+            coarse_weights,
+            pairs: Pairs::new(coarse_weights),
             coarse_level: clamped_i16(div_ceil(level, divisor)),
         }
     }
@@ -83,40 +87,35 @@ impl Projection {
         }
     }
 
-    /// Ready to look quickly for pixels that may exceed the threshold.
-    pub(crate) fn scan(&self) -> Scan {
-        Scan {
-            pairs: Pairs::new(self.coarse_weights),
-            weights: self.coarse_weights,
-            level: self.coarse_level,
+    /// How many pixels a row must have at least for [`mark`](Self::mark) to be quicker than the exact way.
+    #[inline(always)]
+    pub(crate) fn worth_a_look<S: Simd>(&self, simd: S, format: PixelFormat) -> usize {
+        let triples = matches!(format, PixelFormat::Bgr | PixelFormat::Rgb);
+        if triples && triples::are_quick(simd) {
+            BLOCK
+        } else {
+            AT_ONCE
         }
     }
-}
 
-/// Looks for blocks of pixels of which one may exceed the threshold: it misses none.
-///
-/// With W the weights, x a pixel, D > 0: a projected value exceeds the threshold exactly if
-/// `W . x >= level`. Channels are not negative, so `ceil(W / D) . x >= W . x / D`, and a whole number that
-/// is not below `level / D` is not below its ceiling. D is the least for which the sum fits an
-/// `i16`, which is what makes it quick; then the weights fit a byte.
-#[derive(Clone, Debug)]
-pub(crate) struct Scan {
-    pairs: Pairs,
-    weights: [i16; 3],
-    level: i16,
-}
-
-impl Scan {
-    /// Sets the bits of such blocks of a row of at least [`AT_ONCE`] pixels, in words that are 0.
+    /// Sets the bits of the blocks of a row in which a pixel may exceed the threshold, in words that are 0: it
+    /// misses none. The row has the pixels that make it [worth it](Self::worth_a_look).
+    ///
+    /// With W the weights, x a pixel, D > 0: a projected value exceeds the threshold exactly if
+    /// `W . x >= level`. Channels are not negative, so `ceil(W / D) . x >= W . x / D`, and a whole number that
+    /// is not below `level / D` is not below its ceiling. D is the least for which the sum fits an
+    /// `i16`, which is what makes it quick; then a weight fits a byte.
     #[inline(always)]
     pub(crate) fn mark<S: Simd>(&self, simd: S, row: Row<'_>, width: usize, hot: &mut [u64]) {
         if let Row::Triples(bytes) = row
-            && self.pairs.mark(simd, bytes, self.level, hot)
+            && triples::are_quick(simd)
         {
+            self.pairs.mark(simd, bytes, self.coarse_level, hot);
             return;
         }
-        let reaches =
-            |columns: Range<usize>| row.columns(columns).feed(Peak(self.weights)) >= self.level;
+        let reaches = |columns: Range<usize>| {
+            row.columns(columns).feed(Peak(self.coarse_weights)) >= self.coarse_level
+        };
         for start in (0..width).step_by(AT_ONCE) {
             // What is cut short costs more than what was looked at in part before.
             let tested = start.min(width - AT_ONCE);

@@ -13,9 +13,9 @@ use fearless_simd::{Level, dispatch, prelude::*};
 use crate::columns::{BLOCK, Columns};
 use crate::format::Row;
 use crate::lowpass::{At, LowPass, repeat_ends};
-use crate::projection::{AT_ONCE, Projection};
+use crate::projection::Projection;
 use crate::runs::Runs;
-use crate::{ColorDiscriminant, Frame, Window};
+use crate::{ColorDiscriminant, Frame, PixelFormat, Window};
 
 /// Gives the rows of a frame as marker or not, top to bottom, in memory that does not grow with the
 /// image's height.
@@ -23,6 +23,8 @@ use crate::{ColorDiscriminant, Frame, Window};
 pub struct Segmenter {
     level: Level,
     discriminant: ColorDiscriminant,
+    /// For the format of the last frame.
+    prepared: Option<(PixelFormat, Projection)>,
     columns: Columns,
     rows: Rows,
 }
@@ -43,6 +45,7 @@ impl Segmenter {
         Self {
             level: Level::new(),
             discriminant,
+            prepared: None,
             columns: Columns::default(),
             rows: Rows {
                 passes: vec![LowPass::default(); smoothing],
@@ -72,11 +75,15 @@ impl Segmenter {
         visit: impl FnMut(usize, Runs<'_>),
     ) {
         let window = window.within(frame);
-        if window.left < window.right && window.top < window.bottom {
-            let projection = self.discriminant.projection(frame.format());
-            let Self { columns, rows, .. } = self;
-            dispatch!(self.level, simd => sweep(simd, columns, rows, frame, window, &projection, visit));
+        if window.left == window.right || window.top == window.bottom {
+            return;
         }
+        let format = frame.format();
+        let old = self.prepared.take().filter(|(same, _)| *same == format);
+        let new = || (format, self.discriminant.projection(format));
+        let (_, projection) = self.prepared.insert(old.unwrap_or_else(new));
+        let Self { columns, rows, .. } = self;
+        dispatch!(self.level, simd => sweep(simd, columns, rows, frame, window, projection, visit));
     }
 }
 
@@ -103,25 +110,25 @@ fn sweep<S: Simd>(
     let reach = 2 * delay;
     seen.start(width, 2 * reach + 1);
     rows.start(width);
-    // So narrow a window is mostly marker: looking first would cost more than it spares.
-    let scan = (width >= AT_ONCE).then(|| projection.scan());
-    let ahead = if scan.is_some() { reach } else { 0 };
-    if scan.is_none() {
+    // In a window so narrow, looking first would cost more than it spares.
+    let looks = width >= projection.worth_a_look(simd, frame.format());
+    let ahead = if looks { reach } else { 0 };
+    if !looks {
         seen.add_row(|hot| hot.fill(u64::MAX));
         seen.find_spans(|fresh| rows.forget(&fresh));
     }
     for n in 0..height + delay + ahead {
-        if let Some(scan) = &scan {
+        if looks {
             seen.add_row(|hot| {
                 if n < height {
-                    scan.mark(simd, line(n), width, hot);
+                    projection.mark(simd, line(n), width, hot);
                 }
             });
         }
         let Some(step) = n.checked_sub(ahead) else {
             continue;
         };
-        if scan.is_some() {
+        if looks {
             seen.find_spans(|fresh| rows.forget(&fresh));
         }
         if !seen.spans().is_empty() {
@@ -242,9 +249,10 @@ fn blocks_of(columns: &Range<usize>) -> Range<usize> {
 fn above<S: Simd>(simd: S, values: &[i16; BLOCK], threshold: i16) -> u64 {
     let level = S::i16s::splat(simd, threshold);
     let lanes = S::i16s::LEN;
-    let vectors = values.chunks_exact(lanes).enumerate();
-    vectors.fold(0, |word, (index, vector)| {
-        let vector = S::i16s::from_slice(simd, vector);
-        word | vector.simd_gt(level).to_bitmask() << (index * lanes)
-    })
+    let mut word = 0;
+    for (vector, start) in values.chunks_exact(lanes).zip((0..).step_by(lanes)) {
+        let above = S::i16s::from_slice(simd, vector).simd_gt(level);
+        word |= above.to_bitmask() << start;
+    }
+    word
 }

@@ -41,26 +41,31 @@ impl Pairs {
         }
     }
 
-    /// Sets the bit of each block in which `weights . x >= level` for a pixel x, in words that are 0; false
-    /// if it cannot. A last block that is cut short counts what it lacks from the one before it.
+    /// Sets the bit of each block in which `weights . x >= level` for a pixel x, in words that are 0. A last
+    /// block that is cut short counts what it lacks from the one before it.
+    ///
+    /// Does nothing where it [is not quick](are_quick).
     #[inline(always)]
-    pub(crate) fn mark<S: Simd>(&self, simd: S, bytes: &[u8], level: i16, hot: &mut [u64]) -> bool {
+    pub(crate) fn mark<S: Simd>(&self, simd: S, bytes: &[u8], level: i16, hot: &mut [u64]) {
         #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-        {
-            if let Some(wide) = simd.level().as_avx512() {
-                mark(wide, bytes, &self.of_64, level, hot, |a, b| {
-                    dot_64(wide, a, b)
-                });
-                return true;
-            }
-            if let Some(wide) = simd.level().as_avx2() {
-                mark(wide, bytes, &self.of_32, level, hot, |a, b| {
-                    dot_32(wide, a, b)
-                });
-                return true;
-            }
+        if let Some(wide) = simd.level().as_avx512() {
+            mark(wide, bytes, &self.of_64, level, hot);
+        } else if let Some(wide) = simd.level().as_avx2() {
+            mark(wide, bytes, &self.of_32, level, hot);
         }
+        #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
         let _ = (simd, bytes, level, hot);
+    }
+}
+
+/// Whether [`Pairs::mark`] is for this machine.
+#[inline(always)]
+pub(crate) fn are_quick<S: Simd>(simd: S) -> bool {
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    return simd.level().as_avx2().is_some();
+    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+    {
+        let _ = simd;
         false
     }
 }
@@ -84,59 +89,50 @@ fn pairs<const N: usize>(weights: [i16; 3]) -> Weights<N> {
     })
 }
 
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
 #[inline(always)]
-fn mark<S: Simd, const N: usize>(
+fn mark<S: Dot, const N: usize>(
     simd: S,
     bytes: &[u8],
     weights: &Weights<N>,
     level: i16,
     hot: &mut [u64],
-    dot: impl Fn(S::u8s, S::i8s) -> S::i16s,
 ) {
-    let weights = weights.map(|both| both.map(|one| S::i8s::from_slice(simd, &one)));
     let level = S::i16s::splat(simd, level);
-    let reaches = |block| {
-        u64::from(
-            peak::<S, N>(simd, block, &weights, &dot)
-                .simd_ge(level)
-                .any_true(),
-        )
-    };
     let (blocks, rest) = bytes.as_chunks::<BYTES>();
     for (word, blocks) in hot.iter_mut().zip(blocks.chunks(64)) {
         for (bit, block) in blocks.iter().enumerate() {
-            *word |= reaches(block) << bit;
+            let reaches = peak(simd, block, weights).simd_ge(level).any_true();
+            *word |= u64::from(reaches) << bit;
         }
     }
     if !rest.is_empty()
         && let Some(last) = bytes.last_chunk()
         && let Some(word) = hot.get_mut(blocks.len() / 64)
     {
-        *word |= reaches(last) << (blocks.len() % 64);
+        let reaches = peak(simd, last, weights).simd_ge(level).any_true();
+        *word |= u64::from(reaches) << (blocks.len() % 64);
     }
 }
 
 /// By lane the largest sum of a block's pixels.
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
 #[inline(always)]
-fn peak<S: Simd, const N: usize>(
-    simd: S,
-    block: &[u8; BYTES],
-    weights: &[[S::i8s; 2]; 3],
-    dot: &impl Fn(S::u8s, S::i8s) -> S::i16s,
-) -> S::i16s {
+fn peak<S: Dot, const N: usize>(simd: S, block: &[u8; BYTES], weights: &Weights<N>) -> S::i16s {
     let mut peak = S::i16s::splat(simd, i16::MIN);
     for part in block.chunks_exact(3 * N) {
         for (start, [here, further]) in starts(N).into_iter().zip(weights) {
-            let load = |at: usize| S::u8s::from_slice(simd, &part[at..at + N]);
-            let sum = dot(load(start), *here) + dot(load(start + 2), *further);
-            peak = peak.max(sum);
+            let bytes = S::u8s::from_slice(simd, &part[start..start + N]);
+            let sum = simd.dot(bytes, S::i8s::from_slice(simd, here));
+            let bytes = S::u8s::from_slice(simd, &part[start + 2..start + 2 + N]);
+            peak = peak.max(sum + simd.dot(bytes, S::i8s::from_slice(simd, further)));
         }
     }
     peak
 }
 
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-mod dots {
+mod dot {
     #[cfg(target_arch = "x86")]
     use std::arch::x86::{_mm256_maddubs_epi16, _mm512_maddubs_epi16};
     #[cfg(target_arch = "x86_64")]
@@ -146,28 +142,44 @@ mod dots {
         Avx2, Avx512, i8x32, i8x64, i16x16, i16x32, kernel, prelude::*, u8x32, u8x64,
     };
 
+    /// Bytes times weights, summed in pairs; no sum may leave an `i16`.
+    pub(super) trait Dot: Simd {
+        fn dot(self, bytes: Self::u8s, weights: Self::i8s) -> Self::i16s;
+    }
+
+    impl Dot for Avx512 {
+        #[inline(always)]
+        fn dot(self, bytes: u8x64<Self>, weights: i8x64<Self>) -> i16x32<Self> {
+            dot_64(self, bytes, weights)
+        }
+    }
+
+    impl Dot for Avx2 {
+        #[inline(always)]
+        fn dot(self, bytes: u8x32<Self>, weights: i8x32<Self>) -> i16x16<Self> {
+            dot_32(self, bytes, weights)
+        }
+    }
+
     kernel!(
         #[inline(always)]
-        pub(super) fn dot_64(simd: Avx512, a: u8x64<Avx512>, b: i8x64<Avx512>) -> i16x32<Avx512> {
+        fn dot_64(simd: Avx512, a: u8x64<Avx512>, b: i8x64<Avx512>) -> i16x32<Avx512> {
             _mm512_maddubs_epi16(a.into(), b.into()).simd_into(simd)
         }
     );
 
     kernel!(
         #[inline(always)]
-        pub(super) fn dot_32(simd: Avx2, a: u8x32<Avx2>, b: i8x32<Avx2>) -> i16x16<Avx2> {
+        fn dot_32(simd: Avx2, a: u8x32<Avx2>, b: i8x32<Avx2>) -> i16x16<Avx2> {
             _mm256_maddubs_epi16(a.into(), b.into()).simd_into(simd)
         }
     );
 }
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-use dots::{dot_32, dot_64};
+use dot::Dot;
 
 /// Pixels in a vector of 32-bit sums.
 const LANES: usize = 16;
-
-/// Where in a block's bytes the pixels of each sum lie, and how far into what is read there.
-const QUARTERS: [(usize, usize); 4] = [(0, 0), (48, 0), (96, 0), (BYTES - 64, 16)];
 
 /// By pixel: its first and second byte, then its third, each made 16 bits; 64 and above is 0.
 const PICKS: [[[u8; 64]; 2]; 2] = [picks(0), picks(16)];
@@ -184,34 +196,51 @@ pub(crate) fn project<S: Simd>(
     if S::u8s::LEN != 64 {
         return 0;
     }
-    let [first, second, third] = weights;
-    let pair = |even: i16, odd: i16| {
-        let lanes: [i16; 2 * LANES] = std::array::from_fn(|i| if i % 2 == 0 { even } else { odd });
-        i16x32::from_slice(simd, &lanes)
-    };
-    let (here, further) = (pair(first, second), pair(third, 0));
-    let offset = i32x16::splat(simd, offset);
-    let zero = u8x64::splat(simd, 0);
+    // The third goes with a zero.
+    let mut lanes = [[0; 2 * LANES]; 2];
+    for lane in 0..LANES {
+        [
+            lanes[0][2 * lane],
+            lanes[0][2 * lane + 1],
+            lanes[1][2 * lane],
+        ] = weights;
+    }
+    let rest = (
+        i16x32::from_slice(simd, &lanes[0]),
+        i16x32::from_slice(simd, &lanes[1]),
+        i32x16::splat(simd, offset),
+    );
     let blocks = bytes.as_chunks::<BYTES>().0;
     let outputs = projected.as_chunks_mut::<BLOCK>().0;
     for (block, output) in blocks.iter().zip(&mut *outputs) {
-        let sums = QUARTERS.map(|(at, shift)| {
-            let pixels = u8x64::from_slice(simd, &block[at..at + 64]);
-            let [two, one] = PICKS[shift / 16].map(|picks| {
-                let picks = u8x64::from_slice(simd, &picks);
-                let lanes: i16x32<S> = pixels.concat_swizzle_dyn(zero, picks).bitcast();
-                lanes
-            });
-            let sum = simd.pairwise_dot_product_i16x32(two, here)
-                + simd.pairwise_dot_product_i16x32(one, further);
-            (sum + offset) >> bits
-        });
-        let [a, b, c, d] = sums;
         let (left, right) = output.split_at_mut(2 * LANES);
-        simd.narrow_i32x16(a, b).store_slice(left);
-        simd.narrow_i32x16(c, d).store_slice(right);
+        let [a, b] = [sums(simd, block, 0, rest), sums(simd, block, 1, rest)];
+        simd.narrow_i32x16(a >> bits, b >> bits).store_slice(left);
+        let [a, b] = [sums(simd, block, 2, rest), sums(simd, block, 3, rest)];
+        simd.narrow_i32x16(a >> bits, b >> bits).store_slice(right);
     }
     blocks.len().min(outputs.len()) * BLOCK
+}
+
+/// The weighted sums of a quarter of a block: `here` are the weights of the first two channels, `further` that of
+/// the third.
+#[inline(always)]
+fn sums<S: Simd>(
+    simd: S,
+    block: &[u8; BYTES],
+    quarter: usize,
+    (here, further, offset): (i16x32<S>, i16x32<S>, i32x16<S>),
+) -> i32x16<S> {
+    // The last is read from farther left, so as not to read beyond the block.
+    let start = (quarter * 3 * LANES).min(BYTES - 64);
+    let [two, one] = &PICKS[usize::from(quarter == 3)];
+    let pixels = u8x64::from_slice(simd, &block[start..start + 64]);
+    let zero = u8x64::splat(simd, 0);
+    let two = pixels.concat_swizzle_dyn(zero, u8x64::from_slice(simd, two));
+    let one = pixels.concat_swizzle_dyn(zero, u8x64::from_slice(simd, one));
+    simd.pairwise_dot_product_i16x32(two.bitcast(), here)
+        + simd.pairwise_dot_product_i16x32(one.bitcast(), further)
+        + offset
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "below 65")]
@@ -277,9 +306,11 @@ mod tests {
             for simd in levels() {
                 let mut hot = [0];
                 let can = dispatch!(simd, simd => {
-                    Pairs::new(weights).mark(simd, &bytes, level, &mut hot)
+                    Pairs::new(weights).mark(simd, &bytes, level, &mut hot);
+                    are_quick(simd)
                 });
-                let marked: Vec<bool> = (0..expected.len()).map(|bit| hot[0] >> bit & 1 == 1).collect();
+                let marked: Vec<bool> =
+                    (0..expected.len()).map(|bit| hot[0] >> bit & 1 == 1).collect();
                 prop_assert!(!can || marked == expected, "{:?}: {:?}", simd, marked);
                 prop_assert!(can || hot == [0]);
             }
