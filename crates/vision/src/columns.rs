@@ -54,7 +54,11 @@ impl Columns {
         }
         let row = self.newest..self.newest + self.words;
         let row = self.seen.get_mut(row).unwrap_or_default();
-        row.fill(0);
+        if let [word] = row {
+            *word = 0;
+        } else {
+            row.fill(0);
+        }
         see(row);
         let quiet = row.iter().all(|word| *word == 0);
         self.quiet = if quiet {
@@ -72,8 +76,7 @@ impl Columns {
         if self.spans.is_empty() && self.quiet.saturating_mul(self.words) >= remembered {
             return;
         }
-        self.join_rows();
-        if self.wanted != self.worked {
+        if self.join_rows() {
             self.change_spans(fresh);
         }
     }
@@ -83,24 +86,37 @@ impl Columns {
         &self.spans
     }
 
-    fn join_rows(&mut self) {
-        self.wanted.fill(0);
-        let mut before = 0;
-        for index in 0..self.words {
-            let rows = self.seen.iter().skip(index).step_by(self.words);
-            let word = rows.fold(0, |all, word| all | word);
-            if let Some(left) = index.checked_sub(1).and_then(|i| self.wanted.get_mut(i)) {
-                *left |= word << 63;
-            }
-            if let Some(wanted) = self.wanted.get_mut(index) {
-                *wanted = word | word << 1 | word >> 1 | before;
-            }
-            before = word >> 63;
-        }
+    /// What is wanted; whether that is not what is worked.
+    #[inline(always)]
+    fn join_rows(&mut self) -> bool {
         let blocks = self.width.div_ceil(BLOCK);
-        if let Some(last) = self.wanted.last_mut() {
-            *last &= u64::MAX >> ((64 - blocks % 64) % 64);
+        let (mut before, mut here) = (0, self.joined(0));
+        let mut changed = false;
+        for index in 0..self.words {
+            let after = self.joined(index + 1);
+            let mut word = here | here << 1 | here >> 1 | before >> 63 | after << 63;
+            if index + 1 == self.words {
+                word &= u64::MAX >> ((64 - blocks % 64) % 64);
+            }
+            (before, here) = (here, after);
+            if let (Some(wanted), Some(worked)) =
+                (self.wanted.get_mut(index), self.worked.get(index))
+            {
+                *wanted = word;
+                changed |= word != *worked;
+            }
         }
+        changed
+    }
+
+    /// This word of all rows.
+    #[inline(always)]
+    fn joined(&self, index: usize) -> u64 {
+        if index >= self.words {
+            return 0;
+        }
+        let rows = self.seen.iter().skip(index).step_by(self.words);
+        rows.fold(0, |all, word| all | word)
     }
 
     fn change_spans(&mut self, mut fresh: impl FnMut(Range<usize>)) {

@@ -93,7 +93,7 @@ fn step<S: Simd>(simd: S, row: &[i16], [above, here, below, filtered]: [&mut Blo
         let at_it = S::i16s::from_slice(simd, &here[start..end]);
         let under = if at.n < at.height {
             let left = S::i16s::from_slice(simd, &row[start..end]);
-            let middle = S::i16s::from_slice(simd, &row[start + 1..end + 1]);
+            let middle = S::i16s::from_slice(simd, &row[start + 1..=end]);
             let right = S::i16s::from_slice(simd, &row[start + 2..end + 2]);
             mean::<S>(left, middle, right)
         } else {

@@ -55,13 +55,14 @@ impl Projection {
         let divisor = 255 * side(1).max(side(-1)) / (limit - 3 * 255) + 1;
         let level = ((i32::from(threshold) + 1) << FRACTION_BITS) - offset;
         let coarse_weights = wide.map(|weight| clamped_i16(div_ceil(weight, divisor)));
+        let coarse_level = clamped_i16(div_ceil(level, divisor));
         Self {
             weights,
             offset,
             threshold,
             coarse_weights,
-            pairs: Pairs::new(coarse_weights),
-            coarse_level: clamped_i16(div_ceil(level, divisor)),
+            pairs: Pairs::new(coarse_weights, coarse_level),
+            coarse_level,
         }
     }
 
@@ -87,19 +88,8 @@ impl Projection {
         }
     }
 
-    /// How many pixels a row must have at least for [`mark`](Self::mark) to be quicker than the exact way.
-    #[inline(always)]
-    pub(crate) fn worth_a_look<S: Simd>(&self, simd: S, format: PixelFormat) -> usize {
-        let triples = matches!(format, PixelFormat::Bgr | PixelFormat::Rgb);
-        if triples && triples::are_quick(simd) {
-            BLOCK
-        } else {
-            AT_ONCE
-        }
-    }
-
     /// Sets the bits of the blocks of a row in which a pixel may exceed the threshold, in words that are 0: it
-    /// misses none. The row has the pixels that make it [worth it](Self::worth_a_look).
+    /// misses none. The row has the pixels that make it [worth it](worth_a_look).
     ///
     /// With W the weights, x a pixel, D > 0: a projected value exceeds the threshold exactly if
     /// `W . x >= level`. Channels are not negative, so `ceil(W / D) . x >= W . x / D`, and a whole number that
@@ -110,7 +100,7 @@ impl Projection {
         if let Row::Triples(bytes) = row
             && triples::are_quick(simd)
         {
-            self.pairs.mark(simd, bytes, self.coarse_level, hot);
+            self.pairs.mark(simd, bytes, hot);
             return;
         }
         let reaches = |columns: Range<usize>| {
@@ -130,6 +120,17 @@ impl Projection {
                 }
             }
         }
+    }
+}
+
+/// How many pixels a row must have at least for [`Projection::mark`] to be quicker than the exact way.
+#[inline(always)]
+pub(crate) fn worth_a_look<S: Simd>(simd: S, format: PixelFormat) -> usize {
+    let triples = matches!(format, PixelFormat::Bgr | PixelFormat::Rgb);
+    if triples && triples::are_quick(simd) {
+        BLOCK
+    } else {
+        AT_ONCE
     }
 }
 

@@ -13,7 +13,7 @@ use fearless_simd::{Level, dispatch, prelude::*};
 use crate::columns::{BLOCK, Columns};
 use crate::format::Row;
 use crate::lowpass::{At, LowPass, repeat_ends};
-use crate::projection::Projection;
+use crate::projection::{Projection, worth_a_look};
 use crate::runs::Runs;
 use crate::{ColorDiscriminant, Frame, PixelFormat, Window};
 
@@ -111,7 +111,7 @@ fn sweep<S: Simd>(
     seen.start(width, 2 * reach + 1);
     rows.start(width);
     // In a window so narrow, looking first would cost more than it spares.
-    let looks = width >= projection.worth_a_look(simd, frame.format());
+    let looks = width >= worth_a_look(simd, frame.format());
     let ahead = if looks { reach } else { 0 };
     if !looks {
         seen.add_row(|hot| hot.fill(u64::MAX));
