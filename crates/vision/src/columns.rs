@@ -45,27 +45,38 @@ impl Columns {
         self.spans.reserve(blocks.div_ceil(2));
     }
 
-    /// Takes in a row in place of the oldest: `see` sets the bits of its blocks that matter, in words that are 0.
+    /// A row in place of the oldest, all 0: the bits of the blocks that matter are to be set, then
+    /// [`end_row`](Self::end_row) called. Not a closure: one that is not inlined has no vectors.
     #[inline(always)]
-    pub(crate) fn add_row(&mut self, see: impl FnOnce(&mut [u64])) {
+    pub(crate) fn next_row(&mut self) -> &mut [u64] {
         self.newest += self.words;
         if self.newest >= self.seen.len() {
             self.newest = 0;
         }
-        let row = self.newest..self.newest + self.words;
-        let row = self.seen.get_mut(row).unwrap_or_default();
+        let row = self.row();
         if let [word] = row {
             *word = 0;
         } else {
             row.fill(0);
         }
-        see(row);
-        let quiet = row.iter().all(|word| *word == 0);
+        row
+    }
+
+    /// Takes note of whether the row has something that matters.
+    #[inline(always)]
+    pub(crate) fn end_row(&mut self) {
+        let quiet = self.row().iter().all(|word| *word == 0);
         self.quiet = if quiet {
             self.quiet.saturating_add(1)
         } else {
             0
         };
+    }
+
+    #[inline(always)]
+    fn row(&mut self) -> &mut [u64] {
+        let row = self.newest..self.newest + self.words;
+        self.seen.get_mut(row).unwrap_or_default()
     }
 
     /// Finds the spans of columns, maximal and left to right: the blocks that matter in the rows that are
@@ -156,7 +167,9 @@ mod tests {
             columns.start(width, remembered);
             let mut before = vec![false; width];
             for n in 0..rows.len() {
-                columns.add_row(|words| rows[n].iter().for_each(|b| words[b / 64] |= 1 << (b % 64)));
+                let words = columns.next_row();
+                rows[n].iter().for_each(|b| words[b / 64] |= 1 << (b % 64));
+                columns.end_row();
                 let mut fresh = vec![false; width];
                 columns.find_spans(|new| fresh[new].fill(true));
                 let last = rows[(n + 1).saturating_sub(remembered)..=n].concat();

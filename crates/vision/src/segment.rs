@@ -114,16 +114,17 @@ fn sweep<S: Simd>(
     let looks = width >= worth_a_look(simd, frame.format());
     let ahead = if looks { reach } else { 0 };
     if !looks {
-        seen.add_row(|hot| hot.fill(u64::MAX));
+        seen.next_row().fill(u64::MAX);
+        seen.end_row();
         seen.find_spans(|fresh| rows.forget(&fresh));
     }
     for n in 0..height + delay + ahead {
         if looks {
-            seen.add_row(|hot| {
-                if n < height {
-                    projection.mark(simd, line(n), width, hot);
-                }
-            });
+            let hot = seen.next_row();
+            if n < height {
+                projection.mark(simd, line(n), width, hot);
+            }
+            seen.end_row();
         }
         let Some(step) = n.checked_sub(ahead) else {
             continue;
