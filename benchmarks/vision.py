@@ -332,7 +332,8 @@ def main() -> None:
         if name.startswith("1920x1080")
         for row in rows_of(name, figures[name], arguments.repeats)
     ]
-    left_out = {"ViSP": visp.missing, "scikit-image": "" if measure else "not installed"}
+    hint = "not installed (uv run --with scikit-image python benchmarks/vision.py)"
+    left_out = {"ViSP": visp.missing, "scikit-image": "" if measure else hint}
     left_out = {name: why for name, why in left_out.items() if why}
     if arguments.json:
         print(json.dumps({**figures, "worst_ms": worst, "left_out": left_out, "rows": rows}))

@@ -8,6 +8,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,8 +21,7 @@ from tautscope.pixels import FrameLayout
 from tautscope.reduction import Expectation, build_feature_model
 
 
-@dataclass(frozen=True, slots=True)
-class Region:
+class Region(NamedTuple):
     """Pixels of the markers' colour that touch each other along edges or at corners.
 
     Attributes:
@@ -197,7 +197,7 @@ class MarkerDetector:
             self._layout.checked(image), states, deviation
         )
         a, b = (_evidence(row) for row in evidence.tolist())
-        found = tuple(_region(row) for row in regions.tolist())
+        found = tuple(map(Region._make, regions))
         return Detection(features, covariance, reasons, (a, b), found, discriminant)
 
     def _beliefs(
@@ -239,7 +239,7 @@ class MarkerDetector:
             FrameError: As `detect`.
         """
         regions = self._core.regions_in(self._layout.checked(image), windows)
-        return tuple(_region(row) for row in regions.tolist())
+        return tuple(map(Region._make, regions))
 
     def mask(self, image: NDArray[np.uint8]) -> NDArray[np.bool_]:
         """What is above the threshold after the low-pass, for figures: bool (height, width).
@@ -279,8 +279,3 @@ def _checked_prediction(predicted: ArrayLike | None) -> NDArray[np.float64] | No
 def _evidence(row: list[float]) -> Evidence:
     inside, coverage, own, spill, edges, bloom, surprise, u, v = row
     return Evidence(inside, coverage, own, spill, edges, bloom, surprise, (u, v))
-
-
-def _region(row: list[float]) -> Region:
-    area, u, v, left, top, width, height = row
-    return Region((u, v), int(area), (int(left), int(top), int(width), int(height)))

@@ -14,6 +14,7 @@ mod frame;
 mod instrument;
 mod play;
 mod reduction;
+mod region;
 mod render;
 mod state;
 mod vision;

@@ -26,6 +26,7 @@ use tautscope_vision::{
 use crate::arrays::table;
 use crate::features::FeatureModel;
 use crate::frame::ArrayFrame;
+use crate::region::{Described, described};
 
 /// The markers in frames; `tautscope.vision.MarkerDetector` is its public face.
 #[pyclass(frozen, module = "tautscope._core")]
@@ -96,7 +97,7 @@ impl MarkerDetector {
         })
     }
 
-    /// Features (4,), covariance (4, 4), evidence (2, 9), a reason per marker, regions (n, 7).
+    /// Features (4,), covariance (4, 4), evidence (2, 9), a reason per marker, regions.
     ///
     /// `states` (n, 3): where the instrument may be, each with the standard deviations `deviation` (3,).
     fn detect<'py>(
@@ -121,7 +122,7 @@ impl MarkerDetector {
         let (verdict, regions) = py.detach(|| {
             let mut detector = self.detector.lock().unwrap_or_else(PoisonError::into_inner);
             let (verdict, regions) = detector.recognise(&frame, &expect, &demands);
-            (verdict, rows(regions.iter().copied()))
+            (verdict, described(regions))
         });
         let [a, b] = verdict
             .reasons
@@ -145,25 +146,24 @@ impl MarkerDetector {
             table(py, &verdict.covariance)?,
             table(py, &evidence)?,
             (a, b),
-            regions.into_pyarray(py),
+            regions,
             verdict.discriminant,
         ))
     }
 
-    /// The regions in windows (left, top, right, bottom): (n, 7).
-    fn regions_in<'py>(
+    /// The regions in windows (left, top, right, bottom), as in `detect`.
+    fn regions_in(
         &self,
-        py: Python<'py>,
-        image: PyReadonlyArrayDyn<'py, u8>,
+        py: Python<'_>,
+        image: PyReadonlyArrayDyn<'_, u8>,
         windows: Vec<[usize; 4]>,
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    ) -> PyResult<Vec<Described>> {
         let frame = ArrayFrame::new(&image, self.format)?;
         let windows: Vec<Window> = windows.into_iter().map(window).collect();
-        let regions = py.detach(|| {
+        Ok(py.detach(|| {
             let mut detector = self.detector.lock().unwrap_or_else(PoisonError::into_inner);
-            rows(detector.regions_in(&frame, &windows).iter().copied())
-        });
-        Ok(regions.into_pyarray(py))
+            described(detector.regions_in(&frame, &windows))
+        }))
     }
 
     /// What passes the threshold after the low-pass, (h, w).
@@ -203,7 +203,7 @@ type Measured<'py> = (
     Bound<'py, PyArray2<f64>>,
     Bound<'py, PyArray2<f64>>,
     (String, String),
-    Bound<'py, PyArray2<f64>>,
+    Vec<Described>,
     usize,
 );
 

@@ -159,6 +159,7 @@ pub(crate) trait Consumer {
 
 impl<'a> Row<'a> {
     /// Columns of row `v` of a frame; they start at whole groups, as [`PixelFormat::whole_groups`] has them.
+    #[inline(always)]
     pub(crate) fn of(frame: &'a impl Frame, v: usize, columns: Range<usize>) -> Self {
         let (format, width, height) = (frame.format(), frame.width(), frame.height());
         let line = |index, bytes: Range<usize>| frame.line(index).get(bytes).unwrap_or_default();

@@ -2,6 +2,10 @@
 
 use std::ops::Range;
 
+use fearless_simd::prelude::*;
+
+use crate::columns::BLOCK;
+
 /// One pass of the separable 3x3 binomial filter, `[1 2 1] / 4` along rows and along columns, the
 /// image's edges replicated.
 ///
@@ -10,55 +14,63 @@ use std::ops::Range;
 /// variance 1/2 px^2 per pass.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct LowPass {
-    above: Vec<i16>,
-    here: Vec<i16>,
-    below: Vec<i16>,
+    above: Vec<Block>,
+    here: Vec<Block>,
+    below: Vec<Block>,
 }
+
+type Block = [i16; BLOCK];
 
 /// Below every projected value, and still four of it fit an `i16`.
 const NEVER: i16 = -8191;
 
+/// Where a pass over an image of `height` rows is: at row `n`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct At {
+    pub n: usize,
+    pub height: usize,
+}
+
 impl LowPass {
-    /// Makes room for rows of this width; allocates only when they grow.
-    pub(crate) fn prepare(&mut self, width: usize) {
+    /// Makes room for rows of so many blocks; allocates only when they grow.
+    pub(crate) fn prepare(&mut self, blocks: usize) {
         for row in [&mut self.above, &mut self.here, &mut self.below] {
-            row.resize(width, NEVER);
+            row.resize(blocks, [NEVER; BLOCK]);
         }
     }
 
-    /// Forgets the rows so far in these columns: as if they had been far below any threshold.
-    #[inline(always)]
-    pub(crate) fn forget(&mut self, columns: &Range<usize>) {
+    /// Forgets the rows so far in these blocks: as if they had been far below any threshold.
+    pub(crate) fn forget(&mut self, blocks: &Range<usize>) {
         for row in [&mut self.above, &mut self.here] {
-            cut(row, columns).fill(NEVER);
+            cut(row, blocks).fill([NEVER; BLOCK]);
         }
     }
 
-    /// Takes these columns of row `n` of an image of `height` rows and leaves those of the filtered
-    /// row `n - 1` in their place, the columns' ends treated as the image's edges.
+    /// Takes these blocks of row `n` and gives those of the filtered row `n - 1`.
+    ///
+    /// Both have one value more on either side. Of `row` these are read: they are to repeat what is beside
+    /// them where the image ends.
     ///
     /// To be called for `n` = 0, 1, ..., `height`, each followed by [`advance`](Self::advance). The first
-    /// call leaves nothing of use, and the last, which asks for the bottom row, does not read `row`.
-    /// Nor do calls beyond that, which leave nothing of use.
+    /// call gives nothing of use, and the last, which asks for the bottom row, does not look at `row`.
+    /// Nor do calls beyond that, which give nothing of use.
     #[inline(always)]
-    pub(crate) fn step(
+    pub(crate) fn step<S: Simd>(
         &mut self,
-        row: &mut [i16],
-        columns: &Range<usize>,
-        n: usize,
-        height: usize,
+        simd: S,
+        row: &[i16],
+        filtered: &mut [i16],
+        blocks: &Range<usize>,
+        at: At,
     ) {
         let [above, here, below] =
-            [&mut self.above, &mut self.here, &mut self.below].map(|row| cut(row, columns));
-        if n < height {
-            along(row, below);
-        } else {
-            below.copy_from_slice(here);
+            [&mut self.above, &mut self.here, &mut self.below].map(|row| cut(row, blocks));
+        let three = above.iter_mut().zip(here).zip(below);
+        let rows = row.windows(BLOCK + 2).step_by(BLOCK).zip(three);
+        let filtered = filtered.get_mut(1..).unwrap_or_default().as_chunks_mut().0;
+        for ((row, ((above, here), below)), filtered) in rows.zip(filtered) {
+            step(simd, row, [above, here, below, filtered], at);
         }
-        if n == 0 {
-            here.copy_from_slice(below);
-        }
-        combine(above, here, below, row);
     }
 
     /// Row `n` becomes row `n - 1`.
@@ -68,30 +80,42 @@ impl LowPass {
     }
 }
 
-fn cut<'a>(row: &'a mut [i16], columns: &Range<usize>) -> &'a mut [i16] {
-    row.get_mut(columns.clone()).unwrap_or_default()
+fn cut<'a>(row: &'a mut [Block], blocks: &Range<usize>) -> &'a mut [Block] {
+    row.get_mut(blocks.clone()).unwrap_or_default()
 }
 
-/// Filters along a row.
+/// One block of a step: `row` has a value more on either side.
 #[inline(always)]
-fn along(row: &[i16], filtered: &mut [i16]) {
-    let Some(last) = row.len().checked_sub(1) else {
-        return;
-    };
-    let at = |u: usize| row[u.min(last)];
-    filtered[0] = mean(at(0), at(0), at(1));
-    filtered[last] = mean(at(last.saturating_sub(1)), at(last), at(last));
-    if last > 1 {
-        let (before, after) = (&row[..last - 1], &row[2..]);
-        combine(before, &row[1..last], after, &mut filtered[1..last]);
+fn step<S: Simd>(simd: S, row: &[i16], [above, here, below, filtered]: [&mut Block; 4], at: At) {
+    let lanes = S::i16s::LEN;
+    for start in (0..BLOCK).step_by(lanes) {
+        let end = start + lanes;
+        let at_it = S::i16s::from_slice(simd, &here[start..end]);
+        let under = if at.n < at.height {
+            let left = S::i16s::from_slice(simd, &row[start..end]);
+            let middle = S::i16s::from_slice(simd, &row[start + 1..=end]);
+            let right = S::i16s::from_slice(simd, &row[start + 2..end + 2]);
+            mean::<S>(left, middle, right)
+        } else {
+            at_it
+        };
+        under.store_slice(&mut below[start..end]);
+        if at.n == 0 {
+            under.store_slice(&mut here[start..end]);
+        }
+        let over = S::i16s::from_slice(simd, &above[start..end]);
+        mean::<S>(over, at_it, under).store_slice(&mut filtered[start..end]);
     }
 }
 
-/// Filters across three rows.
+/// Makes a row of `width` values that has at least one more on either side repeat its ends there.
 #[inline(always)]
-fn combine(above: &[i16], here: &[i16], below: &[i16], filtered: &mut [i16]) {
-    for (((a, b), c), mean_of_three) in above.iter().zip(here).zip(below).zip(filtered) {
-        *mean_of_three = mean(*a, *b, *c);
+pub(crate) fn repeat_ends(row: &mut [i16], width: usize) {
+    if let [left, first, ..] = row {
+        *left = *first;
+    }
+    if let Some([last, beyond @ ..]) = row.get_mut(width..) {
+        beyond.fill(*last);
     }
 }
 
@@ -99,31 +123,41 @@ fn combine(above: &[i16], here: &[i16], below: &[i16], filtered: &mut [i16]) {
 ///
 /// Never more than the largest of the three, nor less than the least.
 #[inline(always)]
-fn mean(a: i16, b: i16, c: i16) -> i16 {
-    (a + 2 * b + c + 2) >> 2
+fn mean<S: Simd>(a: S::i16s, b: S::i16s, c: S::i16s) -> S::i16s {
+    (a + b + b + c + 2) >> 2
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use fearless_simd::{Level, dispatch};
     use proptest::prelude::*;
 
     proptest! {
         #[test]
         fn one_pass_is_the_binomial_filter_to_within_one_unit(
-            width in 1..12_usize,
-            values in prop::collection::vec(-8191..=8191_i16, 12 * 8),
+            width in 1..150_usize,
+            values in prop::collection::vec(-8191..=8191_i16, 150 * 4),
+            best in any::<bool>(),
         ) {
             let rows: Vec<&[i16]> = values.chunks_exact(width).collect();
             let height = rows.len();
+            let level = if best { Level::new() } else { Level::baseline() };
             let mut pass = LowPass::default();
-            pass.prepare(width);
+            let blocks = 0..width.div_ceil(BLOCK);
+            pass.prepare(blocks.end);
             for n in 0..=height {
-                let mut row = rows.get(n).map_or_else(|| vec![0; width], |row| row.to_vec());
-                pass.step(&mut row, &(0..width), n, height);
+                let mut row = vec![0; blocks.end * BLOCK + 2];
+                let mut filtered = row.clone();
+                if let Some(values) = rows.get(n) {
+                    row[1..=width].copy_from_slice(values);
+                    repeat_ends(&mut row, width);
+                }
+                let at = At { n, height };
+                dispatch!(level, simd => pass.step(simd, &row, &mut filtered, &blocks, at));
                 pass.advance();
                 let Some(v) = n.checked_sub(1) else { continue };
-                for (u, filtered) in row.iter().enumerate() {
+                for (u, filtered) in filtered[1..=width].iter().enumerate() {
                     let mut exact = 0;
                     for (dv, weight_v) in [(0, 1), (1, 2), (2, 1)] {
                         for (du, weight_u) in [(0, 1), (1, 2), (2, 1)] {

@@ -1,9 +1,16 @@
 //! The discriminant in fixed point, for one pixel format.
 
+use std::ops::Range;
+
 use fearless_simd::Simd;
 
+use crate::PixelFormat;
+use crate::columns::BLOCK;
 use crate::format::{Consumer, Group, Row};
-use crate::triples;
+use crate::triples::{self, Pairs};
+
+/// Pixels that are scanned together where the compiler vectorises: whole blocks.
+const AT_ONCE: usize = 4 * BLOCK;
 
 /// Largest magnitude of a projected pixel: four of them still fit an `i16`, which the low-pass needs.
 pub(crate) const RANGE: f64 = 8190.0;
@@ -13,13 +20,14 @@ const FRACTION_BITS: u32 = 9;
 
 /// `(w . x + offset) / 512` to the nearest, halves upwards, for the three channels x of a pixel, and
 /// the threshold it is held against.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(crate) struct Projection {
     weights: [i16; 3],
     offset: i32,
     threshold: i16,
-    /// What [`may_exceed`](Self::may_exceed) goes by.
+    /// What [`mark`](Self::mark) goes by.
     coarse_weights: [i16; 3],
+    pairs: Pairs,
     coarse_level: i16,
 }
 
@@ -46,12 +54,15 @@ impl Projection {
         // Upward rounding adds less than 1 to each of the three.
         let divisor = 255 * side(1).max(side(-1)) / (limit - 3 * 255) + 1;
         let level = ((i32::from(threshold) + 1) << FRACTION_BITS) - offset;
+        let coarse_weights = wide.map(|weight| clamped_i16(div_ceil(weight, divisor)));
+        let coarse_level = clamped_i16(div_ceil(level, divisor));
         Self {
             weights,
             offset,
             threshold,
-            coarse_weights: wide.map(|weight| clamped_i16(div_ceil(weight, divisor))),
-            coarse_level: clamped_i16(div_ceil(level, divisor)),
+            coarse_weights,
+            pairs: Pairs::new(coarse_weights, coarse_level),
+            coarse_level,
         }
     }
 
@@ -62,28 +73,64 @@ impl Projection {
 
     /// Projects a row; the result stays within +-8191.
     #[inline(always)]
-    pub(crate) fn project(&self, row: Row<'_>, projected: &mut [i16]) {
-        row.feed(Project(self, projected));
+    pub(crate) fn project<S: Simd>(&self, simd: S, row: Row<'_>, projected: &mut [i16]) {
+        let done = if let Row::Triples(bytes) = row {
+            let rounding = (self.offset, FRACTION_BITS);
+            triples::project(simd, bytes, self.weights, rounding, projected)
+        } else {
+            0
+        };
+        if let Some(rest) = projected.get_mut(done..)
+            && !rest.is_empty()
+        {
+            let columns = done..done + rest.len();
+            row.columns(columns).feed(Project(self, rest));
+        }
     }
 
-    /// Whether a pixel of a row may exceed the threshold: never false if one does.
+    /// Sets the bits of the blocks of a row in which a pixel may exceed the threshold, in words that are 0: it
+    /// misses none. The row has the pixels that make it [worth it](worth_a_look).
     ///
     /// With W the weights, x a pixel, D > 0: a projected value exceeds the threshold exactly if
     /// `W . x >= level`. Channels are not negative, so `ceil(W / D) . x >= W . x / D`, and a whole number that
     /// is not below `level / D` is not below its ceiling. D is the least for which the sum fits an
-    /// `i16`, which is what makes it quick.
+    /// `i16`, which is what makes it quick; then a weight fits a byte.
     #[inline(always)]
-    pub(crate) fn may_exceed<S: Simd>(&self, simd: S, mut row: Row<'_>) -> bool {
+    pub(crate) fn mark<S: Simd>(&self, simd: S, row: Row<'_>, width: usize, hot: &mut [u64]) {
         if let Row::Triples(bytes) = row
             && triples::are_quick(simd)
         {
-            let (found, rest) = triples::reach(simd, bytes, self.coarse_weights, self.coarse_level);
-            if found || rest.is_empty() {
-                return found;
-            }
-            row = Row::Triples(rest);
+            self.pairs.mark(simd, bytes, hot);
+            return;
         }
-        row.feed(Peak(self.coarse_weights)) >= self.coarse_level
+        let reaches = |columns: Range<usize>| {
+            row.columns(columns).feed(Peak(self.coarse_weights)) >= self.coarse_level
+        };
+        for start in (0..width).step_by(AT_ONCE) {
+            // What is cut short costs more than what was looked at in part before.
+            let tested = start.min(width - AT_ONCE);
+            if !reaches(tested..tested + AT_ONCE) {
+                continue;
+            }
+            for start in (start..width.min(start + AT_ONCE)).step_by(BLOCK) {
+                if reaches(start..width.min(start + BLOCK))
+                    && let Some(word) = hot.get_mut(start / BLOCK / 64)
+                {
+                    *word |= 1 << (start / BLOCK % 64);
+                }
+            }
+        }
+    }
+}
+
+/// How many pixels a row must have at least for [`Projection::mark`] to be quicker than the exact way.
+#[inline(always)]
+pub(crate) fn worth_a_look<S: Simd>(simd: S, format: PixelFormat) -> usize {
+    let triples = matches!(format, PixelFormat::Bgr | PixelFormat::Rgb);
+    if triples && triples::are_quick(simd) {
+        BLOCK
+    } else {
+        AT_ONCE
     }
 }
 

@@ -31,6 +31,7 @@ impl<'a> Runs<'a> {
     }
 
     /// Calls `found(start, end)` for each run of marker pixels; `end` is the first pixel after it.
+    #[inline(always)]
     pub fn each(self, mut found: impl FnMut(usize, usize)) {
         let [left, right] = self.within;
         let mut inside = |start: usize, end: usize| {
@@ -43,31 +44,41 @@ impl<'a> Runs<'a> {
         for span in self.spans {
             let blocks = span.start / BLOCK..span.end.div_ceil(BLOCK);
             let words = self.marker.get(blocks).unwrap_or_default();
-            let mut open = None;
-            for (word, start) in words.iter().zip((span.start..).step_by(BLOCK)) {
-                open = runs_of_word(*word, start, open, &mut inside);
-            }
-            if let Some(begun) = open {
-                inside(begun, span.end);
-            }
+            each_run_of_bits(words.iter().copied(), |start, end| {
+                inside(span.start + start, span.start + end);
+            });
         }
     }
 }
 
 /// Calls `found(start, end)` for each maximal run of items that are `inside`.
-pub fn each_run<T>(row: &[T], inside: impl Fn(&T) -> bool, mut found: impl FnMut(usize, usize)) {
-    let mut open = None;
-    for (block, start) in row.chunks(BLOCK).zip((0..).step_by(BLOCK)) {
+pub fn each_run<T>(row: &[T], inside: impl Fn(&T) -> bool, found: impl FnMut(usize, usize)) {
+    let words = row.chunks(BLOCK).map(|block| {
         let bits = block.iter().zip(0..);
-        let word = bits.fold(0, |word, (item, u)| word | u64::from(inside(item)) << u);
+        bits.fold(0, |word, (item, u)| word | u64::from(inside(item)) << u)
+    });
+    each_run_of_bits(words, found);
+}
+
+/// Calls `found(start, end)` for each maximal run of bits that are set, counted through from the first word's
+/// lowest.
+#[inline(always)]
+pub(crate) fn each_run_of_bits(
+    words: impl IntoIterator<Item = u64>,
+    mut found: impl FnMut(usize, usize),
+) {
+    let (mut open, mut start) = (None, 0);
+    for word in words {
         open = runs_of_word(word, start, open, &mut found);
+        start += BLOCK;
     }
     if let Some(begun) = open {
-        found(begun, row.len());
+        found(begun, start);
     }
 }
 
 /// Ends and begins runs where the bits of a word change; the start of a run that is left open.
+#[inline(always)]
 fn runs_of_word(
     word: u64,
     start: usize,

@@ -12,13 +12,10 @@ use fearless_simd::{Level, dispatch, prelude::*};
 
 use crate::columns::{BLOCK, Columns};
 use crate::format::Row;
-use crate::lowpass::LowPass;
-use crate::projection::Projection;
+use crate::lowpass::{At, LowPass, repeat_ends};
+use crate::projection::{Projection, worth_a_look};
 use crate::runs::Runs;
-use crate::{ColorDiscriminant, Frame, Window};
-
-/// Pixels scanned together: whole blocks.
-const CHUNK: usize = 4 * BLOCK;
+use crate::{ColorDiscriminant, Frame, PixelFormat, Window};
 
 /// Gives the rows of a frame as marker or not, top to bottom, in memory that does not grow with the
 /// image's height.
@@ -26,6 +23,8 @@ const CHUNK: usize = 4 * BLOCK;
 pub struct Segmenter {
     level: Level,
     discriminant: ColorDiscriminant,
+    /// For the format of the last frame.
+    prepared: Option<(PixelFormat, Projection)>,
     columns: Columns,
     rows: Rows,
 }
@@ -34,7 +33,8 @@ pub struct Segmenter {
 #[derive(Clone, Debug)]
 struct Rows {
     passes: Vec<LowPass>,
-    projected: Vec<i16>,
+    /// What goes into a pass and what comes out, with a value more on either side.
+    values: [Vec<i16>; 2],
     /// By block, a bit for each pixel: which are marker; kept up within the spans alone.
     marker: Vec<u64>,
 }
@@ -45,10 +45,11 @@ impl Segmenter {
         Self {
             level: Level::new(),
             discriminant,
+            prepared: None,
             columns: Columns::default(),
             rows: Rows {
                 passes: vec![LowPass::default(); smoothing],
-                projected: Vec::new(),
+                values: [const { Vec::new() }; 2],
                 marker: Vec::new(),
             },
         }
@@ -71,81 +72,103 @@ impl Segmenter {
         &mut self,
         frame: &impl Frame,
         window: Window,
-        mut visit: impl FnMut(usize, Runs<'_>),
+        visit: impl FnMut(usize, Runs<'_>),
     ) {
         let window = window.within(frame);
         if window.left == window.right || window.top == window.bottom {
             return;
         }
-        let delay = self.rows.passes.len();
-        // What is wrong at the edge of what is read comes one pixel farther in with each pass.
-        let read = window.grown(delay, frame);
-        let columns = frame.format().whole_groups(read.left..read.right);
-        let columns = whole_blocks(columns, frame.width());
-        let (width, height) = (columns.len(), read.bottom - read.top);
-        let line = |n: usize| Row::of(frame, read.top + n, columns.clone());
-        let projection = self.discriminant.projection(frame.format());
-        self.columns.start(width);
-        self.rows.start(width);
-        // A pixel seen in row n matters to the filtered rows n - delay to n + delay, and these need the
-        // rows from n - 2 delay to n + 2 delay: scanning goes so far ahead.
-        let reach = 2 * delay;
-        // So narrow a window is mostly marker: looking first would cost more than it spares.
-        let looks = width >= CHUNK;
-        if !looks {
-            (0..width.div_ceil(BLOCK)).for_each(|block| self.columns.see(block, 0, usize::MAX));
+        let format = frame.format();
+        let old = self.prepared.take().filter(|(same, _)| *same == format);
+        let new = || (format, self.discriminant.projection(format));
+        let (_, projection) = self.prepared.insert(old.unwrap_or_else(new));
+        let Self { columns, rows, .. } = self;
+        dispatch!(self.level, simd => sweep(simd, columns, rows, frame, window, projection, visit));
+    }
+}
+
+/// Takes the rows of a window that is not empty through the scan and the filters.
+#[inline(always)]
+fn sweep<S: Simd>(
+    simd: S,
+    seen: &mut Columns,
+    rows: &mut Rows,
+    frame: &impl Frame,
+    window: Window,
+    projection: &Projection,
+    mut visit: impl FnMut(usize, Runs<'_>),
+) {
+    let delay = rows.passes.len();
+    // What is wrong at the edge of what is read comes one pixel farther in with each pass.
+    let read = window.grown(delay, frame);
+    let columns = frame.format().whole_groups(read.left..read.right);
+    let columns = whole_blocks(columns, frame.width());
+    let (width, height) = (columns.len(), read.bottom - read.top);
+    let line = |n: usize| Row::of(frame, read.top + n, columns.clone());
+    // A pixel seen in row n matters to the filtered rows n - delay to n + delay, and these need the
+    // rows from n - 2 delay to n + 2 delay: scanning goes so far ahead.
+    let reach = 2 * delay;
+    seen.start(width, 2 * reach + 1);
+    rows.start(width);
+    // In a window so narrow, looking first would cost more than it spares.
+    let looks = width >= worth_a_look(simd, frame.format());
+    let ahead = if looks { reach } else { 0 };
+    if !looks {
+        seen.next_row().fill(u64::MAX);
+        seen.end_row();
+        seen.find_spans(|fresh| rows.forget(&fresh));
+    }
+    for n in 0..height + delay + ahead {
+        if looks {
+            let hot = seen.next_row();
+            if n < height {
+                projection.mark(simd, line(n), width, hot);
+            }
+            seen.end_row();
         }
-        for n in (if looks { 0 } else { reach })..height + delay + reach {
-            if looks && n < height {
-                let (row, seen) = (line(n), &mut self.columns);
-                let found = |block| seen.see(block, n.saturating_sub(reach), n + reach + 1);
-                dispatch!(self.level, simd => scan(simd, row, width, &projection, found));
-            }
-            let Some(step) = n.checked_sub(reach) else {
-                continue;
+        let Some(step) = n.checked_sub(ahead) else {
+            continue;
+        };
+        if looks {
+            seen.find_spans(|fresh| rows.forget(&fresh));
+        }
+        if !seen.spans().is_empty() {
+            let place = Place {
+                source: (step < height).then(|| line(step)),
+                step,
+                height,
             };
-            let Self {
-                columns: seen,
-                rows,
-                ..
-            } = self;
-            seen.find_spans(step, |fresh| rows.forget(&fresh));
-            if !seen.spans().is_empty() {
-                let place = Place {
-                    source: (step < height).then(|| line(step)),
-                    step,
-                    height,
-                };
-                let spans = seen.spans();
-                dispatch!(self.level, simd => filter(simd, rows, spans, place, &projection));
-            }
+            filter(simd, rows, seen.spans(), place, projection);
             rows.advance();
-            let Some(v) = step.checked_sub(delay).map(|v| v + read.top) else {
-                continue;
-            };
-            if (window.top..window.bottom).contains(&v) {
-                let within = [window.left, window.right];
-                visit(
-                    v,
-                    Runs::new(&rows.marker, seen.spans(), columns.start, within),
-                );
-            }
+        }
+        let Some(v) = step.checked_sub(delay).map(|v| v + read.top) else {
+            continue;
+        };
+        if (window.top..window.bottom).contains(&v) {
+            let within = [window.left, window.right];
+            visit(
+                v,
+                Runs::new(&rows.marker, seen.spans(), columns.start, within),
+            );
         }
     }
 }
 
 impl Rows {
     fn start(&mut self, width: usize) {
-        self.projected.resize(width, 0);
-        self.marker.resize(width.div_ceil(BLOCK), 0);
+        let blocks = width.div_ceil(BLOCK);
+        for values in &mut self.values {
+            values.resize(blocks * BLOCK + 2, 0);
+        }
+        self.marker.resize(blocks, 0);
         for pass in &mut self.passes {
-            pass.prepare(width);
+            pass.prepare(blocks);
         }
     }
 
     fn forget(&mut self, columns: &Range<usize>) {
         for pass in &mut self.passes {
-            pass.forget(columns);
+            pass.forget(&blocks_of(columns));
         }
     }
 
@@ -161,25 +184,6 @@ fn whole_blocks(columns: Range<usize>, width: usize) -> Range<usize> {
     let wanted = columns.len().next_multiple_of(BLOCK).min(width);
     let start = columns.start.min(width - wanted);
     start..start + wanted
-}
-
-/// Finds the blocks of a row in which a pixel may exceed the threshold.
-#[inline(always)]
-fn scan<S: Simd>(
-    simd: S,
-    row: Row<'_>,
-    width: usize,
-    projection: &Projection,
-    mut found: impl FnMut(usize),
-) {
-    for start in (0..width).step_by(CHUNK) {
-        // A chunk that is cut short costs more than one that was looked at in part before.
-        let tested = start.min(width - CHUNK);
-        if projection.may_exceed(simd, row.columns(tested..tested + CHUNK)) {
-            let end = (start + CHUNK).min(width);
-            (start / BLOCK..end.div_ceil(BLOCK)).for_each(&mut found);
-        }
-    }
 }
 
 /// Where the pass over the frame is.
@@ -206,41 +210,50 @@ fn filter<S: Simd>(
     projection: &Projection,
 ) {
     for span in spans {
-        let Some(values) = rows.projected.get_mut(span.clone()) else {
+        let blocks = blocks_of(span);
+        let padded = span.start..blocks.end * BLOCK + 2;
+        let [values, filtered] = rows.values.each_mut();
+        let Some(mut values) = values.get_mut(padded.clone()) else {
             continue;
         };
-        if let Some(source) = source {
-            projection.project(source.columns(span.clone()), values);
+        let Some(mut filtered) = filtered.get_mut(padded) else {
+            continue;
+        };
+        if let (Some(source), Some(values)) = (source, values.get_mut(1..=span.len())) {
+            projection.project(simd, source.columns(span.clone()), values);
         }
         for (n, pass) in (0..=step).rev().zip(&mut rows.passes) {
-            pass.step(values, span, n, height);
+            repeat_ends(values, span.len());
+            pass.step(simd, values, filtered, &blocks, At { n, height });
+            (values, filtered) = (filtered, values);
         }
-        let words = rows.marker.iter_mut().skip(span.start / BLOCK);
-        for (word, values) in words.zip(values.chunks(BLOCK)) {
+        let values = values.get(1..).unwrap_or_default().as_chunks().0;
+        let words = rows.marker.get_mut(blocks).unwrap_or_default();
+        for (word, values) in words.iter_mut().zip(values) {
             *word = above(simd, values, projection.threshold());
+        }
+        // What lies beyond the image is no pixel.
+        let beyond = words.len() * BLOCK - span.len();
+        if let Some(word) = words.last_mut() {
+            *word &= u64::MAX >> beyond;
         }
     }
 }
 
+/// The blocks of columns that begin with one.
+fn blocks_of(columns: &Range<usize>) -> Range<usize> {
+    columns.start / BLOCK..columns.end.div_ceil(BLOCK)
+}
+
 /// Bit i is whether value i exceeds the threshold.
 #[inline(always)]
-fn above<S: Simd>(simd: S, values: &[i16], threshold: i16) -> u64 {
+fn above<S: Simd>(simd: S, values: &[i16; BLOCK], threshold: i16) -> u64 {
     let level = S::i16s::splat(simd, threshold);
     let lanes = S::i16s::LEN;
-    let vectors = values.chunks_exact(lanes);
     let mut word = 0;
-    for (value, u) in vectors
-        .remainder()
-        .iter()
-        .zip(values.len() / lanes * lanes..)
-    {
-        word |= u64::from(*value > threshold) << u;
-    }
-    for (index, vector) in vectors.enumerate() {
-        let bits = S::i16s::from_slice(simd, vector)
-            .simd_gt(level)
-            .to_bitmask();
-        word |= bits << (index * lanes);
+    for (vector, start) in values.chunks_exact(lanes).zip((0..).step_by(lanes)) {
+        let above = S::i16s::from_slice(simd, vector).simd_gt(level);
+        word |= above.to_bitmask() << start;
     }
     word
 }

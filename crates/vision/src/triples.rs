@@ -1,84 +1,268 @@
-//! Pixels of three bytes, taken apart where one instruction picks bytes from two wide vectors.
+//! Pixels of three bytes, where vectors can be told to multiply bytes in pairs or to pick among them.
 //!
 //! Elsewhere, and for the other formats, what the compiler makes of [`Group`](crate::format::Group) is
 //! as fast.
 
-use fearless_simd::{i16x32, prelude::*, u8x64, u16x32};
+use fearless_simd::{i16x32, i32x16, prelude::*, u8x64};
 
-/// Pixels in three vectors.
-const PIXELS: usize = 64;
+use crate::columns::BLOCK;
 
-/// By channel: which of two vectors' bytes are its; then where to complete them from a third.
-const PICKS: [[[u8; PIXELS]; 2]; 3] = picks();
+/// Bytes of a block of pixels.
+const BYTES: usize = 3 * BLOCK;
 
-/// Whether it is worth it.
-#[inline(always)]
-pub(crate) fn are_quick<S: Simd>(_: S) -> bool {
-    S::u8s::LEN == PIXELS
+/// Weights of bytes that are multiplied in pairs where they lie, for vectors of 64 and of 32 bytes, and the
+/// level the sums are held against.
+///
+/// The sum of pixels 2 k and 2 k + 1, bytes 6 k to 6 k + 5, comes out at byte 6 k and 6 k + 2: of the pair there
+/// and of the pair one further on. What comes out at 6 k + 4 is of no pixel.
+#[derive(Clone, Debug)]
+pub(crate) struct Pairs {
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    of_64: [Vector<64>; 3],
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    of_32: [Vector<32>; 3],
 }
 
-/// Whether `weights . x >= level` for a pixel x, and the bytes behind the last 64 whole pixels. No
-/// sum may leave an `i16`.
+/// One of three vectors that cover 3 N bytes.
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+#[derive(Clone, Debug)]
+struct Vector<const N: usize> {
+    /// The weights of its bytes and of those two further on.
+    weights: [[i8; N]; 2],
+    /// By pair: what its sum has to reach.
+    level: [i16; 32],
+}
+
+/// Where the three begin; the last two bytes are only read as those further on.
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+const fn starts(bytes: usize) -> [usize; 3] {
+    [0, bytes, 2 * bytes - 2]
+}
+
+impl Pairs {
+    /// Of the channels' weights, which fit a byte; 255 times the sum of those of one sign is below `i16::MAX`.
+    pub(crate) fn new(weights: [i16; 3], level: i16) -> Self {
+        #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+        let _ = (weights, level);
+        Self {
+            #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+            of_64: starts(64).map(|start| Vector::new(start, weights, level)),
+            #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+            of_32: starts(32).map(|start| Vector::new(start, weights, level)),
+        }
+    }
+
+    /// Sets the bit of each block in which `weights . x >= level` for a pixel x, in words that are 0. A last
+    /// block that is cut short counts what it lacks from the one before it.
+    ///
+    /// Does nothing where it [is not quick](are_quick).
+    #[inline(always)]
+    pub(crate) fn mark<S: Simd>(&self, simd: S, bytes: &[u8], hot: &mut [u64]) {
+        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+        if let Some(wide) = simd.level().as_avx512() {
+            mark(wide, bytes, &self.of_64, hot);
+        } else if let Some(wide) = simd.level().as_avx2() {
+            mark(wide, bytes, &self.of_32, hot);
+        }
+        #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+        let _ = (simd, bytes, hot);
+    }
+}
+
+/// Whether [`Pairs::mark`] is for this machine.
 #[inline(always)]
-pub(crate) fn reach<S: Simd>(
+pub(crate) fn are_quick<S: Simd>(simd: S) -> bool {
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    return simd.level().as_avx2().is_some();
+    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+    {
+        let _ = simd;
+        false
+    }
+}
+
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+impl<const N: usize> Vector<N> {
+    fn new(start: usize, weights: [i16; 3], level: i16) -> Self {
+        #[expect(clippy::cast_possible_truncation, reason = "they fit")]
+        let [first, second, third] = weights.map(|weight| weight as i8);
+        let mut both = [[0; N]; 2];
+        let mut levels = [i16::MAX; 32];
+        let [here, further] = &mut both;
+        let pairs = here.as_chunks_mut().0.iter_mut();
+        let pairs = pairs.zip(further.as_chunks_mut().0).zip(&mut levels);
+        for (((here, further), least), at) in pairs.zip((start..).step_by(2)) {
+            (*here, *further, *least) = match at % 6 {
+                0 => ([first, second], [third, 0], level),
+                2 => ([0, first], [second, third], level),
+                _ => ([0, 0], [0, 0], i16::MAX),
+            };
+        }
+        Self {
+            weights: both,
+            level: levels,
+        }
+    }
+}
+
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+#[inline(always)]
+fn mark<S: Dot, const N: usize>(simd: S, bytes: &[u8], vectors: &[Vector<N>; 3], hot: &mut [u64]) {
+    let (blocks, rest) = bytes.as_chunks::<BYTES>();
+    for (word, blocks) in hot.iter_mut().zip(blocks.chunks(64)) {
+        for (bit, block) in blocks.iter().enumerate() {
+            *word |= u64::from(reaches(simd, block, vectors)) << bit;
+        }
+    }
+    if !rest.is_empty()
+        && let Some(last) = bytes.last_chunk()
+        && let Some(word) = hot.get_mut(blocks.len() / 64)
+    {
+        *word |= u64::from(reaches(simd, last, vectors)) << (blocks.len() % 64);
+    }
+}
+
+/// Whether a pixel of a block does.
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+#[inline(always)]
+fn reaches<S: Dot, const N: usize>(simd: S, block: &[u8; BYTES], vectors: &[Vector<N>; 3]) -> bool {
+    let mut found = <S::i16s as SimdBase<S>>::Mask::splat(simd, false);
+    for part in block.chunks_exact(3 * N) {
+        for (vector, start) in vectors.iter().zip(starts(N)) {
+            let [here, further] = &vector.weights;
+            let bytes = S::u8s::from_slice(simd, &part[start..start + N]);
+            let sum = simd.dot(bytes, S::i8s::from_slice(simd, here));
+            let bytes = S::u8s::from_slice(simd, &part[start + 2..start + 2 + N]);
+            let sum = sum + simd.dot(bytes, S::i8s::from_slice(simd, further));
+            let level = S::i16s::from_slice(simd, &vector.level[..N / 2]);
+            found |= sum.simd_ge(level);
+        }
+    }
+    found.any_true()
+}
+
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+mod dot {
+    #[cfg(target_arch = "x86")]
+    use std::arch::x86::{_mm256_maddubs_epi16, _mm512_maddubs_epi16};
+    #[cfg(target_arch = "x86_64")]
+    use std::arch::x86_64::{_mm256_maddubs_epi16, _mm512_maddubs_epi16};
+
+    use fearless_simd::{
+        Avx2, Avx512, i8x32, i8x64, i16x16, i16x32, kernel, prelude::*, u8x32, u8x64,
+    };
+
+    /// Bytes times weights, summed in pairs; no sum may leave an `i16`.
+    pub(super) trait Dot: Simd {
+        fn dot(self, bytes: Self::u8s, weights: Self::i8s) -> Self::i16s;
+    }
+
+    impl Dot for Avx512 {
+        #[inline(always)]
+        fn dot(self, bytes: u8x64<Self>, weights: i8x64<Self>) -> i16x32<Self> {
+            dot_64(self, bytes, weights)
+        }
+    }
+
+    impl Dot for Avx2 {
+        #[inline(always)]
+        fn dot(self, bytes: u8x32<Self>, weights: i8x32<Self>) -> i16x16<Self> {
+            dot_32(self, bytes, weights)
+        }
+    }
+
+    kernel!(
+        #[inline(always)]
+        fn dot_64(simd: Avx512, a: u8x64<Avx512>, b: i8x64<Avx512>) -> i16x32<Avx512> {
+            _mm512_maddubs_epi16(a.into(), b.into()).simd_into(simd)
+        }
+    );
+
+    kernel!(
+        #[inline(always)]
+        fn dot_32(simd: Avx2, a: u8x32<Avx2>, b: i8x32<Avx2>) -> i16x16<Avx2> {
+            _mm256_maddubs_epi16(a.into(), b.into()).simd_into(simd)
+        }
+    );
+}
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+use dot::Dot;
+
+/// Pixels in a vector of 32-bit sums.
+const LANES: usize = 16;
+
+/// By pixel: its first and second byte, then its third, each made 16 bits; 64 and above is 0.
+const PICKS: [[[u8; 64]; 2]; 2] = [picks(0), picks(16)];
+
+/// `(weights . x + offset) >> bits` of the pixels x of whole blocks, and how many pixels that was.
+#[inline(always)]
+pub(crate) fn project<S: Simd>(
     simd: S,
     bytes: &[u8],
     weights: [i16; 3],
-    level: i16,
-) -> (bool, &[u8]) {
-    let (groups, rest) = bytes.as_chunks::<{ 3 * PIXELS }>();
-    let [first, second, third] = weights.map(|weight| i16x32::splat(simd, weight));
-    let picks = PICKS.map(|both| both.map(|indices| u8x64::from_slice(simd, &indices)));
-    let low_bytes = i16x32::splat(simd, 0xff);
-    let mut peak = i16x32::splat(simd, i16::MIN);
-    for group in groups {
-        let [x, y, z] = channels(simd, group, &picks);
-        // The sum fits; a part of it may not, and comes back.
-        let even = (x & low_bytes) * first + (y & low_bytes) * second + (z & low_bytes) * third;
-        let odd = high_bytes(x) * first + high_bytes(y) * second + high_bytes(z) * third;
-        peak = peak.max(even).max(odd);
+    (offset, bits): (i32, u32),
+    projected: &mut [i16],
+) -> usize {
+    if S::u8s::LEN != 64 {
+        return 0;
     }
-    (peak.simd_ge(i16x32::splat(simd, level)).any_true(), rest)
+    // The third goes with a zero.
+    let mut lanes = [[0; 2 * LANES]; 2];
+    for lane in 0..LANES {
+        [
+            lanes[0][2 * lane],
+            lanes[0][2 * lane + 1],
+            lanes[1][2 * lane],
+        ] = weights;
+    }
+    let rest = (
+        i16x32::from_slice(simd, &lanes[0]),
+        i16x32::from_slice(simd, &lanes[1]),
+        i32x16::splat(simd, offset),
+    );
+    let blocks = bytes.as_chunks::<BYTES>().0;
+    let outputs = projected.as_chunks_mut::<BLOCK>().0;
+    for (block, output) in blocks.iter().zip(&mut *outputs) {
+        let (left, right) = output.split_at_mut(2 * LANES);
+        let [a, b] = [sums(simd, block, 0, rest), sums(simd, block, 1, rest)];
+        simd.narrow_i32x16(a >> bits, b >> bits).store_slice(left);
+        let [a, b] = [sums(simd, block, 2, rest), sums(simd, block, 3, rest)];
+        simd.narrow_i32x16(a >> bits, b >> bits).store_slice(right);
+    }
+    blocks.len().min(outputs.len()) * BLOCK
 }
 
-/// The channels of 64 pixels, two pixels to a lane.
+/// The weighted sums of a quarter of a block: `here` are the weights of the first two channels, `further` that of
+/// the third.
 #[inline(always)]
-fn channels<S: Simd>(
+fn sums<S: Simd>(
     simd: S,
-    group: &[u8; 3 * PIXELS],
-    picks: &[[u8x64<S>; 2]; 3],
-) -> [i16x32<S>; 3] {
-    let (one, rest) = group.split_at(PIXELS);
-    let (two, three) = rest.split_at(PIXELS);
-    let [one, two, three] = [one, two, three].map(|bytes| u8x64::from_slice(simd, bytes));
-    picks.map(|[of_two, of_third]| {
-        let most = one.concat_swizzle_dyn(two, of_two);
-        most.concat_swizzle_dyn(three, of_third).bitcast()
-    })
+    block: &[u8; BYTES],
+    quarter: usize,
+    (here, further, offset): (i16x32<S>, i16x32<S>, i32x16<S>),
+) -> i32x16<S> {
+    // The last is read from farther left, so as not to read beyond the block.
+    let start = (quarter * 3 * LANES).min(BYTES - 64);
+    let [two, one] = &PICKS[usize::from(quarter == 3)];
+    let pixels = u8x64::from_slice(simd, &block[start..start + 64]);
+    let zero = u8x64::splat(simd, 0);
+    let two = pixels.concat_swizzle_dyn(zero, u8x64::from_slice(simd, two));
+    let one = pixels.concat_swizzle_dyn(zero, u8x64::from_slice(simd, one));
+    simd.pairwise_dot_product_i16x32(two.bitcast(), here)
+        + simd.pairwise_dot_product_i16x32(one.bitcast(), further)
+        + offset
 }
 
-#[inline(always)]
-fn high_bytes<S: Simd>(lanes: i16x32<S>) -> i16x32<S> {
-    (lanes.bitcast::<u16x32<S>>() >> 8).bitcast()
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "below 128")]
-const fn picks() -> [[[u8; PIXELS]; 2]; 3] {
-    let mut picks = [[[0; PIXELS]; 2]; 3];
-    let mut channel = 0;
-    while channel < 3 {
-        let mut pixel = 0;
-        while pixel < PIXELS {
-            let at = 3 * pixel + channel;
-            if at < 2 * PIXELS {
-                picks[channel][0][pixel] = at as u8;
-                picks[channel][1][pixel] = pixel as u8;
-            } else {
-                picks[channel][1][pixel] = (at - PIXELS) as u8;
-            }
-            pixel += 1;
-        }
-        channel += 1;
+#[expect(clippy::cast_possible_truncation, reason = "below 65")]
+const fn picks(shift: usize) -> [[u8; 64]; 2] {
+    let mut picks = [[64; 64]; 2];
+    let mut pixel = 0;
+    while pixel < LANES {
+        let at = shift + 3 * pixel;
+        picks[0][4 * pixel] = at as u8;
+        picks[0][4 * pixel + 2] = at as u8 + 1;
+        picks[1][4 * pixel] = at as u8 + 2;
+        pixel += 1;
     }
     picks
 }
@@ -89,30 +273,75 @@ mod tests {
     use fearless_simd::{Level, dispatch};
     use proptest::prelude::*;
 
+    fn levels() -> Vec<Level> {
+        let best = Level::new();
+        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+        let narrower = best.as_avx2().map(Simd::level);
+        #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+        let narrower = None;
+        [Some(best), narrower, Some(Level::baseline())]
+            .into_iter()
+            .flatten()
+            .collect()
+    }
+
     proptest! {
         #[test]
-        fn decides_as_pixel_by_pixel(
-            bytes in prop::collection::vec(any::<u8>(), 0..3 * 3 * PIXELS),
-            weights in [-64..64_i16, -64..64_i16, -64..64_i16],
+        fn marks_the_blocks_of_pixels_that_reach(
+            bytes in (BLOCK..5 * BLOCK, any::<bool>()).prop_flat_map(|(pixels, dark)| {
+                let most = if dark { 3_u8 } else { 255 };
+                prop::collection::vec(prop_oneof![20 => 0..=most, 1 => Just(255)], 3 * pixels)
+            }),
+            weights in prop_oneof![
+                [-42..42_i16, -42..42_i16, -42..42_i16],
+                Just([-66, 127, -61]),
+                Just([-127, 127, -1]),
+                Just([127, -127, 1]),
+            ],
             pick in any::<prop::sample::Index>(),
             above in 0..2_i16,
         ) {
-            let (pixels, _) = bytes[..bytes.len() / (3 * PIXELS) * 3 * PIXELS].as_chunks::<3>();
             let sum = |pixel: &[u8; 3]| -> i16 {
-                pixel.iter().zip(weights).map(|(x, weight)| i16::from(*x) / 2 * weight).sum()
+                pixel.iter().zip(weights).map(|(x, weight)| i16::from(*x) * weight).sum()
             };
-            let halves: Vec<u8> = bytes.iter().map(|byte| byte / 2).collect();
-            // At the largest sum the answer changes.
-            let largest = pixels.iter().map(sum).max().unwrap_or(0);
-            let level = if pick.index(2) == 0 { largest + above } else { above };
-            let expected = pixels.iter().any(|pixel| sum(pixel) >= level);
-            for simd in [Level::new(), Level::baseline()] {
-                let (found, rest) = dispatch!(simd, simd => {
-                    let (found, rest) = reach(simd, &halves, weights, level);
-                    (found, rest.len())
+            let (pixels, _) = bytes.as_chunks::<3>();
+            // At a sum that occurs the answer changes.
+            let level = sum(&pixels[pick.index(pixels.len())]).saturating_add(above);
+            let reaches = |pixels: &[[u8; 3]]| pixels.iter().any(|pixel| sum(pixel) >= level);
+            let (whole, rest) = pixels.as_chunks::<BLOCK>();
+            let mut expected: Vec<bool> = whole.iter().map(|block| reaches(block)).collect();
+            if !rest.is_empty() {
+                expected.push(reaches(&pixels[pixels.len() - BLOCK..]));
+            }
+            for simd in levels() {
+                let mut hot = [0];
+                let can = dispatch!(simd, simd => {
+                    Pairs::new(weights, level).mark(simd, &bytes, &mut hot);
+                    are_quick(simd)
                 });
-                prop_assert_eq!(found, expected);
-                prop_assert_eq!(rest, bytes.len() % (3 * PIXELS));
+                let marked: Vec<bool> =
+                    (0..expected.len()).map(|bit| hot[0] >> bit & 1 == 1).collect();
+                prop_assert!(!can || marked == expected, "{:?}: {:?}", simd, marked);
+                prop_assert!(can || hot == [0]);
+            }
+        }
+
+        #[test]
+        fn projects_as_pixel_by_pixel(
+            bytes in prop::collection::vec(any::<u8>(), 0..3 * 3 * BLOCK),
+            weights in prop::array::uniform3(-21_000..=21_000_i16),
+            offset in -500_000..500_000,
+        ) {
+            for simd in levels() {
+                let (pixels, _) = bytes.as_chunks::<3>();
+                let mut projected = vec![0; pixels.len()];
+                let done = dispatch!(simd, simd => project(simd, &bytes, weights, (offset, 9), &mut projected));
+                prop_assert!(done == 0 || done == pixels.len() / BLOCK * BLOCK);
+                for (pixel, value) in pixels.iter().zip(&projected[..done]) {
+                    let terms = pixel.iter().zip(weights);
+                    let sum: i32 = terms.map(|(x, weight)| i32::from(*x) * i32::from(weight)).sum();
+                    prop_assert_eq!(i32::from(*value), (sum + offset) >> 9);
+                }
             }
         }
     }
