@@ -18,12 +18,12 @@ from pathlib import Path
 import hysteresis_ablation as ablation
 import hysteresis_table as tables
 from hysteresis_rows import GOALS, SCENARIOS, Plan
-from hysteresis_runs import Store
-from tautscope.config import Config, load_config
+from hysteresis_runs import Recordings, Store
+from tautscope.config import Config, Profile, load_config
 from tautscope.dof import Dof
 from tautscope.progress import progress_bar
 
-PROFILES = ("paper", "best")
+PROFILES: tuple[Profile, ...] = ("paper", "best")
 WITHOUT_IDEA = ("alone", "together", "changing", "too wide", "tremor")
 """The groups an ablation runs unless told otherwise."""
 
@@ -51,8 +51,7 @@ def measure(store: Store, work: Work) -> tables.Figures:
     """All figures of finished runs."""
     figures: dict[tuple[str, Dof, str], dict[int, float]] = defaultdict(dict)
     for (group, name, seed), runs in work.items():
-        recordings = {key: store.load(each) for key, each in runs.items()}
-        for what, dof, value in SCENARIOS[group].figures(recordings):
+        for what, dof, value in SCENARIOS[group].figures(store.open(runs)):
             scale = dof.display_scale if GOALS[what].unit == "tip" else 1.0
             figures[what, dof, name][seed] = scale * float(value)
     return tables.pair(figures)
@@ -71,9 +70,11 @@ def arguments() -> argparse.Namespace:
         "--ablation", action="store_true", help="profile best without each of its ideas in turn"
     )
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="[all cores]")
-    parser.add_argument("--cache", type=Path, metavar="DIR", help="keep finished runs, and use them")
+    parser.add_argument(
+        "--cache", type=Path, metavar="DIR", help="keep finished runs, and use them"
+    )
     parser.add_argument("--write", action="store_true", help="make the documentation's tables")
-    parser.add_argument("--figures", type=Path, metavar="DIR", help="only draw what there is, there")
+    parser.add_argument("--figures", type=Path, metavar="DIR", help="draw the figures there")
     return parser.parse_args()
 
 
@@ -90,7 +91,7 @@ def run(options: argparse.Namespace, store: Store) -> None:
             name: best.replace(**changes) for name, changes in ablation.IDEAS.items()
         }
     else:
-        profiles = [options.profile] if options.profile else PROFILES
+        profiles: Sequence[Profile] = [options.profile] if options.profile else PROFILES
         configs = {name: load_config(options.config, name) for name in profiles}
     seeds = range(options.first_seed, options.first_seed + options.seeds)
     groups = options.only or (WITHOUT_IDEA if options.ablation else list(SCENARIOS))
@@ -105,11 +106,39 @@ def run(options: argparse.Namespace, store: Store) -> None:
         print(json.dumps({"ablation": losses, **facts}) if options.json else ablation.table(losses))
     else:
         print(tables.to_json(rows, **facts) if options.json else tables.plain(rows))
-    if options.write or options.figures:
-        # Matplotlib is loaded by those who draw.
-        import hysteresis_pages  # noqa: PLC0415
+    if options.write or (options.figures and not options.ablation):
+        publish(options, store, work, rows)
 
-        hysteresis_pages
+
+def publish(
+    options: argparse.Namespace, store: Store, work: Work, rows: Sequence[tables.Row]
+) -> None:
+    """Draw the figures; with `--write`, make the documentation's tables too."""
+    # Matplotlib is loaded by those who draw.
+    import hysteresis_figures as figures  # noqa: PLC0415
+    import hysteresis_pages as pages  # noqa: PLC0415
+
+    if options.ablation:
+        pages.write_ablation(ablation.table(ablation.compare(rows)), made(options))
+        return
+
+    def load(group: str) -> figures.Finished:
+        found: dict[int, dict[str, Recordings]] = defaultdict(dict)
+        for (each, name, seed), runs in work.items():
+            if each == group:
+                found[seed][name] = store.open(runs)
+        return figures.Finished(found)
+
+    drawn = figures.draw(options.figures or pages.FOLDER, {group for group, _, _ in work}, load)
+    if options.write:
+        pages.write_tables(rows, drawn, made(options))
+
+
+def made(options: argparse.Namespace) -> str:
+    """Of what the tables are."""
+    last = options.first_seed + options.seeds - 1
+    source = "true features with noise" if options.features else "camera images"
+    return f"Seeds {options.first_seed} to {last}, {source}, median (worst)."
 
 
 if __name__ == "__main__":

@@ -73,7 +73,5 @@ def table(losses: Sequence[Row]) -> str:
         for row in mine:
             best, without = (show(row[key], row["unit"]) for key in ("best", "without"))
             missed = " (goal lost)" if row["held"] and not row["holds"] else ""
-            lines.append(
-                f"| {idea} | {row['what']} | {row['dof']} | {best} | {without}{missed} |"
-            )
+            lines.append(f"| {idea} | {row['what']} | {row['dof']} | {best} | {without}{missed} |")
     return "\n".join(lines)

@@ -6,12 +6,12 @@ recordings to figures. `GOALS` says what each figure should be.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from hysteresis_runs import Floats, Simulation, Sines, uncompensated
+from hysteresis_runs import Floats, Recordings, Simulation, Sines, uncompensated
 from tautscope import metrics
 from tautscope.config import DISTURBANCES, Config
 from tautscope.dof import Dof
@@ -20,7 +20,6 @@ from tautscope.references import Segment
 from tautscope.results import evaluate
 
 Plan = dict[str, Simulation]
-Recordings = Mapping[str, Recording]
 Found = list[tuple[str, Dof, float]]
 """What, DOF, figure; in metres or radians or as a share."""
 
@@ -33,7 +32,7 @@ STRAIGHT = (3, 4, 7, 8)
 CHANGING_PERIODS = 11
 WIDE_PERIODS = 4
 GONE = 0.05
-"""An overshoot below this share of the uncompensated width is gone: what the reduction may leave."""
+"""An overshoot below this share of the uncompensated width is gone: as much as may be left."""
 TREMOR = 1e-3
 """Amplitude: 2 mm peak to peak [m]."""
 RESTS = (0.0, 1e-3, 2e-3)
@@ -236,9 +235,7 @@ def too_wide(recordings: Recordings) -> Found:
 
 def latency_plan(config: Config) -> Plan:
     late = {
-        name: Simulation(
-            config.replace(**{"twin.latency": latency, "twin.latency_jitter": 0.0})
-        )
+        name: Simulation(config.replace(**{"twin.latency": latency, "twin.latency_jitter": 0.0}))
         for name, latency in LATENCIES.items()
     }
     return alone_plan(config) | late
@@ -277,9 +274,7 @@ def tremor_plan(config: Config) -> Plan:
     for beyond in RESTS:
         turned = np.arccos(1 - beyond / sine.amplitude) / (2 * np.pi) + 0.25
         rest = REST_AFTER + float(turned) * sine.period
-        motion = insertion(
-            config, (rest + REST_FOR) / sine.period, tremor=TREMOR, rest_at=rest
-        )
+        motion = insertion(config, (rest + REST_FOR) / sine.period, tremor=TREMOR, rest_at=rest)
         plan[f"{1e3 * beyond:g} mm"] = Simulation(config, motion)
     return plan
 
@@ -306,7 +301,8 @@ def tremor(recordings: Recordings) -> Found:
 def resting(recording: Recording) -> Table:
     """The ticks in which the hand rests."""
     time = recording.trace["time"]
-    return recording.trace[time >= time[-1] - REST_FOR]
+    rows: Table = recording.trace[time >= time[-1] - REST_FOR]
+    return rows
 
 
 SCENARIOS = {

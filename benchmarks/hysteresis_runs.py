@@ -6,7 +6,7 @@ import hashlib
 import multiprocessing
 import os
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -183,7 +183,7 @@ class _FeatureCamera:
         self._pending: deque[Frame] = deque()
 
     def look(self, sample: Sample) -> Frame | None:
-        if self._tick % self._every == 0:
+        if self._tick % self._every == 0 and sample.true_state is not None:
             seen = self._model.predict(sample.true_state)
             if seen is not None:
                 noisy = seen[0] + NOISE * self._noise.standard_normal(4)
@@ -243,13 +243,32 @@ class Store:
         with np.load(self._file(simulation)) as tables:
             trace, frames = tables["trace"], tables["frames"]
         segments: Sequence[Segment] = simulation.reference.segments
-        return Recording(
-            trace, frames, simulation.config, simulation.compensate, tuple(segments)
-        )
+        return Recording(trace, frames, simulation.config, simulation.compensate, tuple(segments))
+
+    def open(self, runs: Mapping[str, Simulation]) -> Recordings:
+        """Finished runs by name, each loaded when it is asked for."""
+        return Recordings(self, runs)
 
     def _file(self, simulation: Simulation) -> Path:
         name = hashlib.sha256(self._code + repr(simulation).encode()).hexdigest()
         return self._folder / f"{name[:32]}.npz"
+
+
+class Recordings(Mapping[str, Recording]):
+    """The runs of one group, profile and seed; see `Store.open`."""
+
+    def __init__(self, store: Store, runs: Mapping[str, Simulation]) -> None:
+        self._store = store
+        self._runs = runs
+
+    def __getitem__(self, name: str) -> Recording:
+        return self._store.load(self._runs[name])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._runs)
+
+    def __len__(self) -> int:
+        return len(self._runs)
 
 
 def _one_thread() -> None:

@@ -139,13 +139,12 @@ def full(rows: Sequence[Row]) -> str:
     for (what, dof), mine in cells.items():
         shown = []
         for name in ("paper", "best"):
-            row = mine.get(name)
-            if row is None:
+            if name in mine:
+                unit, steady = mine[name]["unit"], mine[name]["steady"]
+                figures = (show(mine[name][key], unit) for key in ("median", "worst"))
+                shown.append("{} ({})".format(*figures) + (" (!)" if steady is False else ""))
+            else:
                 shown.append("")
-                continue
-            unit = row["unit"]
-            mark = " (!)" if row["steady"] is False else ""
-            shown.append(f"{show(row['median'], unit)} ({show(row['worst'], unit)}){mark}")
         last = mine.get("best") or mine["paper"]
         unit = "" if last["unit"] == "share" else f" [{last['unit']}]"
         lines.append(f"| {what}{unit} | {dof} | {shown[0]} | {shown[1]} | {goal(last)} |")

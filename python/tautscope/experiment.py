@@ -38,6 +38,7 @@ def run_experiment(
     config: Config,
     compensate: bool = True,
     progress: Progress | None = None,
+    *,
     look: Look = HysteresisReduction.on_frame,
 ) -> Recording:
     """Run a reference on a rig, with the camera as the only feedback.
