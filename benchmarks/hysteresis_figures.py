@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from hysteresis_rows import (
     LATENCIES,
     REST_FOR,
     STRAIGHT,
+    gone,
     true_width,
     widths,
 )
@@ -55,6 +56,13 @@ def _panels(height: float, rows: int = 1, columns: int = 3) -> tuple[Figure, lis
 def _legend(figure: Figure, axes: Axes) -> None:
     lines, labels = axes.get_legend_handles_labels()
     figure.legend(lines, labels, loc="outside lower center", ncols=len(lines))
+
+
+def _same_height(panels: Sequence[Axes]) -> None:
+    """One scale for all."""
+    low, high = zip(*(axes.get_ylim() for axes in panels), strict=True)
+    for axes in panels:
+        axes.set_ylim(min(low), max(high))
 
 
 def _shared(finished: Finished) -> Recording:
@@ -142,8 +150,11 @@ def starts(finished: Finished) -> Figure:
             panels[dof].semilogy(at, left, "o-", color=COLOURS[name], markersize=2.5, label=name)
     for dof, axes in zip(Dof, panels, strict=True):
         axes.axhline(5, color=BLACK, linewidth=0.5, linestyle="--")
+        axes.set_yticks(ticks := [0.1, 0.3, 1, 3, 10, 30, 100], [f"{tick:g}" for tick in ticks])
+        axes.minorticks_off()
         axes.set_title(dof.label)
         axes.set_xlabel("period")
+    _same_height(panels)
     panels[0].set_ylabel("width left [%]")
     by_name = dict(zip(*panels[0].get_legend_handles_labels()[::-1], strict=True))
     figure.legend(by_name.values(), by_name.keys(), loc="outside lower center", ncols=2)
@@ -214,7 +225,7 @@ def shaking(finished: Finished) -> Figure:
         axes.set_title(name)
         axes.set_xlabel("time since the hand rests [s]")
         axes.set_ylabel("insertion [mm]")
-        axes.sharey(panels[0])
+    _same_height(panels)
     _legend(figure, panels[0])
     return figure
 
@@ -229,11 +240,12 @@ def delays(finished: Finished) -> Figure:
     for name, runs in finished.every():
         found = {key: evaluate(runs["free"], runs[key]) for key in places}
         for dof, axes in zip(Dof, panels, strict=True):
-            share = [100 * found[key][dof].reduction for key in places]
+            share = [100 * gone(found[key][dof].reduction) for key in places]
             axes.plot(list(places.values()), share, "o-", color=COLOURS[name], markersize=2.5)
     for dof, axes in zip(Dof, panels, strict=True):
         axes.set_title(dof.label)
         axes.set_xlabel("latency [ms]")
+    _same_height(panels)
     panels[0].set_ylabel("reduction [%]")
     for name in finished.first:
         panels[0].plot([], [], "o-", color=COLOURS[name], markersize=2.5, label=name)
@@ -253,7 +265,9 @@ def disturbed(finished: Finished) -> Figure:
         for row, name in enumerate(names):
             for dof, result in evaluate(runs["free"], runs[name]).items():
                 place = row + 0.2 * (dof - 1)
-                axes.plot(100 * result.reduction, place, "o", color=DOF_COLOURS[dof], markersize=3)
+                axes.plot(
+                    100 * gone(result.reduction), place, "o", color=DOF_COLOURS[dof], markersize=3
+                )
     for dof in Dof:
         axes.plot([], [], "o", color=DOF_COLOURS[dof], markersize=3, label=dof.label)
     axes.set_yticks(range(len(names)), ["clean", *names[1:]])

@@ -123,6 +123,7 @@ def test_reduction_is_the_share_that_is_gone() -> None:
         ([9, 8, 7, 6, 1], 4),
         ([math.nan, 1, 1], 1),
         ([-1, -1], 0),
+        ([-9, 1, -1], 1),
     ],
 )
 def test_start_counts_the_periods_before_the_settled_ones(

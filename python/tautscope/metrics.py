@@ -123,7 +123,8 @@ def start_periods(widths: ArrayLike) -> float:
     """Number of periods until the mean width stays within 1.2 times its final value.
 
     Args:
-        widths: (periods,) mean width of each whole period, see `period_widths`.
+        widths: (periods,) mean width of each whole period, see `period_widths`; of one that runs
+            the other way the size counts.
 
     Returns:
         How many periods come before the settled ones: 0 if the first is settled already; NaN if
@@ -132,7 +133,7 @@ def start_periods(widths: ArrayLike) -> float:
     values = np.asarray(widths, dtype=np.float64)
     if values.size == 0 or not np.isfinite(values[-1]):
         return np.nan
-    unsettled = ~(values <= SETTLED * abs(values[-1]))
+    unsettled = ~(np.abs(values) <= SETTLED * abs(values[-1]))
     return float(np.flatnonzero(unsettled)[-1] + 1) if unsettled.any() else 0.0
 
 
