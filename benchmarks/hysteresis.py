@@ -75,7 +75,10 @@ def arguments() -> argparse.Namespace:
     )
     parser.add_argument("--write", action="store_true", help="make the documentation's tables")
     parser.add_argument("--figures", type=Path, metavar="DIR", help="draw the figures there")
-    return parser.parse_args()
+    options = parser.parse_args()
+    if options.write and (options.only or options.profile):
+        parser.error("--write makes whole tables: not with --only or --profile")
+    return options
 
 
 def main() -> None:
