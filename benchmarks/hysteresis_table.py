@@ -162,9 +162,16 @@ def short(rows: Sequence[Row]) -> str:
         bound = "at least" if some[0]["sense"] == "min" else "at most"
         target = show(some[0]["goal"], some[0]["unit"]).replace(".0 %", " %")
         lines.append(
-            f"| {label} | {_cell(cells['paper'])} | {_cell(cells['best'])} | {bound} {target} |"
+            f"| {label} | {_cell(cells['paper'])} | {_cell(cells['best'])} "
+            f"| {bound} {target}{_missed(cells['best'])} |"
         )
     return "\n".join(lines)
+
+
+def _missed(rows: Sequence[Row]) -> str:
+    """The DOFs whose goal is not reached."""
+    names = [row["dof"] for row in rows if not row["holds"]]
+    return f"; missed in {', '.join(names)}" if names else ""
 
 
 def _least_good(rows: Sequence[Row], whats: Sequence[str], name: str) -> list[Row]:
