@@ -13,21 +13,20 @@ from hysteresis_rows import (
     REST_FOR,
     STRAIGHT,
     gone,
+    own,
     true_width,
     widths,
 )
-from hysteresis_runs import Recordings
+from hysteresis_runs import Floats, Recordings
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from tautscope import metrics
-from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.figures import BLACK, BLUE, GREEN, GREY, ORANGE, PAGE, style
-from tautscope.recording import Recording
 from tautscope.results import evaluate, true_loop
 
-COLOURS = {"paper": ORANGE, "best": BLUE}
 PLAIN = "without"
+COLOURS = {PLAIN: GREY, "paper": ORANGE, "best": BLUE}
 DOF_COLOURS = (BLUE, ORANGE, GREEN)
 
 
@@ -65,25 +64,22 @@ def _same_height(panels: Sequence[Axes]) -> None:
         axes.set_ylim(min(low), max(high))
 
 
-def _shared(finished: Finished) -> Recording:
-    """The run without compensation."""
-    return next(iter(finished.first.values()))["free"]
+def _settled(finished: Finished, dof: Dof) -> Iterator[tuple[str, Floats, Floats]]:
+    """Name, hand and true tip in a DOF's last two periods: without compensation, each profile."""
+    runs = finished.first
+    named = {PLAIN: next(iter(runs.values()))["free"]}
+    named |= {name: recordings["run"] for name, recordings in runs.items()}
+    for name, recording in named.items():
+        hand, tip = true_loop(recording, own(recording, dof), "reference")
+        yield name, dof.display_scale * hand, dof.display_scale * tip
 
 
 def loops(finished: Finished) -> Figure:
     """Tip over hand in the last two periods."""
     figure, panels = _panels(2.75)
-    free = _shared(finished)
     for dof, axes in zip(Dof, panels, strict=True):
-        traces = [(PLAIN, GREY, free, "command")]
-        traces += [
-            (name, COLOURS[name], runs["run"], "reference") for name, runs in finished.first.items()
-        ]
-        for name, colour, recording, x in traces:
-            (segment,) = (each for each in recording.segments if each.dof is dof)
-            over, tip = true_loop(recording, segment, x)
-            scale = dof.display_scale
-            axes.plot(scale * over, scale * tip, color=colour, linewidth=0.9, label=name)
+        for name, over, tip in _settled(finished, dof):
+            axes.plot(over, tip, color=COLOURS[name], linewidth=0.9, label=name)
         axes.set_title(dof.label)
         axes.set_xlabel(f"hand [{dof.display_unit}]")
         axes.set_ylabel(f"tip [{dof.display_unit}]")
@@ -95,19 +91,12 @@ def loops(finished: Finished) -> Figure:
 def levels(finished: Finished) -> Figure:
     """Width of the loop at each level of the tip."""
     figure, panels = _panels(2.4)
-    free = _shared(finished)
     for dof, axes in zip(Dof, panels, strict=True):
-        traces = [(PLAIN, GREY, free, "command")]
-        traces += [
-            (name, COLOURS[name], runs["run"], "reference") for name, runs in finished.first.items()
-        ]
-        for name, colour, recording, x in traces:
-            (segment,) = (each for each in recording.segments if each.dof is dof)
-            loop = metrics.loop_width(*true_loop(recording, segment, x))
-            scale = dof.display_scale
-            axes.plot(scale * loop.levels, scale * loop.widths, color=colour, label=name)
+        for name, over, tip in _settled(finished, dof):
+            loop = metrics.loop_width(over, tip)
+            axes.plot(loop.levels, loop.widths, color=COLOURS[name], label=name)
             if name == PLAIN:
-                axes.axhline(0.1 * scale * loop.max, color=BLACK, linewidth=0.5, linestyle="--")
+                axes.axhline(0.1 * loop.max, color=BLACK, linewidth=0.5, linestyle="--")
         axes.axhline(0, color=GREY, linewidth=0.4)
         axes.set_title(dof.label)
         axes.set_xlabel(f"tip [{dof.display_unit}]")
@@ -122,7 +111,7 @@ def speeds(finished: Finished) -> Figure:
     for dof, axes in zip(Dof, panels, strict=True):
         for name, runs in finished.first.items():
             run = runs["run"]
-            (segment,) = (each for each in run.segments if each.dof is dof)
+            segment = own(run, dof)
             rows = run.trace[run.during(segment, segment.periods - 2, segment.periods)]
             hand, tip = (np.gradient(rows[f"{x}_{dof.label}"]) for x in ("reference", "true"))
             time = rows["time"] - rows["time"][0]
@@ -144,8 +133,7 @@ def starts(finished: Finished) -> Figure:
     figure, panels = _panels(2.3)
     for name, runs in finished.every():
         for dof, result in evaluate(runs["free"], runs["run"]).items():
-            (segment,) = (each for each in runs["run"].segments if each.dof is dof)
-            left = 100 * np.abs(widths(runs["run"], segment)) / result.uncompensated
+            left = 100 * np.abs(widths(runs["run"], own(runs["run"], dof))) / result.uncompensated
             at = np.arange(1, len(left) + 1)
             panels[dof].semilogy(at, left, "o-", color=COLOURS[name], markersize=2.5, label=name)
     for dof, axes in zip(Dof, panels, strict=True):
@@ -233,9 +221,10 @@ def shaking(finished: Finished) -> Figure:
 def delays(finished: Finished) -> Figure:
     """Reduction over latency, every seed."""
     figure, panels = _panels(2.3)
-    some = _shared_config(finished)
-    usual = 1e3 * some.twin.latency
-    places = {"run": usual} | {name: 1e3 * value for name, value in LATENCIES.items()}
+    config = next(iter(finished.first.values()))["run"].config
+    places = {"run": 1e3 * config.twin.latency} | {
+        name: 1e3 * value for name, value in LATENCIES.items()
+    }
     places = dict(sorted(places.items(), key=lambda item: item[1]))
     for name, runs in finished.every():
         found = {key: evaluate(runs["free"], runs[key]) for key in places}
@@ -251,10 +240,6 @@ def delays(finished: Finished) -> Figure:
         panels[0].plot([], [], "o-", color=COLOURS[name], markersize=2.5, label=name)
     _legend(figure, panels[0])
     return figure
-
-
-def _shared_config(finished: Finished) -> Config:
-    return next(iter(finished.first.values()))["run"].config
 
 
 def disturbed(finished: Finished) -> Figure:

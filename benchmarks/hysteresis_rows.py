@@ -115,7 +115,7 @@ def alone(recordings: Recordings) -> Found:
     free, run = recordings["free"], recordings["run"]
     found: Found = []
     for dof, result in evaluate(free, run).items():
-        (segment,) = (each for each in run.segments if each.dof is dof)
+        segment = own(run, dof)
         found += [
             ("reduction of mean width", dof, gone(result.reduction)),
             ("reduction of max width", dof, gone(result.reduction_max)),
@@ -137,6 +137,12 @@ def alone(recordings: Recordings) -> Found:
 def gone(reduction: float) -> float:
     """Of a reduction above 1, a loop that runs the other way, as of one as wide that does not."""
     return 1 - abs(1 - reduction)
+
+
+def own(run: Recording, dof: Dof) -> Segment:
+    """The segment in which a DOF moves."""
+    (segment,) = (each for each in run.segments if each.dof is dof)
+    return segment
 
 
 def widths(run: Recording, segment: Segment) -> Floats:
