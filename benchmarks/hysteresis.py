@@ -139,9 +139,10 @@ def publish(
 
 def made(options: argparse.Namespace) -> str:
     """Of what the tables are."""
-    last = options.first_seed + options.seeds - 1
+    first, last = options.first_seed, options.first_seed + options.seeds - 1
+    seeds = f"Seed {first}" if first == last else f"Seeds {first} to {last}"
     source = "true features with noise" if options.features else "camera images"
-    return f"Seeds {options.first_seed} to {last}, {source}, median (worst)."
+    return f"{seeds}, {source}, median (worst)."
 
 
 if __name__ == "__main__":
