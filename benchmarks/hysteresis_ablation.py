@@ -25,7 +25,8 @@ IDEAS: dict[str, dict[str, Any]] = {
 """The idea, and the configuration of the profile without it."""
 
 WORTH = {"share": 0.01, "periods": 0.5, "strokes": 0.5}
-"""A change for the worse below this is not told, by unit; of other units, 5 % of the goal."""
+"""A change for the worse below this is not told, by unit; of other units, 5 % of the goal
+or, where there is none, of the profile's figure."""
 
 
 def compare(rows: Sequence[Row]) -> list[Row]:
@@ -59,8 +60,8 @@ def matters(row: Row) -> bool:
     """Whether taking the idea away made this figure notably worse."""
     if row["worse"] is None:
         return row["without"] is None
-    least = WORTH.get(row["unit"], 0.05 * row["goal"] if row["goal"] is not None else None)
-    return least is not None and row["worse"] >= least
+    usual = row["best"] if row["goal"] is None else row["goal"]
+    return bool(row["worse"] >= WORTH.get(row["unit"], 0.05 * usual))
 
 
 def table(losses: Sequence[Row]) -> str:
