@@ -17,9 +17,10 @@ from tautscope.errors import (
 )
 from tautscope.experiment import run_experiment
 from tautscope.recording import Recording, Table, per_dof, per_feature
+from tautscope.reduction import HysteresisReduction, Report
 from tautscope.references import SineSequence
 from tautscope.results import DofResult, combine, evaluate
-from tautscope.rig import Rig, Sample
+from tautscope.rig import Frame, Rig, Sample
 from tautscope.trials import Trial, run_trials
 
 CONFIG = short_experiment()
@@ -101,6 +102,33 @@ def test_the_slack_goes_down_to_what_the_gain_leaves(
     assert result.actuator_gain == pytest.approx(CONFIG[dof].free_gain, rel=1e-6)
     assert result.state_rms < 0.05 * slack
     assert result.frames_used > 0.9
+
+
+def test_a_detector_of_ones_own_takes_the_place_of_ours(compensated: Recording) -> None:
+    """The features that ours found, fed in from outside, give the same run; none give another."""
+    found = {
+        row["captured_at"]: features
+        for row, features in zip(
+            compensated.frames, per_feature(compensated.frames, "features"), strict=True
+        )
+    }
+
+    def fed(loop: HysteresisReduction, frame: Frame) -> Report:
+        features = found[frame.captured_at]
+        return loop.on_features(None if np.isnan(features).any() else features, frame.captured_at)
+
+    def blind(loop: HysteresisReduction, frame: Frame) -> Report:
+        return loop.on_features(None, frame.captured_at)
+
+    again = run_experiment(DrawnRig(CONFIG), REFERENCE, CONFIG, look=fed)
+    np.testing.assert_allclose(
+        per_dof(again.trace, "command"), per_dof(compensated.trace, "command"), atol=1e-9
+    )
+    unseen = run_experiment(DrawnRig(CONFIG), REFERENCE, CONFIG, look=blind)
+    np.testing.assert_array_equal(
+        per_dof(unseen.trace, "command"), per_dof(unseen.trace, "reference")
+    )
+    assert set(unseen.frames["status"]) == {"no_markers"}
 
 
 def test_without_compensation_the_command_is_the_reference(uncompensated: Recording) -> None:

@@ -123,6 +123,7 @@ def test_reduction_is_the_share_that_is_gone() -> None:
         ([9, 8, 7, 6, 1], 4),
         ([math.nan, 1, 1], 1),
         ([-1, -1], 0),
+        ([-9, 1, -1], 1),
     ],
 )
 def test_start_counts_the_periods_before_the_settled_ones(
@@ -162,6 +163,51 @@ def test_overspeed_is_the_ratio_of_speeds() -> None:
     time = TWO_PERIODS
     assert metrics.tip_overspeed(time, np.sin(time), 3 * np.sin(time)) == pytest.approx(3, rel=1e-5)
     assert math.isnan(metrics.tip_overspeed(time, np.zeros_like(time), time))
+
+
+@given(slack=st.floats(0.05, 0.9), gain=st.floats(1.0, 1.5))
+@settings(max_examples=40, deadline=None)
+def test_a_lagging_tip_never_overshoots(slack: float, gain: float) -> None:
+    """Right after a reversal it is on the far side of the reference, and still lags."""
+    reference, tip = settled_loop(1.0, -slack, slack)
+    assert metrics.overshoot(reference, tip) == pytest.approx(0, abs=1e-9)
+    # A stroke's own motion beyond the reference counts in full.
+    assert metrics.overshoot(reference, gain * reference) == pytest.approx(gain - 1, abs=1e-9)
+
+
+@pytest.mark.parametrize("ahead", [0.1, 0.4])
+def test_overshoot_is_the_largest_lead(ahead: float) -> None:
+    """A play whose offsets have changed sign leads by their size, once it has moved that far."""
+    reference, tip = settled_loop(1.0, -ahead, ahead)
+    assert metrics.overshoot(tip, reference) == pytest.approx(ahead, rel=1e-3)
+    assert metrics.overshoot(-tip, -reference) == pytest.approx(ahead, rel=1e-3)
+
+
+def test_overshoot_of_what_stands_still_or_is_unknown() -> None:
+    assert math.isnan(metrics.overshoot([1.0, 1.0], [0.0, 1.0]))
+    assert math.isnan(metrics.overshoot([], []))
+    assert math.isnan(metrics.overshoot([0.0, 1.0, 2.0], [0.0, np.nan, 2.0]))
+    # A rest inside a stroke does not end it.
+    assert metrics.overshoot([0, 1, 1, 2], [0, 1, 1.5, 2]) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [([10, 10], 0), ([2, 8, 9.5, 10.5], 2), ([10, 2, 10], 2), ([10, math.nan, 10], 2)],
+)
+def test_until_within_counts_what_comes_before(values: list[float], expected: float) -> None:
+    assert metrics.until_within(values, 10.0, 1.0) == expected
+
+
+def test_until_within_that_is_not_reached_is_unknown() -> None:
+    assert math.isnan(metrics.until_within([10, 2], 10.0, 1.0))
+    assert math.isnan(metrics.until_within([], 10.0, 1.0))
+
+
+def test_peak_to_peak() -> None:
+    assert metrics.peak_to_peak([1.0, -2.0, 0.5]) == 3.0
+    assert math.isnan(metrics.peak_to_peak([]))
+    assert math.isnan(metrics.peak_to_peak([1.0, math.nan]))
 
 
 def test_actuator_gain_is_the_largest_ratio_of_steps() -> None:

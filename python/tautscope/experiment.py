@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,16 +18,15 @@ from tautscope.recording import (
     Table,
     per_dof,
 )
-from tautscope.reduction import HysteresisReduction
+from tautscope.reduction import HysteresisReduction, Report
 from tautscope.references import Reference
 from tautscope.rig import Frame, Rig, Sample
-
-if TYPE_CHECKING:
-    from tautscope.reduction import Report
 
 Floats = NDArray[np.float64]
 Progress = Callable[[float, float], None]
 """Called about once per second of the rig's clock with (elapsed, duration) [s]."""
+Look = Callable[[HysteresisReduction, Frame], Report]
+"""An image update: frame in, what became of it out."""
 
 _UNKNOWN = (np.nan, np.nan, np.nan)
 _NO_FEATURES = (np.nan, np.nan, np.nan, np.nan)
@@ -40,6 +38,8 @@ def run_experiment(
     config: Config,
     compensate: bool = True,
     progress: Progress | None = None,
+    *,
+    look: Look = HysteresisReduction.on_frame,
 ) -> Recording:
     """Run a reference on a rig, with the camera as the only feedback.
 
@@ -54,6 +54,8 @@ def run_experiment(
         config: Of the loop.
         compensate: Without, the command is the reference, and the estimators only listen.
         progress: Told how far the run is.
+        look: What the loop does with a frame; one that calls `HysteresisReduction.on_features`
+            brings a marker detector of your own.
 
     Raises:
         SignalError: The reference is not three finite numbers, or the rig's clock does not run.
@@ -69,7 +71,7 @@ def run_experiment(
         recorder.tick(sample, desired, command)
         # After the command, which never waits for an image.
         if sample.frame is not None:
-            report = reduction.on_frame(sample.frame)
+            report = look(reduction, sample.frame)
             recorder.frame(sample.time, sample.frame, report, elapsed)
         before, sample = sample, rig.step(command)
         if not sample.time > before.time:

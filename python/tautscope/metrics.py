@@ -1,4 +1,4 @@
-"""How good a run is: loop width, reduction, start, tracking, state and marker errors.
+"""How good a run is: loop width, reduction, start, overshoot, tracking, state and marker errors.
 
 The one implementation of the project's definitions. Plain arrays in, plain numbers out; nothing
 here draws or knows a file. A figure that its data do not carry is NaN, never a guess.
@@ -123,7 +123,8 @@ def start_periods(widths: ArrayLike) -> float:
     """Number of periods until the mean width stays within 1.2 times its final value.
 
     Args:
-        widths: (periods,) mean width of each whole period, see `period_widths`.
+        widths: (periods,) mean width of each whole period, see `period_widths`; of one that runs
+            the other way the size counts.
 
     Returns:
         How many periods come before the settled ones: 0 if the first is settled already; NaN if
@@ -132,7 +133,7 @@ def start_periods(widths: ArrayLike) -> float:
     values = np.asarray(widths, dtype=np.float64)
     if values.size == 0 or not np.isfinite(values[-1]):
         return np.nan
-    unsettled = ~(values <= SETTLED * abs(values[-1]))
+    unsettled = ~(np.abs(values) <= SETTLED * abs(values[-1]))
     return float(np.flatnonzero(unsettled)[-1] + 1) if unsettled.any() else 0.0
 
 
@@ -189,6 +190,68 @@ def actuator_gain(reference: ArrayLike, command: ArrayLike) -> float:
         return np.inf
     moving = asked > 1e-9 * asked.max(initial=0.0)
     return float(np.max(given[moving] / asked[moving])) if moving.any() else np.nan
+
+
+def overshoot(reference: ArrayLike, tip: ArrayLike) -> float:
+    """How far the tip runs ahead of the reference by its own motion, in their unit; 0 if never.
+
+    A stroke lasts from one reversal of the reference to the next. In it, with the direction
+    s = +-1 of the reference and the tip's place y0 at its start,
+
+        overshoot = max over the stroke of min(s (y - u), s (y - y0))
+
+    so a tip that still lags from the stroke before, and is therefore ahead as soon as the
+    reference turns, does not count until it moves on in the new direction.
+
+    Args:
+        reference: u (n,); where it stands still the stroke goes on.
+        tip: y (n,).
+
+    Returns:
+        The largest over all strokes; NaN if nothing moves or something is not known.
+    """
+    reference, tip = _pair("reference", reference, "tip", tip)
+    largest = np.nan
+    for first, last in pairwise(_reversals(reference)):
+        sign = np.sign(reference[last] - reference[first])
+        stroke = slice(first, last + 1)
+        ahead, moved = sign * (tip[stroke] - reference[stroke]), sign * (tip[stroke] - tip[first])
+        largest = np.maximum(np.nan_to_num(largest), np.minimum(ahead, moved).max())
+    return float(largest)
+
+
+def _reversals(signal: Floats) -> list[int]:
+    """Where a signal turns, with its two ends; empty if it never moves."""
+    moving = np.flatnonzero(np.diff(signal))
+    if len(moving) == 0:
+        return []
+    direction = np.sign(np.diff(signal)[moving])
+    turns = moving[1:][direction[1:] != direction[:-1]]
+    return [0, *turns.tolist(), len(signal) - 1]
+
+
+def until_within(values: ArrayLike, target: float, tolerance: float) -> float:
+    """Number of values, one per stroke or period, before they stay near a target.
+
+    Args:
+        values: (n,).
+        target: What they should be.
+        tolerance: |value - target| that is near, in their unit.
+
+    Returns:
+        0 if all are near; NaN if the last is not, since then it is not known.
+    """
+    errors = np.abs(np.asarray(values, dtype=np.float64) - target)
+    wrong = np.flatnonzero(~(errors <= tolerance))
+    if errors.size == 0 or errors.size - 1 in wrong:
+        return np.nan
+    return float(wrong[-1] + 1) if wrong.size else 0.0
+
+
+def peak_to_peak(signal: ArrayLike) -> float:
+    """Largest less smallest value; NaN if one is not known or there is none."""
+    values = np.asarray(signal, dtype=np.float64)
+    return float(np.ptp(values)) if values.size else np.nan
 
 
 def marker_errors(measured: ArrayLike, truth: ArrayLike) -> Floats:

@@ -1,0 +1,130 @@
+"""The benchmark's harness: what it runs, and how seeds become rows."""
+
+import json
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tautscope.config import load_config
+from tautscope.dof import Dof
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
+
+import hysteresis_ablation as ablation
+import hysteresis_pages as pages
+import hysteresis_table as tables
+from hysteresis_rows import GOALS, SCENARIOS, gone
+from hysteresis_runs import Sines, uncompensated
+
+NAME = "reduction of mean width"
+
+
+def rows(figures: dict[tuple[str, Dof, str], list[float]]) -> list[dict[str, Any]]:
+    return tables.to_rows(
+        tables.pair({key: dict(enumerate(values)) for key, values in figures.items()})
+    )
+
+
+def test_a_row_is_median_and_worst_against_the_goal() -> None:
+    (row,) = rows({(NAME, Dof.ROTATION, "best"): [0.96, 0.99, 0.97]})
+    assert (row["median"], row["worst"], row["n"]) == (0.97, 0.96, 3)
+    assert (row["goal"], row["sense"], row["holds"], row["steady"]) == (0.95, "min", True, True)
+    assert (row["dof"], row["profile"], row["unit"]) == ("rotation", "best", "share")
+    (wide,) = rows({(NAME, Dof.ROTATION, "best"): [0.99, 0.99, 0.93]})
+    assert wide["holds"]
+    assert not wide["steady"]
+
+
+def test_a_seed_without_a_figure_is_the_worst() -> None:
+    (lost,) = rows({(NAME, Dof.BENDING, "paper"): [math.nan, 0.99, 0.98]})
+    assert (lost["median"], lost["worst"], lost["steady"]) == (0.98, None, False)
+    (none,) = rows({("start", Dof.BENDING, "paper"): [math.nan, math.nan, 0.0]})
+    assert none["median"] is None
+    assert not none["holds"]
+    json.loads(tables.to_json([lost, none]))
+
+
+def test_a_loop_that_runs_the_other_way_is_no_gain() -> None:
+    assert gone(1.84) == pytest.approx(0.16)
+    assert gone(0.8) == pytest.approx(0.8)
+
+
+def test_overspeed_is_compared_seed_by_seed() -> None:
+    found = rows(
+        {
+            ("tip overspeed", Dof.INSERTION, "paper"): [4.0, 2.0],
+            ("tip overspeed", Dof.INSERTION, "best"): [2.0, 2.0],
+        }
+    )
+    (ratio,) = (row for row in found if row["what"] == "tip overspeed over paper's")
+    assert (ratio["median"], ratio["worst"]) == (0.75, 1.0)
+
+
+@pytest.mark.parametrize("group", SCENARIOS)
+def test_runs_without_compensation_are_shared_by_both_profiles(group: str) -> None:
+    plans = [SCENARIOS[group].plan(load_config(None, name)) for name in ("paper", "best")]
+    free = [[run for run in plan.values() if not run.compensate] for plan in plans]
+    assert free[0] == free[1]
+    assert all(run.compensate for plan in plans for run in plan.values() if run not in free[0])
+
+
+def test_a_run_without_compensation_keeps_the_instrument() -> None:
+    config = load_config(None, "best").replace(
+        **{"twin.seed": 7, "twin.shaft.friction": 0.4, "twin.disturb": ["smoke"]}
+    )
+    bare = uncompensated(config).config.twin
+    assert (bare.seed, bare.shaft.friction, bare.disturb) == (7, 0.4, ())
+
+
+@pytest.mark.parametrize("idea", ablation.IDEAS)
+def test_every_idea_can_be_taken_away(idea: str) -> None:
+    best = load_config(None, "best")
+    assert best.replace(**ablation.IDEAS[idea]) != best
+
+
+def test_an_ablation_tells_what_gets_worse() -> None:
+    idea = next(iter(ablation.IDEAS))
+    found = rows(
+        {
+            (NAME, Dof.INSERTION, "best"): [0.99],
+            (NAME, Dof.INSERTION, idea): [0.8],
+            ("start", Dof.INSERTION, "best"): [1.0],
+            ("start", Dof.INSERTION, idea): [1.0],
+        }
+    )
+    losses = ablation.compare(found)
+    assert [row["worse"] for row in losses] == pytest.approx([0.19, 0.0])
+    assert [ablation.matters(row) for row in losses] == [True, False]
+    assert "99.0 % | 80.0 % (goal lost)" in ablation.table(losses)
+
+
+def test_whole_periods_end_with_the_reference() -> None:
+    motion = Sines(load_config().experiment, ((Dof.ROTATION, 7.3),), 60.0)
+    (segment,) = motion.segments
+    assert (segment.periods, segment.end) == (8, pytest.approx(60.0))
+
+
+def test_a_hand_at_rest_still_trembles() -> None:
+    sine = load_config().experiment.insertion
+    periods = ((Dof.INSERTION, sine.period),)
+    motion = Sines(load_config().experiment, periods, 30.0, tremor=1e-3, rest_at=12.5)
+    rest = np.array([motion(time)[Dof.INSERTION] for time in np.arange(12.5, 13.5, 0.001)])
+    assert np.ptp(rest) == pytest.approx(2e-3, rel=1e-3)
+    assert rest.mean() == pytest.approx(sine.centre + sine.amplitude, abs=1e-5)
+
+
+def test_text_goes_between_the_markers(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("a\n<!-- x: begin -->\nold\n<!-- x: end -->\nb\n", encoding="utf-8")
+    pages.insert(page, "x", r"new \1")
+    assert page.read_text() == "a\n<!-- x: begin -->\nnew \\1\n<!-- x: end -->\nb\n"
+    with pytest.raises(ValueError, match="y: begin"):
+        pages.insert(page, "y", "new")
+
+
+def test_every_short_row_has_one_goal() -> None:
+    for whats in tables.SHORT.values():
+        assert len({(GOALS[what].value, GOALS[what].sense) for what in whats}) == 1
