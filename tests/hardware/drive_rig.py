@@ -38,7 +38,7 @@ UNHURRIED = {
     "interface": "tautscope",
     "heartbeat_period": 0.1,
     "heartbeat_timeout": 3.0,
-    "state_timeout": 10.0,
+    "state_timeout": 4.0,
     "request_timeout": 5.0,
     "cycle": 0.02,
     "reply_timeout": 0.019,

@@ -181,6 +181,7 @@ class CanopenLink:
 
     def operational(self) -> None:
         """Start the nodes (NMT) and watch their heartbeats from now on."""
+        self._drain()  # what they said of a run before is not of this one
         now = time.monotonic()
         for node in self._nodes.values():
             node.beat = node.heard = now
@@ -210,11 +211,12 @@ class CanopenLink:
             node.controlword = None  # sent again every time, until it is confirmed
         return self._exchange([cia402.QUICK_STOP] * 3, targets)
 
-    def abandon(self) -> None:
-        """Stop the nodes (NMT); with our heartbeat gone, they quick-stop by themselves."""
+    def abandon(self, dofs: Sequence[Dof]) -> None:
+        """Stop these nodes (NMT); with our heartbeat gone, they quick-stop by themselves."""
+        self._watching = False
         with suppress(DriveError):  # there may be no bus to say it on
-            for node in self._nodes.values():
-                self._nmt(STOP, node.id)
+            for dof in dofs:
+                self._nmt(STOP, self._nodes[dof].id)
 
     def close(self) -> None:
         """Tell stopped drives not to wait for our heartbeat any more, and release the bus."""
@@ -441,7 +443,7 @@ def _dictionary(config: DrivesConfig, dof: Dof) -> ObjectDictionary:
     axis = config[dof]
     try:
         return load_eds(axis.eds or "", axis.node)
-    except (OSError, ValueError, NotImplementedError) as error:
+    except (OSError, ValueError) as error:
         raise ConfigError(
             f"drives.{dof.label}.eds", axis.eds, f"a readable EDS file ({error})"
         ) from None

@@ -25,10 +25,9 @@ from numpy.typing import ArrayLike, NDArray
 from tautscope.config import DrivesConfig
 from tautscope.dof import Dof
 from tautscope.errors import (
+    BusError,
     DriveError,
     FollowingError,
-    ModeRefusedError,
-    SettingRefusedError,
     SignalError,
     SilentDriveError,
     StateError,
@@ -36,14 +35,9 @@ from tautscope.errors import (
 from tautscope.hardware import cia402
 from tautscope.hardware import object_dictionary as objects
 from tautscope.hardware.cia402 import Mode, Scale, State
-from tautscope.hardware.link import AbsentError, Feedback, Link
-from tautscope.hardware.object_dictionary import Entry
+from tautscope.hardware.commissioning import LAG, commission
+from tautscope.hardware.link import Feedback, Link
 from tautscope.hardware.signals import signals_deferred
-
-CIA_402 = 402
-"""Device profile number, the low half of 0x1000."""
-LAG = 0.1
-"""How long a drive may take to follow a command [s]."""
 
 
 @dataclass(slots=True)
@@ -61,26 +55,6 @@ class Traffic:
     longest_pause: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class Commissioned:
-    """What one drive is and how it was set; for `tautscope doctor` and the recording.
-
-    Attributes:
-        name: The drive as a person finds it.
-        vendor, product: From its identity object, 0x1018; 0 where it has none.
-        mode: The mode it took.
-        settings: Object and value as read back.
-        absent: Objects it does not have.
-    """
-
-    name: str
-    vendor: int
-    product: int
-    mode: Mode
-    settings: dict[str, int]
-    absent: tuple[str, ...]
-
-
 def open_drives(config: DrivesConfig) -> Drives:
     """Open the bus, find the drives, set them and read back; no motor moves or is enabled.
 
@@ -94,8 +68,10 @@ def open_drives(config: DrivesConfig) -> Drives:
 
         link = EthercatLink(config)
     else:
-        from tautscope.hardware.canopen_drives import CanopenLink  # noqa: PLC0415
-
+        try:
+            from tautscope.hardware.canopen_drives import CanopenLink  # noqa: PLC0415
+        except ImportError as error:
+            raise BusError("CAN bus", str(error), "pip install 'tautscope[hardware]'") from None
         link = CanopenLink(config)
     return Drives(config, link)
 
@@ -129,7 +105,7 @@ class Drives:
         )
         self._last_cycle = time.monotonic()
         try:
-            self.commissioned = tuple(self._commission(dof) for dof in Dof)
+            self.commissioned = tuple(commission(link, config, dof) for dof in Dof)
             self._modes = {dof: self.commissioned[dof].mode for dof in Dof}
             link.prepare(self._modes)
         except BaseException:
@@ -270,109 +246,6 @@ class Drives:
                 raise
             error.add_note(str(failed))
 
-    # Commissioning
-
-    def _commission(self, dof: Dof) -> Commissioned:
-        link, config, scale = self._link, self.config, self._scales[dof]
-        kind = link.read(dof, objects.DEVICE_TYPE)
-        if kind & 0xFFFF != CIA_402:
-            raise ModeRefusedError(
-                link.name(dof),
-                f"its device type is 0x{kind:08X}, not that of a CiA 402 drive",
-                f"Check drives.{dof.label}.node",
-            )
-        absent: list[str] = []
-        settings: dict[str, int] = {}
-
-        def setting(entry: Entry, value: int, *, needed: bool = False) -> None:
-            try:
-                settings[str(entry)] = self._set(dof, entry, value)
-            except AbsentError:
-                if needed and f"{entry.index:04X}" not in config.waive:
-                    raise SettingRefusedError(
-                        link.name(dof),
-                        f"it does not have {entry}",
-                        f"Add {entry.index:04X} to drives.waive if another protection replaces it",
-                    ) from None
-                absent.append(str(entry))
-
-        lower, upper = scale.travel_counts()
-        hold = config.after_quick_stop == "hold"
-        option = cia402.QUICK_STOP_HOLD if hold else cia402.QUICK_STOP_RELEASE
-        setting(objects.ON_LOSS, cia402.ON_LOSS_QUICK_STOP, needed=config.protocol == "canopen")
-        setting(objects.QUICK_STOP_OPTION, option, needed=True)
-        setting(objects.LEAST_POSITION, lower, needed=True)
-        setting(objects.LARGEST_POSITION, upper, needed=True)
-        setting(objects.PROFILE_SPEED_LIMIT, scale.speed_counts())
-        window = round(config[dof].following_error * config[dof].counts_per_unit)
-        setting(objects.FOLLOWING_WINDOW, max(1, window))
-        setting(objects.FOLLOWING_TIME, round(LAG * 1e3))
-        turn = [self._read_or(dof, entry, 0) for entry in _ENCODER]
-        if all(turn):
-            setting(objects.MOTOR_SPEED_LIMIT, -(-scale.speed_counts() * 60 * turn[1] // turn[0]))
-        mode = self._take_mode(dof, setting)
-        vendor, product = (
-            self._read_or(dof, entry, 0) for entry in (objects.VENDOR, objects.PRODUCT)
-        )
-        return Commissioned(link.name(dof), vendor, product, mode, settings, tuple(absent))
-
-    def _take_mode(self, dof: Dof, setting: Callable[[Entry, int], None]) -> Mode:
-        link = self._link
-        supported = link.read(dof, objects.SUPPORTED_MODES)
-        for mode in (Mode.CYCLIC_SYNCHRONOUS_POSITION, Mode.INTERPOLATED_POSITION):
-            if supported & mode.supported_bit:
-                break
-        else:
-            raise ModeRefusedError(
-                link.name(dof),
-                f"its supported modes (0x6502) are 0x{supported:08X}: neither cyclic synchronous "
-                "position (8) nor interpolated position (7)",
-                "Such a drive cannot follow streamed positions; use another, or other firmware",
-            )
-        if mode is Mode.INTERPOLATED_POSITION:
-            setting(objects.INTERPOLATION_SUBMODE, 0)
-            setting(objects.INTERPOLATION_EXPONENT, -3)
-            setting(objects.INTERPOLATION_TIME, round(self.cycle * 1e3))
-            setting(objects.BUFFER_CLEAR, 0)
-            setting(objects.BUFFER_CLEAR, 1)
-        link.write(dof, objects.MODE, mode)
-        deadline = time.monotonic() + self.config.state_timeout
-        while (shown := link.read(dof, objects.MODE_DISPLAY)) != mode:
-            if time.monotonic() > deadline:
-                raise ModeRefusedError(
-                    link.name(dof),
-                    f"mode {mode.value} was asked for, its display (0x6061) says {shown}",
-                    "Disable the drive, and see its manual for what mode "
-                    f"{mode.value} needs to be set",
-                )
-            time.sleep(self.cycle)
-        return mode
-
-    def _set(self, dof: Dof, entry: Entry, value: int) -> int:
-        """Write, unless the drive has that value and does not let it be written, and read back."""
-        try:
-            self._link.write(dof, entry, value)
-        except SettingRefusedError:
-            if self._link.read(dof, entry) != value:
-                raise
-            return value
-        if entry == objects.BUFFER_CLEAR:
-            return value  # a command; what it reads back is not its value
-        found = self._link.read(dof, entry)
-        if found != value:
-            raise SettingRefusedError(
-                self._link.name(dof),
-                f"{entry} was set to {value} and reads back {found}",
-                "See the drive's manual for the values it takes, and when",
-            )
-        return value
-
-    def _read_or(self, dof: Dof, entry: Entry, default: int) -> int:
-        try:
-            return self._link.read(dof, entry)
-        except AbsentError:
-            return default
-
     # The cycle
 
     def _cycle(self) -> None:
@@ -425,7 +298,8 @@ class Drives:
                     f"it ignores set-points (statusword 0x{said.statusword:04X}, bit 12)",
                     "See its limits and inputs; it may be halted",
                 )
-            self._check_position(dof, before, positions[dof], commands[:, dof])
+            if said.age == 0:
+                self._check_position(dof, before, positions[dof], commands[:, dof])
 
     def _check_position(
         self,
@@ -554,9 +428,9 @@ class Drives:
 
     def _quick_stop(self) -> list[str]:
         """Quick-stop all drives; the names of those that do not confirm it."""
-        if not self._feedback:
-            return []  # never cycled, so never enabled
         self._running = False
+        if not self._feedback:
+            return []  # at rest: never cycled, or stopped before
         pending = list(Dof)
         deadline = time.monotonic() + self.config.state_timeout
         while pending and time.monotonic() < deadline:
@@ -571,14 +445,10 @@ class Drives:
             ]
             if pending:
                 time.sleep(self.cycle / 4)
+        self._feedback = []
         if pending:
-            self._link.abandon()
-        else:
-            self._feedback = []
+            self._link.abandon(pending)
         return [self._link.name(dof) for dof in pending]
-
-
-_ENCODER = (objects.ENCODER_COUNTS, objects.ENCODER_TURNS)
 
 
 def _three(command: ArrayLike) -> NDArray[np.float64]:

@@ -81,7 +81,7 @@ class Link(Protocol):
         """As `cycle`, with a quick stop for every drive, whatever else is wrong on the bus."""
         ...
 
-    def abandon(self) -> None:
+    def abandon(self, dofs: Sequence[Dof]) -> None:
         """Make drives that do not answer stop by themselves; raises nothing."""
         ...
 

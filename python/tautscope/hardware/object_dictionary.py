@@ -165,18 +165,24 @@ def load_eds(path: str, node: int) -> canopen.ObjectDictionary:
         ValueError: It is not an EDS file, or one with errors; the text says which.
     """
     import configparser  # noqa: PLC0415 -- with canopen, only where a bus is opened
+    import warnings  # noqa: PLC0415
     from io import StringIO  # noqa: PLC0415
 
     from canopen.objectdictionary import import_od  # noqa: PLC0415
 
+    source: str | StringIO = path
+    if not path:
+        source = StringIO(eds_text(node))
+        source.name = "tautscope.eds"
     try:
-        if not path:
-            source = StringIO(eds_text(node))
-            source.name = "tautscope.eds"
-            return import_od(source, node)
-        return import_od(path, node)
-    except (configparser.Error, KeyError, TypeError) as error:
+        with warnings.catch_warnings():  # canopen's own, of how it logs
+            warnings.simplefilter("ignore", DeprecationWarning)
+            dictionary = import_od(source, node)
+    except (configparser.Error, KeyError, TypeError, AttributeError, NotImplementedError) as error:
         raise ValueError(f"{type(error).__name__}: {error}") from None
+    if MODE.index not in dictionary:
+        raise ValueError(f"it is not of a CiA 402 drive: no {MODE}")
+    return dictionary
 
 
 def _section(name: str, entry: Entry) -> list[str]:
