@@ -58,15 +58,14 @@ def settle(*stations: LocalBus) -> None:
                 assert time.monotonic() < deadline
                 sender.send(can.Message(arbitration_id=number, is_extended_id=False))
                 heard = other.recv(0.1)
-    last = stations[0]
-    last.send(can.Message(arbitration_id=0x7FF, is_extended_id=False))
+    stations[0].send(can.Message(arbitration_id=0x7FF, is_extended_id=False))
     stations[1].send(can.Message(arbitration_id=0x7FE, is_extended_id=False))
-    for station in stations:
-        for end in (0x7FF, 0x7FE):
-            if station is not stations[0x7FF - end]:
-                while (heard := station.recv(PATIENCE)) is not None:
-                    if heard.arbitration_id == end:
-                        break
+    for number, station in enumerate(stations):
+        ends = {0x7FF, 0x7FE} - {0x7FF - number}
+        while ends:
+            heard = station.recv(PATIENCE)
+            assert heard is not None
+            ends.discard(heard.arbitration_id)
 
 
 def test_it_is_an_interface_of_python_can(hub: Hub) -> None:
