@@ -215,7 +215,7 @@ def test_a_fault_stops_all() -> None:
     with running(soem, config) as drives:
         master.slaves[1].drive.fail(0.0)
         with pytest.raises(EmergencyError, match=r"rotation, device 2.*0x4310"):
-            drives.exchange(drives._previous)
+            drives.exchange(drives.last_command)
         assert states(master) <= AT_REST
 
 
@@ -225,7 +225,7 @@ def test_a_line_that_breaks_stops_all() -> None:
         master.slaves[2].deaf = True
         with pytest.raises(SilentDriveError) as found:
             for _ in range(10_000):
-                drives.exchange(drives._previous)
+                drives.exchange(drives.last_command)
         assert "quick stop is not confirmed" in str(found.value.__notes__)
         assert master.state == SAFEOP  # the watchdogs do the rest
         assert {slave.drive.status for slave in master.slaves[:2]} == {State.QUICK_STOP_ACTIVE}
@@ -236,7 +236,7 @@ def test_an_adapter_that_is_gone() -> None:
     with running(soem, config) as drives:
         master.unplugged = True
         with pytest.raises(BusError, match="adapter is gone"):
-            drives.exchange(drives._previous)
+            drives.exchange(drives.last_command)
 
 
 def test_what_cannot_be_opened() -> None:

@@ -35,7 +35,7 @@ Bench = Callable[..., SimulatedDrives]
 
 def drive(drives: Drives, cycles: int, speed: np.ndarray = SPEED) -> None:
     """Move back and forth, paced."""
-    command = drives._previous.copy()
+    command = drives.last_command
     for count in range(cycles):
         command = command + speed * drives.cycle * (1 if count // 40 % 2 == 0 else -1)
         drives.exchange(command)
@@ -245,7 +245,7 @@ def listen_while(drives: Drives, config: DrivesConfig) -> None:
 
     def go_on() -> None:
         while not ending.is_set():
-            drives.exchange(drives._previous)
+            drives.exchange(drives.last_command)
             time.sleep(drives.cycle / 2)
 
     thread = threading.Thread(target=go_on)

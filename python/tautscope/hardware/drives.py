@@ -122,6 +122,11 @@ class Drives:
         """Whether the motors follow commands."""
         return self._running
 
+    @property
+    def last_command(self) -> NDArray[np.float64]:
+        """(3,) [m, rad, rad] what was last sent, or where the motors were at the start."""
+        return self._previous.copy()
+
     def start(self, *, reset_faults: bool = False) -> NDArray[np.float64]:
         """Enable the motors where they are; `exchange` must follow within `heartbeat_timeout`.
 
