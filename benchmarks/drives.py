@@ -168,14 +168,19 @@ def row(what: str, unit: str, values: list[float], goal: float | None) -> dict[s
 
 
 def streaming_rows(seconds: float) -> list[dict[str, Any]]:
-    with tempfile.TemporaryDirectory() as folder, rig(Path(folder)) as (file, _):
-        with open_drives(settings(file)) as drives:
-            took = stream(drives, seconds, drives.start())
-            traffic = drives.traffic
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        rig(Path(folder)) as (file, _),
+        open_drives(settings(file)) as drives,
+    ):
+        took = stream(drives, seconds, drives.start())
+        traffic = drives.traffic
+    answers = 3 * traffic.cycles
     return [
         row("set-points to answers, 100 Hz", "ms", took, None),
-        row("answers later than 6 ms", "of the cycles", [float(sum(traffic.late))], 0.0)
-        | {"n": traffic.cycles},
+        row("answers that came never", "answers", [float(sum(traffic.lost))], 0.0) | {"n": answers},
+        row("answers that came later than 6 ms", "answers", [float(sum(traffic.late))], None)
+        | {"n": answers},
         row("longest time between two set-points", "ms", [traffic.longest_pause * 1e3], None)
         | {"n": traffic.cycles},
     ]

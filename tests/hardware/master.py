@@ -11,7 +11,6 @@ from tautscope.config import load_config
 from tautscope.hardware.drives import open_drives
 from tautscope.hardware.signals import exit_on_signals
 
-
 STEP = np.array([1e-4, 0.01, 0.01])
 
 

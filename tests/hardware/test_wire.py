@@ -114,7 +114,7 @@ def test_writing_an_object(
     if (index, subindex) == (0x1800, 9):
         subindex = 2  # the manual writes four bytes here, whatever CiA 301 says of the type
     link, bus = link_to({sent: answered}, node)
-    link._nodes[Dof.INSERTION].dictionary.indices.pop(index, None)
+    link._sdo[Dof.INSERTION].od.indices.pop(index, None)
     try:
         link.write(Dof.INSERTION, Entry(index, subindex, "object", size), value)  # type: ignore[arg-type]
         assert bus.sent == [sent]

@@ -1,12 +1,7 @@
 """CiA 402 drives on a CAN bus (CANopen, CiA 301).
 
-`canopen` reads EDS files and speaks SDO; what is sent every cycle are plain frames:
-
-    700+master  heartbeat, when due          from us
-    200+node    controlword, when it changes; taken at once (transmission type 255)
-    300+node    set-point; taken at SYNC (type 1)
-    080         SYNC
-    180+node    statusword, position, mode   from each drive, at SYNC (type 1)
+`canopen` reads EDS files and speaks SDO; what is sent every cycle are plain frames, in
+`tautscope.hardware.can_wire`.
 
 There is no thread here. Whoever calls `cycle` keeps our heartbeat alive, so a loop that hangs is
 noticed by the drives. An interface that hears its own frames cannot be used: they would be taken
@@ -19,8 +14,6 @@ import struct
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
-from typing import Any
 
 import can
 from canopen import Network, ObjectDictionary
@@ -30,35 +23,38 @@ from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 from tautscope.config import DrivesConfig
 from tautscope.dof import Dof
 from tautscope.errors import (
-    BusError,
     ConfigError,
     DriveError,
-    EmergencyError,
-    HeartbeatError,
-    SecondMasterError,
     SettingRefusedError,
     SilentDriveError,
-    StateError,
 )
 from tautscope.hardware import cia402
 from tautscope.hardware import object_dictionary as objects
+from tautscope.hardware.can_wire import (
+    ANSWER,
+    CONTROLWORD,
+    PRE_OPERATIONAL,
+    SDO_ANSWER,
+    SDO_REQUEST,
+    SET_POINT,
+    STOP,
+    Wire,
+    gone,
+    open_bus,
+)
 from tautscope.hardware.cia402 import Mode
 from tautscope.hardware.link import AbsentError, Feedback
 from tautscope.hardware.object_dictionary import Entry, load_eds
 
-NMT, SYNC, EMERGENCY = 0x000, 0x080, 0x080
-ANSWER, CONTROLWORD, SET_POINT = 0x180, 0x200, 0x300
-SDO_ANSWER, SDO_REQUEST, HEARTBEAT = 0x580, 0x600, 0x700
-START, STOP, PRE_OPERATIONAL = 0x01, 0x02, 0x80
-BOOT_UP, OPERATIONAL, PRE_OPERATIONAL_STATE = 0x00, 0x05, 0x7F
 AT_ONCE, AT_EVERY_SYNC = 255, 1
 INVALID = 1 << 31
 """In a PDO's COB-ID: the PDO does not exist."""
 NO_REMOTE = 1 << 30
 """In a transmit PDO's COB-ID: not to be asked for with a remote frame."""
+GENERAL_ERROR = 0x0800_0000
+"""SDO abort code."""
 ABSENT = (0x0602_0000, 0x0609_0011)
 """SDO abort codes: object, sub-index does not exist."""
-_ANSWER = struct.Struct("<Hib")
 
 
 class _Sdo(SdoClient):
@@ -75,25 +71,9 @@ class _Sdo(SdoClient):
         response: bytes = super().read_response()  # type: ignore[no-untyped-call]
         return response
 
-
-@dataclass(slots=True)
-class _Node:
-    """What is known of one drive."""
-
-    name: str
-    id: int
-    dictionary: ObjectDictionary
-    sdo: _Sdo
-    statusword: int = 0
-    position: int = 0
-    mode: int = 0
-    age: int = 0
-    heard: float = 0.0
-    beat: float = 0.0
-    beating: int = PRE_OPERATIONAL_STATE
-    was_operational: bool = False
-    controlword: int | None = None
-    emergency: bytes = b""
+    def abort(self, abort_code: int = GENERAL_ERROR) -> None:
+        """Tell the drive; we are told by the exception, not by a line in a log."""
+        self.send_request(struct.pack("<B3xI", 0x80, abort_code))  # type: ignore[no-untyped-call]
 
 
 class CanopenLink:
@@ -111,31 +91,26 @@ class CanopenLink:
 
     def __init__(self, config: DrivesConfig, bus: can.BusABC | None = None) -> None:
         self._config = config
-        self._nodes: dict[Dof, _Node] = {}
         dictionaries = {dof: _dictionary(config, dof) for dof in Dof}
-        self._bus = _open(config) if bus is None else bus
         self._network = Network()
-        self._network.bus = self._bus
+        self._network.bus = self._bus = open_bus(config) if bus is None else bus
+        self._sdo: dict[Dof, _Sdo] = {}
+        self._wire = Wire(config, self._bus, self._answered)
         for dof, dictionary in dictionaries.items():
             node = config[dof].node
             sdo = _Sdo(SDO_REQUEST + node, SDO_ANSWER + node, dictionary)  # type: ignore[no-untyped-call]
-            sdo.network, sdo.patience, sdo.pump = self._network, config.request_timeout, self._pump
-            name = f"{dof.label}, node {node}"
-            self._nodes[dof] = _Node(name, node, dictionary, sdo)
-        self._by_id = {node.id: node for node in self._nodes.values()}
-        self._foreign = self._foreign_frames()
-        self._second_master: can.Message | None = None
-        self._watching = False
-        self._next_beat = 0.0
+            sdo.network, sdo.patience = self._network, config.request_timeout
+            sdo.pump = self._wire.pump
+            self._sdo[dof] = sdo
         try:
-            self._listen(2 * config.heartbeat_period + 2 * config.cycle)
+            self._wire.listen(2 * config.heartbeat_period + 2 * config.cycle)
         except BaseException:
             self.close()
             raise
 
     def name(self, dof: Dof) -> str:
         """The drive as a person finds it."""
-        return self._nodes[dof].name
+        return self._wire.nodes[dof].name
 
     def read(self, dof: Dof, entry: Entry) -> int:
         """A value by SDO upload; see `tautscope.hardware.link.Link.read`."""
@@ -144,7 +119,7 @@ class CanopenLink:
 
     def write(self, dof: Dof, entry: Entry, value: int) -> None:
         """Set a value by SDO download; see `tautscope.hardware.link.Link.write`."""
-        known = self._nodes[dof].dictionary.get_variable(entry.index, entry.subindex)
+        known = self._sdo[dof].od.get_variable(entry.index, entry.subindex)
         size = len(known) // 8 if known is not None and known.fixed_size else entry.size
         try:
             data = value.to_bytes(size, "little", signed=entry.signed)
@@ -159,8 +134,8 @@ class CanopenLink:
         """Heartbeats both ways and the layout of the PDOs, read back."""
         config = self._config
         for dof in Dof:
-            node = self._nodes[dof]
-            self._nmt(PRE_OPERATIONAL, node.id)
+            node = self._wire.nodes[dof]
+            self._wire.nmt(PRE_OPERATIONAL, node.id)
             period = round(config.heartbeat_period * 1e3)
             timeout = round(config.heartbeat_timeout * 1e3)
             self._set(dof, objects.PRODUCER_HEARTBEAT, period)
@@ -181,14 +156,7 @@ class CanopenLink:
 
     def operational(self) -> None:
         """Start the nodes (NMT) and watch their heartbeats from now on."""
-        self._drain()  # what they said of a run before is not of this one
-        now = time.monotonic()
-        for node in self._nodes.values():
-            node.beat = node.heard = now
-            node.beating, node.was_operational = PRE_OPERATIONAL_STATE, False
-            node.statusword, node.controlword, node.age, node.emergency = 0, None, 0, b""
-            self._nmt(START, node.id)
-        self._watching = True
+        self._wire.start()
 
     def cycle(self, controlwords: Sequence[int], targets: Sequence[int]) -> list[Feedback]:
         """See the module's text for the frames, `tautscope.hardware.link.Link.cycle` for the rest.
@@ -200,30 +168,30 @@ class CanopenLink:
             SecondMasterError: Another master's frames were heard.
             BusError: The bus is gone.
         """
-        self._alarm()  # what came since the last cycle
-        said = self._exchange(controlwords, targets)
-        self._alarm()
+        self._wire.alarm()  # what came since the last cycle
+        said = self._wire.exchange(controlwords, targets)
+        self._wire.alarm()
         return said
 
     def quick_stop(self, targets: Sequence[int]) -> list[Feedback]:
         """As `cycle` with a quick stop for all, but nothing else stands in its way."""
-        for node in self._nodes.values():
+        for node in self._wire.nodes.values():
             node.controlword = None  # sent again every time, until it is confirmed
-        return self._exchange([cia402.QUICK_STOP] * 3, targets)
+        return self._wire.exchange([cia402.QUICK_STOP] * 3, targets)
 
     def abandon(self, dofs: Sequence[Dof]) -> None:
         """Stop these nodes (NMT); with our heartbeat gone, they quick-stop by themselves."""
-        self._watching = False
+        self._wire.watching = False
         with suppress(DriveError):  # there may be no bus to say it on
             for dof in dofs:
-                self._nmt(STOP, self._nodes[dof].id)
+                self._wire.nmt(STOP, self._wire.nodes[dof].id)
 
     def close(self) -> None:
         """Tell stopped drives not to wait for our heartbeat any more, and release the bus."""
         if self._network.bus is None:
             return
-        if self._watching:
-            self._watching = False
+        if self._wire.watching:
+            self._wire.watching = False
             for dof in Dof:
                 try:
                     self.write(dof, objects.CONSUMER_HEARTBEAT, 0)
@@ -233,138 +201,15 @@ class CanopenLink:
         with suppress(can.CanError, OSError):  # it may be unplugged
             self._bus.shutdown()
 
-    # Frames
-
-    def _exchange(self, controlwords: Sequence[int], targets: Sequence[int]) -> list[Feedback]:
-        self._drain()
-        now = time.monotonic()
-        if now >= self._next_beat:
-            self._send(HEARTBEAT + self._config.master_node, bytes([OPERATIONAL]))
-            self._next_beat = now + self._config.heartbeat_period - self._config.cycle / 2
-        for dof, node in self._nodes.items():
-            if node.controlword != controlwords[dof]:
-                self._send(CONTROLWORD + node.id, struct.pack("<H", controlwords[dof]))
-                node.controlword = controlwords[dof]
-        for dof, node in self._nodes.items():
-            self._send(SET_POINT + node.id, struct.pack("<i", targets[dof]))
-        for node in self._nodes.values():
-            node.age += 1
-        self._send(SYNC, b"")
-        deadline = time.monotonic() + self._config.reply_timeout
-        while any(node.age for node in self._nodes.values()):
-            left = deadline - time.monotonic()
-            if left <= 0 or not self._pump(left):
-                break
-        now = time.monotonic()
-        return [
-            Feedback(node.statusword, node.position, node.mode, node.age, now - node.heard)
-            for node in self._nodes.values()
-        ]
-
-    def _send(self, identifier: int, data: bytes) -> None:
-        message = can.Message(arbitration_id=identifier, data=data, is_extended_id=False)
-        try:
-            self._bus.send(message)
-        except (can.CanError, OSError, ValueError) as error:
-            raise _gone(error) from error
-
-    def _nmt(self, command: int, node: int) -> None:
-        self._send(NMT, bytes([command, node]))
-
-    def _pump(self, patience: float) -> bool:
-        """Take one frame, waiting at most `patience` [s]; whether there was one."""
-        try:
-            message = self._bus.recv(patience)
-        except (can.CanError, OSError, ValueError) as error:
-            raise _gone(error) from error
-        if message is None:
-            return False
-        if message.is_error_frame or message.is_extended_id or message.is_remote_frame:
-            return True
-        self._take(message)
-        return True
-
-    def _drain(self) -> None:
-        while self._pump(0.0):
-            pass
-
-    def _take(self, message: can.Message) -> None:
-        identifier, data = message.arbitration_id, bytes(message.data)
-        if identifier in self._foreign:
-            self._second_master = message
-            return
-        node = self._by_id.get(identifier & 0x7F)
-        if node is None:
-            return
-        function = identifier & 0x780
-        now = time.monotonic()
-        if function == ANSWER and len(data) >= _ANSWER.size:
-            node.statusword, node.position, node.mode = _ANSWER.unpack_from(data)
-            node.age, node.heard = 0, now
-        elif function == SDO_ANSWER and len(data) == 8:
-            node.sdo.responses.put(data)
-        elif function == HEARTBEAT and data:
-            node.beat, node.beating = now, data[0] & 0x7F
-            node.was_operational |= node.beating == OPERATIONAL
-        elif function == EMERGENCY and len(data) == 8 and data[:2] != b"\0\0":
-            node.emergency = node.emergency or data
-
-    def _foreign_frames(self) -> frozenset[int]:
-        """Identifiers that only a master sends; we do not hear our own."""
-        ids = self._by_id
-        commands = {base + node for base in (CONTROLWORD, SET_POINT) for node in ids}
-        return frozenset(commands | {NMT, SYNC, HEARTBEAT + self._config.master_node})
-
-    def _listen(self, duration: float) -> None:
-        deadline = time.monotonic() + duration
-        while (left := deadline - time.monotonic()) > 0:
-            self._pump(left)
-        self._alarm()
-
-    def _alarm(self) -> None:
-        """Raise what the bus has said that must stop a run."""
-        if (foreign := self._second_master) is not None:
-            self._second_master = None
-            frame = f"{foreign.arbitration_id:03X}#{bytes(foreign.data).hex().upper()}"
-            raise SecondMasterError(
-                "CAN bus",
-                f"somebody else sends {frame}",
-                "Let only one program command the drives; use no interface that hears its own "
-                "frames",
-            )
-        for node in self._nodes.values():
-            if node.emergency:
-                data, node.emergency = node.emergency, b""
-                raise EmergencyError(
-                    node.name,
-                    f"emergency 0x{int.from_bytes(data[:2], 'little'):04X}, error register "
-                    f"0x{data[2]:02X}, maker's data {data[3:].hex()}",
-                    "Look the code up in the drive's manual; start again with reset_faults",
-                )
-        if not self._watching:
-            return
-        now = time.monotonic()
-        for node in self._nodes.values():
-            restarted = node.was_operational and node.beating != OPERATIONAL
-            if restarted or node.beating == BOOT_UP:
-                raise StateError(
-                    node.name,
-                    f"its heartbeat says 0x{node.beating:02X}, not operational (0x05)",
-                    "It restarted or was stopped: check its supply",
-                )
-            if now - node.beat > self._config.heartbeat_timeout:
-                raise HeartbeatError(
-                    node.name,
-                    f"no heartbeat for {(now - node.beat) * 1e3:.0f} ms",
-                    "Check its supply, the bus and its terminating resistors",
-                )
-
-    # Requests
+    def _answered(self, node: int, data: bytes) -> None:
+        for sdo in self._sdo.values():
+            if sdo.tx_cobid == SDO_ANSWER + node:
+                sdo.responses.put(data)
 
     def _request(self, dof: Dof, what: object, ask: Callable[[_Sdo], bytes | None]) -> bytes:
-        node = self._nodes[dof]
+        node = self._wire.nodes[dof]
         try:
-            data = ask(node.sdo)
+            data = ask(self._sdo[dof])
         except SdoAbortedError as error:
             if error.code in ABSENT:
                 raise AbsentError(str(what)) from None
@@ -380,7 +225,7 @@ class CanopenLink:
                 f"Check drives.{dof.label}.node, its supply, the bus and the bit rate",
             ) from None
         except (can.CanError, OSError, RuntimeError) as error:
-            raise _gone(error) from error
+            raise gone(error) from error
         return data if data is not None else b""
 
     def _set(self, dof: Dof, entry: Entry, value: int) -> None:
@@ -402,7 +247,7 @@ class CanopenLink:
         """Lay out a PDO in the order CiA 301 asks for: off, change, on."""
         name = f"PDO 0x{base:04X}"
         identifier, transmission, count, *mapped = objects.pdo_entries(base, base + 0x200, 0, name)
-        valid = cob + self._nodes[dof].id
+        valid = cob + self._wire.nodes[dof].id
         if base >= 0x1800:
             valid |= self.read(dof, identifier) & NO_REMOTE
         self.write(dof, identifier, valid | INVALID)
@@ -424,21 +269,6 @@ class CanopenLink:
             pass
 
 
-def _open(config: DrivesConfig) -> can.BusABC:
-    options: dict[str, Any] = {"bitrate": config.bitrate, **config.options}
-    try:
-        return can.Bus(interface=config.interface, channel=config.channel, **options)
-    except (can.CanError, OSError, ValueError, TypeError) as error:
-        hint = (
-            f"sudo ip link set {config.channel} up type can bitrate {config.bitrate}"
-            if config.interface == "socketcan"
-            else "Check drives.interface, drives.channel and drives.options"
-        )
-        raise BusError(
-            "CAN bus", f"{config.interface} {config.channel} cannot be opened: {error}", hint
-        ) from error
-
-
 def _dictionary(config: DrivesConfig, dof: Dof) -> ObjectDictionary:
     axis = config[dof]
     try:
@@ -447,7 +277,3 @@ def _dictionary(config: DrivesConfig, dof: Dof) -> ObjectDictionary:
         raise ConfigError(
             f"drives.{dof.label}.eds", axis.eds, f"a readable EDS file ({error})"
         ) from None
-
-
-def _gone(error: BaseException) -> BusError:
-    return BusError("CAN bus", f"it is gone: {error}", "Plug the adapter in and start again")

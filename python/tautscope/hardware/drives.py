@@ -13,9 +13,7 @@ back. Anything unexpected is a `DriveError`: the motors have then been brought t
 from __future__ import annotations
 
 import time
-from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from types import TracebackType
 from typing import Self
 
@@ -27,32 +25,19 @@ from tautscope.dof import Dof
 from tautscope.errors import (
     BusError,
     DriveError,
-    FollowingError,
     SignalError,
-    SilentDriveError,
     StateError,
 )
 from tautscope.hardware import cia402
 from tautscope.hardware import object_dictionary as objects
 from tautscope.hardware.cia402 import Mode, Scale, State
-from tautscope.hardware.commissioning import LAG, commission
+from tautscope.hardware.commissioning import commission
 from tautscope.hardware.link import Feedback, Link
 from tautscope.hardware.signals import signals_deferred
+from tautscope.hardware.watch import Traffic, Watch
 
-
-@dataclass(slots=True)
-class Traffic:
-    """How punctual the bus was.
-
-    Attributes:
-        cycles: Set-points sent.
-        late: Answers that did not come within their cycle, per DOF.
-        longest_pause: Longest time between two cycles [s].
-    """
-
-    cycles: int = 0
-    late: list[int] = field(default_factory=lambda: [0, 0, 0])
-    longest_pause: float = 0.0
+CONFIRMATIONS = 2
+"""Answers in a row that show a motor at rest; one may have been under way before the stop."""
 
 
 def open_drives(config: DrivesConfig) -> Drives:
@@ -91,7 +76,6 @@ class Drives:
 
     def __init__(self, config: DrivesConfig, link: Link) -> None:
         self.config = config
-        self.traffic = Traffic()
         self._link = link
         self._scales = [Scale(config[dof], dof.label) for dof in Dof]
         self._running = False
@@ -100,13 +84,11 @@ class Drives:
         self._targets = [0, 0, 0]
         self._feedback: list[Feedback] = []
         self._previous: NDArray[np.float64] = np.zeros(3)
-        self._recent: deque[NDArray[np.float64]] = deque(
-            maxlen=max(1, round(LAG / config.cycle)) + config.lead_points
-        )
         self._last_cycle = time.monotonic()
         try:
             self.commissioned = tuple(commission(link, config, dof) for dof in Dof)
             self._modes = {dof: self.commissioned[dof].mode for dof in Dof}
+            self._watch = Watch(config, [link.name(dof) for dof in Dof], self._modes)
             link.prepare(self._modes)
         except BaseException:
             link.close()
@@ -121,6 +103,11 @@ class Drives:
     def running(self) -> bool:
         """Whether the motors follow commands."""
         return self._running
+
+    @property
+    def traffic(self) -> Traffic:
+        """How punctual the bus was since `start`."""
+        return self._watch.traffic
 
     @property
     def last_command(self) -> NDArray[np.float64]:
@@ -145,7 +132,7 @@ class Drives:
             raise StateError("drives", "started while running or closed", "Open them anew")
         try:
             self._targets = [self._link.read(dof, objects.POSITION) for dof in Dof]
-            self._check_inside()
+            self._watch.check_start(self._targets)
             self._link.operational()
             if reset_faults:
                 self._walk(self._reset)
@@ -158,9 +145,7 @@ class Drives:
         except BaseException as error:
             self._stop_because(error)
             raise
-        self._previous = self._positions()
-        self._recent.extend([self._previous] * (self._recent.maxlen or 1))
-        self.traffic = Traffic()
+        self._previous = self._watch.begin(self._feedback)
         self._running = True
         return self._previous.copy()
 
@@ -195,15 +180,13 @@ class Drives:
                 scale.checked(wanted[dof], self._previous[dof], self.cycle)
                 for dof, scale in enumerate(self._scales)
             ]
-            self._recent.append(wanted)
-            before = self._feedback
             self._cycle()
-            self._check(before)
+            applied = self._watch.check(wanted, self._feedback)
         except BaseException as error:
             self._stop_because(error)
             raise
         self._previous = wanted
-        return self._positions()
+        return applied
 
     def stop(self) -> None:
         """Bring all motors to quick stop and see that they are; the bus stays open.
@@ -224,10 +207,10 @@ class Drives:
         Raises:
             StateError: As `stop`.
         """
-        if self._closed:
-            return
-        self._closed = True
         with signals_deferred():
+            if self._closed:
+                return
+            self._closed = True
             try:
                 unconfirmed = self._quick_stop()
             finally:
@@ -254,98 +237,17 @@ class Drives:
     # The cycle
 
     def _cycle(self) -> None:
-        now = time.monotonic()
-        if self.traffic.cycles:
-            self.traffic.longest_pause = max(self.traffic.longest_pause, now - self._last_cycle)
+        now, traffic = time.monotonic(), self.traffic
+        if traffic.cycles:
+            traffic.longest_pause = max(traffic.longest_pause, now - self._last_cycle)
         self._last_cycle = now
+        traffic.cycles += 1
         self._feedback = self._link.cycle(self._words, self._targets)
-        self.traffic.cycles += 1
-        for dof, said in enumerate(self._feedback):
-            self.traffic.late[dof] += said.age > 0
 
     def _paced_cycle(self) -> None:
         began = time.monotonic()
         self._cycle()
         time.sleep(max(0.0, self.cycle - (time.monotonic() - began)))
-
-    def _positions(self) -> NDArray[np.float64]:
-        return np.array(
-            [
-                scale.to_position(said.position)
-                for scale, said in zip(self._scales, self._feedback, strict=True)
-            ]
-        )
-
-    def _check(self, before: list[Feedback]) -> None:
-        """What the drives said in this cycle, against what they were told."""
-        positions = self._positions()
-        commands = np.stack(self._recent)
-        for dof in Dof:
-            said, name = self._feedback[dof], self._link.name(dof)
-            if said.silence > self.config.heartbeat_timeout:
-                raise SilentDriveError(
-                    name,
-                    f"no answer to {said.age} set-points, {said.silence * 1e3:.0f} ms",
-                    "Check its supply and the bus, and what else loads this computer",
-                )
-            state = cia402.state_of(said.statusword)
-            if state is not State.OPERATION_ENABLED:
-                raise self._left(dof, state, said)
-            if said.mode != self._modes[dof]:
-                raise StateError(
-                    name,
-                    f"it changed from mode {self._modes[dof].value} to {said.mode}",
-                    "Let nobody else command it",
-                )
-            if not said.statusword & cia402.FOLLOWS:
-                raise StateError(
-                    name,
-                    f"it ignores set-points (statusword 0x{said.statusword:04X}, bit 12)",
-                    "See its limits and inputs; it may be halted",
-                )
-            if said.age == 0:
-                self._check_position(dof, before, positions[dof], commands[:, dof])
-
-    def _check_position(
-        self,
-        dof: Dof,
-        before: list[Feedback],
-        position: float,
-        commands: NDArray[np.float64],
-    ) -> None:
-        axis, said, name = self.config[dof], self._feedback[dof], self._link.name(dof)
-        error = max(float(commands.min()) - position, position - float(commands.max()))
-        flagged = (
-            said.statusword & cia402.FOLLOWING_ERROR
-            and self._modes[dof] is Mode.CYCLIC_SYNCHRONOUS_POSITION
-        )
-        if error > axis.following_error or flagged:
-            raise FollowingError(
-                name,
-                f"it is at {position:.6g} and was told to be within {commands.min():.6g} and "
-                f"{commands.max():.6g}" + (" (the drive says so itself)" if flagged else ""),
-                "See whether something blocks the motor, then drives."
-                f"{dof.label}.counts_per_unit and following_error",
-            )
-        jump = abs(position - self._scales[dof].to_position(before[dof].position))
-        elapsed = (before[dof].age + 2) * self.cycle
-        if jump > 2 * axis.speed_limit * elapsed + axis.following_error:
-            raise FollowingError(
-                name, f"its position jumped by {jump:.6g} in a cycle", "Check the encoder's cable"
-            )
-
-    def _check_inside(self) -> None:
-        for dof, scale in zip(Dof, self._scales, strict=True):
-            position = scale.to_position(self._targets[dof])
-            lower, upper = self.config[dof].travel
-            slack = self.config[dof].following_error
-            if not lower - slack <= position <= upper + slack:
-                raise FollowingError(
-                    self._link.name(dof),
-                    f"it stands at {position:.6g}, outside its travel {lower} to {upper}",
-                    f"Move it there by hand, or check drives.{dof.label}.home, sign and "
-                    "counts_per_unit",
-                )
 
     # Enabling
 
@@ -365,16 +267,8 @@ class Drives:
                 done = done and content
                 if content or said.statusword != seen[dof]:
                     seen[dof], since[dof] = said.statusword, time.monotonic()
-                elif time.monotonic() - since[dof] <= self.config.state_timeout:
-                    continue
-                elif said.age:
-                    raise SilentDriveError(
-                        self._link.name(dof),
-                        f"no answer to {said.age} set-points",
-                        "Check its supply, and whether it takes synchronous PDOs",
-                    )
-                else:
-                    raise self._left(dof, cia402.state_of(said.statusword), said, stuck=True)
+                elif time.monotonic() - since[dof] > self.config.state_timeout:
+                    raise self._watch.stuck(dof, said)
             if done:
                 return
 
@@ -388,7 +282,7 @@ class Drives:
 
     def _enable(self, dof: Dof, state: State | None, said: Feedback) -> bool:
         if state is State.FAULT:
-            raise self._left(dof, state, said)
+            raise self._watch.wrong_state(dof, said)
         word = cia402.towards_enabled(state)
         if word is not None:
             self._words[dof] = word
@@ -398,30 +292,10 @@ class Drives:
 
     def _follow(self, dof: Dof, state: State | None, said: Feedback) -> bool:
         if state is not State.OPERATION_ENABLED:
-            raise self._left(dof, state, said)
+            raise self._watch.wrong_state(dof, said)
         if self._modes[dof] is Mode.INTERPOLATED_POSITION:
             self._words[dof] = cia402.INTERPOLATE
         return bool(said.statusword & cia402.FOLLOWS)
-
-    def _left(
-        self, dof: Dof, state: State | None, said: Feedback, *, stuck: bool = False
-    ) -> StateError:
-        shown = "a state CiA 402 does not have" if state is None else state.value
-        fault = state in (State.FAULT, State.FAULT_REACTION)
-        paused = time.monotonic() - self._last_cycle
-        if fault:
-            remedy = "Find the fault's cause in its manual (0x603F), then start with reset_faults"
-        elif self.traffic.longest_pause > self.config.heartbeat_timeout:
-            remedy = (
-                f"This computer paused for {self.traffic.longest_pause * 1e3:.0f} ms: unload it"
-            )
-        else:
-            remedy = "Check its supply, its enable input and its limits"
-        what = f"it stays in {shown}" if stuck else f"it is in {shown}, not operation enabled"
-        silent = f", silent for {said.silence + paused:.1f} s" if said.age else ""
-        return StateError(
-            self._link.name(dof), f"{what} (statusword 0x{said.statusword:04X}{silent})", remedy
-        )
 
     # Stopping
 
@@ -436,21 +310,20 @@ class Drives:
         self._running = False
         if not self._feedback:
             return []  # at rest: never cycled, or stopped before
-        pending = list(Dof)
+        confirmed = [0, 0, 0]
         deadline = time.monotonic() + self.config.state_timeout
-        while pending and time.monotonic() < deadline:
+        while min(confirmed) < CONFIRMATIONS and time.monotonic() < deadline:
             try:
                 said = self._link.quick_stop(self._targets)
             except DriveError:
                 break  # the bus itself is gone
-            pending = [
-                dof
-                for dof in Dof
-                if said[dof].age or cia402.state_of(said[dof].statusword) not in cia402.AT_REST
-            ]
-            if pending:
+            for dof, one in enumerate(said):
+                rests = not one.age and cia402.state_of(one.statusword) in cia402.AT_REST
+                confirmed[dof] = confirmed[dof] + 1 if rests else 0
+            if not all(confirmed):
                 time.sleep(self.cycle / 4)
         self._feedback = []
+        pending = [dof for dof in Dof if confirmed[dof] < CONFIRMATIONS]
         if pending:
             self._link.abandon(pending)
         return [self._link.name(dof) for dof in pending]

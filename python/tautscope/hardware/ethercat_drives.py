@@ -63,7 +63,7 @@ class EthercatLink:
         self._config = config
         self._soem = _library() if pysoem is None else pysoem
         self._master = self._soem.Master()
-        self._age = 0
+        self._age = self._answers = 0
         self._heard = time.monotonic()
         self._closed = False
         try:
@@ -197,12 +197,20 @@ class EthercatLink:
             self._age += 1
         else:
             self._age, self._heard = 0, now
+            self._answers += 1
             for slave in self._slaves.values():
                 slave.statusword, slave.position, slave.mode = _ANSWER.unpack_from(
                     bytes(slave.device.input)
                 )
         return [
-            Feedback(slave.statusword, slave.position, slave.mode, self._age, now - self._heard)
+            Feedback(
+                statusword=slave.statusword,
+                position=slave.position,
+                mode=slave.mode,
+                age=self._age,
+                answers=self._answers,
+                silence=now - self._heard,
+            )
             for slave in self._slaves.values()
         ]
 

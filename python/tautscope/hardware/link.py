@@ -20,6 +20,7 @@ class Feedback:
         position: 0x6064 [counts].
         mode: 0x6061.
         age: Cycles since it said so; 0 in this one.
+        answers: How often it has said so since the link began.
         silence: Time since it said so [s].
     """
 
@@ -27,6 +28,7 @@ class Feedback:
     position: int
     mode: int
     age: int
+    answers: int
     silence: float
 
 
