@@ -16,19 +16,32 @@ Vect   Bonfiglioli Active, CANopen, 8.1.9 (0x1016)
 from __future__ import annotations
 
 import itertools
+import struct
 from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
 
 import can
 import pytest
 from drive_rig import AXES, drives_config
+from hypothesis import given
+from hypothesis import strategies as st
+from tautscope.bench.can_bus import Hub
 from tautscope.bench.canopen_node import CanopenNode
 from tautscope.bench.drives import SimulatedDrive
 from tautscope.dof import Dof
-from tautscope.errors import EmergencyError, SecondMasterError, SettingRefusedError
+from tautscope.errors import (
+    ConfigError,
+    DriveError,
+    EmergencyError,
+    SecondMasterError,
+    SettingRefusedError,
+)
 from tautscope.hardware import cia402
 from tautscope.hardware import object_dictionary as objects
 from tautscope.hardware.canopen_drives import CanopenLink
 from tautscope.hardware.cia402 import Mode, State
+from tautscope.hardware.drives import open_drives
 from tautscope.hardware.link import AbsentError
 from tautscope.hardware.object_dictionary import Entry
 
@@ -308,3 +321,88 @@ def test_the_simulated_drive_answers_as_printed() -> None:
     said.clear()
     drive.fail(0.0)
     assert said[0].startswith("082#1043")
+
+
+EDS = """[FileInfo]
+FileName=drive.eds
+[DeviceInfo]
+VendorNumber={vendor}
+[607F]
+ParameterName=Max profile velocity
+ObjectType=0x7
+DataType=0x0006
+AccessType=rw
+[6060]
+ParameterName=Modes of operation
+ObjectType=0x7
+DataType=0x0002
+AccessType=rw
+"""
+
+
+def test_the_eds_file_says_how_long_an_object_is(tmp_path: Path) -> None:
+    """Festo: 2B is a download of two bytes. Type 0x0006 is UNSIGNED16, as some drives have it."""
+    file = tmp_path / "drive.eds"
+    file.write_text(EDS.format(vendor=0), encoding="utf-8")
+    sent = "601#2B7F6000E8030000"
+    bus = Transcript(lambda frame: ["581#607F600000000000"] if frame == sent else [])
+    axis = AXES["insertion"] | {"eds": str(file)}
+    link = CanopenLink(drives_config(**QUICK, insertion=axis), bus)
+    try:
+        link.write(Dof.INSERTION, objects.PROFILE_SPEED_LIMIT, 0x03E8)
+        assert bus.sent == [sent]
+        with pytest.raises(SettingRefusedError, match=r"cannot hold 65536.*EDS"):
+            link.write(Dof.INSERTION, objects.PROFILE_SPEED_LIMIT, 65536)
+    finally:
+        link.close()
+
+
+def test_the_eds_file_of_another_drive_is_refused(
+    tmp_path: Path, hub: Hub, bench: Callable[..., object]
+) -> None:
+    file = tmp_path / "drive.eds"
+    file.write_text(EDS.format(vendor="0x9A"), encoding="utf-8")
+    axis = AXES["insertion"] | {"eds": str(file)}
+    config = drives_config(channel=str(hub.path), insertion=axis)
+    bench(config)
+    with pytest.raises(ConfigError, match=r"Vendor id\) is 0x0, not 0x9A") as found:
+        open_drives(config)
+    assert found.value.field == "drives.insertion.eds"
+
+
+frames = st.tuples(st.integers(0, 0x7FF), st.binary(max_size=8))
+requests = st.tuples(  # such as reach the server behind the SDO
+    st.just(0x602),
+    st.builds(
+        lambda command, entry, value: struct.pack("<BHBI", command, *entry, value),
+        st.sampled_from([0x40, 0x23, 0x2B, 0x2F, 0x80, 0x60]),
+        st.sampled_from([(entry.index, entry.subindex) for entry in objects.profile(2)]),
+        st.integers(0, 2**32 - 1) | st.integers(0, 255),
+    ),
+)
+
+
+@given(st.lists(frames | requests | st.just((0x080, b"")), max_size=40))
+def test_no_frame_brings_either_side_down(received: list[tuple[int, bytes]]) -> None:
+    """Whatever comes: the drive answers or ignores it, the master's errors are its own."""
+    drive = SimulatedDrive(
+        Dof.ROTATION,
+        drives_config(),
+        lambda identifier, data: None,
+        lambda now, what: None,
+        modes=frozenset({7, 8}),
+    )
+    drive.boot(0.0)
+    drive.take(0x000, bytes.fromhex("0102"), 0.0)
+    for number, (identifier, data) in enumerate(received):
+        drive.take(identifier, data, number * 0.01)
+        drive.tick(number * 0.01)
+    link, bus = link_to({})
+    try:
+        link.operational()
+        bus.waiting += [frame(identifier, data) for identifier, data in received]
+        with suppress(DriveError):
+            link.cycle([0] * 3, [0] * 3)
+    finally:
+        link.abandon([])
+        link.close()

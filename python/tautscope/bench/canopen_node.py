@@ -199,7 +199,7 @@ class CanopenNode:
             if not subindex:
                 keys = [
                     (packed >> 16, packed >> 8 & 0xFF)
-                    for packed in (self.values[index, sub] for sub in range(1, value + 1))
+                    for packed in (self.values.get((index, sub), 0) for sub in range(1, value + 1))
                 ]
                 if any(mapped not in self.entries for mapped in keys):
                     return NO_OBJECT

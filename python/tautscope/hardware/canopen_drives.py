@@ -84,7 +84,7 @@ class CanopenLink:
         bus: An open bus to use instead of the one the configuration names; closed with the link.
 
     Raises:
-        ConfigError: An EDS file is missing or unreadable.
+        ConfigError: An EDS file is missing, unreadable or of another drive.
         BusError: The bus cannot be opened.
         SecondMasterError: There is traffic of another master.
     """
@@ -104,6 +104,8 @@ class CanopenLink:
             self._sdo[dof] = sdo
         try:
             self._wire.listen(2 * config.heartbeat_period + 2 * config.cycle)
+            for dof in Dof:
+                self._check_identity(dof)
         except BaseException:
             self.close()
             raise
@@ -257,6 +259,21 @@ class CanopenLink:
             self._set(dof, place, entry.mapping)
         self._set(dof, count, len(entries))
         self._set(dof, identifier, valid)
+
+    def _check_identity(self, dof: Dof) -> None:
+        """Whether the drive is the one its EDS file describes."""
+        described = self._sdo[dof].od.device_information
+        for entry, number in (
+            (objects.VENDOR, described.vendor_number),
+            (objects.PRODUCT, described.product_number),
+        ):
+            if number and (found := self.read(dof, entry)) != number:
+                raise ConfigError(
+                    f"drives.{dof.label}.eds",
+                    self._config[dof].eds,
+                    f"the file of the drive at node {self._config[dof].node}, whose {entry} is "
+                    f"0x{found:X}, not 0x{number:X}",
+                )
 
     def _silence(self, dof: Dof, base: int) -> None:
         """Switch off a PDO that is not used, if the drive has it."""

@@ -44,7 +44,7 @@ def open_drives(config: DrivesConfig) -> Drives:
     """Open the bus, find the drives, set them and read back; no motor moves or is enabled.
 
     Raises:
-        ConfigError: An EDS file is missing or unreadable.
+        ConfigError: An EDS file is missing, unreadable or of another drive.
         DriveError: As `Drives`.
     """
     link: Link
