@@ -156,6 +156,14 @@ def test_a_protection_the_drive_lacks_must_be_waived(hub: Hub, bench: Bench) -> 
             assert [name[:6] for name in one.absent] == ["0x6007", "0x6080"]
 
 
+@pytest.mark.parametrize("index", [0x6502, 0x6064, 0x1401, 0x1016])
+def test_an_object_that_cannot_be_missed(hub: Hub, bench: Bench, index: int) -> None:
+    config = drives_config(channel=str(hub.path))
+    bench(config, absent=(index,))
+    with pytest.raises(SettingRefusedError, match=r"insertion, node 1"):
+        open_drives(config)
+
+
 def test_protections_and_limits_are_in_the_drive(hub: Hub, bench: Bench) -> None:
     """In counts, with the rotation's sign -1 and home 0.25 rad worked out by hand."""
     config = drives_config(channel=str(hub.path))

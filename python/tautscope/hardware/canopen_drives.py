@@ -197,7 +197,7 @@ class CanopenLink:
             for dof in Dof:
                 try:
                     self.write(dof, objects.CONSUMER_HEARTBEAT, 0)
-                except (DriveError, AbsentError):
+                except DriveError:
                     break  # the one that is gone needs no telling, and the others may be slow
         self._network.bus = None
         with suppress(can.CanError, OSError):  # it may be unplugged
@@ -214,7 +214,9 @@ class CanopenLink:
             data = ask(self._sdo[dof])
         except SdoAbortedError as error:
             if error.code in ABSENT:
-                raise AbsentError(str(what)) from None
+                raise AbsentError(
+                    node.name, f"it does not have {what}", "It may be another kind of drive"
+                ) from None
             raise SettingRefusedError(
                 node.name,
                 f"it refused {what}: abort code 0x{error.code:08X} ({error})",
@@ -231,13 +233,8 @@ class CanopenLink:
         return data if data is not None else b""
 
     def _set(self, dof: Dof, entry: Entry, value: int) -> None:
-        try:
-            self.write(dof, entry, value)
-            found = self.read(dof, entry)
-        except AbsentError:
-            raise SettingRefusedError(
-                self.name(dof), f"it does not have {entry}", "Such a drive cannot be used safely"
-            ) from None
+        self.write(dof, entry, value)
+        found = self.read(dof, entry)
         if found != value:
             raise SettingRefusedError(
                 self.name(dof),

@@ -182,6 +182,8 @@ class _Visit:
     def _write(self, entry: Entry, value: int) -> None:
         try:
             self._link.write(self._dof, entry, value)
+        except AbsentError:
+            raise
         except SettingRefusedError:
             # A value that is fixed in the drive and is the right one needs no writing.
             if self._link.read(self._dof, entry) != value:

@@ -261,7 +261,9 @@ class EthercatLink:
             return ask()
         except self._soem.SdoError as error:
             if error.abort_code in ABSENT:
-                raise AbsentError(str(what)) from None
+                raise AbsentError(
+                    name, f"it does not have {what}", "It may be another kind of drive"
+                ) from None
             raise SettingRefusedError(
                 name,
                 f"it refused {what}: abort code 0x{error.abort_code:08X} ({error.desc})",

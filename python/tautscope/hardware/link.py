@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from tautscope.dof import Dof
+from tautscope.errors import SettingRefusedError
 from tautscope.hardware.cia402 import Mode
 from tautscope.hardware.object_dictionary import Entry
 
@@ -32,7 +33,7 @@ class Feedback:
     silence: float
 
 
-class AbsentError(Exception):
+class AbsentError(SettingRefusedError):
     """A drive does not have the object that was asked for."""
 
 
