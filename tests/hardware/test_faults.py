@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from drive_rig import drives_config
 from tautscope.bench.can_bus import Hub, LocalBus
+from tautscope.bench.canopen_node import CanopenNode
 from tautscope.bench.drives import SimulatedDrives
 from tautscope.config import DrivesConfig
 from tautscope.dof import Dof
@@ -31,6 +32,10 @@ from tautscope.hardware.drives import Drives, open_drives
 
 SPEED = np.array([0.01, 1.5, 0.8])
 Bench = Callable[..., SimulatedDrives]
+
+
+def hex_of(key: tuple[int, int]) -> str:
+    return f"{key[0]:04X}:{key[1]}"
 
 
 def drive(drives: Drives, cycles: int, speed: np.ndarray = SPEED) -> None:
@@ -161,6 +166,22 @@ def test_an_object_that_cannot_be_missed(hub: Hub, bench: Bench, index: int) -> 
     config = drives_config(channel=str(hub.path))
     bench(config, absent=(index,))
     with pytest.raises(SettingRefusedError, match=r"insertion, node 1"):
+        open_drives(config)
+
+
+@pytest.mark.parametrize("key", [(0x605A, 0), (0x607D, 2), (0x1017, 0), (0x1401, 2)], ids=hex_of)
+def test_a_setting_that_reads_back_differently(
+    hub: Hub, bench: Bench, monkeypatch: pytest.MonkeyPatch, key: tuple[int, int]
+) -> None:
+    store = CanopenNode._store
+
+    def other(self: CanopenNode, where: tuple[int, int], value: int, now: float) -> int | None:
+        return store(self, where, value - (where == key), now)
+
+    monkeypatch.setattr(CanopenNode, "_store", other)
+    config = drives_config(channel=str(hub.path))
+    bench(config)
+    with pytest.raises(SettingRefusedError, match=rf"0x{key[0]:04X}:{key[1]}.*reads back"):
         open_drives(config)
 
 
