@@ -33,9 +33,18 @@ def test_a_signal_leaves_every_with(number: int) -> None:
     assert found.value.code == 128 + number
 
 
+def test_sigint_that_a_shell_had_ignored() -> None:
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with pytest.raises(KeyboardInterrupt), exit_on_signals():
+            os.kill(os.getpid(), signal.SIGINT)
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
 def test_a_second_ctrl_c_waits_for_the_stop() -> None:
     stopped = []
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(KeyboardInterrupt), exit_on_signals():
         try:
             raise KeyboardInterrupt
         finally:

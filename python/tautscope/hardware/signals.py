@@ -18,9 +18,10 @@ DEFERRED = (signal.SIGINT, *TERMINATING)
 def exit_on_signals() -> Iterator[None]:
     """SIGTERM and SIGHUP raise SystemExit in the main thread, so that every ``with`` is left.
 
-    Python does so for SIGINT by itself (KeyboardInterrupt); the others would end the process at
-    once, and only the drives' own watchdogs would stop the motors. In another thread than the main
-    one this does nothing. What was there before comes back at the end.
+    They would end the process at once, and only the drives' own watchdogs would stop the motors.
+    SIGINT raises KeyboardInterrupt, also in a process in the background, whose shell had it
+    ignored. In another thread than the main one this does nothing. What was there before comes
+    back at the end.
     """
 
     def leave(number: int, frame: FrameType | None) -> None:
@@ -30,6 +31,7 @@ def exit_on_signals() -> Iterator[None]:
         yield
         return
     before = {number: signal.signal(number, leave) for number in TERMINATING}
+    before[signal.SIGINT] = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         yield
     finally:
