@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
+import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -108,3 +111,12 @@ def test_importing_the_package_loads_no_bus() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_the_documented_configuration_is_accepted() -> None:
+    page = Path(__file__).resolve().parents[2] / "docs" / "hardware.md"
+    (block,) = re.findall(r"```toml\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+    drives = from_document(tomllib.loads(block)).drives
+    assert drives is not None
+    # The comment beside the figure: 4096 counts a turn, 20:1, over 2 pi.
+    assert drives.rotation.counts_per_unit == pytest.approx(4096 * 20 / (2 * math.pi), rel=1e-5)
