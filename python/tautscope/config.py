@@ -362,6 +362,75 @@ class TwinConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     drives: DriveConfig = field(default_factory=DriveConfig)
 
 
+class AxisConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """One motor and its drive. What has no default is a fact of the rig that nobody can guess."""
+
+    node: Annotated[int, Meta(ge=1, le=127)]
+    """CANopen node id; with EtherCAT, the position on the line, from 1."""
+    counts_per_unit: Positive
+    """Encoder counts per m or rad of the instrument's degree of freedom, gears included."""
+    sign: Literal[-1, 1]
+    """1 where counts grow with the degree of freedom, else -1."""
+    travel: tuple[float, float]
+    """Least and largest position [m or rad]; set in the drive and checked before every command."""
+    speed_limit: Positive
+    """[m/s or rad/s]; likewise."""
+    following_error: Positive
+    """How far the motor may be from what was commanded within the last 0.1 s [m or rad]."""
+    home: float = 0.0
+    """Where the degree of freedom is when the drive reads 0 counts [m or rad]."""
+    eds: str | None = None
+    """The drive's EDS file; without it, the objects of CiA 402 that are used."""
+
+
+class DrivesConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Motors on a bus. Only a rig of hardware, or the bench that stands for one, has them.
+
+    The times are [ours].
+    """
+
+    insertion: AxisConfig
+    rotation: AxisConfig
+    bending: AxisConfig
+    protocol: Literal["canopen", "ethercat"] = "canopen"
+    interface: str = "socketcan"
+    """Any of python-can's, as it names them; not those that hear their own frames."""
+    channel: str = "can0"
+    """What the interface calls the bus; with EtherCAT, the network adapter."""
+    bitrate: Annotated[int, Meta(ge=10_000, le=1_000_000)] = 1_000_000
+    """[bit/s]; SocketCAN takes the operating system's."""
+    options: dict[str, str | int | float | bool] = field(default_factory=dict)
+    """What else the interface wants to know."""
+    cycle: Positive = 0.01
+    """From one set-point to the next [s], whole milliseconds."""
+    reply_timeout: Positive = 0.006
+    """How long a cycle waits for the drives' answers [s]; what comes later counts as late."""
+    lead_points: Annotated[int, Meta(ge=0, le=16)] = 2
+    """Set-points ahead in the input buffer, interpolated position mode only; each is a cycle's
+    delay, and covers a cycle's unpunctuality."""
+    master_node: Annotated[int, Meta(ge=1, le=127)] = 127
+    """Node id of our own heartbeat."""
+    heartbeat_period: Positive = 0.02
+    """[s], ours and the drives', whole milliseconds."""
+    heartbeat_timeout: Positive = 0.08
+    """Silence after which a drive quick-stops, and after which we stop all drives [s], whole
+    milliseconds."""
+    state_timeout: Positive = 1.0
+    """For each state of the drive to be reached [s]."""
+    request_timeout: Positive = 0.3
+    """For each answer to a request [s]."""
+    after_quick_stop: Literal["hold", "release"] = "hold"
+    """Whether the motor is held where it stopped, or let go."""
+    waive: tuple[Literal["6007", "605A", "607D"], ...] = ()
+    """Protections the drives do not have: what a lost connection does, what a quick stop does,
+    limits of travel. Each named here is one you go without."""
+
+    def __getitem__(self, dof: Dof) -> AxisConfig:
+        """The motor of one DOF."""
+        axis: AxisConfig = getattr(self, dof.label)
+        return axis
+
+
 class Config(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Everything a run depends on. The defaults are the article's experiment."""
 
@@ -391,6 +460,8 @@ class Config(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     control: ControlConfig = field(default_factory=ControlConfig)
     experiment: ExperimentConfig = field(default_factory=ExperimentConfig)
     twin: TwinConfig = field(default_factory=TwinConfig)
+    drives: DrivesConfig | None = None
+    """Motors of a rig; nothing about them can be guessed, so there is no default."""
 
     def __getitem__(self, dof: Dof) -> DofConfig:
         """The settings of one DOF."""
@@ -488,8 +559,10 @@ def _named(error: msgspec.ValidationError, document: dict[str, Any]) -> ConfigEr
     expected, _, path = message.partition(" - at `$")
     path = path.rstrip("`").lstrip(".")
     unknown = re.search(r"unknown field `([^`]*)`", expected)
-    if unknown:
-        path = f"{path}.{unknown[1]}".lstrip(".")
+    missing = re.search(r"missing required field `([^`]*)`", expected)
+    for named in (unknown, missing):
+        if named:
+            path = f"{path}.{named[1]}".lstrip(".")
     value: Any = document
     for key in re.findall(r"[^.\[\]]+", path):
         try:
@@ -499,6 +572,8 @@ def _named(error: msgspec.ValidationError, document: dict[str, Any]) -> ConfigEr
             break
     if unknown:
         allowed = "no such key; `tautscope config` prints those there are"
+    elif missing:
+        allowed = "a value: it has no default"
     else:
         allowed = expected.removeprefix("Expected ").split(", got")[0].replace("`", "")
     return ConfigError(path or "config", value, allowed)
@@ -564,4 +639,50 @@ def _check_relations(config: Config) -> None:
             "control.history",
             config.control.history,
             f"1 to 1024 ticks of control.period = {config.control.period}",
+        )
+    if config.drives is not None:
+        _check_drives(config.drives)
+
+
+def _check_drives(drives: DrivesConfig) -> None:
+    taken = {drives.master_node: "master_node"}
+    for dof in Dof:
+        axis, path = drives[dof], f"drives.{dof.label}"
+        if axis.node in taken:
+            raise ConfigError(f"{path}.node", axis.node, f"not that of drives.{taken[axis.node]}")
+        taken[axis.node] = dof.label
+        lower, upper = axis.travel
+        if lower >= upper:
+            raise ConfigError(f"{path}.travel", axis.travel, "the lesser end, then the larger")
+        if max(abs(end - axis.home) for end in axis.travel) * axis.counts_per_unit >= 2**31:
+            raise ConfigError(
+                f"{path}.counts_per_unit",
+                axis.counts_per_unit,
+                f"less than 2^31 counts over the travel {axis.travel}",
+            )
+        step = axis.speed_limit * drives.cycle * axis.counts_per_unit
+        if step < 1:
+            raise ConfigError(
+                f"{path}.counts_per_unit",
+                axis.counts_per_unit,
+                "a count or more per cycle at the speed limit: counts per m or rad, not mm or deg",
+            )
+    for name, most in (
+        ("cycle", 0.255),
+        ("heartbeat_period", 65.535),
+        ("heartbeat_timeout", 65.535),
+    ):
+        value = getattr(drives, name)
+        if not (0.001 <= value <= most and math.isclose(value * 1e3, round(value * 1e3))):
+            raise ConfigError(f"drives.{name}", value, f"whole milliseconds, 0.001 to {most}")
+    if drives.reply_timeout >= drives.cycle:
+        raise ConfigError(
+            "drives.reply_timeout", drives.reply_timeout, f"less than drives.cycle = {drives.cycle}"
+        )
+    least = 2 * max(drives.heartbeat_period, drives.cycle)
+    if drives.heartbeat_timeout < least:
+        raise ConfigError(
+            "drives.heartbeat_timeout",
+            drives.heartbeat_timeout,
+            f"at least {least}: two heartbeats and two cycles",
         )

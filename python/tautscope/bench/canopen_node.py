@@ -1,0 +1,216 @@
+"""A simulated CANopen device: object dictionary, SDO server, PDOs, NMT, heartbeats (CiA 301).
+
+It shares with `tautscope.hardware` the table of objects, and no code that speaks the protocol. It
+has no thread and no clock: frames and the time are given to it.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Callable
+
+from tautscope.hardware.object_dictionary import Entry, profile
+
+BOOT, STOPPED, OPERATIONAL, PRE_OPERATIONAL = 0x00, 0x04, 0x05, 0x7F
+NMT_COMMANDS = {0x01: OPERATIONAL, 0x02: STOPPED, 0x80: PRE_OPERATIONAL}
+NMT_RESETS = (0x81, 0x82)
+INVALID = 1 << 31
+
+TOGGLE = 0x0503_0000
+BAD_COMMAND = 0x0504_0001
+READ_ONLY = 0x0601_0002
+NO_OBJECT = 0x0602_0000
+NOT_MAPPABLE = 0x0604_0041
+TOO_LONG_FOR_PDO = 0x0604_0042
+WRONG_LENGTH = 0x0607_0010
+NO_SUBINDEX = 0x0609_0011
+OUT_OF_RANGE = 0x0609_0030
+WRONG_STATE = 0x0800_0022
+
+HEARTBEAT_LOST = 0x8130
+"""Emergency code: life guard error or heartbeat error."""
+
+Key = tuple[int, int]
+Send = Callable[[int, bytes], None]
+
+
+class CanopenNode:
+    """One device.
+
+    Args:
+        node: Its id.
+        send: Takes identifier and data of what it sends.
+        absent: Objects it does not have, by index.
+    """
+
+    def __init__(self, node: int, send: Send, absent: frozenset[int] = frozenset()) -> None:
+        self.node = node
+        self.entries: dict[Key, Entry] = {
+            (entry.index, entry.subindex): entry
+            for entry in profile(node)
+            if entry.index not in absent
+        }
+        self._send = send
+        self.state = BOOT
+        self.values: dict[Key, int] = {}
+        self.next_beat = math.inf
+        self.watched_until = math.inf
+
+    def boot(self, now: float) -> None:
+        """Power on, or NMT reset: defaults, boot-up message, pre-operational."""
+        self.values = {key: entry.default for key, entry in self.entries.items()}
+        self.next_beat = self.watched_until = math.inf
+        self.state = PRE_OPERATIONAL
+        self._send(0x700 + self.node, bytes([BOOT]))
+
+    def deadline(self) -> float:
+        """When `tick` has something to do."""
+        return min(self.next_beat, self.watched_until)
+
+    def tick(self, now: float) -> None:
+        """Send what is due, notice what did not come."""
+        if now >= self.next_beat:
+            self._send(0x700 + self.node, bytes([self.state]))
+            period = self.values[0x1017, 0] / 1e3
+            self.next_beat = max(self.next_beat + period, now)
+        if now >= self.watched_until:
+            self.watched_until = math.inf
+            self.emergency(HEARTBEAT_LOST, 0x11)
+            self.on_heartbeat_lost(now)
+
+    def take(self, identifier: int, data: bytes, now: float) -> None:
+        """A frame from the bus."""
+        if identifier == 0x000 and len(data) == 2 and data[1] in (0, self.node):
+            self._nmt(data[0], now)
+        elif identifier == 0x080:
+            if self.state == OPERATIONAL:
+                self.on_sync(now)
+        elif identifier == 0x600 + self.node and len(data) == 8 and self.state != STOPPED:
+            self._send(0x580 + self.node, self._serve(data, now))
+        elif identifier >= 0x700:
+            self._beat_of(identifier - 0x700, now)
+        elif self.state == OPERATIONAL:
+            for base in (0x1400, 0x1401):
+                if self._active(base) and self.values[base, 1] & 0x7FF == identifier:
+                    self._unpack(base, data, now)
+
+    def emergency(self, code: int, register: int) -> None:
+        """Send an emergency object: code, error register, nothing from the maker."""
+        self.values[0x1001, 0] = register
+        self.values[0x603F, 0] = code
+        self._send(0x80 + self.node, struct.pack("<HB5x", code, register))
+
+    def answer(self, base: int) -> None:
+        """Send a transmit PDO, if it is on."""
+        if self.state != OPERATIONAL or not self._active(base):
+            return
+        data = b"".join(
+            self.entries[key].encode(self.values[key]) for key in self._mapped(base + 0x200)
+        )
+        self._send(self.values[base, 1] & 0x7FF, data)
+
+    # What a kind of device adds
+
+    def on_write(self, key: Key, value: int, now: float) -> int | None:
+        """Called before a value is stored; an abort code refuses it."""
+        return None
+
+    def on_sync(self, now: float) -> None:
+        """SYNC came."""
+
+    def on_heartbeat_lost(self, now: float) -> None:
+        """The watched heartbeat stayed away."""
+
+    def on_stopped(self, now: float) -> None:
+        """NMT took the device out of operational."""
+
+    # CiA 301
+
+    def _nmt(self, command: int, now: float) -> None:
+        if command in NMT_RESETS:
+            self.on_stopped(now)
+            self.boot(now)
+        elif command in NMT_COMMANDS:
+            was, self.state = self.state, NMT_COMMANDS[command]
+            if was == OPERATIONAL != self.state:
+                self.on_stopped(now)
+
+    def _beat_of(self, node: int, now: float) -> None:
+        watched = self.values[0x1016, 1]
+        if watched >> 16 & 0x7F == node and watched & 0xFFFF:
+            self.watched_until = now + (watched & 0xFFFF) / 1e3
+
+    def _active(self, base: int) -> bool:
+        return not self.values[base, 1] & INVALID
+
+    def _mapped(self, mapping: int) -> list[Key]:
+        count = self.values[mapping, 0]
+        packed = [self.values[mapping, sub] for sub in range(1, count + 1)]
+        return [(value >> 16, value >> 8 & 0xFF) for value in packed]
+
+    def _unpack(self, base: int, data: bytes, now: float) -> None:
+        start = 0
+        for key in self._mapped(base + 0x200):
+            entry = self.entries[key]
+            piece = data[start : start + entry.size]
+            start += entry.size
+            if len(piece) == entry.size:
+                self._store(key, entry.decode(piece), now)
+
+    def _serve(self, request: bytes, now: float) -> bytes:
+        """An SDO server of expedited transfers: all objects here have 4 bytes or fewer."""
+        command, index, subindex = struct.unpack_from("<BHB", request)
+        key = (index, subindex)
+        entry = self.entries.get(key)
+        if entry is None:
+            known = any(index == other for other, _ in self.entries)
+            return _abort(key, NO_SUBINDEX if known else NO_OBJECT)
+        if command == 0x40:
+            data = entry.encode(self.values[key])
+            answer = 0x43 | (4 - len(data)) << 2
+            return struct.pack("<BHB", answer, *key) + data.ljust(4, b"\0")
+        if command & 0xE3 != 0x23:
+            return _abort(key, BAD_COMMAND)
+        size = 4 - (command >> 2 & 3)
+        if size != entry.size:
+            return _abort(key, WRONG_LENGTH)
+        if entry.access != "rw":
+            return _abort(key, READ_ONLY)
+        code = self._store(key, entry.decode(request[4 : 4 + size]), now)
+        return struct.pack("<BHB4x", 0x60, *key) if code is None else _abort(key, code)
+
+    def _store(self, key: Key, value: int, now: float) -> int | None:
+        code = self._refuses(key, value) or self.on_write(key, value, now)
+        if code is None:
+            self.values[key] = value
+            if key == (0x1017, 0):
+                self.next_beat = now if value else math.inf
+            elif key == (0x1016, 1):
+                self.watched_until = math.inf  # until its first heartbeat
+        return code
+
+    def _refuses(self, key: Key, value: int) -> int | None:
+        """What CiA 301 asks of a change to a PDO: it must be off, and its mapping empty."""
+        index, subindex = key
+        if 0x1600 <= index < 0x1800 or 0x1A00 <= index < 0x1C00:
+            if self._active(index - 0x200) or (subindex and self.values[index, 0]):
+                return WRONG_STATE
+            if not subindex:
+                keys = [
+                    (packed >> 16, packed >> 8 & 0xFF)
+                    for packed in (self.values.get((index, sub), 0) for sub in range(1, value + 1))
+                ]
+                if any(mapped not in self.entries for mapped in keys):
+                    return NO_OBJECT
+                if sum(self.entries[mapped].size for mapped in keys) > 8:
+                    return TOO_LONG_FOR_PDO
+            else:
+                mapped = self.entries.get((value >> 16, value >> 8 & 0xFF))
+                if mapped is None or not mapped.mappable or mapped.mapping != value:
+                    return NOT_MAPPABLE
+        return None
+
+
+def _abort(key: Key, code: int) -> bytes:
+    return struct.pack("<BHBI", 0x80, *key, code)

@@ -1,0 +1,171 @@
+"""CiA 402 in numbers: states of a drive, commands that change them, modes, units.
+
+Source: CiA 402-2 (IEC 61800-7-201), as reproduced in Elmo MAN-CAN402IG 1.2.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import IntEnum, StrEnum
+
+from tautscope.config import AxisConfig
+from tautscope.errors import SignalError
+
+
+class Mode(IntEnum):
+    """The modes of operation (0x6060) that follow streamed positions."""
+
+    INTERPOLATED_POSITION = 7
+    CYCLIC_SYNCHRONOUS_POSITION = 8
+
+    @property
+    def supported_bit(self) -> int:
+        """Its bit in the supported drive modes, 0x6502."""
+        return 1 << (self - 1)
+
+
+class State(StrEnum):
+    """State of the drive, as the statusword (0x6041) shows it."""
+
+    NOT_READY = "not ready to switch on"
+    SWITCH_ON_DISABLED = "switch on disabled"
+    READY = "ready to switch on"
+    SWITCHED_ON = "switched on"
+    OPERATION_ENABLED = "operation enabled"
+    QUICK_STOP_ACTIVE = "quick stop active"
+    FAULT_REACTION = "fault reaction active"
+    FAULT = "fault"
+
+
+_STATUS = (
+    (0x4F, 0x00, State.NOT_READY),
+    (0x4F, 0x40, State.SWITCH_ON_DISABLED),
+    (0x6F, 0x21, State.READY),
+    (0x6F, 0x23, State.SWITCHED_ON),
+    (0x6F, 0x27, State.OPERATION_ENABLED),
+    (0x6F, 0x07, State.QUICK_STOP_ACTIVE),
+    (0x4F, 0x0F, State.FAULT_REACTION),
+    (0x4F, 0x08, State.FAULT),
+)
+
+AT_REST = frozenset(
+    {
+        State.NOT_READY,
+        State.SWITCH_ON_DISABLED,
+        State.READY,
+        State.SWITCHED_ON,
+        State.QUICK_STOP_ACTIVE,
+        State.FAULT,
+    }
+)
+"""States in which a drive follows no set-points."""
+
+FOLLOWS = 1 << 12
+"""Statusword: the drive follows the set-points (mode 8), interpolation is active (mode 7)."""
+LIMIT = 1 << 11
+"""Statusword: an internal limit is active."""
+FOLLOWING_ERROR = 1 << 13
+"""Statusword, mode 8: following error."""
+
+DISABLE_VOLTAGE = 0x00
+QUICK_STOP = 0x02
+SHUTDOWN = 0x06
+SWITCH_ON = 0x07
+ENABLE_OPERATION = 0x0F
+INTERPOLATE = 0x1F
+"""Enable operation, and bit 4: enable interpolation (mode 7)."""
+FAULT_RESET = 0x80
+
+QUICK_STOP_HOLD = 6
+"""0x605A: slow down on the quick stop ramp, stay in quick stop active."""
+QUICK_STOP_RELEASE = 2
+"""0x605A: slow down on the quick stop ramp, then switch on disabled."""
+ON_LOSS_QUICK_STOP = 3
+"""0x6007: quick stop when the connection is lost."""
+
+_NEXT = {
+    State.SWITCH_ON_DISABLED: SHUTDOWN,
+    State.READY: SWITCH_ON,
+    State.SWITCHED_ON: ENABLE_OPERATION,
+    State.OPERATION_ENABLED: ENABLE_OPERATION,
+    State.QUICK_STOP_ACTIVE: DISABLE_VOLTAGE,
+}
+
+
+def state_of(statusword: int) -> State | None:
+    """The state a statusword shows; None for a pattern the standard does not have."""
+    for mask, value, state in _STATUS:
+        if statusword & mask == value:
+            return state
+    return None
+
+
+def towards_enabled(state: State | None) -> int | None:
+    """The controlword that brings a drive one state nearer to operation enabled.
+
+    None where there is none: in a fault, and while the drive is changing by itself.
+    """
+    return _NEXT.get(state) if state is not None else None
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """SI positions of one DOF and counts of its drive: x = home + sign counts / counts_per_unit.
+
+    Attributes:
+        axis: Units, sign, home and limits.
+        label: The DOF's name, for errors.
+    """
+
+    axis: AxisConfig
+    label: str
+
+    def to_counts(self, position: float) -> int:
+        """Position [m or rad] to the nearest count."""
+        axis = self.axis
+        return round(axis.sign * (position - axis.home) * axis.counts_per_unit)
+
+    def to_position(self, counts: int) -> float:
+        """Counts to position [m or rad]."""
+        axis = self.axis
+        return axis.home + axis.sign * counts / axis.counts_per_unit
+
+    def travel_counts(self) -> tuple[int, int]:
+        """The limits of travel in counts, the lesser first."""
+        lower, upper = sorted(self.to_counts(end) for end in self.axis.travel)
+        return lower, upper
+
+    def speed_counts(self) -> int:
+        """The speed limit [counts/s], rounded up."""
+        return math.ceil(self.axis.speed_limit * self.axis.counts_per_unit)
+
+    def checked(self, command: float, previous: float, cycle: float) -> int:
+        """Counts of a command that may be sent.
+
+        Args:
+            command: [m or rad].
+            previous: The command before, or where the motor is [m or rad].
+            cycle: Time between the two [s].
+
+        Raises:
+            SignalError: The command is not finite, leaves the travel, or is further from the one
+                before than the speed limit allows.
+        """
+        axis = self.axis
+        field = f"command[{self.label}]"
+        lower, upper = axis.travel
+        rounding = 1 / axis.counts_per_unit
+        if not math.isfinite(command):
+            raise SignalError(field, command, "a finite number")
+        if not lower - rounding <= command <= upper + rounding:
+            raise SignalError(field, command, f"{lower} to {upper}, drives.{self.label}.travel")
+        step = axis.speed_limit * cycle + rounding
+        if abs(command - previous) > step:
+            raise SignalError(
+                field,
+                command,
+                f"within {step:.6g} of {previous:.6g}, drives.{self.label}.speed_limit "
+                f"over a cycle of {cycle} s",
+            )
+        return self.to_counts(command)

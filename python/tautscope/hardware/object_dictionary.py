@@ -1,0 +1,198 @@
+"""The objects of CiA 301 and 402 that are used, and an EDS file of them.
+
+A drive's own EDS file says which of them it has and of what type; this table stands in for it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    import canopen
+
+Access = Literal["ro", "rw", "const"]
+
+SIGNED = {1: 0x02, 2: 0x03, 4: 0x04}
+"""CiA 301 data type by length in bytes: INTEGER8, INTEGER16, INTEGER32."""
+UNSIGNED = {1: 0x05, 2: 0x06, 4: 0x07}
+"""CiA 301 data type by length in bytes: UNSIGNED8, UNSIGNED16, UNSIGNED32."""
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One value in a drive's object dictionary.
+
+    Attributes:
+        index, subindex: Where.
+        name: What, as the standard calls it.
+        size: Length [byte].
+        signed: Whether it is an integer of two's complement.
+        access: ``rw``, ``ro`` or ``const``.
+        default: What a drive that just started has there.
+        mappable: Whether a PDO may carry it.
+    """
+
+    index: int
+    subindex: int
+    name: str
+    size: Literal[1, 2, 4]
+    signed: bool = False
+    access: Access = "rw"
+    default: int = 0
+    mappable: bool = False
+
+    def __str__(self) -> str:
+        return f"0x{self.index:04X}:{self.subindex} ({self.name})"
+
+    @property
+    def data_type(self) -> int:
+        """Its type's number in CiA 301."""
+        return (SIGNED if self.signed else UNSIGNED)[self.size]
+
+    @property
+    def mapping(self) -> int:
+        """What a PDO's mapping holds to carry it: index, sub-index, length in bits."""
+        return self.index << 16 | self.subindex << 8 | self.size * 8
+
+    def encode(self, value: int) -> bytes:
+        """Little-endian bytes.
+
+        Raises:
+            OverflowError: The value does not fit.
+        """
+        return value.to_bytes(self.size, "little", signed=self.signed)
+
+    def decode(self, data: bytes) -> int:
+        """The value of little-endian bytes; their number is the drive's choice."""
+        return int.from_bytes(data, "little", signed=self.signed)
+
+
+DEVICE_TYPE = Entry(0x1000, 0, "Device type", 4, access="ro", default=0x0002_0192)
+ERROR_REGISTER = Entry(0x1001, 0, "Error register", 1, access="ro")
+CONSUMER_HEARTBEAT = Entry(0x1016, 1, "Consumer heartbeat time", 4)
+PRODUCER_HEARTBEAT = Entry(0x1017, 0, "Producer heartbeat time", 2)
+VENDOR = Entry(0x1018, 1, "Vendor id", 4, access="const")
+PRODUCT = Entry(0x1018, 2, "Product code", 4, access="const")
+ON_LOSS = Entry(0x6007, 0, "Abort connection option code", 2, signed=True, default=1)
+ERROR_CODE = Entry(0x603F, 0, "Error code", 2, access="ro", mappable=True)
+CONTROLWORD = Entry(0x6040, 0, "Controlword", 2, mappable=True)
+STATUSWORD = Entry(0x6041, 0, "Statusword", 2, access="ro", mappable=True)
+QUICK_STOP_OPTION = Entry(0x605A, 0, "Quick stop option code", 2, signed=True, default=2)
+MODE = Entry(0x6060, 0, "Modes of operation", 1, signed=True, mappable=True)
+MODE_DISPLAY = Entry(
+    0x6061, 0, "Modes of operation display", 1, signed=True, access="ro", mappable=True
+)
+POSITION = Entry(0x6064, 0, "Position actual value", 4, signed=True, access="ro", mappable=True)
+FOLLOWING_WINDOW = Entry(0x6065, 0, "Following error window", 4, default=0xFFFF_FFFF)
+FOLLOWING_TIME = Entry(0x6066, 0, "Following error time out", 2)
+TARGET_POSITION = Entry(0x607A, 0, "Target position", 4, signed=True, mappable=True)
+LEAST_POSITION = Entry(0x607D, 1, "Min position limit", 4, signed=True, default=-(2**31))
+LARGEST_POSITION = Entry(0x607D, 2, "Max position limit", 4, signed=True, default=2**31 - 1)
+PROFILE_SPEED_LIMIT = Entry(0x607F, 0, "Max profile velocity", 4, default=0xFFFF_FFFF)
+MOTOR_SPEED_LIMIT = Entry(0x6080, 0, "Max motor speed", 4, default=0xFFFF_FFFF)
+ENCODER_COUNTS = Entry(0x608F, 1, "Encoder increments", 4, default=4096)
+ENCODER_TURNS = Entry(0x608F, 2, "Motor revolutions", 4, default=1)
+INTERPOLATION_SUBMODE = Entry(0x60C0, 0, "Interpolation sub mode select", 2, signed=True)
+INTERPOLATION_DATA = Entry(0x60C1, 1, "Interpolation data record", 4, signed=True, mappable=True)
+INTERPOLATION_TIME = Entry(0x60C2, 1, "Interpolation time units", 1, default=1)
+INTERPOLATION_EXPONENT = Entry(0x60C2, 2, "Interpolation time index", 1, signed=True, default=-3)
+BUFFER_CLEAR = Entry(0x60C4, 6, "Buffer clear", 1)
+SUPPORTED_MODES = Entry(0x6502, 0, "Supported drive modes", 4, access="ro", default=0xC0)
+
+
+def pdo_entries(base: int, mapping: int, cob: int, name: str) -> tuple[Entry, ...]:
+    """Communication and mapping parameters of one PDO, two mapped objects and more."""
+    return (
+        Entry(base, 1, f"{name} COB-ID", 4, default=cob),
+        Entry(base, 2, f"{name} transmission type", 1, default=255),
+        Entry(mapping, 0, f"{name} number of mapped objects", 1),
+        *(Entry(mapping, sub, f"{name} mapped object {sub}", 4) for sub in range(1, 5)),
+    )
+
+
+def profile(node: int) -> tuple[Entry, ...]:
+    """Every object of a drive with this node id."""
+    pdos = [
+        (kind, number, base + number, base + 0x200 + number, cob + number * 0x100 + node)
+        for kind, base, cob in (("Receive PDO", 0x1400, 0x200), ("Transmit PDO", 0x1800, 0x180))
+        for number in range(2)
+    ]
+    single = tuple(value for value in globals().values() if isinstance(value, Entry))
+    return single + tuple(
+        entry
+        for kind, number, base, mapping, cob in pdos
+        for entry in pdo_entries(base, mapping, cob, f"{kind} {number + 1}")
+    )
+
+
+def eds_text(node: int = 1) -> str:
+    """An EDS file (CiA 306) of `profile`, for tools that want one."""
+    entries = sorted(profile(node), key=lambda entry: (entry.index, entry.subindex))
+    indices = sorted({entry.index for entry in entries})
+    mandatory = [index for index in indices if index in {0x1000, 0x1001, 0x1018}]
+    lines = ["[FileInfo]", "FileName=tautscope.eds", "EDSVersion=4.0", ""]
+    lines += ["[DeviceInfo]", "VendorName=tautscope", "ProductName=CiA 402 drive", ""]
+    for section, members in (
+        ("MandatoryObjects", mandatory),
+        ("OptionalObjects", [index for index in indices if index not in mandatory]),
+    ):
+        lines += [f"[{section}]", f"SupportedObjects={len(members)}"]
+        lines += [f"{number}=0x{index:04X}" for number, index in enumerate(members, 1)] + [""]
+    for index in indices:
+        members_of = [entry for entry in entries if entry.index == index]
+        if [entry.subindex for entry in members_of] == [0]:
+            lines += _section(f"{index:04X}", members_of[0])
+            continue
+        name = members_of[0].name.split(" COB-ID")[0]
+        lines += [f"[{index:04X}]", f"ParameterName={name}", "ObjectType=0x9"]
+        counted = [entry for entry in members_of if entry.subindex == 0]
+        lines += [f"SubNumber={len(members_of) + (not counted)}", ""]
+        if not counted:
+            largest = max(entry.subindex for entry in members_of)
+            count = Entry(index, 0, "Highest sub-index", 1, access="const", default=largest)
+            lines += _section(f"{index:04X}sub0", count)
+        for entry in members_of:
+            lines += _section(f"{index:04X}sub{entry.subindex:X}", entry)
+    return "\n".join(lines)
+
+
+def load_eds(path: str, node: int) -> canopen.ObjectDictionary:
+    """The object dictionary of an EDS file; without a path, that of `profile`.
+
+    Raises:
+        OSError: The file cannot be read.
+        ValueError: It is not an EDS file, or one with errors; the text says which.
+    """
+    import configparser  # noqa: PLC0415 -- with canopen, only where a bus is opened
+    import warnings  # noqa: PLC0415
+    from io import StringIO  # noqa: PLC0415
+
+    from canopen.objectdictionary import import_od  # noqa: PLC0415
+
+    source: str | StringIO = path
+    if not path:
+        source = StringIO(eds_text(node))
+        source.name = "tautscope.eds"
+    try:
+        with warnings.catch_warnings():  # canopen's own, of how it logs
+            warnings.simplefilter("ignore", DeprecationWarning)
+            dictionary = import_od(source, node)
+    except (configparser.Error, KeyError, TypeError, AttributeError, NotImplementedError) as error:
+        raise ValueError(f"{type(error).__name__}: {error}") from None
+    if MODE.index not in dictionary:
+        raise ValueError(f"it is not of a CiA 402 drive: no {MODE}")
+    return dictionary
+
+
+def _section(name: str, entry: Entry) -> list[str]:
+    return [
+        f"[{name}]",
+        f"ParameterName={entry.name}",
+        "ObjectType=0x7",
+        f"DataType=0x{entry.data_type:04X}",
+        f"AccessType={entry.access}",
+        f"DefaultValue={entry.default}",
+        f"PDOMapping={int(entry.mappable)}",
+        "",
+    ]

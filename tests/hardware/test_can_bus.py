@@ -1,0 +1,112 @@
+"""The bus between processes: as a cable, and as an interface of python-can."""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import can
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tautscope.bench.can_bus import Hub, LocalBus
+
+PATIENCE = 30.0
+
+frames = st.builds(
+    lambda extended, identifier, data: can.Message(
+        arbitration_id=identifier & (0x1FFF_FFFF if extended else 0x7FF),
+        is_extended_id=extended,
+        data=data,
+    ),
+    st.booleans(),
+    st.integers(0, 0x1FFF_FFFF),
+    st.binary(max_size=8),
+)
+
+
+def test_every_other_station_hears_every_frame_in_order(station: Callable[[], LocalBus]) -> None:
+    one, two, three = station(), station(), station()
+    settle(one, two, three)
+
+    @settings(max_examples=20, deadline=None)
+    @given(st.lists(frames, max_size=30))
+    def check(messages: list[can.Message]) -> None:
+        for message in messages:
+            one.send(message)
+        for other in (two, three):
+            for message in messages:
+                heard = other.recv(PATIENCE)
+                assert heard is not None
+                assert heard.equals(message, timestamp_delta=None, check_channel=False)
+        assert one.recv(0.0) is None
+
+    check()
+
+
+def settle(*stations: LocalBus) -> None:
+    """Wait until the hub knows them all: each hears of each."""
+    for number, sender in enumerate(stations):
+        for other in stations:
+            if other is sender:
+                continue
+            heard = None
+            deadline = time.monotonic() + PATIENCE
+            while heard is None or heard.arbitration_id != number:
+                assert time.monotonic() < deadline
+                sender.send(can.Message(arbitration_id=number, is_extended_id=False))
+                heard = other.recv(0.1)
+    stations[0].send(can.Message(arbitration_id=0x7FF, is_extended_id=False))
+    stations[1].send(can.Message(arbitration_id=0x7FE, is_extended_id=False))
+    for number, station in enumerate(stations):
+        ends = {0x7FF, 0x7FE} - {0x7FF - number}
+        while ends:
+            heard = station.recv(PATIENCE)
+            assert heard is not None
+            ends.discard(heard.arbitration_id)
+
+
+def test_it_is_an_interface_of_python_can(hub: Hub) -> None:
+    with can.Bus(interface="tautscope", channel=str(hub.path), bitrate=1_000_000) as bus:
+        assert isinstance(bus, LocalBus)
+        assert bus.recv(0.0) is None
+
+
+def test_no_hub_no_bus(tmp_path: Path) -> None:
+    with pytest.raises(can.CanInitializationError, match="no bus at"):
+        LocalBus(str(tmp_path / "nothing"))
+
+
+def test_a_hub_that_closes_unplugs_its_stations(hub: Hub, station: Callable[[], LocalBus]) -> None:
+    bus = station()
+    hub.close()
+    with pytest.raises(can.CanOperationError, match="the bus is gone"):
+        bus.recv(PATIENCE)
+    assert not hub.path.exists()
+
+
+def test_a_dead_hubs_socket_is_replaced_and_a_living_ones_is_not(tmp_path: Path) -> None:
+    path = tmp_path / "can"
+    dead = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    dead.bind(str(path))
+    dead.close()
+    with Hub(path), pytest.raises(OSError, match="in use"):
+        Hub(path)
+
+
+def test_a_station_that_does_not_listen_holds_nobody_up(
+    hub: Hub, station: Callable[[], LocalBus]
+) -> None:
+    talker, sleeper = station(), station()
+    settle(talker, sleeper)
+    for count in range(200_000):
+        talker.send(
+            can.Message(arbitration_id=count & 0x7FF, is_extended_id=False, data=b"8 bytes!")
+        )
+    listener = station()
+    with pytest.raises(can.CanOperationError):
+        while True:
+            sleeper.recv(PATIENCE)
+    settle(talker, listener)

@@ -1,0 +1,122 @@
+"""What a configuration of drives refuses, and how it says so."""
+
+from __future__ import annotations
+
+import math
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+from drive_rig import AXES, drives_config, drives_document
+from tautscope.config import Config, dump_config, from_document, load_config
+from tautscope.dof import Dof
+from tautscope.errors import ConfigError
+from tautscope.hardware.cia402 import Scale
+from tautscope.hardware.drives import open_drives
+from tautscope.hardware.object_dictionary import eds_text, load_eds, profile
+
+
+def rotation(**changes: Any) -> dict[str, Any]:
+    return {"rotation": {**AXES["rotation"], **changes}}
+
+
+@pytest.mark.parametrize(
+    ("changes", "field", "says"),
+    [
+        (rotation(node=0), "drives.rotation.node", ">= 1"),
+        (rotation(node=128), "drives.rotation.node", "<= 127"),
+        (rotation(node=1), "drives.rotation.node", "not that of drives.insertion"),
+        (rotation(node=127), "drives.rotation.node", "not that of drives.master_node"),
+        (rotation(sign=0), "drives.rotation.sign", "enum"),
+        (rotation(sign=-2), "drives.rotation.sign", "enum"),
+        (rotation(counts_per_unit=0.0), "drives.rotation.counts_per_unit", "> 0"),
+        (rotation(counts_per_unit=float("inf")), "drives.rotation.counts_per_unit", "finite"),
+        (rotation(counts_per_unit=1e9), "drives.rotation.counts_per_unit", "less than 2^31"),
+        (rotation(counts_per_unit=1.0), "drives.rotation.counts_per_unit", "not mm or deg"),
+        (rotation(travel=[1.0, -1.0]), "drives.rotation.travel", "lesser end"),
+        (rotation(speed_limit=-1.0), "drives.rotation.speed_limit", "> 0"),
+        (rotation(unit="mm"), "drives.rotation.unit", "no such key"),
+        ({"rotation": {"node": 2}}, "drives.rotation.counts_per_unit", "no default"),
+        ({"cycle": 0.0105}, "drives.cycle", "whole milliseconds"),
+        ({"cycle": 0.3}, "drives.cycle", "whole milliseconds"),
+        ({"reply_timeout": 0.02}, "drives.reply_timeout", "less than drives.cycle"),
+        ({"heartbeat_timeout": 0.15}, "drives.heartbeat_timeout", "two heartbeats"),
+        ({"waive": ["6040"]}, "drives.waive[0]", "enum"),
+    ],
+)
+def test_a_mistake_is_named(changes: dict[str, Any], field: str, says: str) -> None:
+    with pytest.raises(ConfigError) as found:
+        from_document({"drives": drives_document(**changes)})
+    assert found.value.field == field
+    assert says in found.value.allowed
+
+
+def test_drives_are_read_back_equal_and_are_not_there_by_default(tmp_path: Path) -> None:
+    assert Config().drives is None
+    config = from_document({"drives": drives_document()})
+    file = tmp_path / "rig.toml"
+    file.write_text(dump_config(config), encoding="utf-8")
+    assert load_config(file) == config
+
+
+@pytest.mark.parametrize("text", [None, "no EDS\n", "[6040]\nParameterName=x\nObjectType=7\n"])
+def test_an_eds_file_that_cannot_be_used(tmp_path: Path, text: str | None) -> None:
+    file = tmp_path / "drive.eds"
+    if text is not None:
+        file.write_text(text, encoding="utf-8")
+    with pytest.raises(ConfigError) as found:
+        open_drives(drives_config(**rotation(eds=str(file))))
+    assert found.value.field == "drives.rotation.eds"
+    assert found.value.value == str(file)
+
+
+def test_the_eds_file_says_what_the_table_says(tmp_path: Path) -> None:
+    """Read by the `canopen` library."""
+    file = tmp_path / "drive.eds"
+    file.write_text(eds_text(5), encoding="utf-8")
+    dictionary = load_eds(str(file), 5)
+    for entry in profile(5):
+        found = dictionary.get_variable(entry.index, entry.subindex)
+        assert found is not None, str(entry)
+        assert (found.data_type, len(found)) == (entry.data_type, 8 * entry.size), str(entry)
+        assert found.access_type == entry.access
+        assert found.default == entry.default, str(entry)
+        assert found.pdo_mappable == entry.mappable
+
+
+@pytest.mark.parametrize(
+    ("dof", "position", "counts"),
+    [
+        (Dof.INSERTION, 0.0123456, 12_346),
+        (Dof.ROTATION, 0.25, 0),
+        (Dof.ROTATION, 1.25, -10_000),
+        (Dof.BENDING, -1.5, -15_000),
+    ],
+)
+def test_units_and_signs(dof: Dof, position: float, counts: int) -> None:
+    """Worked out by hand from the axes' figures."""
+    scale = Scale(drives_config()[dof], dof.label)
+    assert scale.to_counts(position) == counts
+    assert scale.to_position(counts) == pytest.approx(position, abs=1e-6)
+
+
+def test_importing_the_package_loads_no_bus() -> None:
+    code = (
+        "import sys, tautscope, tautscope.hardware.drives, tautscope.config\n"
+        "assert not {'can', 'canopen', 'pysoem', 'serial'} & set(sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_documented_configuration_is_accepted() -> None:
+    page = Path(__file__).resolve().parents[2] / "docs" / "hardware.md"
+    (block,) = re.findall(r"```toml\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+    drives = from_document(tomllib.loads(block)).drives
+    assert drives is not None
+    # The comment beside the figure: 4096 counts a turn, 20:1, over 2 pi.
+    assert drives.rotation.counts_per_unit == pytest.approx(4096 * 20 / (2 * math.pi), rel=1e-5)

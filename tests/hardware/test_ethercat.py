@@ -1,0 +1,271 @@
+"""The EtherCAT link, against a fake of `pysoem` with simulated drives behind it.
+
+A contract test: the same `Drives` over another link. The fake's drives are those of the CAN bench,
+reached as EtherCAT reaches them: SDO by mailbox, process data as PDO 0x1600 and 0x1A00.
+"""
+
+from __future__ import annotations
+
+import struct
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from drive_rig import drives_config
+from tautscope.bench.drives import SimulatedDrive
+from tautscope.config import DrivesConfig
+from tautscope.dof import Dof
+from tautscope.errors import (
+    BusError,
+    EmergencyError,
+    ModeRefusedError,
+    SettingRefusedError,
+    SilentDriveError,
+    StateError,
+)
+from tautscope.hardware.cia402 import AT_REST, Mode, State
+from tautscope.hardware.drives import Drives
+from tautscope.hardware.ethercat_drives import EthercatLink
+
+INIT, PREOP, SAFEOP, OP = 1, 2, 4, 8
+
+
+class SdoError(Exception):
+    def __init__(self, code: int) -> None:
+        super().__init__()
+        self.abort_code, self.desc = code, "refused"
+
+
+class WkcError(Exception):
+    pass
+
+
+class Slave:
+    """A simulated drive as pysoem shows one."""
+
+    def __init__(self, dof: Dof, config: DrivesConfig, modes: frozenset[int]) -> None:
+        self.drive = SimulatedDrive(
+            dof, config, self._said, lambda now, what: None, modes=modes, absent=frozenset({0x6007})
+        )
+        self.answers: list[bytes] = []
+        self.drive.boot(0.0)
+        self.assigned: dict[tuple[int, int], int] = {}
+        self.output = bytes(6)
+        self.input = bytes(7)
+        self.state = PREOP
+        self.al_status = 0x001B
+        self.watchdog: tuple[str, float] | None = None
+        self.deaf = False
+
+    def _said(self, identifier: int, data: bytes) -> None:
+        if identifier >> 7 == 0x580 >> 7:
+            self.answers.append(data)
+
+    def _ask(self, request: bytes) -> bytes:
+        if self.deaf:
+            raise WkcError
+        if struct.unpack_from("<H", request, 1)[0] in (0x1600, 0x1A00):
+            base = struct.unpack_from("<H", request, 1)[0] - 0x200
+            self.drive.values[base, 1] |= 1 << 31  # there is no COB-ID on EtherCAT
+        self.drive.take(0x600 + self.drive.node, request, 0.0)
+        answer = self.answers.pop()
+        if answer[0] == 0x80:
+            raise SdoError(struct.unpack_from("<I", answer, 4)[0])
+        return answer
+
+    def sdo_read(self, index: int, subindex: int) -> bytes:
+        answer = self._ask(struct.pack("<BHB4x", 0x40, index, subindex))
+        return answer[4 : 8 - (answer[0] >> 2 & 3)]
+
+    def sdo_write(self, index: int, subindex: int, data: bytes) -> None:
+        if index in (0x1C12, 0x1C13):
+            self.assigned[index, subindex] = int.from_bytes(data, "little")
+            return
+        command = 0x23 | (4 - len(data)) << 2
+        self._ask(struct.pack("<BHB", command, index, subindex) + data.ljust(4, b"\0"))
+
+    def set_watchdog(self, kind: str, milliseconds: float) -> None:
+        self.watchdog = (kind, milliseconds)
+
+    def cycle(self) -> None:
+        values = self.drive.values
+        for mapping, data in ((0x1600, self.output), (0x1A00, None)):
+            assert self.assigned[0x1C12 if data else 0x1C13, 1] == mapping
+        start = 0
+        for key in self.drive._mapped(0x1600):
+            size = self.drive.entries[key].size
+            value = self.drive.entries[key].decode(self.output[start : start + size])
+            self.drive._store(key, value, 0.0)
+            start += size
+        self.drive.on_sync(0.0)
+        self.drive.set_actual(self.drive.demand)
+        self.input = b"".join(
+            self.drive.entries[key].encode(values[key]) for key in self.drive._mapped(0x1A00)
+        )
+
+
+class Master:
+    """A line of slaves as pysoem's Master."""
+
+    def __init__(self, slaves: list[Slave], *, stuck_in: int | None = None) -> None:
+        self.slaves = slaves
+        self.state = PREOP
+        self.expected_wkc = 3 * len(slaves)
+        self.open_on: str | None = None
+        self.unplugged = False
+        self._stuck_in = stuck_in
+
+    def open(self, adapter: str) -> None:
+        if adapter != "eth7":
+            raise ConnectionError(f"could not open interface {adapter}")
+        self.open_on = adapter
+
+    def close(self) -> None:
+        self.open_on = None
+
+    def config_init(self) -> int:
+        return len(self.slaves) or -1
+
+    def config_map(self) -> int:
+        return 39
+
+    def write_state(self) -> None:
+        for slave in self.slaves:
+            slave.state = self.state if self._stuck_in is None else self._stuck_in
+
+    def read_state(self) -> int:
+        return min(slave.state for slave in self.slaves)
+
+    def state_check(self, state: int, timeout: int) -> int:
+        return self.read_state()
+
+    def send_processdata(self) -> None:
+        if self.unplugged:
+            raise ConnectionError("adapter is gone")
+
+    def receive_processdata(self, timeout: int) -> int:
+        counter = 0
+        for slave in self.slaves:
+            if not slave.deaf and slave.state >= SAFEOP:
+                slave.cycle()
+                counter += 3
+        return counter
+
+
+QUICK = {
+    "protocol": "ethercat",
+    "channel": "eth7",
+    "cycle": 0.001,
+    "reply_timeout": 5e-4,
+    "heartbeat_period": 0.001,
+    "heartbeat_timeout": 0.02,
+    "state_timeout": 0.5,
+}
+
+
+def line(modes: tuple[int, ...] = (8,), **options: Any) -> tuple[Any, Master, DrivesConfig]:
+    config = drives_config(**QUICK)
+    master = Master([Slave(dof, config, frozenset(modes)) for dof in Dof], **options)
+    soem = SimpleNamespace(
+        Master=lambda: master,
+        SAFEOP_STATE=SAFEOP,
+        OP_STATE=OP,
+        INIT_STATE=INIT,
+        SdoError=SdoError,
+        WkcError=WkcError,
+        MailboxError=type("MailboxError", (Exception,), {}),
+        PacketError=type("PacketError", (Exception,), {}),
+        ConfigMapError=type("ConfigMapError", (Exception,), {}),
+    )
+    return soem, master, config
+
+
+def states(master: Master) -> set[State]:
+    return {slave.drive.status for slave in master.slaves}
+
+
+@pytest.mark.parametrize("mode", [8, 7])
+def test_motors_follow_and_stop(mode: int) -> None:
+    soem, master, config = line((mode,))
+    with Drives(config, EthercatLink(config, soem)) as drives:
+        assert {one.mode for one in drives.commissioned} == {Mode(mode)}
+        assert {slave.watchdog for slave in master.slaves} == {("processdata", 20.0)}
+        command = drives.start()
+        for _ in range(10):
+            command = command + np.array([1e-5, 0.01, -0.005])
+            applied = drives.exchange(command)
+        for _ in range(5):
+            applied = drives.exchange(command)
+        np.testing.assert_allclose(applied, command, atol=1e-4)
+        assert states(master) == {State.OPERATION_ENABLED}
+    assert states(master) == {State.QUICK_STOP_ACTIVE}
+    assert master.open_on is None
+    assert master.state == INIT
+
+
+def running(soem: Any, config: DrivesConfig) -> Drives:
+    drives = Drives(config, EthercatLink(config, soem))
+    drives.start()
+    return drives
+
+
+def test_a_fault_stops_all() -> None:
+    soem, master, config = line()
+    with running(soem, config) as drives:
+        master.slaves[1].drive.fail(0.0)
+        with pytest.raises(EmergencyError, match=r"rotation, device 2.*0x4310"):
+            drives.exchange(drives.last_command)
+        assert states(master) <= AT_REST
+
+
+def test_a_line_that_breaks_stops_all() -> None:
+    soem, master, config = line()
+    with running(soem, config) as drives:
+        master.slaves[2].deaf = True
+        with pytest.raises(SilentDriveError) as found:
+            for _ in range(10_000):
+                drives.exchange(drives.last_command)
+        assert "quick stop is not confirmed" in str(found.value.__notes__)
+        assert master.state == SAFEOP  # the watchdogs do the rest
+        assert {slave.drive.status for slave in master.slaves[:2]} == {State.QUICK_STOP_ACTIVE}
+
+
+def test_an_adapter_that_is_gone() -> None:
+    soem, master, config = line()
+    with running(soem, config) as drives:
+        master.unplugged = True
+        with pytest.raises(BusError, match="adapter is gone"):
+            drives.exchange(drives.last_command)
+
+
+def test_what_cannot_be_opened() -> None:
+    soem, master, config = line()
+    with pytest.raises(BusError, match="CAP_NET_RAW"):
+        EthercatLink(drives_config(**QUICK | {"channel": "eth0"}), soem)
+    master.slaves.pop()
+    with pytest.raises(BusError, match="2 devices on eth7, 3 needed"):
+        EthercatLink(config, soem)
+    assert master.open_on is None
+
+
+def test_what_a_drive_refuses() -> None:
+    soem, master, config = line((1, 3))
+    with pytest.raises(ModeRefusedError, match="neither"):
+        Drives(config, EthercatLink(config, soem))
+    assert master.open_on is None
+
+    soem, master, config = line()
+    for slave in master.slaves:
+        del slave.drive.entries[0x607D, 1]
+    with pytest.raises(SettingRefusedError, match="add 607D"):
+        Drives(config, EthercatLink(config, soem))
+
+    soem, master, config = line()
+    master.slaves[0].deaf = True
+    with pytest.raises(SilentDriveError, match="insertion, device 1"):
+        Drives(config, EthercatLink(config, soem))
+
+    soem, master, config = line(stuck_in=PREOP)
+    with pytest.raises(StateError, match=r"safe-operational is not reached.*AL status 0x001B"):
+        Drives(config, EthercatLink(config, soem))

@@ -1,0 +1,315 @@
+"""What goes wrong ends in a quick stop of all motors and an error that says what to do."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from drive_rig import drives_config
+from tautscope.bench.can_bus import Hub, LocalBus
+from tautscope.bench.canopen_node import CanopenNode
+from tautscope.bench.drives import SimulatedDrives
+from tautscope.config import DrivesConfig
+from tautscope.dof import Dof
+from tautscope.errors import (
+    BusError,
+    ConfigError,
+    DriveError,
+    EmergencyError,
+    FollowingError,
+    HeartbeatError,
+    ModeRefusedError,
+    SecondMasterError,
+    SettingRefusedError,
+    SignalError,
+    SilentDriveError,
+    StateError,
+)
+from tautscope.hardware.cia402 import AT_REST, State
+from tautscope.hardware.drives import Drives, open_drives
+
+SPEED = np.array([0.01, 1.5, 0.8])
+Bench = Callable[..., SimulatedDrives]
+
+
+def hex_of(key: tuple[int, int]) -> str:
+    return f"{key[0]:04X}:{key[1]}"
+
+
+def drive(drives: Drives, cycles: int, speed: np.ndarray = SPEED) -> None:
+    """Move back and forth, paced."""
+    command = drives.last_command
+    for count in range(cycles):
+        command = command + speed * drives.cycle * (1 if count // 40 % 2 == 0 else -1)
+        drives.exchange(command)
+        time.sleep(drives.cycle / 2)
+
+
+def at_rest(rig: SimulatedDrives) -> bool:
+    return all(state in AT_REST for state in rig.states.values())
+
+
+@pytest.mark.parametrize(
+    ("kind", "errors", "says"),
+    [
+        ("fault", EmergencyError, "emergency 0x4310"),
+        ("freeze", FollowingError, "blocks the motor"),
+        ("heartbeat", HeartbeatError, "no heartbeat for"),
+        ("drop", (HeartbeatError, SilentDriveError), "Check its supply"),
+        ("delay", (HeartbeatError, SilentDriveError), "Check its supply"),
+        ("refuse", StateError, "changed from mode 8 to 0"),
+    ],
+)
+def test_a_fault_while_running_stops_all_motors(
+    hub: Hub, bench: Bench, kind: str, errors: type[DriveError], says: str
+) -> None:
+    config = drives_config(channel=str(hub.path))
+    rig = bench(config)
+    with open_drives(config) as drives:
+        drives.start()
+        drive(drives, 5)
+        rig.inject(kind, Dof.ROTATION, 60.0)  # type: ignore[arg-type]
+        with pytest.raises(errors, match=says) as found:
+            drive(drives, 10_000)
+        assert "rotation, node 2" in str(found.value)
+        assert not drives.running
+        if kind in ("drop", "delay"):
+            assert "quick stop is not confirmed" in str(found.value.__notes__)
+            # It did hear it, or lost our heartbeat.
+            rig.clear(Dof.ROTATION)
+            wait_for(lambda: at_rest(rig))
+        assert at_rest(rig)
+        with pytest.raises(StateError, match="before start or after stop"):
+            drives.exchange([0, 0, 0])
+
+
+def wait_for(condition: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + 30
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+def test_answers_that_are_a_little_late_are_counted(hub: Hub, bench: Bench) -> None:
+    config = drives_config(channel=str(hub.path))
+    rig = bench(config)
+    with open_drives(config) as drives:
+        drives.start()
+        rig.inject("delay", Dof.BENDING, 3 * config.cycle)
+        drive(drives, 10)
+        assert drives.traffic.late[Dof.BENDING] >= 1
+        assert drives.traffic.cycles == 10
+
+
+def test_a_fault_is_kept_until_it_is_acknowledged(hub: Hub, bench: Bench) -> None:
+    config = drives_config(channel=str(hub.path))
+    rig = bench(config)
+    with open_drives(config) as drives:
+        drives.start()
+        rig.inject("fault", Dof.INSERTION)
+        with pytest.raises(EmergencyError):
+            drive(drives, 10_000)
+    rig.clear(Dof.INSERTION)
+    with open_drives(config) as drives:
+        with pytest.raises(StateError, match="reset_faults"):
+            drives.start()
+        assert at_rest(rig)
+        drives.start(reset_faults=True)
+        assert set(rig.states.values()) == {State.OPERATION_ENABLED}
+
+
+def test_a_mode_that_is_refused(hub: Hub, bench: Bench) -> None:
+    config = drives_config(channel=str(hub.path), state_timeout=0.2)
+    rig = bench(config, modes=(7,))
+    rig.inject("refuse", Dof.BENDING)
+    wait_for(lambda: any(event.what == "fault: refuse" for event in rig.events))
+    with pytest.raises(ModeRefusedError, match=r"bending, node 3: mode 7.*says 0"):
+        open_drives(config)
+
+
+def test_a_drive_without_a_streaming_mode(hub: Hub, bench: Bench) -> None:
+    config = drives_config(channel=str(hub.path))
+    bench(config, modes=(1, 3, 6))
+    with pytest.raises(ModeRefusedError, match="0x00000025: neither"):
+        open_drives(config)
+
+
+def test_a_drive_that_is_not_there(hub: Hub, bench: Bench) -> None:
+    config = drives_config(channel=str(hub.path), request_timeout=0.3)
+    bench(drives_config())
+    axis = {name: getattr(config.rotation, name) for name in config.rotation.__struct_fields__}
+    other = drives_config(
+        channel=str(hub.path), request_timeout=0.3, rotation=without_none(axis) | {"node": 9}
+    )
+    with pytest.raises(SilentDriveError, match=r"rotation, node 9.*Check drives.rotation.node"):
+        open_drives(other)
+
+
+def without_none(values: dict[str, object]) -> dict[str, object]:
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def test_a_protection_the_drive_lacks_must_be_waived(hub: Hub, bench: Bench) -> None:
+    config = drives_config(channel=str(hub.path))
+    bench(config, absent=(0x6007, 0x6080))
+    with pytest.raises(SettingRefusedError, match=r"add 6007 to drives\.waive"):
+        open_drives(config)
+    with open_drives(drives_config(channel=str(hub.path), waive=["6007"])) as drives:
+        for one in drives.commissioned:
+            assert [name[:6] for name in one.absent] == ["0x6007", "0x6080"]
+
+
+@pytest.mark.parametrize("index", [0x6502, 0x6064, 0x1401, 0x1016])
+def test_an_object_that_cannot_be_missed(hub: Hub, bench: Bench, index: int) -> None:
+    config = drives_config(channel=str(hub.path))
+    bench(config, absent=(index,))
+    with pytest.raises(SettingRefusedError, match=r"insertion, node 1"):
+        open_drives(config)
+
+
+@pytest.mark.parametrize("key", [(0x605A, 0), (0x607D, 2), (0x1017, 0), (0x1401, 2)], ids=hex_of)
+def test_a_setting_that_reads_back_differently(
+    hub: Hub, bench: Bench, monkeypatch: pytest.MonkeyPatch, key: tuple[int, int]
+) -> None:
+    store = CanopenNode._store
+
+    def other(self: CanopenNode, where: tuple[int, int], value: int, now: float) -> int | None:
+        return store(self, where, value - (where == key), now)
+
+    monkeypatch.setattr(CanopenNode, "_store", other)
+    config = drives_config(channel=str(hub.path))
+    bench(config)
+    with pytest.raises(SettingRefusedError, match=rf"0x{key[0]:04X}:{key[1]}.*reads back"):
+        open_drives(config)
+
+
+def test_protections_and_limits_are_in_the_drive(hub: Hub, bench: Bench) -> None:
+    """In counts, with the rotation's sign -1 and home 0.25 rad worked out by hand."""
+    config = drives_config(channel=str(hub.path))
+    rig = bench(config)
+    with open_drives(config):
+        values = rig._drives[Dof.ROTATION].values
+        assert values[0x6007, 0] == 3
+        assert values[0x605A, 0] == 6
+        assert values[0x607D, 1] == -32_500  # -(3.5 - 0.25) 10000
+        assert values[0x607D, 2] == 32_500  # -(-3.0 - 0.25) 10000
+        assert values[0x607F, 0] == 200_000  # 20 rad/s
+        assert values[0x6080, 0] == 2930  # 200000 60 / 4096 = 2929.7 per minute
+        assert values[0x1017, 0] == 100
+        assert values[0x1016, 1] == 127 << 16 | 3000
+
+
+@pytest.mark.parametrize(
+    ("command", "says"),
+    [
+        ([np.nan, 0, 0], r"command\[insertion\].*finite"),
+        ([0, 0, np.inf], r"command\[bending\].*finite"),
+        ([0, 3.6, 0], r"command\[rotation\].*travel"),
+        ([0, 0, 0.21], r"command\[bending\].*speed_limit"),
+        ([0, 0], "command: got"),
+        ("left", "command: got"),
+    ],
+)
+def test_a_command_that_must_not_be_sent(
+    hub: Hub, bench: Bench, command: object, says: str
+) -> None:
+    config = drives_config(channel=str(hub.path))
+    rig = bench(config)
+    with open_drives(config) as drives:
+        drives.start()
+        with pytest.raises(SignalError, match=says):
+            drives.exchange(command)  # type: ignore[arg-type]
+        assert at_rest(rig)
+        assert not drives.running
+
+
+def test_a_motor_outside_its_travel_is_not_enabled(hub: Hub, bench: Bench) -> None:
+    config = drives_config(channel=str(hub.path))
+    rig = bench(config, start=np.array([0.0, 0.0, 2.5]))
+    with (
+        open_drives(config) as drives,
+        pytest.raises(FollowingError, match=r"bending.*outside its travel.*home, sign"),
+    ):
+        drives.start()
+    assert not any(event.what == State.OPERATION_ENABLED for event in rig.events)
+
+
+def test_an_encoder_that_jumps(hub: Hub, bench: Bench) -> None:
+    """A plant that says what cannot be: the following error or the jump is noticed."""
+    jump = np.zeros(3)
+    config = drives_config(channel=str(hub.path))
+    rig = bench(config, lambda told: told + jump)
+    with open_drives(config) as drives:
+        drives.start()
+        drive(drives, 5)
+        jump[Dof.INSERTION] = 0.02
+        with pytest.raises(FollowingError, match="insertion, node 1"):
+            drive(drives, 10_000)
+    assert at_rest(rig)
+
+
+def test_a_second_master_is_refused_and_stops_the_first(
+    hub: Hub, bench: Bench, station: Callable[[], LocalBus]
+) -> None:
+    config = drives_config(channel=str(hub.path))
+    rig = bench(config)
+    with open_drives(config) as drives:
+        drives.start()
+        drive(drives, 5)
+        # The second sees the first's SYNC, if only the first goes on.
+        with pytest.raises(SecondMasterError):
+            listen_while(drives, config)
+        assert drives.running
+    assert at_rest(rig)
+
+
+def listen_while(drives: Drives, config: DrivesConfig) -> None:
+    import threading
+
+    from tautscope.hardware.canopen_drives import CanopenLink
+
+    ending = threading.Event()
+
+    def go_on() -> None:
+        while not ending.is_set():
+            drives.exchange(drives.last_command)
+            time.sleep(drives.cycle / 2)
+
+    thread = threading.Thread(target=go_on)
+    thread.start()
+    try:
+        CanopenLink(config).close()
+    finally:
+        ending.set()
+        thread.join()
+
+
+def test_the_bus_is_unplugged(hub: Hub, bench: Bench) -> None:
+    """Nobody can tell the drives to stop; they miss our heartbeat."""
+    config = drives_config(channel=str(hub.path))
+    rig = bench(config)
+    drives = open_drives(config)
+    drives.start()
+    drive(drives, 5)
+    hub.close()
+    with pytest.raises(BusError, match="Plug the adapter in"):
+        drive(drives, 10_000)
+    drives.close()
+    wait_for(lambda: set(rig.states.values()) == {State.QUICK_STOP_ACTIVE})
+
+
+def test_there_is_no_bus() -> None:
+    with pytest.raises(BusError, match=r"tautscope /nowhere cannot be opened.*drives.interface"):
+        open_drives(drives_config(channel="/nowhere"))
+    with pytest.raises(BusError, match="sudo ip link set can7 up type can bitrate 1000000"):
+        open_drives(drives_config(interface="socketcan", channel="can7"))
+    with pytest.raises(BusError, match="cannot be opened"):
+        open_drives(drives_config(interface="no_such_interface"))
+
+
+def test_a_fault_that_does_not_exist(bench: Bench) -> None:
+    rig = bench(drives_config())
+    with pytest.raises(ConfigError, match=r"fault: got 'explode'"):
+        rig.inject("explode", Dof.BENDING)  # type: ignore[arg-type]
