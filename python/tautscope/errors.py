@@ -49,3 +49,7 @@ class MissingPathError(FieldError):
 
 class OutputError(FieldError):
     """A result cannot be written where it was asked for."""
+
+
+class CameraError(FieldError):
+    """A camera is not there, or does not give the pictures it should."""

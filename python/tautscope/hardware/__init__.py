@@ -1,0 +1,1 @@
+"""Real cameras and drives."""
