@@ -220,7 +220,13 @@ def test_dv_from_a_pipe_that_pauses_is_said_and_goes_on(tmp_path: Path) -> None:
     write_dv(tmp_path / "clip.dv", 25)
     data, pipe = (tmp_path / "clip.dv").read_bytes(), tmp_path / "pipe"
     os.mkfifo(pipe)
-    source = SourceConfig(url=str(pipe), format="dv", timeout=0.3, start_timeout=PATIENCE)
+    source = SourceConfig(
+        url=str(pipe),
+        format="dv",
+        timeout=0.3,
+        start_timeout=PATIENCE,
+        options={"probesize": "500000"},
+    )
     go_on = threading.Event()
 
     def write() -> None:
@@ -230,7 +236,7 @@ def test_dv_from_a_pipe_that_pauses_is_said_and_goes_on(tmp_path: Path) -> None:
             while True:  # until nobody reads any more
                 file.write(data)
 
-    writer = threading.Thread(target=write)
+    writer = threading.Thread(target=write, daemon=True)
     writer.start()
     with Camera(CameraConfig(source=source)) as live:
         until(lambda: live.state.trouble.startswith("no frame for"))

@@ -20,6 +20,8 @@ from tautscope.rig import Frame
 TEST_FRAMES = 8
 """How many frames the self-test looks at."""
 
+_LIVE = {"fflags": "nobuffer"}
+"""FFmpeg's options for every source: what is read to learn its format is not shown late."""
 _JUMP = 1.0
 """Time stamps that go on by more, or back, are another clock [s]."""
 _OLDEST = 1.0
@@ -183,7 +185,8 @@ class Camera:
         source = self._source
         while not self._is_closing.is_set():
             try:
-                with opened(source.url, source.format, source.options, source.timeout) as container:
+                options = _LIVE | source.options
+                with opened(source.url, source.format, options, source.timeout) as container:
                     self._read(Decoder(container, self._config, live=True))
                 trouble = f"{source.url} has ended; it is opened again"
             except CameraError as error:
