@@ -259,8 +259,8 @@ class RecordingConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     """The log of a run. All [ours]."""
 
     image_format: ImageFormat = "png"
-    """``png`` is lossless, so that a replay gives the same outputs; ``jpeg`` is a fifth of it,
-    moves the features by tenths of a pixel, and no replay is identical (decision 0020)."""
+    """``png`` is lossless, so that a replay gives the same outputs; ``jpeg`` is a fifth of it and
+    moves the features by up to 0.3 px, so that no replay is identical (decision 0020)."""
     jpeg_quality: Annotated[int, Meta(ge=1, le=100)] = 95
     """With ``jpeg``."""
     flush_period: Annotated[float, Meta(gt=0, le=0.2)] = 0.1
