@@ -11,19 +11,27 @@ import argparse
 import json
 import mmap
 import os
-import signal
 import struct
-import subprocess
 import sys
 import tempfile
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from multiprocessing import get_context
 from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from tautscope import Config, Frame, HysteresisReduction, MarkerDetector, Sample, Twin, load_config
+from tautscope import (
+    Config,
+    Frame,
+    HysteresisReduction,
+    MarkerDetector,
+    Report,
+    Sample,
+    Twin,
+    load_config,
+)
 from tautscope.dof import Dof
 from tautscope.experiment import run_experiment
 from tautscope.log.export import recover
@@ -77,52 +85,67 @@ class Loss:
     is_readable: bool
 
 
-def write_for_ever(log_file: Path, sent_file: Path) -> None:
-    """The process to be killed."""
+@dataclass(frozen=True)
+class Scene:
+    """What the killed process sends again and again."""
+
+    config: Config
+    sample: Sample
+    images: list[NDArray[np.uint8]]
+    report: Report
+
+
+def scene() -> Scene:
+    """The first frame of the twin, with fresh noise each time, and the loop's report on it."""
     config = load_config()
     twin, loop = Twin(config), HysteresisReduction(config)
     sample = twin.reset()
     while sample.frame is None:
         loop.step(sample.applied, sample.time)
         sample = twin.step(sample.applied)
-    report = loop.on_frame(sample.frame)
+    loop.step(sample.applied, sample.time)
+    report, image = loop.on_frame(sample.frame), sample.frame.image
     noise = np.random.default_rng(0)
-    images = [
-        np.clip(sample.frame.image + noise.normal(0, 2, sample.frame.image.shape), 0, 255)
-        for _ in range(8)
-    ]
-    pictures = [image.astype(np.uint8) for image in images]
-    with sent_file.open("r+b") as file, LogWriter(log_file, config) as log:
+    images = [np.clip(image + noise.normal(0, 2, image.shape), 0, 255) for _ in range(8)]
+    sample = replace(sample, frame=None)
+    return Scene(config, sample, [each.astype(np.uint8) for each in images], report)
+
+
+def write_for_ever(log_file: Path, sent_file: Path, scene: Scene) -> None:
+    """The process to be killed."""
+    applied = scene.sample.applied
+    with sent_file.open("r+b") as file, LogWriter(log_file, scene.config) as log:
         sent = mmap.mmap(file.fileno(), _SENT.size)
         begin, tick = time.monotonic(), 0
         while True:
             now = time.monotonic() - begin
-            log.tick(Sample(now, sample.applied), sample.applied, sample.applied)
+            log.tick(Sample(now, applied), applied, applied)
             if tick % EVERY == 0:
-                frame = Frame(pictures[tick // EVERY % 8], now, tick // EVERY)
-                log.frame(now, frame, report)
+                frame = Frame(scene.images[tick // EVERY % 8], now, tick // EVERY)
+                log.frame(now, frame, scene.report)
             tick += 1
             sent[:] = _SENT.pack(tick, now)
             time.sleep(max(begin + tick * PERIOD - time.monotonic(), 0))
 
 
-def kill_one(folder: Path, lifetime: float) -> Loss:
+def kill_one(folder: Path, lifetime: float, scene: Scene) -> Loss:
     """Start a recording, kill it `lifetime` after its first tick, and see what is left."""
     log_file, sent_file, mended = (folder / name for name in ("run.mcap", "sent", "mended.mcap"))
     sent_file.write_bytes(bytes(_SENT.size))
-    child = subprocess.Popen(
-        [sys.executable, __file__, "--write", str(log_file), str(sent_file)],
-        stderr=subprocess.DEVNULL,
-    )
+    # A server that has all modules loaded: a process each would spend its time on imports.
+    context = get_context("forkserver")
+    context.set_forkserver_preload(["tautscope.twin", "tautscope.log.writer", "tautscope.vision"])
+    child = context.Process(target=write_for_ever, args=(log_file, sent_file, scene))
+    child.start()
     try:
         while _SENT.unpack(sent_file.read_bytes())[0] == 0:
-            if child.poll() is not None:
-                raise RuntimeError(f"the recording process ended with {child.returncode}")
-            time.sleep(0.02)
+            if not child.is_alive():
+                raise RuntimeError(f"the recording process ended with {child.exitcode}")
+            time.sleep(0.01)
         time.sleep(lifetime)
     finally:
-        child.send_signal(signal.SIGKILL)
-        child.wait()
+        child.kill()
+        child.join()
     ticks, last = _SENT.unpack(sent_file.read_bytes())
     recover(log_file, mended)
     log = read_log(mended)
@@ -154,10 +177,10 @@ def _rosbags_reads(path: Path) -> bool:
 def kills(count: int) -> dict[str, object]:
     """Kill `count` recordings at random times."""
     rng = np.random.default_rng(0)
-    losses = []
+    losses, sent = [], scene()
     for number in range(count):
         with tempfile.TemporaryDirectory() as folder:
-            losses.append(kill_one(Path(folder), float(rng.uniform(0.05, 3.0))))
+            losses.append(kill_one(Path(folder), float(rng.uniform(0.05, 3.0)), sent))
         if number % 10 == 9:
             print(f"{number + 1} of {count} killed", file=sys.stderr, flush=True)
     lost = np.array([loss.ticks for loss in losses])
@@ -250,11 +273,8 @@ def main() -> None:
     parser.add_argument("--replays", type=int, default=0, metavar="N")
     parser.add_argument("--images", type=int, default=0, metavar="N")
     parser.add_argument("--seconds", type=float, default=5.0, help="of a replayed run")
-    parser.add_argument("--write", nargs=2, type=Path, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     cv2.setNumThreads(1)
-    if arguments.write:
-        write_for_ever(*arguments.write)
     if arguments.images:
         for row in images(arguments.images):
             print(json.dumps(row), flush=True)
