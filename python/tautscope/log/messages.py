@@ -212,12 +212,15 @@ def update_messages(clock: Clock, now: float, frame: Frame, report: Report) -> M
 
 
 def read_update(messages: Mapping[str, bytes]) -> tuple[Row, Floats, Floats]:
-    """A `frame_row`, and the offsets after it; NaN in columns that the log's version had not."""
+    """A `frame_row`, and the offsets after it; NaN or 0 in columns its version had not."""
     update = decode(TOPICS[UPDATE], messages[UPDATE])
     known = dict(zip(update["layout"]["dim"][0]["label"].split(","), update["data"], strict=True))
     known["status"] = decode(TOPICS[STATUS], messages[STATUS])["status"][0]["message"]
     deltas = np.array(decode(TOPICS[DELTA], messages[DELTA])["data"], np.float64).reshape(3, 2)
-    row = tuple(FRAME_COLUMNS[name].type(known.get(name, np.nan)).item() for name in _COLUMNS)
+    row = tuple(
+        kind.type(known.get(name, np.nan if kind.kind == "f" else 0)).item()
+        for name, kind in ((name, FRAME_COLUMNS[name]) for name in _COLUMNS)
+    )
     return row, deltas[:, 0], deltas[:, 1]
 
 

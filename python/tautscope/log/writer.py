@@ -1,4 +1,4 @@
-"""The log of a run, written while it goes on, by a thread of its own.
+"""The log of a run, written while it goes on, by threads of its own.
 
 The loop only puts references into bounded queues: no encoding, no lock, no file. What does not fit
 is dropped and counted; a disk that fails ends the recording, never the run.
@@ -34,7 +34,7 @@ from tautscope.references import Segment
 from tautscope.rig import Frame, Sample
 
 _LOOK_PERIOD = 0.01
-"""How often the thread looks for news [s]: far below every `flush_period`."""
+"""How often the threads look for news [s]: far below the `flush_period`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,10 +67,11 @@ class LogSummary:
 
 @dataclass(slots=True)
 class _Queues:
-    """What waits for the thread. Appending and popping a deque need no lock."""
+    """What waits for the threads. Appending and popping a deque need no lock."""
 
     events: deque[tuple[int, float, tuple[Any, ...]]] = field(default_factory=deque)
     images: deque[tuple[int, float, float, NDArray[np.uint8]]] = field(default_factory=deque)
+    coded: deque[tuple[int, float, float, bytes]] = field(default_factory=deque)
     texts: deque[tuple[float | None, str]] = field(default_factory=deque)
 
 
@@ -117,10 +118,11 @@ class LogWriter:
         self._ticks = self._updates = self._dropped = self._dropped_images = 0
         self._failure = ""
         self._written: Counter[str] = Counter()
-        self._is_closing, self._is_done = Event(), Event()
+        self._is_closing, self._is_encoded, self._is_done = Event(), Event(), Event()
         self._file = _open(self._path)
         self._thread = Thread(target=self._work, name="recording", daemon=True)
         self._thread.start()
+        Thread(target=self._encode, name="image encoding", daemon=True).start()
 
     def tick(self, sample: Sample, reference: Iterable[float], command: Iterable[float]) -> None:
         """One control tick: the sample before it, reference u (3,) and command c (3,)."""
@@ -217,9 +219,10 @@ class LogWriter:
         finally:
             self._is_done.set()
         if self._failure:
-            waiting = len(self._queues.events) + len(self._queues.images)
+            images = len(self._queues.images) + len(self._queues.coded)
+            waiting = len(self._queues.events) + images
             self._dropped += len(self._queues.events)
-            self._dropped_images += len(self._queues.images)
+            self._dropped_images += images
             self._say(
                 f"{self._path}: recording ended, {waiting} messages are lost and nothing more is "
                 f"recorded; the run goes on ({self._failure})"
@@ -241,13 +244,14 @@ class LogWriter:
         flushed = synced = time.monotonic()
         told = 0
         while True:
-            last = self._is_closing.is_set()  # asked before the queues, so that nothing is missed
+            # Asked before the queues, so that nothing is missed.
+            last = self._is_closing.is_set() and self._is_encoded.is_set()
             self._write_events(put)
-            has_more = self._write_image(put)
+            self._write_images(put)
             if self.dropped and not told:
                 told = self.dropped
                 self._trouble("the disk or the encoder is too slow; ticks or images are dropped")
-            if last and not has_more and not self._queues.events:
+            if last:
                 break
             now = time.monotonic()
             if now - flushed >= self._settings.flush_period:
@@ -256,8 +260,7 @@ class LogWriter:
             if now - synced >= self._settings.sync_period:
                 os.fsync(self._file.fileno())
                 synced = time.monotonic()
-            if not has_more:
-                self._is_closing.wait(_LOOK_PERIOD)
+            time.sleep(_LOOK_PERIOD)
         if told:
             self._trouble(
                 f"{self._dropped} ticks and updates and {self._dropped_images} images were dropped"
@@ -271,7 +274,7 @@ class LogWriter:
         self.warn(text)
 
     def _write_events(self, put: Callable[[str, bytes, int, int], None]) -> None:
-        """Everything but the images, which take longest and may come later in the file."""
+        """Everything but the images, which may come later in the file."""
         while self._queues.texts:
             now, text = self._queues.texts.popleft()
             on_rig = self._clock is not None and now is not None
@@ -285,17 +288,36 @@ class LogWriter:
             for topic, data in kind(clock, *facts).items():
                 put(topic, data, index, clock.nanoseconds(now))
 
-    def _write_image(self, put: Callable[[str, bytes, int, int], None]) -> bool:
-        """The oldest image that waits, if there is one; whether there was."""
-        if not self._queues.images:
-            return False
-        index, now, captured_at, image = self._queues.images.popleft()
-        clock = self._clock
-        assert clock is not None
-        data = self._codec.encode(image)
-        message = msg.image_message(clock, captured_at, self._codec.format, data)
-        put(msg.IMAGE, message, index, clock.nanoseconds(now))
-        return True
+    def _write_images(self, put: Callable[[str, bytes, int, int], None]) -> None:
+        while self._queues.coded:
+            index, now, captured_at, data = self._queues.coded.popleft()
+            clock = self._clock
+            assert clock is not None
+            message = msg.image_message(clock, captured_at, self._codec.format, data)
+            put(msg.IMAGE, message, index, clock.nanoseconds(now))
+
+    def _encode(self) -> None:
+        """The other thread: an image takes longer to encode than a tick may wait."""
+        queues, limit = self._queues, self._settings.queue_images
+        told = False
+        while not self._is_done.is_set():
+            # Asked before the queue, so that nothing is missed.
+            is_last = self._is_closing.is_set()
+            if not queues.images or len(queues.coded) >= limit:
+                if is_last and not queues.images:
+                    break
+                time.sleep(_LOOK_PERIOD)
+                continue
+            index, now, captured_at, image = queues.images[0]
+            try:
+                queues.coded.append((index, now, captured_at, self._codec.encode(image)))
+            except Exception as error:  # an image that is none; the ticks go on
+                self._dropped_images += 1
+                if not told:
+                    self._trouble(f"image {index} cannot be encoded ({error})")
+                told = True
+            queues.images.popleft()
+        self._is_encoded.set()
 
 
 def register_channels(writer: Writer) -> dict[str, int]:
