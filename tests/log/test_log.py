@@ -262,6 +262,16 @@ def test_every_pixel_format_comes_back_to_the_byte(name: str) -> None:
         codec.decode(data[:20])
 
 
+def test_arrays_may_be_used_again(tmp_path: Path, config: Config) -> None:
+    applied, reference = np.ones(3), np.ones(3)
+    with LogWriter(tmp_path / "run.mcap", config) as log:
+        log.tick(Sample(0.0, applied), reference, reference)
+        applied[:] = reference[:] = 7.0
+    (tick,) = read_log(tmp_path / "run.mcap").events.values()
+    assert isinstance(tick, Tick)
+    assert tick.sample.applied.tolist() == tick.reference.tolist() == [1.0, 1.0, 1.0]
+
+
 def test_a_run_that_fails_leaves_its_log_and_why(tmp_path: Path, config: Config) -> None:
     with pytest.raises(ZeroDivisionError), LogWriter(tmp_path / "run.mcap", config) as log:
         log.tick(Sample(0.0, np.zeros(3)), np.zeros(3), np.zeros(3))

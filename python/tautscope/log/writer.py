@@ -129,7 +129,10 @@ class LogWriter:
         if self._clock is None:
             self._clock = msg.Clock(sample.time, time.time_ns())
         self._ticks += 1
-        self._put(sample.time, (sample, np.array(reference), np.array(command)))
+        # Copies: the caller may use its arrays again before they are written.
+        truth = None if sample.true_state is None else np.array(sample.true_state)
+        kept = Sample(sample.time, np.array(sample.applied), None, truth)
+        self._put(sample.time, (kept, np.array(reference), np.array(command)))
 
     def frame(self, now: float, frame: Frame, report: Report) -> None:
         """One image update, after the tick in whose sample the frame came.
