@@ -1,7 +1,7 @@
 """Image-based hysteresis reduction for flexible endoscopic instruments.
 
 Reilink, Stramigioli, Misra, Mechatronics 23 (2013) 652-658. Names below are loaded when first
-used: importing the package imports neither the physics nor OpenCV nor matplotlib.
+used: importing the package imports neither the physics nor OpenCV nor matplotlib nor MCAP.
 """
 
 from __future__ import annotations

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, get_args
 from tautscope._core import __version__
 from tautscope.config import DISTURBANCES, Config, Profile, dump_config, load_config
 from tautscope.errors import MissingPathError, TautscopeError
+from tautscope.log import commands
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -24,17 +25,19 @@ PROFILES = get_args(Profile)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; 0 on success, 2 on an error a person can mend, 130 when interrupted."""
+    """Run the command; 0 on success, 2 on an error a person can mend, 130 when interrupted.
+
+    `replay` returns 1 if the outputs were others than those recorded.
+    """
     options = _parser().parse_args(arguments)
     try:
-        options.run(options)
+        return options.run(options) or 0
     except TautscopeError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print("interrupted; nothing was written", file=sys.stderr)
         return 130
-    return 0
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -121,6 +124,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     _add_common(analyze)
     analyze.set_defaults(run=_analyze)
+    commands.add_parsers(verbs)
     return parser
 
 

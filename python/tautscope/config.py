@@ -27,6 +27,9 @@ Fraction = Annotated[float, Meta(gt=0, lt=1)]
 Gain = Annotated[float, Meta(ge=1)]
 PixelFormat = Literal["bgr", "rgb", "bgra", "yuyv", "uyvy", "nv12", "i420"]
 Profile = Literal["paper", "best"]
+ImageFormat = Literal["png", "jpeg"]
+Deinterlace = Literal["bwdif", "none"]
+CameraClock = Literal["stream", "device", "arrival"]
 Vector3 = tuple[float, float, float]
 Vector8 = tuple[float, float, float, float, float, float, float, float]
 
@@ -167,6 +170,36 @@ class PoseConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     guide's z axis is the channel's axis, outwards [ours]."""
 
 
+class SourceConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Where a camera's images come from, in FFmpeg's words. All [ours]."""
+
+    url: str = "/dev/video0"
+    """Device, file, ``pipe:0``, ``udp://...``, ``rtsp://...``, or a filter graph for lavfi."""
+    format: str | None = "v4l2"
+    """FFmpeg's input format: v4l2, dv, mpegts, lavfi, ...; left empty, it is guessed."""
+    options: dict[str, str] = field(default_factory=dict)
+    """FFmpeg's options of that format: ``video_size``, ``framerate``, ``input_format``, ..."""
+    deinterlace: Deinterlace = "bwdif"
+    """What becomes of interlaced frames: ``bwdif`` makes each field a frame, one frame late."""
+    clock: CameraClock = "stream"
+    """When a frame was captured: ``stream``, its time stamp put on our clock by the quickest of
+    the frames of `clock_window`; ``device``, its time stamp as it is, the system's monotonic clock
+    (V4L2); ``arrival``, when it arrived, for a source without time stamps."""
+    clock_window: Positive = 10.0
+    """[s]."""
+    delay: NonNegative = 0.0
+    """From exposure to time stamp for ``device``, else of the quickest frame from exposure to
+    arrival [s]; to be measured, since none of these can tell."""
+    timeout: Positive = 2.0
+    """Without a frame for so long a source is lost, and opened anew [s]."""
+    reconnect_period: Positive = 0.5
+    """Between two attempts to open it [s]."""
+    start_timeout: Positive = 10.0
+    """For the frames of the self-test at the start [s]."""
+    darkest: Annotated[int, Meta(ge=1, le=255)] = 24
+    """A picture without a pixel above this is black [grey levels]; video black is 16."""
+
+
 class CameraConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Pinhole with OpenCV's distortion, Eq. (8)."""
 
@@ -187,6 +220,7 @@ class CameraConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """Principal point [px]."""
     distortion: Vector8 = (-0.18, 0.05, 0.0, 0.0, -0.005, 0.0, 0.0, 0.0)
     """k1, k2, p1, p2, k3, k4, k5, k6 in OpenCV's order and meaning [ours]."""
+    source: SourceConfig = field(default_factory=SourceConfig)
     camera_from_guide: PoseConfig = field(default_factory=PoseConfig)
 
 
@@ -237,6 +271,26 @@ class ControlConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     history: Positive = 2.0
     """How long commands are remembered, so that a frame finds the one in force when it was
     captured [s]; at most 1024 ticks. An older frame is refused."""
+
+
+class RecordingConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The log of a run. All [ours]."""
+
+    image_format: ImageFormat = "png"
+    """``png`` is lossless, so that a replay gives the same outputs; ``jpeg`` is a fifth of it and
+    moves the features by up to 0.3 px, so that no replay is identical (decision 0020)."""
+    jpeg_quality: Annotated[int, Meta(ge=1, le=100)] = 95
+    """With ``jpeg``."""
+    flush_period: Annotated[float, Meta(gt=0, le=0.2)] = 0.1
+    """What is older is in the file if the process is killed [s]."""
+    sync_period: Positive = 5.0
+    """What is older is on the disk if the power fails [s]."""
+    queue_events: Annotated[int, Meta(ge=1)] = 20_000
+    """Ticks and image updates that may wait for a slow disk; more are dropped, and it is said."""
+    queue_images: Annotated[int, Meta(ge=1)] = 50
+    """Images that may wait for encoder and disk; likewise."""
+    close_timeout: Positive = 10.0
+    """How long the end of a run may wait for a slow disk [s]."""
 
 
 class Sine(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -458,6 +512,7 @@ class Config(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     camera: CameraConfig = field(default_factory=CameraConfig)
     vision: VisionConfig = field(default_factory=VisionConfig)
     control: ControlConfig = field(default_factory=ControlConfig)
+    recording: RecordingConfig = field(default_factory=RecordingConfig)
     experiment: ExperimentConfig = field(default_factory=ExperimentConfig)
     twin: TwinConfig = field(default_factory=TwinConfig)
     drives: DrivesConfig | None = None

@@ -105,3 +105,7 @@ class SilentDriveError(DriveError):
 
 class FollowingError(DriveError):
     """A drive is not where it was told to be, or its position jumped."""
+
+
+class CameraError(FieldError):
+    """A camera is not there, or does not give the pictures it should."""

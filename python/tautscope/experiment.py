@@ -3,33 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tautscope.config import Config
-from tautscope.dof import Dof
 from tautscope.errors import SignalError
-from tautscope.recording import (
-    FRAME_COLUMNS,
-    TRACE_COLUMNS,
-    Recording,
-    Snapshot,
-    Table,
-    per_dof,
-)
+from tautscope.recording import Recording, Snapshot, Tables, frame_row
 from tautscope.reduction import HysteresisReduction, Report
 from tautscope.references import Reference
-from tautscope.rig import Frame, Rig, Sample
+from tautscope.rig import Frame, Rig
 
-Floats = NDArray[np.float64]
+if TYPE_CHECKING:
+    from tautscope.log.writer import LogWriter
+
 Progress = Callable[[float, float], None]
 """Called about once per second of the rig's clock with (elapsed, duration) [s]."""
 Look = Callable[[HysteresisReduction, Frame], Report]
 """An image update: frame in, what became of it out."""
-
-_UNKNOWN = (np.nan, np.nan, np.nan)
-_NO_FEATURES = (np.nan, np.nan, np.nan, np.nan)
 
 
 def run_experiment(
@@ -40,6 +31,7 @@ def run_experiment(
     progress: Progress | None = None,
     *,
     look: Look = HysteresisReduction.on_frame,
+    log: LogWriter | None = None,
 ) -> Recording:
     """Run a reference on a rig, with the camera as the only feedback.
 
@@ -56,6 +48,7 @@ def run_experiment(
         progress: Told how far the run is.
         look: What the loop does with a frame; one that calls `HysteresisReduction.on_features`
             brings a marker detector of your own.
+        log: Written while the run goes on, so that it survives whatever ends it; left open.
 
     Raises:
         SignalError: The reference is not three finite numbers, or the rig's clock does not run.
@@ -69,10 +62,14 @@ def run_experiment(
         desired = reference(elapsed)
         command = reduction.step(desired, time=sample.time)
         recorder.tick(sample, desired, command)
+        if log is not None:
+            log.tick(sample, desired, command)
         # After the command, which never waits for an image.
         if sample.frame is not None:
             report = look(reduction, sample.frame)
-            recorder.frame(sample.time, sample.frame, report, elapsed)
+            recorder.seen(sample.time, sample.frame, report, elapsed)
+            if log is not None:
+                log.frame(sample.time, sample.frame, report)
         before, sample = sample, rig.step(command)
         if not sample.time > before.time:
             raise SignalError("sample.time", sample.time, f"later than the last, {before.time}")
@@ -83,78 +80,28 @@ def run_experiment(
     return Recording(trace, frames, config, compensate, segments, recorder.snapshot)
 
 
-class _Recorder:
-    """Collects the rows of a `Recording`."""
+class _Recorder(Tables):
+    """Keeps one frame of about the middle too."""
 
     def __init__(self, config: Config, snapshot_after: float) -> None:
+        super().__init__(config)
         self.snapshot: Snapshot | None = None
         self._snapshot_after = snapshot_after
         self._is_late = False
-        self._trace: list[tuple[object, ...]] = []
-        self._frames: list[tuple[object, ...]] = []
-        deltas = [
-            *(config[dof].delta_minus for dof in Dof),
-            *(config[dof].delta_plus for dof in Dof),
-        ]
-        self._estimate: tuple[float, ...] = _UNKNOWN
-        self._deltas: tuple[float, ...] = tuple(deltas)
-        self._status = "none"
 
-    def tick(self, sample: Sample, desired: Floats, command: Floats) -> None:
-        truth = _UNKNOWN if sample.true_state is None else sample.true_state
-        self._trace.append(
-            (
-                sample.time,
-                *desired,
-                *command,
-                *sample.applied,
-                *self._estimate,
-                *truth,
-                *self._deltas,
-                self._status,
-            )
-        )
-
-    def frame(self, now: float, frame: Frame, report: Report, elapsed: float) -> None:
-        self._estimate = tuple(report.state_estimate)
-        self._deltas = (*report.delta_minus, *report.delta_plus)
-        self._status = str(report.status)
+    def seen(self, now: float, frame: Frame, report: Report, elapsed: float) -> None:
+        self.frame(frame_row(now, frame, report), report.delta_minus, report.delta_plus)
         detection = report.detection
-        valid = detection is not None and bool(detection.valid)
-        features = detection.features if detection is not None and valid else _NO_FEATURES
-        truth = _NO_FEATURES if frame.true_features is None else frame.true_features
-        self._frames.append(
-            (
-                frame.captured_at,
-                now,
-                frame.sequence,
-                self._status,
-                valid,
-                *report.state_estimate,
-                *report.predicted_state,
-                *_UNKNOWN,
-                *report.observable,
-                *features,
-                *report.predicted_features,
-                *report.innovation,
-                *truth,
-            )
-        )
         is_late = elapsed >= self._snapshot_after
-        if valid and (self.snapshot is None or (is_late and not self._is_late)):
+        if (
+            detection is not None
+            and detection.valid
+            and (self.snapshot is None or (is_late and not self._is_late))
+        ):
             self._is_late = is_late
             self.snapshot = Snapshot(
                 frame.image.copy(),
                 frame.captured_at,
-                np.array(features),
+                np.array(detection.features),
                 np.array(report.predicted_features),
             )
-
-    def tables(self) -> tuple[Table, Table]:
-        trace = np.array(self._trace, dtype=TRACE_COLUMNS)
-        frames = np.array(self._frames, dtype=FRAME_COLUMNS)
-        for dof, truth in zip(Dof, per_dof(trace, "true").T, strict=True):
-            frames[f"true_{dof.label}"] = np.interp(
-                frames["captured_at"], trace["time"], truth, left=np.nan, right=np.nan
-            )
-        return trace, frames

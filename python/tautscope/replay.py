@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 from bisect import bisect_left
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tautscope.dof import Dof
 from tautscope.errors import MissingPathError, RecordError, SignalError
 
 if TYPE_CHECKING:
@@ -120,29 +121,61 @@ def read_record(
     samples: list[list[float]] = []
     rows: list[int] = []
     blank = 0
+    for number, values in _lines(file, names):
+        if any(math.isnan(value) for value in values[:1] + values[2:]):
+            blank += 1
+            continue
+        samples.append(values)
+        rows.append(number)
+    table = np.array(samples).reshape(-1, len(names))
+    seen = int(np.count_nonzero(np.isfinite(table[:, 1])))
+    if seen < 2:
+        raise RecordError(str(file), f"{seen} samples", "at least 2")
+    return _cleaned(table, np.array(rows, dtype=np.int64), blank)
+
+
+def read_motors(path: str | PathLike[str]) -> tuple[Floats, Floats]:
+    """Read motor positions: a CSV file with columns time, insertion, rotation and bending.
+
+    Returns:
+        Time (n,) [s], rising, and positions (n, 3) [m, rad, rad]. Lines with a blank cell are left
+        out.
+
+    Raises:
+        MissingPathError: There is no such file.
+        RecordError: A column is not there, a cell is not a number, the time does not rise, or no
+            line is left; the error names file, line and column.
+    """
+    file = Path(path)
+    table: list[list[float]] = []
+    for number, values in _lines(file, ["time", *(dof.label for dof in Dof)]):
+        if any(math.isnan(value) for value in values):
+            continue
+        if table and values[0] <= table[-1][0]:
+            raise RecordError(
+                f"{file}, line {number}, column time", values[0], f"later than {table[-1][0]}"
+            )
+        table.append(values)
+    if not table:
+        raise RecordError(str(file), "no line with all columns", "at least one")
+    array = np.array(table)
+    return array[:, 0], array[:, 1:]
+
+
+def _lines(file: Path, names: Sequence[str]) -> Iterator[tuple[int, list[float]]]:
+    """Number and cells of each line, NaN where blank, of a CSV file with a header line."""
     try:
         with file.open(newline="", encoding="utf-8-sig") as stream:
             reader = csv.reader(stream)
             header = [name.strip() for name in next(reader, [])]
             places = [_column(file, header, name) for name in names]
             for line in reader:
-                if not line:
-                    continue
-                values = _numbers(file, reader.line_num, line, places, names)
-                if any(math.isnan(value) for value in values[:1] + values[2:]):
-                    blank += 1
-                    continue
-                samples.append(values)
-                rows.append(reader.line_num)
+                if line:
+                    yield reader.line_num, _numbers(file, reader.line_num, line, places, names)
     except (FileNotFoundError, IsADirectoryError):
         raise MissingPathError("record", str(file), "a CSV file with a header line") from None
     except (UnicodeDecodeError, csv.Error) as error:
         raise RecordError(str(file), str(error), "a CSV file with a header line") from None
-    table = np.array(samples).reshape(-1, len(names))
-    seen = int(np.count_nonzero(np.isfinite(table[:, 1])))
-    if seen < 2:
-        raise RecordError(str(file), f"{seen} samples", "at least 2")
-    return _cleaned(table, np.array(rows, dtype=np.int64), blank)
 
 
 def _cleaned(table: Floats, rows: NDArray[np.int64], blank: int) -> Record:

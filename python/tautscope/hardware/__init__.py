@@ -1,5 +1,5 @@
-"""Real devices behind the loop: drives on a bus.
+"""Real devices behind the loop: drives on a bus, cameras.
 
-Importing this package loads neither `can` nor `canopen` nor `pysoem`; they come with the extras
-``hardware`` and ``ethercat`` and are loaded when a bus is opened.
+Importing this package loads neither `can` nor `canopen` nor `pysoem` nor `av`; they come with the
+extras ``hardware`` and ``ethercat`` and are loaded when a bus or a camera is opened.
 """

@@ -1,0 +1,203 @@
+"""Video of any source to images, by FFmpeg through PyAV; interlaced frames become their fields.
+
+OpenCV's reader gives black pictures for interlaced DV and says all is well, so it is not used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tautscope.config import CameraConfig
+from tautscope.errors import CameraError, MissingPathError
+from tautscope.pixels import FrameLayout
+from tautscope.rig import Frame
+
+if TYPE_CHECKING:
+    import av
+    from av.container import InputContainer
+    from av.filter import Graph
+    from av.video.stream import VideoStream
+
+Image = NDArray[np.uint8]
+
+_FORMATS = {
+    "bgr": "bgr24",
+    "rgb": "rgb24",
+    "bgra": "bgra",
+    "yuyv": "yuyv422",
+    "uyvy": "uyvy422",
+    "nv12": "nv12",
+    "i420": "yuv420p",
+}
+"""Ours -> FFmpeg's."""
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A decoded frame, or field made a frame.
+
+    Attributes:
+        image: As `camera.pixel_format` says.
+        stamp: The source's time stamp [s]; None if it gives none.
+    """
+
+    image: Image
+    stamp: float | None
+
+
+@contextmanager
+def opened(
+    url: str,
+    format_name: str | None = None,
+    options: dict[str, str] | None = None,
+    timeout: float | None = None,
+) -> Iterator[InputContainer]:
+    """A source, open while the block lasts.
+
+    Raises:
+        CameraError: PyAV is not installed, or the source cannot be opened or read, or has no video.
+    """
+    try:
+        import av  # noqa: PLC0415  an extra, and 0.1 s
+    except ImportError:
+        raise CameraError(
+            "camera.source", "no PyAV", "it installed: pip install 'tautscope[hardware]'"
+        ) from None
+    try:
+        with av.open(url, format=format_name, options=options or {}, timeout=timeout) as container:
+            if not container.streams.video:
+                raise CameraError("camera.source.url", url, "a source with a video stream")
+            yield container
+    except av.error.FFmpegError as error:
+        hint = "a source that opens and goes on; is it connected, and is another program using it?"
+        raise CameraError("camera.source.url", url, f"{hint} ({error})") from None
+
+
+class Decoder:
+    """Decodes the video of an open source into pictures of the configured size and format.
+
+    Args:
+        container: From `opened`.
+        camera: Its size, pixel format and ``source.deinterlace`` are used.
+        live: Frames as soon as they are there; without it, as many as possible per second.
+
+    Attributes:
+        is_interlaced: Whether an interlaced frame has come; None before the first frame.
+    """
+
+    def __init__(self, container: InputContainer, camera: CameraConfig, *, live: bool) -> None:
+        self.is_interlaced: bool | None = None
+        self._container = container
+        self._stream: VideoStream = container.streams.video[0]
+        # Threads that decode a frame each hold as many frames back as there are threads.
+        self._stream.thread_type = "SLICE" if live else "AUTO"
+        self._camera = camera
+        self._shape = FrameLayout(camera).shape
+        self._graph: Graph | None = None
+
+    @property
+    def period(self) -> float | None:
+        """Time from one picture to the next, as the source names it [s]; None if it does not."""
+        rate = self._stream.average_rate or self._stream.guessed_rate
+        if not rate:
+            return None
+        return 1 / float(rate) / (2 if self._graph is not None else 1)
+
+    def __iter__(self) -> Iterator[Picture]:
+        """Every picture, until the source ends.
+
+        Raises:
+            CameraError: It is not of the configured size.
+        """
+        for frame in self._container.decode(self._stream):
+            yield from self._pictures(frame)
+        if self._graph is not None:
+            self._graph.push(None)
+            yield from self._fields(self._graph)
+
+    def _pictures(self, frame: av.VideoFrame) -> Iterator[Picture]:
+        self.is_interlaced = bool(self.is_interlaced or frame.interlaced_frame)
+        self._check_size(frame)
+        if not self.is_interlaced or self._camera.source.deinterlace == "none":
+            yield self._picture(frame)
+            return
+        if self._graph is None:
+            self._graph = _deinterlacer(self._stream)
+        self._graph.push(frame)
+        yield from self._fields(self._graph)
+
+    def _fields(self, graph: Graph) -> Iterator[Picture]:
+        from av.error import BlockingIOError, EOFError  # noqa: PLC0415
+
+        while True:
+            try:
+                field = graph.pull()
+            except (BlockingIOError, EOFError):
+                return
+            yield self._picture(field)  # type: ignore[arg-type]  # a video graph gives video
+
+    def _picture(self, frame: av.VideoFrame) -> Picture:
+        return Picture(_pixels(frame, _FORMATS[self._camera.pixel_format], self._shape), frame.time)
+
+    def _check_size(self, frame: av.VideoFrame) -> None:
+        camera = self._camera
+        if (frame.width, frame.height) != (camera.width, camera.height):
+            raise CameraError(
+                "camera.source",
+                f"pictures of {frame.width} x {frame.height}",
+                f"camera.width x height = {camera.width} x {camera.height}, as calibrated; set "
+                "camera.source.options.video_size, or calibrate for this size",
+            )
+
+
+def read_video(path: str, camera: CameraConfig, start: float = 0.0) -> Iterator[Frame]:
+    """The frames of a video file; fields if it is interlaced.
+
+    Args:
+        path: The file.
+        camera: Its size and pixel format, and what is done to interlaced frames.
+        start: Capture time of its first frame [s].
+
+    Raises:
+        MissingPathError: There is no such file.
+        CameraError: It is no video, or not of this size, or a frame has no time stamp.
+    """
+    if not Path(path).is_file():
+        raise MissingPathError("video", path, "a video file")
+    with opened(path) as container:
+        first: float | None = None
+        for sequence, picture in enumerate(Decoder(container, camera, live=False)):
+            if picture.stamp is None:
+                raise CameraError("video", f"frame {sequence} without a time", "a time per frame")
+            first = picture.stamp if first is None else first
+            yield Frame(picture.image, start + picture.stamp - first, sequence)
+
+
+def _deinterlacer(stream: VideoStream) -> Graph:
+    from av.filter import Graph  # noqa: PLC0415
+
+    graph = Graph()
+    source = graph.add_buffer(template=stream)
+    fields = graph.add("bwdif", "mode=send_field:deint=interlaced")
+    sink = graph.add("buffersink")
+    source.link_to(fields)
+    fields.link_to(sink)
+    graph.configure()
+    return graph
+
+
+def _pixels(frame: av.VideoFrame, name: str, shape: tuple[int, ...]) -> Image:
+    if name != "uyvy422":
+        return np.ascontiguousarray(frame.to_ndarray(format=name), dtype=np.uint8)
+    # PyAV has no array for it; its only plane has lines with padding at their ends.
+    plane = frame.reformat(format=name).planes[0]
+    lines = np.frombuffer(plane, np.uint8).reshape(-1, plane.line_size)  # type: ignore[call-overload]
+    rows, columns, channels = shape
+    return np.ascontiguousarray(lines[:rows, : columns * channels].reshape(shape))

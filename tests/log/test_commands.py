@@ -1,0 +1,194 @@
+"""`tautscope recover`, `export` and `replay` as a person or a script meets them."""
+
+import csv
+import json
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+from recorded import record
+from rosbags.highlevel import AnyReader
+from tautscope.cli import main
+from tautscope.config import Config, dump_config
+from tautscope.log.reader import Update, read_log
+from tautscope.log.writer import LogSummary
+from tautscope.recording import Recording, per_dof
+
+Recorded = tuple[Path, Recording, LogSummary]
+Capture = pytest.CaptureFixture[str]
+
+
+@pytest.fixture
+def torn(recorded: Recorded, tmp_path: Path) -> Path:
+    whole = recorded[0].read_bytes()
+    file = tmp_path / "torn.mcap"
+    file.write_bytes(whole[: len(whole) // 2])
+    return file
+
+
+def failed(capsys: Capture, *arguments: str) -> str:
+    assert main(arguments) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith("error: ")
+    return err
+
+
+def test_recover_mends_a_torn_log(capsys: Capture, torn: Path) -> None:
+    before = torn.read_bytes()
+    assert main(["recover", str(torn)]) == 0
+    assert "torn-recovered.mcap:" in (said := capsys.readouterr().out)
+    assert f"{torn} is torn" in said
+    assert torn.read_bytes() == before
+    with AnyReader([torn.with_name("torn-recovered.mcap")]) as reader:
+        assert reader.message_count > 100
+    assert "does not exist yet" in failed(capsys, "recover", str(torn))
+    assert (
+        main(
+            [
+                "recover",
+                str(torn.with_name("torn-recovered.mcap")),
+                "--out",
+                str(torn.with_name("again.mcap")),
+            ]
+        )
+        == 0
+    )
+    assert "was whole" in capsys.readouterr().out
+
+
+def test_export_writes_csv_and_a_bag(capsys: Capture, torn: Path, recorded: Recorded) -> None:
+    assert main(["export", str(torn), "--csv"]) == 0
+    folder = torn.with_name("torn-csv")
+    assert str(folder) in capsys.readouterr().out
+    trace = Recording.load(folder).trace
+    np.testing.assert_array_equal(
+        per_dof(trace, "command"), per_dof(recorded[1].trace, "command")[: len(trace)]
+    )
+    assert main(["export", str(torn), "--rosbag", str(torn.with_name("bag"))]) == 0
+    with AnyReader([torn.with_name("bag")]) as reader:
+        assert f"{reader.message_count} messages" in capsys.readouterr().out
+    with pytest.raises(SystemExit):
+        main(["export", str(torn)])
+
+
+def test_replay_counts_what_is_identical(
+    capsys: Capture, recorded: Recorded, torn: Path, tmp_path: Path
+) -> None:
+    path, recording, _ = recorded
+    ticks, frames = len(recording.trace), len(recording.frames)
+    assert main(["replay", str(path)]) == 0
+    assert capsys.readouterr().out == (
+        f"{ticks} of {ticks} commands and {frames} of {frames} image updates identical, "
+        "bit for bit.\n"
+    )
+    assert main(["replay", str(torn), "--json", "--out", str(tmp_path / "out")]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["identical"] is True
+    assert 0 < found["same_ticks"] == found["ticks"] < ticks
+    assert "replay.png" in {file.name for file in (tmp_path / "out").iterdir()}
+
+
+def test_a_replay_that_differs_has_status_1(
+    capsys: Capture, tmp_path: Path, config: Config
+) -> None:
+    lossy = config.replace(**{"recording.image_format": "jpeg", "recording.jpeg_quality": 70})
+    record(tmp_path / "run.mcap", lossy, 3.0)
+    assert main(["replay", str(tmp_path / "run.mcap")]) == 1
+    said = capsys.readouterr().out
+    assert "First difference: image " in said
+    assert "not lossless" in said
+
+
+def test_replay_with_another_configuration_shows_what_it_would_estimate(
+    capsys: Capture, recorded: Recorded, tmp_path: Path
+) -> None:
+    path, recording, _ = recorded
+    other = tmp_path / "slow.toml"
+    slow = read_log(path).config.replace(**{"insertion.smoothing_factor": 0.001})
+    other.write_text(dump_config(slow))
+    arguments = ["replay", str(path), "--config", str(other), "--out"]
+    assert main([*arguments, str(tmp_path / "a"), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["dof"]["insertion"]
+    width = recording.trace["delta_plus_insertion"] - recording.trace["delta_minus_insertion"]
+    assert found["recorded"]["width"] == pytest.approx(width[-1])
+    assert found["replayed"]["width"] < 0.5 * width[-1]
+    assert {file.name for file in (tmp_path / "a").iterdir()} == {
+        "trace.csv",
+        "frames.csv",
+        "recording.toml",
+        "config.toml",
+        "replay.png",
+    }
+    assert main([*arguments, str(tmp_path / "b")]) == 0
+    said = capsys.readouterr().out
+    assert "slack at the end" in said
+    assert "replay.png" in said
+    assert main(["replay", str(path), "--profile", "best", "--out", str(tmp_path / "c")]) == 0
+
+
+def test_replay_of_a_video_and_motor_positions(
+    capsys: Capture, recorded: Recorded, tmp_path: Path
+) -> None:
+    """A lossless video of the run's frames, 1000 s later than the table says."""
+    path, recording, _ = recorded
+    log = read_log(path)
+    with av.open(str(tmp_path / "clip.mkv"), "w") as container:
+        stream = container.add_stream("ffv1", rate=25)
+        stream.width, stream.height, stream.pix_fmt = 720, 576, "bgr0"
+        stream.time_base = stream.codec_context.time_base = Fraction(1, 1000)
+        for index, event in log.events.items():
+            if isinstance(event, Update):
+                frame = av.VideoFrame.from_ndarray(log.image(index), format="bgr24")
+                frame = frame.reformat(format="bgr0")
+                frame.pts, frame.time_base = round(1000 * float(event.row[0])), stream.time_base
+                container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))
+    with (tmp_path / "motors.csv").open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(["time", "insertion", "rotation", "bending"])
+        for time, command in zip(
+            recording.trace["time"], per_dof(recording.trace, "command"), strict=True
+        ):
+            writer.writerow([float(time) - 1000, *map(float, command)])
+    arguments = [
+        "replay",
+        "--video",
+        str(tmp_path / "clip.mkv"),
+        "--motors",
+        str(tmp_path / "motors.csv"),
+        "--video-start",
+        "-1000",
+    ]
+    out = tmp_path / "out"
+    assert main([*arguments, "--out", str(out), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["images"] == pytest.approx(len(recording.frames), abs=1)
+    width = recording.trace["delta_plus_insertion"] - recording.trace["delta_minus_insertion"]
+    assert found["dof"]["insertion"]["replayed"]["width"] == pytest.approx(width[-1], rel=0.02)
+    frames = Recording.load(out).frames
+    np.testing.assert_allclose(
+        frames["estimate_insertion"],
+        recording.frames["estimate_insertion"][: len(frames)],
+        atol=2e-4,
+    )
+
+
+def test_replay_names_what_it_cannot_use(
+    capsys: Capture, recorded: Recorded, tmp_path: Path
+) -> None:
+    path = str(recorded[0])
+    assert "got 'neither'" in failed(capsys, "replay")
+    assert "got 'both'" in failed(capsys, "replay", path, "--video", "x.avi")
+    assert "--motors: got None" in failed(capsys, "replay", "--video", "x.avi")
+    assert "no.mcap" in failed(capsys, "replay", str(tmp_path / "no.mcap"))
+    table = tmp_path / "m.csv"
+    table.write_text("time,insertion,rotation\n0,1,2\n")
+    video = ["replay", "--video", str(table), "--motors", str(table)]
+    assert "bending: got 'no such column'" in failed(capsys, *video)
+    table.write_text("time,insertion,rotation,bending\n0,1,2,3\n0,1,2,3\n")
+    assert "line 3, column time: got 0.0, expected later than 0.0" in failed(capsys, *video)
+    table.write_text("time,insertion,rotation,bending\n0,1,2,3\n1,1,2,3\n")
+    assert "m.csv" in failed(capsys, *video)  # which is no video

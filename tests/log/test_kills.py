@@ -1,0 +1,25 @@
+"""A recording that is killed, as `benchmarks/recordings.py --kills` does it for the figures."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+
+from recordings import Scene, kill_one, scene
+
+
+@pytest.fixture(scope="module")
+def sent() -> Scene:
+    return scene()
+
+
+@pytest.mark.parametrize("lifetime", [0.05, 0.3, 1.0])
+def test_a_killed_recording_is_readable_without_holes(
+    tmp_path: Path, lifetime: float, sent: Scene
+) -> None:
+    loss = kill_one(tmp_path, lifetime, sent)
+    assert loss.is_readable
+    assert loss.holes == 0
+    assert loss.ticks >= 0
