@@ -148,6 +148,8 @@ class AdaptiveAxis:
         *,
         free_gain: float,
         contact_gain: float,
+        tip_speed: float,
+        speed_memory: float,
         cautious_gain: float,
         cautious_deviation: float,
         gain_limit: float,
@@ -155,9 +157,11 @@ class AdaptiveAxis:
         settling: float,
         node_spacing: float,
         level_deviation: float,
+        gain_deviation: float,
         local_deviation: float,
         correlation: float,
         level_drift: float,
+        gain_drift: float,
         local_drift: float,
         symmetry: float,
         contact_distance: float,
@@ -172,6 +176,8 @@ class AdaptiveAxis:
     ) -> AdaptiveAxis: ...
     def step(self, reference: float) -> float: ...
     def run(self, references: ArrayLike) -> _Floats: ...
+    @property
+    def gain(self) -> tuple[float, float]: ...
     def learn(
         self, command: float, measured: float, deviation: float, since: ArrayLike
     ) -> _Triggers: ...

@@ -82,8 +82,13 @@ class AdaptiveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     free_gain, gain_limit, delta_minus and delta_plus are those of `DofConfig`.
     """
 
-    contact_gain: Gain = 2.1
-    """Largest command over reference in contact, until the lead is what it should be."""
+    contact_gain: Gain = 3.0
+    """Largest speed of the tip over that of the reference in contact, until the lead is what it
+    should be."""
+    tip_speed: Gain = 1.6
+    """Largest speed of the tip in contact over the fastest that the reference has been lately."""
+    speed_memory: Positive = 500.0
+    """Travel of the reference over which a fast motion is forgotten."""
     cautious_gain: Gain = 1.4
     """The same for a stroke that begins with an offset hardly known."""
     cautious_deviation: Positive = 3.0
@@ -100,12 +105,16 @@ class AdaptiveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """Distance of two of the 33 positions at which an offset is held."""
     level_deviation: Positive = 20.0
     """Standard deviation of an offset at the start, the same error at all positions."""
+    gain_deviation: NonNegative = 0.3
+    """Standard deviation of the command's travel over the tip's in contact, about 1."""
     local_deviation: NonNegative = 0.7
     """Standard deviation of an offset's variation with position."""
     correlation: Positive = 40.0
     """Distance over which that variation is alike."""
     level_drift: NonNegative = 0.2
     """Standard deviation of the offset's change while the command travels 1."""
+    gain_drift: NonNegative = 0.003
+    """The same of the command's travel over the tip's."""
     local_drift: NonNegative = 0.03
     """The same of its variation with position."""
     symmetry: Annotated[float, Meta(ge=0, lt=1)] = 0.8

@@ -222,6 +222,8 @@ def build_adaptive_axis(config: Config, dof: Dof, compensate: bool = True) -> _c
     return _core.AdaptiveAxis(
         free_gain=free,
         contact_gain=contact,
+        tip_speed=shared.tip_speed,
+        speed_memory=unit * shared.speed_memory,
         cautious_gain=min(shared.cautious_gain, contact),
         cautious_deviation=unit * shared.cautious_deviation,
         gain_limit=own.gain_limit,
@@ -229,10 +231,12 @@ def build_adaptive_axis(config: Config, dof: Dof, compensate: bool = True) -> _c
         settling=unit * shared.settling,
         node_spacing=unit * shared.node_spacing,
         level_deviation=unit * shared.level_deviation,
+        gain_deviation=shared.gain_deviation,
         local_deviation=unit * shared.local_deviation,
         correlation=unit * shared.correlation,
         # A deviation per square root of travel.
         level_drift=math.sqrt(unit) * shared.level_drift,
+        gain_drift=shared.gain_drift / math.sqrt(unit),
         local_drift=math.sqrt(unit) * shared.local_drift,
         symmetry=shared.symmetry,
         contact_distance=unit * shared.contact_distance,

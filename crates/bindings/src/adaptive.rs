@@ -18,8 +18,9 @@ pub struct AdaptiveAxis(pub core::AdaptiveAxis);
 impl AdaptiveAxis {
     #[new]
     #[pyo3(signature = (
-        *, free_gain, contact_gain, cautious_gain, cautious_deviation, gain_limit, taper, settling, node_spacing, level_deviation, local_deviation, correlation, level_drift,
-        local_drift, symmetry, contact_distance, contact_moved, slope_tolerance, marker_deviation,
+        *, free_gain, contact_gain, tip_speed, speed_memory, cautious_gain, cautious_deviation, gain_limit,
+        taper, settling, node_spacing, level_deviation, gain_deviation, local_deviation, correlation,
+        level_drift, gain_drift, local_drift, symmetry, contact_distance, contact_moved, slope_tolerance, marker_deviation,
         model_deviation, tremor_time, period, delta_minus, delta_plus
     ))]
     // One argument per setting, by keyword only.
@@ -28,6 +29,8 @@ impl AdaptiveAxis {
         py: Python<'_>,
         free_gain: f64,
         contact_gain: f64,
+        tip_speed: f64,
+        speed_memory: f64,
         cautious_gain: f64,
         cautious_deviation: f64,
         gain_limit: f64,
@@ -35,9 +38,11 @@ impl AdaptiveAxis {
         settling: f64,
         node_spacing: f64,
         level_deviation: f64,
+        gain_deviation: f64,
         local_deviation: f64,
         correlation: f64,
         level_drift: f64,
+        gain_drift: f64,
         local_drift: f64,
         symmetry: f64,
         contact_distance: f64,
@@ -57,14 +62,18 @@ impl AdaptiveAxis {
                 taper,
                 settling,
             },
+            tip_speed,
+            speed_memory,
             cautious_gain,
             cautious_deviation,
             prior: core::OffsetPrior {
                 spacing: node_spacing,
                 level: level_deviation,
+                tilt: gain_deviation,
                 local: local_deviation,
                 correlation,
                 level_drift,
+                tilt_drift: gain_drift,
                 local_drift,
                 symmetry,
             },
@@ -138,6 +147,12 @@ impl AdaptiveAxis {
     #[getter]
     fn delta_plus(&self) -> f64 {
         self.0.play().delta_plus()
+    }
+
+    /// Travel of the tip over the command's in contact: mean and standard deviation.
+    #[getter]
+    fn gain(&self) -> (f64, f64) {
+        self.0.gain()
     }
 
     /// Standard deviations of (`delta_minus`, `delta_plus`) where the reference is now.

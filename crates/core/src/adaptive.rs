@@ -5,14 +5,21 @@ use crate::error::{ConfigError, require, require_non_negative, require_positive}
 use crate::estimator::{Trigger, Triggers};
 use crate::lead::LeadLaw;
 use crate::offset_map::{OffsetMap, OffsetPrior, Side};
-use crate::play::{Play, PlayState};
+use crate::play::Play;
 use crate::smoother::Smoother;
+
+/// Least stretch that is believed: a tip that does twice what the command does.
+const LEAST_STRETCH: f64 = 0.5;
 
 /// What an [`AdaptiveAxis`] is set to; lengths in the unit of the DOF.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AdaptiveSettings {
     /// How the lead is brought about.
     pub law: LeadLaw,
+    /// Largest speed of a tip in contact over the fastest the reference has been lately.
+    pub tip_speed: f64,
+    /// Travel of the reference over which a fast motion is forgotten.
+    pub speed_memory: f64,
     /// `contact_gain` of a stroke that began with an offset uncertain by more than
     /// `cautious_deviation`.
     pub cautious_gain: f64,
@@ -49,6 +56,8 @@ pub struct AdaptiveAxis {
     reference: Option<f64>,
     /// The smoothed reference up to which the lead has been worked out.
     intended: f64,
+    /// The longest way it has made in a tick lately.
+    fastest: f64,
     lead: f64,
     command: f64,
     tip: f64,
@@ -79,6 +88,9 @@ impl AdaptiveAxis {
             settings.cautious_gain,
             "at least 1, at most contact_gain",
         )?;
+        let speed = settings.tip_speed.is_finite() && settings.tip_speed >= 1.0;
+        require(speed, "tip_speed", settings.tip_speed, "finite, at least 1")?;
+        require_positive("speed_memory", settings.speed_memory)?;
         require_positive("cautious_deviation", settings.cautious_deviation)?;
         require_positive("contact_distance", settings.contact.distance)?;
         require_non_negative("contact_moved", settings.contact.moved)?;
@@ -94,6 +106,7 @@ impl AdaptiveAxis {
             stroke: Stroke::new(),
             reference: None,
             intended: f64::NAN,
+            fastest: 0.0,
             lead: 0.0,
             command: f64::NAN,
             tip: f64::NAN,
@@ -123,6 +136,13 @@ impl AdaptiveAxis {
         let at = self.reference.unwrap_or(0.0);
         let root = |side| libm::sqrt(self.offsets.variance(side, at));
         (root(Side::Minus), root(Side::Plus))
+    }
+
+    /// Travel of the tip over the command's in contact: mean and standard deviation.
+    pub fn gain(&self) -> (f64, f64) {
+        let (tilt, deviation) = self.offsets.tilt();
+        let gain = 1.0 / (1.0 + tilt).max(LEAST_STRETCH);
+        (gain, gain * gain * deviation)
     }
 
     /// The command for the next reference.
@@ -172,16 +192,10 @@ impl AdaptiveAxis {
             self.landed = false;
             self.cautious = deviation > settings.cautious_deviation;
         }
-        let contact = |play: Play| {
-            if upwards {
-                play.delta_plus()
-            } else {
-                play.delta_minus()
-            }
-        };
-        let missing = sign * (contact(self.play_at(reference)) - self.lead);
+        let stretch = self.stretch(side, reference);
+        let missing = sign * (self.offsets.offset(side, reference) - self.lead);
         let position = self.command - self.tip;
-        let gap = sign * (contact(self.play_at(self.tip)) - position);
+        let gap = sign * (self.offsets.offset(side, self.tip) - position);
         // Up to where the contact may already be.
         let sure = gap - deviation * deviation / settings.cautious_deviation;
         self.landed |= sure <= 0.0;
@@ -190,8 +204,12 @@ impl AdaptiveAxis {
         if self.cautious {
             law.contact_gain = settings.cautious_gain;
         }
+        let travel = intention.abs();
+        self.fastest = travel.max(self.fastest * libm::exp(-travel / settings.speed_memory));
+        let fast = settings.tip_speed * self.fastest / travel;
+        law.contact_gain = law.contact_gain.min(fast.max(1.0));
         let gap = if self.landed { 0.0 } else { sure };
-        self.lead += sign * law.gain(intention.abs(), gap, missing);
+        self.lead += sign * law.gain(travel, stretch, gap, missing);
     }
 
     /// Learn from command and output of one instant, the output's standard deviation per px of
@@ -211,7 +229,10 @@ impl AdaptiveAxis {
         if !(command.is_finite() && measured.is_finite() && variance.is_finite()) {
             return triggers;
         }
-        let motion = self.stroke.follow(&settings.contact, command, measured);
+        let gains = self.gains();
+        let motion = self
+            .stroke
+            .follow(&settings.contact, gains, command, measured);
         if let Some(motion) = motion {
             self.offsets.travel(motion.travel);
             let offset = command - measured;
@@ -254,9 +275,26 @@ impl AdaptiveAxis {
         self.tip = self.carried(self.tip, self.command);
     }
 
+    /// Where the tip is when the command comes to be there: between the contacts, whose offsets
+    /// change with where the tip is.
     fn carried(&self, tip: f64, command: f64) -> f64 {
-        let mut state = PlayState { output: tip };
-        self.play_at(tip).step(&mut state, command)
+        let [plus, minus] = [Side::Plus, Side::Minus].map(|side| {
+            let beyond = command - self.offsets.offset(side, tip) - tip;
+            tip + beyond / self.stretch(side, tip)
+        });
+        tip.max(plus.min(minus)).min(plus.max(minus))
+    }
+
+    /// Travel of the command for a tip in contact to travel 1.
+    fn stretch(&self, side: Side, position: f64) -> f64 {
+        (1.0 + self.offsets.slope(side, position)).clamp(LEAST_STRETCH, self.settings.gain_limit)
+    }
+
+    /// Between which a contact's gain, tip over command, may be. One does not exclude 1.
+    fn gains(&self) -> (f64, f64) {
+        let (tilt, deviation) = self.offsets.tilt();
+        let [most, least] = [-2.0, 2.0].map(|by| (1.0 + tilt + by * deviation).max(LEAST_STRETCH));
+        (1.0 / least, (1.0 / most).min(1.0).max(1.0 / (1.0 + tilt).max(LEAST_STRETCH)))
     }
 
     fn play_at(&self, position: f64) -> Play {

@@ -16,6 +16,8 @@ fn settings(tremor_time: f64, period: f64) -> AdaptiveSettings {
             taper: 0.1,
             settling: 0.05,
         },
+        tip_speed: 2.0,
+        speed_memory: 100.0,
         cautious_gain: 1.5,
         cautious_deviation: 0.1,
         prior: prior(),
@@ -37,6 +39,7 @@ fn certain(play: Play, tremor_time: f64, period: f64) -> AdaptiveAxis {
     let mut settings = settings(tremor_time, period);
     settings.prior.level = 1e-9;
     settings.prior.local = 0.0;
+    settings.prior.tilt = 0.0;
     AdaptiveAxis::new(settings, play).unwrap()
 }
 

@@ -9,9 +9,11 @@ pub fn prior() -> OffsetPrior {
     OffsetPrior {
         spacing: 0.25,
         level: 1.0,
+        tilt: 0.2,
         local: 0.1,
         correlation: 1.0,
         level_drift: 0.01,
+        tilt_drift: 0.01,
         local_drift: 0.005,
         symmetry: 0.8,
     }
