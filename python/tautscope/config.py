@@ -85,7 +85,7 @@ class AdaptiveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     contact_gain: Gain = 3.0
     """Largest speed of the tip over that of the reference in contact, until the lead is what it
     should be."""
-    tip_speed: Gain = 1.6
+    tip_speed: Gain = 1.65
     """Largest speed of the tip in contact over the fastest that the reference has been lately."""
     speed_memory: Positive = 500.0
     """Travel of the reference over which a fast motion is forgotten."""
@@ -113,7 +113,7 @@ class AdaptiveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """Distance over which that variation is alike."""
     level_drift: NonNegative = 0.2
     """Standard deviation of the offset's change while the command travels 1."""
-    gain_drift: NonNegative = 0.003
+    gain_drift: NonNegative = 0.0003
     """The same of the command's travel over the tip's."""
     local_drift: NonNegative = 0.03
     """The same of its variation with position."""

@@ -192,7 +192,7 @@ impl AdaptiveAxis {
             self.landed = false;
             self.cautious = deviation > settings.cautious_deviation;
         }
-        let stretch = self.stretch(side, reference);
+        let stretch = self.stretch();
         let missing = sign * (self.offsets.offset(side, reference) - self.lead);
         let position = self.command - self.tip;
         let gap = sign * (self.offsets.offset(side, self.tip) - position);
@@ -280,14 +280,14 @@ impl AdaptiveAxis {
     fn carried(&self, tip: f64, command: f64) -> f64 {
         let [plus, minus] = [Side::Plus, Side::Minus].map(|side| {
             let beyond = command - self.offsets.offset(side, tip) - tip;
-            tip + beyond / self.stretch(side, tip)
+            tip + beyond / self.stretch()
         });
         tip.max(plus.min(minus)).min(plus.max(minus))
     }
 
     /// Travel of the command for a tip in contact to travel 1.
-    fn stretch(&self, side: Side, position: f64) -> f64 {
-        (1.0 + self.offsets.slope(side, position)).clamp(LEAST_STRETCH, self.settings.gain_limit)
+    fn stretch(&self) -> f64 {
+        (1.0 + self.offsets.tilt().0).clamp(LEAST_STRETCH, self.settings.gain_limit)
     }
 
     /// Between which a contact's gain, tip over command, may be. One does not exclude 1.

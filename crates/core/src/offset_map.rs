@@ -127,17 +127,6 @@ impl OffsetMap {
         self.node(side, position).pick(&self.mean)
     }
 
-    /// How fast an offset grows with position there.
-    pub fn slope(&self, side: Side, position: f64) -> f64 {
-        let node = self.node(side, position);
-        let inside = node.share > 0.0 && node.share < 1.0;
-        let rise = match self.mean.get(node.below..node.below + 2) {
-            Some([a, b]) if inside => b - a,
-            _ => 0.0,
-        };
-        self.tilt().0 + rise / self.prior.spacing
-    }
-
     /// The tilt: mean and standard deviation.
     pub fn tilt(&self) -> (f64, f64) {
         let variance = self.covariance.get(TILT).and_then(|row| row.get(TILT));
