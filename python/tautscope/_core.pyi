@@ -148,8 +148,6 @@ class AdaptiveAxis:
         *,
         free_gain: float,
         contact_gain: float,
-        tip_speed: float,
-        speed_memory: float,
         cautious_gain: float,
         cautious_deviation: float,
         gain_limit: float,

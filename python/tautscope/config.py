@@ -82,13 +82,9 @@ class AdaptiveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     free_gain, gain_limit, delta_minus and delta_plus are those of `DofConfig`.
     """
 
-    contact_gain: Gain = 3.0
+    contact_gain: Gain = 2.0
     """Largest speed of the tip over that of the reference in contact, until the lead is what it
     should be."""
-    tip_speed: Gain = 1.65
-    """Largest speed of the tip in contact over the fastest that the reference has been lately."""
-    speed_memory: Positive = 500.0
-    """Travel of the reference over which a fast motion is forgotten."""
     cautious_gain: Gain = 1.4
     """The same for a stroke that begins with an offset hardly known."""
     cautious_deviation: Positive = 3.0
@@ -96,7 +92,7 @@ class AdaptiveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     deviation^2 / cautious_deviation before the contact."""
     taper: Positive = 1.5
     """End of the gap over which free_gain falls to contact_gain."""
-    settling: Positive = 1.5
+    settling: Positive = 3.0
     """Lead yet missing below which the gain in contact falls to 1; an offset's standard deviation
     comes on top."""
     tremor_time: NonNegative = 0.15
@@ -107,7 +103,7 @@ class AdaptiveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """Standard deviation of an offset at the start, the same error at all positions."""
     gain_deviation: NonNegative = 0.3
     """Standard deviation of the command's travel over the tip's in contact, about 1."""
-    local_deviation: NonNegative = 0.7
+    local_deviation: NonNegative = 1.5
     """Standard deviation of an offset's variation with position."""
     correlation: Positive = 40.0
     """Distance over which that variation is alike."""

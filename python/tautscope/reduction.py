@@ -222,8 +222,6 @@ def build_adaptive_axis(config: Config, dof: Dof, compensate: bool = True) -> _c
     return _core.AdaptiveAxis(
         free_gain=free,
         contact_gain=contact,
-        tip_speed=shared.tip_speed,
-        speed_memory=unit * shared.speed_memory,
         cautious_gain=min(shared.cautious_gain, contact),
         cautious_deviation=unit * shared.cautious_deviation,
         gain_limit=own.gain_limit,

@@ -18,7 +18,7 @@ pub struct AdaptiveAxis(pub core::AdaptiveAxis);
 impl AdaptiveAxis {
     #[new]
     #[pyo3(signature = (
-        *, free_gain, contact_gain, tip_speed, speed_memory, cautious_gain, cautious_deviation, gain_limit,
+        *, free_gain, contact_gain, cautious_gain, cautious_deviation, gain_limit,
         taper, settling, node_spacing, level_deviation, gain_deviation, local_deviation, correlation,
         level_drift, gain_drift, local_drift, symmetry, contact_distance, contact_moved, slope_tolerance, marker_deviation,
         model_deviation, tremor_time, period, delta_minus, delta_plus
@@ -29,8 +29,6 @@ impl AdaptiveAxis {
         py: Python<'_>,
         free_gain: f64,
         contact_gain: f64,
-        tip_speed: f64,
-        speed_memory: f64,
         cautious_gain: f64,
         cautious_deviation: f64,
         gain_limit: f64,
@@ -62,8 +60,6 @@ impl AdaptiveAxis {
                 taper,
                 settling,
             },
-            tip_speed,
-            speed_memory,
             cautious_gain,
             cautious_deviation,
             prior: core::OffsetPrior {

@@ -16,10 +16,6 @@ const LEAST_STRETCH: f64 = 0.5;
 pub struct AdaptiveSettings {
     /// How the lead is brought about.
     pub law: LeadLaw,
-    /// Largest speed of a tip in contact over the fastest the reference has been lately.
-    pub tip_speed: f64,
-    /// Travel of the reference over which a fast motion is forgotten.
-    pub speed_memory: f64,
     /// `contact_gain` of a stroke that began with an offset uncertain by more than
     /// `cautious_deviation`.
     pub cautious_gain: f64,
@@ -56,8 +52,6 @@ pub struct AdaptiveAxis {
     reference: Option<f64>,
     /// The smoothed reference up to which the lead has been worked out.
     intended: f64,
-    /// The longest way it has made in a tick lately.
-    fastest: f64,
     lead: f64,
     command: f64,
     tip: f64,
@@ -88,9 +82,6 @@ impl AdaptiveAxis {
             settings.cautious_gain,
             "at least 1, at most contact_gain",
         )?;
-        let speed = settings.tip_speed.is_finite() && settings.tip_speed >= 1.0;
-        require(speed, "tip_speed", settings.tip_speed, "finite, at least 1")?;
-        require_positive("speed_memory", settings.speed_memory)?;
         require_positive("cautious_deviation", settings.cautious_deviation)?;
         require_positive("contact_distance", settings.contact.distance)?;
         require_non_negative("contact_moved", settings.contact.moved)?;
@@ -106,7 +97,6 @@ impl AdaptiveAxis {
             stroke: Stroke::new(),
             reference: None,
             intended: f64::NAN,
-            fastest: 0.0,
             lead: 0.0,
             command: f64::NAN,
             tip: f64::NAN,
@@ -204,12 +194,8 @@ impl AdaptiveAxis {
         if self.cautious {
             law.contact_gain = settings.cautious_gain;
         }
-        let travel = intention.abs();
-        self.fastest = travel.max(self.fastest * libm::exp(-travel / settings.speed_memory));
-        let fast = settings.tip_speed * self.fastest / travel;
-        law.contact_gain = law.contact_gain.min(fast.max(1.0));
         let gap = if self.landed { 0.0 } else { sure };
-        self.lead += sign * law.gain(travel, stretch, gap, missing);
+        self.lead += sign * law.gain(intention.abs(), stretch, gap, missing);
     }
 
     /// Learn from command and output of one instant, the output's standard deviation per px of

@@ -33,8 +33,6 @@ fn adaptive() -> PerDof<Axis> {
                 taper: unit,
                 settling: unit,
             },
-            tip_speed: 1.7,
-            speed_memory: 500.0 * unit,
             cautious_gain: 1.5,
             cautious_deviation: 3.0 * unit,
             prior: OffsetPrior {

@@ -16,8 +16,6 @@ fn settings(tremor_time: f64, period: f64) -> AdaptiveSettings {
             taper: 0.1,
             settling: 0.05,
         },
-        tip_speed: 2.0,
-        speed_memory: 100.0,
         cautious_gain: 1.5,
         cautious_deviation: 0.1,
         prior: prior(),
