@@ -90,7 +90,7 @@ class AdaptiveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     cautious_deviation: Positive = 3.0
     """Standard deviation of an offset from which on it counts as hardly known. The free zone ends
     deviation^2 / cautious_deviation before the contact."""
-    taper: Positive = 1.5
+    taper: Positive = 0.7
     """End of the gap over which free_gain falls to contact_gain."""
     settling: Positive = 3.0
     """Lead yet missing below which the gain in contact falls to 1; an offset's standard deviation

@@ -280,7 +280,12 @@ impl AdaptiveAxis {
     fn gains(&self) -> (f64, f64) {
         let (tilt, deviation) = self.offsets.tilt();
         let [most, least] = [-2.0, 2.0].map(|by| (1.0 + tilt + by * deviation).max(LEAST_STRETCH));
-        (1.0 / least, (1.0 / most).min(1.0).max(1.0 / (1.0 + tilt).max(LEAST_STRETCH)))
+        (
+            1.0 / least,
+            (1.0 / most)
+                .min(1.0)
+                .max(1.0 / (1.0 + tilt).max(LEAST_STRETCH)),
+        )
     }
 
     fn play_at(&self, position: f64) -> Play {

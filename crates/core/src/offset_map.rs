@@ -104,7 +104,11 @@ impl OffsetMap {
         });
         let mut mean = [0.0; SIZE];
         for (index, value) in mean.iter_mut().take(TILT).enumerate() {
-            *value = if index < NODES { delta_minus } else { delta_plus };
+            *value = if index < NODES {
+                delta_minus
+            } else {
+                delta_plus
+            };
         }
         let mut map = Self {
             prior,
