@@ -167,6 +167,7 @@ class AdaptiveAxis:
         slope_tolerance: float,
         marker_deviation: float,
         model_deviation: float,
+        state_correction: float,
         tremor_time: float,
         period: float,
         delta_minus: float,

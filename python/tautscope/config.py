@@ -82,7 +82,7 @@ class AdaptiveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     free_gain, gain_limit, delta_minus and delta_plus are those of `DofConfig`.
     """
 
-    contact_gain: Gain = 2.0
+    contact_gain: Gain = 2.1
     """Largest speed of the tip over that of the reference in contact, until the lead is what it
     should be."""
     cautious_gain: Gain = 1.4
@@ -90,9 +90,9 @@ class AdaptiveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     cautious_deviation: Positive = 3.0
     """Standard deviation of an offset from which on it counts as hardly known. The free zone ends
     deviation^2 / cautious_deviation before the contact."""
-    taper: Positive = 0.7
+    taper: Positive = 1.5
     """End of the gap over which free_gain falls to contact_gain."""
-    settling: Positive = 3.0
+    settling: Positive = 1.5
     """Lead yet missing below which the gain in contact falls to 1; an offset's standard deviation
     comes on top."""
     tremor_time: NonNegative = 0.15
@@ -101,9 +101,10 @@ class AdaptiveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """Distance of two of the 33 positions at which an offset is held."""
     level_deviation: Positive = 20.0
     """Standard deviation of an offset at the start, the same error at all positions."""
-    gain_deviation: NonNegative = 0.3
-    """Standard deviation of the command's travel over the tip's in contact, about 1."""
-    local_deviation: NonNegative = 1.5
+    gain_deviation: NonNegative = 0.0
+    """Standard deviation of the command's travel over the tip's in contact, about 1; 0 takes them to
+    be equal. 0.3 finds gains from 0.5 to 1 of an instrument whose scale is not known."""
+    local_deviation: NonNegative = 0.7
     """Standard deviation of an offset's variation with position."""
     correlation: Positive = 40.0
     """Distance over which that variation is alike."""
@@ -123,6 +124,8 @@ class AdaptiveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """Largest deviation from 1 of tip over command travel in contact."""
     model_deviation: Positive = 0.5
     """Standard deviation of a measured offset beyond the markers' noise."""
+    state_correction: Annotated[float, Meta(ge=0, le=1)] = 1.0
+    """Share of what an image says of the play state that is taken over; 0 leaves it to the model."""
     marker_deviation: NonNegative = 0.3
     """Standard deviation of a marker's position [px]."""
 

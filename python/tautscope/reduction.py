@@ -242,6 +242,7 @@ def build_adaptive_axis(config: Config, dof: Dof, compensate: bool = True) -> _c
         slope_tolerance=shared.slope_tolerance,
         marker_deviation=shared.marker_deviation,
         model_deviation=unit * shared.model_deviation,
+        state_correction=shared.state_correction,
         tremor_time=shared.tremor_time,
         period=config.control.period,
         delta_minus=own.delta_minus,

@@ -98,7 +98,7 @@ SEEDS = pytest.mark.parametrize("seed", [0, 1])
 def test_a_tip_that_follows_at_another_scale_is_put_where_it_is_asked_to_be(
     gain: float, seed: int
 ) -> None:
-    trial = Trial(constant(-10, 10), gain=gain, seed=seed)
+    trial = Trial(constant(-10, 10), gain=gain, seed=seed, gain_deviation=0.3)
     assert abs(trial.gain - gain) < 0.05, f"seed {seed}: {trial.gain} +- {trial.gain_deviation}"
     assert abs(trial.width(3, 5)) < 0.05 * 20, f"seed {seed}: {trial.width(3, 5)}"
     assert trial.error(3, 5) < 1.0, f"seed {seed}: {trial.error(3, 5)}"

@@ -20,8 +20,9 @@ impl AdaptiveAxis {
     #[pyo3(signature = (
         *, free_gain, contact_gain, cautious_gain, cautious_deviation, gain_limit,
         taper, settling, node_spacing, level_deviation, gain_deviation, local_deviation, correlation,
-        level_drift, gain_drift, local_drift, symmetry, contact_distance, contact_moved, slope_tolerance, marker_deviation,
-        model_deviation, tremor_time, period, delta_minus, delta_plus
+        level_drift, gain_drift, local_drift, symmetry, contact_distance, contact_moved,
+        slope_tolerance, marker_deviation, model_deviation, state_correction, tremor_time, period,
+        delta_minus, delta_plus
     ))]
     // One argument per setting, by keyword only.
     #[allow(clippy::too_many_arguments)]
@@ -48,6 +49,7 @@ impl AdaptiveAxis {
         slope_tolerance: f64,
         marker_deviation: f64,
         model_deviation: f64,
+        state_correction: f64,
         tremor_time: f64,
         period: f64,
         delta_minus: f64,
@@ -80,6 +82,7 @@ impl AdaptiveAxis {
             },
             marker_deviation,
             model_deviation,
+            correction: state_correction,
             gain_limit,
             tremor_time,
             period,

@@ -30,6 +30,9 @@ pub struct AdaptiveSettings {
     pub marker_deviation: f64,
     /// Deviation of a measured offset beyond that of the markers.
     pub model_deviation: f64,
+    /// Share of what an image says of the play state that is taken over: 1, or 0 to leave it to
+    /// the model.
+    pub correction: f64,
     /// Bound of every gain.
     pub gain_limit: f64,
     /// Time constant of the smoothing that tells tremor from intention, in s.
@@ -88,6 +91,13 @@ impl AdaptiveAxis {
         require_positive("slope_tolerance", settings.contact.tolerance)?;
         require_non_negative("marker_deviation", settings.marker_deviation)?;
         require_positive("model_deviation", settings.model_deviation)?;
+        let share = (0.0..=1.0).contains(&settings.correction);
+        require(
+            share,
+            "state_correction",
+            settings.correction,
+            "at least 0, at most 1",
+        )?;
         require_non_negative("tremor_time", settings.tremor_time)?;
         require_positive("period", settings.period)?;
         Ok(Self {
@@ -257,7 +267,7 @@ impl AdaptiveAxis {
         let [minus, plus] =
             [Side::Minus, Side::Plus].map(|side| self.offsets.variance(side, measured));
         let own = model * model + minus.min(plus);
-        self.tip += own / (own + variance) * (tip - self.tip);
+        self.tip += self.settings.correction * own / (own + variance) * (tip - self.tip);
         self.tip = self.carried(self.tip, self.command);
     }
 

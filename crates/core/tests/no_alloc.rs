@@ -53,6 +53,7 @@ fn adaptive() -> PerDof<Axis> {
             },
             marker_deviation: 0.3,
             model_deviation: unit,
+            correction: 1.0,
             gain_limit: 5.0,
             tremor_time: 0.15,
             period: 0.005,

@@ -26,6 +26,7 @@ fn settings(tremor_time: f64, period: f64) -> AdaptiveSettings {
         },
         marker_deviation: 0.3,
         model_deviation: 0.02,
+        correction: 1.0,
         gain_limit: 5.0,
         tremor_time,
         period,
