@@ -102,8 +102,8 @@ class AdaptiveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     level_deviation: Positive = 20.0
     """Standard deviation of an offset at the start, the same error at all positions."""
     gain_deviation: NonNegative = 0.0
-    """Standard deviation of the command's travel over the tip's in contact, about 1; 0 takes them to
-    be equal. 0.3 finds gains from 0.5 to 1 of an instrument whose scale is not known."""
+    """Standard deviation of the command's travel over the tip's in contact, about 1; 0 takes them
+    to be equal. 0.3 finds gains from 0.5 to 1 of an instrument whose scale is not known."""
     local_deviation: NonNegative = 0.7
     """Standard deviation of an offset's variation with position."""
     correlation: Positive = 40.0
@@ -125,7 +125,8 @@ class AdaptiveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     model_deviation: Positive = 0.5
     """Standard deviation of a measured offset beyond the markers' noise."""
     state_correction: Annotated[float, Meta(ge=0, le=1)] = 1.0
-    """Share of what an image says of the play state that is taken over; 0 leaves it to the model."""
+    """Share of what an image says of the play state that is taken over; 0 leaves it to the
+    model."""
     marker_deviation: NonNegative = 0.3
     """Standard deviation of a marker's position [px]."""
 
