@@ -186,15 +186,18 @@ class AdaptiveAxis:
         settling: float,
         node_spacing: float,
         level_deviation: float,
+        gain_deviation: float,
         local_deviation: float,
         correlation: float,
         level_drift: float,
+        gain_drift: float,
         local_drift: float,
         symmetry: float,
         contact_distance: float,
         contact_moved: float,
         slope_tolerance: float,
         model_deviation: float,
+        state_correction: float,
         tremor_time: float,
         period: float,
         delta_minus: float,
@@ -202,6 +205,8 @@ class AdaptiveAxis:
     ) -> AdaptiveAxis: ...
     def step(self, reference: float) -> float: ...
     def run(self, references: ArrayLike) -> _Floats: ...
+    @property
+    def gain(self) -> tuple[float, float]: ...
     def learn(
         self, command: float, measured: float, deviation: float, since: ArrayLike
     ) -> _Triggers: ...

@@ -86,7 +86,8 @@ class AdaptiveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """
 
     contact_gain: Gain = 2.1
-    """Largest command over reference in contact, until the lead is what it should be."""
+    """Largest speed of the tip over that of the reference in contact, until the lead is what it
+    should be."""
     cautious_gain: Gain = 1.4
     """The same for a stroke that begins with an offset hardly known."""
     cautious_deviation: Positive = 3.0
@@ -103,12 +104,17 @@ class AdaptiveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """Distance of two of the 33 positions at which an offset is held."""
     level_deviation: Positive = 20.0
     """Standard deviation of an offset at the start, the same error at all positions."""
+    gain_deviation: NonNegative = 0.0
+    """Standard deviation of the command's travel over the tip's in contact, about 1; 0 takes them
+    to be equal. 0.3 finds gains from 0.5 to 1 of an instrument whose scale is not known."""
     local_deviation: NonNegative = 0.7
     """Standard deviation of an offset's variation with position."""
     correlation: Positive = 40.0
     """Distance over which that variation is alike."""
     level_drift: NonNegative = 0.2
     """Standard deviation of the offset's change while the command travels 1."""
+    gain_drift: NonNegative = 0.0003
+    """The same of the command's travel over the tip's."""
     local_drift: NonNegative = 0.03
     """The same of its variation with position."""
     symmetry: Annotated[float, Meta(ge=0, lt=1)] = 0.8
@@ -121,6 +127,9 @@ class AdaptiveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """Largest deviation from 1 of tip over command travel in contact."""
     model_deviation: Positive = 0.5
     """Standard deviation of a measured offset beyond the markers' noise."""
+    state_correction: Annotated[float, Meta(ge=0, le=1)] = 1.0
+    """Share of what an image says of the play state that is taken over; 0 leaves it to the
+    model."""
 
 
 class StateEstimationConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

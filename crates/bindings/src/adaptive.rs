@@ -18,9 +18,11 @@ pub struct AdaptiveAxis(pub core::AdaptiveAxis);
 impl AdaptiveAxis {
     #[new]
     #[pyo3(signature = (
-        *, free_gain, contact_gain, cautious_gain, cautious_deviation, gain_limit, taper, settling, node_spacing, level_deviation, local_deviation, correlation, level_drift,
-        local_drift, symmetry, contact_distance, contact_moved, slope_tolerance,
-        model_deviation, tremor_time, period, delta_minus, delta_plus
+        *, free_gain, contact_gain, cautious_gain, cautious_deviation, gain_limit,
+        taper, settling, node_spacing, level_deviation, gain_deviation, local_deviation, correlation,
+        level_drift, gain_drift, local_drift, symmetry, contact_distance, contact_moved,
+        slope_tolerance, model_deviation, state_correction, tremor_time, period,
+        delta_minus, delta_plus
     ))]
     // One argument per setting, by keyword only.
     #[allow(clippy::too_many_arguments)]
@@ -35,15 +37,18 @@ impl AdaptiveAxis {
         settling: f64,
         node_spacing: f64,
         level_deviation: f64,
+        gain_deviation: f64,
         local_deviation: f64,
         correlation: f64,
         level_drift: f64,
+        gain_drift: f64,
         local_drift: f64,
         symmetry: f64,
         contact_distance: f64,
         contact_moved: f64,
         slope_tolerance: f64,
         model_deviation: f64,
+        state_correction: f64,
         tremor_time: f64,
         period: f64,
         delta_minus: f64,
@@ -61,9 +66,11 @@ impl AdaptiveAxis {
             prior: core::OffsetPrior {
                 spacing: node_spacing,
                 level: level_deviation,
+                tilt: gain_deviation,
                 local: local_deviation,
                 correlation,
                 level_drift,
+                tilt_drift: gain_drift,
                 local_drift,
                 symmetry,
             },
@@ -73,6 +80,7 @@ impl AdaptiveAxis {
                 tolerance: slope_tolerance,
             },
             model_deviation,
+            correction: state_correction,
             gain_limit,
             tremor_time,
             period,
@@ -136,6 +144,12 @@ impl AdaptiveAxis {
     #[getter]
     fn delta_plus(&self) -> f64 {
         self.0.play().delta_plus()
+    }
+
+    /// Travel of the tip over the command's in contact: mean and standard deviation.
+    #[getter]
+    fn gain(&self) -> (f64, f64) {
+        self.0.gain()
     }
 
     /// Standard deviations of (`delta_minus`, `delta_plus`) where the reference is now.

@@ -5,8 +5,11 @@ use crate::error::{ConfigError, require, require_non_negative, require_positive}
 use crate::estimator::{Trigger, Triggers};
 use crate::lead::LeadLaw;
 use crate::offset_map::{OffsetMap, OffsetPrior, Side};
-use crate::play::{Play, PlayState};
+use crate::play::Play;
 use crate::smoother::Smoother;
+
+/// Least stretch that is believed: a tip that does twice what the command does.
+const LEAST_STRETCH: f64 = 0.5;
 
 /// What an [`AdaptiveAxis`] is set to; lengths in the unit of the DOF.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,6 +28,9 @@ pub struct AdaptiveSettings {
     pub contact: ContactTest,
     /// Deviation of a measured offset beyond that of the output.
     pub model_deviation: f64,
+    /// Share of what an image says of the play state that is taken over: 1, or 0 to leave it to
+    /// the model.
+    pub correction: f64,
     /// Bound of every gain.
     pub gain_limit: f64,
     /// Time constant of the smoothing that tells tremor from intention, in s.
@@ -82,6 +88,13 @@ impl AdaptiveAxis {
         require_non_negative("contact_moved", settings.contact.moved)?;
         require_positive("slope_tolerance", settings.contact.tolerance)?;
         require_positive("model_deviation", settings.model_deviation)?;
+        let share = (0.0..=1.0).contains(&settings.correction);
+        require(
+            share,
+            "state_correction",
+            settings.correction,
+            "at least 0, at most 1",
+        )?;
         require_non_negative("tremor_time", settings.tremor_time)?;
         require_positive("period", settings.period)?;
         Ok(Self {
@@ -120,6 +133,13 @@ impl AdaptiveAxis {
         let at = self.reference.unwrap_or(0.0);
         let root = |side| libm::sqrt(self.offsets.variance(side, at));
         (root(Side::Minus), root(Side::Plus))
+    }
+
+    /// Travel of the tip over the command's in contact: mean and standard deviation.
+    pub fn gain(&self) -> (f64, f64) {
+        let (tilt, deviation) = self.offsets.tilt();
+        let gain = 1.0 / (1.0 + tilt).max(LEAST_STRETCH);
+        (gain, gain * gain * deviation)
     }
 
     /// The command for the next reference.
@@ -169,16 +189,10 @@ impl AdaptiveAxis {
             self.landed = false;
             self.cautious = deviation > settings.cautious_deviation;
         }
-        let contact = |play: Play| {
-            if upwards {
-                play.delta_plus()
-            } else {
-                play.delta_minus()
-            }
-        };
-        let missing = sign * (contact(self.play_at(reference)) - self.lead);
+        let stretch = self.stretch();
+        let missing = sign * (self.offsets.offset(side, reference) - self.lead);
         let position = self.command - self.tip;
-        let gap = sign * (contact(self.play_at(self.tip)) - position);
+        let gap = sign * (self.offsets.offset(side, self.tip) - position);
         // Up to where the contact may already be.
         let sure = gap - deviation * deviation / settings.cautious_deviation;
         self.landed |= sure <= 0.0;
@@ -188,7 +202,7 @@ impl AdaptiveAxis {
             law.contact_gain = settings.cautious_gain;
         }
         let gap = if self.landed { 0.0 } else { sure };
-        self.lead += sign * law.gain(intention.abs(), gap, missing);
+        self.lead += sign * law.gain(intention.abs(), stretch, gap, missing);
     }
 
     /// Learn from command and output of one instant, the output's standard deviation, and the
@@ -207,7 +221,10 @@ impl AdaptiveAxis {
         if !(command.is_finite() && measured.is_finite() && variance.is_finite()) {
             return triggers;
         }
-        let motion = self.stroke.follow(&settings.contact, command, measured);
+        let gains = self.gains();
+        let motion = self
+            .stroke
+            .follow(&settings.contact, gains, command, measured);
         if let Some(motion) = motion {
             self.offsets.travel(motion.travel);
             let offset = command - measured;
@@ -246,13 +263,35 @@ impl AdaptiveAxis {
         let [minus, plus] =
             [Side::Minus, Side::Plus].map(|side| self.offsets.variance(side, measured));
         let own = model * model + minus.min(plus);
-        self.tip += own / (own + variance) * (tip - self.tip);
+        self.tip += self.settings.correction * own / (own + variance) * (tip - self.tip);
         self.tip = self.carried(self.tip, self.command);
     }
 
+    /// Where the tip is when the command comes to be there: between the contacts, whose offsets
+    /// change with where the tip is.
     fn carried(&self, tip: f64, command: f64) -> f64 {
-        let mut state = PlayState { output: tip };
-        self.play_at(tip).step(&mut state, command)
+        let [plus, minus] = [Side::Plus, Side::Minus].map(|side| {
+            let beyond = command - self.offsets.offset(side, tip) - tip;
+            tip + beyond / self.stretch()
+        });
+        tip.max(plus.min(minus)).min(plus.max(minus))
+    }
+
+    /// Travel of the command for a tip in contact to travel 1.
+    fn stretch(&self) -> f64 {
+        (1.0 + self.offsets.tilt().0).clamp(LEAST_STRETCH, self.settings.gain_limit)
+    }
+
+    /// Between which a contact's gain, tip over command, may be. One does not exclude 1.
+    fn gains(&self) -> (f64, f64) {
+        let (tilt, deviation) = self.offsets.tilt();
+        let [most, least] = [-2.0, 2.0].map(|by| (1.0 + tilt + by * deviation).max(LEAST_STRETCH));
+        (
+            1.0 / least,
+            (1.0 / most)
+                .min(1.0)
+                .max(1.0 / (1.0 + tilt).max(LEAST_STRETCH)),
+        )
     }
 
     fn play_at(&self, position: f64) -> Play {

@@ -10,7 +10,7 @@ pub struct ContactTest {
     pub distance: f64,
     /// How far the tip must have come since the command turned.
     pub moved: f64,
-    /// |slope - 1| below which they move together.
+    /// Deviation of tip over command travel from the gain in contact, as a share of it.
     pub tolerance: f64,
 }
 
@@ -46,7 +46,15 @@ impl Stroke {
     }
 
     /// Take in command and output of one instant; None until the command has moved enough.
-    pub fn follow(&mut self, test: &ContactTest, command: f64, measured: f64) -> Option<Motion> {
+    ///
+    /// In contact the tip travels between `gains.0` and `gains.1` of what the command does.
+    pub fn follow(
+        &mut self,
+        test: &ContactTest,
+        gains: (f64, f64),
+        command: f64,
+        measured: f64,
+    ) -> Option<Motion> {
         if self.count == 0 {
             self.start = measured;
             self.remember(command, measured);
@@ -71,7 +79,9 @@ impl Stroke {
             .find(|(past, _)| (command - past).abs() >= test.distance);
         let together = before.is_some_and(|(past, then)| {
             let slope = (measured - then) / (command - past);
-            (slope - 1.0).abs() < test.tolerance && (measured - self.start).abs() > test.moved
+            let follows = slope > gains.0 * (1.0 - test.tolerance)
+                && slope < gains.1 * (1.0 + test.tolerance);
+            follows && (measured - self.start).abs() > test.moved
         });
         self.remember(command, measured);
         Some(Motion {

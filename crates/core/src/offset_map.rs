@@ -1,38 +1,48 @@
 //! The two contact offsets as functions of position, with their uncertainty.
 
+use core::ops::Range;
+
 use crate::error::{ConfigError, require, require_non_negative, require_positive};
 
 const NODES: usize = 33;
-const SIZE: usize = 2 * NODES;
+const TILT: usize = 2 * NODES;
+const SIZE: usize = TILT + 1;
 const MIDDLE: f64 = 16.0;
 
 /// What is known beforehand of how a contact offset varies; all in the unit of the DOF.
 ///
-/// The offset at position y is a level, common to all positions, plus a local deviation that
-/// is alike at neighbouring positions. Both are normal and wander as the command travels:
+/// The offset at position y is a level, common to all positions, plus a tilt, plus a local
+/// deviation that is alike at neighbouring positions. All are normal and wander as the command
+/// travels:
 ///
 /// ```text
-/// cov(delta(y), delta(y')) = level^2 + local^2 exp(-|y - y'| / correlation)
-/// drift per travel d:        d (level_drift^2 + local_drift^2 exp(-|y - y'| / correlation))
+/// cov(delta(y), delta(y')) = level^2 + tilt^2 y y' + local^2 exp(-|y - y'| / correlation)
+/// drift per travel d:        d times the same of level_drift, tilt_drift, local_drift
 /// ```
 ///
 /// Friction moves both contacts outwards alike, so the levels of the two offsets are correlated
-/// with -`symmetry`, and so are their drifts. The local parts are not.
+/// with -`symmetry`, and so are their drifts. The tilt is the same of both. The local parts have
+/// nothing to do with each other.
 ///
-/// A change of the level is what a straightened scope does. What is local is a stretched cable, a
-/// shaft that has taken a set, or one cable handing over to the other.
+/// A change of the level is what a straightened scope does. A tip that follows with a gain g in
+/// contact has offsets of tilt 1/g - 1. What is local is a stretched cable, a shaft that has taken a
+/// set, or one cable handing over to the other.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OffsetPrior {
     /// Distance of two nodes; 33 of them, centred where the run starts, hold the function.
     pub spacing: f64,
     /// Standard deviation of the level before the first measurement, and the largest ever.
     pub level: f64,
+    /// Standard deviation of the tilt, a number; 0 says that tip and command have one scale.
+    pub tilt: f64,
     /// Standard deviation of the local part.
     pub local: f64,
     /// Distance over which the local part is alike.
     pub correlation: f64,
     /// Standard deviation of the level's change over a travel of 1, in the DOF's unit.
     pub level_drift: f64,
+    /// The same of the tilt.
+    pub tilt_drift: f64,
     /// The same of the local part.
     pub local_drift: f64,
     /// Minus the correlation of the two levels: 0, independent, to 1.
@@ -47,9 +57,11 @@ impl OffsetPrior {
     pub fn checked(self) -> Result<Self, ConfigError> {
         require_positive("spacing", self.spacing)?;
         require_positive("level", self.level)?;
+        require_non_negative("tilt", self.tilt)?;
         require_non_negative("local", self.local)?;
         require_positive("correlation", self.correlation)?;
         require_non_negative("level_drift", self.level_drift)?;
+        require_non_negative("tilt_drift", self.tilt_drift)?;
         require_non_negative("local_drift", self.local_drift)?;
         let share = (0.0..1.0).contains(&self.symmetry);
         require(share, "symmetry", self.symmetry, "at least 0, below 1")?;
@@ -66,13 +78,14 @@ pub enum Side {
     Plus,
 }
 
-/// Both contact offsets over position: mean and joint covariance at nodes, linear between them,
-/// constant beyond the outermost. A Kalman filter, one scalar measurement at a time.
+/// Both contact offsets over position: the tilt, and what is left of them at nodes, linear between
+/// them, constant beyond the outermost; mean and joint covariance. A Kalman filter, one scalar
+/// measurement at a time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OffsetMap {
     prior: OffsetPrior,
     origin: f64,
-    /// Of the nodes of `delta_minus`, then of `delta_plus`.
+    /// Of the nodes of `delta_minus`, then of `delta_plus`, then of the tilt.
     mean: [f64; SIZE],
     covariance: [[f64; SIZE]; SIZE],
     /// By distance in nodes, of the local part: exp(-distance / correlation).
@@ -89,9 +102,13 @@ impl OffsetMap {
             distance += prior.spacing;
             libm::exp(-distance / prior.correlation)
         });
-        let mut mean = [delta_minus; SIZE];
-        for value in mean.iter_mut().skip(NODES) {
-            *value = delta_plus;
+        let mut mean = [0.0; SIZE];
+        for (index, value) in mean.iter_mut().take(TILT).enumerate() {
+            *value = if index < NODES {
+                delta_minus
+            } else {
+                delta_plus
+            };
         }
         let mut map = Self {
             prior,
@@ -100,7 +117,7 @@ impl OffsetMap {
             covariance: [[0.0; SIZE]; SIZE],
             alike,
         };
-        map.add(prior.level * prior.level, prior.local * prior.local);
+        map.add(1.0, [prior.level, prior.tilt, prior.local]);
         map
     }
 
@@ -114,35 +131,46 @@ impl OffsetMap {
         self.node(side, position).pick(&self.mean)
     }
 
+    /// The tilt: mean and standard deviation.
+    pub fn tilt(&self) -> (f64, f64) {
+        let variance = self.covariance.get(TILT).and_then(|row| row.get(TILT));
+        let mean = self.mean.get(TILT).unwrap_or(&f64::NAN);
+        (*mean, libm::sqrt(variance.unwrap_or(&f64::NAN).max(0.0)))
+    }
+
     /// The variance of an offset at a position.
     pub fn variance(&self, side: Side, position: f64) -> f64 {
         let node = self.node(side, position);
-        let [first, second] = [node.below, node.below + 1].map(|index| {
+        let with = |index: usize| {
             let row = self.covariance.get(index);
             row.map_or(f64::NAN, |row| node.pick(row))
-        });
-        (first + node.share * (second - first)).max(0.0)
+        };
+        let [first, second] = [node.below, node.below + 1].map(with);
+        (first + node.share * (second - first) + node.away * with(TILT)).max(0.0)
     }
 
     /// The command has travelled so far: what is known grows old, up to what the prior says.
     pub fn travel(&mut self, distance: f64) {
         let prior = self.prior;
-        let distance = distance.abs();
-        self.add(
-            distance * prior.level_drift * prior.level_drift,
-            distance * prior.local_drift * prior.local_drift,
-        );
-        let most = prior.level * prior.level + prior.local * prior.local;
-        let largest = self
-            .covariance
-            .iter()
-            .enumerate()
-            .filter_map(|(index, row)| row.get(index))
-            .fold(0.0, |a: f64, b| a.max(*b));
-        if largest > most {
-            let share = most / largest;
-            for value in self.covariance.iter_mut().flatten() {
-                *value *= share;
+        let drift = [prior.level_drift, prior.tilt_drift, prior.local_drift];
+        self.add(distance.abs(), drift);
+        let diagonal = |(index, row): (usize, &[f64; SIZE])| row.get(index).copied();
+        let rows = self.covariance.iter().take(TILT).enumerate();
+        let largest = libm::sqrt(rows.filter_map(diagonal).fold(0.0, f64::max));
+        let most = libm::sqrt(prior.level * prior.level + prior.local * prior.local);
+        self.shrink(0..TILT, most / largest);
+        self.shrink(TILT..SIZE, prior.tilt / self.tilt().1);
+    }
+
+    /// Make some of what is estimated more certain by a factor, if below 1.
+    fn shrink(&mut self, which: Range<usize>, factor: f64) {
+        if factor < 1.0 {
+            for (i, row) in self.covariance.iter_mut().enumerate() {
+                for (j, value) in row.iter_mut().enumerate() {
+                    for index in [i, j] {
+                        *value *= if which.contains(&index) { factor } else { 1.0 };
+                    }
+                }
             }
         }
     }
@@ -151,7 +179,8 @@ impl OffsetMap {
     pub fn measure(&mut self, side: Side, position: f64, offset: f64, variance: f64) {
         let node = self.node(side, position);
         let column = self.column(&node);
-        let total = self.shift(&node, &column, offset, variance);
+        let total = node.pick(&column) + variance;
+        self.shift(&column, (offset - node.pick(&self.mean)) / total);
         for (row, own) in self.covariance.iter_mut().zip(column) {
             for (value, other) in row.iter_mut().zip(column) {
                 *value -= own * other / total;
@@ -161,25 +190,26 @@ impl OffsetMap {
 
     /// An offset is at least so far out: the mean follows, and is as uncertain as before.
     ///
-    /// It says nothing about the other contact.
+    /// It says nothing about the other contact, nor about the tilt that both share.
     pub fn bound(&mut self, side: Side, position: f64, offset: f64, variance: f64) {
         let node = self.node(side, position);
+        let surprise = offset - node.pick(&self.mean);
+        // As if the tilt were known.
+        let node = Node { away: 0.0, ..node };
         let mut column = self.column(&node);
         for (index, value) in column.iter_mut().enumerate() {
-            if (index < NODES) != (side == Side::Minus) {
+            if index == TILT || (index < NODES) != (side == Side::Minus) {
                 *value = 0.0;
             }
         }
-        self.shift(&node, &column, offset, variance);
+        let total = node.pick(&column) + variance;
+        self.shift(&column, surprise / total);
     }
 
-    fn shift(&mut self, node: &Node, column: &[f64; SIZE], offset: f64, variance: f64) -> f64 {
-        let total = node.pick(column) + variance;
-        let surprise = offset - node.pick(&self.mean);
+    fn shift(&mut self, column: &[f64; SIZE], by: f64) {
         for (mean, gain) in self.mean.iter_mut().zip(column) {
-            *mean += gain / total * surprise;
+            *mean += gain * by;
         }
-        total
     }
 
     /// Covariance of every node with the offset at a place.
@@ -191,14 +221,18 @@ impl OffsetMap {
         column
     }
 
-    /// Add a variance of the levels and one of the local parts.
-    fn add(&mut self, level: f64, local: f64) {
+    /// Add `share` of the variances of level, tilt and local part with these deviations.
+    fn add(&mut self, share: f64, deviations: [f64; 3]) {
+        let [level, tilt, local] = deviations.map(|deviation| share * deviation * deviation);
         for (i, row) in self.covariance.iter_mut().enumerate() {
             for (j, value) in row.iter_mut().enumerate() {
-                *value += if (i < NODES) == (j < NODES) {
-                    level + local * self.alike.get(i.abs_diff(j)).unwrap_or(&0.0)
-                } else {
-                    -self.prior.symmetry * level
+                *value += match (i == TILT, j == TILT) {
+                    (true, true) => tilt,
+                    (false, false) if (i < NODES) == (j < NODES) => {
+                        level + local * self.alike.get(i.abs_diff(j)).unwrap_or(&0.0)
+                    }
+                    (false, false) => -self.prior.symmetry * level,
+                    _ => 0.0,
                 };
             }
         }
@@ -215,6 +249,7 @@ impl OffsetMap {
         Node {
             below: first + below,
             share,
+            away: position - self.origin,
         }
     }
 }
@@ -223,12 +258,14 @@ impl OffsetMap {
 struct Node {
     below: usize,
     share: f64,
+    /// From where the map is centred.
+    away: f64,
 }
 
 impl Node {
     fn pick(&self, values: &[f64; SIZE]) -> f64 {
         match values.get(self.below..self.below + 2) {
-            Some([a, b]) => a + self.share * (b - a),
+            Some([a, b]) => a + self.share * (b - a) + self.away * values[TILT],
             _ => f64::NAN,
         }
     }

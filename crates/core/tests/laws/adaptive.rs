@@ -25,6 +25,7 @@ fn settings(tremor_time: f64, period: f64) -> AdaptiveSettings {
             tolerance: 0.25,
         },
         model_deviation: 0.02,
+        correction: 1.0,
         gain_limit: 5.0,
         tremor_time,
         period,
@@ -36,6 +37,7 @@ fn certain(play: Play, tremor_time: f64, period: f64) -> AdaptiveAxis {
     let mut settings = settings(tremor_time, period);
     settings.prior.level = 1e-9;
     settings.prior.local = 0.0;
+    settings.prior.tilt = 0.0;
     AdaptiveAxis::new(settings, play).unwrap()
 }
 

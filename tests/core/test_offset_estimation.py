@@ -1,0 +1,179 @@
+"""Profile `best`, one DOF, against mechanisms as real records show them.
+
+Each plant is written out here: a tip that stays until a contact pushes it. None is the package's.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from tautscope.config import load_config
+from tautscope.dof import Dof
+from tautscope.metrics import loop_width
+from tautscope.reduction import build_adaptive_axis
+
+Floats = NDArray[np.float64]
+Contacts = Callable[[float, float], tuple[float, float]]
+"""From tip and time to the command's offsets (minus, plus) at the two contacts."""
+
+CONFIG = load_config(profile="best")
+UNIT = CONFIG.insertion.update_distance
+TICK = CONFIG.control.period
+AMPLITUDE, PERIOD = 40.0, 10.0
+"""Of the reference [update distances, s]."""
+
+
+class Trial:
+    """The loop around a plant; lengths in update distances, periods numbered from 0."""
+
+    def __init__(
+        self,
+        contacts: Contacts,
+        *,
+        gain: float = 1.0,
+        start: tuple[float, float] = (0.0, 0.0),
+        seed: int = 0,
+        periods: int = 5,
+        compensate: bool = True,
+        **settings: float,
+    ) -> None:
+        changes = {f"adaptive.{name}": value for name, value in settings.items()}
+        changes |= {
+            "insertion.delta_minus": start[0] * UNIT,
+            "insertion.delta_plus": start[1] * UNIT,
+        }
+        config = CONFIG.replace(**changes)
+        axis = build_adaptive_axis(config, Dof.INSERTION, compensate)
+        noise, seen = np.random.default_rng(seed), deque[tuple[int, float]]()
+        tip, commands, rows = 0.0, [], []
+        for tick in range(round(periods * PERIOD / TICK)):
+            reference = AMPLITUDE * np.sin(2 * np.pi * tick * TICK / PERIOD)
+            commands.append(axis.step(reference * UNIT))
+            if seen and seen[0][0] + 16 <= tick:
+                at, measured = seen.popleft()
+                axis.learn(commands[at], measured * UNIT, 0.0, np.array(commands[at + 1 :]))
+            minus, plus = contacts(tip, tick * TICK)
+            command = commands[-1] / UNIT
+            tip = gain * np.clip(tip / gain, command - plus, command - minus)
+            if tick % 8 == 0:
+                seen.append((tick, tip + 0.2 * noise.standard_normal()))
+            rows.append((reference, tip, axis.delta_minus / UNIT, axis.delta_plus / UNIT))
+        self.reference, self.tip, self.minus, self.plus = np.array(rows).T
+        self.gain, self.gain_deviation = axis.gain
+
+    def _rows(self, first: float, last: float) -> slice:
+        return slice(round(first * PERIOD / TICK), round(last * PERIOD / TICK))
+
+    def width(self, first: float, last: float) -> float:
+        rows = self._rows(first, last)
+        return loop_width(self.reference[rows], self.tip[rows]).mean
+
+    def ahead(self, first: float, last: float) -> float:
+        """Largest way of the tip beyond the reference in the direction it moves."""
+        rows = self._rows(first, last)
+        beyond = np.sign(np.gradient(self.reference)) * (self.tip - self.reference)
+        return float(beyond[rows].max())
+
+    def error(self, first: float, last: float) -> float:
+        """Largest error of the tip where it has been caught up with: past half of a stroke."""
+        rows = self._rows(first, last)
+        wrong = np.abs(self.tip - self.reference)[rows]
+        moving = np.gradient(self.reference)[rows] * self.reference[rows]
+        return float(wrong[moving > 0].max())
+
+
+def constant(minus: float, plus: float) -> Contacts:
+    return lambda tip, time: (minus, plus)
+
+
+SEEDS = pytest.mark.parametrize("seed", [0, 1])
+
+
+@SEEDS
+@pytest.mark.parametrize("gain", [0.5, 0.6, 0.75, 0.9, 1.0])
+def test_a_tip_that_follows_at_another_scale_is_put_where_it_is_asked_to_be(
+    gain: float, seed: int
+) -> None:
+    trial = Trial(constant(-10, 10), gain=gain, seed=seed, gain_deviation=0.3)
+    assert abs(trial.gain - gain) < 0.05, f"seed {seed}: {trial.gain} +- {trial.gain_deviation}"
+    assert abs(trial.width(3, 5)) < 0.05 * 20, f"seed {seed}: {trial.width(3, 5)}"
+    assert trial.error(3, 5) < 1.0, f"seed {seed}: {trial.error(3, 5)}"
+
+
+@pytest.mark.parametrize("gain", [0.5, 0.6])
+def test_without_its_gain_such_a_tip_goes_astray(gain: float) -> None:
+    trial = Trial(constant(-10, 10), gain=gain, gain_deviation=0.0)
+    assert trial.error(3, 5) > 5.0, str(trial.error(3, 5))
+
+
+@SEEDS
+@pytest.mark.parametrize(("minus", "plus"), [(0.0, 20.0), (-18.0, 2.0), (-25.0, -5.0), (3.0, 19.0)])
+def test_offsets_need_not_be_symmetric(minus: float, plus: float, seed: int) -> None:
+    trial = Trial(constant(minus, plus), seed=seed)
+    found = np.median(trial.minus[-2000:]), np.median(trial.plus[-2000:])
+    np.testing.assert_allclose(found, (minus, plus), atol=1.0, err_msg=f"seed {seed}")
+    assert abs(trial.width(1, 2)) < 1.0, f"seed {seed}: {trial.width(1, 2)}"
+
+
+@SEEDS
+@pytest.mark.parametrize("slack", [4.0, 8.0])
+def test_one_cable_hands_over_to_the_other_in_mid_stroke(slack: float, seed: int) -> None:
+    def contacts(tip: float, time: float) -> tuple[float, float]:
+        """Beyond the middle the command is `slack` further for the same tip."""
+        share = np.clip(tip / 0.5, 0.0, 1.0)
+        return -10 + slack * share, 10 + slack * share
+
+    trial = Trial(contacts, seed=seed)
+    assert abs(trial.width(3, 5)) < 1.0, f"seed {seed}: {trial.width(3, 5)}"
+    assert trial.error(3, 5) < 0.75 * slack + 0.5, f"seed {seed}: {trial.error(3, 5)}"
+
+
+@SEEDS
+def test_the_width_may_depend_on_position(seed: int) -> None:
+    def contacts(tip: float, time: float) -> tuple[float, float]:
+        half = 9.0 + 4.0 * np.sin(tip / 12.0)
+        return -half, half
+
+    trial = Trial(contacts, seed=seed)
+    flat = Trial(contacts, seed=seed, local_deviation=0.0, local_drift=0.0)
+    left = [np.abs(x.tip - x.reference)[-4000:].mean() for x in (trial, flat)]
+    assert abs(trial.width(3, 5)) < 0.05 * 18, f"seed {seed}: {trial.width(3, 5)}"
+    assert left[0] < 0.85 * left[1], f"seed {seed}: {left}"
+
+
+@SEEDS
+def test_the_width_may_change_while_it_is_used(seed: int) -> None:
+    """10, 2 and 10 mm, over a period each."""
+
+    def contacts(tip: float, time: float) -> tuple[float, float]:
+        half = float(np.interp(time / PERIOD, [3, 4, 6, 7], [12.5, 2.5, 2.5, 12.5]))
+        return -half, half
+
+    trial = Trial(contacts, seed=seed, periods=9)
+    for half, first, last in ((2.5, 5, 6), (12.5, 8, 9)):
+        rows = slice(round(first * PERIOD / TICK), round(last * PERIOD / TICK))
+        width = np.median((trial.plus - trial.minus)[rows])
+        assert abs(width - 2 * half) < 0.2 * half, f"seed {seed}: {width}"
+        assert abs(trial.width(first, last)) < 1.0, f"seed {seed}: {trial.width(first, last)}"
+    assert trial.ahead(2, 9) < 2.5, f"seed {seed}: {trial.ahead(2, 9)}"
+
+
+@SEEDS
+@pytest.mark.parametrize("factor", [0.5, 1.5])
+def test_start_values_are_not_over_trusted(factor: float, seed: int) -> None:
+    start = (-12.5 * factor, 12.5 * factor)
+    trial = Trial(constant(-12.5, 12.5), start=start, seed=seed)
+    assert trial.ahead(0, 1) < 2.5, f"seed {seed}: {trial.ahead(0, 1)}"
+    assert abs(trial.width(1, 2)) < 1.0, f"seed {seed}: {trial.width(1, 2)}"
+
+
+@SEEDS
+def test_a_start_value_weighs_what_it_should(seed: int) -> None:
+    """One that is right and trusted is used at once; one that is wrong and trusted stays longer."""
+    right = Trial(constant(-12.5, 12.5), start=(-12.5, 12.5), seed=seed, level_deviation=0.5)
+    blank = Trial(constant(-12.5, 12.5), seed=seed)
+    assert abs(right.width(0, 1)) < abs(blank.width(0, 1)), f"seed {seed}"
