@@ -1,7 +1,9 @@
 //! Frame to markers: Fig. 5 as a whole.
 
-use crate::judge::{Demands, Verdict, judge};
-use crate::{ColorDiscriminant, Error, Expect, Frame, Labeller, Region, RunMap, Segmenter, Window};
+use crate::judge::{Verdict, judge};
+use crate::{
+    ColorDiscriminant, Demands, Error, Expect, Frame, Labeller, Region, RunMap, Segmenter, Window,
+};
 
 /// Only so many regions, the largest, are considered: it bounds the time on a noisy frame.
 pub const CANDIDATES: usize = 16;
