@@ -1,5 +1,6 @@
 //! Frame to markers: Fig. 5 as a whole.
 
+use crate::blend::Blend;
 use crate::judge::{Verdict, judge};
 use crate::{
     ColorDiscriminant, Demands, Error, Expect, Frame, Labeller, Region, RunMap, Segmenter, Window,
@@ -29,6 +30,7 @@ pub struct Detector {
     regions: Vec<Region>,
     alternatives: Vec<Segmenter>,
     best: Vec<Region>,
+    blend: Blend,
 }
 
 impl Detector {
@@ -56,6 +58,7 @@ impl Detector {
             regions: Vec::with_capacity(CANDIDATES),
             alternatives: Vec::new(),
             best: Vec::with_capacity(CANDIDATES),
+            blend: Blend::default(),
         })
     }
 
@@ -105,7 +108,36 @@ impl Detector {
                 std::mem::swap(&mut self.best, &mut self.regions);
             }
         }
+        if !verdict.is_clear()
+            && let Some(blended) = self.blended(frame, expect, &verdict, demands)
+        {
+            verdict = blended;
+        }
         (verdict, &self.regions)
+    }
+
+    fn blended(
+        &mut self,
+        frame: &impl Frame,
+        expect: &impl Expect,
+        verdict: &Verdict,
+        demands: &Demands,
+    ) -> Option<Verdict> {
+        let blind = expect.expect([0.0; 4], [f64::INFINITY; 4])?;
+        let [a, b] = verdict.bands.map(|band| band.centroid);
+        let starts = [[a[0], a[1], b[0], b[1]], blind.features];
+        let mut best: Option<crate::blend::Blended> = None;
+        for start in starts {
+            if start.iter().all(|value| value.is_finite())
+                && let Some(found) = self.blend.fit(frame, expect, &blind, start)
+                && best.is_none_or(|best| found.explained > best.explained)
+            {
+                best = Some(found);
+            }
+        }
+        let found = best?;
+        if std::env::var("DEBUG").is_ok() { eprintln!("blend {:.3?} R2 {:.3} light {:.0?} noise {:.1} grain {:.1} spread {:.1} surprise {:.1} sd {:.2?}", found.features, found.explained, found.light, found.noise, self.blend.grain(), found.spread, found.surprise, [0,1,2,3].map(|i: usize| found.covariance[i][i].sqrt())); }
+        Verdict::by_light(&found, frame, demands)
     }
 
     /// The regions in some windows, the largest first, at most [`CANDIDATES`]; each ends where its

@@ -142,6 +142,24 @@ impl Outline {
         count
     }
 
+    /// Whether a place is inside.
+    pub fn contains(&self, [u, v]: [f64; 2]) -> bool {
+        let mut inside = false;
+        self.each_crossing(v, |from, to| inside |= (from..=to).contains(&u));
+        inside
+    }
+
+    /// Where row `v` is inside, from and to (px).
+    pub fn each_crossing(&self, v: f64, mut visit: impl FnMut(f64, f64)) {
+        let spans = self.crossings(v);
+        let pairs = spans.crossings.chunks_exact(2).take(spans.len / 2);
+        for pair in pairs {
+            if let [from, to] = pair {
+                visit(*from, *to);
+            }
+        }
+    }
+
     /// First and last row of an image so high that it may touch.
     fn rows(&self, height: f64) -> (f64, f64) {
         let extreme = |pick: fn(f64, f64) -> f64, start| {
@@ -156,6 +174,12 @@ impl Outline {
 
     /// Where row `v` is inside: pixels, whole numbers.
     fn spans(&self, v: f64, width: f64) -> Spans {
+        let mut spans = self.crossings(v);
+        spans.clip(width);
+        spans
+    }
+
+    fn crossings(&self, v: f64) -> Spans {
         let mut spans = Spans::default();
         let next = self.corners.iter().cycle().skip(1);
         for ([u0, v0], [u1, v1]) in self.corners.iter().zip(next) {
@@ -163,7 +187,7 @@ impl Outline {
                 spans.add(u0 + (v - v0) / (v1 - v0) * (u1 - u0));
             }
         }
-        spans.sort(width);
+        spans.sort();
         spans
     }
 }
@@ -194,9 +218,13 @@ impl Spans {
         }
     }
 
-    fn sort(&mut self, width: f64) {
+    fn sort(&mut self) {
         let crossings = self.crossings.get_mut(..self.len).unwrap_or_default();
         crossings.sort_by(f64::total_cmp);
+    }
+
+    fn clip(&mut self, width: f64) {
+        let crossings = self.crossings.get_mut(..self.len).unwrap_or_default();
         for (index, u) in crossings.iter_mut().enumerate() {
             *u = if index % 2 == 0 {
                 u.ceil().max(0.0)

@@ -1,5 +1,6 @@
 //! Which of what has the markers' colour is a band: by place, size, outline, and both together.
 
+use crate::blend::Blended;
 use crate::evidence::{Demands, Evidence, weigh};
 use crate::fit::{COARSE, FINE, Fit, fit};
 use crate::pairing::{Pair, likely, shift};
@@ -206,6 +207,34 @@ impl Verdict {
         };
         verdict.conceal();
         verdict
+    }
+
+    /// Of bands whose light explains what is there; None if it does not.
+    pub(crate) fn by_light(
+        found: &Blended,
+        _frame: &impl crate::Frame,
+        demands: &Demands,
+    ) -> Option<Self> {
+        let [a, b] = found.light;
+        let env = |name: &str, value: f64| std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(value);
+        let good = found.explained > env("R2", 0.9)
+            && a.min(b) > env("LIGHT", 10.0)
+            && a.min(b) > env("RATIO", 0.6) * a.max(b)
+            && (0..4).all(|i| found.covariance[i][i] < env("SD", 1.5))
+            && found.surprise <= demands.surprise;
+        let [ua, va, ub, vb] = found.features;
+        good.then(|| Self {
+            features: found.features,
+            covariance: found.covariance,
+            bands: [[ua, va], [ub, vb]].map(|centroid| Evidence {
+                surprise: found.surprise,
+                edges: found.explained,
+                centroid,
+                ..Evidence::default()
+            }),
+            reasons: [None; 2],
+            discriminant: 0,
+        })
     }
 
     /// Whether there is no need to look further.

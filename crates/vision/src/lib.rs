@@ -9,6 +9,7 @@
 // Kernels are compiled once for each instruction set, which they are only if they are inlined.
 #![allow(clippy::inline_always)]
 
+pub mod blend;
 mod columns;
 pub mod detector;
 pub mod discriminant;
@@ -22,6 +23,7 @@ pub mod judge;
 mod linear;
 mod lowpass;
 mod pairing;
+mod patch;
 mod projection;
 pub mod regions;
 pub mod rejection;

@@ -1,0 +1,344 @@
+//! Bands whose outlines are blurred away: their light instead of their edges.
+
+use crate::fit::settle;
+use crate::linear::{Square, apply, inverse, quadratic};
+use crate::patch::{Patch, SIDE};
+use crate::{Expect, Expectation, Frame, Outline};
+
+/// Steps to the best place.
+const STEPS: usize = 12;
+/// The longest of a place, in one step (px).
+const STRIDE: f64 = 4.0;
+/// Spread of the blur (px): where it starts, its own standard deviation, and its limits.
+const SPREAD: f64 = 2.5;
+const SPREAD_DEVIATION: f64 = 2.0;
+const SPREADS: [f64; 2] = [0.6, 8.0];
+/// The two bands are lit alike: standard deviation of the logarithm of their ratio.
+const UNLIKE: f64 = 0.2;
+/// How far around the outlines light is looked at (px).
+const AROUND: f64 = 14.0;
+/// Places, light of A and B, ground, spread, and how the tissue's colour changes.
+const UNKNOWNS: usize = 12;
+/// Sub-rows in which an outline's share of a sample is counted.
+const FINE: usize = 4;
+
+/// Two bands in place by their light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Blended {
+    /// Centroids `[u_A, v_A, u_B, v_B]` (px).
+    pub features: [f64; 4],
+    /// (4, 4) (px^2).
+    pub covariance: Square<4>,
+    /// How green each band is (grey levels).
+    pub light: [f64; 2],
+    /// Share of the variance of the light that is explained, but for the sensor's noise.
+    pub explained: f64,
+    /// Standard deviation of what is not (grey levels).
+    pub noise: f64,
+    /// Spread of the blur (px).
+    pub spread: f64,
+    /// Squared Mahalanobis distance of both bands from where they were expected.
+    pub surprise: f64,
+    /// The outlines in place.
+    pub outlines: [Outline; 2],
+}
+
+/// Memory for [`Blend::fit`].
+#[derive(Clone, Debug)]
+pub struct Blend {
+    patch: Patch,
+    layers: [Layer; 2],
+    across: Vec<f32>,
+}
+
+/// A band's blurred share of each sample.
+#[derive(Clone, Debug)]
+struct Layer {
+    share: Vec<f32>,
+}
+
+impl Default for Blend {
+    fn default() -> Self {
+        let layer = || Layer {
+            share: Vec::with_capacity(SIDE * SIDE),
+        };
+        Self {
+            patch: Patch::default(),
+            layers: [layer(), layer()],
+            across: Vec::with_capacity(SIDE * SIDE),
+        }
+    }
+}
+
+impl Blend {
+    /// Least squares for places, light and blur of both bands.
+    ///
+    /// ```text
+    /// green(x) = a_A (m_A * g_sigma)(x - d_A) + a_B (m_B * g_sigma)(x - d_B) + b + noise
+    /// ```
+    ///
+    /// with m the outlines' shares of a sample and g a normal density; Gauss-Newton, the outlines drawn anew at each
+    /// step. d keeps to the expectation, a_A and a_B to each other.
+    pub fn fit(
+        &mut self,
+        frame: &impl Frame,
+        expect: &impl Expect,
+        blind: &Expectation,
+        start: [f64; 4],
+    ) -> Option<Blended> {
+        let prior = inverse(blind.covariance)?;
+        let drawn = |place: [f64; 4], sure: f64| {
+            let laid = expect.expect(place, [sure; 4])?;
+            let [a, b] = &laid.bands;
+            let [ua, va, ub, vb] = place;
+            Some([settle(a, [ua, va]), settle(b, [ub, vb])])
+        };
+        let mut place = start;
+        let mut outlines = drawn(place, 3.0)?;
+        let mut grain = self.look(frame, &outlines)?;
+        let (mut light, mut spread) = ([0.0; 2], SPREAD);
+        let mut noise = 10.0_f64;
+        let mut result = None;
+        for step in 0..STEPS {
+            if step == STEPS / 2 {
+                outlines = drawn(place, 1.0)?;
+                grain = self.look(frame, &outlines)?;
+            } else if step > 0 {
+                outlines = drawn(place, 2.0)?;
+            }
+            for (layer, outline) in self.layers.iter_mut().zip(&outlines) {
+                layer.draw(outline, &self.patch);
+                layer.blur(spread / self.patch.step, self.patch.columns, &mut self.across);
+            }
+            let sums = self.sums(light, spread, place);
+            // What is not noise of the sensor errs alike in neighbours: as many as the blur holds count as one.
+            let alike = 4.0 * (spread / self.patch.step).powi(2);
+            let weight = 1.0 / (noise * noise + alike * (noise * noise - grain).max(0.0)).max(1.0);
+            let mut normal = sums.normal.map(|row| row.map(|value| weight * value));
+            let mut right = sums.right.map(|value| weight * value);
+            let away: [f64; 4] = std::array::from_fn(|i| blind.features[i] - place[i]);
+            for (row, pull) in apply(&prior, away).into_iter().enumerate() {
+                right[row] += pull;
+                for (entry, prior) in normal[row].iter_mut().zip(prior[row]) {
+                    *entry += prior;
+                }
+            }
+            let mean = f64::midpoint(light[0], light[1]);
+            let alike = (UNLIKE * mean.max(5.0)).powi(-2);
+            for (i, j) in [(4, 5), (5, 4)] {
+                normal[i][i] += alike;
+                normal[i][j] -= alike;
+            }
+            let looseness = SPREAD_DEVIATION.powi(-2);
+            normal[7][7] += looseness;
+            right[7] += looseness * (SPREAD - spread);
+            for (index, row) in normal.iter_mut().enumerate().skip(6) {
+                row[index] += 1e-9;
+            }
+            let covariance = inverse(normal)?;
+            let found = apply(&covariance, right);
+            let longest = found[..4].iter().fold(0.0_f64, |most, d| most.max(d.abs()));
+            // Without light there is no slope yet.
+            let share = if step == 0 { 0.0 } else { (STRIDE / longest).min(1.0) };
+            for (value, by) in place.iter_mut().zip(found) {
+                *value += share * by;
+            }
+            light = [found[4], found[5]].map(|value: f64| value.clamp(0.0, 400.0));
+            spread = (spread + if step == 0 { 0.0 } else { found[7].clamp(-1.0, 1.0) }).clamp(SPREADS[0], SPREADS[1]);
+            let (explained, left) = self.left(&found, light, grain);
+            noise = left;
+            let away: [f64; 4] = std::array::from_fn(|i| blind.features[i] - place[i]);
+            result = Some(Blended {
+                features: place,
+                covariance: std::array::from_fn(|i| std::array::from_fn(|j| covariance[i][j])),
+                light,
+                explained,
+                noise,
+                spread,
+                surprise: quadratic(&prior, away),
+                outlines,
+            });
+            if step > STEPS / 2 && longest < 0.02 {
+                break;
+            }
+        }
+        result
+    }
+
+    pub fn grain(&self) -> f64 { self.patch.grain().sqrt() }
+    /// Reads the part of the frame around the outlines.
+    fn look(&mut self, frame: &impl Frame, outlines: &[Outline; 2]) -> Option<f64> {
+        let corners = || outlines.iter().flat_map(|outline| &outline.corners);
+        let bound = |axis: usize, size: usize| {
+            let values = || corners().map(|corner| corner[axis]);
+            let first = values().fold(f64::INFINITY, f64::min) - AROUND;
+            let last = values().fold(f64::NEG_INFINITY, f64::max) + AROUND;
+            whole(first).min(size)..whole(last + 1.0).min(size)
+        };
+        let (columns, rows) = (bound(0, frame.width()), bound(1, frame.height()));
+        if columns.len() < 8 || rows.len() < 8 {
+            return None;
+        }
+        self.patch.read(frame, columns, rows);
+        let grown = outlines.map(|outline| outline.grown(4.0));
+        self.patch.unmix(&grown);
+        Some(self.patch.grain())
+    }
+
+    /// The normal equations over all samples: steps of the four places, light of A and B, ground, step of the spread.
+    fn sums(&self, light: [f64; 2], spread: f64, _place: [f64; 4]) -> Sums {
+        let columns = self.patch.columns;
+        let rows = self.patch.green.len() / columns.max(1);
+        let step = self.patch.step;
+        let mut sums = Sums {
+            normal: [[0.0; UNKNOWNS]; UNKNOWNS],
+            right: [0.0; UNKNOWNS],
+        };
+        for v in 1..rows.saturating_sub(1) {
+            for u in 1..columns.saturating_sub(1) {
+                let at = v * columns + u;
+                let mut row = [0.0; UNKNOWNS];
+                row[6] = 1.0;
+                row[8..].copy_from_slice(&self.patch.tissue(at));
+                for (band, layer) in self.layers.iter().enumerate() {
+                    let [here, left, right, above, below] =
+                        [at, at - 1, at + 1, at - columns, at + columns].map(|index| {
+                            f64::from(layer.share.get(index).copied().unwrap_or_default())
+                        });
+                    row[2 * band] = -light[band] * (right - left) / (2.0 * step);
+                    row[2 * band + 1] = -light[band] * (below - above) / (2.0 * step);
+                    row[4 + band] = here;
+                    row[7] += light[band] * spread * (left + right + above + below - 4.0 * here)
+                        / (step * step);
+                }
+                let green = f64::from(self.patch.green.get(at).copied().unwrap_or_default());
+                for i in 0..UNKNOWNS {
+                    sums.right[i] += row[i] * green;
+                    for j in 0..=i {
+                        sums.normal[i][j] += row[i] * row[j];
+                    }
+                }
+            }
+        }
+        for i in 0..UNKNOWNS {
+            for j in 0..i {
+                sums.normal[j][i] = sums.normal[i][j];
+            }
+        }
+        sums
+    }
+
+    /// Share of the light's variance that is explained, and the deviation of what is not.
+    fn left(&self, found: &[f64; UNKNOWNS], light: [f64; 2], grain: f64) -> (f64, f64) {
+        let (mut count, mut sum, mut square, mut left) = (0.0, 0.0, 0.0, 0.0);
+        let [a, b] = &self.layers;
+        for (at, ((green, a), b)) in self.patch.green.iter().zip(&a.share).zip(&b.share).enumerate() {
+            let tissue = self.patch.tissue(at);
+            let tissue: f64 = tissue.iter().zip(&found[8..]).map(|(value, by)| value * by).sum();
+            let green = f64::from(*green) - tissue - found[6];
+            let model = light[0] * f64::from(*a) + light[1] * f64::from(*b);
+            count += 1.0;
+            sum += green;
+            square += green * green;
+            left += (green - model).powi(2);
+        }
+        let variance = square - sum * sum / f64::max(count, 1.0) - count * grain;
+        (
+            1.0 - f64::max(left - count * grain, 0.0) / f64::max(variance, 1.0),
+            (left / f64::max(count, 1.0)).sqrt(),
+        )
+    }
+}
+
+struct Sums {
+    normal: Square<UNKNOWNS>,
+    right: [f64; UNKNOWNS],
+}
+
+impl Layer {
+    /// The outline's share of each sample.
+    fn draw(&mut self, outline: &Outline, patch: &Patch) {
+        self.share.clear();
+        self.share.resize(patch.green.len(), 0.0);
+        let columns = patch.columns.max(1);
+        let part = 1.0 / real(FINE);
+        for (row, shares) in self.share.chunks_mut(columns).enumerate() {
+            for fine in 0..FINE {
+                let offset = (real(fine) + 0.5) * part - 0.5;
+                let v = patch.origin[1] + (real(row) + offset) * patch.step;
+                outline.each_crossing(v, |from, to| {
+                    let [from, to] = [from, to].map(|u| (u - patch.origin[0]) / patch.step + 0.5);
+                    let (from, to) = (from.max(0.0), to.min(real(columns)));
+                    let first = whole(from);
+                    for (share, left) in shares.iter_mut().skip(first).zip(first..) {
+                        let left = real(left);
+                        if left >= to {
+                            break;
+                        }
+                        let inside = (left + 1.0).min(to) - left.max(from);
+                        #[expect(clippy::cast_possible_truncation, reason = "a share")]
+                        {
+                            *share += (part * inside.max(0.0)) as f32;
+                        }
+                    }
+                });
+            }
+        }
+    }
+
+    /// Blurs by a normal density of this spread (samples).
+    fn blur(&mut self, spread: f64, columns: usize, across: &mut Vec<f32>) {
+        let mut kernel = [0.0_f32; SIDE / 2];
+        let reach = whole((3.0 * spread).ceil()).clamp(1, kernel.len() - 1);
+        let mut sum = 0.0;
+        for (index, weight) in kernel.iter_mut().enumerate().take(reach + 1) {
+            let distance = real(index) / spread;
+            #[expect(clippy::cast_possible_truncation, reason = "a weight")]
+            {
+                *weight = (-0.5 * distance * distance).exp() as f32;
+            }
+            sum += if index == 0 { *weight } else { 2.0 * *weight };
+        }
+        kernel.iter_mut().for_each(|weight| *weight /= sum);
+        across.clear();
+        across.resize(self.share.len(), 0.0);
+        for (row, blurred) in self.share.chunks(columns.max(1)).zip(across.chunks_mut(columns.max(1))) {
+            for (u, value) in row.iter().enumerate().filter(|(_, value)| **value > 0.0) {
+                for (index, weight) in kernel.iter().enumerate().take(reach + 1) {
+                    if let Some(place) = blurred.get_mut(u + index) {
+                        *place += weight * value;
+                    }
+                    if index > 0
+                        && let Some(place) = u.checked_sub(index).and_then(|u| blurred.get_mut(u))
+                    {
+                        *place += weight * value;
+                    }
+                }
+            }
+        }
+        self.share.fill(0.0);
+        let rows = across.len() / columns.max(1);
+        for (v, row) in across.chunks(columns.max(1)).enumerate() {
+            for to in v.saturating_sub(reach)..(v + reach + 1).min(rows) {
+                let weight = kernel[v.abs_diff(to)];
+                let into = self.share.iter_mut().skip(to * columns);
+                for (place, value) in into.zip(row) {
+                    *place += weight * value;
+                }
+            }
+        }
+    }
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a cast from a float saturates; NaN becomes 0"
+)]
+fn whole(place: f64) -> usize {
+    place as usize
+}
+
+fn real(count: usize) -> f64 {
+    u32::try_from(count).map_or(f64::INFINITY, f64::from)
+}
