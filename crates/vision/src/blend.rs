@@ -1,5 +1,7 @@
 //! Bands whose outlines are blurred away: their light instead of their edges.
 
+use std::f64::consts::PI;
+
 use crate::fit::settle;
 use crate::linear::{Square, apply, inverse, quadratic};
 use crate::patch::{Patch, SIDE};
@@ -15,6 +17,8 @@ const SPREAD_DEVIATION: f64 = 2.0;
 const SPREADS: [f64; 2] = [0.6, 8.0];
 /// The two bands are lit alike: standard deviation of the logarithm of their ratio.
 const UNLIKE: f64 = 0.2;
+/// Light is uneven by this share of a band's at least, and alike in neighbours.
+const UNEVEN: f64 = 0.015;
 /// How far around the outlines light is looked at (px).
 const AROUND: f64 = 14.0;
 /// Places, light of A and B, ground, spread, and how the tissue's colour changes.
@@ -112,8 +116,10 @@ impl Blend {
             }
             let sums = self.sums(light, spread, place);
             // What is not noise of the sensor errs alike in neighbours: as many as the blur holds count as one.
-            let alike = 4.0 * (spread / self.patch.step).powi(2);
-            let weight = 1.0 / (noise * noise + alike * (noise * noise - grain).max(0.0)).max(1.0);
+            let alike = 4.0 * PI * (spread / self.patch.step).max(1.0).powi(2);
+            let brightness = f64::midpoint(light[0], light[1]);
+            let unlike = (noise * noise - grain).max((UNEVEN * brightness).powi(2));
+            let weight = 1.0 / (noise * noise + alike * unlike).max(1.0);
             let mut normal = sums.normal.map(|row| row.map(|value| weight * value));
             let mut right = sums.right.map(|value| weight * value);
             let away: [f64; 4] = std::array::from_fn(|i| blind.features[i] - place[i]);
@@ -123,8 +129,7 @@ impl Blend {
                     *entry += prior;
                 }
             }
-            let mean = f64::midpoint(light[0], light[1]);
-            let alike = (UNLIKE * mean.max(5.0)).powi(-2);
+            let alike = (UNLIKE * brightness.max(5.0)).powi(-2);
             for (i, j) in [(4, 5), (5, 4)] {
                 normal[i][i] += alike;
                 normal[i][j] -= alike;

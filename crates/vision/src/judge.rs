@@ -217,10 +217,10 @@ impl Verdict {
     ) -> Option<Self> {
         let [a, b] = found.light;
         let env = |name: &str, value: f64| std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(value);
-        let good = found.explained > env("R2", 0.9)
-            && a.min(b) > env("LIGHT", 10.0)
+        let good = found.explained > env("R2", 0.5)
+            && a.min(b) > env("LIGHT", 8.0) * found.noise
             && a.min(b) > env("RATIO", 0.6) * a.max(b)
-            && (0..4).all(|i| found.covariance[i][i] < env("SD", 1.5))
+            && (0..4).all(|i| found.covariance[i][i] < env("SD", 1.5).powi(2))
             && found.surprise <= demands.surprise;
         let [ua, va, ub, vb] = found.features;
         good.then(|| Self {

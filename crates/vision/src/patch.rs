@@ -11,6 +11,10 @@ pub const SIDE: usize = 64;
 /// Green minus red and green minus blue: of a grey pixel, bright or dark, both are 0.
 const DIFFERENCES: [[f64; 3]; 2] = [[0.0, 1.0, -1.0], [-1.0, 1.0, 0.0]];
 
+/// Second differences are counted in so many bins of so many grey levels.
+const BINS: usize = 128;
+const BIN: f64 = 0.5;
+
 /// Samples of a frame in a grid.
 #[derive(Clone, Debug)]
 pub struct Patch {
@@ -94,15 +98,28 @@ impl Patch {
         [red, red * u, red * v, red * red]
     }
 
-    /// Variance of the sensor's noise (grey levels squared): of second differences, which blurred light has none of.
+    /// Variance of the sensor's noise (grey levels squared), by the median of second differences: of what changes
+    /// slowly there are none, and few are at edges.
     pub fn grain(&self) -> f64 {
+        let mut counts = [0_u32; BINS];
         let rows = self.green.chunks_exact(self.columns.max(1));
-        let bends = rows.flat_map(|row| row.windows(3)).filter_map(|three| match three {
-            [a, b, c] => Some(f64::from(a - 2.0 * b + c).powi(2) / 6.0),
-            _ => None,
+        for three in rows.flat_map(|row| row.windows(3)) {
+            if let [a, b, c] = three {
+                let bin = whole(f64::from((a - 2.0 * b + c).abs()) / BIN);
+                if let Some(count) = counts.get_mut(bin.min(BINS - 1)) {
+                    *count += 1;
+                }
+            }
+        }
+        let half = counts.iter().sum::<u32>() / 2;
+        let mut below = 0;
+        let bin = counts.iter().position(|count| {
+            below += count;
+            below > half
         });
-        let (count, sum) = bends.fold((0.0, 0.0), |(count, sum), bend| (count + 1.0, sum + bend));
-        sum / f64::max(count, 1.0)
+        // The median of |x| is 0.6745 deviations; a second difference has 6 variances.
+        let median = (real(bin.unwrap_or_default()) + 0.5) * BIN;
+        (median / 0.6745).powi(2) / 6.0
     }
 
     /// Where a sample is (px).
@@ -139,6 +156,15 @@ impl Consumer for Sample<'_> {
             })
         }));
     }
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a cast from a float saturates; NaN becomes 0"
+)]
+fn whole(value: f64) -> usize {
+    value as usize
 }
 
 /// A frame's side is at most [`crate::frame::MAX_SIDE`], so that nothing is lost.
