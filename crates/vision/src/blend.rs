@@ -8,9 +8,9 @@ use crate::patch::{Patch, SIDE};
 use crate::{Expect, Expectation, Frame, Outline};
 
 /// Steps to the best place.
-const STEPS: usize = 12;
+const STEPS: usize = 16;
 /// The longest of a place, in one step (px).
-const STRIDE: f64 = 4.0;
+const STRIDE: f64 = 2.5;
 /// Spread of the blur (px): where it starts, its own standard deviation, and its limits.
 const SPREAD: f64 = 2.5;
 const SPREAD_DEVIATION: f64 = 2.0;
@@ -19,6 +19,9 @@ const SPREADS: [f64; 2] = [0.6, 8.0];
 const UNLIKE: f64 = 0.2;
 /// Light is uneven by this share of a band's at least, and alike in neighbours.
 const UNEVEN: f64 = 0.015;
+/// Deviation of the tissue's colour relative to its redness: where it starts, and the least.
+const MOTLEY: f64 = 0.05;
+const LEAST_MOTLEY: f64 = 0.005;
 /// How far around the outlines light is looked at (px).
 const AROUND: f64 = 14.0;
 /// Places, light of A and B, ground, spread, and how the tissue's colour changes.
@@ -101,7 +104,7 @@ impl Blend {
         let mut outlines = drawn(place, 3.0)?;
         let mut grain = self.look(frame, &outlines)?;
         let (mut light, mut spread) = ([0.0; 2], SPREAD);
-        let mut noise = 10.0_f64;
+        let mut motley = MOTLEY;
         let mut result = None;
         for step in 0..STEPS {
             if step == STEPS / 2 {
@@ -114,14 +117,18 @@ impl Blend {
                 layer.draw(outline, &self.patch);
                 layer.blur(spread / self.patch.step, self.patch.columns, &mut self.across);
             }
-            let sums = self.sums(light, spread, place);
             // What is not noise of the sensor errs alike in neighbours: as many as the blur holds count as one.
-            let alike = 4.0 * PI * (spread / self.patch.step).max(1.0).powi(2);
             let brightness = f64::midpoint(light[0], light[1]);
-            let unlike = (noise * noise - grain).max((UNEVEN * brightness).powi(2));
-            let weight = 1.0 / (noise * noise + alike * unlike).max(1.0);
-            let mut normal = sums.normal.map(|row| row.map(|value| weight * value));
-            let mut right = sums.right.map(|value| weight * value);
+            let errors = Errors {
+                grain,
+                alike: 4.0 * PI * (spread / self.patch.step).max(1.0).powi(2),
+                uneven: UNEVEN * brightness,
+                motley,
+            };
+            let Sums {
+                mut normal,
+                mut right,
+            } = self.sums(light, spread, &errors);
             let away: [f64; 4] = std::array::from_fn(|i| blind.features[i] - place[i]);
             for (row, pull) in apply(&prior, away).into_iter().enumerate() {
                 right[row] += pull;
@@ -149,16 +156,16 @@ impl Blend {
                 *value += share * by;
             }
             light = [found[4], found[5]].map(|value: f64| value.clamp(0.0, 400.0));
-            spread = (spread + if step == 0 { 0.0 } else { found[7].clamp(-1.0, 1.0) }).clamp(SPREADS[0], SPREADS[1]);
-            let (explained, left) = self.left(&found, light, grain);
-            noise = left;
+            spread = (spread + if step == 0 { 0.0 } else { found[7].clamp(-0.5, 0.5) }).clamp(SPREADS[0], SPREADS[1]);
+            let left = self.left(&found, light, grain);
+            motley = left.motley;
             let away: [f64; 4] = std::array::from_fn(|i| blind.features[i] - place[i]);
             result = Some(Blended {
                 features: place,
                 covariance: std::array::from_fn(|i| std::array::from_fn(|j| covariance[i][j])),
                 light,
-                explained,
-                noise,
+                explained: left.explained,
+                noise: left.noise,
                 spread,
                 surprise: quadratic(&prior, away),
                 outlines,
@@ -191,7 +198,7 @@ impl Blend {
     }
 
     /// The normal equations over all samples: steps of the four places, light of A and B, ground, step of the spread.
-    fn sums(&self, light: [f64; 2], spread: f64, _place: [f64; 4]) -> Sums {
+    fn sums(&self, light: [f64; 2], spread: f64, errors: &Errors) -> Sums {
         let columns = self.patch.columns;
         let rows = self.patch.green.len() / columns.max(1);
         let step = self.patch.step;
@@ -217,10 +224,12 @@ impl Blend {
                         / (step * step);
                 }
                 let green = f64::from(self.patch.green.get(at).copied().unwrap_or_default());
+                let weight = errors.weight(self.patch.redness(at));
                 for i in 0..UNKNOWNS {
-                    sums.right[i] += row[i] * green;
+                    let weighted = weight * row[i];
+                    sums.right[i] += weighted * green;
                     for j in 0..=i {
-                        sums.normal[i][j] += row[i] * row[j];
+                        sums.normal[i][j] += weighted * row[j];
                     }
                 }
             }
@@ -233,25 +242,57 @@ impl Blend {
         sums
     }
 
-    /// Share of the light's variance that is explained, and the deviation of what is not.
-    fn left(&self, found: &[f64; UNKNOWNS], light: [f64; 2], grain: f64) -> (f64, f64) {
+    /// What is left of the light when the bands are taken out.
+    fn left(&self, found: &[f64; UNKNOWNS], light: [f64; 2], grain: f64) -> Left {
         let (mut count, mut sum, mut square, mut left) = (0.0, 0.0, 0.0, 0.0);
+        let (mut hue, mut fourth) = (0.0, 0.0);
         let [a, b] = &self.layers;
         for (at, ((green, a), b)) in self.patch.green.iter().zip(&a.share).zip(&b.share).enumerate() {
             let tissue = self.patch.tissue(at);
             let tissue: f64 = tissue.iter().zip(&found[8..]).map(|(value, by)| value * by).sum();
             let green = f64::from(*green) - tissue - found[6];
             let model = light[0] * f64::from(*a) + light[1] * f64::from(*b);
+            let red = self.patch.redness(at).powi(2);
+            let missed = (green - model).powi(2);
             count += 1.0;
             sum += green;
             square += green * green;
-            left += (green - model).powi(2);
+            left += missed;
+            hue += (missed - grain) * red;
+            fourth += red * red;
         }
         let variance = square - sum * sum / f64::max(count, 1.0) - count * grain;
-        (
-            1.0 - f64::max(left - count * grain, 0.0) / f64::max(variance, 1.0),
-            (left / f64::max(count, 1.0)).sqrt(),
-        )
+        Left {
+            explained: 1.0 - f64::max(left - count * grain, 0.0) / f64::max(variance, 1.0),
+            noise: (left / f64::max(count, 1.0)).sqrt(),
+            motley: (hue / f64::max(fourth, 1.0)).max(0.0).sqrt().max(LEAST_MOTLEY),
+        }
+    }
+}
+
+struct Left {
+    explained: f64,
+    noise: f64,
+    motley: f64,
+}
+
+/// How far a sample may be from the model.
+struct Errors {
+    /// Variance of the sensor's noise (grey levels squared).
+    grain: f64,
+    /// Samples that err alike.
+    alike: f64,
+    /// Deviation of a band's light (grey levels).
+    uneven: f64,
+    /// Deviation of the tissue's colour, relative to its redness.
+    motley: f64,
+}
+
+impl Errors {
+    /// One over the variance of a sample so red.
+    fn weight(&self, redness: f64) -> f64 {
+        let own = self.uneven.powi(2) + (self.motley * redness).powi(2);
+        1.0 / (self.grain + self.alike * own).max(1.0)
     }
 }
 

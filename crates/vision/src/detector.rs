@@ -110,6 +110,7 @@ impl Detector {
         }
         if !verdict.is_clear()
             && let Some(blended) = self.blended(frame, expect, &verdict, demands)
+            && (verdict.reasons != [None; 2] || blended.bands[0].bloom > 1.0)
         {
             verdict = blended;
         }

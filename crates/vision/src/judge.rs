@@ -229,6 +229,7 @@ impl Verdict {
             bands: [[ua, va], [ub, vb]].map(|centroid| Evidence {
                 surprise: found.surprise,
                 edges: found.explained,
+                bloom: found.spread,
                 centroid,
                 ..Evidence::default()
             }),

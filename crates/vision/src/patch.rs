@@ -90,6 +90,12 @@ impl Patch {
         self.green.extend(values);
     }
 
+    /// How much redder than green a sample is (grey levels).
+    pub fn redness(&self, index: usize) -> f64 {
+        let red = self.differences.get(index).map_or(0.0, |[red, _]| f64::from(*red));
+        (-red).max(0.0)
+    }
+
     /// By how much a sample's green changes if the tissue's colour does: in all of the patch, along it, and down it.
     pub fn tissue(&self, index: usize) -> [f64; 4] {
         let red = self.differences.get(index).map_or(0.0, |[red, _]| f64::from(*red)) / 100.0;
