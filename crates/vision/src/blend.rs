@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use crate::fit::settle;
 use crate::linear::{Square, apply, inverse, quadratic};
 use crate::patch::{Patch, SIDE};
-use crate::{Expect, Expectation, Frame, Outline};
+use crate::{Demands, Evidence, Expect, Expectation, Frame, Outline, Verdict};
 
 /// Steps to the best place.
 const STEPS: usize = 16;
@@ -19,6 +19,14 @@ const SPREADS: [f64; 2] = [0.6, 8.0];
 const UNLIKE: f64 = 0.2;
 /// Light is uneven by this share of a band's at least, and alike in neighbours.
 const UNEVEN: f64 = 0.015;
+/// What is found must explain this share of the light, be so many times brighter than what is left, its bands
+/// be alike to this ratio, and its place be so sure (px): a marker that is 3 px off counts as wrong.
+const EXPLAINED: f64 = 0.8;
+const CLEARLY: f64 = 8.0;
+const ALIKE: f64 = 0.6;
+const SURE: f64 = 1.2;
+/// Largest spread of the blur in a sharp frame (px).
+const SHARP: f64 = 1.0;
 /// Deviation of the tissue's colour relative to its redness: where it starts, and the least.
 const MOTLEY: f64 = 0.05;
 const LEAST_MOTLEY: f64 = 0.005;
@@ -48,6 +56,45 @@ pub struct Blended {
     pub surprise: f64,
     /// The outlines in place.
     pub outlines: [Outline; 2],
+}
+
+impl Blended {
+    /// Whether light like this is that of two bands, and says where they are.
+    #[must_use]
+    pub fn is_good(&self, demands: &Demands) -> bool {
+        let [a, b] = self.light;
+        let (least, most) = (a.min(b), a.max(b));
+        self.explained >= EXPLAINED
+            && least >= CLEARLY * self.noise
+            && least >= ALIKE * most
+            && self.surprise <= demands.surprise
+            && (0..4).all(|index| self.covariance[index][index] <= SURE * SURE)
+    }
+
+    /// Whether the blur is more than what a frame that is sharp has.
+    #[must_use]
+    pub fn is_blurred(&self) -> bool {
+        self.spread > SHARP
+    }
+
+    /// As a verdict. What the outlines' edges would have said is not asked: the share of the light takes its place.
+    #[must_use]
+    pub fn verdict(&self) -> Verdict {
+        let [ua, va, ub, vb] = self.features;
+        Verdict {
+            features: self.features,
+            covariance: self.covariance,
+            bands: [[ua, va], [ub, vb]].map(|centroid| Evidence {
+                edges: self.explained,
+                bloom: self.spread,
+                surprise: self.surprise,
+                centroid,
+                ..Evidence::default()
+            }),
+            reasons: [None; 2],
+            discriminant: 0,
+        }
+    }
 }
 
 /// Memory for [`Blend::fit`].
@@ -115,7 +162,11 @@ impl Blend {
             }
             for (layer, outline) in self.layers.iter_mut().zip(&outlines) {
                 layer.draw(outline, &self.patch);
-                layer.blur(spread / self.patch.step, self.patch.columns, &mut self.across);
+                layer.blur(
+                    spread / self.patch.step,
+                    self.patch.columns,
+                    &mut self.across,
+                );
             }
             // What is not noise of the sensor errs alike in neighbours: as many as the blur holds count as one.
             let brightness = f64::midpoint(light[0], light[1]);
@@ -151,12 +202,22 @@ impl Blend {
             let found = apply(&covariance, right);
             let longest = found[..4].iter().fold(0.0_f64, |most, d| most.max(d.abs()));
             // Without light there is no slope yet.
-            let share = if step == 0 { 0.0 } else { (STRIDE / longest).min(1.0) };
+            let share = if step == 0 {
+                0.0
+            } else {
+                (STRIDE / longest).min(1.0)
+            };
             for (value, by) in place.iter_mut().zip(found) {
                 *value += share * by;
             }
             light = [found[4], found[5]].map(|value: f64| value.clamp(0.0, 400.0));
-            spread = (spread + if step == 0 { 0.0 } else { found[7].clamp(-0.5, 0.5) }).clamp(SPREADS[0], SPREADS[1]);
+            spread = (spread
+                + if step == 0 {
+                    0.0
+                } else {
+                    found[7].clamp(-0.5, 0.5)
+                })
+            .clamp(SPREADS[0], SPREADS[1]);
             let left = self.left(&found, light, grain);
             motley = left.motley;
             let away: [f64; 4] = std::array::from_fn(|i| blind.features[i] - place[i]);
@@ -177,7 +238,6 @@ impl Blend {
         result
     }
 
-    pub fn grain(&self) -> f64 { self.patch.grain().sqrt() }
     /// Reads the part of the frame around the outlines.
     fn look(&mut self, frame: &impl Frame, outlines: &[Outline; 2]) -> Option<f64> {
         let corners = || outlines.iter().flat_map(|outline| &outline.corners);
@@ -247,9 +307,20 @@ impl Blend {
         let (mut count, mut sum, mut square, mut left) = (0.0, 0.0, 0.0, 0.0);
         let (mut hue, mut fourth) = (0.0, 0.0);
         let [a, b] = &self.layers;
-        for (at, ((green, a), b)) in self.patch.green.iter().zip(&a.share).zip(&b.share).enumerate() {
+        for (at, ((green, a), b)) in self
+            .patch
+            .green
+            .iter()
+            .zip(&a.share)
+            .zip(&b.share)
+            .enumerate()
+        {
             let tissue = self.patch.tissue(at);
-            let tissue: f64 = tissue.iter().zip(&found[8..]).map(|(value, by)| value * by).sum();
+            let tissue: f64 = tissue
+                .iter()
+                .zip(&found[8..])
+                .map(|(value, by)| value * by)
+                .sum();
             let green = f64::from(*green) - tissue - found[6];
             let model = light[0] * f64::from(*a) + light[1] * f64::from(*b);
             let red = self.patch.redness(at).powi(2);
@@ -265,7 +336,10 @@ impl Blend {
         Left {
             explained: 1.0 - f64::max(left - count * grain, 0.0) / f64::max(variance, 1.0),
             noise: (left / f64::max(count, 1.0)).sqrt(),
-            motley: (hue / f64::max(fourth, 1.0)).max(0.0).sqrt().max(LEAST_MOTLEY),
+            motley: (hue / f64::max(fourth, 1.0))
+                .max(0.0)
+                .sqrt()
+                .max(LEAST_MOTLEY),
         }
     }
 }
@@ -348,7 +422,11 @@ impl Layer {
         kernel.iter_mut().for_each(|weight| *weight /= sum);
         across.clear();
         across.resize(self.share.len(), 0.0);
-        for (row, blurred) in self.share.chunks(columns.max(1)).zip(across.chunks_mut(columns.max(1))) {
+        for (row, blurred) in self
+            .share
+            .chunks(columns.max(1))
+            .zip(across.chunks_mut(columns.max(1)))
+        {
             for (u, value) in row.iter().enumerate().filter(|(_, value)| **value > 0.0) {
                 for (index, weight) in kernel.iter().enumerate().take(reach + 1) {
                     if let Some(place) = blurred.get_mut(u + index) {

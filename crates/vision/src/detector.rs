@@ -1,9 +1,10 @@
 //! Frame to markers: Fig. 5 as a whole.
 
-use crate::blend::Blend;
-use crate::judge::{Verdict, judge};
+use crate::blend::{Blend, Blended};
+use crate::judge::{Verdict, judge, judge_at};
 use crate::{
-    ColorDiscriminant, Demands, Error, Expect, Frame, Labeller, Region, RunMap, Segmenter, Window,
+    ColorDiscriminant, Demands, Error, Expect, Expectation, Frame, Labeller, Region, RunMap,
+    Segmenter, Window,
 };
 
 /// Only so many regions, the largest, are considered: it bounds the time on a noisy frame.
@@ -90,6 +91,33 @@ impl Detector {
         }
         self.find(frame, Window::whole(frame));
         let mut verdict = judge(&self.regions, &self.map, expect, demands);
+        if verdict.is_clear() {
+            return (verdict, &self.regions);
+        }
+        let lit = before.and_then(|blind| self.by_light(frame, expect, &blind, &verdict, demands));
+        if let Some(lit) = lit
+            && let Some(again) = judge_at(lit.features, [1.0; 4], &self.map, expect, demands)
+            && again.score() > verdict.score()
+        {
+            verdict = again;
+        }
+        self.try_alternatives(frame, expect, demands, &mut verdict);
+        if let Some(lit) = lit
+            && (verdict.reasons != [None; 2] || lit.is_blurred() && !verdict.is_clear())
+        {
+            verdict = lit.verdict();
+        }
+        (verdict, &self.regions)
+    }
+
+    /// Replaces a verdict that is not clear by a better one, from another discriminant.
+    fn try_alternatives(
+        &mut self,
+        frame: &impl Frame,
+        expect: &impl Expect,
+        demands: &Demands,
+        verdict: &mut Verdict,
+    ) {
         for index in 0..self.alternatives.len() {
             if verdict.is_clear() {
                 break;
@@ -100,7 +128,7 @@ impl Detector {
             self.exchange(index);
             let other = judge(&self.regions, &self.map, expect, demands);
             if other.score() > verdict.score() {
-                verdict = Verdict {
+                *verdict = Verdict {
                     discriminant: index + 1,
                     ..other
                 };
@@ -108,37 +136,29 @@ impl Detector {
                 std::mem::swap(&mut self.best, &mut self.regions);
             }
         }
-        if !verdict.is_clear()
-            && let Some(blended) = self.blended(frame, expect, &verdict, demands)
-            && (verdict.reasons != [None; 2] || blended.bands[0].bloom > 1.0)
-        {
-            verdict = blended;
-        }
-        (verdict, &self.regions)
     }
 
-    fn blended(
+    /// The bands by their light, if that is good: from where the outlines were laid, and from where they are expected.
+    fn by_light(
         &mut self,
         frame: &impl Frame,
         expect: &impl Expect,
+        blind: &Expectation,
         verdict: &Verdict,
         demands: &Demands,
-    ) -> Option<Verdict> {
-        let blind = expect.expect([0.0; 4], [f64::INFINITY; 4])?;
-        let [a, b] = verdict.bands.map(|band| band.centroid);
-        let starts = [[a[0], a[1], b[0], b[1]], blind.features];
-        let mut best: Option<crate::blend::Blended> = None;
+    ) -> Option<Blended> {
+        let [[ua, va], [ub, vb]] = verdict.bands.map(|band| band.centroid);
+        let starts = [[ua, va, ub, vb], blind.features];
+        let mut best: Option<Blended> = None;
         for start in starts {
             if start.iter().all(|value| value.is_finite())
-                && let Some(found) = self.blend.fit(frame, expect, &blind, start)
+                && let Some(found) = self.blend.fit(frame, expect, blind, start)
                 && best.is_none_or(|best| found.explained > best.explained)
             {
                 best = Some(found);
             }
         }
-        let found = best?;
-        if std::env::var("DEBUG").is_ok() { eprintln!("blend {:.3?} R2 {:.3} light {:.0?} noise {:.1} grain {:.1} spread {:.1} surprise {:.1} sd {:.2?}", found.features, found.explained, found.light, found.noise, self.blend.grain(), found.spread, found.surprise, [0,1,2,3].map(|i: usize| found.covariance[i][i].sqrt())); }
-        Verdict::by_light(&found, frame, demands)
+        best.filter(|found| found.is_good(demands))
     }
 
     /// The regions in some windows, the largest first, at most [`CANDIDATES`]; each ends where its

@@ -3,6 +3,9 @@
 use crate::fit::{Fit, settle};
 use crate::{Expectation, Rejection, RunMap};
 
+/// Least share of a band's rims at which the colour ends.
+const RIMS: f64 = 0.2;
+
 /// What speaks for a band.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Evidence {
@@ -93,6 +96,12 @@ pub fn weigh(
         }
     });
     let mut reasons = bands.map(|band| refusal(&band, demands));
+    for (reason, rims) in reasons.iter_mut().zip(found.rims) {
+        // Sides alone do not say where along them it is.
+        if reason.is_none() && rims < RIMS {
+            *reason = Some(Rejection::Shape { share: rims });
+        }
+    }
     // The weaker of two weak ones falls, and with it the other.
     let weaker = usize::from(bands[1].edges < bands[0].edges);
     let average = |band: usize| match reasons[1 - band] {
@@ -115,7 +124,9 @@ fn refusal(band: &Evidence, demands: &Demands) -> Option<Rejection> {
         Some(Rejection::Outside {
             share: 1.0 - band.inside,
         })
-    } else if band.coverage < demands.coverage || band.own < 0.75 * demands.coverage {
+    } else if band.coverage < demands.coverage
+        || band.own < f64::max(0.75 * demands.coverage, 0.5 * band.coverage)
+    {
         Some(Rejection::Hidden { share: band.own })
     } else if band.spill > demands.spill * band.coverage {
         Some(Rejection::Larger { share: band.spill })

@@ -1,6 +1,5 @@
 //! Which of what has the markers' colour is a band: by place, size, outline, and both together.
 
-use crate::blend::Blended;
 use crate::evidence::{Demands, Evidence, weigh};
 use crate::fit::{COARSE, FINE, Fit, fit};
 use crate::pairing::{Pair, likely, shift};
@@ -29,6 +28,8 @@ const STILL: f64 = 0.2;
 const AMBIGUOUS: f64 = 9.0;
 /// Share of edges of both bands with which a verdict needs no other.
 const ENOUGH: f64 = 0.75;
+/// And of its area.
+const WHOLE: f64 = 0.8;
 /// And the squared Mahalanobis distance.
 const UNSURPRISING: f64 = 8.0;
 /// What a unit of that distance takes from a score that edges make.
@@ -136,7 +137,18 @@ fn attempt(
         let [ua, va, ub, vb] = blind.features;
         seen = [ua + u, va + v, ub + u, vb + v];
     }
-    let (mut laid, mut found) = lay(seen, [4.0; 4], [true; 2], COARSE, map, expect)?;
+    judge_at(seen, [4.0; 4], map, expect, demands)
+}
+
+/// The verdict on outlines laid from there on, features (4,) in px with standard deviations (4,) in px.
+pub fn judge_at(
+    seen: [f64; 4],
+    deviation: [f64; 4],
+    map: &RunMap,
+    expect: &impl Expect,
+    demands: &Demands,
+) -> Option<Verdict> {
+    let (mut laid, mut found) = lay(seen, deviation, [true; 2], COARSE, map, expect)?;
     // The better the place is known, the better the outlines.
     for _ in 0..LAYS {
         let before = found.features;
@@ -209,40 +221,14 @@ impl Verdict {
         verdict
     }
 
-    /// Of bands whose light explains what is there; None if it does not.
-    pub(crate) fn by_light(
-        found: &Blended,
-        _frame: &impl crate::Frame,
-        demands: &Demands,
-    ) -> Option<Self> {
-        let [a, b] = found.light;
-        let env = |name: &str, value: f64| std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(value);
-        let good = found.explained > env("R2", 0.5)
-            && a.min(b) > env("LIGHT", 8.0) * found.noise
-            && a.min(b) > env("RATIO", 0.6) * a.max(b)
-            && (0..4).all(|i| found.covariance[i][i] < env("SD", 1.5).powi(2))
-            && found.surprise <= demands.surprise;
-        let [ua, va, ub, vb] = found.features;
-        good.then(|| Self {
-            features: found.features,
-            covariance: found.covariance,
-            bands: [[ua, va], [ub, vb]].map(|centroid| Evidence {
-                surprise: found.surprise,
-                edges: found.explained,
-                bloom: found.spread,
-                centroid,
-                ..Evidence::default()
-            }),
-            reasons: [None; 2],
-            discriminant: 0,
-        })
-    }
-
     /// Whether there is no need to look further.
     pub(crate) fn is_clear(&self) -> bool {
         let mut bands = self.bands.iter().zip(&self.reasons);
         bands.all(|(band, reason)| {
-            reason.is_none() && band.edges >= ENOUGH && band.surprise <= UNSURPRISING
+            reason.is_none()
+                && band.edges >= ENOUGH
+                && band.coverage >= WHOLE
+                && band.surprise <= UNSURPRISING
         })
     }
 

@@ -92,13 +92,20 @@ impl Patch {
 
     /// How much redder than green a sample is (grey levels).
     pub fn redness(&self, index: usize) -> f64 {
-        let red = self.differences.get(index).map_or(0.0, |[red, _]| f64::from(*red));
+        let red = self
+            .differences
+            .get(index)
+            .map_or(0.0, |[red, _]| f64::from(*red));
         (-red).max(0.0)
     }
 
     /// By how much a sample's green changes if the tissue's colour does: in all of the patch, along it, and down it.
     pub fn tissue(&self, index: usize) -> [f64; 4] {
-        let red = self.differences.get(index).map_or(0.0, |[red, _]| f64::from(*red)) / 100.0;
+        let red = self
+            .differences
+            .get(index)
+            .map_or(0.0, |[red, _]| f64::from(*red))
+            / 100.0;
         let [u, v] = self.place(index);
         let [u, v] = [u - self.origin[0], v - self.origin[1]].map(|away| away / 30.0 - 1.0);
         [red, red * u, red * v, red * red]
@@ -132,7 +139,10 @@ impl Patch {
     pub fn place(&self, index: usize) -> [f64; 2] {
         let columns = self.columns.max(1);
         let [u, v] = [index % columns, index / columns].map(real);
-        [self.origin[0] + u * self.step, self.origin[1] + v * self.step]
+        [
+            self.origin[0] + u * self.step,
+            self.origin[1] + v * self.step,
+        ]
     }
 }
 
