@@ -189,7 +189,7 @@ class VisionConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     bands that run into each other in a blurred picture [ours]."""
     smoothing: Annotated[int, Meta(ge=0, le=8)] = 1
     """Passes of the 3x3 binomial low-pass over the projected channel; 0 is none [ours]."""
-    minimum_area: Annotated[int, Meta(ge=1)] = 40
+    minimum_area: Annotated[int, Meta(ge=1)] = 15
     """Regions below this are dropped [px]."""
     model_deviation: Positive = 2.5
     """Of a band from where the instrument's model has it: standard deviation [px] [ours]."""
@@ -202,7 +202,7 @@ class VisionConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     coverage] [ours]."""
     least_edges: Fraction = 0.4
     """A band at less of whose outline the colour ends is refused [share of it] [ours]."""
-    least_edges_on_average: Fraction = 0.65
+    least_edges_on_average: Fraction = 0.55
     """The same for the mean of both bands [ours]."""
     least_edges_alone: Fraction = 0.85
     """The same for a band that is found alone, and 4/3 of its coverage [ours]."""
