@@ -29,7 +29,7 @@ const SURE: f64 = 1.2;
 const SHARP: f64 = 1.0;
 /// Deviation of the tissue's colour relative to its redness: where it starts, and the least.
 const MOTLEY: f64 = 0.05;
-const LEAST_MOTLEY: f64 = 0.005;
+const LEAST_MOTLEY: f64 = 0.015;
 /// How far around the outlines light is looked at (px).
 const AROUND: f64 = 14.0;
 /// Places, light of A and B, ground, spread, and how the tissue's colour changes.

@@ -32,6 +32,8 @@ const ENOUGH: f64 = 0.75;
 const WHOLE: f64 = 0.8;
 /// And the squared Mahalanobis distance.
 const UNSURPRISING: f64 = 8.0;
+/// Variance that a band has more of for its missing edges.
+const HIDDEN: f64 = 5.0;
 /// What a unit of that distance takes from a score that edges make.
 const DOUBT: f64 = 0.02;
 
@@ -212,7 +214,7 @@ impl Verdict {
         let (bands, reasons) = weigh(laid, found, map, demands);
         let mut verdict = Self {
             features: found.features,
-            covariance: found.covariance,
+            covariance: doubted(&found.covariance, found.edges),
             bands,
             reasons,
             discriminant: 0,
@@ -244,6 +246,14 @@ impl Verdict {
             }
         }
     }
+}
+
+/// What hides a part of an outline may pass for another part of it: the less of it is there, the less sure it is.
+fn doubted(covariance: &[[f64; 4]; 4], edges: [f64; 2]) -> [[f64; 4]; 4] {
+    let factors = edges.map(|share| (1.0 + HIDDEN * (1.0 - share)).sqrt());
+    std::array::from_fn(|i| {
+        std::array::from_fn(|j| covariance[i][j] * factors[i / 2] * factors[j / 2])
+    })
 }
 
 fn nothing(reason: Rejection) -> Verdict {
