@@ -3,7 +3,9 @@
 use std::f64::consts::PI;
 
 use crate::fit::settle;
+use crate::layer::Layer;
 use crate::linear::{Square, apply, inverse, quadratic};
+use crate::numbers::whole;
 use crate::patch::{Patch, SIDE};
 use crate::{Demands, Evidence, Expect, Expectation, Frame, Outline, Verdict};
 
@@ -25,6 +27,8 @@ const EXPLAINED: f64 = 0.8;
 const CLEARLY: f64 = 8.0;
 const ALIKE: f64 = 0.6;
 const SURE: f64 = 1.2;
+/// Standard deviation for what is hidden and for what is not as the model has it (px).
+const MODEL: f64 = 0.25;
 /// Largest spread of the blur in a sharp frame (px).
 const SHARP: f64 = 1.0;
 /// Deviation of the tissue's colour relative to its redness: where it starts, and the least.
@@ -34,8 +38,6 @@ const LEAST_MOTLEY: f64 = 0.015;
 const AROUND: f64 = 14.0;
 /// Places, light of A and B, ground, spread, and how the tissue's colour changes.
 const UNKNOWNS: usize = 12;
-/// Sub-rows in which an outline's share of a sample is counted.
-const FINE: usize = 4;
 
 /// Two bands in place by their light.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -105,20 +107,11 @@ pub struct Blend {
     across: Vec<f32>,
 }
 
-/// A band's blurred share of each sample.
-#[derive(Clone, Debug)]
-struct Layer {
-    share: Vec<f32>,
-}
-
 impl Default for Blend {
     fn default() -> Self {
-        let layer = || Layer {
-            share: Vec::with_capacity(SIDE * SIDE),
-        };
         Self {
             patch: Patch::default(),
-            layers: [layer(), layer()],
+            layers: [Layer::default(), Layer::default()],
             across: Vec::with_capacity(SIDE * SIDE),
         }
     }
@@ -132,7 +125,7 @@ impl Blend {
     /// ```
     ///
     /// with m the outlines' shares of a sample and g a normal density; Gauss-Newton, the outlines drawn anew at each
-    /// step. d keeps to the expectation, a_A and a_B to each other.
+    /// step. Places keep to the expectation, and the light of both bands to each other.
     pub fn fit(
         &mut self,
         frame: &impl Frame,
@@ -223,7 +216,11 @@ impl Blend {
             let away: [f64; 4] = std::array::from_fn(|i| blind.features[i] - place[i]);
             result = Some(Blended {
                 features: place,
-                covariance: std::array::from_fn(|i| std::array::from_fn(|j| covariance[i][j])),
+                covariance: std::array::from_fn(|i| {
+                    std::array::from_fn(|j| {
+                        covariance[i][j] + if i == j { MODEL * MODEL } else { 0.0 }
+                    })
+                }),
                 light,
                 explained: left.explained,
                 noise: left.noise,
@@ -285,11 +282,12 @@ impl Blend {
                 }
                 let green = f64::from(self.patch.green.get(at).copied().unwrap_or_default());
                 let weight = errors.weight(self.patch.redness(at));
-                for i in 0..UNKNOWNS {
-                    let weighted = weight * row[i];
-                    sums.right[i] += weighted * green;
-                    for j in 0..=i {
-                        sums.normal[i][j] += weighted * row[j];
+                for (index, own) in row.iter().enumerate() {
+                    let weighted = weight * own;
+                    sums.right[index] += weighted * green;
+                    let below = sums.normal[index].iter_mut().zip(row).take(index + 1);
+                    for (entry, other) in below {
+                        *entry += weighted * other;
                     }
                 }
             }
@@ -373,96 +371,4 @@ impl Errors {
 struct Sums {
     normal: Square<UNKNOWNS>,
     right: [f64; UNKNOWNS],
-}
-
-impl Layer {
-    /// The outline's share of each sample.
-    fn draw(&mut self, outline: &Outline, patch: &Patch) {
-        self.share.clear();
-        self.share.resize(patch.green.len(), 0.0);
-        let columns = patch.columns.max(1);
-        let part = 1.0 / real(FINE);
-        for (row, shares) in self.share.chunks_mut(columns).enumerate() {
-            for fine in 0..FINE {
-                let offset = (real(fine) + 0.5) * part - 0.5;
-                let v = patch.origin[1] + (real(row) + offset) * patch.step;
-                outline.each_crossing(v, |from, to| {
-                    let [from, to] = [from, to].map(|u| (u - patch.origin[0]) / patch.step + 0.5);
-                    let (from, to) = (from.max(0.0), to.min(real(columns)));
-                    let first = whole(from);
-                    for (share, left) in shares.iter_mut().skip(first).zip(first..) {
-                        let left = real(left);
-                        if left >= to {
-                            break;
-                        }
-                        let inside = (left + 1.0).min(to) - left.max(from);
-                        #[expect(clippy::cast_possible_truncation, reason = "a share")]
-                        {
-                            *share += (part * inside.max(0.0)) as f32;
-                        }
-                    }
-                });
-            }
-        }
-    }
-
-    /// Blurs by a normal density of this spread (samples).
-    fn blur(&mut self, spread: f64, columns: usize, across: &mut Vec<f32>) {
-        let mut kernel = [0.0_f32; SIDE / 2];
-        let reach = whole((3.0 * spread).ceil()).clamp(1, kernel.len() - 1);
-        let mut sum = 0.0;
-        for (index, weight) in kernel.iter_mut().enumerate().take(reach + 1) {
-            let distance = real(index) / spread;
-            #[expect(clippy::cast_possible_truncation, reason = "a weight")]
-            {
-                *weight = (-0.5 * distance * distance).exp() as f32;
-            }
-            sum += if index == 0 { *weight } else { 2.0 * *weight };
-        }
-        kernel.iter_mut().for_each(|weight| *weight /= sum);
-        across.clear();
-        across.resize(self.share.len(), 0.0);
-        for (row, blurred) in self
-            .share
-            .chunks(columns.max(1))
-            .zip(across.chunks_mut(columns.max(1)))
-        {
-            for (u, value) in row.iter().enumerate().filter(|(_, value)| **value > 0.0) {
-                for (index, weight) in kernel.iter().enumerate().take(reach + 1) {
-                    if let Some(place) = blurred.get_mut(u + index) {
-                        *place += weight * value;
-                    }
-                    if index > 0
-                        && let Some(place) = u.checked_sub(index).and_then(|u| blurred.get_mut(u))
-                    {
-                        *place += weight * value;
-                    }
-                }
-            }
-        }
-        self.share.fill(0.0);
-        let rows = across.len() / columns.max(1);
-        for (v, row) in across.chunks(columns.max(1)).enumerate() {
-            for to in v.saturating_sub(reach)..(v + reach + 1).min(rows) {
-                let weight = kernel[v.abs_diff(to)];
-                let into = self.share.iter_mut().skip(to * columns);
-                for (place, value) in into.zip(row) {
-                    *place += weight * value;
-                }
-            }
-        }
-    }
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a cast from a float saturates; NaN becomes 0"
-)]
-fn whole(place: f64) -> usize {
-    place as usize
-}
-
-fn real(count: usize) -> f64 {
-    u32::try_from(count).map_or(f64::INFINITY, f64::from)
 }

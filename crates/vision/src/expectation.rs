@@ -1,5 +1,6 @@
 //! What the loop expects to see: where, how large, how sure. Plain numbers, whoever made them.
 
+use crate::numbers::{real, whole};
 use crate::{Frame, RunMap, Window};
 
 /// How far a band's colour may reach beyond its outline, motion and defocus included (px).
@@ -24,7 +25,7 @@ impl Expectation {
     ///
     /// None if that is more than a quarter of it: then the whole frame may as well be read.
     pub fn window(&self, frame: &impl Frame) -> Option<Window> {
-        let [size_u, size_v] = [frame.width(), frame.height()].map(pixels);
+        let [size_u, size_v] = [frame.width(), frame.height()].map(real);
         let [mut left, mut top, mut right, mut bottom] = [size_u, size_v, 0.0, 0.0];
         for (band, outline) in self.bands.iter().enumerate() {
             let spread = |axis: usize| {
@@ -52,20 +53,6 @@ impl Expectation {
         let is_small = 4.0 * area <= size_u * size_v;
         (is_small && window.left < window.right && window.top < window.bottom).then_some(window)
     }
-}
-
-/// A frame's side is at most [`crate::frame::MAX_SIDE`], so that nothing is lost.
-fn pixels(side: usize) -> f64 {
-    u32::try_from(side).map_or(f64::INFINITY, f64::from)
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "clamped to a frame's side; NaN becomes 0"
-)]
-fn whole(place: f64) -> usize {
-    place as usize
 }
 
 /// Whoever can say what to expect.

@@ -8,7 +8,7 @@ const SAMPLES: usize = 48;
 /// How far from the outline an edge is sought (px), at most.
 const REACH: f64 = 9.0;
 /// Standard deviation of an edge (px), neighbours taken as independent.
-const EDGE: f64 = 0.5;
+const EDGE: f64 = 0.4;
 /// Edges farther than this from where they should be have no say in the end (px).
 const TOLERANCE: f64 = 1.8;
 /// Standard deviation of the growth of the outlines: blur and threshold (px), and unknown scale (1).

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use crate::format::{Consumer, Group, Row};
+use crate::numbers::{real, single, whole};
 use crate::{ColorDiscriminant, Frame, Outline};
 
 /// Most samples in a row and in a column.
@@ -83,8 +84,7 @@ impl Patch {
                 product += f64::from(red * blue);
             }
         }
-        #[expect(clippy::cast_possible_truncation, reason = "a ratio of grey levels")]
-        let k = (product / f64::max(square, 1.0)) as f32;
+        let k = single(product / f64::max(square, 1.0));
         self.green.clear();
         let values = self.differences.iter().map(|[red, blue]| blue - k * red);
         self.green.extend(values);
@@ -165,25 +165,8 @@ impl Consumer for Sample<'_> {
                 let sum: f64 = (weights.iter().enumerate())
                     .map(|(channel, weight)| weight * f64::from(group.channel(pixel, channel)))
                     .sum();
-                #[expect(clippy::cast_possible_truncation, reason = "a grey level")]
-                {
-                    (sum + constant) as f32
-                }
+                single(sum + constant)
             })
         }));
     }
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a cast from a float saturates; NaN becomes 0"
-)]
-fn whole(value: f64) -> usize {
-    value as usize
-}
-
-/// A frame's side is at most [`crate::frame::MAX_SIDE`], so that nothing is lost.
-fn real(pixels: usize) -> f64 {
-    u32::try_from(pixels).map_or(f64::INFINITY, f64::from)
 }
