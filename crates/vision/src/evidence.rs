@@ -6,6 +6,9 @@ use crate::{Expectation, Rejection, RunMap};
 /// Least share of a band's rims at which the colour ends.
 const RIMS: f64 = 0.2;
 
+/// Share of its colour that a band has to itself: two outlines on one band share theirs.
+const APART: f64 = 0.8;
+
 /// What speaks for a band.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Evidence {
@@ -125,7 +128,7 @@ fn refusal(band: &Evidence, demands: &Demands) -> Option<Rejection> {
             share: 1.0 - band.inside,
         })
     } else if band.coverage < demands.coverage
-        || band.own < f64::max(0.75 * demands.coverage, 0.5 * band.coverage)
+        || band.own < f64::max(0.75 * demands.coverage, APART * band.coverage)
     {
         Some(Rejection::Hidden { share: band.own })
     } else if band.spill > demands.spill * band.coverage {
