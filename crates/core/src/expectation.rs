@@ -9,9 +9,6 @@ use crate::posture::Belief;
 /// States from which the best is sought.
 const STARTS: usize = 3;
 
-/// Both bands are on one stiff tip: correlation of how far they are from where the model has them.
-const ALIKE: f64 = 0.9;
-
 /// What is believed of the instrument's state: one of several, equally likely.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Beliefs<'a> {
@@ -58,12 +55,11 @@ impl FeatureModel {
         let [[ua, va], [ub, vb]] = bands.map(|band| band.centroid);
         let mut features = [ua, va, ub, vb];
         let own = square(beliefs.model_deviation);
-        let both = ALIKE * own;
         let mut covariance = [
-            [own, 0.0, both, 0.0],
-            [0.0, own, 0.0, both],
-            [both, 0.0, own, 0.0],
-            [0.0, both, 0.0, own],
+            [own, 0.0, 0.0, 0.0],
+            [0.0, own, 0.0, 0.0],
+            [0.0, 0.0, own, 0.0],
+            [0.0, 0.0, 0.0, own],
         ];
         let dofs = believed.iter().zip(posture).zip(beliefs.deviation);
         for (column, ((believed, here), spread)) in prediction.columns.iter().zip(dofs) {
