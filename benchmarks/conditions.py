@@ -245,6 +245,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--frames", type=int, default=250, help="per condition [%(default)s]")
     parser.add_argument("--seeds", type=int, default=5, help="number of seeds [%(default)s]")
+    parser.add_argument("--first-seed", type=int, default=0, help="others to tune on [%(default)s]")
     parser.add_argument("--workers", type=int, default=os.cpu_count(), help="[all cores]")
     parser.add_argument("--json", action="store_true", help="print one JSON object and no more")
     parser.add_argument("--write", action="store_true", help="make docs/conditions.md")
@@ -253,7 +254,7 @@ def main() -> None:
     if options.montage is not None:
         montage(options.montage, seed=0)
         return
-    work = jobs(options.frames, range(options.seeds))
+    work = jobs(options.frames, range(options.first_seed, options.first_seed + options.seeds))
     with progress_bar(f"{sum(job.frames for job in work)} frames") as tell:
         rows = to_rows(run(work, options.workers, tell))
     if options.write:

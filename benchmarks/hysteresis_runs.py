@@ -217,7 +217,8 @@ class Store:
         self, plan: Iterable[Simulation], workers: int, tell: Callable[[float], None]
     ) -> None:
         """Run what is not there yet, the longest first; `tell` is given the share done."""
-        todo = [each for each in dict.fromkeys(plan) if not self._file(each).exists()]
+        files = {self._file(each): each for each in plan}
+        todo = [each for file, each in files.items() if not file.exists()]
         todo.sort(key=lambda each: -each.work)
         total, done = sum(each.work for each in todo), 0.0
         if not todo:

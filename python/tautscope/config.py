@@ -250,7 +250,7 @@ class VisionConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     bands that run into each other in a blurred picture [ours]."""
     smoothing: Annotated[int, Meta(ge=0, le=8)] = 1
     """Passes of the 3x3 binomial low-pass over the projected channel; 0 is none [ours]."""
-    minimum_area: Annotated[int, Meta(ge=1)] = 40
+    minimum_area: Annotated[int, Meta(ge=1)] = 15
     """Regions below this are dropped [px]."""
     model_deviation: Positive = 2.5
     """Of a band from where the instrument's model has it: standard deviation [px] [ours]."""

@@ -110,9 +110,11 @@ impl MarkerDetector {
         let frame = ArrayFrame::new(&image, self.format)?;
         let expect = Believed {
             model: &self.model,
-            states: &states,
-            deviation,
-            model_deviation: self.model_deviation,
+            beliefs: core::Beliefs {
+                states: &states,
+                deviation,
+                model_deviation: self.model_deviation,
+            },
         };
         let demands = if states.len() > 1 {
             self.demands.without_a_place()
@@ -207,92 +209,19 @@ type Measured<'py> = (
     usize,
 );
 
-/// States from which the best is sought.
-const STARTS: usize = 3;
-
-/// What the core's model says of where the instrument may be.
+/// What the core's model says of where the instrument may be, as the vision asks it.
 struct Believed<'a> {
     model: &'a core::FeatureModel,
-    states: &'a [[f64; 3]],
-    deviation: [f64; 3],
-    model_deviation: f64,
-}
-
-impl Believed<'_> {
-    fn belief(&self, state: [f64; 3]) -> core::Belief {
-        core::Belief {
-            state,
-            deviation: self.deviation,
-        }
-    }
-
-    /// Of a state as it is; infinite if no band can be seen in it.
-    fn misfit(&self, state: [f64; 3], seen: [f64; 4], deviation: [f64; 4]) -> f64 {
-        let misfit = self
-            .model
-            .misfit(&self.belief(state), state, seen, deviation);
-        misfit.unwrap_or(f64::INFINITY)
-    }
+    beliefs: core::Beliefs<'a>,
 }
 
 impl Expect for Believed<'_> {
     fn expect(&self, seen: [f64; 4], deviation: [f64; 4]) -> Option<Expectation> {
-        // The states that explain the features best as they are; one of them leads to the best of all.
-        let mut starts = [(f64::INFINITY, None); STARTS];
-        let mut consider = |state: [f64; 3]| {
-            let misfit = self.misfit(state, seen, deviation);
-            if let Some(place) = starts.iter().position(|(less, _)| misfit < *less) {
-                starts[place..].rotate_right(1);
-                starts[place] = (misfit, Some(state));
-            }
-        };
-        self.states.iter().copied().for_each(&mut consider);
-        if let [state] = self.states
-            && self.misfit(*state, seen, deviation).is_infinite()
-        {
-            // No band can be seen from there; but it need not be exactly there.
-            for (dof, spread) in self.deviation.into_iter().enumerate() {
-                for step in [-spread, spread] {
-                    let mut near = *state;
-                    near[dof] += step;
-                    consider(near);
-                }
-            }
-        }
-        let found = starts.iter().filter_map(|(_, state)| {
-            let state = (*state)?;
-            let belief = self.belief(state);
-            let (nearest, misfit) = self.model.nearest_state(&belief, seen, deviation)?;
-            Some((state, nearest, misfit))
-        });
-        let (believed, nearest, _) = found.min_by(|a, b| a.2.total_cmp(&b.2))?;
-        // Where several states cover the workspace, no place in it is surprising.
-        let believed = if self.states.len() > 1 {
-            nearest
-        } else {
-            believed
-        };
-        let prediction = self.model.predict(nearest)?;
-        let bands = self.model.bands(nearest)?;
-        let [a, b] = bands.map(|band| band.centroid);
-        let mut features = [a[0], a[1], b[0], b[1]];
-        let mut covariance = [[0.0; 4]; 4];
-        for dof in 0..3 {
-            let column = prediction.columns[dof];
-            for i in 0..4 {
-                features[i] += column[i] * (believed[dof] - nearest[dof]);
-                for j in 0..4 {
-                    covariance[i][j] += column[i] * column[j] * self.deviation[dof].powi(2);
-                }
-            }
-        }
-        for (index, row) in covariance.iter_mut().enumerate() {
-            row[index] += self.model_deviation.powi(2);
-        }
+        let expected = self.model.expect(&self.beliefs, seen, deviation)?;
         Some(Expectation {
-            features,
-            covariance,
-            bands: bands.map(|band| Outline {
+            features: expected.features,
+            covariance: expected.covariance,
+            bands: expected.bands.map(|band| Outline {
                 corners: band.outline,
                 centroid: band.centroid,
                 area: band.area,

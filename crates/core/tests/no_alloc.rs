@@ -39,11 +39,11 @@ fn adaptive() -> PerDof<Axis> {
             prior: OffsetPrior {
                 spacing: 6.0 * unit,
                 level: 20.0 * unit,
-                tilt: 0.05,
+                tilt: 0.3,
                 local: unit,
                 correlation: 40.0 * unit,
                 level_drift: unit,
-                tilt_drift: 0.0003,
+                tilt_drift: 0.1,
                 local_drift: unit,
                 symmetry: 0.8,
             },
@@ -75,16 +75,19 @@ fn weighted(outlier_distance: f64) -> StateEstimation {
     StateEstimation::Weighted(WeightedEstimator::new(watch, settings).unwrap())
 }
 
-fn reduction(axes: PerDof<Axis>, estimation: StateEstimation) -> HysteresisReduction {
+fn model() -> FeatureModel {
     let distortion = [-0.18, 0.05, 0.001, -0.001, -0.005, 0.0, 0.0, 0.0];
-    let model = FeatureModel::new(
+    FeatureModel::new(
         Instrument::new(18.5e-3, 5e-3, 15e-3, 1.75e-3, 4e-3).unwrap(),
         Camera::new([424.0, 454.0], [349.6, 285.0], distortion).unwrap(),
         Pose::new([9e-3, 7e-3, 8e-3], [0.29, -0.37, 0.0]).unwrap(),
-    );
+    )
+}
+
+fn reduction(axes: PerDof<Axis>, estimation: StateEstimation) -> HysteresisReduction {
     HysteresisReduction::new(
         axes,
-        model,
+        model(),
         estimation,
         History::new(2.0, 0.005).unwrap(),
         Whereabouts::new([5e-3, 0.6, 0.5], [2e-4, 0.02, 0.01]).unwrap(),
@@ -101,19 +104,24 @@ fn step_and_image_update_do_not_allocate() {
 
 fn run(mut reduction: HysteresisReduction) {
     let (mut used, mut learnt) = (0, 0);
+    let truth = model();
+    let posture = |time: f64| {
+        let wave = time.sin();
+        [0.025 + 0.01 * wave, wave, 0.9 + 0.5 * wave]
+    };
     assert_no_alloc(|| {
         for tick in 0..4000_u32 {
             let time = f64::from(tick) * 0.005;
-            let wave = time.sin();
-            let reference = [0.025 + 0.01 * wave, wave, 0.9 + 0.5 * wave];
-            reduction.step(reference, time);
+            reduction.step(posture(time), time);
             if tick % 8 == 0 {
                 let captured_at = time - 0.08;
-                let seen = reduction.predicted_features(captured_at);
-                let shifted = seen.map(|features| features.map(|value| value + 3.0 * wave));
+                let seen = truth.predict(posture(captured_at - 0.3));
                 let wrong = if tick % 80 == 0 { 300.0 } else { 0.0 };
-                let shifted = shifted.map(|[ua, va, ub, vb]| [ua, va, ub + wrong, vb]);
-                let report = reduction.on_features(shifted, None, captured_at);
+                let measured = seen.map(|seen| {
+                    let [ua, va, ub, vb] = seen.features;
+                    [ua, va, ub + wrong, vb]
+                });
+                let report = reduction.on_features(measured, None, captured_at);
                 used += u32::from(report.status == Status::Ok);
                 learnt += u32::from(report.triggers.iter().any(Triggers::any));
             }

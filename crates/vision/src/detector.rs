@@ -1,7 +1,11 @@
 //! Frame to markers: Fig. 5 as a whole.
 
-use crate::judge::{Demands, Verdict, judge};
-use crate::{ColorDiscriminant, Error, Expect, Frame, Labeller, Region, RunMap, Segmenter, Window};
+use crate::blend::{Blend, Blended};
+use crate::judge::{Verdict, judge, judge_at};
+use crate::{
+    ColorDiscriminant, Demands, Error, Expect, Expectation, Frame, Labeller, Region, RunMap,
+    Segmenter, Window,
+};
 
 /// Only so many regions, the largest, are considered: it bounds the time on a noisy frame.
 pub const CANDIDATES: usize = 16;
@@ -27,6 +31,7 @@ pub struct Detector {
     regions: Vec<Region>,
     alternatives: Vec<Segmenter>,
     best: Vec<Region>,
+    blend: Blend,
 }
 
 impl Detector {
@@ -54,6 +59,7 @@ impl Detector {
             regions: Vec::with_capacity(CANDIDATES),
             alternatives: Vec::new(),
             best: Vec::with_capacity(CANDIDATES),
+            blend: Blend::default(),
         })
     }
 
@@ -85,6 +91,33 @@ impl Detector {
         }
         self.find(frame, Window::whole(frame));
         let mut verdict = judge(&self.regions, &self.map, expect, demands);
+        if verdict.is_clear() {
+            return (verdict, &self.regions);
+        }
+        let lit = before.and_then(|blind| self.by_light(frame, expect, &blind, &verdict, demands));
+        if let Some(lit) = lit
+            && let Some(again) = judge_at(lit.features, [1.0; 4], &self.map, expect, demands)
+            && again.score() > verdict.score()
+        {
+            verdict = again;
+        }
+        self.try_alternatives(frame, expect, demands, &mut verdict);
+        if let Some(lit) = lit
+            && (verdict.reasons != [None; 2] || lit.is_blurred() && !verdict.is_clear())
+        {
+            verdict = lit.verdict();
+        }
+        (verdict, &self.regions)
+    }
+
+    /// Replaces a verdict that is not clear by a better one, from another discriminant.
+    fn try_alternatives(
+        &mut self,
+        frame: &impl Frame,
+        expect: &impl Expect,
+        demands: &Demands,
+        verdict: &mut Verdict,
+    ) {
         for index in 0..self.alternatives.len() {
             if verdict.is_clear() {
                 break;
@@ -95,7 +128,7 @@ impl Detector {
             self.exchange(index);
             let other = judge(&self.regions, &self.map, expect, demands);
             if other.score() > verdict.score() {
-                verdict = Verdict {
+                *verdict = Verdict {
                     discriminant: index + 1,
                     ..other
                 };
@@ -103,7 +136,29 @@ impl Detector {
                 std::mem::swap(&mut self.best, &mut self.regions);
             }
         }
-        (verdict, &self.regions)
+    }
+
+    /// The bands by their light, if that is good: from where the outlines were laid, and from where they are expected.
+    fn by_light(
+        &mut self,
+        frame: &impl Frame,
+        expect: &impl Expect,
+        blind: &Expectation,
+        verdict: &Verdict,
+        demands: &Demands,
+    ) -> Option<Blended> {
+        let [[ua, va], [ub, vb]] = verdict.bands.map(|band| band.centroid);
+        let starts = [[ua, va, ub, vb], blind.features];
+        let mut best: Option<Blended> = None;
+        for start in starts {
+            if start.iter().all(|value| value.is_finite())
+                && let Some(found) = self.blend.fit(frame, expect, blind, start)
+                && best.is_none_or(|best| found.explained > best.explained)
+            {
+                best = Some(found);
+            }
+        }
+        best.filter(|found| found.is_good(demands))
     }
 
     /// The regions in some windows, the largest first, at most [`CANDIDATES`]; each ends where its

@@ -64,6 +64,16 @@ impl ColorDiscriminant {
         Projection::new(affine.weights, affine.constant, self.threshold, scale)
     }
 
+    /// Weights of a format's three channels, and the constant, that make `weights . [B, G, R]`.
+    pub(crate) fn affine_of(weights: [f64; 3], format: PixelFormat) -> ([f64; 3], f64) {
+        let discriminant = Self {
+            weights,
+            threshold: 0.0,
+        };
+        let Affine { weights, constant } = discriminant.affine(format);
+        (weights, constant)
+    }
+
     /// The weighted sum as a function of the channels in the order in which the format's rows give them.
     ///
     /// Y, U, V as cameras give them, ITU-R BT.601 with limited range: Y 16 to 235, U and V 16 to 240 about 128,

@@ -1,5 +1,6 @@
 //! What the loop expects to see: where, how large, how sure. Plain numbers, whoever made them.
 
+use crate::numbers::{real, whole};
 use crate::{Frame, RunMap, Window};
 
 /// How far a band's colour may reach beyond its outline, motion and defocus included (px).
@@ -24,7 +25,7 @@ impl Expectation {
     ///
     /// None if that is more than a quarter of it: then the whole frame may as well be read.
     pub fn window(&self, frame: &impl Frame) -> Option<Window> {
-        let [size_u, size_v] = [frame.width(), frame.height()].map(pixels);
+        let [size_u, size_v] = [frame.width(), frame.height()].map(real);
         let [mut left, mut top, mut right, mut bottom] = [size_u, size_v, 0.0, 0.0];
         for (band, outline) in self.bands.iter().enumerate() {
             let spread = |axis: usize| {
@@ -52,20 +53,6 @@ impl Expectation {
         let is_small = 4.0 * area <= size_u * size_v;
         (is_small && window.left < window.right && window.top < window.bottom).then_some(window)
     }
-}
-
-/// A frame's side is at most [`crate::frame::MAX_SIDE`], so that nothing is lost.
-fn pixels(side: usize) -> f64 {
-    u32::try_from(side).map_or(f64::INFINITY, f64::from)
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "clamped to a frame's side; NaN becomes 0"
-)]
-fn whole(place: f64) -> usize {
-    place as usize
 }
 
 /// Whoever can say what to expect.
@@ -142,6 +129,24 @@ impl Outline {
         count
     }
 
+    /// Whether a place is inside.
+    pub fn contains(&self, [u, v]: [f64; 2]) -> bool {
+        let mut inside = false;
+        self.each_crossing(v, |from, to| inside |= (from..=to).contains(&u));
+        inside
+    }
+
+    /// Where row `v` is inside, from and to (px).
+    pub fn each_crossing(&self, v: f64, mut visit: impl FnMut(f64, f64)) {
+        let spans = self.crossings(v);
+        let pairs = spans.crossings.chunks_exact(2).take(spans.len / 2);
+        for pair in pairs {
+            if let [from, to] = pair {
+                visit(*from, *to);
+            }
+        }
+    }
+
     /// First and last row of an image so high that it may touch.
     fn rows(&self, height: f64) -> (f64, f64) {
         let extreme = |pick: fn(f64, f64) -> f64, start| {
@@ -156,6 +161,12 @@ impl Outline {
 
     /// Where row `v` is inside: pixels, whole numbers.
     fn spans(&self, v: f64, width: f64) -> Spans {
+        let mut spans = self.crossings(v);
+        spans.clip(width);
+        spans
+    }
+
+    fn crossings(&self, v: f64) -> Spans {
         let mut spans = Spans::default();
         let next = self.corners.iter().cycle().skip(1);
         for ([u0, v0], [u1, v1]) in self.corners.iter().zip(next) {
@@ -163,7 +174,7 @@ impl Outline {
                 spans.add(u0 + (v - v0) / (v1 - v0) * (u1 - u0));
             }
         }
-        spans.sort(width);
+        spans.sort();
         spans
     }
 }
@@ -194,9 +205,13 @@ impl Spans {
         }
     }
 
-    fn sort(&mut self, width: f64) {
+    fn sort(&mut self) {
         let crossings = self.crossings.get_mut(..self.len).unwrap_or_default();
         crossings.sort_by(f64::total_cmp);
+    }
+
+    fn clip(&mut self, width: f64) {
+        let crossings = self.crossings.get_mut(..self.len).unwrap_or_default();
         for (index, u) in crossings.iter_mut().enumerate() {
             *u = if index % 2 == 0 {
                 u.ceil().max(0.0)

@@ -8,7 +8,7 @@ const SAMPLES: usize = 48;
 /// How far from the outline an edge is sought (px), at most.
 const REACH: f64 = 9.0;
 /// Standard deviation of an edge (px), neighbours taken as independent.
-const EDGE: f64 = 0.6;
+const EDGE: f64 = 0.4;
 /// Edges farther than this from where they should be have no say in the end (px).
 const TOLERANCE: f64 = 1.8;
 /// Standard deviation of the growth of the outlines: blur and threshold (px), and unknown scale (1).
@@ -21,6 +21,8 @@ const SCALE_APART: f64 = 0.03;
 const BORDER: f64 = 2.0;
 /// Nearer than this to where a rim meets a side the low-pass rounds the outline off (px).
 const CORNER: f64 = 2.5;
+/// Fewer samples of a rim than this say nothing of how much of it is there.
+const FEW: f64 = 4.0;
 /// Where they meet.
 const CORNERS: [usize; 4] = [0, OUTLINE / 2 - 1, OUTLINE / 2, OUTLINE - 1];
 /// The tolerance, round by round: from a region's centroid, and from where the outlines have lain before.
@@ -39,8 +41,8 @@ pub struct Fit {
     pub bloom: [Bloom; 2],
     /// Share of each outline at which an edge was where it should be, of that in the image.
     pub edges: [f64; 2],
-    /// Mean square of those edges' misfits (px^2).
-    pub misfit: [f64; 2],
+    /// The same of the rims alone; 1 where next to none of them is in the image.
+    pub rims: [f64; 2],
     /// (d - expected)' inverse covariance (d - expected), 4 degrees of freedom.
     pub surprise: f64,
 }
@@ -106,10 +108,11 @@ pub fn fit(
             row[other] = -apart;
         }
         let (mut edges, mut inside) = ([0.0; 2], [0.0; 2]);
-        let (mut weights, mut misfit) = ([0.0; 2], [0.0; 2]);
+        let (mut rims, mut rims_inside) = ([0.0; 2], [0.0; 2]);
         for (band, outline) in laid.iter().enumerate().filter(|(band, _)| seen[*band]) {
             each_edge(outline, map, |edge| {
                 inside[band] += 1.0;
+                rims_inside[band] += f64::from(u8::from(!edge.side));
                 let Some(offset) = edge.offset else { return };
                 let grown = 2 * band + usize::from(edge.side);
                 let left = offset - bloom[grown];
@@ -119,8 +122,7 @@ pub fn fit(
                 }
                 let weight = (1.0 - share * share).powi(2);
                 edges[band] += 1.0;
-                weights[band] += weight;
-                misfit[band] += weight * left * left;
+                rims[band] += f64::from(u8::from(!edge.side));
                 let mut row = [0.0; 8];
                 row[2 * band..2 * band + 2].copy_from_slice(&edge.normal);
                 row[4 + grown] = 1.0;
@@ -155,7 +157,10 @@ pub fn fit(
                 },
             ],
             edges: [0, 1].map(|band| edges[band] / f64::max(inside[band], 1.0)),
-            misfit: [0, 1].map(|band| misfit[band] / f64::max(weights[band], 1.0)),
+            rims: [0, 1].map(|band| match rims_inside[band] {
+                few if few < FEW => 1.0,
+                count => rims[band] / count,
+            }),
             surprise: pull.iter().zip(away).map(|(a, b)| a * b).sum(),
         });
     }

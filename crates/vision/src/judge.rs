@@ -1,8 +1,8 @@
 //! Which of what has the markers' colour is a band: by place, size, outline, and both together.
 
-use crate::fit::{COARSE, FINE, Fit, fit, settle};
-use crate::linear::{inverse, quadratic};
-use crate::regions::real;
+use crate::evidence::{Demands, Evidence, weigh};
+use crate::fit::{COARSE, FINE, Fit, fit};
+use crate::pairing::{Pair, likely, shift};
 use crate::{Expect, Expectation, Region, Rejection, RunMap};
 
 /// How the two bands were recognised, or why not.
@@ -20,64 +20,7 @@ pub struct Verdict {
     pub discriminant: usize,
 }
 
-/// What speaks for a band.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Evidence {
-    /// Share of its outline's area that is in the image.
-    pub inside: f64,
-    /// Share of that which has the markers' colour.
-    pub coverage: f64,
-    /// Share of it that has the markers' colour and is not in the other band's outline.
-    pub own: f64,
-    /// Share of a ring around it that has the markers' colour.
-    pub spill: f64,
-    /// Share of its outline at which the colour ends.
-    pub edges: f64,
-    /// How much its outline had to grow (px).
-    pub bloom: f64,
-    /// Squared Mahalanobis distance of both bands from where they were expected.
-    pub surprise: f64,
-    /// Centroid of the outline, u, v (px).
-    pub centroid: [f64; 2],
-}
-
-/// What a band must show.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Demands {
-    /// Least [`Evidence::inside`].
-    pub inside: f64,
-    /// Least [`Evidence::coverage`].
-    pub coverage: f64,
-    /// Largest [`Evidence::spill`] over [`Evidence::coverage`].
-    pub spill: f64,
-    /// Least [`Evidence::edges`].
-    pub edges: f64,
-    /// Least mean of the edges of both bands.
-    pub edges_on_average: f64,
-    /// Least edges, and three quarters of it the least coverage, of a band that is found alone.
-    pub edges_alone: f64,
-    /// Largest squared Mahalanobis distance of both from where they are expected.
-    pub surprise: f64,
-}
-
-impl Demands {
-    /// Where nothing is known of the place, only what is all but whole is a band.
-    #[must_use]
-    pub fn without_a_place(&self) -> Self {
-        Self {
-            inside: self.inside.max(0.9),
-            coverage: self.coverage.max(0.75),
-            edges: self.edges.max(0.75),
-            edges_on_average: self.edges_on_average.max(0.85),
-            edges_alone: f64::INFINITY,
-            ..*self
-        }
-    }
-}
-
 const NOWHERE: [f64; 4] = [f64::NAN; 4];
-/// Pairs of regions that are tried, the likeliest first.
-const TRIALS: usize = 6;
 /// Outlines are laid again at most so often, and until they stay within so much (px).
 const LAYS: usize = 4;
 const STILL: f64 = 0.2;
@@ -85,8 +28,12 @@ const STILL: f64 = 0.2;
 const AMBIGUOUS: f64 = 9.0;
 /// Share of edges of both bands with which a verdict needs no other.
 const ENOUGH: f64 = 0.75;
+/// And of its area.
+const WHOLE: f64 = 0.8;
 /// And the squared Mahalanobis distance.
 const UNSURPRISING: f64 = 8.0;
+/// Variance that a band has more of for its missing edges.
+const HIDDEN: f64 = 5.0;
 /// What a unit of that distance takes from a score that edges make.
 const DOUBT: f64 = 0.02;
 
@@ -171,81 +118,6 @@ impl Verdict {
     }
 }
 
-/// A region for A and one for B; none: not among the regions; one for both: they run into each other.
-type Pair = [Option<usize>; 2];
-
-/// The likeliest pairs, the likeliest first: squared Mahalanobis distance of each pair's centroids, where a
-/// centroid may be off by a third of the band's size, and squared logarithm of the ratios of areas. A band without a region
-/// costs as much as one four deviations off.
-fn likely(regions: &[Region], expected: &Expectation) -> [Option<Pair>; TRIALS] {
-    let mut kept: [Option<(f64, Pair)>; TRIALS] = [None; TRIALS];
-    let slack = expected
-        .bands
-        .each_ref()
-        .map(|band| (0.35 * band.radius()).powi(2));
-    let mut covariance = expected.covariance;
-    for (index, row) in covariance.iter_mut().enumerate() {
-        row[index] += slack[index / 2];
-    }
-    let choices = || (0..regions.len()).map(Some).chain([None]);
-    let both = inverse(covariance).unwrap_or([[0.0; 4]; 4]);
-    let single = [0, 2].map(|at| {
-        let part = [0, 1].map(|i| [0, 1].map(|j| covariance[at + i][at + j]));
-        inverse(part).unwrap_or([[0.0; 2]; 2])
-    });
-    let middle = [0, 1].map(|i| {
-        [0, 1].map(|j| {
-            let across = covariance[i][j + 2] + covariance[i + 2][j];
-            (covariance[i][j] + covariance[i + 2][j + 2] + across) / 4.0
-        })
-    });
-    let middle = inverse(middle).unwrap_or([[0.0; 2]; 2]);
-    let away = |index: usize, band: usize| {
-        let [u, v] = regions[index].centroid();
-        [
-            u - expected.features[2 * band],
-            v - expected.features[2 * band + 1],
-        ]
-    };
-    let size = |index: usize, band: usize| {
-        (real(regions[index].area) / expected.bands[band].area)
-            .ln()
-            .powi(2)
-    };
-    for a in choices() {
-        for b in choices() {
-            let cost = match (a, b) {
-                (Some(a), Some(b)) if a != b => {
-                    let ([ua, va], [ub, vb]) = (away(a, 0), away(b, 1));
-                    quadratic(&both, [ua, va, ub, vb]) + size(a, 0) + size(b, 1)
-                }
-                (Some(a), None) => 16.0 + quadratic(&single[0], away(a, 0)) + size(a, 0),
-                (None, Some(b)) => 16.0 + quadratic(&single[1], away(b, 1)) + size(b, 1),
-                (Some(one), Some(_)) => {
-                    let both = expected.bands[0].area + expected.bands[1].area;
-                    let shift = shift(regions[one].centroid(), expected);
-                    quadratic(&middle, shift) + (real(regions[one].area) / both).ln().powi(2)
-                }
-                (None, None) => 24.0,
-            };
-            let place = kept
-                .iter()
-                .position(|one| one.is_none_or(|(less, _)| cost < less));
-            if let Some(place) = place {
-                kept[place..].rotate_right(1);
-                kept[place] = Some((cost, [a, b]));
-            }
-        }
-    }
-    kept.map(|one| one.map(|(_, pair)| pair))
-}
-
-/// From the middle of the two expected bands to a region over both.
-fn shift([u, v]: [f64; 2], expected: &Expectation) -> [f64; 2] {
-    let [ua, va, ub, vb] = expected.features;
-    [u - f64::midpoint(ua, ub), v - f64::midpoint(va, vb)]
-}
-
 fn attempt(
     pair: Pair,
     blind: &Expectation,
@@ -267,7 +139,18 @@ fn attempt(
         let [ua, va, ub, vb] = blind.features;
         seen = [ua + u, va + v, ub + u, vb + v];
     }
-    let (mut laid, mut found) = lay(seen, [4.0; 4], [true; 2], COARSE, map, expect)?;
+    judge_at(seen, [4.0; 4], map, expect, demands)
+}
+
+/// The verdict on outlines laid from there on, features (4,) in px with standard deviations (4,) in px.
+pub fn judge_at(
+    seen: [f64; 4],
+    deviation: [f64; 4],
+    map: &RunMap,
+    expect: &impl Expect,
+    demands: &Demands,
+) -> Option<Verdict> {
+    let (mut laid, mut found) = lay(seen, deviation, [true; 2], COARSE, map, expect)?;
     // The better the place is known, the better the outlines.
     for _ in 0..LAYS {
         let before = found.features;
@@ -279,7 +162,7 @@ fn attempt(
             break;
         }
     }
-    let verdict = weigh(&laid, &found, map, demands);
+    let verdict = Verdict::of(&laid, &found, map, demands);
     match verdict.reasons {
         [None, None] | [Some(_), Some(_)] => Some(verdict),
         reasons => {
@@ -290,7 +173,7 @@ fn attempt(
                 seen[2 * band..2 * band + 2].fill(f64::NAN);
             }
             let (laid, found) = lay(seen, sureness(&found), alone, FINE, map, expect)?;
-            let mut last = weigh(&laid, &found, map, demands);
+            let mut last = Verdict::of(&laid, &found, map, demands);
             for band in (0..2).filter(|band| !alone[*band]) {
                 last.reasons[band] = reasons[band].or(Some(Rejection::NoRegion));
                 last.bands[band] = verdict.bands[band];
@@ -326,86 +209,28 @@ fn lay(
     Some((laid, found))
 }
 
-fn weigh(laid: &Expectation, found: &Fit, map: &RunMap, demands: &Demands) -> Verdict {
-    let [ua, va, ub, vb] = found.features;
-    let places = [[ua, va], [ub, vb]];
-    let outlines = [0, 1].map(|band| {
-        settle(&laid.bands[band], places[band]).grown(f64::midpoint(
-            found.bloom[band].rims,
-            found.bloom[band].sides,
-        ))
-    });
-    let bands = [0, 1].map(|band| {
-        let (own, other) = (&outlines[band], &outlines[1 - band]);
-        let whole = own.count(map, other);
-        let radius = own.radius();
-        let inner = own.grown(f64::max(1.5, 0.1 * radius)).count(map, other);
-        let outer = own.grown(f64::max(4.0, 0.4 * radius)).count(map, other);
-        let ring = f64::max(outer.pixels - inner.pixels, 1.0);
-        let marker = outer.marker - inner.marker - (outer.shared - inner.shared);
-        Evidence {
-            inside: whole.pixels / own.area,
-            coverage: whole.marker / f64::max(whole.pixels, 1.0),
-            own: (whole.marker - whole.shared) / f64::max(whole.pixels, 1.0),
-            spill: marker / ring,
-            edges: found.edges[band],
-            bloom: found.bloom[band].rims,
-            surprise: found.surprise,
-            centroid: places[band],
-        }
-    });
-    let mut reasons = bands.map(|band| refusal(&band, demands));
-    // The weaker of two weak ones falls, and with it the other.
-    let weaker = usize::from(bands[1].edges < bands[0].edges);
-    let average = |band: usize| match reasons[1 - band] {
-        None => f64::midpoint(bands[0].edges, bands[1].edges),
-        Some(_) => f64::INFINITY,
-    };
-    for band in [weaker, 1 - weaker] {
-        if reasons[band].is_none() && average(band) < demands.edges_on_average {
-            reasons[band] = Some(Rejection::Shape {
-                share: bands[band].edges,
-            });
-            break;
-        }
-    }
-    let mut verdict = Verdict {
-        features: found.features,
-        covariance: found.covariance,
-        bands,
-        reasons,
-        discriminant: 0,
-    };
-    verdict.conceal();
-    verdict
-}
-
-fn refusal(band: &Evidence, demands: &Demands) -> Option<Rejection> {
-    if band.inside < demands.inside {
-        Some(Rejection::Outside {
-            share: 1.0 - band.inside,
-        })
-    } else if band.coverage < demands.coverage || band.own < 0.75 * demands.coverage {
-        Some(Rejection::Hidden { share: band.own })
-    } else if band.spill > demands.spill * band.coverage {
-        Some(Rejection::Larger { share: band.spill })
-    } else if band.edges < demands.edges {
-        Some(Rejection::Shape { share: band.edges })
-    } else if band.surprise.is_nan() || band.surprise > demands.surprise {
-        Some(Rejection::Elsewhere {
-            distance: band.surprise.sqrt(),
-        })
-    } else {
-        None
-    }
-}
-
 impl Verdict {
+    fn of(laid: &Expectation, found: &Fit, map: &RunMap, demands: &Demands) -> Self {
+        let (bands, reasons) = weigh(laid, found, map, demands);
+        let mut verdict = Self {
+            features: found.features,
+            covariance: doubted(&found.covariance, found.edges),
+            bands,
+            reasons,
+            discriminant: 0,
+        };
+        verdict.conceal();
+        verdict
+    }
+
     /// Whether there is no need to look further.
     pub(crate) fn is_clear(&self) -> bool {
         let mut bands = self.bands.iter().zip(&self.reasons);
         bands.all(|(band, reason)| {
-            reason.is_none() && band.edges >= ENOUGH && band.surprise <= UNSURPRISING
+            reason.is_none()
+                && band.edges >= ENOUGH
+                && band.coverage >= WHOLE
+                && band.surprise <= UNSURPRISING
         })
     }
 
@@ -421,6 +246,14 @@ impl Verdict {
             }
         }
     }
+}
+
+/// What hides a part of an outline may pass for another part of it: the less of it is there, the less sure it is.
+fn doubted(covariance: &[[f64; 4]; 4], edges: [f64; 2]) -> [[f64; 4]; 4] {
+    let factors = edges.map(|share| (1.0 + HIDDEN * (1.0 - share)).sqrt());
+    std::array::from_fn(|i| {
+        std::array::from_fn(|j| covariance[i][j] * factors[i / 2] * factors[j / 2])
+    })
 }
 
 fn nothing(reason: Rejection) -> Verdict {

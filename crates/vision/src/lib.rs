@@ -9,17 +9,23 @@
 // Kernels are compiled once for each instruction set, which they are only if they are inlined.
 #![allow(clippy::inline_always)]
 
+pub mod blend;
 mod columns;
 pub mod detector;
 pub mod discriminant;
 pub mod error;
+pub mod evidence;
 pub mod expectation;
 pub mod fit;
 pub mod format;
 pub mod frame;
 pub mod judge;
+mod layer;
 mod linear;
 mod lowpass;
+mod numbers;
+mod pairing;
+mod patch;
 mod projection;
 pub mod regions;
 pub mod rejection;
@@ -31,10 +37,11 @@ mod triples;
 pub use detector::{Detector, Settings};
 pub use discriminant::ColorDiscriminant;
 pub use error::Error;
+pub use evidence::{Demands, Evidence};
 pub use expectation::{Expect, Expectation, OUTLINE, Outline};
 pub use format::PixelFormat;
 pub use frame::{Frame, Image, Window};
-pub use judge::{Demands, Evidence, Verdict};
+pub use judge::Verdict;
 pub use regions::{Labeller, Region};
 pub use rejection::Rejection;
 pub use runmap::RunMap;

@@ -6,6 +6,7 @@
 mod adaptive;
 mod compensator;
 mod estimator;
+mod expectation;
 mod history;
 mod lead;
 mod offset_map;

@@ -1,0 +1,172 @@
+//! A small part of a frame as light: how green it is, with the tissue's colour taken out.
+
+use std::ops::Range;
+
+use crate::format::{Consumer, Group, Row};
+use crate::numbers::{real, single, whole};
+use crate::{ColorDiscriminant, Frame, Outline};
+
+/// Most samples in a row and in a column.
+pub const SIDE: usize = 64;
+
+/// Green minus red and green minus blue: of a grey pixel, bright or dark, both are 0.
+const DIFFERENCES: [[f64; 3]; 2] = [[0.0, 1.0, -1.0], [-1.0, 1.0, 0.0]];
+
+/// Second differences are counted in so many bins of so many grey levels.
+const BINS: usize = 128;
+const BIN: f64 = 0.5;
+
+/// Samples of a frame in a grid.
+#[derive(Clone, Debug)]
+pub struct Patch {
+    /// Place of the first sample (px).
+    pub origin: [f64; 2],
+    /// Distance of neighbours (px).
+    pub step: f64,
+    /// Samples in a row.
+    pub columns: usize,
+    differences: Vec<[f32; 2]>,
+    /// Of each sample, row by row: how green (grey levels).
+    pub green: Vec<f32>,
+}
+
+impl Default for Patch {
+    fn default() -> Self {
+        Self {
+            origin: [0.0; 2],
+            step: 1.0,
+            columns: 0,
+            differences: Vec::with_capacity(SIDE * SIDE),
+            green: Vec::with_capacity(SIDE * SIDE),
+        }
+    }
+}
+
+impl Patch {
+    /// Samples these columns and rows of a frame, as densely as there is room for. Does not allocate.
+    pub fn read(&mut self, frame: &impl Frame, columns: Range<usize>, rows: Range<usize>) {
+        let step = columns.len().max(rows.len()).div_ceil(SIDE).max(1);
+        self.origin = [columns.start, rows.start].map(real);
+        self.step = real(step);
+        self.columns = columns.len().div_ceil(step);
+        self.differences.clear();
+        let format = frame.format();
+        let channels = DIFFERENCES.map(|weights| ColorDiscriminant::affine_of(weights, format));
+        let whole = format.whole_groups(columns.clone());
+        for v in rows.step_by(step) {
+            Row::of(frame, v, whole.clone()).feed(Sample {
+                channels,
+                skip: columns.start - whole.start,
+                step,
+                count: self.columns,
+                into: &mut self.differences,
+            });
+        }
+    }
+
+    /// Takes the tissue's colour out.
+    ///
+    /// A blurred pixel is a mixture of band, tissue, and grey or black plastic. Grey has no difference of
+    /// channels, tissue has them in a fixed proportion k, fitted where it is redder than green and outside `outlines`:
+    ///
+    /// ```text
+    /// green = (G - B) - k (G - R),    k = sum (G - B) (G - R) / sum (G - R)^2
+    /// ```
+    ///
+    /// It is 0 of both and of every mixture of them, so that it measures the band's share. It errs where there are
+    /// tissues of two colours.
+    pub fn unmix(&mut self, outlines: &[Outline; 2]) {
+        let (mut square, mut product) = (0.0, 0.0);
+        for (index, [red, blue]) in self.differences.iter().enumerate() {
+            let at = self.place(index);
+            if *red < 0.0 && !outlines.iter().any(|outline| outline.contains(at)) {
+                square += f64::from(red * red);
+                product += f64::from(red * blue);
+            }
+        }
+        let k = single(product / f64::max(square, 1.0));
+        self.green.clear();
+        let values = self.differences.iter().map(|[red, blue]| blue - k * red);
+        self.green.extend(values);
+    }
+
+    /// How much redder than green a sample is (grey levels).
+    pub fn redness(&self, index: usize) -> f64 {
+        let red = self
+            .differences
+            .get(index)
+            .map_or(0.0, |[red, _]| f64::from(*red));
+        (-red).max(0.0)
+    }
+
+    /// By how much a sample's green changes if the tissue's colour does: in all of the patch, along it, and down it.
+    pub fn tissue(&self, index: usize) -> [f64; 4] {
+        let red = self
+            .differences
+            .get(index)
+            .map_or(0.0, |[red, _]| f64::from(*red))
+            / 100.0;
+        let [u, v] = self.place(index);
+        let [u, v] = [u - self.origin[0], v - self.origin[1]].map(|away| away / 30.0 - 1.0);
+        [red, red * u, red * v, red * red]
+    }
+
+    /// Variance of the sensor's noise (grey levels squared), by the median of second differences: of what changes
+    /// slowly there are none, and few are at edges.
+    pub fn grain(&self) -> f64 {
+        let mut counts = [0_u32; BINS];
+        let rows = self.green.chunks_exact(self.columns.max(1));
+        for three in rows.flat_map(|row| row.windows(3)) {
+            if let [a, b, c] = three {
+                let bin = whole(f64::from((a - 2.0 * b + c).abs()) / BIN);
+                if let Some(count) = counts.get_mut(bin.min(BINS - 1)) {
+                    *count += 1;
+                }
+            }
+        }
+        let half = counts.iter().sum::<u32>() / 2;
+        let mut below = 0;
+        let bin = counts.iter().position(|count| {
+            below += count;
+            below > half
+        });
+        // The median of |x| is 0.6745 deviations; a second difference has 6 variances.
+        let median = (real(bin.unwrap_or_default()) + 0.5) * BIN;
+        (median / 0.6745).powi(2) / 6.0
+    }
+
+    /// Where a sample is (px).
+    pub fn place(&self, index: usize) -> [f64; 2] {
+        let columns = self.columns.max(1);
+        let [u, v] = [index % columns, index / columns].map(real);
+        [
+            self.origin[0] + u * self.step,
+            self.origin[1] + v * self.step,
+        ]
+    }
+}
+
+struct Sample<'a> {
+    channels: [([f64; 3], f64); 2],
+    skip: usize,
+    step: usize,
+    count: usize,
+    into: &'a mut Vec<[f32; 2]>,
+}
+
+impl Consumer for Sample<'_> {
+    type Outcome = ();
+
+    fn consume<const P: usize, G: Group<P>>(self, groups: impl Iterator<Item = G>) {
+        let pixels = groups.flat_map(|group| (0..P).map(move |pixel| (group, pixel)));
+        let wanted = pixels.skip(self.skip).step_by(self.step).take(self.count);
+        self.into.extend(wanted.map(|(group, pixel)| {
+            self.channels.map(|(weights, constant)| {
+                let sum: f64 = (weights.iter().enumerate())
+                    .map(|(channel, weight)| weight * f64::from(group.channel(pixel, channel)))
+                    .sum();
+                single(sum + constant)
+            })
+        }));
+    }
+}
