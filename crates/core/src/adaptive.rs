@@ -4,12 +4,9 @@ use crate::contact::{ContactTest, Stroke};
 use crate::error::{ConfigError, require, require_non_negative, require_positive};
 use crate::estimator::{Trigger, Triggers};
 use crate::lead::LeadLaw;
-use crate::offset_map::{OffsetMap, OffsetPrior, Side};
+use crate::offset_map::{OffsetMap, OffsetPrior, Side, TILTS};
 use crate::play::Play;
 use crate::smoother::Smoother;
-
-/// Least stretch that is believed: a tip that does twice what the command does.
-const LEAST_STRETCH: f64 = 0.5;
 
 /// What an [`AdaptiveAxis`] is set to; lengths in the unit of the DOF.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -138,7 +135,7 @@ impl AdaptiveAxis {
     /// Travel of the tip over the command's in contact: mean and standard deviation.
     pub fn gain(&self) -> (f64, f64) {
         let (tilt, deviation) = self.offsets.tilt();
-        let gain = 1.0 / (1.0 + tilt).max(LEAST_STRETCH);
+        let gain = 1.0 / (1.0 + tilt);
         (gain, gain * gain * deviation)
     }
 
@@ -272,26 +269,22 @@ impl AdaptiveAxis {
     fn carried(&self, tip: f64, command: f64) -> f64 {
         let [plus, minus] = [Side::Plus, Side::Minus].map(|side| {
             let beyond = command - self.offsets.offset(side, tip) - tip;
-            tip + beyond / self.stretch()
+            tip + beyond / (1.0 + self.offsets.tilt().0)
         });
         tip.max(plus.min(minus)).min(plus.max(minus))
     }
 
-    /// Travel of the command for a tip in contact to travel 1.
+    /// Travel of the command for a tip in contact to travel 1, as far as the limit allows it.
     fn stretch(&self) -> f64 {
-        (1.0 + self.offsets.tilt().0).clamp(LEAST_STRETCH, self.settings.gain_limit)
+        (1.0 + self.offsets.tilt().0).min(self.settings.gain_limit)
     }
 
     /// Between which a contact's gain, tip over command, may be. One does not exclude 1.
     fn gains(&self) -> (f64, f64) {
         let (tilt, deviation) = self.offsets.tilt();
-        let [most, least] = [-2.0, 2.0].map(|by| (1.0 + tilt + by * deviation).max(LEAST_STRETCH));
-        (
-            1.0 / least,
-            (1.0 / most)
-                .min(1.0)
-                .max(1.0 / (1.0 + tilt).max(LEAST_STRETCH)),
-        )
+        let [most, least] =
+            [-2.0, 2.0].map(|by| 1.0 + (tilt + by * deviation).clamp(TILTS.0, TILTS.1));
+        (1.0 / least, (1.0 / most).min(1.0).max(1.0 / (1.0 + tilt)))
     }
 
     fn play_at(&self, position: f64) -> Play {

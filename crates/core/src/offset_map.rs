@@ -9,6 +9,10 @@ const TILT: usize = 2 * NODES;
 const SIZE: usize = TILT + 1;
 const MIDDLE: f64 = 16.0;
 
+/// The tilt is kept between these, gains of 2 to 0.25, whatever was measured: with 1 + tilt at or below 0 no
+/// command would put the tip anywhere.
+pub(crate) const TILTS: (f64, f64) = (-0.5, 3.0);
+
 /// What is known beforehand of how a contact offset varies; all in the unit of the DOF.
 ///
 /// The offset at position y is a level, common to all positions, plus a tilt, plus a local
@@ -131,7 +135,7 @@ impl OffsetMap {
         self.node(side, position).pick(&self.mean)
     }
 
-    /// The tilt: mean and standard deviation.
+    /// The tilt: mean, from -0.5 to 3, and standard deviation.
     pub fn tilt(&self) -> (f64, f64) {
         let variance = self.covariance.get(TILT).and_then(|row| row.get(TILT));
         let mean = self.mean.get(TILT).unwrap_or(&f64::NAN);
@@ -209,6 +213,9 @@ impl OffsetMap {
     fn shift(&mut self, column: &[f64; SIZE], by: f64) {
         for (mean, gain) in self.mean.iter_mut().zip(column) {
             *mean += gain * by;
+        }
+        if let Some(tilt) = self.mean.get_mut(TILT) {
+            *tilt = tilt.clamp(TILTS.0, TILTS.1);
         }
     }
 

@@ -102,6 +102,23 @@ proptest! {
 
     /// After enough travel the tip of the true play is where the reference is.
     #[test]
+    fn no_outlier_sends_the_play_state_away(
+        tilt in 0.0..1.0, outliers in prop::collection::vec(-30.0..30.0, 50..200)
+    ) {
+        let mut settings = settings(0.0, PERIOD);
+        (settings.prior.tilt, settings.prior.tilt_drift) = (tilt, tilt);
+        let mut axis = AdaptiveAxis::new(settings, Play::new(0.0, 0.0).unwrap()).unwrap();
+        for (turn, outlier) in (0_u32..).zip(outliers) {
+            for tick in 0..40_u32 {
+                axis.step(2.0 * (0.1 * f64::from(40 * turn + tick)).sin());
+            }
+            axis.learn(axis.command(), outlier, 0.02, std::iter::empty());
+            // Offsets as wide as what was measured, the least stretch, and the command.
+            prop_assert!(axis.predicted_state().abs() < 200.0, "{}", axis.predicted_state());
+        }
+    }
+
+    #[test]
     fn a_known_play_is_inverted_exactly(play in plays(), strokes in prop::collection::vec(0.0..5.0, 1..6)) {
         let mut axis = certain(play, 0.0, PERIOD);
         let mut tip = PlayState { output: 0.0 };
