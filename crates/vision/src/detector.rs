@@ -82,7 +82,8 @@ impl Detector {
         demands: &Demands,
     ) -> (Verdict, &[Region]) {
         let before = expect.expect([0.0; 4], [f64::INFINITY; 4]);
-        if let Some(window) = before.and_then(|expectation| expectation.window(frame)) {
+        let window = before.and_then(|expectation| expectation.window(frame));
+        if let Some(window) = window {
             self.find(frame, window);
             let verdict = judge(&self.regions, &self.map, expect, demands);
             if verdict.is_clear() {
@@ -94,7 +95,9 @@ impl Detector {
         if verdict.is_clear() {
             return (verdict, &self.regions);
         }
-        let lit = before.and_then(|blind| self.by_light(frame, expect, &blind, &verdict, demands));
+        // Light says less than edges: it is asked only where it is known where to look.
+        let near = before.filter(|_| window.is_some());
+        let lit = near.and_then(|blind| self.by_light(frame, expect, &blind, &verdict, demands));
         if let Some(lit) = lit
             && let Some(again) = judge_at(lit.features, [1.0; 4], &self.map, expect, demands)
             && again.score() > verdict.score()
