@@ -71,7 +71,7 @@ def test_demo_fills_a_run_folder_and_prints_one_object(
 ) -> None:
     out = tmp_path / "run"
     arguments = ["demo", "--config", config_file, "--seed", "3", "--seeds", "2", "--json"]
-    assert main([*arguments, "--out", str(out)]) == 0
+    assert main([*arguments, "--profile", "paper", "--out", str(out)]) == 0
     captured = capsys.readouterr()
     assert "4 runs: 100 %" in captured.err
     assert captured.out.count("\n") == 1
@@ -120,7 +120,7 @@ def test_demo_fills_a_run_folder_and_prints_one_object(
 def test_demo_prints_the_article_beside_ours(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, config_file: str
 ) -> None:
-    arguments = ["demo", "--config", config_file, "--profile", "best"]
+    arguments = ["demo", "--config", config_file]
     assert main([*arguments, "--out", str(tmp_path / "run")]) == 0
     out = capsys.readouterr().out
     assert next(line.split() for line in out.splitlines() if "article" in line and "paper" in line)[

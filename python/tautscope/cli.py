@@ -61,7 +61,7 @@ def _parser() -> argparse.ArgumentParser:
     demo.add_argument(
         "--profile",
         choices=PROFILES,
-        default="paper",
+        default="best",
         help="how slack is compensated: as in the article, or ours beside it [%(default)s]",
     )
     demo.add_argument(
