@@ -234,18 +234,11 @@ pub(crate) fn project<S: Simd>(
     if S::u8s::LEN != 64 {
         return 0;
     }
-    // The third goes with a zero.
-    let mut lanes = [[0; 2 * LANES]; 2];
-    for lane in 0..LANES {
-        [
-            lanes[0][2 * lane],
-            lanes[0][2 * lane + 1],
-            lanes[1][2 * lane],
-        ] = weights;
-    }
+    // Two weights to a lane of 32 bits, the first the lower; the third goes with a zero.
+    let [first, second, third] = weights.map(|weight| i32::from(weight) & 0xffff);
     let rest = (
-        i16x32::from_slice(simd, &lanes[0]),
-        i16x32::from_slice(simd, &lanes[1]),
+        i32x16::splat(simd, first | second << 16).bitcast(),
+        i32x16::splat(simd, third).bitcast(),
         i32x16::splat(simd, offset),
     );
     let blocks = bytes.as_chunks::<BYTES>().0;
