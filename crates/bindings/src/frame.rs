@@ -90,7 +90,10 @@ impl Frame for ArrayFrame<'_> {
         self.height
     }
 
-    // A call between rows would empty the registers of the vectors that the scan keeps there.
+    #[expect(
+        clippy::inline_always,
+        reason = "a call between rows empties the registers that the scan keeps vectors in"
+    )]
     #[inline(always)]
     fn line(&self, index: usize) -> &[u8] {
         let Some(bytes) = self.whole else {
