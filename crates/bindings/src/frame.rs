@@ -66,6 +66,15 @@ impl<'a> ArrayFrame<'a> {
         }
         Ok(frame)
     }
+
+    #[inline(never)]
+    fn padded_line(&self, index: usize) -> &[u8] {
+        let line = match &self.lines {
+            Lines::Bytes(view) => view.index_axis_move(Axis(0), index).to_slice(),
+            Lines::Pixels(view) => view.index_axis_move(Axis(0), index).to_slice(),
+        };
+        line.unwrap_or_default()
+    }
 }
 
 impl Frame for ArrayFrame<'_> {
@@ -81,17 +90,18 @@ impl Frame for ArrayFrame<'_> {
         self.height
     }
 
+    #[expect(
+        clippy::inline_always,
+        reason = "a call between rows empties the registers that the scan keeps vectors in"
+    )]
+    #[inline(always)]
     fn line(&self, index: usize) -> &[u8] {
-        if let Some(bytes) = self.whole {
-            let length = self.format.line_bytes(self.width);
-            return bytes
-                .get(index * length..(index + 1) * length)
-                .unwrap_or_default();
-        }
-        let line = match &self.lines {
-            Lines::Bytes(view) => view.index_axis_move(Axis(0), index).to_slice(),
-            Lines::Pixels(view) => view.index_axis_move(Axis(0), index).to_slice(),
+        let Some(bytes) = self.whole else {
+            return self.padded_line(index);
         };
-        line.unwrap_or_default()
+        let length = self.format.line_bytes(self.width);
+        bytes
+            .get(index * length..(index + 1) * length)
+            .unwrap_or_default()
     }
 }

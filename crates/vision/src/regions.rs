@@ -140,7 +140,14 @@ impl Labeller {
     }
 
     /// Ends a row; `finished` gets the regions that do not touch it.
-    pub fn end_row(&mut self, mut finished: impl FnMut(Region)) {
+    #[inline]
+    pub fn end_row(&mut self, finished: impl FnMut(Region)) {
+        if !self.here.is_empty() || !self.parts.is_empty() {
+            self.end_busy_row(finished);
+        }
+    }
+
+    fn end_busy_row(&mut self, mut finished: impl FnMut(Region)) {
         let Self {
             here, parts, next, ..
         } = self;

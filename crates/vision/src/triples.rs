@@ -14,24 +14,20 @@ const BYTES: usize = 3 * BLOCK;
 /// level the sums are held against.
 ///
 /// The sum of pixels 2 k and 2 k + 1, bytes 6 k to 6 k + 5, comes out at byte 6 k and 6 k + 2: of the pair there
-/// and of the pair one further on. What comes out at 6 k + 4 is of no pixel.
+/// and of the pair one further on. What comes out at 6 k + 4 is of no pixel, and 0.
 #[derive(Clone, Debug)]
 pub(crate) struct Pairs {
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     of_64: [Vector<64>; 3],
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     of_32: [Vector<32>; 3],
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    level: i16,
 }
 
-/// One of three vectors that cover 3 N bytes.
+/// The weights of the bytes of one of three vectors that cover 3 N bytes, and of those two further on.
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-#[derive(Clone, Debug)]
-struct Vector<const N: usize> {
-    /// The weights of its bytes and of those two further on.
-    weights: [[i8; N]; 2],
-    /// By pair: what its sum has to reach.
-    level: [i16; 32],
-}
+type Vector<const N: usize> = [[i8; N]; 2];
 
 /// Where the three begin; the last two bytes are only read as those further on.
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
@@ -46,23 +42,26 @@ impl Pairs {
         let _ = (weights, level);
         Self {
             #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-            of_64: starts(64).map(|start| Vector::new(start, weights, level)),
+            of_64: starts(64).map(|start| vector(start, weights)),
             #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-            of_32: starts(32).map(|start| Vector::new(start, weights, level)),
+            of_32: starts(32).map(|start| vector(start, weights)),
+            #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+            level,
         }
     }
 
-    /// Sets the bit of each block in which `weights . x >= level` for a pixel x, in words that are 0. A last
-    /// block that is cut short counts what it lacks from the one before it.
+    /// Sets the bit of each block in which `weights . x >= level` for a pixel x, in words that are 0; of every
+    /// block where black reaches the level too. A last block that is cut short counts what it lacks from the one
+    /// before it.
     ///
     /// Does nothing where it [is not quick](are_quick).
     #[inline(always)]
     pub(crate) fn mark<S: Simd>(&self, simd: S, bytes: &[u8], hot: &mut [u64]) {
         #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
         if let Some(wide) = simd.level().as_avx512() {
-            mark(wide, bytes, &self.of_64, hot);
+            mark(wide, bytes, (&self.of_64, self.level), hot);
         } else if let Some(wide) = simd.level().as_avx2() {
-            mark(wide, bytes, &self.of_32, hot);
+            mark(wide, bytes, (&self.of_32, self.level), hot);
         }
         #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
         let _ = (simd, bytes, hot);
@@ -82,63 +81,92 @@ pub(crate) fn are_quick<S: Simd>(simd: S) -> bool {
 }
 
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-impl<const N: usize> Vector<N> {
-    fn new(start: usize, weights: [i16; 3], level: i16) -> Self {
-        #[expect(clippy::cast_possible_truncation, reason = "they fit")]
-        let [first, second, third] = weights.map(|weight| weight as i8);
-        let mut both = [[0; N]; 2];
-        let mut levels = [i16::MAX; 32];
-        let [here, further] = &mut both;
-        let pairs = here.as_chunks_mut().0.iter_mut();
-        let pairs = pairs.zip(further.as_chunks_mut().0).zip(&mut levels);
-        for (((here, further), least), at) in pairs.zip((start..).step_by(2)) {
-            (*here, *further, *least) = match at % 6 {
-                0 => ([first, second], [third, 0], level),
-                2 => ([0, first], [second, third], level),
-                _ => ([0, 0], [0, 0], i16::MAX),
-            };
-        }
-        Self {
-            weights: both,
-            level: levels,
-        }
+fn vector<const N: usize>(start: usize, weights: [i16; 3]) -> Vector<N> {
+    #[expect(clippy::cast_possible_truncation, reason = "they fit")]
+    let [first, second, third] = weights.map(|weight| weight as i8);
+    let mut both = [[0; N]; 2];
+    let [here, further] = &mut both;
+    let pairs = here.as_chunks_mut().0.iter_mut();
+    let pairs = pairs.zip(further.as_chunks_mut().0);
+    for ((here, further), at) in pairs.zip((start..).step_by(2)) {
+        (*here, *further) = match at % 6 {
+            0 => ([first, second], [third, 0]),
+            2 => ([0, first], [second, third]),
+            _ => ([0, 0], [0, 0]),
+        };
     }
+    both
 }
 
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
 #[inline(always)]
-fn mark<S: Dot, const N: usize>(simd: S, bytes: &[u8], vectors: &[Vector<N>; 3], hot: &mut [u64]) {
+fn mark<S: Dot, const N: usize>(
+    simd: S,
+    bytes: &[u8],
+    (vectors, level): (&[Vector<N>; 3], i16),
+    hot: &mut [u64],
+) {
+    let loaded = Loaded::new(simd, vectors, level);
     let (blocks, rest) = bytes.as_chunks::<BYTES>();
     for (word, blocks) in hot.iter_mut().zip(blocks.chunks(64)) {
+        let mut bits = 0;
         for (bit, block) in blocks.iter().enumerate() {
-            *word |= u64::from(reaches(simd, block, vectors)) << bit;
+            bits |= u64::from(loaded.is_reached::<N>(simd, block)) << bit;
         }
+        *word = bits;
     }
     if !rest.is_empty()
         && let Some(last) = bytes.last_chunk()
         && let Some(word) = hot.get_mut(blocks.len() / 64)
     {
-        *word |= u64::from(reaches(simd, last, vectors)) << (blocks.len() % 64);
+        *word |= u64::from(loaded.is_reached::<N>(simd, last)) << (blocks.len() % 64);
     }
 }
 
-/// Whether a pixel of a block does.
+/// The weights and the level in registers: left in memory, they are loaded more often than the bytes.
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-#[inline(always)]
-fn reaches<S: Dot, const N: usize>(simd: S, block: &[u8; BYTES], vectors: &[Vector<N>; 3]) -> bool {
-    let mut found = <S::i16s as SimdBase<S>>::Mask::splat(simd, false);
-    for part in block.chunks_exact(3 * N) {
-        for (vector, start) in vectors.iter().zip(starts(N)) {
-            let [here, further] = &vector.weights;
-            let bytes = S::u8s::from_slice(simd, &part[start..start + N]);
-            let sum = simd.dot(bytes, S::i8s::from_slice(simd, here));
-            let bytes = S::u8s::from_slice(simd, &part[start + 2..start + 2 + N]);
-            let sum = sum + simd.dot(bytes, S::i8s::from_slice(simd, further));
-            let level = S::i16s::from_slice(simd, &vector.level[..N / 2]);
-            found |= sum.simd_ge(level);
+struct Loaded<S: Simd> {
+    weights: [[S::i8s; 2]; 3],
+    least: S::i16s,
+}
+
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+impl<S: Dot> Loaded<S> {
+    #[inline(always)]
+    fn new<const N: usize>(simd: S, [a, b, c]: &[Vector<N>; 3], level: i16) -> Self {
+        Self {
+            weights: [
+                [
+                    S::i8s::from_slice(simd, &a[0]),
+                    S::i8s::from_slice(simd, &a[1]),
+                ],
+                [
+                    S::i8s::from_slice(simd, &b[0]),
+                    S::i8s::from_slice(simd, &b[1]),
+                ],
+                [
+                    S::i8s::from_slice(simd, &c[0]),
+                    S::i8s::from_slice(simd, &c[1]),
+                ],
+            ],
+            least: S::i16s::splat(simd, level),
         }
     }
-    found.any_true()
+
+    /// Whether a pixel of a block does.
+    #[inline(always)]
+    fn is_reached<const N: usize>(&self, simd: S, block: &[u8; BYTES]) -> bool {
+        let mut most = S::i16s::splat(simd, i16::MIN);
+        for part in block.chunks_exact(3 * N) {
+            for ([here, further], start) in self.weights.iter().zip(starts(N)) {
+                let bytes = S::u8s::from_slice(simd, &part[start..start + N]);
+                let sum = simd.dot(bytes, *here);
+                let bytes = S::u8s::from_slice(simd, &part[start + 2..start + 2 + N]);
+                most = most.max(sum + simd.dot(bytes, *further));
+            }
+        }
+        most.simd_ge(self.least).any_true()
+    }
 }
 
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
@@ -206,18 +234,11 @@ pub(crate) fn project<S: Simd>(
     if S::u8s::LEN != 64 {
         return 0;
     }
-    // The third goes with a zero.
-    let mut lanes = [[0; 2 * LANES]; 2];
-    for lane in 0..LANES {
-        [
-            lanes[0][2 * lane],
-            lanes[0][2 * lane + 1],
-            lanes[1][2 * lane],
-        ] = weights;
-    }
+    // Two weights to a lane of 32 bits, the first the lower; the third goes with a zero.
+    let [first, second, third] = weights.map(|weight| i32::from(weight) & 0xffff);
     let rest = (
-        i16x32::from_slice(simd, &lanes[0]),
-        i16x32::from_slice(simd, &lanes[1]),
+        i32x16::splat(simd, first | second << 16).bitcast(),
+        i32x16::splat(simd, third).bitcast(),
         i32x16::splat(simd, offset),
     );
     let blocks = bytes.as_chunks::<BYTES>().0;
@@ -307,7 +328,8 @@ mod tests {
             let (pixels, _) = bytes.as_chunks::<3>();
             // At a sum that occurs the answer changes.
             let level = sum(&pixels[pick.index(pixels.len())]).saturating_add(above);
-            let reaches = |pixels: &[[u8; 3]]| pixels.iter().any(|pixel| sum(pixel) >= level);
+            let reaches =
+                |pixels: &[[u8; 3]]| level <= 0 || pixels.iter().any(|pixel| sum(pixel) >= level);
             let (whole, rest) = pixels.as_chunks::<BLOCK>();
             let mut expected: Vec<bool> = whole.iter().map(|block| reaches(block)).collect();
             if !rest.is_empty() {
