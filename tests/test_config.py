@@ -27,6 +27,21 @@ def test_what_is_written_reads_back_equal(tmp_path: Path) -> None:
     assert loaded(tmp_path, dump_config(config)) == config
 
 
+def test_files_are_found_from_where_the_configuration_is(tmp_path: Path) -> None:
+    axis = "{node = %d, counts_per_unit = 1e4, sign = 1, travel = [0, 1], speed_limit = 1, "
+    axis += "following_error = 0.1, eds = '%s'}"
+    names = [(1, "drive.eds"), (2, "../other/drive.eds"), (3, "/opt/drive.eds")]
+    axes = [axis % each for each in names]
+    dofs = ("insertion", "rotation", "bending")
+    text = "\n".join(["[drives]", *(f"{dof} = {one}" for dof, one in zip(dofs, axes, strict=True))])
+    config = loaded(tmp_path, text)
+    assert config.drives is not None
+    for dof, (_, name) in zip(Dof, names, strict=True):
+        assert Path(config.drives[dof].eds or "") == tmp_path / name
+    (tmp_path / "elsewhere").mkdir()
+    assert loaded(tmp_path / "elsewhere", dump_config(config)) == config
+
+
 def test_a_file_names_only_what_it_changes(tmp_path: Path) -> None:
     config = loaded(tmp_path, "[rotation]\nfree_gain = 4\n[camera.camera_from_guide]\n")
     assert config == Config().replace(**{"rotation.free_gain": 4.0})

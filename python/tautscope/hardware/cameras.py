@@ -13,7 +13,7 @@ from types import TracebackType
 import numpy as np
 
 from tautscope.config import CameraConfig, SourceConfig
-from tautscope.errors import CameraError
+from tautscope.errors import CameraError, CameraMismatchError
 from tautscope.hardware.video import Decoder, Image, Picture, opened
 from tautscope.rig import Frame
 
@@ -137,9 +137,9 @@ class Camera:
             CameraError: The source does not open, or what it gives cannot be used; it is closed.
         """
         self._thread.start()
-        in_time = self._is_tested.wait(self._source.start_timeout)
+        self._is_tested.wait(self._source.start_timeout)
         try:
-            if not in_time and self._state.trouble:
+            if len(self._first) < TEST_FRAMES and self._state.trouble:
                 raise CameraError("camera.source", self._state.trouble, "frames")
             check_captures(self._first, self._config)
         except CameraError:
@@ -184,6 +184,7 @@ class Camera:
         """The thread: open, read, and again."""
         source = self._source
         while not self._is_closing.is_set():
+            is_in_vain = False
             try:
                 options = _LIVE | source.options
                 with opened(source.url, source.format, options, source.timeout) as container:
@@ -191,10 +192,13 @@ class Camera:
                 trouble = f"{source.url} has ended; it is opened again"
             except CameraError as error:
                 trouble = str(error)
+                is_in_vain = isinstance(error, CameraMismatchError)
             except Exception as error:  # a thread that dies in silence would look like no news
                 trouble = f"{source.url}: {type(error).__name__}: {error}"
             with self._lock:
                 self._state = replace(self._state, trouble=trouble)
+            if is_in_vain:
+                self._is_tested.set()
             if not self._is_closing.wait(source.reconnect_period):
                 with self._lock:
                     self._state = replace(self._state, reconnects=self._state.reconnects + 1)
