@@ -74,9 +74,7 @@ def opened(
     try:
         with av.open(url, format=format_name, options=options or {}, timeout=timeout) as container:
             if not container.streams.video:
-                raise CameraMismatchError(
-                    "camera.source.url", url, "a source with a video stream"
-                )
+                raise CameraMismatchError("camera.source.url", url, "a source with a video stream")
             yield container
     except av.error.FFmpegError as error:
         hint = "a source that opens and goes on; is it connected, and is another program using it?"
