@@ -124,6 +124,7 @@ class Camera:
         self._lock = Lock()
         self._slot: Capture | None = None
         self._state = CameraState()
+        self._error: CameraError | None = None
         self._arrived_at = float("-inf")
         self._sequence = 0
         self._first: list[Capture] = []
@@ -139,8 +140,8 @@ class Camera:
         self._thread.start()
         self._is_tested.wait(self._source.start_timeout)
         try:
-            if len(self._first) < TEST_FRAMES and self._state.trouble:
-                raise CameraError("camera.source", self._state.trouble, "frames")
+            if len(self._first) < TEST_FRAMES and self._error is not None:
+                raise self._error
             check_captures(self._first, self._config)
         except CameraError:
             self.close()
@@ -191,10 +192,11 @@ class Camera:
                     self._read(Decoder(container, self._config, live=True))
                 trouble = f"{source.url} has ended; it is opened again"
             except CameraError as error:
-                trouble = str(error)
+                self._error, trouble = error, str(error)
                 is_in_vain = isinstance(error, CameraMismatchError)
             except Exception as error:  # a thread that dies in silence would look like no news
                 trouble = f"{source.url}: {type(error).__name__}: {error}"
+                self._error = CameraError("camera.source", trouble, "frames")
             with self._lock:
                 self._state = replace(self._state, trouble=trouble)
             if is_in_vain:

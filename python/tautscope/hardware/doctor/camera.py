@@ -7,6 +7,7 @@ import os
 import statistics
 import sys
 import time
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -44,10 +45,9 @@ def check_devices(*, needed: bool) -> Finding:
 def check_source(config: CameraConfig) -> list[Finding]:
     """Open the configured source, have it tested, and watch it for a second."""
     source = config.source
-    what = f"source {source.url}"
+    what, piped = f"source {source.url}", f"{DV_PIPE} uv run tautscope doctor CONFIG"
     if source.url.startswith("pipe:") and sys.stdin.isatty():
-        todo = f"{DV_PIPE} uv run tautscope doctor CONFIG"
-        return [Finding("camera", what, "missing", "nothing is piped in", todo)]
+        return [Finding("camera", what, "missing", "nothing is piped in", piped)]
     if source.url.startswith("/dev/") and not Path(source.url).exists():
         todo = "Connect it, or name another in camera.source.url: ls /dev/video*"
         return [Finding("camera", what, "missing", "no such device", todo)]
@@ -56,7 +56,10 @@ def check_source(config: CameraConfig) -> list[Finding]:
             seen = _watch(camera, 2 * source.timeout)
             state = camera.state
     except CameraError as error:
-        return [failed("camera", what, error)]
+        found = failed("camera", what, error)
+        if source.url.startswith("pipe:"):
+            found = replace(found, todo=f"{found.todo}; for DV over FireWire: {piped}")
+        return [found]
     return [_judge(what, config, seen, state), *_delay(config)]
 
 
