@@ -37,7 +37,8 @@ CAMERA = {
 
 def document(hub: Path, camera: dict[str, Any] | None = None, **changes: Any) -> dict[str, Any]:
     drives = drives_document(channel=str(hub), heartbeat_timeout=1.0, **changes)
-    return {"camera": camera or CAMERA, "drives": drives}
+    control = {"period": drives["cycle"]}
+    return {"camera": camera or CAMERA, "control": control, "drives": drives}
 
 
 def drives_of(found: dict[str, Any]) -> DrivesConfig:
@@ -69,7 +70,7 @@ def was_never_enabled(drives: SimulatedDrives) -> bool:
 
 def put(drives: SimulatedDrives, dof: Dof, state: State) -> None:
     """As somebody else left it; a drive that boots would forget."""
-    until(lambda: drives.states[dof] is State.SWITCH_ON_DISABLED)
+    until(lambda: State.NOT_READY not in drives.states.values())
     drives._drives[dof]._go(state, time.monotonic())
 
 
@@ -140,9 +141,11 @@ def test_interlaced_dv_is_told_as_fields(
 def test_nothing_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     config = document(tmp_path / "nobody")
     config["camera"] = {**CAMERA, "source": {"url": "/dev/video99"}}
+    config["control"]["period"] = 0.005
     status, found = doctor(capsys, tmp_path, config)
     assert status == 1
     assert "ls /dev/video*" in found["source /dev/video99"]["todo"]
+    assert found["pace"]["status"] == "missing"
     bus = found[f"bus tautscope {tmp_path / 'nobody'}"]
     assert bus["status"] == "missing"
     assert "drives.channel" in bus["todo"]

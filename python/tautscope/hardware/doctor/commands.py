@@ -56,6 +56,10 @@ def examine(config: Config, *, is_rig: bool, folder: Path) -> Iterator[Finding]:
         todo = "Add a section [drives], as in configs/article_rig.toml; docs/hardware.md says how"
         yield Finding("drives", "configuration", "missing", "no section [drives]", todo)
         return
+    if config.control.period != config.drives.cycle:
+        found = f"control.period {config.control.period} s, drives.cycle {config.drives.cycle} s"
+        todo = "Make them the same: every tick of the loop is a set-point"
+        yield Finding("drives", "pace", "missing", found, todo)
     yield from drives.check_drives(config.drives)
 
 
