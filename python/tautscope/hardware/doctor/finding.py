@@ -47,6 +47,6 @@ def failed(group: str, what: str, error: TautscopeError) -> Finding:
     if isinstance(error, DriveError):
         return Finding(group, what, "missing", f"{error.node}: {error.what}", error.remedy)
     if isinstance(error, FieldError):
-        found = f"{error.field} is {error.value}"
+        found = f"{error.field}: {error.value}"
         return Finding(group, what, "missing", found, f"needed: {error.allowed}")
     return Finding(group, what, "missing", str(error))
