@@ -1,11 +1,14 @@
 """Configuration: what it takes, what it refuses, and how it says so."""
 
+import math
 from pathlib import Path
 
 import pytest
 from tautscope.config import Config, dump_config, from_document, load_config
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError, MissingPathError
+
+CONFIGS = Path(__file__).parents[1] / "configs"
 
 
 def loaded(tmp_path: Path, text: str) -> Config:
@@ -25,6 +28,35 @@ def test_defaults_are_the_articles_protocol() -> None:
 def test_what_is_written_reads_back_equal(tmp_path: Path) -> None:
     config = Config().replace(**{"twin.seed": 7, "insertion.free_gain": 3.5})
     assert loaded(tmp_path, dump_config(config)) == config
+
+
+@pytest.mark.parametrize("file", sorted(CONFIGS.glob("*.toml")), ids=lambda file: file.name)
+def test_the_configurations_are_accepted(file: Path) -> None:
+    config = load_config(file)
+    assert config.drives is not None
+    # `tautscope run` moves them through the article's references; each must fit the travel.
+    for dof in Dof:
+        lower, upper = config.drives[dof].travel
+        sine = config.experiment[dof]
+        assert lower < sine.centre - sine.amplitude < sine.centre + sine.amplitude < upper
+        fastest = config[dof].free_gain * sine.amplitude * 2 * math.pi / sine.period
+        assert fastest < config.drives[dof].speed_limit
+    assert config.control.period == config.drives.cycle
+
+
+def test_files_are_found_from_where_the_configuration_is(tmp_path: Path) -> None:
+    axis = "{node = %d, counts_per_unit = 1e4, sign = 1, travel = [0, 1], speed_limit = 1, "
+    axis += "following_error = 0.1, eds = '%s'}"
+    names = [(1, "drive.eds"), (2, "../other/drive.eds"), (3, "/opt/drive.eds")]
+    axes = [axis % each for each in names]
+    dofs = ("insertion", "rotation", "bending")
+    text = "\n".join(["[drives]", *(f"{dof} = {one}" for dof, one in zip(dofs, axes, strict=True))])
+    config = loaded(tmp_path, text)
+    assert config.drives is not None
+    for dof, (_, name) in zip(Dof, names, strict=True):
+        assert Path(config.drives[dof].eds or "") == tmp_path / name
+    (tmp_path / "elsewhere").mkdir()
+    assert loaded(tmp_path / "elsewhere", dump_config(config)) == config
 
 
 def test_a_file_names_only_what_it_changes(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ PAPER = (ROOT / "docs" / "paper.md").read_text(encoding="utf-8")
 
 REFERENCE = re.compile(r"`([\w./-]+\.(?:py|rs))::(\w+)`")
 """`file::name`, the file from the repository's root."""
-FOLDERS = ("benchmarks", "crates", "docs", "examples", "python", "tests")
+FOLDERS = ("benchmarks", "configs", "crates", "docs", "examples", "python", "tests")
 TREE_PATH = re.compile(rf"`((?:{'|'.join(FOLDERS)})/[\w./-]+)(?:::\w+)?`")
 LINK = re.compile(r"\]\(([^)#\s]+)")
 

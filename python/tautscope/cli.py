@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, get_args
 from tautscope._core import __version__
 from tautscope.config import DISTURBANCES, Config, Profile, dump_config, load_config
 from tautscope.errors import MissingPathError, TautscopeError
+from tautscope.hardware.doctor import commands as doctor
 from tautscope.log import commands
 
 if TYPE_CHECKING:
@@ -27,7 +28,8 @@ PROFILES = get_args(Profile)
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; 0 on success, 2 on an error a person can mend, 130 when interrupted.
 
-    `replay` returns 1 if the outputs were others than those recorded.
+    `replay` returns 1 if the outputs were others than those recorded, `doctor` if something is
+    missing.
     """
     options = _parser().parse_args(arguments)
     try:
@@ -125,6 +127,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_common(analyze)
     analyze.set_defaults(run=_analyze)
     commands.add_parsers(verbs)
+    doctor.add_parser(verbs)
     return parser
 
 

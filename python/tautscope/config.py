@@ -443,7 +443,8 @@ class AxisConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     home: float = 0.0
     """Where the degree of freedom is when the drive reads 0 counts [m or rad]."""
     eds: str | None = None
-    """The drive's EDS file; without it, the objects of CiA 402 that are used."""
+    """The drive's EDS file, seen from the TOML file's folder; without it, the objects of CiA 402
+    that are used."""
 
 
 class DrivesConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -570,6 +571,7 @@ def load_config(path: str | PathLike[str] | None = None, profile: Profile | None
         raise MissingPathError("config", str(file), "a TOML file") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ConfigError("config", str(file), f"TOML ({error})") from None
+    _place_files(document, file.absolute().parent)
     return from_document(document | changes)
 
 
@@ -598,6 +600,14 @@ def to_document(config: Config) -> dict[str, Any]:
 def dump_config(config: Config) -> str:
     """The configuration as TOML, every key written out; `load_config` reads it back equal."""
     return tomli_w.dumps(to_document(config))
+
+
+def _place_files(document: dict[str, Any], folder: Path) -> None:
+    """Files that a TOML file names are beside it, wherever the program runs."""
+    drives = document.get("drives")
+    for axis in drives.values() if isinstance(drives, dict) else ():
+        if isinstance(axis, dict) and isinstance(axis.get("eds"), str):
+            axis["eds"] = str(folder / axis["eds"])
 
 
 def _merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:

@@ -109,3 +109,7 @@ class FollowingError(DriveError):
 
 class CameraError(FieldError):
     """A camera is not there, or does not give the pictures it should."""
+
+
+class CameraMismatchError(CameraError):
+    """What is there cannot be used as configured; to wait for it is no use."""

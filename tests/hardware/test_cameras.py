@@ -205,14 +205,35 @@ def test_the_self_test_says_what_came_and_what_to_do(url: str, what: str, todo: 
     ("config", "what"),
     [
         (camera("/dev/video99", "v4l2", start_timeout=0.5), r"/dev/video99.*is it connected"),
-        (camera(pattern(size="32x24"), start_timeout=2.0), r"32 x 24.*64 x 48"),
         (camera("nosuchfilter=1", start_timeout=0.5), "nosuchfilter"),
     ],
-    ids=["missing", "size", "source"],
+    ids=["missing", "source"],
 )
 def test_a_camera_that_does_not_open_is_named(config: CameraConfig, what: str) -> None:
     with pytest.raises(CameraError, match=what):
         Camera(config).open()
+
+
+@pytest.mark.parametrize(
+    ("config", "what"),
+    [
+        (camera(pattern(size="32x24")), r"32 x 24.*64 x 48"),
+        (camera("sine=440"), "a source with a video stream"),
+    ],
+    ids=["size", "sound"],
+)
+def test_what_waiting_does_not_mend_is_said_at_once(
+    config: CameraConfig, what: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    live = Camera(config)
+    waited: list[bool] = []
+    wait = live._is_tested.wait
+    monkeypatch.setattr(
+        live._is_tested, "wait", lambda timeout: waited.append(wait(timeout)) or waited[-1]
+    )
+    with pytest.raises(CameraError, match=what):
+        live.open()
+    assert waited == [True]  # told, not timed out
 
 
 def test_dv_from_a_pipe_that_pauses_is_said_and_goes_on(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 import pytest
 from drawn import DrawnRig
+from mcap.reader import NonSeekingReader, make_reader
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
 from tautscope.config import CameraConfig, Config, RecordingConfig
@@ -50,6 +51,32 @@ def test_rosbags_reads_every_message_that_was_sent(recorded: Recorded) -> None:
     for topic in (*msg.OF_UPDATE, msg.IMAGE):
         assert counts[topic] == frames, topic
     assert counts[msg.CONFIG] == counts[msg.RUN] == counts[msg.VERSIONS] == 1
+
+
+def test_the_summary_is_that_of_the_messages(recorded: Recorded) -> None:
+    """As the `mcap` library's reader has it, which finds messages by the summary."""
+    path, _, summary = recorded
+    with path.open("rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        found = reader.get_summary()
+        assert found is not None
+        assert found.statistics is not None
+        assert found.statistics.message_count == sum(summary.messages.values())
+        counts = found.statistics.channel_message_counts
+        topics = {found.channels[key].topic: number for key, number in counts.items()}
+        assert topics == summary.messages
+        assert len(found.chunk_indexes) == found.statistics.chunk_count > 50
+        stamps = [message.log_time for _, _, message in reader.iter_messages(log_time_order=True)]
+        assert stamps == sorted(stamps)
+        assert (stamps[0], stamps[-1]) == (
+            found.statistics.message_start_time,
+            found.statistics.message_end_time,
+        )
+        middle = stamps[len(stamps) // 2]
+        late = sum(1 for _ in reader.iter_messages([msg.IMAGE], starting_at=middle))
+    with path.open("rb") as file:
+        front_to_back = NonSeekingReader(file, validate_crcs=True).iter_messages([msg.IMAGE])
+        assert late == sum(message.log_time >= middle for _, _, message in front_to_back)
 
 
 def test_rosbags_reads_what_the_run_was(recorded: Recorded) -> None:
@@ -180,10 +207,10 @@ def test_a_full_disk_ends_the_recording_and_not_the_run(
     def full(path: Path) -> IO[bytes]:
         return Path("/dev/full").open("wb", buffering=0)
 
-    monkeypatch.setattr("tautscope.log.writer._open", full)
+    monkeypatch.setattr("tautscope.log.journal._open", full)
     said: list[str] = []
     log = LogWriter(tmp_path / "run.mcap", config, say=said.append)
-    log._thread.join()
+    log._journal._thread.join()
     for tick in range(5):
         log.tick(Sample(0.01 * tick, np.zeros(3)), np.zeros(3), np.zeros(3))
     summary = log.close()
@@ -203,8 +230,8 @@ def test_a_disk_that_stands_still_drops_and_says_so(tmp_path: Path, config: Conf
     small = config.replace(**{"recording.queue_events": 500, "recording.close_timeout": 0.2})
     said: list[str] = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("tautscope.log.writer._open", lambda path: path.open("wb", buffering=0))
-        patch.setattr("tautscope.log.writer.os.fsync", lambda number: None)
+        patch.setattr("tautscope.log.journal._open", lambda path: path.open("wb", buffering=0))
+        patch.setattr("tautscope.log.journal.os.fsync", lambda number: None)
         log = LogWriter(pipe, small, say=said.append)
     rng = np.random.default_rng(2)
     ticks = 0
@@ -219,7 +246,7 @@ def test_a_disk_that_stands_still_drops_and_says_so(tmp_path: Path, config: Conf
     assert summary.dropped == 1
     assert any("the disk did not take the rest" in text for text in said)
     os.close(reader)  # the thread's write fails, and it ends
-    log._thread.join()
+    log._journal._thread.join()
 
 
 def test_images_are_dropped_before_ticks(tmp_path: Path, config: Config) -> None:

@@ -13,7 +13,7 @@ from types import TracebackType
 import numpy as np
 
 from tautscope.config import CameraConfig, SourceConfig
-from tautscope.errors import CameraError
+from tautscope.errors import CameraError, CameraMismatchError
 from tautscope.hardware.video import Decoder, Image, Picture, opened
 from tautscope.rig import Frame
 
@@ -124,6 +124,7 @@ class Camera:
         self._lock = Lock()
         self._slot: Capture | None = None
         self._state = CameraState()
+        self._error: CameraError | None = None
         self._arrived_at = float("-inf")
         self._sequence = 0
         self._first: list[Capture] = []
@@ -137,10 +138,10 @@ class Camera:
             CameraError: The source does not open, or what it gives cannot be used; it is closed.
         """
         self._thread.start()
-        in_time = self._is_tested.wait(self._source.start_timeout)
+        self._is_tested.wait(self._source.start_timeout)
         try:
-            if not in_time and self._state.trouble:
-                raise CameraError("camera.source", self._state.trouble, "frames")
+            if len(self._first) < TEST_FRAMES and self._error is not None:
+                raise self._error
             check_captures(self._first, self._config)
         except CameraError:
             self.close()
@@ -184,17 +185,22 @@ class Camera:
         """The thread: open, read, and again."""
         source = self._source
         while not self._is_closing.is_set():
+            is_in_vain = False
             try:
                 options = _LIVE | source.options
                 with opened(source.url, source.format, options, source.timeout) as container:
                     self._read(Decoder(container, self._config, live=True))
                 trouble = f"{source.url} has ended; it is opened again"
             except CameraError as error:
-                trouble = str(error)
+                self._error, trouble = error, str(error)
+                is_in_vain = isinstance(error, CameraMismatchError)
             except Exception as error:  # a thread that dies in silence would look like no news
                 trouble = f"{source.url}: {type(error).__name__}: {error}"
+                self._error = CameraError("camera.source", trouble, "frames")
             with self._lock:
                 self._state = replace(self._state, trouble=trouble)
+            if is_in_vain:
+                self._is_tested.set()
             if not self._is_closing.wait(source.reconnect_period):
                 with self._lock:
                     self._state = replace(self._state, reconnects=self._state.reconnects + 1)

@@ -47,18 +47,26 @@ def open_drives(config: DrivesConfig) -> Drives:
         ConfigError: An EDS file is missing, unreadable or of another drive.
         DriveError: As `Drives`.
     """
-    link: Link
+    return Drives(config, open_link(config))
+
+
+def open_link(config: DrivesConfig) -> Link:
+    """Open the bus and find the drives; they are told nothing.
+
+    Raises:
+        ConfigError: An EDS file is missing, unreadable or of another drive.
+        BusError: The bus cannot be opened.
+        DriveError: A drive does not answer, or there is another master.
+    """
     if config.protocol == "ethercat":
         from tautscope.hardware.ethercat_drives import EthercatLink  # noqa: PLC0415
 
-        link = EthercatLink(config)
-    else:
-        try:
-            from tautscope.hardware.canopen_drives import CanopenLink  # noqa: PLC0415
-        except ImportError as error:
-            raise BusError("CAN bus", str(error), "pip install 'tautscope[hardware]'") from None
-        link = CanopenLink(config)
-    return Drives(config, link)
+        return EthercatLink(config)
+    try:
+        from tautscope.hardware.canopen_drives import CanopenLink  # noqa: PLC0415
+    except ImportError as error:
+        raise BusError("CAN bus", str(error), "pip install 'tautscope[hardware]'") from None
+    return CanopenLink(config)
 
 
 class Drives:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.config import CameraConfig
-from tautscope.errors import CameraError, MissingPathError
+from tautscope.errors import CameraError, CameraMismatchError, MissingPathError
 from tautscope.pixels import FrameLayout
 from tautscope.rig import Frame
 
@@ -62,18 +62,19 @@ def opened(
     """A source, open while the block lasts.
 
     Raises:
-        CameraError: PyAV is not installed, or the source cannot be opened or read, or has no video.
+        CameraMismatchError: PyAV is not installed, or the source has no video.
+        CameraError: The source cannot be opened or read.
     """
     try:
         import av  # noqa: PLC0415  an extra, and 0.1 s
     except ImportError:
-        raise CameraError(
+        raise CameraMismatchError(
             "camera.source", "no PyAV", "it installed: pip install 'tautscope[hardware]'"
         ) from None
     try:
         with av.open(url, format=format_name, options=options or {}, timeout=timeout) as container:
             if not container.streams.video:
-                raise CameraError("camera.source.url", url, "a source with a video stream")
+                raise CameraMismatchError("camera.source.url", url, "a source with a video stream")
             yield container
     except av.error.FFmpegError as error:
         hint = "a source that opens and goes on; is it connected, and is another program using it?"
@@ -114,7 +115,7 @@ class Decoder:
         """Every picture, until the source ends.
 
         Raises:
-            CameraError: It is not of the configured size.
+            CameraMismatchError: It is not of the configured size.
         """
         for frame in self._container.decode(self._stream):
             yield from self._pictures(frame)
@@ -149,7 +150,7 @@ class Decoder:
     def _check_size(self, frame: av.VideoFrame) -> None:
         camera = self._camera
         if (frame.width, frame.height) != (camera.width, camera.height):
-            raise CameraError(
+            raise CameraMismatchError(
                 "camera.source",
                 f"pictures of {frame.width} x {frame.height}",
                 f"camera.width x height = {camera.width} x {camera.height}, as calibrated; set "

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
-from mcap.writer import Writer
-
-from tautscope._core import __version__
 from tautscope.errors import OutputError
 from tautscope.log import messages as msg
+from tautscope.log.mcap_file import McapFile
 from tautscope.log.reader import Damage, messages_in, read_log
-from tautscope.log.writer import register_channels
 from tautscope.output import new_folder
 
 
@@ -45,7 +41,7 @@ def recover(path: str | PathLike[str], out: str | PathLike[str]) -> Recovery:
         OutputError: `out` is there already, or cannot be written.
     """
     source, target = Path(path), Path(out)
-    damage, counts = Damage(), Counter[str]()
+    damage = Damage()
     first = last = 0
     partial = target.with_name(f".{target.name}.partial")
     if target.exists():
@@ -53,25 +49,20 @@ def recover(path: str | PathLike[str], out: str | PathLike[str]) -> Recovery:
     messages = messages_in(source, damage)
     try:
         with partial.open("wb") as file:
-            writer = Writer(file)
-            writer.start("ros2", f"tautscope {__version__}")
-            channels = register_channels(writer)
+            whole = McapFile(file)
             for _, topic, message in messages:
-                if topic not in channels:
+                if topic not in whole:
                     continue
                 at = message.log_time
-                writer.add_message(
-                    channels[topic], at, message.data, message.publish_time, message.sequence
-                )
+                whole.add(topic, message.data, message.sequence, at, message.publish_time)
                 first, last = min(first or at, at), max(last, at)
-                counts[topic] += 1
-            writer.finish()  # type: ignore[no-untyped-call]
+            whole.finish()
         partial.rename(target)
     except OSError as error:
         raise OutputError("out", str(target), f"a place that can be written ({error})") from None
     finally:
         partial.unlink(missing_ok=True)
-    return Recovery(target, dict(counts), first, last, damage)
+    return Recovery(target, dict(whole.counts), first, last, damage)
 
 
 def export_csv(path: str | PathLike[str], folder: str | PathLike[str]) -> None:

@@ -1,0 +1,199 @@
+"""An MCAP file with our topics, written front to back.
+
+The records are the `mcap` library's. Its writer would compress at zstd's level 3, which takes six
+times as long for images as level 1 and makes them larger (decision 0020).
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections import Counter
+from typing import IO
+
+import zstandard
+from mcap.data_stream import RecordBuilder
+from mcap.opcode import Opcode
+from mcap.records import (
+    Channel,
+    Chunk,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Header,
+    McapRecord,
+    Message,
+    MessageIndex,
+    Schema,
+    Statistics,
+    SummaryOffset,
+)
+from mcap.writer import MCAP0_MAGIC
+
+from tautscope._core import __version__
+from tautscope.log import messages as msg
+from tautscope.log.cdr import schema
+
+CHUNK_SIZE = 1 << 20
+"""A chunk that has grown beyond this is closed [bytes]; one image of the article's size does it."""
+_LEVEL = 1
+
+
+class McapFile:
+    """Messages into a file, by chunks; each closed chunk is the system's, with nothing kept here.
+
+    Args:
+        file: Open for writing, and at its start.
+
+    Attributes:
+        counts: Topic -> how many messages were given.
+    """
+
+    def __init__(self, file: IO[bytes]) -> None:
+        self._file, self._at = file, 0
+        self.counts: Counter[str] = Counter()
+        self._compressor = zstandard.ZstdCompressor(level=_LEVEL)
+        self._schemas = {
+            kind: Schema(id=number, name=kind, encoding="ros2msg", data=schema(kind))
+            for number, kind in enumerate(sorted(set(msg.TOPICS.values())), 1)
+        }
+        self._channels = {
+            topic: Channel(
+                id=number,
+                topic=topic,
+                message_encoding="cdr",
+                metadata={"offered_qos_profiles": ""},
+                schema_id=self._schemas[kind].id,
+            )
+            for number, (topic, kind) in enumerate(msg.TOPICS.items(), 1)
+        }
+        self._chunks: list[ChunkIndex] = []
+        self._body, self._indices = RecordBuilder(), dict[int, MessageIndex]()
+        self._spans: list[tuple[int, int]] = []
+        self._put(MCAP0_MAGIC + _bytes(Header("ros2", f"tautscope {__version__}")))
+        for record in (*self._schemas.values(), *self._channels.values()):
+            _write(record, self._body)
+
+    def __contains__(self, topic: str) -> bool:
+        return topic in self._channels
+
+    def add(self, topic: str, data: bytes, sequence: int, at: int, sent: int | None = None) -> None:
+        """One message.
+
+        Args:
+            topic: Of ours.
+            data: CDR.
+            sequence: Its place in the loop's order.
+            at: Log time [ns since 1970].
+            sent: Publish time [ns since 1970]; without it, the log time.
+        """
+        channel = self._channels[topic].id
+        index = self._indices.setdefault(channel, MessageIndex(channel, []))
+        index.records.append((at, self._body.count))
+        message = Message(
+            channel_id=channel,
+            log_time=at,
+            data=data,
+            publish_time=at if sent is None else sent,
+            sequence=sequence,
+        )
+        _write(message, self._body)
+        self.counts[topic] += 1
+        if self._body.count > CHUNK_SIZE:
+            self.flush()
+
+    def flush(self) -> None:
+        """Close the chunk, if there is anything in it."""
+        if not self._indices:
+            return
+        data = _ended(self._body)
+        times = [at for index in self._indices.values() for at, _ in index.records]
+        chunk = Chunk(
+            compression="zstd",
+            data=self._compressor.compress(data),
+            message_start_time=min(times),
+            message_end_time=max(times),
+            uncompressed_crc=zlib.crc32(data),
+            uncompressed_size=len(data),
+        )
+        start = self._at
+        self._put(_bytes(chunk))
+        length, offsets, indices = self._at - start, dict[int, int](), RecordBuilder()
+        for channel, index in self._indices.items():
+            offsets[channel] = self._at + indices.count
+            _write(index, indices)
+        entry = ChunkIndex(
+            chunk_length=length,
+            chunk_start_offset=start,
+            compression="zstd",
+            compressed_size=len(chunk.data),
+            message_end_time=chunk.message_end_time,
+            message_index_length=indices.count,
+            message_index_offsets=offsets,
+            message_start_time=chunk.message_start_time,
+            uncompressed_size=chunk.uncompressed_size,
+        )
+        self._put(_ended(indices))
+        self._chunks.append(entry)
+        self._indices = {}
+
+    def finish(self) -> None:
+        """The last chunk, and the summary by which a reader finds what it wants."""
+        self.flush()
+        self._put(_bytes(DataEnd(0)))
+        start, summary, offsets = self._at, RecordBuilder(), RecordBuilder()
+        groups: list[tuple[Opcode, list[McapRecord]]] = [
+            (Opcode.SCHEMA, list(self._schemas.values())),
+            (Opcode.CHANNEL, list(self._channels.values())),
+            (Opcode.STATISTICS, [self._statistics()]),
+            (Opcode.CHUNK_INDEX, list(self._chunks)),
+        ]
+        for opcode, records in groups:
+            begin = summary.count
+            for record in records:
+                _write(record, summary)
+            if records:
+                _write(SummaryOffset(opcode, start + begin, summary.count - begin), offsets)
+        offset_start = start + summary.count
+        body = _ended(summary) + _ended(offsets)
+        footer = Footer(start, offset_start, summary_crc=0)
+        # The checksum goes over all of the summary and the footer but itself.
+        footer.summary_crc = zlib.crc32(body + _bytes(footer)[:-4])
+        self._put(body + _bytes(footer) + MCAP0_MAGIC)
+
+    def _statistics(self) -> Statistics:
+        starts = [chunk.message_start_time for chunk in self._chunks]
+        ends = [chunk.message_end_time for chunk in self._chunks]
+        return Statistics(
+            attachment_count=0,
+            channel_count=len(self._channels),
+            channel_message_counts={
+                self._channels[topic].id: count for topic, count in self.counts.items()
+            },
+            chunk_count=len(self._chunks),
+            message_count=self.counts.total(),
+            metadata_count=0,
+            message_start_time=min(starts, default=0),
+            message_end_time=max(ends, default=0),
+            schema_count=len(self._schemas),
+        )
+
+    def _put(self, data: bytes) -> None:
+        rest = memoryview(data)
+        while rest:
+            rest = rest[self._file.write(rest) :]
+        self._at += len(data)
+
+
+def _write(record: McapRecord, builder: RecordBuilder) -> None:
+    record.write(builder)
+
+
+def _bytes(record: McapRecord) -> bytes:
+    builder = RecordBuilder()
+    _write(record, builder)
+    return _ended(builder)
+
+
+def _ended(builder: RecordBuilder) -> bytes:
+    data: bytes = builder.end()  # type: ignore[no-untyped-call]
+    return data

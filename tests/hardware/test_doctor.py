@@ -1,0 +1,250 @@
+"""`tautscope doctor` with a rig, with a wrong one, and with none; nothing is ever enabled."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from drive_rig import AXES, drives_document
+from tautscope.bench.can_bus import Hub
+from tautscope.bench.drives import SimulatedDrives
+from tautscope.cli import main
+from tautscope.config import DrivesConfig, dump_config, from_document
+from tautscope.dof import Dof
+from tautscope.hardware.cia402 import State
+from tautscope.hardware.doctor.computer import check_disk
+from tautscope.hardware.doctor.drives import check_drives
+from tautscope.hardware.doctor.finding import Finding
+from test_cameras import PATIENCE, until, write_dv
+
+Bench = Callable[..., SimulatedDrives]
+CAMERA = {
+    "width": 64,
+    "height": 48,
+    "source": {
+        "url": "testsrc2=size=64x48:rate=50,realtime",
+        "format": "lavfi",
+        "start_timeout": PATIENCE,
+        "timeout": PATIENCE,
+    },
+}
+
+
+def document(hub: Path, camera: dict[str, Any] | None = None, **changes: Any) -> dict[str, Any]:
+    drives = drives_document(channel=str(hub), heartbeat_timeout=1.0, **changes)
+    control = {"period": drives["cycle"]}
+    return {"camera": camera or CAMERA, "control": control, "drives": drives}
+
+
+def drives_of(found: dict[str, Any]) -> DrivesConfig:
+    config = from_document(found).drives
+    assert config is not None
+    return config
+
+
+def doctor(
+    capsys: pytest.CaptureFixture[str], folder: Path, found: dict[str, Any] | None
+) -> tuple[int, dict[str, dict[str, Any]]]:
+    arguments = ["doctor", "--json"]
+    if found is not None:
+        file = folder / "rig.toml"
+        file.write_text(dump_config(from_document(found)), encoding="utf-8")
+        arguments.append(str(file))
+    status = main(arguments)
+    said = json.loads(capsys.readouterr().out)
+    assert said["complete"] == (status == 0)
+    return status, {one["what"]: one for one in said["findings"]}
+
+
+def was_never_enabled(drives: SimulatedDrives) -> bool:
+    known = {state.value for state in State}
+    seen = {event.what for event in drives.events}
+    assert seen <= known | {f"fault: {kind}" for kind in ("fault", "refuse", "drop")}
+    return State.OPERATION_ENABLED.value not in seen
+
+
+def put(drives: SimulatedDrives, dof: Dof, state: State) -> None:
+    """As somebody else left it; a drive that boots would forget."""
+    until(lambda: State.NOT_READY not in drives.states.values())
+    drives._drives[dof]._go(state, time.monotonic())
+
+
+@pytest.fixture
+def permitted(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """The policies that were asked for; the tests' own process keeps its own."""
+    asked: list[int] = []
+    monkeypatch.setattr(os, "sched_setscheduler", lambda pid, policy, of: asked.append(policy))
+    return asked
+
+
+@pytest.mark.parametrize("modes", [(7, 8), (1, 7)], ids=["csp", "article"])
+def test_a_rig_that_is_all_there(
+    hub: Hub,
+    bench: Bench,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    permitted: list[int],
+    *,
+    modes: tuple[int, ...],
+) -> None:
+    config = document(hub.path)
+    drives = bench(drives_of(config), modes=modes, start=[0.01, 0.5, 0.2])
+    status, found = doctor(capsys, tmp_path, config)
+    assert status == 0, found
+    assert permitted == [os.SCHED_FIFO, os.sched_getscheduler(0)]
+    source = found[f"source {CAMERA['source']['url']}"]["data"]
+    assert (source["width"], source["height"], source["interlaced"]) == (64, 48, False)
+    assert source["rate"] == pytest.approx(50, rel=0.5)
+    for dof, where in zip(Dof, (0.01, 0.5, 0.2), strict=True):
+        name = f"{dof.label}, node {dof + 1}"
+        assert found[name]["data"]["modes"] == list(modes)
+        assert found[name]["data"]["position"] == pytest.approx(where, abs=1e-3)
+        settings = found[f"{name}: settings"]["data"]
+        assert settings["mode"] == modes[-1]
+        assert settings["settings"]["0x607F:0 (Max profile velocity)"] == round(
+            AXES[dof.label]["speed_limit"] * AXES[dof.label]["counts_per_unit"]
+        )
+    assert found["heartbeats and answers"]["data"]["cycles"] > 10
+    assert was_never_enabled(drives)
+
+
+def test_a_quick_stopped_motor_stays_held(hub: Hub, bench: Bench) -> None:
+    config = drives_of(document(hub.path))
+    drives = bench(config)
+    for dof in Dof:
+        put(drives, dof, State.QUICK_STOP_ACTIVE)
+    findings = check_drives(config)
+    assert {one.status for one in findings} <= {"ok", "note"}, findings
+    assert set(drives.states.values()) == {State.QUICK_STOP_ACTIVE}
+    assert was_never_enabled(drives)
+
+
+def test_interlaced_dv_is_told_as_fields(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_dv(tmp_path / "clip.avi", 40)
+    movie = {**CAMERA["source"], "url": f"movie={tmp_path / 'clip.avi'},realtime"}
+    camera = {"width": 720, "height": 576, "source": movie}
+    status, found = doctor(capsys, tmp_path, {"camera": camera})
+    source = found[f"source {movie['url']}"]
+    assert source["data"]["interlaced"] is True
+    assert source["data"]["rate"] == pytest.approx(50, rel=0.5)
+    assert status == 1
+    assert "configs/article_rig.toml" in found["configuration"]["todo"]
+
+
+def test_nothing_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    config = document(tmp_path / "nobody")
+    config["camera"] = {**CAMERA, "source": {"url": "/dev/video99"}}
+    config["control"]["period"] = 0.005
+    status, found = doctor(capsys, tmp_path, config)
+    assert status == 1
+    assert "ls /dev/video*" in found["source /dev/video99"]["todo"]
+    assert found["pace"]["status"] == "missing"
+    bus = found[f"bus tautscope {tmp_path / 'nobody'}"]
+    assert bus["status"] == "missing"
+    assert "drives.channel" in bus["todo"]
+
+
+def test_without_a_configuration_nothing_is_opened(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, found = doctor(capsys, tmp_path, None)
+    assert {"system", "disk", "V4L2 devices", "CAN interfaces"} <= found.keys()
+    assert not any(what.startswith(("source", "bus")) for what in found)
+
+
+def test_text_says_what_to_type(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(pid: int, policy: int, of: object) -> None:
+        raise PermissionError
+
+    monkeypatch.setattr(os, "sched_setscheduler", refuse)
+    file = tmp_path / "rig.toml"
+    file.write_text("[camera.source]\nurl = '/dev/video99'\n")
+    assert main(["doctor", str(file)]) == 1
+    said = capsys.readouterr().out
+    assert "MISSING real-time priority: SCHED_FIFO is not permitted" in said
+    assert "rtprio 60" in said
+    assert said.endswith("3 missing. No motor was enabled.\n")
+    assert main(["doctor", str(tmp_path / "none.toml")]) == 2
+
+
+def missing(findings: list[Finding]) -> dict[str, Finding]:
+    return {one.what: one for one in findings if one.status == "missing"}
+
+
+@pytest.mark.parametrize(
+    ("options", "changes", "where", "says"),
+    [
+        ({"modes": (1, 3)}, {}, "rotation, node 2", "streamed positions"),
+        ({"absent": (0x6007,)}, {}, "rotation, node 2: settings", "add 6007 to drives.waive"),
+        ({"start": [0, 3.4, 0]}, {"home": 2.0}, "rotation, node 2", "drives.rotation.travel"),
+        ({}, {"node": 9}, "rotation, node 9", "drives.rotation.node"),
+    ],
+    ids=["modes", "protection", "travel", "node"],
+)
+def test_a_wrong_drive_is_named_and_the_others_are_seen(
+    hub: Hub,
+    bench: Bench,
+    *,
+    options: dict[str, Any],
+    changes: dict[str, Any],
+    where: str,
+    says: str,
+) -> None:
+    drives = bench(drives_of(document(hub.path)), **options)
+    wrong = {"rotation": {**AXES["rotation"], **changes}, "request_timeout": 1.0}
+    found = check_drives(drives_of(document(hub.path, **wrong)))
+    assert says in missing(found)[where].todo, missing(found)
+    assert any(one.what == "bending, node 3" for one in found)
+    assert was_never_enabled(drives)
+
+
+@pytest.mark.parametrize(
+    ("state", "todo"),
+    [(State.FAULT, "Find the cause"), (State.OPERATION_ENABLED, "end the program")],
+)
+def test_a_drive_that_is_not_at_rest_is_told_nothing(
+    hub: Hub, bench: Bench, state: State, todo: str
+) -> None:
+    config = drives_of(document(hub.path))
+    drives = bench(config)
+    put(drives, Dof.ROTATION, state)
+    before = [dict(drive.values) for drive in drives._drives]
+    found = missing(check_drives(config))
+    assert found.keys() == {"rotation, node 2"}
+    assert todo in found["rotation, node 2"].todo
+    assert [drive.values for drive in drives._drives] == before
+
+
+def test_a_heartbeat_that_stays_away_is_missing(hub: Hub, bench: Bench) -> None:
+    config = drives_of(document(hub.path))
+    drives = bench(config)
+    drives.inject("heartbeat", Dof.BENDING)
+    found = missing(check_drives(config))
+    assert found.keys() == {"heartbeats and answers"}
+    assert "bending, node 3: no heartbeat" in found["heartbeats and answers"].found
+
+
+def test_a_full_or_slow_disk_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    config = from_document({})
+    where = "tautscope.hardware.doctor.computer"
+    monkeypatch.setattr(f"{where}._speed", lambda folder, size: 1e9)
+    assert check_disk(config, tmp_path).status == "ok"
+    # 720 x 576 x 3 bytes, 50 a second, 55 % of it: 34 MB/s, or 20 GB in ten minutes.
+    monkeypatch.setattr(f"{where}._speed", lambda folder, size: 30e6)
+    slow = check_disk(config, tmp_path)
+    assert (slow.status, "quicker disk" in slow.todo) == ("missing", True)
+    assert slow.data["needed_per_second"] == pytest.approx(34.2e6, rel=0.01)
+    used = type("Usage", (), {"free": 20e9})
+    monkeypatch.setattr(f"{where}.shutil.disk_usage", lambda folder: used)
+    assert "more room" in check_disk(config, tmp_path).todo
+    monkeypatch.undo()
+    assert "ls -ld" in check_disk(config, tmp_path / "none").todo
