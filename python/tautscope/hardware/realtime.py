@@ -1,0 +1,50 @@
+"""Priority over other programs, for what moves motors."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+SETPOINTS, LOOP = 60, 40
+"""SCHED_FIFO priorities of the thread that sends set-points, and of the loop."""
+_SWITCH_INTERVAL = 5e-4
+"""For how long a thread may keep Python's lock when another wants it [s]; 5 ms is the default."""
+
+
+@contextmanager
+def realtime(priority: int) -> Iterator[str]:
+    """SCHED_FIFO for the calling thread while the block lasts; threads it starts inherit it.
+
+    Yields:
+        Nothing if it was granted, else why not and what to do.
+    """
+    if not hasattr(os, "sched_setscheduler"):
+        yield f"{sys.platform} has no SCHED_FIFO; set-points may be late under load"
+        return
+    policy, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+    except OSError as error:
+        yield (
+            f"no real-time priority ({error.strerror}); set-points may be late under load. Add "
+            f"'@realtime - rtprio {SETPOINTS}' to /etc/security/limits.conf, yourself to the group "
+            "realtime, and log in again"
+        )
+        return
+    try:
+        yield ""
+    finally:
+        os.sched_setscheduler(0, policy, parameters)
+
+
+@contextmanager
+def quick_switching() -> Iterator[None]:
+    """Python's threads wait less for each other while the block lasts."""
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(_SWITCH_INTERVAL)
+    try:
+        yield
+    finally:
+        sys.setswitchinterval(before)
