@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from tautscope.config import Config
 from tautscope.dof import Dof
@@ -25,7 +24,7 @@ from tautscope.hardware.signals import exit_on_signals
 from tautscope.hardware.timing import Timing
 from tautscope.log.writer import LogSummary, LogWriter
 from tautscope.output import check_free
-from tautscope.recording import Recording
+from tautscope.recording import Recording, Table
 from tautscope.reduction import HysteresisReduction, Report
 from tautscope.references import SineSequence
 from tautscope.results import Results, evaluate
@@ -150,6 +149,7 @@ def write_run_folder(run: HardwareRun, folder: Path) -> None:
     ]
     if run.uncompensated is not None and results is not None:
         run.uncompensated.recording.write(folder, "_uncompensated")
+        run.uncompensated.timing.write(folder, "_uncompensated")
         tables.write_csv(folder / "table1.csv", [run.config.twin.seed], [results])
         compared = figures.figure9(run.uncompensated.recording, first.recording)
         caption = (
@@ -168,15 +168,7 @@ def write_run_folder(run: HardwareRun, folder: Path) -> None:
         page = report.run_report(run.config, facts, results, pictures)
     (folder / "report.html").write_text(page, encoding="utf-8")
     (folder / "run.json").write_text(json.dumps(run.to_json(), indent=1), encoding="utf-8")
-    for name in ("cycles", "frames"):
-        np.savetxt(
-            folder / f"timing_{name}.csv",
-            getattr(first.timing, name),
-            "%.6f",
-            ",",
-            header="due,began,ended,new" if name == "cycles" else "captured,arrived,used",
-            comments="",
-        )
+    first.timing.write(folder)
 
 
 def _run(
@@ -278,7 +270,7 @@ def _facts(part: Part) -> dict[str, Any]:
     }
 
 
-def _shares(frames: NDArray[np.void]) -> dict[str, float | None]:
+def _shares(frames: Table) -> dict[str, float | None]:
     return {
         dof.label: finite_or_none(float(frames[f"observable_{dof.label}"].mean()))
         if len(frames)

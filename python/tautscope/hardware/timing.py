@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from array import array
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+
+CYCLE_COLUMNS = ("due", "began", "ended", "new")
+FRAME_COLUMNS = ("captured", "arrived", "used")
 
 
 @dataclass
@@ -78,6 +82,15 @@ class Timing:
         """Cycles without a new set-point."""
         return self.held + self.skipped
 
+    def write(self, folder: Path, suffix: str = "") -> None:
+        """Write timing_cycles.csv and timing_frames.csv; `suffix` goes on their names."""
+        for name, table, columns in (
+            ("cycles", self.cycles, CYCLE_COLUMNS),
+            ("frames", self.frames, FRAME_COLUMNS),
+        ):
+            file = folder / f"timing_{name}{suffix}.csv"
+            np.savetxt(file, table, "%.6f", ",", header=",".join(columns), comments="")
+
     def summary(self) -> dict[str, Any]:
         """For JSON; times in ms."""
         cycles, frames = self.cycles, self.frames
@@ -94,6 +107,13 @@ class Timing:
             "frame_age_ms": _spread(self.frame_age),
             "frame_waiting_ms": _spread(frames[:, 2] - frames[:, 1]),
         }
+
+
+def read_sent(path: Path) -> Floats:
+    """(ticks,) `Timing.sent` of a file of cycles [s]."""
+    cycles = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
+    sent: Floats = cycles[cycles[:, 3] == 1, 1]
+    return sent
 
 
 def _spread(times: Floats) -> dict[str, float | None]:
