@@ -21,12 +21,17 @@ dofs = pytest.mark.parametrize("dof", Dof, ids=lambda dof: dof.label)
 
 
 def watch(
-    dof: Dof, tip_of: Callable[[float, float], float], *, seen: bool = True, noise: float = 0.0
+    dof: Dof,
+    tip_of: Callable[[float, float], float],
+    *,
+    seen: bool = True,
+    noise: float = 0.0,
+    config: Config = CONFIG,
 ) -> None:
-    """Three periods of the article's sine; the tip from where it was and where the motor is."""
-    sine, random = CONFIG.experiment[dof], np.random.default_rng(0)
+    """Five periods of the article's sine; the tip from where it was and where the motor is."""
+    sine, random = config.experiment[dof], np.random.default_rng(0)
     plausibility, tip = Plausibility(CONFIG, START), float(START[dof])
-    for time in np.arange(0, 3 * sine.period, 0.04):
+    for time in np.arange(0, 5 * sine.period, 0.04):
         motor = START.copy()
         motor[dof] += sine.amplitude * np.sin(2 * np.pi * time / sine.period)
         plausibility.tick(motor)
@@ -45,6 +50,13 @@ def play(width: float) -> Callable[[float, float], float]:
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
 def test_a_tip_behind_slack_passes(dof: Dof, share: float) -> None:
     watch(dof, play(share * SLACK[dof]), noise=0.05 * CONFIG[dof].update_distance)
+
+
+@dofs
+def test_strokes_inside_the_slack_show_nothing(dof: Dof) -> None:
+    """A tip that stands still in them is as it should be."""
+    small = CONFIG.replace(**{f"experiment.{dof.label}.amplitude": float(0.4 * SLACK[dof])})
+    watch(dof, play(SLACK[dof]), config=small, noise=0.5 * CONFIG[dof].update_distance)
 
 
 @dofs

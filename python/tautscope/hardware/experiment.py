@@ -19,6 +19,7 @@ from tautscope.dof import Dof
 from tautscope.errors import OutputError
 from tautscope.experiment import run_experiment
 from tautscope.hardware.plausibility import Plausibility
+from tautscope.hardware.realtime import OTHERS, realtime
 from tautscope.hardware.rig import HardwareRig
 from tautscope.hardware.signals import exit_on_signals
 from tautscope.hardware.timing import Timing
@@ -119,7 +120,7 @@ def run_on_hardware(
     rig = make_rig(config)  # a configuration that cannot work leaves no folder
     _make(check_free(folder))
     parts = []
-    with exit_on_signals(), _without_collection():
+    with exit_on_signals(), _without_collection(), realtime(OTHERS):
         for index, compensate in enumerate(kinds):
             parts.append(
                 _run(

@@ -10,11 +10,15 @@ from tautscope.dof import Dof
 from tautscope.errors import ConfigError
 from tautscope.reduction import Report
 
-UNSEEN, FOLLOWS, OUTRUNS = 8.0, 0.1, 3.0
-"""Travel of a motor [in start deviations] after which its tip must have been seen, and have
-followed at least so far [share of the travel]; how much further than its motor no tip goes."""
-OPPOSITE = 2.0
-"""How far a tip may go against its motor [in start deviations]."""
+UNSEEN = 8.0
+"""Travel of a motor after which its tip must have been seen [in start deviations]."""
+OPPOSITE = 1.0
+"""How far a tip may seem to go against its motor [in start deviations]."""
+BEYOND_SLACK, FOLLOWS = 3.5, 0.05
+"""Range of a motor that is more than any slack [in start deviations], and the least share of it
+that its tip then goes."""
+OUTRUNS = 3.0
+"""How many times as far as its motor no tip goes."""
 
 
 class Plausibility:
@@ -22,9 +26,10 @@ class Plausibility:
 
     Per DOF, over the frames that measured it, with q the state estimate and p the motor,
 
-        T = sum |p_k - p_(k-1)|,    C = sum sign(p_k - p_(k-1)) (q_k - q_(k-1)).
+        R = max p - min p,    D = q(where p was largest) - q(where p was smallest).
 
-    A tip behind slack has 0 < C < T. The scale of all is ``start_deviation``, half of the slack.
+    A tip behind slack w has max(0, R - w) <= D <= R, whatever the motor did between. The scale of
+    all is ``start_deviation``, half of the slack.
 
     Args:
         config: Of the loop.
@@ -34,12 +39,10 @@ class Plausibility:
     def __init__(self, config: Config, applied: NDArray[np.float64]) -> None:
         self._scale = np.array([config[dof].start_deviation for dof in Dof])
         self._last = np.array(applied)
-        self._seen_at = np.array(applied)
-        self._seen = np.full(3, np.nan)
-        self._travel = np.zeros(3)
         self._unseen = np.zeros(3)
-        self._followed = np.zeros(3)
-        self._settled = np.zeros(3, dtype=bool)
+        self._ends: list[tuple[tuple[float, float], tuple[float, float]] | None] = [None] * 3
+        """Per DOF (motor, estimate) at the least and at the largest position of the motor."""
+        self._settled = [False] * 3
 
     def tick(self, applied: NDArray[np.float64]) -> None:
         """Where the motors are (3,), once per control period.
@@ -65,32 +68,30 @@ class Plausibility:
             ConfigError: A tip goes against its motor, further than it, or not at all.
         """
         for dof in Dof:
-            if not report.observable[dof]:
-                continue
-            estimate, motor = float(report.state_estimate[dof]), float(self._last[dof])
-            self._unseen[dof] = 0.0
-            if np.isfinite(self._seen[dof]) and not self._settled[dof]:
-                moved = motor - self._seen_at[dof]
-                self._travel[dof] += abs(moved)
-                self._followed[dof] += np.sign(moved) * (estimate - self._seen[dof])
-                self._judge(dof)
-            self._seen[dof], self._seen_at[dof] = estimate, motor
+            if report.observable[dof]:
+                self._unseen[dof] = 0.0
+                if not self._settled[dof]:
+                    self._judge(dof, (float(self._last[dof]), float(report.state_estimate[dof])))
 
-    def _judge(self, dof: Dof) -> None:
-        travel, followed = float(self._travel[dof]), float(self._followed[dof])
+    def _judge(self, dof: Dof, now: tuple[float, float]) -> None:
+        least, largest = self._ends[dof] or (now, now)
+        least, largest = min(least, now), max(largest, now)
+        self._ends[dof] = least, largest
+        motor, tip = largest[0] - least[0], largest[1] - least[1]
         scale, name = float(self._scale[dof]), f"drives.{dof.label}"
-        told = f"a tip that went {followed:.3g} while its motor went {travel:.3g}"
-        if followed < -OPPOSITE * scale:
+        told = f"a tip that went {tip:.3g} while its motor went {motor:.3g}"
+        if tip < -OPPOSITE * scale:
             raise ConfigError(f"{name}.sign", told, "one that goes with it: the sign is wrong")
-        if followed > OUTRUNS * (travel + scale):
+        if tip > OUTRUNS * (motor + scale):
             raise ConfigError(
                 f"{name}.counts_per_unit", told, "counts per m or rad: it is too large"
             )
-        if travel > UNSEEN * scale:
-            if followed < FOLLOWS * travel:
+        if motor > BEYOND_SLACK * scale:
+            if tip < FOLLOWS * motor:
                 raise ConfigError(
                     f"{name}.counts_per_unit",
                     told,
-                    "one that follows: it is too small, or the transmission is broken",
+                    f"one that follows: it is too small, {name}.sign is wrong, or the "
+                    "transmission is broken",
                 )
             self._settled[dof] = True

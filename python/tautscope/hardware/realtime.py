@@ -7,8 +7,10 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-SETPOINTS, LOOP = 60, 40
-"""SCHED_FIFO priorities of the thread that sends set-points, and of the loop."""
+SETPOINTS, LOOP, OTHERS = 60, 40, 10
+"""SCHED_FIFO priorities of the thread that sends set-points, of the loop, and of what else runs in
+their process: a thread that holds Python's lock and is kept waiting by another program would keep
+them waiting too."""
 _SWITCH_INTERVAL = 5e-4
 """For how long a thread may keep Python's lock when another wants it [s]; 5 ms is the default."""
 
