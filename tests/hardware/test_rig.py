@@ -273,6 +273,17 @@ def test_a_loop_that_gives_no_commands_ends_in_quick_stop(setup: Callable[..., S
         one.rig.step(start)
 
 
+def test_a_run_that_is_over_may_be_closed_late(setup: Callable[..., Setup]) -> None:
+    one = setup(drives={"command_timeout": 0.05})
+    one.rig.step(one.rig.reset().applied)
+    end = time.monotonic() + 60
+    while not one.motors.stopped and time.monotonic() < end:
+        time.sleep(CYCLE)
+    one.rig.close()
+    assert one.motors.stopped == 1
+    assert one.rig.timing.lost == 0
+
+
 def test_close_stops_the_motors_and_the_rig_can_start_again(setup: Callable[..., Setup]) -> None:
     one = setup()
     one.rig.close()
@@ -295,12 +306,12 @@ def test_a_configuration_that_cannot_be_driven_is_refused() -> None:
 
 def test_timing_is_written_and_read_back(tmp_path: Any) -> None:
     timing = Timing(CYCLE)
-    for index, is_new in enumerate([True, False, True]):
-        timing.add_cycle(index * CYCLE, index * CYCLE + 0.001, index * CYCLE + 0.003, is_new)
+    for place, is_new in ((0, True), (1, False), (4, True), (5, False)):
+        due = place * CYCLE
+        timing.add_cycle(due, due + 0.001, due + 0.003, is_new)
     timing.add_frame(1.0, 1.08, 1.09)
-    timing.skipped = 2
     timing.write(tmp_path)
-    np.testing.assert_allclose(read_sent(tmp_path / "timing_cycles.csv"), [0.001, 0.021])
+    np.testing.assert_allclose(read_sent(tmp_path / "timing_cycles.csv"), [0.001, 0.041])
     summary = timing.summary()
     assert (summary["cycles"], summary["lost_cycles"], summary["held_cycles"]) == (5, 3, 1)
     assert summary["jitter_ms"]["worst"] == pytest.approx(1.0)

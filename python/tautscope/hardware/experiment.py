@@ -120,7 +120,7 @@ def run_on_hardware(
     rig = make_rig(config)  # a configuration that cannot work leaves no folder
     _make(check_free(folder))
     parts = []
-    with exit_on_signals(), _without_collection(), realtime(OTHERS):
+    with exit_on_signals(), _little_collection(), realtime(OTHERS):
         for index, compensate in enumerate(kinds):
             parts.append(
                 _run(
@@ -242,14 +242,14 @@ class _Watched:
 
 
 @contextmanager
-def _without_collection() -> Iterator[None]:
-    """Python's search for cycles of dead objects stops all threads; none are made here."""
+def _little_collection() -> Iterator[None]:
+    """Python's search for cycles of dead objects stops all threads: spare it what is there now."""
     gc.collect()
-    gc.disable()
+    gc.freeze()
     try:
         yield
     finally:
-        gc.enable()
+        gc.unfreeze()
 
 
 def _make(folder: Path) -> None:

@@ -68,6 +68,7 @@ class Setpoints:
         self._command: Floats | None = None
         self._sent: tuple[float, Floats] | None = None
         self._has_begun = self._is_ending = self._is_over = self._is_told = False
+        self._is_abandoned = False
         self._failure: BaseException | None = None
         self._due = 0.0
         self._thread = threading.Thread(target=self._run, name="set-points")
@@ -106,7 +107,7 @@ class Setpoints:
             self._is_ending = True
         if self._thread.ident is not None:
             self._thread.join()
-        if not self._is_told:
+        if not (self._is_told or self._is_abandoned):
             self._check()
 
     def _take(self) -> tuple[float, Floats]:
@@ -165,6 +166,7 @@ class Setpoints:
             if taken is not None:
                 command, last_news, self._has_begun = taken, began, True
             elif began - last_news > self._config.command_timeout:
+                self._is_abandoned = True
                 raise StateError(
                     "loop",
                     f"no command for {began - last_news:.2g} s",
@@ -190,5 +192,4 @@ class Setpoints:
         late = math.floor((time.monotonic() - self._due) / cycle)
         if late > 0:
             self._due += late * cycle
-            self._timing.skipped += late if self._has_begun else 0
         time.sleep(max(0.0, self._due - time.monotonic()))

@@ -25,12 +25,10 @@ class Timing:
 
     Attributes:
         cycle: Time from one set-point to the next as it should be [s].
-        skipped: Cycles that were left out.
         realtime: Why there is no real-time priority; empty if there is.
     """
 
     cycle: float
-    skipped: int = 0
     realtime: str = ""
     _cycles: array[float] = field(default_factory=lambda: array("d"))
     _frames: array[float] = field(default_factory=lambda: array("d"))
@@ -45,8 +43,12 @@ class Timing:
 
     @property
     def cycles(self) -> Floats:
-        """(n, 4) due, began, ended [s], and 1 for a new set-point, 0 for one that was held."""
-        return np.array(self._cycles[:]).reshape(-1, 4)
+        """(n, 4) due, began, ended [s], and 1 for a new set-point, 0 for one that was held.
+
+        Up to the last new one: what is held when the run is over is not late.
+        """
+        cycles: Floats = np.array(self._cycles[:]).reshape(-1, 4)
+        return cycles[: np.flatnonzero(cycles[:, 3])[-1] + 1] if cycles[:, 3].any() else cycles[:0]
 
     @property
     def frames(self) -> Floats:
@@ -76,6 +78,12 @@ class Timing:
     def held(self) -> int:
         """Cycles in which the loop had no new command, and the last one was sent again."""
         return int((self.cycles[:, 3] == 0).sum())
+
+    @property
+    def skipped(self) -> int:
+        """Cycles for which the thread woke too late, and which were left out."""
+        due = self.cycles[:, 0]
+        return int((np.round(np.diff(due) / self.cycle) - 1).sum())
 
     @property
     def lost(self) -> int:
