@@ -7,26 +7,25 @@ import json
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-from numpy.typing import ArrayLike
 
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import OutputError
 from tautscope.experiment import run_experiment
 from tautscope.hardware.plausibility import Plausibility
-from tautscope.hardware.realtime import OTHERS, realtime
+from tautscope.hardware.realtime import OTHERS, VISION, realtime, settle
 from tautscope.hardware.rig import HardwareRig
 from tautscope.hardware.signals import exit_on_signals
 from tautscope.hardware.timing import Timing
 from tautscope.log.writer import LogSummary, LogWriter
 from tautscope.output import check_free
-from tautscope.recording import Recording, Table
-from tautscope.reduction import HysteresisReduction, Report
+from tautscope.recording import Floats, Recording, Table
+from tautscope.reduction import Report
 from tautscope.references import SineSequence
 from tautscope.results import Results, evaluate
 from tautscope.rig import Frame, Sample
@@ -187,16 +186,16 @@ def _run(
             log.warn(text)
 
         rig.say = say
-        watched = _Watched(rig, config)
+        eyes = ThreadPoolExecutor(1, "vision", settle, (VISION,))
         try:
             recording = run_experiment(
-                watched,
+                rig,
                 reference,
                 config,
                 compensate,
                 lambda elapsed, duration: progress(min(elapsed / duration, 1.0)),
-                look=watched.look,
-                log=log,
+                log=_Watched(log, config),
+                aside=eyes,
             )
         except BaseException as error:
             log.warn(f"{type(error).__name__}: {error}")
@@ -204,41 +203,29 @@ def _run(
             raise
         finally:
             rig.close()
+            eyes.shutdown()
     progress(1.0)
     return Part(recording, rig.timing, log.close())
 
 
 class _Watched:
-    """A rig whose tip is watched to go where the motors go."""
+    """A log, and a watch that the tip goes where the motors go."""
 
-    def __init__(self, rig: HardwareRig, config: Config) -> None:
-        self._rig = rig
+    def __init__(self, log: LogWriter, config: Config) -> None:
+        self._log = log
         self._config = config
         self._watch: Plausibility | None = None
 
-    @property
-    def control_period(self) -> float:
-        return self._rig.control_period
+    def tick(self, sample: Sample, reference: Floats, command: Floats) -> None:
+        self._log.tick(sample, reference, command)
+        if self._watch is None:
+            self._watch = Plausibility(self._config, sample.applied)
+        self._watch.tick(sample.applied)
 
-    def reset(self) -> Sample:
-        sample = self._rig.reset()
-        self._watch = Plausibility(self._config, sample.applied)
-        return sample
-
-    def step(self, command: ArrayLike) -> Sample:
-        sample = self._rig.step(command)
-        if self._watch is not None:
-            self._watch.tick(sample.applied)
-        return sample
-
-    def close(self) -> None:
-        self._rig.close()
-
-    def look(self, reduction: HysteresisReduction, frame: Frame) -> Report:
-        report = reduction.on_frame(frame)
+    def frame(self, now: float, frame: Frame, report: Report) -> None:
+        self._log.frame(now, frame, report)
         if self._watch is not None:
             self._watch.frame(report)
-        return report
 
 
 @contextmanager

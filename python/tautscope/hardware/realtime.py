@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
-SETPOINTS, LOOP, OTHERS = 60, 40, 10
-"""SCHED_FIFO priorities of the thread that sends set-points, of the loop, and of what else runs in
-their process: a thread that holds Python's lock and is kept waiting by another program would keep
-them waiting too."""
+SETPOINTS, LOOP, VISION, OTHERS = 60, 40, 20, 10
+"""SCHED_FIFO priorities of the thread that sends set-points, of the loop, of the thread that looks
+at images, and of what else runs in their process: a thread that holds Python's lock and is kept
+waiting by another program would keep them waiting too."""
 _SWITCH_INTERVAL = 5e-4
 """For how long a thread may keep Python's lock when another wants it [s]; 5 ms is the default."""
 
@@ -39,6 +39,12 @@ def realtime(priority: int) -> Iterator[str]:
         yield ""
     finally:
         os.sched_setscheduler(0, policy, parameters)
+
+
+def settle(priority: int) -> None:
+    """SCHED_FIFO for the calling thread for good, where it is permitted."""
+    with suppress(OSError, AttributeError):
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
 
 
 @contextmanager

@@ -97,6 +97,7 @@ class HardwareRig:
         self._last: Capture | None = None
         self._news_at = 0.0
         self._trouble = ""
+        self._is_frozen = False
 
     @property
     def control_period(self) -> float:
@@ -128,7 +129,7 @@ class HardwareRig:
         if self.timing.realtime:
             self.say(self.timing.realtime)
         self._sent.clear()
-        self._ticks, self._last, self._trouble = 0, None, ""
+        self._ticks, self._last, self._trouble, self._is_frozen = 0, None, "", False
         self._news_at = time.monotonic()
         return Sample(0.0, applied)
 
@@ -179,7 +180,9 @@ class HardwareRig:
         )
         if is_new:
             self._news_at = now
-        self._mind(eye.state, now, is_frozen=capture is not None and not is_new)
+        if capture is not None:
+            self._is_frozen = not is_new
+        self._mind(eye.state, now)
         if capture is None or not is_new:
             return None
         self._last = capture
@@ -187,19 +190,19 @@ class HardwareRig:
         captured_at = self.on_clock(capture.frame.captured_at)
         return Frame(capture.frame.image, captured_at, capture.frame.sequence)
 
-    def _mind(self, state: CameraState, now: float, is_frozen: bool) -> None:
+    def _mind(self, state: CameraState, now: float) -> None:
         source = self._config.camera.source
         away = now - self._news_at
         trouble = state.trouble
+        what = "the same picture again and again" if self._is_frozen else "no picture"
         if not trouble and away > source.timeout:
-            why = "the same picture again and again" if is_frozen else "no frame"
-            trouble = f"{why} for {source.timeout:g} s; is the camera on and connected?"
+            trouble = f"{what} for {source.timeout:g} s; is the camera on and connected?"
         if away > source.lost_timeout:
             raise CameraError(
                 "camera.source",
-                trouble or "no frame",
-                f"one within {source.lost_timeout:g} s; the motors are stopped. See to the camera "
-                "and start again",
+                f"{what} for {source.lost_timeout:g} s",
+                "new ones; the motors are stopped. See to the camera, its cable and the video "
+                "processor, then start again",
             )
         if bool(trouble) != bool(self._trouble):
             self.say(f"camera: {trouble}" if trouble else "camera: frames again")
