@@ -3,9 +3,10 @@
 One process is the rig (`tautscope bench`), another drives it (`tautscope run`), over a CAN bus and
 a camera stream, at 100 Hz in real time. The first part runs the protocol with and without
 compensation and compares the reductions with those of the in-process twin of the same seed,
-profile and control period; the bench writes where its tip truly was, for this evaluation alone.
-``--minutes`` is how long each run streams set-points: periods are repeated until then. The second
-part asks for faults, and for configurations that are wrong, one by one.
+profile, control period and history (the second run goes on with the same instrument); the bench
+writes where its tip truly was, for this evaluation alone. ``--minutes`` is how long each run
+streams set-points: periods are repeated until then. The second part asks for faults, the third for
+configurations that are wrong, each in a run of its own.
 """
 
 from __future__ import annotations
@@ -24,14 +25,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from tautscope import tables
 from tautscope.bench.rig import read_truth
 from tautscope.config import Config, dump_config, load_config
 from tautscope.dof import Dof
+from tautscope.experiment import run_experiment
 from tautscope.hardware.timing import read_sent
 from tautscope.recording import Recording
+from tautscope.references import SineSequence
 from tautscope.results import Results, evaluate
-from tautscope.trials import Trial, run_trials
+from tautscope.rig import Sample
+from tautscope.twin import Twin
 
 BENCH = Path(__file__).resolve().parents[1] / "configs" / "bench.toml"
 WITHIN = 0.03
@@ -74,6 +79,29 @@ def bench_config(folder: Path, arguments: argparse.Namespace) -> Config:
     }
     changes |= {f"experiment.{dof.label}.period": arguments.period for dof in Dof}
     return load_config(BENCH).replace(**changes)
+
+
+class GoingOn(Twin):
+    """The in-process twin, which a second run finds as the first has left it, as on the bench."""
+
+    _is_used = False
+    _command: np.ndarray
+
+    def reset(self) -> Sample:
+        """New at first, then a slow way to the start."""
+        start = np.array([self._config.experiment[dof].centre for dof in Dof])
+        if not self._is_used:
+            self._is_used, self._command = True, start
+            return super().reset()
+        before = self._command
+        for share in (1 - np.cos(np.linspace(0, np.pi, 100))) / 2:
+            sample = self.step(before + share * (start - before))
+        return sample
+
+    def step(self, command: ArrayLike) -> Sample:
+        """As the twin's."""
+        self._command = np.array(command)
+        return super().step(command)
 
 
 class Rig:
@@ -154,8 +182,9 @@ def compared(arguments: argparse.Namespace, out: Path | None) -> dict[str, Any]:
             raise RuntimeError(errors)
         pair = [with_truth(place, suffix, truth) for suffix in ("_uncompensated", "")]
         bench = evaluate(*pair)
-    trials = [Trial(config, False), Trial(config, True)]
-    twin = evaluate(*run_trials(trials, lambda share: None, workers=1))
+    one = GoingOn(config)
+    reference = SineSequence(config.experiment)
+    twin = evaluate(*(run_experiment(one, reference, config, kind) for kind in (False, True)))
     document: dict[str, Any] = {"run": json.loads(text)["runs"], "reductions": {}}
     for dof in Dof:
         ours, theirs = bench[dof].reduction, twin[dof].reduction

@@ -74,8 +74,11 @@ def test_a_tip_that_outruns_its_motor(dof: Dof) -> None:
 
 @dofs
 def test_a_tip_that_stands_still(dof: Dof) -> None:
+    far = CONFIG.replace(
+        **{f"experiment.{dof.label}.amplitude": 1.5 * CONFIG.experiment[dof].amplitude}
+    )
     with pytest.raises(ConfigError, match=f"drives.{dof.label}.counts_per_unit.*too small"):
-        watch(dof, lambda tip, motor: tip)
+        watch(dof, lambda tip, motor: tip, config=far)
 
 
 @dofs

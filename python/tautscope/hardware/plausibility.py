@@ -14,9 +14,10 @@ UNSEEN = 8.0
 """Travel of a motor after which its tip must have been seen [in start deviations]."""
 OPPOSITE = 1.0
 """How far a tip may seem to go against its motor [in start deviations]."""
-BEYOND_SLACK, FOLLOWS = 3.5, 0.05
-"""Range of a motor that is more than any slack [in start deviations], and the least share of it
-that its tip then goes."""
+LARGEST_SLACK = 4.0
+"""By how much less than its motor a tip may go [in start deviations], twice the slack expected."""
+SETTLED = 5.0
+"""Range of the motor after which a tip that went with it is believed [in start deviations]."""
 OUTRUNS = 3.0
 """How many times as far as its motor no tip goes."""
 
@@ -86,12 +87,11 @@ class Plausibility:
             raise ConfigError(
                 f"{name}.counts_per_unit", told, "counts per m or rad: it is too large"
             )
-        if motor > BEYOND_SLACK * scale:
-            if tip < FOLLOWS * motor:
-                raise ConfigError(
-                    f"{name}.counts_per_unit",
-                    told,
-                    f"one that follows: it is too small, {name}.sign is wrong, or the "
-                    "transmission is broken",
-                )
-            self._settled[dof] = True
+        if motor - tip > LARGEST_SLACK * scale:
+            raise ConfigError(
+                f"{name}.counts_per_unit",
+                told,
+                f"one that follows: it is too small, {name}.sign is wrong, the transmission is "
+                f"broken, or {dof.label}.start_deviation, half of the slack, is too small",
+            )
+        self._settled[dof] = motor > SETTLED * scale
