@@ -19,6 +19,8 @@ from tautscope.hardware.realtime import SETPOINTS, realtime
 from tautscope.hardware.timing import Timing
 
 Floats = NDArray[np.float64]
+_PATIENCE = 0.3
+"""How long a cycle waits for a command that is late [share of the cycle]."""
 
 
 class Motors(Protocol):
@@ -71,6 +73,7 @@ class Setpoints:
         self._is_abandoned = False
         self._failure: BaseException | None = None
         self._due = 0.0
+        self._patience = _PATIENCE * config.cycle
         self._thread = threading.Thread(target=self._run, name="set-points")
 
     def start(self) -> Floats:
@@ -95,6 +98,7 @@ class Setpoints:
         """
         with self._news:
             self._command = command
+            self._news.notify_all()
             return self._take()
 
     def stop(self) -> None:
@@ -161,6 +165,8 @@ class Setpoints:
         command, last_news = self._start, time.monotonic()
         while not self._must_end():
             with self._news:
+                if self._has_begun:
+                    self._news.wait_for(lambda: self._command is not None, self._patience)
                 taken, self._command = self._command, None
             began = time.monotonic()
             if taken is not None:
