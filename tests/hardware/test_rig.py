@@ -143,6 +143,15 @@ def test_the_motors_go_to_the_start_within_the_speed_asked_for(
     assert sample.time == 0.0
 
 
+def test_a_motor_outside_its_travel_is_not_moved(setup: Callable[..., Setup]) -> None:
+    one = setup()
+    one.motors.start = lambda: np.array([0.01, 3.6, 0.2])  # type: ignore[method-assign]
+    with pytest.raises(FollowingError, match=r"rotation, node 2: it stands at 3.6, outside"):
+        one.rig.reset()
+    assert not one.motors.told
+    assert one.motors.stopped == one.eye.closed == 1
+
+
 def test_every_command_is_sent_once_in_order_by_one_thread(setup: Callable[..., Setup]) -> None:
     one = setup()
     start = one.rig.reset().applied

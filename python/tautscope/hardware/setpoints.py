@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tautscope.config import DrivesConfig
 from tautscope.dof import Dof
-from tautscope.errors import StateError
+from tautscope.errors import FollowingError, StateError
 from tautscope.hardware.realtime import SETPOINTS, realtime
 from tautscope.hardware.timing import Timing
 
@@ -144,6 +144,16 @@ class Setpoints:
     def _approach(self, motors: Motors, position: Floats) -> None:
         """From where the motors are to the start, slowly, without a jump in speed."""
         config = self._config
+        for dof in Dof:
+            axis, at = config[dof], float(position[dof])
+            if not axis.travel[0] <= at <= axis.travel[1]:
+                raise FollowingError(
+                    f"{dof.label}, node {axis.node}",
+                    f"it stands at {at:.6g}, outside its travel {axis.travel[0]:g} to "
+                    f"{axis.travel[1]:g}",
+                    f"Move it there by hand, or check drives.{dof.label}.home, sign and "
+                    "counts_per_unit",
+                )
         way = self._start - position
         speeds = np.array([config[dof].speed_limit for dof in Dof]) * config.start_speed
         # The cosine's largest speed is pi / 2 times its mean.
