@@ -1,7 +1,9 @@
 """The loop on a rig that is not the twin: three plays and a drawn picture."""
 
+from concurrent.futures import Executor, Future
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -301,3 +303,39 @@ def test_medians_and_worst_leave_out_what_is_not_known() -> None:
     assert combine(results, ends)[Dof.BENDING].reduction == 1.0
     assert combine(results, ends)[Dof.BENDING].state_rms == 5.0
     assert np.isnan(combine([result(np.nan)], "median")[Dof.BENDING].state_rms)
+
+
+class Answering(Executor):
+    """Runs what it is asked at once, or `late` calls of `done` later."""
+
+    def __init__(self, late: int) -> None:
+        self.late = late
+        self.asked = 0
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Any:
+        self.asked += 1
+        answer, left = fn(), self.late
+
+        class Later(Future[Any]):
+            def done(self) -> bool:
+                nonlocal left
+                left -= 1
+                return left < 0
+
+        later = Later()
+        later.set_result(answer)
+        return later
+
+
+@pytest.mark.parametrize("late", [0, 3, 9])
+def test_images_looked_at_aside_hold_up_no_tick(late: int, compensated: Recording) -> None:
+    """Every tick is made; with slow eyes fewer frames are seen, each later and as it would be."""
+    eyes = Answering(late)
+    aside = run_experiment(DrawnRig(CONFIG), REFERENCE, CONFIG, aside=eyes)
+    np.testing.assert_array_equal(aside.trace["time"], compensated.trace["time"])
+    assert eyes.asked >= len(aside.frames) > 0
+    assert (np.diff(aside.frames["captured_at"]) > 0).all()
+    assert set(aside.frames["captured_at"]) <= set(compensated.frames["captured_at"])
+    waited = aside.frames["arrived_at"] - aside.frames["captured_at"]
+    assert waited.min() >= (late + 1) * DrawnRig.control_period - 1e-9
+    assert evaluate(aside, aside)[Dof.INSERTION].frames_used > 0.9

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, get_args
 from tautscope._core import __version__
 from tautscope.config import DISTURBANCES, Config, Profile, dump_config, load_config
 from tautscope.errors import MissingPathError, TautscopeError
+from tautscope.hardware import commands as hardware_commands
 from tautscope.hardware.doctor import commands as doctor
 from tautscope.log import commands
 
@@ -35,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         return options.run(options) or 0
     except TautscopeError as error:
-        print(f"error: {error}", file=sys.stderr)
+        print("\n".join([f"error: {error}", *getattr(error, "__notes__", ())]), file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print("interrupted; nothing was written", file=sys.stderr)
@@ -127,6 +128,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_common(analyze)
     analyze.set_defaults(run=_analyze)
     commands.add_parsers(verbs)
+    hardware_commands.add_parsers(verbs)
     doctor.add_parser(verbs)
     return parser
 

@@ -205,6 +205,8 @@ class SourceConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """Between two attempts to open it [s]."""
     start_timeout: Positive = 10.0
     """For the frames of the self-test at the start [s]."""
+    lost_timeout: Positive = 5.0
+    """Without a frame for so long a run on hardware ends, and the motors stop [s]."""
     darkest: Annotated[int, Meta(ge=1, le=255)] = 24
     """A picture without a pixel above this is black [grey levels]; video black is 16."""
 
@@ -483,6 +485,11 @@ class DrivesConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """For each state of the drive to be reached [s]."""
     request_timeout: Positive = 0.3
     """For each answer to a request [s]."""
+    command_timeout: Positive = 0.5
+    """How long the motors are held where they are while the loop gives no command; then quick
+    stop [s]."""
+    start_speed: Fraction = 0.1
+    """Share of `speed_limit` at which the motors go to where a run starts."""
     after_quick_stop: Literal["hold", "release"] = "hold"
     """Whether the motor is held where it stopped, or let go."""
     waive: tuple[Literal["6007", "605A", "607D"], ...] = ()

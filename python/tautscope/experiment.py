@@ -2,25 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from tautscope.config import Config
 from tautscope.errors import SignalError
-from tautscope.recording import Recording, Snapshot, Tables, frame_row
+from tautscope.recording import Floats, Recording, Snapshot, Tables, frame_row
 from tautscope.reduction import HysteresisReduction, Report
 from tautscope.references import Reference
-from tautscope.rig import Frame, Rig
+from tautscope.rig import Frame, Rig, Sample
 
 if TYPE_CHECKING:
-    from tautscope.log.writer import LogWriter
+    from tautscope.vision import Detection
 
 Progress = Callable[[float, float], None]
 """Called about once per second of the rig's clock with (elapsed, duration) [s]."""
 Look = Callable[[HysteresisReduction, Frame], Report]
 """An image update: frame in, what became of it out."""
+
+
+class Log(Protocol):
+    """Told everything as it happens; `tautscope.log.writer.LogWriter` for one."""
+
+    def tick(self, sample: Sample, reference: Floats, command: Floats) -> None:
+        """A control tick."""
+        ...
+
+    def frame(self, now: float, frame: Frame, report: Report) -> None:
+        """An image update, at a time of the rig's clock [s]."""
+        ...
 
 
 def run_experiment(
@@ -31,7 +44,8 @@ def run_experiment(
     progress: Progress | None = None,
     *,
     look: Look = HysteresisReduction.on_frame,
-    log: LogWriter | None = None,
+    log: Log | None = None,
+    aside: Executor | None = None,
 ) -> Recording:
     """Run a reference on a rig, with the camera as the only feedback.
 
@@ -49,6 +63,8 @@ def run_experiment(
         look: What the loop does with a frame; one that calls `HysteresisReduction.on_features`
             brings a marker detector of your own.
         log: Written while the run goes on, so that it survives whatever ends it; left open.
+        aside: Looks at the images, in place of `look`, while ticks go on; of frames that come
+            meanwhile, the newest is next. For a rig whose time does not wait.
 
     Raises:
         SignalError: The reference is not three finite numbers, or the rig's clock does not run.
@@ -56,6 +72,7 @@ def run_experiment(
     """
     reduction = HysteresisReduction(config, compensate=compensate)
     recorder = _Recorder(config, reference.duration / 2)
+    eyes = _Ahead(look) if aside is None else _Aside(aside)
     sample = rig.reset()
     start = sample.time
     while (elapsed := sample.time - start) < reference.duration:
@@ -65,11 +82,10 @@ def run_experiment(
         if log is not None:
             log.tick(sample, desired, command)
         # After the command, which never waits for an image.
-        if sample.frame is not None:
-            report = look(reduction, sample.frame)
-            recorder.seen(sample.time, sample.frame, report, elapsed)
+        for frame, report in eyes.see(reduction, sample.frame):
+            recorder.seen(sample.time, frame, report, elapsed)
             if log is not None:
-                log.frame(sample.time, sample.frame, report)
+                log.frame(sample.time, frame, report)
         before, sample = sample, rig.step(command)
         if not sample.time > before.time:
             raise SignalError("sample.time", sample.time, f"later than the last, {before.time}")
@@ -78,6 +94,38 @@ def run_experiment(
     trace, frames = recorder.tables()
     segments = tuple(reference.segments)
     return Recording(trace, frames, config, compensate, segments, recorder.snapshot)
+
+
+Seen = Iterator[tuple[Frame, Report]]
+
+
+class _Ahead:
+    """Looks at a frame before anything else happens."""
+
+    def __init__(self, look: Look) -> None:
+        self._look = look
+
+    def see(self, reduction: HysteresisReduction, frame: Frame | None) -> Seen:
+        if frame is not None:
+            yield frame, self._look(reduction, frame)
+
+
+class _Aside:
+    """Has one frame looked at by another thread; its answer is taken in when it is there."""
+
+    def __init__(self, executor: Executor) -> None:
+        self._executor = executor
+        self._next: Frame | None = None
+        self._asked: tuple[Frame, Future[Detection]] | None = None
+
+    def see(self, reduction: HysteresisReduction, frame: Frame | None) -> Seen:
+        if self._asked is not None and self._asked[1].done():
+            (seen, answer), self._asked = self._asked, None
+            yield seen, reduction.on_detection(seen, answer.result())
+        self._next = frame or self._next
+        if self._next is not None and self._asked is None:
+            question = reduction.question(self._next)
+            self._asked, self._next = (self._next, self._executor.submit(question)), None
 
 
 class _Recorder(Tables):

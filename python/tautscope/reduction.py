@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
@@ -132,12 +133,28 @@ class HysteresisReduction:
             FrameError: The image is not what the configured camera gives.
             SignalError: The capture time is not finite.
         """
+        return self.on_detection(frame, self.question(frame)())
+
+    def question(self, frame: Frame) -> Callable[[], Detection]:
+        """What the vision is asked about a frame, to be called here or in another thread.
+
+        It does not touch the loop: ticks may go on meanwhile. One frame after the other, each
+        answer to `on_detection` before the next question.
+
+        Raises:
+            SignalError: The capture time is not finite.
+        """
         captured_at = _time("captured_at", frame.captured_at)
-        detection = self._detector.detect(
-            frame.image,
+        predicted, expected = (
             self._loop.predicted_features(captured_at),
             self.expectation(captured_at),
         )
+        detector = self._detector
+        return lambda: detector.detect(frame.image, predicted, expected)
+
+    def on_detection(self, frame: Frame, detection: Detection) -> Report:
+        """The rest of `on_frame`, with the answer to `question`."""
+        captured_at = _time("captured_at", frame.captured_at)
         if not any(detection.found):
             return self._report(None, captured_at, detection)
         return self._report(detection.features, captured_at, detection, detection.covariance)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from tautscope import tables
 from tautscope._core import __version__
-from tautscope.config import dump_config
+from tautscope.config import Config, dump_config
 from tautscope.results import Results
 
 if TYPE_CHECKING:
@@ -83,7 +83,41 @@ def demo_report(demo: Demo, pictures: Sequence[Picture]) -> str:
         "simulated": f"{demo.sim_seconds:.0f} s in {2 * len(seeds)} runs",
         "took": f"{demo.wall_seconds:.0f} s",
     }
-    figures = "".join(_figure(picture) for picture in pictures)
+    return _page(
+        f"on a simulated instrument, camera images the only feedback; {count}",
+        f"""<h2>Table 1</h2>
+<div class="wide">{_table(demo.results, "twin")}</div>
+<p class="note">Median over the seeds{", the worst seed in brackets" if len(seeds) > 1 else ""}.
+Widths over the last two periods of each degree of freedom: mean over 41 levels across the central
+80&nbsp;% of the tip&rsquo;s range, of the true tip unless said otherwise.</p>
+<h2>Figures</h2>
+{_figures(pictures)}
+<h2>What this shows, and what it does not</h2>
+{_CAVEATS}""",
+        facts,
+        demo.config,
+    )
+
+
+def run_report(
+    config: Config, facts: dict[str, str], results: Results | None, pictures: Sequence[Picture]
+) -> str:
+    """The page of ``tautscope run``; Table 1 if the run was compared with an uncompensated one."""
+    table = ""
+    if results is not None:
+        table = f"""<h2>Table 1</h2>
+<div class="wide">{_table([results], "rig")}</div>
+<p class="note">Widths as the camera sees them; no rig knows its true tip.</p>
+"""
+    return _page(
+        "on the drives and the camera named below",
+        f"{table}<h2>Figures</h2>\n{_figures(pictures)}",
+        {"tautscope": __version__, **facts},
+        config,
+    )
+
+
+def _page(where: str, body: str, facts: dict[str, str], config: Config) -> str:
     facts_list = "".join(f"<dt>{escape(k)}</dt><dd>{escape(v)}</dd>" for k, v in facts.items())
     return f"""<!doctype html>
 <html lang="en"><head><meta charset="utf-8">
@@ -91,39 +125,34 @@ def demo_report(demo: Demo, pictures: Sequence[Picture]) -> str:
 <title>tautscope: hysteresis reduction</title><style>{_STYLE}</style></head><body>
 <h1>Hysteresis reduction from the endoscope&rsquo;s images</h1>
 <p class="lead">The experiment of Reilink, Stramigioli and Misra (Mechatronics 23, 2013, 652, doi
-10.1016/j.mechatronics.2013.06.006) on a simulated instrument, camera images the only feedback;
-{count}.</p>
-<h2>Table 1</h2>
-<div class="wide">{_table(demo.results)}</div>
-<p class="note">Median over the seeds{", the worst seed in brackets" if len(seeds) > 1 else ""}.
-Widths over the last two periods of each degree of freedom: mean over 41 levels across the central
-80&nbsp;% of the tip&rsquo;s range, of the true tip unless said otherwise.</p>
-<h2>Figures</h2>
-{figures}
-<h2>What this shows, and what it does not</h2>
-{_CAVEATS}
+10.1016/j.mechatronics.2013.06.006) {where}.</p>
+{body}
 <h2>Made with</h2>
 <dl>{facts_list}</dl>
 <h2>Configuration</h2>
-<pre>{escape(dump_config(demo.config))}</pre>
+<pre>{escape(dump_config(config))}</pre>
 </body></html>
 """
 
 
-def _table(results: Sequence[Results]) -> str:
+def _figures(pictures: Sequence[Picture]) -> str:
+    return "".join(_figure(picture) for picture in pictures)
+
+
+def _table(results: Sequence[Results], ours: str) -> str:
     middle, bad = tables.median(results), tables.worst(results)
     dofs = list(middle)
     heads = "".join(f'<th colspan="2">{tables.heading(dof)}</th>' for dof in dofs)
-    columns = "<th>article</th><th>twin</th>" * len(dofs)
+    columns = f"<th>article</th><th>{ours}</th>" * len(dofs)
     lines = []
     for row in tables.ROWS:
         cells = []
         for dof in dofs:
-            ours = tables.cell(row, dof, getattr(middle[dof], row.name))
+            value = tables.cell(row, dof, getattr(middle[dof], row.name))
             worst = tables.cell(row, dof, getattr(bad[dof], row.name))
             note = f" <small>({worst})</small>" if len(results) > 1 else ""
             cells.append(f"<td>{tables.article_cell(row, dof)}</td>")
-            cells.append(f'<td class="ours">{ours}{note}</td>')
+            cells.append(f'<td class="ours">{value}{note}</td>')
         lines.append(f"<tr><td>{escape(row.title)}</td>{''.join(cells)}</tr>")
     return (
         f"<table><thead><tr><th></th>{heads}</tr><tr><th></th>{columns}</tr></thead>"

@@ -50,7 +50,7 @@ class Event:
 
     Attributes:
         time: [s], the computer's monotonic clock, the same in all its processes.
-        dof: Which drive.
+        dof: Which drive, or ``camera``.
         what: The state it went to, or ``fault: <kind>``.
     """
 
@@ -141,6 +141,10 @@ class SimulatedDrives:
     def events(self) -> list[Event]:
         """What the drives did, in order."""
         return list(self._events)
+
+    def note(self, who: str, what: str) -> None:
+        """Put what something else on the bench did among the events."""
+        self._events.append(Event(time.monotonic(), who, what))
 
     @property
     def states(self) -> Mapping[Dof, State]:
@@ -264,7 +268,7 @@ def main() -> None:
     with Hub(arguments.socket), LocalBus(arguments.socket) as bus:
         drives = SimulatedDrives(bus, config, start=start, modes=modes)
         with drives:
-            said = _Reporter(drives)
+            said = Reporter(lambda: drives.events)
             print(json.dumps({"time": time.monotonic(), "what": "ready"}), flush=True)
             for line in sys.stdin:
                 kind, label = line.split()
@@ -273,16 +277,21 @@ def main() -> None:
         said.close()
 
 
-class _Reporter:
-    """Writes events as they come; a thread, as the main one waits for its input."""
+class Reporter:
+    """Writes events as they come, a JSON line each; a thread, as the main one waits for input.
 
-    def __init__(self, drives: SimulatedDrives) -> None:
-        self._drives = drives
+    Args:
+        events: All that happened so far; each is written once.
+    """
+
+    def __init__(self, events: Callable[[], list[Event]]) -> None:
+        self._events = events
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
     def close(self) -> None:
+        """Write the last of them."""
         self._ending.set()
         self._thread.join()
 
@@ -291,7 +300,7 @@ class _Reporter:
         last = False
         while not last:
             last = self._ending.wait(0.02)
-            for event in self._drives.events[told:]:
+            for event in self._events()[told:]:
                 told += 1
                 line = {"time": event.time, "dof": event.dof, "what": event.what}
                 print(json.dumps(line), flush=True)

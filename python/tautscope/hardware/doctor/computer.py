@@ -13,10 +13,9 @@ from pathlib import Path
 from tautscope._core import __version__
 from tautscope.config import Config
 from tautscope.hardware.doctor.finding import Finding
+from tautscope.hardware.realtime import REMEDY, SETPOINTS, realtime
 from tautscope.pixels import FrameLayout
 
-PRIORITY = 60
-"""Of SCHED_FIFO; above the kernel's threaded interrupts, which have 50."""
 PACKED = {"png": 0.55, "jpeg": 0.12}
 """Size of an image in a log, as a share of its pixels' (decision 0020)."""
 FRAME_RATE = 50.0
@@ -82,20 +81,12 @@ def _extra(name: str, modules: tuple[str, ...]) -> Finding:
 
 def _priority() -> Finding:
     what = "real-time priority"
-    if not hasattr(os, "sched_setscheduler"):
-        found = f"{platform.system()} has no SCHED_FIFO; set-points come as punctually as it lets"
-        return Finding("computer", what, "note", found, "Use Linux for a rig")
-    before, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
-    try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
-    except PermissionError:
-        todo = (
-            f'echo "$USER - rtprio {PRIORITY}" | sudo tee /etc/security/limits.d/90-tautscope.conf'
-            ", then log in again"
-        )
-        return Finding("computer", what, "missing", "SCHED_FIFO is not permitted", todo)
-    os.sched_setscheduler(0, before, parameters)
-    return Finding("computer", what, "ok", f"SCHED_FIFO {PRIORITY} is permitted")
+    with realtime(SETPOINTS) as refusal:
+        if not refusal:
+            return Finding("computer", what, "ok", f"SCHED_FIFO {SETPOINTS} is permitted")
+    if platform.system() != "Linux":
+        return Finding("computer", what, "note", refusal, "Use Linux for a rig")
+    return Finding("computer", what, "missing", "SCHED_FIFO is not permitted", REMEDY)
 
 
 def _speed(folder: Path, size: int) -> float:

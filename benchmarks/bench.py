@@ -1,0 +1,326 @@
+"""The article's experiment in two processes, beside the in-process twin; and what goes wrong.
+
+One process is the rig (`tautscope bench`), another drives it (`tautscope run`), over a CAN bus and
+a camera stream, at 100 Hz in real time. The first part runs the protocol with and without
+compensation and compares the reductions with those of the in-process twin of the same seed,
+profile, control period and history (the second run goes on with the same instrument); the bench
+writes where its tip truly was, for this evaluation alone. ``--minutes`` is how long each run
+streams set-points: periods are repeated until then. The second part asks for faults, the third for
+configurations that are wrong, each in a run of its own.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from tautscope import tables
+from tautscope.bench.rig import read_truth
+from tautscope.config import Config, dump_config, load_config
+from tautscope.dof import Dof
+from tautscope.experiment import run_experiment
+from tautscope.hardware.timing import read_sent
+from tautscope.recording import Recording
+from tautscope.references import SineSequence
+from tautscope.results import Results, evaluate
+from tautscope.rig import Sample
+from tautscope.twin import Twin
+
+BENCH = Path(__file__).resolve().parents[1] / "configs" / "bench.toml"
+WITHIN = 0.03
+"""How far a reduction may be from the in-process twin's."""
+PATIENCE = 60.0
+TAUTSCOPE = [sys.executable, "-c", "from tautscope.cli import main; raise SystemExit(main())"]
+FAULTS = {
+    "a drive's emergency": ("fault rotation", "EmergencyError"),
+    "a drive silent": ("drop rotation", "SilentDriveError"),
+    "a drive answers 0.3 s late": ("delay rotation", "SilentDriveError"),
+    "heartbeat of a drive lost": ("heartbeat rotation", "HeartbeatError"),
+    "a drive leaves its mode": ("refuse rotation", "StateError"),
+    "a motor stands still": ("freeze insertion", "FollowingError"),
+    "camera unplugged": ("fault camera", "CameraError"),
+    "camera frozen": ("freeze camera", "CameraError"),
+}
+"""What -> request, and the error that ends the run."""
+WRONG: dict[str, dict[str, Any]] = {
+    "wrong node id": {"drives.rotation.node": 9},
+    "wrong sign, insertion": {"drives.insertion.sign": -1},
+    "wrong sign, rotation": {"drives.rotation.sign": 1},
+    "wrong sign, bending": {"drives.bending.sign": -1},
+    "counts per mm, insertion": {"drives.insertion.counts_per_unit": 1e3},
+    "counts per degree, rotation": {"drives.rotation.counts_per_unit": 1e4 * np.pi / 180},
+    "degrees for counts per rad, rotation": {"drives.rotation.counts_per_unit": 1e4 * 180 / np.pi},
+    "counts per degree, bending": {"drives.bending.counts_per_unit": 1e4 * np.pi / 180},
+}
+REPLUG = 3.0
+"""After how long an unplugged camera comes back [s]."""
+
+
+def bench_config(folder: Path, arguments: argparse.Namespace) -> Config:
+    """The bench with its sockets in a folder."""
+    changes = {
+        "drives.channel": str(folder / "can"),
+        "camera.source.url": f"unix:{folder / 'video'}",
+        "twin.seed": arguments.seed,
+        "profile": arguments.profile,
+        "experiment.periods": arguments.periods,
+    }
+    changes |= {f"experiment.{dof.label}.period": arguments.period for dof in Dof}
+    return load_config(BENCH).replace(**changes)
+
+
+class GoingOn(Twin):
+    """The in-process twin, which a second run finds as the first has left it, as on the bench."""
+
+    _is_used = False
+    _command: np.ndarray
+
+    def reset(self) -> Sample:
+        """New at first, then a slow way to the start."""
+        start = np.array([self._config.experiment[dof].centre for dof in Dof])
+        if not self._is_used:
+            self._is_used, self._command = True, start
+            return super().reset()
+        before = self._command
+        for share in (1 - np.cos(np.linspace(0, np.pi, 100))) / 2:
+            sample = self.step(before + share * (start - before))
+        return sample
+
+    def step(self, command: ArrayLike) -> Sample:
+        """As the twin's."""
+        self._command = np.array(command)
+        return super().step(command)
+
+
+class Rig:
+    """The process that is the rig."""
+
+    def __init__(self, process: subprocess.Popen[str]) -> None:
+        self._process = process
+
+    def request(self, line: str) -> None:
+        """Ask for a fault."""
+        assert self._process.stdin is not None
+        print(line, file=self._process.stdin, flush=True)
+
+    def event(self, what: str, dof: str | None = None) -> float:
+        """When the next event of this kind was [s, monotonic clock]."""
+        assert self._process.stdout is not None
+        for text in self._process.stdout:
+            found = json.loads(text)
+            if found["what"] == what and dof in {None, found.get("dof")}:
+                return float(found["time"])
+        raise RuntimeError(f"the bench ended before {what!r}")
+
+
+@contextmanager
+def rig(config: Config, folder: Path, *more: str) -> Iterator[Rig]:
+    file = folder / "rig.toml"
+    file.write_text(dump_config(config), encoding="utf-8")
+    with subprocess.Popen(
+        [*TAUTSCOPE, "bench", "--config", str(file), *more],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
+        found = Rig(process)
+        found.event("ready")
+        try:
+            yield found
+        finally:
+            process.communicate(timeout=PATIENCE)
+
+
+def run(file: Path, out: Path, *more: str) -> subprocess.Popen[str]:
+    """The process that drives it."""
+    return subprocess.Popen(
+        [*TAUTSCOPE, "run", str(file), "--out", str(out), "--json", *more],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def with_truth(folder: Path, suffix: str, truth: Path) -> Recording:
+    """A run with the true tip at its ticks and captures, as the in-process twin would have it."""
+    recording = Recording.load(folder, suffix)
+    sent = read_sent(folder / f"timing_cycles{suffix}.csv")
+    instants, states = read_truth(truth)
+    trace, frames = recording.trace.copy(), recording.frames.copy()
+    count = min(len(sent), len(trace))
+    trace = trace[:count]
+    for dof in Dof:
+        column = np.interp(sent[:count], instants, states[:, dof])
+        trace[f"true_{dof.label}"] = column
+        frames[f"true_{dof.label}"] = np.interp(
+            frames["captured_at"], trace["time"], column, left=np.nan, right=np.nan
+        )
+    return replace(recording, trace=trace, frames=frames)
+
+
+def compared(arguments: argparse.Namespace, out: Path | None) -> dict[str, Any]:
+    """The protocol on the bench and in the in-process twin."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        config = bench_config(folder, arguments)
+        truth, place = folder / "truth.csv", out or folder / "run"
+        with rig(config, folder, "--truth", str(truth)):
+            text, errors = (process := run(folder / "rig.toml", place, "--compare")).communicate()
+        if process.returncode:
+            raise RuntimeError(errors)
+        pair = [with_truth(place, suffix, truth) for suffix in ("_uncompensated", "")]
+        bench = evaluate(*pair)
+    one = GoingOn(config)
+    reference = SineSequence(config.experiment)
+    twin = evaluate(*(run_experiment(one, reference, config, kind) for kind in (False, True)))
+    document: dict[str, Any] = {"run": json.loads(text)["runs"], "reductions": {}}
+    for dof in Dof:
+        ours, theirs = bench[dof].reduction, twin[dof].reduction
+        document["reductions"][dof.label] = {
+            "bench": ours,
+            "bench_by_camera": bench[dof].reduction_estimate,
+            "in_process": theirs,
+            "in_process_by_camera": twin[dof].reduction_estimate,
+            "holds": bool(abs(ours - theirs) <= WITHIN),
+        }
+    document["widths"] = {"bench": _widths(bench), "in_process": _widths(twin)}
+    return document
+
+
+def _widths(results: Results) -> dict[str, dict[str, float | None]]:
+    names = ("uncompensated", "compensated", "tracking_rms", "state_rms", "frames_used")
+    return {
+        dof.label: {name: tables.finite_or_none(getattr(found, name)) for name in names}
+        for dof, found in results.items()
+    }
+
+
+def faults(arguments: argparse.Namespace) -> list[dict[str, Any]]:
+    """Each fault in a run of its own: the error, what it says, and when the motors were stopped."""
+    rows = []
+    for what, (request, _) in FAULTS.items():
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            config = bench_config(folder, arguments)
+            with rig(config, folder) as found:
+                process = run(folder / "rig.toml", folder / "run")
+                found.event("operation enabled", "bending")
+                time.sleep(4.0)
+                found.request(request)
+                began = found.event(f"fault: {request.split()[0]}")
+                stopped = found.event("quick stop active", "bending")
+                _, errors = process.communicate(timeout=PATIENCE)
+            rows.append(_row(what, process.returncode, errors, 1e3 * (stopped - began)))
+    rows.append(replugged(arguments))
+    return rows
+
+
+def replugged(arguments: argparse.Namespace) -> dict[str, Any]:
+    """A camera that is away for a while: the run goes on."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        config = bench_config(folder, arguments)
+        with rig(config, folder) as found:
+            process = run(folder / "rig.toml", folder / "run")
+            found.event("operation enabled", "bending")
+            time.sleep(4.0)
+            found.request("fault camera")
+            time.sleep(REPLUG)
+            found.request("clear camera")
+            came, said = time.monotonic(), []
+            assert process.stderr is not None
+            for line in process.stderr:
+                said.append(line)
+                if "frames again" in line:
+                    break
+            took = 1e3 * (time.monotonic() - came)
+            process.terminate()
+            found.event("quick stop active", "bending")
+            process.communicate(timeout=PATIENCE)
+        warnings = " / ".join(line.strip() for line in said if line.startswith("warning"))
+        return _row(f"camera back after {REPLUG:g} s", None, warnings, took)
+
+
+def wrong(arguments: argparse.Namespace) -> list[dict[str, Any]]:
+    """Each wrong configuration against a right rig; from enabled to stopped, if it moved."""
+    rows = []
+    for what, changes in WRONG.items():
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            config = bench_config(folder, arguments)
+            file = folder / "wrong.toml"
+            file.write_text(dump_config(config.replace(**changes)), encoding="utf-8")
+            with rig(config, folder) as found:
+                process = run(file, folder / "run")
+                _, errors = process.communicate()
+                found.request("clear camera")  # so that there is something to read to
+                events = _until(found, "fault: clear")
+            enabled = [at for at, what in events if what == "operation enabled"]
+            stopped = [at for at, what in events if what == "quick stop active"]
+            took = 1e3 * (max(stopped) - min(enabled)) if enabled and stopped else None
+            rows.append(_row(what, process.returncode, errors, took))
+    return rows
+
+
+def _until(found: Rig, what: str) -> list[tuple[float, str]]:
+    assert found._process.stdout is not None
+    events = []
+    for text in found._process.stdout:
+        line = json.loads(text)
+        if line["what"] == what:
+            break
+        events.append((line["time"], line["what"]))
+    return events
+
+
+def _row(what: str, status: int | None, errors: str, took: float | None) -> dict[str, Any]:
+    said = [line for line in errors.splitlines() if line.startswith(("error", "warning"))]
+    return {"what": what, "status": status, "ms": took, "said": said[-1] if said else errors[-300:]}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--json", action="store_true")
+    parser.add_argument("--minutes", type=float, help="of each run [what the periods take]")
+    parser.add_argument("--period", type=float, default=10.0, help="of the sines [s]")
+    parser.add_argument("--periods", type=int, default=5, help="per degree of freedom")
+    parser.add_argument("--profile", default="paper")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--out", type=Path, help="keep the run's folder here")
+    parser.add_argument("--only", choices=["compared", "faults", "wrong"])
+    arguments = parser.parse_args()
+    if arguments.minutes is not None:
+        arguments.periods = round(60 * arguments.minutes / (len(Dof) * arguments.period))
+    document: dict[str, Any] = {"cpus": os.cpu_count(), "load": os.getloadavg()}
+    if arguments.only in {None, "compared"}:
+        document |= compared(arguments, arguments.out)
+    if arguments.only in {None, "faults"}:
+        document["faults"] = faults(arguments)
+    if arguments.only in {None, "wrong"}:
+        document["wrong"] = wrong(arguments)
+    if arguments.json:
+        print(json.dumps(document, indent=1))
+        return
+    for name, part in document.get("run", {}).items():
+        print(f"{name}: {json.dumps(part['timing'])}")
+    for dof, row in document.get("reductions", {}).items():
+        print(f"{dof}: {json.dumps(row)}")
+    for row in [*document.get("faults", []), *document.get("wrong", [])]:
+        took = "" if row["ms"] is None else f"{row['ms']:.1f} ms"
+        print(f"{row['what']:40} {took:>12}  {row['said']}")
+
+
+if __name__ == "__main__":
+    main()

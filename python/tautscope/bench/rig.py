@@ -1,0 +1,139 @@
+"""The rig that `tautscope bench` is: the twin behind a CAN bus and a camera, in real time.
+
+    with Bench(config) as bench: bench.request("freeze rotation")
+
+Nothing of it is shared with the process that drives it but the two sockets.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tautscope.bench.camera import CameraStream, Centreline
+from tautscope.bench.can_bus import Hub, LocalBus
+from tautscope.bench.drives import Event, SimulatedDrives
+from tautscope.config import Config
+from tautscope.dof import Dof
+from tautscope.errors import ConfigError
+from tautscope.hardware.rig import rig_drives
+from tautscope.recording import per_dof
+from tautscope.twin.plant import Plant
+
+CAMERA = "camera"
+TRUTH = np.dtype([("time", "f8")] + [(f"true_{dof.label}", "f8") for dof in Dof])
+"""A line of the truth: the tip (3,) [m, rad, rad] at an instant of the monotonic clock [s]."""
+
+
+class Bench:
+    """Three simulated drives that move the twin's plant, and its camera.
+
+    The same ``twin.seed`` is the same instrument as `tautscope.twin.Twin`. The plant goes on by
+    one ``control.period`` with every SYNC, so it stands while nobody sends set-points.
+
+    Args:
+        config: ``drives.channel`` and ``camera.source.url`` (``unix:PATH``) are where it is.
+        truth: CSV to write where the tip is at every SYNC, for evaluation alone; whoever drives
+            the bench does not see it.
+        modes: Of the drives.
+
+    Raises:
+        ConfigError: The configuration is not one of a bench.
+    """
+
+    def __init__(
+        self, config: Config, truth: Path | None = None, *, modes: tuple[int, ...] = (7, 8)
+    ) -> None:
+        drives = rig_drives(config)
+        if drives.interface != "tautscope":
+            raise ConfigError("drives.interface", drives.interface, "tautscope, for a bench")
+        url = config.camera.source.url
+        if not url.startswith("unix:"):
+            raise ConfigError("camera.source.url", url, "unix:PATH, for a bench")
+        if config.camera.pixel_format != "bgr":
+            raise ConfigError("camera.pixel_format", config.camera.pixel_format, "bgr, for a bench")
+        seed = np.random.SeedSequence(config.twin.seed)
+        physics, timing = (np.random.default_rng(child) for child in seed.spawn(2))
+        self._plant = Plant(config, physics)
+        self._lock = threading.Lock()
+        self._camera = CameraStream(config, url.removeprefix("unix:"), self._centreline, timing)
+        self._open = ExitStack()
+        self._truth = None if truth is None else truth.open("w", encoding="utf-8")
+        try:
+            bus = self._plug(drives.channel)
+            start = self._plant.applied
+            self.drives = SimulatedDrives(bus, drives, self._on_sync, start=start, modes=modes)
+        except BaseException:
+            self._open.close()
+            raise
+
+    def request(self, line: str) -> None:
+        """Ask for a fault: ``freeze rotation``, ``drop camera``, ``clear camera``.
+
+        Raises:
+            ConfigError: No such fault, or nothing of that name.
+        """
+        kind, _, part = line.strip().partition(" ")
+        if part == CAMERA:
+            self._camera.clear() if kind == "clear" else self._camera.inject(kind)  # type: ignore[arg-type]
+            self.drives.note(CAMERA, f"fault: {kind}")
+            return
+        names = [dof.label for dof in Dof]
+        if part not in names:
+            raise ConfigError("fault", line.strip(), "KIND " + ", KIND ".join([*names, CAMERA]))
+        dof = Dof[part.upper()]
+        self.drives.clear(dof) if kind == "clear" else self.drives.inject(kind, dof)  # type: ignore[arg-type]
+
+    @property
+    def events(self) -> list[Event]:
+        """What drives and camera did; in order."""
+        return self.drives.events
+
+    def __enter__(self) -> Self:
+        self._open.enter_context(self._camera)
+        self._open.enter_context(self.drives)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._open.close()
+
+    def _plug(self, channel: str) -> LocalBus:
+        if self._truth is not None:
+            self._open.enter_context(self._truth)
+            self._truth.write(",".join(TRUTH.names or ()) + "\n")
+        self._open.enter_context(Hub(channel))
+        return self._open.enter_context(LocalBus(channel))
+
+    def _centreline(self) -> Centreline:
+        with self._lock:
+            return self._plant.centreline()
+
+    def _on_sync(self, told: NDArray[np.float64]) -> NDArray[np.float64]:
+        now = time.monotonic()
+        with self._lock:
+            plant = self._plant
+            if self._truth is not None:
+                state = plant.true_state
+                self._truth.write(f"{now!r},{state[0]:.9g},{state[1]:.9g},{state[2]:.9g}\n")
+            if self._camera.is_due:
+                self._camera.capture(now, plant.centreline())
+            plant.step(told)
+            return plant.applied
+
+
+def read_truth(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Instants (n,) [s, monotonic clock] and true tip states (n, 3) [m, rad, rad] of a bench."""
+    table = np.loadtxt(path, TRUTH, delimiter=",", skiprows=1)
+    return table["time"], per_dof(table, "true")

@@ -1,0 +1,62 @@
+"""Priority over other programs, for what moves motors."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+
+SETPOINTS, LOOP, VISION, OTHERS = 60, 40, 20, 10
+"""SCHED_FIFO priorities of the thread that sends set-points, of the loop, of the thread that looks
+at images, and of what else runs in their process: a thread that holds Python's lock and is kept
+waiting by another program would keep them waiting too."""
+REMEDY = (
+    f'echo "$USER - rtprio {SETPOINTS}" | sudo tee /etc/security/limits.d/90-tautscope.conf, then '
+    "log in again"
+)
+"""What gives the priority where it is refused."""
+_SWITCH_INTERVAL = 5e-4
+"""For how long a thread may keep Python's lock when another wants it [s]; 5 ms is the default."""
+
+
+@contextmanager
+def realtime(priority: int) -> Iterator[str]:
+    """SCHED_FIFO for the calling thread while the block lasts; threads it starts inherit it.
+
+    Yields:
+        Nothing if it was granted, else why not and what to do.
+    """
+    if not hasattr(os, "sched_setscheduler"):
+        yield f"{sys.platform} has no SCHED_FIFO; set-points may be late under load"
+        return
+    policy, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+    except OSError as error:
+        yield (
+            f"no real-time priority ({error.strerror}); set-points may be late under load. "
+            f"Run: {REMEDY}"
+        )
+        return
+    try:
+        yield ""
+    finally:
+        os.sched_setscheduler(0, policy, parameters)
+
+
+def settle(priority: int) -> None:
+    """SCHED_FIFO for the calling thread for good, where it is permitted."""
+    with suppress(OSError, AttributeError):
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+
+
+@contextmanager
+def quick_switching() -> Iterator[None]:
+    """Python's threads wait less for each other while the block lasts."""
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(_SWITCH_INTERVAL)
+    try:
+        yield
+    finally:
+        sys.setswitchinterval(before)

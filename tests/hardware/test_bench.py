@@ -1,0 +1,205 @@
+"""The bench: the twin behind a bus and a camera stream, here and in a process of its own."""
+
+from __future__ import annotations
+
+import json
+import signal
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from drive_rig import drives_document
+from tautscope.bench.rig import Bench, read_truth
+from tautscope.config import Config, dump_config, from_document
+from tautscope.dof import Dof
+from tautscope.errors import ConfigError
+from tautscope.hardware.cameras import Camera, Capture
+from tautscope.hardware.experiment import run_on_hardware, write_run_folder
+from tautscope.hardware.timing import read_sent
+from tautscope.log.reader import read_log
+from tautscope.recording import Recording, per_dof
+from test_processes import Lines, process
+
+CYCLE, PATIENCE = 0.02, 60.0
+RUN = "from tautscope.cli import main; raise SystemExit(main())"
+
+
+def bench_config(folder: Path, **changes: Any) -> Config:
+    """A rig for a machine that may be busy: slow cycles, and patience."""
+    document = {
+        "control": {"period": CYCLE},
+        "camera": {
+            "source": {
+                "url": f"unix:{folder / 'video'}",
+                "format": "nut",
+                "clock": "device",
+                "timeout": PATIENCE,
+                "start_timeout": PATIENCE,
+                "lost_timeout": PATIENCE,
+                "reconnect_period": 0.05,
+            }
+        },
+        "drives": drives_document(
+            channel=str(folder / "can"), cycle=CYCLE, command_timeout=PATIENCE, start_speed=0.5
+        ),
+        "experiment": {
+            "periods": 3,
+            "insertion": {"centre": 0.025, "amplitude": 0.004, "period": 1.0},
+            "rotation": {"centre": 0.0, "amplitude": 0.2, "period": 0.4},
+            "bending": {"centre": 0.9, "amplitude": 0.1, "period": 0.4},
+        },
+        "twin": {"frame_rate": 12.5},
+        "recording": {"image_format": "jpeg"},
+    }
+    return from_document(document).replace(**changes)
+
+
+def next_capture(camera: Camera) -> Capture:
+    end = time.monotonic() + PATIENCE
+    while (capture := camera.newest()) is None:
+        assert time.monotonic() < end, camera.state
+        time.sleep(0.005)
+    return capture
+
+
+def until(condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.005)
+
+
+def test_the_camera_is_seen_as_it_is_and_its_faults(tmp_path: Path) -> None:
+    """Without a master: the instrument stands, and is seen."""
+    config = bench_config(tmp_path)
+    before = time.monotonic()
+    with Bench(config) as bench, Camera(config.camera, time.monotonic) as camera:
+        captures = [next_capture(camera) for _ in range(3)]
+        stamps = [capture.frame.captured_at for capture in captures]
+        assert before < stamps[0] < stamps[1] < stamps[2]
+        for capture in captures:
+            lag = capture.arrived_at - capture.frame.captured_at
+            assert lag >= config.twin.latency - config.twin.latency_jitter - 1e-5
+        assert not np.array_equal(captures[0].frame.image, captures[1].frame.image)
+
+        bench.request("freeze camera")
+        until(lambda: (last := next_capture(camera)) is not None and _is_still(camera, last))
+        bench.request("clear camera")
+        until(lambda: not _is_still(camera, next_capture(camera)))
+
+        bench.request("fault camera")
+        until(lambda: bool(camera.state.trouble))
+        camera.newest()
+        bench.request("clear camera")
+        next_capture(camera)
+        assert camera.state.trouble == ""
+        assert camera.state.reconnects >= 1
+        events = [event.what for event in bench.events if event.dof == "camera"]
+    assert events == ["fault: freeze", "fault: clear", "fault: fault", "fault: clear"]
+
+
+def _is_still(camera: Camera, last: Capture) -> bool:
+    return np.array_equal(next_capture(camera).frame.image, last.frame.image)
+
+
+@pytest.mark.parametrize(
+    ("changes", "where"),
+    [
+        ({"drives.interface": "socketcan"}, "drives.interface"),
+        ({"camera.source.url": "/dev/video0"}, "camera.source.url"),
+        ({"camera.pixel_format": "nv12"}, "camera.pixel_format"),
+    ],
+)
+def test_a_configuration_of_hardware_is_no_bench(
+    tmp_path: Path, changes: dict[str, Any], where: str
+) -> None:
+    with pytest.raises(ConfigError, match=where):
+        Bench(bench_config(tmp_path, **changes))
+
+
+def test_a_fault_that_is_none_is_refused(tmp_path: Path) -> None:
+    with Bench(bench_config(tmp_path)) as bench:
+        for line in ("explode camera", "freeze", "freeze tail", "explode rotation"):
+            with pytest.raises(ConfigError, match="fault"):
+                bench.request(line)
+
+
+@pytest.fixture
+def rig(tmp_path: Path) -> Iterator[tuple[Config, Path, Lines]]:
+    """A bench in a process of its own: configuration, its file, what it says."""
+    config = bench_config(tmp_path)
+    file = tmp_path / "rig.toml"
+    file.write_text(dump_config(config), encoding="utf-8")
+    arguments = ("-c", RUN, "bench", "--config", str(file), "--truth", str(tmp_path / "truth.csv"))
+    with process(*arguments) as (_, lines):
+        lines.until("ready")
+        yield config, file, lines
+
+
+def test_the_protocol_runs_over_bus_and_stream(
+    rig: tuple[Config, Path, Lines], tmp_path: Path
+) -> None:
+    config, _, lines = rig
+    out = tmp_path / "run"
+    found = run_on_hardware(config, out, lambda share: None)
+    write_run_folder(found, out)
+    lines.until("quick stop active", 3)
+
+    recording = Recording.load(out)
+    trace, frames = recording.trace, recording.frames
+    assert len(trace) == round(5.4 / CYCLE)
+    np.testing.assert_allclose(np.diff(trace["time"]), CYCLE, rtol=1e-6)
+    assert len(frames) > 0
+    assert (frames["captured_at"] < frames["arrived_at"]).all()
+    # The motors do what they are told, a cycle or two later.
+    late = np.abs(per_dof(trace, "applied")[2:] - per_dof(trace, "command")[:-2])
+    assert (late.max(axis=0) < [2e-3, 0.2, 0.1]).all()
+
+    sent = read_sent(out / "timing_cycles.csv")
+    instants, states = read_truth(tmp_path / "truth.csv")
+    assert len(sent) == len(trace)
+    truth = np.interp(sent, instants, states[:, Dof.INSERTION])
+    seen = frames[frames["observable_insertion"] & (frames["captured_at"] > 0)]
+    if len(seen) > 5:  # a machine so busy that no frame arrives shows nothing of this
+        tip = np.interp(seen["captured_at"], trace["time"], truth)
+        assert np.median(np.abs(seen["estimate_insertion"] - tip)) < 2e-3
+
+    facts = json.loads((out / "run.json").read_text(encoding="utf-8"))
+    assert facts["runs"]["compensated"]["ticks"] == len(trace)
+    assert facts["runs"]["compensated"]["timing"]["frames"] >= len(frames)
+    for name in ("report.html", "timing.png", "compensated.mcap", "timing_frames.csv"):
+        assert (out / name).stat().st_size > 0
+
+
+def test_a_run_that_is_told_to_end_stops_the_motors_and_leaves_its_log(
+    rig: tuple[Config, Path, Lines], tmp_path: Path
+) -> None:
+    _, file, lines = rig
+    out = tmp_path / "run"
+    with process("-c", RUN, "run", str(file), "--out", str(out)) as (running, _):
+        lines.until("operation enabled", 3)
+        log = out / "compensated.mcap"
+        until(lambda: log.is_file() and log.stat().st_size > 10_000)
+        running.send_signal(signal.SIGTERM)
+        lines.until("quick stop active", 3)
+        assert running.wait(PATIENCE) == 128 + signal.SIGTERM
+    assert len(read_log(log).recording().trace) > 0
+
+
+def test_a_wrong_node_is_said_and_nothing_moves(
+    rig: tuple[Config, Path, Lines], tmp_path: Path
+) -> None:
+    _, file, _ = rig
+    wrong = tmp_path / "wrong.toml"
+    text = file.read_text(encoding="utf-8").replace("node = 2", "node = 9")
+    wrong.write_text(text.replace("request_timeout = 5.0", "request_timeout = 0.5"))
+    with process("-c", RUN, "run", str(wrong), "--out", str(tmp_path / "run")) as (running, _):
+        assert running.wait(PATIENCE) == 2
+        assert running.stderr is not None
+        said = running.stderr.read()
+    assert "error: rotation, node 9: no answer to a request" in said
+    assert "Check drives.rotation.node" in said
+    assert "The log up to then is" in said

@@ -1,0 +1,87 @@
+"""A tip behind a play passes; one that a wrong configuration moves does not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from tautscope.config import Config
+from tautscope.dof import Dof
+from tautscope.errors import ConfigError
+from tautscope.hardware.plausibility import Plausibility
+
+CONFIG = Config()
+START = np.array([CONFIG.experiment[dof].centre for dof in Dof])
+SLACK = np.array([10e-3, 1.84, 1.1])
+"""Table 1 of the article."""
+dofs = pytest.mark.parametrize("dof", Dof, ids=lambda dof: dof.label)
+
+
+def watch(
+    dof: Dof,
+    tip_of: Callable[[float, float], float],
+    *,
+    seen: bool = True,
+    noise: float = 0.0,
+    config: Config = CONFIG,
+) -> None:
+    """Five periods of the article's sine; the tip from where it was and where the motor is."""
+    sine, random = config.experiment[dof], np.random.default_rng(0)
+    plausibility, tip = Plausibility(CONFIG, START), float(START[dof])
+    for time in np.arange(0, 5 * sine.period, 0.04):
+        motor = START.copy()
+        motor[dof] += sine.amplitude * np.sin(2 * np.pi * time / sine.period)
+        plausibility.tick(motor)
+        tip = tip_of(tip, motor[dof])
+        estimate = START.copy()
+        estimate[dof] = tip + noise * random.standard_normal()
+        report: Any = SimpleNamespace(state_estimate=estimate, observable=np.full(3, seen))
+        plausibility.frame(report)
+
+
+def play(width: float) -> Callable[[float, float], float]:
+    return lambda tip, motor: min(max(tip, motor - width / 2), motor + width / 2)
+
+
+@dofs
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+def test_a_tip_behind_slack_passes(dof: Dof, share: float) -> None:
+    watch(dof, play(share * SLACK[dof]), noise=0.05 * CONFIG[dof].update_distance)
+
+
+@dofs
+def test_strokes_inside_the_slack_show_nothing(dof: Dof) -> None:
+    """A tip that stands still in them is as it should be."""
+    small = CONFIG.replace(**{f"experiment.{dof.label}.amplitude": float(0.4 * SLACK[dof])})
+    watch(dof, play(SLACK[dof]), config=small, noise=0.5 * CONFIG[dof].update_distance)
+
+
+@dofs
+def test_a_tip_that_goes_against_its_motor(dof: Dof) -> None:
+    follow = play(SLACK[dof])
+    with pytest.raises(ConfigError, match=f"drives.{dof.label}.sign"):
+        watch(dof, lambda tip, motor: follow(tip, 2 * START[dof] - motor))
+
+
+@dofs
+def test_a_tip_that_outruns_its_motor(dof: Dof) -> None:
+    with pytest.raises(ConfigError, match=f"drives.{dof.label}.counts_per_unit.*too large"):
+        watch(dof, lambda tip, motor: START[dof] + 57.3 * (motor - START[dof]))
+
+
+@dofs
+def test_a_tip_that_stands_still(dof: Dof) -> None:
+    far = CONFIG.replace(
+        **{f"experiment.{dof.label}.amplitude": 1.5 * CONFIG.experiment[dof].amplitude}
+    )
+    with pytest.raises(ConfigError, match=f"drives.{dof.label}.counts_per_unit.*too small"):
+        watch(dof, lambda tip, motor: tip, config=far)
+
+
+@dofs
+def test_a_tip_that_is_never_seen(dof: Dof) -> None:
+    with pytest.raises(ConfigError, match=f"drives.{dof.label}: .*no frame measured it"):
+        watch(dof, play(0.0), seen=False)

@@ -1,0 +1,329 @@
+"""The rig on motors and a camera that are made of Python; no asserted times."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from itertools import pairwise
+from typing import Any, Self
+
+import numpy as np
+import pytest
+from drive_rig import drives_document
+from numpy.typing import ArrayLike, NDArray
+from tautscope.config import Config, from_document
+from tautscope.dof import Dof
+from tautscope.errors import CameraError, ConfigError, FollowingError, SignalError, StateError
+from tautscope.hardware.cameras import CameraState, Capture
+from tautscope.hardware.rig import HardwareRig
+from tautscope.hardware.timing import Timing, read_sent
+from tautscope.rig import Frame, Rig
+
+HOME = np.array([0.01, 0.5, 0.2])
+CYCLE = 0.01
+
+
+class FakeMotors:
+    """Motors that are where they are told to be, and remember it."""
+
+    def __init__(self) -> None:
+        self.told: list[NDArray[np.float64]] = []
+        self.threads: set[str] = set()
+        self.stopped = 0
+        self.meanwhile: Callable[[], object] = lambda: None
+
+    def start(self) -> NDArray[np.float64]:
+        return HOME.copy()
+
+    def exchange(self, command: ArrayLike) -> NDArray[np.float64]:
+        self.meanwhile()
+        self.threads.add(threading.current_thread().name)
+        self.told.append(np.array(command))
+        return np.array(command)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *failure: object) -> None:
+        self.stopped += 1
+
+
+class FakeEye:
+    """A camera that has one frame to give whenever it is told to."""
+
+    def __init__(self) -> None:
+        self.next: Capture | None = None
+        self.trouble = ""
+        self.closed = 0
+
+    def see(self, captured_at: float, value: int, sequence: int = 0) -> None:
+        image = np.full((4, 4, 3), value, np.uint8)
+        self.next = Capture(Frame(image, captured_at, sequence), captured_at)
+
+    @property
+    def state(self) -> CameraState:
+        return CameraState(trouble=self.trouble)
+
+    def newest(self) -> Capture | None:
+        taken, self.next = self.next, None
+        return taken
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *failure: object) -> None:
+        self.closed += 1
+
+
+class Setup:
+    """A rig with what it moves and sees."""
+
+    def __init__(self, **changes: Any) -> None:
+        self.motors, self.eye, self.said = FakeMotors(), FakeEye(), list[str]()
+        self.config = rig_config(**changes)
+        self.rig = HardwareRig(
+            self.config,
+            motors=lambda _: self.motors,
+            eye=lambda _: self.eye,
+            say=self.said.append,
+        )
+
+
+def rig_config(
+    drives: dict[str, Any] | None = None,
+    source: dict[str, Any] | None = None,
+    period: float = CYCLE,
+) -> Config:
+    known = {"cycle": CYCLE, "reply_timeout": 0.009, "command_timeout": 60.0, "start_speed": 0.9}
+    patient = {"timeout": 60.0, "lost_timeout": 60.0}
+    return from_document(
+        {
+            "control": {"period": period},
+            "drives": drives_document(**(known | (drives or {}))),
+            "camera": {"source": patient | (source or {})},
+        }
+    )
+
+
+@pytest.fixture
+def setup() -> Iterator[Callable[..., Setup]]:
+    """Makes rigs that are closed at the end."""
+    made: list[Setup] = []
+
+    def make(**changes: Any) -> Setup:
+        made.append(Setup(**changes))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.rig.close()
+
+
+def test_it_is_a_rig(setup: Callable[..., Setup]) -> None:
+    rig = setup().rig
+    assert isinstance(rig, Rig)
+    assert rig.control_period == CYCLE
+
+
+def test_the_motors_go_to_the_start_within_the_speed_asked_for(
+    setup: Callable[..., Setup],
+) -> None:
+    one = setup(drives={"start_speed": 0.5})
+    sample = one.rig.reset()
+    told = np.array(one.motors.told)
+    centres = [one.config.experiment[dof].centre for dof in Dof]
+    np.testing.assert_allclose(told[0], HOME)
+    np.testing.assert_allclose(sample.applied, centres)
+    assert one.config.drives is not None
+    fastest = np.abs(np.diff(told, axis=0)).max(axis=0) / CYCLE
+    limits = [one.config.drives[dof].speed_limit for dof in Dof]
+    assert (fastest <= 0.5 * np.array(limits) * (1 + 1e-9)).all()
+    assert (fastest / limits).max() > 0.2  # and not for ever
+    assert sample.time == 0.0
+
+
+def test_a_motor_outside_its_travel_is_not_moved(setup: Callable[..., Setup]) -> None:
+    one = setup()
+    one.motors.start = lambda: np.array([0.01, 3.6, 0.2])  # type: ignore[method-assign]
+    with pytest.raises(FollowingError, match=r"rotation, node 2: it stands at 3.6, outside"):
+        one.rig.reset()
+    assert not one.motors.told
+    assert one.motors.stopped == one.eye.closed == 1
+
+
+def test_every_command_is_sent_once_in_order_by_one_thread(setup: Callable[..., Setup]) -> None:
+    one = setup()
+    start = one.rig.reset().applied
+    commands = [start + step * np.array([1e-4, 1e-3, 1e-3]) for step in range(30)]
+    before = len(one.motors.told)
+    times = [one.rig.step(command).time for command in commands]
+    np.testing.assert_allclose(times, CYCLE * np.arange(1, 31))
+    told = one.motors.told[before:]
+    changes = [told[0]] + [b for a, b in pairwise(told) if not np.array_equal(a, b)]
+    np.testing.assert_array_equal(changes, commands)
+    assert one.motors.threads == {"set-points"}
+    assert len(one.rig.timing.sent) == 30
+
+
+def test_a_loop_that_is_late_is_held_and_not_made_up_for(setup: Callable[..., Setup]) -> None:
+    one = setup()
+    start = one.rig.reset().applied
+    one.rig.step(start)
+    before = one.rig.step(start + 1e-4)
+    count = len(one.motors.told)
+    while len(one.motors.told) < count + 8:
+        time.sleep(CYCLE)
+    after = one.rig.step(start + 2e-4)
+    assert after.time == pytest.approx(before.time + CYCLE)
+    for held in one.motors.told[count : count + 8]:
+        np.testing.assert_array_equal(held, start + 1e-4)
+    assert one.rig.timing.held >= 8
+    assert one.rig.timing.lost >= 8
+
+
+def test_a_thread_that_wakes_late_leaves_cycles_out(setup: Callable[..., Setup]) -> None:
+    one = setup()
+    start = one.rig.reset().applied
+    one.rig.step(start)
+    one.motors.meanwhile = lambda: time.sleep(3.5 * CYCLE)
+    one.rig.step(start)
+    one.motors.meanwhile = lambda: None
+    for _ in range(5):
+        one.rig.step(start)
+    cycles = one.rig.timing.cycles
+    steps = np.diff(cycles[:, 0]) / CYCLE
+    np.testing.assert_allclose(steps, np.round(steps), atol=1e-6)
+    assert steps.min() == pytest.approx(1.0)
+    assert one.rig.timing.skipped >= 2
+    assert round(steps.sum()) + 1 == len(cycles) + one.rig.timing.skipped
+    assert (one.rig.timing.jitter >= 0).all()
+
+
+def test_frames_are_stamped_by_the_set_point_in_force(setup: Callable[..., Setup]) -> None:
+    one = setup()
+    start = one.rig.reset().applied
+    for _ in range(6):
+        one.rig.step(start)
+    sent = one.rig.timing.sent
+    assert one.rig.on_clock(sent[2]) == pytest.approx(2 * CYCLE, abs=1e-9)
+    assert one.rig.on_clock(sent[3] + 0.4 * CYCLE) == pytest.approx(3.4 * CYCLE, abs=1e-9)
+    assert one.rig.on_clock(sent[5] + 20 * CYCLE) == pytest.approx(6 * CYCLE, abs=1e-9)
+    assert one.rig.on_clock(sent[0] - 1.0) == pytest.approx(-1.0, abs=1e-9)
+    one.eye.see(sent[4] + 0.5 * CYCLE, 7, sequence=3)
+    frame = one.rig.step(start).frame
+    assert frame is not None
+    assert frame.captured_at == pytest.approx(4.5 * CYCLE, abs=1e-9)
+    assert frame.sequence == 3
+    ages = one.rig.timing.frame_age
+    assert len(ages) == 1
+    assert ages[0] > 0
+
+
+def test_the_same_picture_again_is_no_news(setup: Callable[..., Setup]) -> None:
+    one = setup()
+    start = one.rig.reset().applied
+    seen = []
+    for value in (1, 2, 2, 2, 3):
+        one.eye.see(time.monotonic(), value)
+        seen.append(one.rig.step(start).frame is not None)
+    assert seen == [True, True, False, False, True]
+
+
+@pytest.mark.parametrize("how", ["nothing", "frozen"])
+def test_without_news_of_the_camera_the_run_ends(setup: Callable[..., Setup], how: str) -> None:
+    one = setup(source={"timeout": 0.05, "lost_timeout": 0.2})
+    start = one.rig.reset().applied
+    what = "the same picture" if how == "frozen" else "no picture"
+    with pytest.raises(CameraError, match=f"{what}.*the motors are stopped"):
+        for _ in range(1000):
+            if how == "frozen":
+                one.eye.see(time.monotonic(), 1)
+            one.rig.step(start)
+    assert one.motors.stopped == one.eye.closed == 1
+
+
+def test_trouble_with_the_camera_is_said_once_and_its_end_too(setup: Callable[..., Setup]) -> None:
+    one = setup()
+    start = one.rig.reset().applied
+    one.said.clear()
+    for value, trouble in enumerate(["", "unplugged", "unplugged", "", ""]):
+        one.eye.trouble = trouble
+        one.eye.see(time.monotonic(), value)
+        one.rig.step(start)
+    assert one.said == ["camera: unplugged", "camera: frames again"]
+
+
+def test_what_the_drives_raise_comes_out_and_the_motors_are_stopped(
+    setup: Callable[..., Setup],
+) -> None:
+    one = setup()
+    start = one.rig.reset().applied
+
+    def fail() -> None:
+        raise FollowingError("insertion, node 1", "it is stuck", "See what holds it")
+
+    one.motors.meanwhile = fail
+    with pytest.raises(FollowingError, match="it is stuck"):
+        for _ in range(100):
+            one.rig.step(start)
+    assert one.motors.stopped == one.eye.closed == 1
+    with pytest.raises(SignalError, match="closed"):
+        one.rig.step(start)
+
+
+def test_a_loop_that_gives_no_commands_ends_in_quick_stop(setup: Callable[..., Setup]) -> None:
+    one = setup(drives={"command_timeout": 0.05})
+    start = one.rig.reset().applied
+    end = time.monotonic() + 60
+    while not one.motors.stopped and time.monotonic() < end:
+        time.sleep(CYCLE)
+    assert one.motors.stopped == 1
+    with pytest.raises(StateError, match=r"loop: no command for .* drives.command_timeout"):
+        one.rig.step(start)
+
+
+def test_a_run_that_is_over_may_be_closed_late(setup: Callable[..., Setup]) -> None:
+    one = setup(drives={"command_timeout": 0.05})
+    one.rig.step(one.rig.reset().applied)
+    end = time.monotonic() + 60
+    while not one.motors.stopped and time.monotonic() < end:
+        time.sleep(CYCLE)
+    one.rig.close()
+    assert one.motors.stopped == 1
+    assert one.rig.timing.lost == 0
+
+
+def test_close_stops_the_motors_and_the_rig_can_start_again(setup: Callable[..., Setup]) -> None:
+    one = setup()
+    one.rig.close()
+    one.rig.step(one.rig.reset().applied)
+    one.rig.close()
+    one.rig.close()
+    assert one.motors.stopped == one.eye.closed == 1
+    assert not [t for t in threading.enumerate() if t.name == "set-points"]
+    sample = one.rig.step(one.rig.reset().applied)
+    assert sample.time == CYCLE
+    assert len(one.rig.timing.sent) == 1
+
+
+def test_a_configuration_that_cannot_be_driven_is_refused() -> None:
+    with pytest.raises(ConfigError, match=r"drives: .*a section \[drives\]"):
+        HardwareRig(Config())
+    with pytest.raises(ConfigError, match=r"control.period: got 0.005, expected drives.cycle"):
+        HardwareRig(rig_config(period=0.005))
+
+
+def test_timing_is_written_and_read_back(tmp_path: Any) -> None:
+    timing = Timing(CYCLE)
+    for place, is_new in ((0, True), (1, False), (4, True), (5, False)):
+        due = place * CYCLE
+        timing.add_cycle(due, due + 0.001, due + 0.003, is_new)
+    timing.add_frame(1.0, 1.08, 1.09)
+    timing.write(tmp_path)
+    np.testing.assert_allclose(read_sent(tmp_path / "timing_cycles.csv"), [0.001, 0.041])
+    summary = timing.summary()
+    assert (summary["cycles"], summary["lost_cycles"], summary["held_cycles"]) == (5, 3, 1)
+    assert summary["jitter_ms"]["worst"] == pytest.approx(1.0)
+    assert summary["answer_ms"]["median"] == pytest.approx(2.0)
+    assert summary["frame_age_ms"]["median"] == pytest.approx(90.0)
