@@ -303,6 +303,30 @@ def test_where_to_look_follows_the_images_and_widens_with_travel() -> None:
     np.testing.assert_allclose(later.deviation[1:], after.deviation[1:])
 
 
+def test_a_search_that_finds_nothing_widens_and_one_that_finds_narrows() -> None:
+    loop = started()
+    seen = build_feature_model(CONFIG).predict(REST)
+    assert seen is not None
+    loop.on_features(seen[0], 0.3)
+    sure = loop.expectation(0.3)
+    assert sure is not None
+    last = sure.deviation
+    for missed in range(20):
+        loop.step(REST)
+        now = 0.31 + 0.01 * missed
+        assert loop.on_features(None, now).status is Status.NO_MARKERS
+        belief = loop.expectation(now)
+        assert belief is not None
+        np.testing.assert_array_equal(belief.state, sure.state)
+        assert (belief.deviation >= last).all()
+        last = belief.deviation
+    np.testing.assert_array_equal(last, [CONFIG[dof].start_deviation for dof in Dof])
+    loop.on_features(seen[0], 0.51)
+    again = loop.expectation(0.51)
+    assert again is not None
+    np.testing.assert_allclose(again.deviation, sure.deviation, rtol=0.1)
+
+
 @pytest.mark.parametrize("lost", [0, 1])
 def test_one_band_alone_informs_and_is_called_partial(lost: int) -> None:
     loop = started()

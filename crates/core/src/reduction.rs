@@ -137,6 +137,7 @@ impl HysteresisReduction {
             return self.unused(Status::Stale, None);
         };
         let Some(measured) = measured.filter(|features| usable(*features)) else {
+            self.whereabouts.miss(&past);
             return self.unused(Status::NoMarkers, Some(past));
         };
         let seen = match self.state_estimation {

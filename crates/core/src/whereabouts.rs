@@ -13,6 +13,9 @@ const STEP_ERROR: f64 = 0.25;
 /// What an image does to the belief's deviation of which a marker was left out: it makes nothing surer. Were the
 /// belief wrong, it would otherwise refuse every image to come.
 const DOUBT: f64 = 1.25;
+/// What an image without markers does to the belief's deviation. A tip that slid on while its command rested is
+/// not where it is looked for; it is found again when the search has grown to where it is.
+const MISS: f64 = 1.5;
 
 /// What the last images said, per DOF, and how it has aged.
 ///
@@ -23,7 +26,7 @@ const DOUBT: f64 = 1.25;
 ///
 /// with the travel of the command, forth and back: whatever the slack does, the tip has moved no
 /// farther than the command, but for `rest_deviation`. `deviation_last` has the image's own and, of the linear
-/// step of Eq. (16), a quarter of the correction.
+/// step of Eq. (16), a quarter of the correction. Every image without markers makes it half as large again.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Whereabouts {
     start_deviation: PerDof<f64>,
@@ -101,6 +104,12 @@ impl Whereabouts {
             seen.deviation
         };
         self.set(past, seen.estimate.state, deviation, [true; 3]);
+    }
+
+    /// Takes in that the markers were not found where they should be.
+    pub(crate) fn miss(&mut self, past: &Entry) {
+        self.deviation = self.at(past).deviation.map(|value| MISS * value);
+        self.travel = past.travel;
     }
 
     fn set(
