@@ -320,7 +320,9 @@ def test_a_search_that_finds_nothing_widens_and_one_that_finds_narrows() -> None
         np.testing.assert_array_equal(belief.state, sure.state)
         assert (belief.deviation >= last).all()
         last = belief.deviation
-    np.testing.assert_array_equal(last, [CONFIG[dof].start_deviation for dof in Dof])
+    start = np.array([CONFIG[dof].start_deviation for dof in Dof])
+    assert (last > 2 * sure.deviation).all() or (last >= 0.15 * start).all()
+    assert (last <= start).all()
     loop.on_features(seen[0], 0.51)
     again = loop.expectation(0.51)
     assert again is not None

@@ -16,6 +16,9 @@ const DOUBT: f64 = 1.25;
 /// What an image without markers does to the belief's deviation. A tip that slid on while its command rested is
 /// not where it is looked for; it is found again when the search has grown to where it is.
 const MISS: f64 = 1.5;
+/// The largest share of the start's deviation that comes of missing images: with more, a bend the other way, half a
+/// turn on, is found as well.
+const MISSED: f64 = 0.15;
 
 /// What the last images said, per DOF, and how it has aged.
 ///
@@ -26,7 +29,8 @@ const MISS: f64 = 1.5;
 ///
 /// with the travel of the command, forth and back: whatever the slack does, the tip has moved no
 /// farther than the command, but for `rest_deviation`. `deviation_last` has the image's own and, of the linear
-/// step of Eq. (16), a quarter of the correction. Every image without markers makes it half as large again.
+/// step of Eq. (16), a quarter of the correction. Every image without markers makes it half as large again,
+/// up to a part of `start_deviation`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Whereabouts {
     start_deviation: PerDof<f64>,
@@ -108,7 +112,10 @@ impl Whereabouts {
 
     /// Takes in that the markers were not found where they should be.
     pub(crate) fn miss(&mut self, past: &Entry) {
-        self.deviation = self.at(past).deviation.map(|value| MISS * value);
+        self.deviation = self.at(past).deviation;
+        for (deviation, start) in self.deviation.iter_mut().zip(self.start_deviation) {
+            *deviation = deviation.max((MISS * *deviation).min(MISSED * start));
+        }
         self.travel = past.travel;
     }
 
