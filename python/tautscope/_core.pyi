@@ -229,6 +229,7 @@ class Reduction:
         estimators: Sequence[Estimator],
         model: FeatureModel,
         state_estimator: StateEstimator,
+        guards: Guards,
         *,
         span: float,
         period: float,
@@ -239,16 +240,21 @@ class Reduction:
         axes: Sequence[AdaptiveAxis],
         model: FeatureModel,
         state_estimator: WeightedEstimator,
+        guards: Guards,
         *,
         span: float,
         period: float,
         start_deviation: _Vector3,
         rest_deviation: _Vector3,
     ) -> Reduction: ...
-    def step(self, reference: ArrayLike, time: float) -> _Floats: ...
+    def step(self, reference: ArrayLike, time: float, stamp: float | None = None) -> _Floats: ...
     def run(self, references: ArrayLike, times: ArrayLike) -> _Floats: ...
     def on_features(
-        self, features: ArrayLike | None, captured_at: float, covariance: ArrayLike | None = None
+        self,
+        features: ArrayLike | None,
+        captured_at: float,
+        covariance: ArrayLike | None = None,
+        checksum: int | None = None,
     ) -> tuple[
         str,
         _Floats,
@@ -262,6 +268,11 @@ class Reduction:
         _Floats,
         _Floats,
     ]: ...
+    @property
+    def supervision(self) -> tuple[str, list[str], list[str], float]: ...
+    def engage(self) -> None: ...
+    def acknowledge(self) -> None: ...
+    def raise_flag(self, name: str) -> None: ...
     def predicted_features(self, captured_at: float) -> _Floats | None: ...
     def expectation(self, captured_at: float) -> tuple[_Floats, _Floats] | None: ...
     @property
