@@ -5,11 +5,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
+    "DETECTORS",
     "AdaptiveAxis",
     "Camera",
     "Compensator",
     "Estimator",
     "FeatureModel",
+    "Guards",
     "Instrument",
     "MarkerDetector",
     "Play",
@@ -22,6 +24,7 @@ __all__ = [
 ]
 
 __version__: str
+DETECTORS: tuple[str, ...]
 
 # The control law: crates/core.
 
@@ -220,6 +223,37 @@ class AdaptiveAxis:
     def delta_plus(self) -> float: ...
     @property
     def deviation(self) -> tuple[float, float]: ...
+
+@final
+class Guards:
+    def __new__(
+        cls,
+        *,
+        period: float,
+        gain_limit: _Vector3,
+        reference_speed: _Vector3,
+        reference_age: float,
+        late_tick: float,
+        stall: float,
+        command_speed: _Vector3,
+        command_travel: Sequence[tuple[float, float]],
+        width_limit: _Vector3,
+        offset_limit: _Vector3,
+        frame_age: float,
+        frame_gap: float,
+        frozen_travel: _Vector3,
+        innovation_limit: float,
+        start_deviation: _Vector3,
+        innovation_floor: _Vector3,
+        blind_growth: float,
+        hold_time: float,
+        hold_travel: float,
+        fade_travel: float,
+        restore_travel: float,
+        good_frames: int,
+        good_ticks: int,
+        off: Sequence[str],
+    ) -> Guards: ...
 
 @final
 class Reduction:

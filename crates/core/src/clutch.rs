@@ -31,6 +31,7 @@ pub struct ClutchSettings {
 pub struct Clutch {
     settings: ClutchSettings,
     offset: PerDof<f64>,
+    raw: PerDof<f64>,
     admitted: Option<PerDof<f64>>,
     time: Option<f64>,
 }
@@ -65,6 +66,7 @@ impl Clutch {
         Ok(Self {
             settings,
             offset: [0.0; 3],
+            raw: [f64::NAN; 3],
             admitted: None,
             time: None,
         })
@@ -113,9 +115,18 @@ impl Clutch {
             .iter_mut()
             .zip(&mut self.offset)
             .zip(&mut admission.moved);
-        for (((next, offset), moved), (raw, limit)) in axes.zip(reference.into_iter().zip(limit)) {
+        let inputs = reference.into_iter().zip(self.raw).zip(limit);
+        self.raw = reference;
+        for (((next, offset), moved), ((raw, before), limit)) in axes.zip(inputs) {
             let last = *next;
-            let wanted = if *offset == 0.0 { raw } else { raw + *offset };
+            // A hand at rest moves nothing, whatever rounding makes of the offset.
+            let wanted = if (raw - before).abs() == 0.0 {
+                last
+            } else if *offset == 0.0 {
+                raw
+            } else {
+                raw + *offset
+            };
             let increment = wanted - last;
             if stopped {
                 *offset = last - raw;

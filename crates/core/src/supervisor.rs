@@ -104,7 +104,7 @@ pub const TABLE: [Rule; 22] = [
     rule(Flag::ReferenceLate,    Tick,  &[(HoldMotion, Engage)],                 false),
     rule(Flag::ReferenceInvalid, Tick,  &[(HoldMotion, Engage)],                 false),
     rule(Flag::LateTick,         Tick,  &[(Warn, Auto), (HoldMotion, Engage)],   false),
-    rule(Flag::DriveFault,       Rig,   &[(QuickStop, Engage)],                  false),
+    rule(Flag::DriveFault,       Rig,   &[(QuickStop, Engage), (Disable, Restart)], true),
     rule(Flag::StartCheck,       Frame, &[(PassThrough, Engage)],                false),
     rule(Flag::WidthLimit,       Frame, WARN,                                    false),
     rule(Flag::Monitor,          Tick,  &[(Warn, Auto), (Disable, Restart)],     false),
