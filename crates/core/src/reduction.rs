@@ -166,7 +166,8 @@ impl HysteresisReduction {
         past: Option<Entry>,
         raised: &mut Flags,
     ) -> Report {
-        if captured_at <= self.last_used || raised.has(Flag::Duplicate) {
+        if captured_at <= self.last_used {
+            *raised = self.guards.watched(raised.and(Flags::of(Flag::Duplicate)));
             return self.unused(Status::Duplicate, None);
         }
         let Some(past) = past else {
