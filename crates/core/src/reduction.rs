@@ -187,20 +187,19 @@ impl HysteresisReduction {
         };
         let belief = self.whereabouts.at(&past);
         let fits = |seen: &Seen| {
-            let frames = &self.guards.frames;
-            seen.used != [false; 2]
-                && frames.fits(&belief, seen.image_state(), seen.output_deviation)
+            self.guards
+                .frames
+                .fits(&belief, seen.image_state(), seen.output_deviation)
         };
-        if !fits(&seen) {
+        let is_believed = seen.used != [false; 2];
+        if !(is_believed && fits(&seen)) {
             let [ua, va, ub, vb] = measured;
             let exchanged = self.look(&past, [ub, vb, ua, va], covariance);
             let swapped = exchanged.is_some_and(|other| other.used == [true; 2] && fits(&other));
-            let flag = if swapped {
-                Flag::Swapped
-            } else {
-                Flag::Innovation
-            };
-            *raised = self.guards.watched(Flags::of(flag));
+            *raised = self.guards.watched(
+                Flags::when(swapped, Flag::Swapped)
+                    .and(Flags::when(!swapped && is_believed, Flag::Innovation)),
+            );
             if !raised.is_empty() {
                 self.whereabouts.miss(&past);
                 return self.unused(Status::Refused, Some(past));
@@ -225,7 +224,11 @@ impl HysteresisReduction {
         *raised = self.guards.watched(
             raised
                 .and(Flags::when(status == Status::Partial, Flag::Merged))
-                .and(Flags::when(status == Status::Held, Flag::Unobservable)),
+                .and(Flags::when(!is_believed, Flag::Lost))
+                .and(Flags::when(
+                    is_believed && status == Status::Held,
+                    Flag::Unobservable,
+                )),
         );
         Report {
             status,
