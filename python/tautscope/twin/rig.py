@@ -34,6 +34,25 @@ class Twin:
         self._plant: Plant | None = None
 
     @property
+    def config(self) -> Config:
+        """What it was made from."""
+        return self._config
+
+    @property
+    def draws(self) -> bool:
+        """Whether its frames are pictures."""
+        return self._camera is not None
+
+    @property
+    def plant(self) -> Plant:
+        """The physics, to look into and to disturb.
+
+        Raises:
+            SignalError: Before `reset` or after `close`.
+        """
+        return self._running()
+
+    @property
     def control_period(self) -> float:
         """Time from one command to the next [s]."""
         return self._config.control.period
