@@ -30,6 +30,8 @@ class Target(StrEnum):
     """The control tick and its clock."""
     DRIVE = "drive"
     """A motor with its drive and encoder."""
+    START = "start"
+    """What the loop is told of the slack at the start."""
 
 
 class Mode(StrEnum):
@@ -141,7 +143,12 @@ TABLE = (
     Kind("hand_slow", _R, _M.SLOW, (2, 10), "Hz", "C8", "new values so often only"),
     Kind("hand_tremor", _R, _M.GARBAGE, (0.1, 1), "mm", "C1", "6 to 12 Hz on top"),
     Kind("hand_displaced", _R, _M.WRONG, (2, 20), "mm", "C5", "engaged again elsewhere", False),
-    Kind("hand_reversed", _R, _M.WRONG, _NONE, "", "D5", "moves the other way"),
+    # What is told of the slack before the first image; a configuration, so nothing of the rig.
+    Kind("start_wide", Target.START, _M.WRONG, (1.1, 1.5), "times", "E2", "too wide", False),
+    Kind("start_narrow", Target.START, _M.WRONG, (0, 0.9), "times", "E2", "too narrow", False),
+    Kind("start_shifted", Target.START, _M.WRONG, (-5, 5), "mm", "E1", "beside it", False),
+    Kind("start_negative", Target.START, _M.GARBAGE, _NONE, "", "E1", "upper below lower", False),
+    Kind("start_nan", Target.START, _M.GARBAGE, _NONE, "", "E1", "no number", False),
     # The tick.
     Kind("stall", _K, _M.STUCK, (0.005, 2), "s", "C7", "no tick for so long", False),
     Kind("stalls", _K, _M.INTERMITTENT, (0.01, 0.1), "s", "C7", "5 a second, each so long"),

@@ -167,7 +167,6 @@ HANDS: dict[str, Act] = {
     "hand_slow": on_axis(_updated),
     "hand_tremor": on_axis(_trembling),
     "hand_displaced": on_axis(_displaced),
-    "hand_reversed": on_axis(_reversed),
 }
 """What the hand means to what its device says."""
 

@@ -48,7 +48,7 @@ class FaultyRig:
     Faults of the hand do nothing here: `FaultyHand` has them.
 
     Args:
-        twin: What fails. Faults are made in a twin and in nothing else.
+        twin: What fails; it may be under way already. Faults are made in a twin and in nothing else.
         faults: What goes wrong, and when.
         seed: Of everything random about them; the same gives the same bytes.
 
@@ -87,8 +87,9 @@ class FaultyRig:
 
     def reset(self) -> Sample:
         """As `Twin.reset`."""
+        sample = self._twin.reset()
         self._forget()
-        return self._seen(self._twin.reset())
+        return self._seen(sample)
 
     def step(self, command: ArrayLike) -> Sample:
         """As `Twin.step`; a stall lets many control periods pass at once."""
@@ -105,7 +106,7 @@ class FaultyRig:
         self._twin.close()
 
     def _forget(self) -> None:
-        self._time = 0.0
+        self._time = self._twin.time
         self._under_way: Arrivals = []
         camera, instrument = self._twin.config.camera, self._twin.config.instrument
         places = instrument.marker_a, instrument.marker_b
