@@ -38,9 +38,10 @@ def summary(rows: Sequence[Row]) -> str:
     passing = [row["excursion"][0] for row in rows if row["passing"]]
     lasting = [row["excursion"][0] for row in rows if not row["passing"]]
     counts = ", ".join(f"{ended[name]} {name}" for name in ENDINGS)
+    seeds, kinds = {row["seed"] for row in rows}, {row["kind"] for row in rows}
     return (
-        f"N = {len(rows)} runs of {len({row['kind'] for row in rows})} kinds, "
-        f"seeds {min(row['seed'] for row in rows)} to {max(row['seed'] for row in rows)}: {counts}. "
+        f"N = {len(rows)} runs of {len(kinds)} kinds, seeds {min(seeds)} to {max(seeds)}: "
+        f"{counts}. "
         f"k = {beyond} beyond the goal. Insertion, worst excursion: "
         f"{1e3 * max(passing, default=0):.2f} mm of faults that pass, "
         f"{1e3 * max(lasting, default=0):.2f} mm of those that stay."

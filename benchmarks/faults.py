@@ -14,6 +14,7 @@ import os
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 
 import fault_tables as tables
@@ -62,18 +63,16 @@ def detectors() -> tuple[str, ...]:
 
 def campaign(
     seeds: Sequence[int],
-    kinds: Sequence[str],
-    profile: Profile,
-    off: tuple[str, ...],
+    one: Callable[[int], list[tables.Row]],
     workers: int,
     tell: Callable[[float], None] = lambda _: None,
 ) -> list[tables.Row]:
-    """Every kind with every seed, in the order of the seeds."""
+    """The rows of many seeds, in the order of the seeds."""
     found: dict[int, list[tables.Row]] = {}
     with ProcessPoolExecutor(
         workers, mp_context=multiprocessing.get_context("spawn"), initializer=one_thread
     ) as pool:
-        running = {pool.submit(rows, seed, kinds, profile, off): seed for seed in seeds}
+        running = {pool.submit(one, seed): seed for seed in seeds}
         try:
             for done in as_completed(running):
                 found[running[done]] = done.result()
@@ -85,7 +84,7 @@ def campaign(
 
 
 def rows(
-    seed: int, kinds: Sequence[str], profile: Profile, off: tuple[str, ...]
+    seed: int, *, kinds: Sequence[str], profile: Profile, off: tuple[str, ...]
 ) -> list[tables.Row]:
     """Those of one seed."""
     return [tables.to_row(each) for each in study(seed, kinds, profile, off)]
@@ -103,10 +102,11 @@ def chosen(options: argparse.Namespace, runs: int) -> list[int]:
 def measure(options: argparse.Namespace, off: tuple[str, ...], runs: int) -> list[tables.Row]:
     """One campaign."""
     seeds, kinds = chosen(options, runs), options.kind or list(KINDS)
-    if len(seeds) * len(kinds) < 2:
-        return rows(seeds[0], kinds, options.profile, off)
+    one = partial(rows, kinds=kinds, profile=options.profile, off=off)
+    if len(seeds) == 1:
+        return one(seeds[0])
     with progress_bar("faults" + "".join(f" without {name}" for name in off[:1])) as tell:
-        return campaign(seeds, kinds, options.profile, off, options.workers, tell)
+        return campaign(seeds, one, options.workers, tell)
 
 
 def read(files: Iterable[Path]) -> dict[str, list[tables.Row]]:
