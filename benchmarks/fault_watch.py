@@ -59,7 +59,8 @@ class FeatureTwin(Twin):
         return sample
 
     def _looked(self, sample: Sample) -> Sample:
-        return replace(sample, frame=self._eye.look(sample))
+        frame = self._eye.look(sample)
+        return sample if frame is None else replace(sample, frame=frame)
 
 
 def look(loop: HysteresisReduction, frame: Frame) -> Report:
@@ -224,7 +225,7 @@ class Driven:
         error = np.maximum(recent.min(axis=0) - self._applied, self._applied - recent.max(axis=0))
         if self.rig.drive_fault:
             self._give_up("drive_fault")
-        elif not (error <= FOLLOWING_ERROR).all():
+        elif (error > FOLLOWING_ERROR).any():
             self._give_up("following_error")
 
     def _give_up(self, flag: str) -> None:

@@ -122,7 +122,7 @@ class FaultyRig:
     def _active(self, *targets: Target) -> list[Moment]:
         found = []
         for moment in self._moments:
-            if moment.fault.row.target in targets and moment.fault.active(self._time):
+            if moment.fault.active(self._time) and moment.fault.row.target in targets:
                 moment.since = self._time - moment.fault.start
                 found.append(moment)
         return found
@@ -145,11 +145,13 @@ class FaultyRig:
 
     def _seen(self, sample: Sample) -> Sample:
         self._time = sample.time
+        if not self._faults:
+            return sample
         applied = _acted(ENCODERS, sample.applied, self._active(Target.DRIVE))
         frame = self._arrived(sample)
-        if frame is not None:
-            frame = replace(frame, captured_at=self._clock(frame.captured_at))
-        return replace(sample, time=self._clock(sample.time), applied=applied, frame=frame)
+        if frame is not None and (stamp := self._clock(frame.captured_at)) != frame.captured_at:
+            frame = replace(frame, captured_at=stamp)
+        return Sample(self._clock(sample.time), applied, frame, sample.true_state)
 
     def _arrived(self, sample: Sample) -> Frame | None:
         if sample.frame is not None:
