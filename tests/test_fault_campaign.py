@@ -15,13 +15,13 @@ from tautscope.dof import Dof
 from tautscope.errors import ConfigError
 from tautscope.twin.faults import KINDS, Fault
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT / "benchmarks"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
 
 import fault_runs as runs
 import fault_tables as tables
 from fault_watch import Hand, Watch
 
+ROOT = Path(__file__).resolve().parents[1]
 CONFIG = load_config()
 needs_fork = pytest.mark.skipif(sys.platform == "win32", reason="the campaign forks")
 

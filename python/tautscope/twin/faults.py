@@ -48,7 +48,7 @@ class FaultyRig:
     Faults of the hand do nothing here: `FaultyHand` has them.
 
     Args:
-        twin: What fails; it may be under way already. Faults are made in a twin and in nothing else.
+        twin: What fails; it may be under way already. Nothing else is ever made to fail.
         faults: What goes wrong, and when.
         seed: Of everything random about them; the same gives the same bytes.
 
