@@ -39,8 +39,8 @@ PASSES = (0.1, 2.0)
 SHARE_PASSING = 0.7
 DECADES = 30.0
 """Severities that span more are drawn evenly in their logarithm."""
-PLAY = np.array([10e-3, 1.2, 1.0])
-"""Slack of the instrument [m, rad, rad]."""
+PLAY = np.array([10e-3, 1.8, 1.1])
+"""Slack of the instrument, the article's Table 1 [m, rad, rad]."""
 FREE_GAIN = 5.0
 PASSING = 0.1 * PLAY
 """Goal for a fault that passes: 1.0 mm, and the like share of the other DOFs' slack."""
@@ -91,20 +91,18 @@ class Outcome:
         """Whether the fault passes."""
         return math.isfinite(self.fault.duration)
 
-    @property
-    def beyond(self) -> bool:
-        """Whether the tip went farther than the goal."""
-        goal = PASSING if self.passing else LASTING
-        return bool((np.array(self.excursion) > goal).any())
 
-    @property
-    def ending(self) -> str:
-        """``masked``, ``warned``, ``stopped`` or ``SILENT``: unsafe and not noticed."""
-        if self.stopped:
-            return "stopped"
-        if math.isfinite(self.detected):
-            return "warned"
-        return "SILENT" if bool((np.array(self.excursion) > PASSING).any()) else "masked"
+def judged(
+    excursion: Sequence[float], passing: bool, noticed: bool, stopped: bool
+) -> dict[str, Any]:
+    """Whether the tip went farther than the goal, and how the run ended.
+
+    ``masked``, ``warned``, ``stopped``, or ``SILENT``: unsafe and not noticed.
+    """
+    far = np.array(excursion)
+    unsafe = bool((far > PASSING).any())
+    ending = "stopped" if stopped else "warned" if noticed else "SILENT" if unsafe else "masked"
+    return {"beyond": bool((far > (PASSING if passing else LASTING)).any()), "ending": ending}
 
 
 def study(

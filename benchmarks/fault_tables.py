@@ -9,7 +9,7 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from fault_runs import LASTING, PASSING, PLAY, Outcome
+from fault_runs import LASTING, PASSING, PLAY, Outcome, judged
 from tautscope.twin.faults import KINDS
 
 Row = dict[str, Any]
@@ -19,12 +19,17 @@ ENDINGS = ("masked", "warned", "stopped", "SILENT")
 
 def to_row(outcome: Outcome) -> Row:
     """Plain numbers and words; NaN and infinity are None."""
-    found = asdict(outcome)
-    found |= {"beyond": outcome.beyond, "ending": outcome.ending, "passing": outcome.passing}
+    found = asdict(outcome) | {"passing": outcome.passing}
     found["fault"]["dof"] = outcome.fault.dof.label
     found["fault"]["duration"] = _finite(outcome.fault.duration)
     found["detected"] = _finite(outcome.detected)
-    return found
+    return judge(found)
+
+
+def judge(row: Row) -> Row:
+    """With what is to be said of it; the goals may have changed since it was kept."""
+    noticed = row["detected"] is not None
+    return row | judged(row["excursion"], row["passing"], noticed, row["stopped"])
 
 
 def _finite(value: float) -> float | None:

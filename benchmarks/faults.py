@@ -114,7 +114,7 @@ def read(files: Iterable[Path]) -> dict[str, list[tables.Row]]:
     found: dict[str, list[tables.Row]] = {}
     for file in files:
         for name, each in json.loads(file.read_text(encoding="utf-8")).items():
-            found.setdefault(name, []).extend(each)
+            found.setdefault(name, []).extend(tables.judge(row) for row in each)
     return found
 
 
