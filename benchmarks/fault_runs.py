@@ -245,6 +245,8 @@ class Instrument:
 
     def _pause(self, fault: Fault) -> None:
         self._hand.pauses = pauses(fault)
+        if fault.row.target is Target.REFERENCE:
+            self._hand.paused = [fault.dof]
         self._hand.end = self._since + watched(fault)
 
     def _replay(self, fault: Fault, commands: Floats) -> None:

@@ -249,6 +249,7 @@ class Hand:
 
     Attributes:
         pauses: (start, end) [s] in which the hand means no motion, whatever it does.
+        paused: Of which DOFs.
     """
 
     segments: tuple[Segment, ...] = ()
@@ -258,6 +259,7 @@ class Hand:
     ) -> None:
         self.clock, self.end = clock, end
         self.pauses: Sequence[tuple[float, float]] = ()
+        self.paused: Sequence[int] = tuple(Dof)
         self._centre = np.array([config.experiment[dof].centre for dof in Dof])
         self._sines = [
             (int(dof), config.experiment[dof].amplitude, 2 * math.pi / period)
@@ -275,7 +277,8 @@ class Hand:
         position = self._at(now)
         for start, end in self.pauses:
             if now > start:
-                position = position - (self._at(min(now, end)) - self._at(start))
+                moved = self._at(min(now, end)) - self._at(start)
+                position[list(self.paused)] -= moved[list(self.paused)]
         return position
 
     def _at(self, time: float) -> Floats:

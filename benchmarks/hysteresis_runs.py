@@ -15,11 +15,12 @@ import msgspec
 import numpy as np
 import tautscope
 from numpy.typing import ArrayLike, NDArray
+from tautscope.blocks import build_feature_model
 from tautscope.config import Config, ExperimentConfig
 from tautscope.dof import Dof
 from tautscope.experiment import run_experiment
 from tautscope.recording import Recording
-from tautscope.reduction import HysteresisReduction, Report, build_feature_model
+from tautscope.reduction import HysteresisReduction, Report
 from tautscope.references import Segment, SineSequence
 from tautscope.rig import Frame, Sample
 from tautscope.twin.fault_frames import FeatureFrame

@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from tautscope import Config, Frame, Sample, run_experiment
+from tautscope.blocks import build_feature_model
 from tautscope.config import ControlConfig, ExperimentConfig, Sine
-from tautscope.reduction import build_feature_model
 from tautscope.references import SineSequence
 from tautscope.results import evaluate
 

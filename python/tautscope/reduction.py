@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tautscope import _core
-from tautscope.config import Config, DofConfig
-from tautscope.dof import Dof
+from tautscope.blocks import build_loop
+from tautscope.config import Config
 from tautscope.errors import SignalError
 from tautscope.rig import Frame
+from tautscope.safety import Reaction, Supervision, checksum, switched_off
 
 if TYPE_CHECKING:
     from tautscope.vision import Detection, MarkerDetector
@@ -39,6 +39,8 @@ class Status(StrEnum):
     """Captured at a time the command history does not reach."""
     DUPLICATE = "duplicate"
     """Captured no later than a frame already used."""
+    REFUSED = "refused"
+    """A guard did not believe it: it taught nothing. `Report.warnings` has which."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,6 +79,9 @@ class Report:
             "violation", Eq. (5), or None.
         delta_minus: (3,) contact offsets after this frame, input minus output.
         delta_plus: (3,) contact offsets after this frame, input minus output.
+        reaction: What is in force after this frame.
+        warnings: Why, by the names of `tautscope.safety.DETECTORS`; and a line for every guard
+            that ``safety.off`` names.
     """
 
     detection: Detection | None
@@ -92,6 +97,8 @@ class Report:
     triggers: tuple[Triggers, Triggers, Triggers]
     delta_minus: NDArray[np.float64]
     delta_plus: NDArray[np.float64]
+    reaction: Reaction
+    warnings: tuple[str, ...]
 
 
 class HysteresisReduction:
@@ -105,17 +112,23 @@ class HysteresisReduction:
     def __init__(self, config: Config, compensate: bool = True) -> None:
         self._config = config
         self._ticks = 0
+        self._off = switched_off(config)
         self._loop = build_loop(config, compensate)
 
-    def step(self, reference: ArrayLike, time: float | None = None) -> NDArray[np.float64]:
+    def step(
+        self, reference: ArrayLike, time: float | None = None, made_at: float | None = None
+    ) -> NDArray[np.float64]:
         """One control tick: the command for a reference, Eqs. (2)-(3).
 
         Args:
             reference: u (3,) [m, rad, rad].
             time: The rig's clock [s]; without it, ticks of `control.period` from 0 on.
+            made_at: When the reference was made [s, the same clock], if that is known: one older
+                than ``safety.reference_age`` moves nothing.
 
         Returns:
-            c (3,) [m, rad, rad]. The first reference is passed through.
+            c (3,) [m, rad, rad]. The first reference is passed through. While motion is held, the
+            last command.
 
         Raises:
             SignalError: The reference is not three finite numbers, or the time is not finite;
@@ -124,7 +137,7 @@ class HysteresisReduction:
         values = _finite("reference", reference, (3,))
         at = self._ticks * self._config.control.period if time is None else _time("time", time)
         self._ticks += 1
-        return self._loop.step(values, at)
+        return self._loop.step(values, at, None if made_at is None else _time("made_at", made_at))
 
     def on_frame(self, frame: Frame) -> Report:
         """Image update: find the markers, estimate the state, learn the slack, Eqs. (4)-(16).
@@ -155,9 +168,10 @@ class HysteresisReduction:
     def on_detection(self, frame: Frame, detection: Detection) -> Report:
         """The rest of `on_frame`, with the answer to `question`."""
         captured_at = _time("captured_at", frame.captured_at)
+        features, covariance = detection.features, detection.covariance
         if not any(detection.found):
-            return self._report(None, captured_at, detection)
-        return self._report(detection.features, captured_at, detection, detection.covariance)
+            features = covariance = None
+        return self._report(features, captured_at, detection, covariance, checksum(frame.image))
 
     def on_features(self, features: ArrayLike | None, captured_at: float) -> Report:
         """Image update from a marker detector of your own.
@@ -173,6 +187,31 @@ class HysteresisReduction:
         """
         values = None if features is None else _features(features)
         return self._report(values, _time("captured_at", captured_at), None)
+
+    @property
+    def supervision(self) -> Supervision:
+        """How the loop stands now."""
+        reaction, flags, latched, lead = self._loop.supervision
+        return Supervision(Reaction(reaction), tuple(flags), tuple(latched), lead)
+
+    def engage(self) -> None:
+        """The operator re-engages: held motion goes on, its first increment zero.
+
+        What is still wrong stops it again at once; what only a restart clears stays.
+        """
+        self._loop.engage()
+
+    def acknowledge(self) -> None:
+        """The operator has seen the warnings; faded compensation may come back, with motion."""
+        self._loop.acknowledge()
+
+    def raise_flag(self, name: str) -> None:
+        """Something only the rig can see: ``drive_fault``, ``following_error``.
+
+        Raises:
+            ConfigError: It is none of `tautscope.safety.DETECTORS`.
+        """
+        self._loop.raise_flag(name)
 
     def expectation(self, captured_at: float) -> Expectation | None:
         """Where the instrument should be in a frame captured at this time, to the best knowledge.
@@ -216,160 +255,14 @@ class HysteresisReduction:
         captured_at: float,
         detection: Detection | None,
         covariance: NDArray[np.float64] | None = None,
+        picture: int | None = None,
     ) -> Report:
-        facts = self._loop.on_features(features, captured_at, covariance)
-        return Report(detection, captured_at, Status(facts[0]), *facts[1:])
-
-
-def build_compensator(dof: DofConfig, compensate: bool = True) -> _core.Compensator:
-    """The compensator of one DOF, Eqs. (2)-(3); without compensation its gain is 1."""
-    return _core.Compensator(
-        free_gain=dof.free_gain if compensate else 1.0,
-        gain_limit=dof.gain_limit,
-        delta_minus=dof.delta_minus,
-        delta_plus=dof.delta_plus,
-        recovery=dof.recovery,
-    )
-
-
-def build_adaptive_axis(config: Config, dof: Dof, compensate: bool = True) -> _core.AdaptiveAxis:
-    """One DOF of profile ``best``; without compensation its gains are 1."""
-    own, shared = config[dof], config.adaptive
-    unit = own.update_distance
-    free = own.free_gain if compensate else 1.0
-    contact = min(shared.contact_gain, free)
-    return _core.AdaptiveAxis(
-        free_gain=free,
-        contact_gain=contact,
-        cautious_gain=min(shared.cautious_gain, contact),
-        cautious_deviation=unit * shared.cautious_deviation,
-        gain_limit=own.gain_limit,
-        taper=unit * shared.taper,
-        settling=unit * shared.settling,
-        node_spacing=unit * shared.node_spacing,
-        level_deviation=unit * shared.level_deviation,
-        gain_deviation=shared.gain_deviation,
-        local_deviation=unit * shared.local_deviation,
-        correlation=unit * shared.correlation,
-        # A deviation per square root of travel.
-        level_drift=math.sqrt(unit) * shared.level_drift,
-        gain_drift=shared.gain_drift / math.sqrt(unit),
-        local_drift=math.sqrt(unit) * shared.local_drift,
-        symmetry=shared.symmetry,
-        contact_distance=unit * shared.contact_distance,
-        contact_moved=unit * shared.contact_moved,
-        slope_tolerance=shared.slope_tolerance,
-        model_deviation=unit * shared.model_deviation,
-        state_correction=shared.state_correction,
-        tremor_time=shared.tremor_time,
-        period=config.control.period,
-        delta_minus=own.delta_minus,
-        delta_plus=own.delta_plus,
-    )
-
-
-def build_estimator(dof: DofConfig) -> _core.Estimator:
-    """The hysteresis estimator of one DOF, Eqs. (4)-(6)."""
-    return _core.Estimator(
-        update_distance=dof.update_distance,
-        contact_tolerance=dof.contact_tolerance,
-        smoothing_factor=dof.smoothing_factor,
-        delta_minus=dof.delta_minus,
-        delta_plus=dof.delta_plus,
-    )
-
-
-def build_instrument(config: Config) -> _core.Instrument:
-    """The kinematics, Eq. (7)."""
-    instrument = config.instrument
-    return _core.Instrument(
-        bending_length=instrument.bending_length,
-        marker_a=instrument.marker_a,
-        marker_b=instrument.marker_b,
-        radius=instrument.diameter / 2,
-        band_length=instrument.band_length,
-    )
-
-
-def build_camera(config: Config) -> _core.Camera:
-    """The projection, Eq. (8)."""
-    camera = config.camera
-    return _core.Camera(
-        fx=camera.fx, fy=camera.fy, cx=camera.cx, cy=camera.cy, distortion=camera.distortion
-    )
-
-
-def build_feature_model(config: Config) -> _core.FeatureModel:
-    """The predicted features and their interaction matrix, Eqs. (9)-(11)."""
-    pose = config.camera.camera_from_guide
-    return _core.FeatureModel(
-        build_instrument(config),
-        build_camera(config),
-        translation=pose.translation,
-        rotation=pose.rotation,
-    )
-
-
-def build_state_estimator(config: Config) -> _core.StateEstimator:
-    """The state estimation with its rank watch, Eqs. (13)-(16)."""
-    insertion, rotation, bending = (config[dof].observable_deviation for dof in Dof)
-    return _core.StateEstimator(observable_deviation=(insertion, rotation, bending))
-
-
-def build_weighted_estimator(config: Config) -> _core.WeightedEstimator:
-    """The state estimation of profile ``best``, decision 0018."""
-    settings = config.state_estimation
-    return _core.WeightedEstimator(
-        build_state_estimator(config),
-        marker_deviation=settings.marker_deviation,
-        model_deviation=settings.model_deviation,
-        sideways_deviation=settings.sideways_deviation,
-        outlier_distance=settings.outlier_distance,
-        steps=settings.steps,
-    )
-
-
-def build_loop(config: Config, compensate: bool = True) -> _core.Reduction:
-    """The whole loop, Fig. 6, without checks of what goes in: `HysteresisReduction` has those."""
-    insertion, rotation, bending = (config[dof] for dof in Dof)
-    model = build_feature_model(config)
-    span, period = config.control.history, config.control.period
-    start_deviation = (
-        insertion.start_deviation,
-        rotation.start_deviation,
-        bending.start_deviation,
-    )
-    if config.profile == "best":
-
-        def rest(dof: DofConfig) -> float:
-            return dof.update_distance * config.state_estimation.rest_deviation
-
-        return _core.Reduction.adaptive(
-            (
-                build_adaptive_axis(config, Dof.INSERTION, compensate),
-                build_adaptive_axis(config, Dof.ROTATION, compensate),
-                build_adaptive_axis(config, Dof.BENDING, compensate),
-            ),
-            model,
-            build_weighted_estimator(config),
-            span=span,
-            period=period,
-            start_deviation=start_deviation,
-            rest_deviation=(rest(insertion), rest(rotation), rest(bending)),
+        facts = self._loop.on_features(features, captured_at, covariance, picture)
+        now = self.supervision
+        warnings = (*self._off, *now.flags)
+        return Report(
+            detection, captured_at, Status(facts[0]), *facts[1:], now.reaction, warnings
         )
-    return _core.Reduction(
-        (
-            build_compensator(insertion, compensate),
-            build_compensator(rotation, compensate),
-            build_compensator(bending, compensate),
-        ),
-        (build_estimator(insertion), build_estimator(rotation), build_estimator(bending)),
-        model,
-        build_state_estimator(config),
-        span=span,
-        period=period,
-        start_deviation=start_deviation,
-    )
 
 
 def _features(values: ArrayLike) -> NDArray[np.float64]:

@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tautscope import _core
+from tautscope.blocks import build_feature_model
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import FieldError
 from tautscope.pixels import FrameLayout
-from tautscope.reduction import Expectation, build_feature_model
+from tautscope.reduction import Expectation
 
 
 class Region(NamedTuple):

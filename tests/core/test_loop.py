@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from tautscope import _core
+from tautscope.blocks import build_feature_model
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError, SignalError
-from tautscope.reduction import HysteresisReduction, Report, Status, build_feature_model
+from tautscope.reduction import HysteresisReduction, Report, Status
 from tautscope.rig import Frame
 
 Floats = NDArray[np.float64]
@@ -228,7 +229,7 @@ def test_the_blocks_name_what_is_wrong_with_their_settings() -> None:
 
 
 def test_batch_run_is_step_by_step() -> None:
-    from tautscope.reduction import build_loop
+    from tautscope.blocks import build_loop
 
     references = REST + 0.1 * np.sin(np.arange(300.0))[:, None] * AMPLITUDES
     times = np.arange(300) * PERIOD

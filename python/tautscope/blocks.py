@@ -1,0 +1,199 @@
+"""The blocks of the core, built from a configuration: every argument by name, units converted."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from tautscope import _core
+from tautscope.config import Config, DofConfig
+from tautscope.dof import Dof
+
+
+def build_compensator(dof: DofConfig, compensate: bool = True) -> _core.Compensator:
+    """The compensator of one DOF, Eqs. (2)-(3); without compensation its gain is 1."""
+    return _core.Compensator(
+        free_gain=dof.free_gain if compensate else 1.0,
+        gain_limit=dof.gain_limit,
+        delta_minus=dof.delta_minus,
+        delta_plus=dof.delta_plus,
+        recovery=dof.recovery,
+    )
+
+
+def build_adaptive_axis(config: Config, dof: Dof, compensate: bool = True) -> _core.AdaptiveAxis:
+    """One DOF of profile ``best``; without compensation its gains are 1."""
+    own, shared = config[dof], config.adaptive
+    unit = own.update_distance
+    free = own.free_gain if compensate else 1.0
+    contact = min(shared.contact_gain, free)
+    return _core.AdaptiveAxis(
+        free_gain=free,
+        contact_gain=contact,
+        cautious_gain=min(shared.cautious_gain, contact),
+        cautious_deviation=unit * shared.cautious_deviation,
+        gain_limit=own.gain_limit,
+        taper=unit * shared.taper,
+        settling=unit * shared.settling,
+        node_spacing=unit * shared.node_spacing,
+        level_deviation=unit * shared.level_deviation,
+        gain_deviation=shared.gain_deviation,
+        local_deviation=unit * shared.local_deviation,
+        correlation=unit * shared.correlation,
+        # A deviation per square root of travel.
+        level_drift=math.sqrt(unit) * shared.level_drift,
+        gain_drift=shared.gain_drift / math.sqrt(unit),
+        local_drift=math.sqrt(unit) * shared.local_drift,
+        symmetry=shared.symmetry,
+        contact_distance=unit * shared.contact_distance,
+        contact_moved=unit * shared.contact_moved,
+        slope_tolerance=shared.slope_tolerance,
+        model_deviation=unit * shared.model_deviation,
+        state_correction=shared.state_correction,
+        tremor_time=shared.tremor_time,
+        period=config.control.period,
+        delta_minus=own.delta_minus,
+        delta_plus=own.delta_plus,
+    )
+
+
+def build_estimator(dof: DofConfig) -> _core.Estimator:
+    """The hysteresis estimator of one DOF, Eqs. (4)-(6)."""
+    return _core.Estimator(
+        update_distance=dof.update_distance,
+        contact_tolerance=dof.contact_tolerance,
+        smoothing_factor=dof.smoothing_factor,
+        delta_minus=dof.delta_minus,
+        delta_plus=dof.delta_plus,
+    )
+
+
+def build_instrument(config: Config) -> _core.Instrument:
+    """The kinematics, Eq. (7)."""
+    instrument = config.instrument
+    return _core.Instrument(
+        bending_length=instrument.bending_length,
+        marker_a=instrument.marker_a,
+        marker_b=instrument.marker_b,
+        radius=instrument.diameter / 2,
+        band_length=instrument.band_length,
+    )
+
+
+def build_camera(config: Config) -> _core.Camera:
+    """The projection, Eq. (8)."""
+    camera = config.camera
+    return _core.Camera(
+        fx=camera.fx, fy=camera.fy, cx=camera.cx, cy=camera.cy, distortion=camera.distortion
+    )
+
+
+def build_feature_model(config: Config) -> _core.FeatureModel:
+    """The predicted features and their interaction matrix, Eqs. (9)-(11)."""
+    pose = config.camera.camera_from_guide
+    return _core.FeatureModel(
+        build_instrument(config),
+        build_camera(config),
+        translation=pose.translation,
+        rotation=pose.rotation,
+    )
+
+
+def build_state_estimator(config: Config) -> _core.StateEstimator:
+    """The state estimation with its rank watch, Eqs. (13)-(16)."""
+    insertion, rotation, bending = (config[dof].observable_deviation for dof in Dof)
+    return _core.StateEstimator(observable_deviation=(insertion, rotation, bending))
+
+
+def build_weighted_estimator(config: Config) -> _core.WeightedEstimator:
+    """The state estimation of profile ``best``, decision 0018."""
+    settings = config.state_estimation
+    return _core.WeightedEstimator(
+        build_state_estimator(config),
+        marker_deviation=settings.marker_deviation,
+        model_deviation=settings.model_deviation,
+        sideways_deviation=settings.sideways_deviation,
+        outlier_distance=settings.outlier_distance,
+        steps=settings.steps,
+    )
+
+
+def build_guards(config: Config) -> _core.Guards:
+    """What watches the loop: reference, command, frames, and the reactions to them."""
+    safety = config.safety
+
+    def each(of: Callable[[DofConfig], float]) -> tuple[float, float, float]:
+        insertion, rotation, bending = (of(config[dof]) for dof in Dof)
+        return insertion, rotation, bending
+
+    return _core.Guards(
+        period=config.control.period,
+        gain_limit=each(lambda dof: dof.gain_limit),
+        reference_speed=safety.reference_speed,
+        reference_age=safety.reference_age,
+        late_tick=safety.late_tick,
+        stall=safety.stall,
+        command_speed=safety.command_speed,
+        command_travel=safety.command_travel,
+        width_limit=safety.width_limit,
+        offset_limit=safety.offset_limit,
+        frame_age=safety.frame_age,
+        frame_gap=safety.frame_gap,
+        frozen_travel=each(lambda dof: dof.update_distance * safety.frozen_travel),
+        innovation_limit=safety.innovation_limit,
+        start_deviation=each(lambda dof: dof.start_deviation),
+        innovation_floor=each(lambda dof: dof.start_deviation * safety.innovation_floor),
+        blind_growth=safety.blind_growth,
+        hold_time=safety.hold_time,
+        hold_travel=safety.hold_travel,
+        fade_travel=safety.fade_travel,
+        restore_travel=safety.restore_travel,
+        good_frames=safety.good_frames,
+        good_ticks=safety.good_ticks,
+        off=safety.off,
+    )
+
+
+def build_loop(config: Config, compensate: bool = True) -> _core.Reduction:
+    """The whole loop, Fig. 6, without checks of what goes in: `HysteresisReduction` has those."""
+    insertion, rotation, bending = (config[dof] for dof in Dof)
+    model = build_feature_model(config)
+    span, period = config.control.history, config.control.period
+    start_deviation = (
+        insertion.start_deviation,
+        rotation.start_deviation,
+        bending.start_deviation,
+    )
+    if config.profile == "best":
+
+        def rest(dof: DofConfig) -> float:
+            return dof.update_distance * config.state_estimation.rest_deviation
+
+        return _core.Reduction.adaptive(
+            (
+                build_adaptive_axis(config, Dof.INSERTION, compensate),
+                build_adaptive_axis(config, Dof.ROTATION, compensate),
+                build_adaptive_axis(config, Dof.BENDING, compensate),
+            ),
+            model,
+            build_weighted_estimator(config),
+            build_guards(config),
+            span=span,
+            period=period,
+            start_deviation=start_deviation,
+            rest_deviation=(rest(insertion), rest(rotation), rest(bending)),
+        )
+    return _core.Reduction(
+        (
+            build_compensator(insertion, compensate),
+            build_compensator(rotation, compensate),
+            build_compensator(bending, compensate),
+        ),
+        (build_estimator(insertion), build_estimator(rotation), build_estimator(bending)),
+        model,
+        build_state_estimator(config),
+        build_guards(config),
+        span=span,
+        period=period,
+        start_deviation=start_deviation,
+    )

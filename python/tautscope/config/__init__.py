@@ -1,0 +1,81 @@
+"""Configuration: TOML in, frozen structures out. The single source of every default.
+
+Each default carries its unit and, in brackets, its origin: [paper] is Reilink et al. 2013,
+[ours] is chosen here, [geometry] is a plausible instrument (shared by no publication).
+SI units throughout: m, rad, s; px for images.
+"""
+
+from tautscope.config.adaptive import AdaptiveConfig
+from tautscope.config.camera import (
+    CameraClock,
+    CameraConfig,
+    Deinterlace,
+    PixelFormat,
+    PoseConfig,
+    SourceConfig,
+    Vector8,
+)
+from tautscope.config.control import ControlConfig
+from tautscope.config.dof import DofConfig
+from tautscope.config.drives import AxisConfig, DrivesConfig
+from tautscope.config.experiment import ExperimentConfig, Sine
+from tautscope.config.fields import (
+    Fraction,
+    Gain,
+    NonNegative,
+    Positive,
+    Vector3,
+)
+from tautscope.config.instrument import InstrumentConfig
+from tautscope.config.load import dump_config, load_config
+from tautscope.config.recording import ImageFormat, RecordingConfig
+from tautscope.config.root import Config, Profile, from_document, to_document
+from tautscope.config.safety import SafetyConfig
+from tautscope.config.state_estimation import StateEstimationConfig
+from tautscope.config.twin import (
+    DISTURBANCES,
+    CableConfig,
+    DriveConfig,
+    ShaftConfig,
+    TwinConfig,
+)
+from tautscope.config.vision import VisionConfig
+
+__all__ = [
+    "DISTURBANCES",
+    "AdaptiveConfig",
+    "AxisConfig",
+    "CableConfig",
+    "CameraClock",
+    "CameraConfig",
+    "Config",
+    "ControlConfig",
+    "Deinterlace",
+    "DofConfig",
+    "DriveConfig",
+    "DrivesConfig",
+    "ExperimentConfig",
+    "Fraction",
+    "Gain",
+    "ImageFormat",
+    "InstrumentConfig",
+    "NonNegative",
+    "PixelFormat",
+    "PoseConfig",
+    "Positive",
+    "Profile",
+    "RecordingConfig",
+    "SafetyConfig",
+    "ShaftConfig",
+    "Sine",
+    "SourceConfig",
+    "StateEstimationConfig",
+    "TwinConfig",
+    "Vector3",
+    "Vector8",
+    "VisionConfig",
+    "dump_config",
+    "from_document",
+    "load_config",
+    "to_document",
+]

@@ -1,0 +1,37 @@
+"""The article's scheme, one degree of freedom at a time."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from msgspec import Meta, Struct
+
+from tautscope.config.fields import Fraction, Gain, Positive
+
+
+class DofConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """One degree of freedom: its compensator, Eqs. (2)-(3), and estimator, Eqs. (4)-(6)."""
+
+    update_distance: Positive
+    """tau: command travel between two estimator updates [m or rad]; about 1 % of the stroke."""
+    observable_deviation: Positive
+    """Largest standard deviation of the state per px of marker noise [m/px or rad/px] at which
+    the DOF counts as observable; beyond it the DOF is held."""
+    start_deviation: Positive
+    """How far the tip may be from the reference before the first image: standard deviation [m or
+    rad]; about half the slack [ours]."""
+    free_gain: Gain = 5.0
+    """K_b: command over reference while the slack is crossed [paper]."""
+    gain_limit: Gain = 5.0
+    """Upper bound of every gain; free_gain may not exceed it [paper]."""
+    recovery: Annotated[float, Meta(ge=0, lt=1)] = 0.0
+    """Share of the reference's travel by which the command gives back what changed offsets have
+    left between it and the reference; 0 keeps it [paper]."""
+    contact_tolerance: Fraction = 0.4
+    """epsilon in Eq. (4) [ours]."""
+    smoothing_factor: Fraction = 0.25
+    """alpha in Eq. (6), per update_distance travelled [ours]."""
+    delta_minus: float = 0.0
+    """Contact offset at the start [m or rad] [paper]."""
+    delta_plus: float = 0.0
+    """Contact offset at the start [m or rad], not below delta_minus [paper]."""

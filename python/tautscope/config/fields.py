@@ -1,0 +1,11 @@
+"""Kinds of numbers that several blocks use."""
+
+from typing import Annotated
+
+from msgspec import Meta
+
+Positive = Annotated[float, Meta(gt=0)]
+NonNegative = Annotated[float, Meta(ge=0)]
+Fraction = Annotated[float, Meta(gt=0, lt=1)]
+Gain = Annotated[float, Meta(ge=1)]
+Vector3 = tuple[float, float, float]

@@ -1,0 +1,119 @@
+"""The whole configuration, as a structure and as the nested dictionary that TOML is."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import msgspec
+from msgspec import Struct, field
+
+from tautscope.config.adaptive import AdaptiveConfig
+from tautscope.config.camera import CameraConfig
+from tautscope.config.checks import check_finite, check_relations, refusal
+from tautscope.config.control import ControlConfig
+from tautscope.config.dof import DofConfig
+from tautscope.config.drives import DrivesConfig
+from tautscope.config.experiment import ExperimentConfig
+from tautscope.config.instrument import InstrumentConfig
+from tautscope.config.recording import RecordingConfig
+from tautscope.config.safety import SafetyConfig
+from tautscope.config.state_estimation import StateEstimationConfig
+from tautscope.config.twin import TwinConfig
+from tautscope.config.vision import VisionConfig
+from tautscope.dof import Dof
+
+Profile = Literal["paper", "best"]
+
+
+class Config(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Everything a run depends on. The defaults are the article's experiment."""
+
+    profile: Profile = "paper"
+    """How slack is compensated and learnt, and the state estimated: ``paper`` as in the article,
+    ``best`` as in `AdaptiveConfig` and `StateEstimationConfig`."""
+    adaptive: AdaptiveConfig = field(default_factory=AdaptiveConfig)
+    state_estimation: StateEstimationConfig = field(default_factory=StateEstimationConfig)
+    insertion: DofConfig = field(
+        default_factory=lambda: DofConfig(
+            update_distance=0.4e-3, observable_deviation=2e-3, start_deviation=5e-3
+        )
+    )
+    rotation: DofConfig = field(
+        default_factory=lambda: DofConfig(
+            update_distance=0.04, observable_deviation=0.1, start_deviation=0.6
+        )
+    )
+    bending: DofConfig = field(
+        default_factory=lambda: DofConfig(
+            update_distance=0.02, observable_deviation=0.1, start_deviation=0.5
+        )
+    )
+    instrument: InstrumentConfig = field(default_factory=InstrumentConfig)
+    camera: CameraConfig = field(default_factory=CameraConfig)
+    vision: VisionConfig = field(default_factory=VisionConfig)
+    control: ControlConfig = field(default_factory=ControlConfig)
+    safety: SafetyConfig = field(default_factory=SafetyConfig)
+    recording: RecordingConfig = field(default_factory=RecordingConfig)
+    experiment: ExperimentConfig = field(default_factory=ExperimentConfig)
+    twin: TwinConfig = field(default_factory=TwinConfig)
+    drives: DrivesConfig | None = None
+    """Motors of a rig; nothing about them can be guessed, so there is no default."""
+
+    def __getitem__(self, dof: Dof) -> DofConfig:
+        """The settings of one DOF."""
+        settings: DofConfig = getattr(self, dof.label)
+        return settings
+
+    def replace(self, **changes: Any) -> Config:
+        """A copy with changes by dotted path, checked: ``replace(**{"twin.seed": 3})``.
+
+        Raises:
+            ConfigError: As `load_config`.
+        """
+        document = to_document(self)
+        for path, value in changes.items():
+            *sections, key = path.split(".")
+            place = document
+            for section in sections:
+                place = place.setdefault(section, {})
+            place[key] = value
+        return from_document(document)
+
+
+def from_document(document: dict[str, Any]) -> Config:
+    """Check a nested dictionary and make it a `Config`; what it does not name keeps its default.
+
+    Raises:
+        ConfigError: As `load_config`.
+    """
+    document = _merged(to_document(Config()), document)
+    try:
+        config = msgspec.convert(document, Config)
+    except msgspec.ValidationError as error:
+        raise refusal(error, document) from None
+    check_finite(msgspec.to_builtins(config), "")
+    check_relations(config)
+    return config
+
+
+def to_document(config: Config) -> dict[str, Any]:
+    """The nested dictionary of a configuration, without the keys that are None."""
+    document: dict[str, Any] = _without_none(msgspec.to_builtins(config))
+    return document
+
+
+def _merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    merged = dict(base)
+    for key, value in changes.items():
+        old = merged.get(key)
+        if isinstance(old, dict) and isinstance(value, dict):
+            merged[key] = _merged(old, value)
+        else:
+            merged[key] = value
+    return merged
+
+
+def _without_none(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _without_none(item) for key, item in value.items() if item is not None}
+    return value
