@@ -168,10 +168,12 @@ class HysteresisReduction:
     def on_detection(self, frame: Frame, detection: Detection) -> Report:
         """The rest of `on_frame`, with the answer to `question`."""
         captured_at = _time("captured_at", frame.captured_at)
-        features, covariance = detection.features, detection.covariance
+        picture = checksum(frame.image)
         if not any(detection.found):
-            features = covariance = None
-        return self._report(features, captured_at, detection, covariance, checksum(frame.image))
+            return self._report(None, captured_at, detection, None, picture)
+        return self._report(
+            detection.features, captured_at, detection, detection.covariance, picture
+        )
 
     def on_features(self, features: ArrayLike | None, captured_at: float) -> Report:
         """Image update from a marker detector of your own.
@@ -260,9 +262,7 @@ class HysteresisReduction:
         facts = self._loop.on_features(features, captured_at, covariance, picture)
         now = self.supervision
         warnings = (*self._off, *now.flags)
-        return Report(
-            detection, captured_at, Status(facts[0]), *facts[1:], now.reaction, warnings
-        )
+        return Report(detection, captured_at, Status(facts[0]), *facts[1:], now.reaction, warnings)
 
 
 def _features(values: ArrayLike) -> NDArray[np.float64]:

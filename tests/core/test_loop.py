@@ -20,7 +20,12 @@ from tautscope.rig import Frame
 Floats = NDArray[np.float64]
 
 CONFIG = Config().replace(
-    **{"insertion.observable_deviation": 5e-3, "bending.observable_deviation": 0.1}
+    **{
+        "insertion.observable_deviation": 5e-3,
+        "bending.observable_deviation": 0.1,
+        # Without noise, pictures repeat themselves while the slack is crossed.
+        "safety.frozen_travel": 100.0,
+    }
 )
 WIDTHS = np.array([10e-3, 1.8, 1.1])
 REST = np.array([0.025, 0.0, 0.9])

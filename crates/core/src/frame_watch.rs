@@ -8,7 +8,7 @@ use crate::posture::Belief;
 
 /// A frame out of order by more than this has a wrong clock, in s.
 const JUMP: f64 = 1.0;
-/// Share of the difference by which the spread follows a larger innovation, and a smaller one.
+/// Share of the difference by which the spread follows a larger innovation, and a smaller one of a DOF in motion.
 const GROW: f64 = 0.3;
 const SHRINK: f64 = 0.05;
 
@@ -63,7 +63,7 @@ pub struct Arrival {
 /// ```
 ///
 /// with the image's own standard deviation from the markers' covariance, and a spread that follows the root mean square
-/// of the innovations accepted: quickly when they grow, slowly when they shrink. A refused innovation teaches it nothing.
+/// of the innovations accepted: quickly when they grow, slowly and with motion when they shrink. A refused innovation teaches it nothing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrameWatch {
     settings: FrameSettings,
@@ -168,12 +168,19 @@ impl FrameWatch {
 
     /// An image was believed.
     pub fn accept(&mut self, belief: &Belief, state: PerDof<f64>, travel: PerDof<f64>) {
+        let moved = travel.iter().zip(self.travel).map(|(now, then)| now - then);
         let axes = state.iter().zip(belief.state).zip(&mut self.spread);
-        for (((state, expected), spread), least) in axes.zip(self.settings.least_deviation) {
+        let axes = axes.zip(moved).zip(self.settings.least_deviation);
+        for ((((state, expected), spread), moved), least) in axes {
             let surprise = square(state - expected);
             if surprise.is_finite() {
                 let change = surprise - square(*spread);
-                let rate = if change > 0.0 { GROW } else { SHRINK };
+                let rate = if change > 0.0 {
+                    GROW
+                } else {
+                    // A DOF at rest shows nothing of how well its motion is foreseen.
+                    SHRINK * (moved / least).min(1.0)
+                };
                 *spread = libm::sqrt(square(*spread) + rate * change).max(least);
             }
         }

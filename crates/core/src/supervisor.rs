@@ -85,7 +85,7 @@ const fn rule(
 /// A frame without markers teaches nothing by itself, so `lost` need not hold before it fades; two markers
 /// that leave a DOF undetermined hold it by themselves.
 #[rustfmt::skip]
-pub const TABLE: [Rule; 22] = [
+pub static TABLE: [Rule; 22] = [
     rule(Flag::Frozen,           Frame, HOLD_THEN_FADE,                          true),
     rule(Flag::Late,             Frame, HOLD_THEN_FADE,                          true),
     rule(Flag::Duplicate,        Frame, WARN,                                    false),
@@ -157,6 +157,9 @@ pub struct Event {
 pub struct Supervisor {
     settings: SupervisorSettings,
     standing: [Option<Standing>; TABLE.len()],
+    /// Of all that stands.
+    reaction: Reaction,
+    flags: Flags,
     latched: Flags,
     lead: f64,
     time: f64,
@@ -191,6 +194,8 @@ impl Supervisor {
         Ok(Self {
             settings,
             standing: [None; TABLE.len()],
+            reaction: Reaction::None,
+            flags: Flags::NONE,
             latched: Flags::NONE,
             lead: 1.0,
             time: f64::NEG_INFINITY,
@@ -199,6 +204,7 @@ impl Supervisor {
     }
 
     /// Take in an event. A time that is not finite counts as the last one, such a travel as none.
+    #[inline(never)]
     pub fn update(&mut self, event: &Event) {
         let travel = if event.travel.is_finite() {
             event.travel.max(0.0)
@@ -209,49 +215,18 @@ impl Supervisor {
             self.time = event.time;
         }
         self.travel += travel;
-        let needed = match event.source {
-            Source::Frame => self.settings.good_frames,
-            Source::Tick | Source::Rig => self.settings.good_ticks,
-        };
         for (rule, standing) in TABLE.iter().zip(&mut self.standing) {
-            let raised = event.raised.has(rule.flag) || event.severe.has(rule.flag);
-            if raised {
-                let start = if event.severe.has(rule.flag) {
-                    rule.ladder.len() - 1
-                } else {
-                    0
-                };
-                let rung = standing.map_or(start, |standing| {
-                    standing.next(rule, &self.settings, self.time, self.travel)
-                });
-                let rung = rung.max(start);
-                if standing.is_none_or(|standing| standing.rung != rung) {
-                    *standing = Some(Standing {
-                        rung,
-                        since: self.time,
-                        since_travel: self.travel,
-                        good: 0,
-                    });
-                    self.latched = self.latched.and(Flags::of(rule.flag));
-                } else if let Some(standing) = standing {
-                    standing.good = 0;
-                    // A clock that was set back starts the hold afresh.
-                    standing.since = standing.since.min(self.time);
-                }
-            } else if let Some(held) = standing
-                && event.source == rule.source
-            {
-                held.good = held.good.saturating_add(1);
-                if held.good >= needed && held.clear(rule) == Some(Clear::Auto) {
-                    *standing = None;
-                }
+            let now = (self.time, self.travel);
+            if take(standing, rule, &self.settings, event, now) {
+                self.latched = self.latched.and(Flags::of(rule.flag));
             }
         }
+        self.sum_up();
         self.move_lead(travel);
     }
 
     fn move_lead(&mut self, travel: f64) {
-        match self.reaction() {
+        match self.reaction {
             Reaction::Fade => {
                 self.lead = (self.lead - travel / self.settings.fade_travel).max(0.0);
             }
@@ -272,6 +247,21 @@ impl Supervisor {
                 *standing = None;
             }
         }
+        self.sum_up();
+    }
+
+    // Unrolled over the table wherever it is called, it would take minutes to compile.
+    #[inline(never)]
+    fn sum_up(&mut self) {
+        (self.reaction, self.flags) = (Reaction::None, Flags::NONE);
+        for (rule, standing) in TABLE.iter().zip(&self.standing) {
+            if let Some(standing) = standing {
+                self.flags = self.flags.and(Flags::of(rule.flag));
+                if let Some((reaction, _)) = rule.ladder.get(standing.rung) {
+                    self.reaction = self.reaction.max(*reaction);
+                }
+            }
+        }
     }
 
     /// The operator has seen the warnings.
@@ -280,23 +270,13 @@ impl Supervisor {
     }
 
     /// The highest reaction of all flags in force.
-    pub fn reaction(&self) -> Reaction {
-        TABLE
-            .iter()
-            .zip(&self.standing)
-            .filter_map(|(rule, standing)| rule.ladder.get((*standing)?.rung))
-            .map(|(reaction, _)| *reaction)
-            .max()
-            .unwrap_or(Reaction::None)
+    pub const fn reaction(&self) -> Reaction {
+        self.reaction
     }
 
     /// The flags in force.
-    pub fn flags(&self) -> Flags {
-        TABLE
-            .iter()
-            .zip(&self.standing)
-            .filter(|(_, standing)| standing.is_some())
-            .fold(Flags::NONE, |all, (rule, _)| all.and(Flags::of(rule.flag)))
+    pub const fn flags(&self) -> Flags {
+        self.flags
     }
 
     /// What has been raised since the last acknowledgement.
@@ -308,6 +288,53 @@ impl Supervisor {
     pub const fn lead(&self) -> f64 {
         self.lead
     }
+}
+
+/// What an event makes of a flag; whether it climbed, or is new.
+// As above.
+#[inline(never)]
+fn take(
+    standing: &mut Option<Standing>,
+    rule: &Rule,
+    settings: &SupervisorSettings,
+    event: &Event,
+    (time, travel): (f64, f64),
+) -> bool {
+    let severe = event.severe.has(rule.flag);
+    if severe || event.raised.has(rule.flag) {
+        let start = if severe { rule.ladder.len() - 1 } else { 0 };
+        let rung = standing.map_or(start, |now| {
+            now.next(rule, settings, time, travel).max(start)
+        });
+        if let Some(now) = standing
+            && now.rung == rung
+        {
+            now.good = 0;
+            // A clock that was set back starts the hold afresh.
+            now.since = now.since.min(time);
+            return false;
+        }
+        *standing = Some(Standing {
+            rung,
+            since: time,
+            since_travel: travel,
+            good: 0,
+        });
+        return true;
+    }
+    if let Some(now) = standing
+        && event.source == rule.source
+    {
+        let needed = match rule.source {
+            Source::Frame => settings.good_frames,
+            Source::Tick | Source::Rig => settings.good_ticks,
+        };
+        now.good = now.good.saturating_add(1);
+        if now.good >= needed && now.clear(rule) == Some(Clear::Auto) {
+            *standing = None;
+        }
+    }
+    false
 }
 
 impl Standing {
