@@ -44,8 +44,10 @@ PLAY = np.array([10e-3, 1.8, 1.1])
 FREE_GAIN = 5.0
 PASSING = 0.1 * PLAY
 """Goal for a fault that passes: 1.0 mm, and the like share of the other DOFs' slack."""
-LASTING = (1 - 1 / FREE_GAIN + 0.03) * PLAY
-"""Goal for one that stays: what K_b = 1 gives back, and 0.3 mm."""
+GIVEN_BACK = {"paper": 1 - 1 / FREE_GAIN, "best": 1.0}
+"""Share of the slack that a profile makes up for, and gives back when it can no longer."""
+SPARE = 0.03 * PLAY
+"""0.3 mm, and the like."""
 
 HELD = {"hand_nan", "hand_silent", "stall", "stalls"}
 """While these act the hand means no motion; what it does then is not to be made up for."""
@@ -92,8 +94,13 @@ class Outcome:
         return math.isfinite(self.fault.duration)
 
 
+def lasting(profile: str) -> Floats:
+    """Goal for a fault that stays: what is given back when compensation ends, and a little."""
+    return np.asarray(GIVEN_BACK[profile] * PLAY + SPARE, dtype=np.float64)
+
+
 def judged(
-    excursion: Sequence[float], passing: bool, noticed: bool, stopped: bool
+    excursion: Sequence[float], goal: Floats, noticed: bool, stopped: bool
 ) -> dict[str, Any]:
     """Whether the tip went farther than the goal, and how the run ended.
 
@@ -102,7 +109,7 @@ def judged(
     far = np.array(excursion)
     unsafe = bool((far > PASSING).any())
     ending = "stopped" if stopped else "warned" if noticed else "SILENT" if unsafe else "masked"
-    return {"beyond": bool((far > (PASSING if passing else LASTING)).any()), "ending": ending}
+    return {"beyond": bool((far > goal).any()), "ending": ending}
 
 
 def study(

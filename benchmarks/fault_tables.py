@@ -9,7 +9,7 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from fault_runs import LASTING, PASSING, PLAY, Outcome, judged
+from fault_runs import PASSING, PLAY, Outcome, judged, lasting
 from tautscope.twin.faults import KINDS
 
 Row = dict[str, Any]
@@ -17,9 +17,9 @@ Row = dict[str, Any]
 ENDINGS = ("masked", "warned", "stopped", "SILENT")
 
 
-def to_row(outcome: Outcome) -> Row:
+def to_row(outcome: Outcome, profile: str = "best") -> Row:
     """Plain numbers and words; NaN and infinity are None."""
-    found = asdict(outcome) | {"passing": outcome.passing}
+    found = asdict(outcome) | {"passing": outcome.passing, "profile": profile}
     found["fault"]["dof"] = outcome.fault.dof.label
     found["fault"]["duration"] = _finite(outcome.fault.duration)
     found["detected"] = _finite(outcome.detected)
@@ -29,7 +29,8 @@ def to_row(outcome: Outcome) -> Row:
 def judge(row: Row) -> Row:
     """With what is to be said of it; the goals may have changed since it was kept."""
     noticed = row["detected"] is not None
-    return row | judged(row["excursion"], row["passing"], noticed, row["stopped"])
+    goal = PASSING if row["passing"] else lasting(row["profile"])
+    return row | judged(row["excursion"], goal, noticed, row["stopped"])
 
 
 def _finite(value: float) -> float | None:
@@ -130,8 +131,12 @@ def _worst(rows: Iterable[Row]) -> float:
     return 1e3 * max((row["excursion"][0] for row in rows), default=0.0)
 
 
-def goals() -> str:
+def goals(profile: str) -> str:
     """The limits in words."""
-    passing = f"{1e3 * PASSING[0]:g} mm, {PASSING[1]:g} rad, {PASSING[2]:g} rad"
-    lasting = f"{1e3 * LASTING[0]:g} mm, {LASTING[1]:.3g} rad, {LASTING[2]:.3g} rad"
-    return f"Goal: at most {passing} for a fault that passes, {lasting} for one that stays."
+    stays = lasting(profile)
+    passing = f"{1e3 * PASSING[0]:.3g} mm, {PASSING[1]:.3g} rad, {PASSING[2]:.3g} rad"
+    lasts = f"{1e3 * stays[0]:.3g} mm, {stays[1]:.3g} rad, {stays[2]:.3g} rad"
+    return (
+        f"Goal: at most {passing} for a fault that passes, {lasts} for one that stays: as much as "
+        "the profile makes up for, which is given back when it no longer can."
+    )

@@ -26,13 +26,18 @@ from tautscope.progress import progress_bar
 from tautscope.twin.faults import KINDS
 
 PAGE = ROOT / "docs" / "faults.md"
+RUNS = 20_000
 DETECTOR_RUNS = 2_000
 """For each detector that is switched off."""
 
 
 def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--runs", type=int, default=20_000, help="at least [%(default)s]")
+    parser.add_argument(
+        "--runs",
+        type=int,
+        help=f"at least [{RUNS}, {DETECTOR_RUNS} for each detector]",
+    )
     parser.add_argument("--first-seed", type=int, default=0, help="[%(default)s]")
     parser.add_argument("--seed", type=int, help="only this one")
     parser.add_argument(
@@ -87,7 +92,7 @@ def rows(
     seed: int, *, kinds: Sequence[str], profile: Profile, off: tuple[str, ...]
 ) -> list[tables.Row]:
     """Those of one seed."""
-    return [tables.to_row(each) for each in study(seed, kinds, profile, off)]
+    return [tables.to_row(each, profile) for each in study(seed, kinds, profile, off)]
 
 
 def chosen(options: argparse.Namespace, runs: int) -> list[int]:
@@ -123,17 +128,20 @@ def main() -> None:
     if options.read:
         found = read(options.read)
     elif options.off == "each":
-        found = {f"-{name}": measure(options, (name,), DETECTOR_RUNS) for name in detectors()}
+        found = {
+            f"-{name}": measure(options, (name,), options.runs or DETECTOR_RUNS)
+            for name in detectors()
+        }
     else:
         off = detectors() if options.off == "all" else tuple(filter(None, options.off.split(",")))
         name = "unguarded" if options.off == "all" or not detectors() else ",".join(off)
-        found = {name: measure(options, off, options.runs)}
+        found = {name: measure(options, off, options.runs or RUNS)}
     if options.json:
         options.json.write_text(json.dumps(found), encoding="utf-8")
     apart = {name.removeprefix("-"): each for name, each in found.items() if name.startswith("-")}
     whole = {name: each for name, each in found.items() if not name.startswith("-")}
     for name, each in whole.items():
-        text = f"{tables.summary(each)} {tables.goals()}\n\n{tables.table(each)}"
+        text = f"{tables.summary(each)} {tables.goals(options.profile)}\n\n{tables.table(each)}"
         print(f"{name or 'guarded'}: {text}\n")
         if options.write:
             insert(PAGE, f"faults {name or 'guarded'}", f"{made(options, name)}\n\n{text}")

@@ -100,13 +100,18 @@ def test_after_a_stop_it_is_against_the_way_that_was_to_come():
         (outcome((1.1e-3, 0, 0), duration=math.inf), "SILENT", False),
         (outcome((1.1e-3, 0, 0), detected=0.1), "warned", True),
         (outcome((1.1e-3, 0, 0), detected=0.1, stopped=True), "stopped", True),
-        (outcome((8.2e-3, 0, 0), detected=0.1, duration=math.inf), "warned", False),
-        (outcome((8.4e-3, 0, 0), detected=0.1, duration=math.inf), "warned", True),
+        (outcome((10.2e-3, 0, 0), detected=0.1, duration=math.inf), "warned", False),
+        (outcome((10.4e-3, 0, 0), detected=0.1, duration=math.inf), "warned", True),
     ],
 )
 def test_endings(made, ending, beyond):
     row = tables.to_row(made)
     assert (row["ending"], row["beyond"]) == (ending, beyond)
+
+
+def test_what_a_profile_makes_up_for_may_be_given_back():
+    np.testing.assert_allclose(runs.lasting("paper")[0], 8.3e-3)
+    np.testing.assert_allclose(runs.lasting("best")[0], 10.3e-3)
 
 
 def test_the_hand_rests_in_pauses_and_goes_on_from_there():
