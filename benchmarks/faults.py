@@ -18,8 +18,8 @@ from functools import partial
 from pathlib import Path
 
 import fault_tables as tables
+from doc_pages import ROOT, insert
 from fault_runs import study
-from hysteresis_pages import ROOT, insert
 from hysteresis_runs import one_thread
 from tautscope.config import Profile
 from tautscope.progress import progress_bar

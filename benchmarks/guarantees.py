@@ -20,8 +20,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import guarantee_rows as rows
+from doc_pages import ROOT, insert
 from faults import read
-from hysteresis_pages import ROOT, insert
 
 PAGE = ROOT / "docs" / "safety.md"
 HEAD = (

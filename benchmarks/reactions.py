@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from hysteresis_pages import ROOT, insert
+from doc_pages import ROOT, insert
 
 PAGE = ROOT / "docs" / "safety.md"
 SOURCE = ROOT / "crates" / "core" / "src" / "supervisor.rs"

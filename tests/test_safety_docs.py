@@ -4,13 +4,13 @@ import re
 import sys
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
 
 import guarantees
 import reactions
 from tautscope.safety import DETECTORS, Reaction
 
+ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs" / "safety.md").read_text(encoding="utf-8")
 HAZARDS = {"V": 17, "E": 7, "C": 9, "D": 6, "P": 5, "L": 4}
 TEST = re.compile(r"`([\w./-]+\.(?:py|rs))::(\w+)`")
