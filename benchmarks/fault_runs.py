@@ -67,13 +67,13 @@ class Outcome:
         seed: Of instrument, noise, motion, and when and how much fails.
         fault: What failed.
         excursion: Largest deviation of the tip (3,) [m, rad, rad]; see `excursion`.
-        detected: Time from the fault to the first warning, reaction or refusal [s]; NaN if none.
+        detected: Time from the fault to the first flag or refusal that is its own [s]; NaN if none.
         reaction: The highest.
-        flags: All that were raised.
+        flags: All that are its own: raised earlier than without the fault, or only with it.
         stopped: Whether the motion was stopped.
         step: Largest change of the insertion command in a tick after the fault [m].
         width: Largest insertion slack the loop believed in [m].
-        spurious: What was raised before the fault.
+        spurious: What is raised without the fault.
     """
 
     kind: str
@@ -122,13 +122,17 @@ def study(
     return begun + (Instrument(config, seed, off).runs(warm) if warm else [])
 
 
+Said = dict[str, Any]
+"""As `Watch.said`."""
+
+
 @dataclass(frozen=True)
 class Traces:
     """What a run leaves behind: the tip and the commands from the fault on, and what was said."""
 
     truth: Floats
     commands: Floats
-    said: dict[str, Any]
+    said: Said
 
 
 class Instrument:
@@ -212,7 +216,7 @@ class Instrument:
             elif kind in PUSHED:
                 base = yield partial(self._replay, fault, nominal.commands)
             found = yield partial(self._fail, fault)
-            outcomes.append(outcome(self._seed, fault, found, base))
+            outcomes.append(outcome(self._seed, fault, found, base, nominal.said))
 
     def _branch(self) -> None:
         """Every fork returns from here and goes on; we never do."""
@@ -278,23 +282,31 @@ def started(config: Config, seed: int, kind: str) -> Outcome:
         said = Watch(lambda: 0.0, 0.0, config.control.period)
         said.flags["ConfigError"] = 0.0
         said.note(0.0, "disable", 7)
-        return outcome(seed, fault, Traces(nothing, nothing, said.said()), None)
+        return outcome(seed, fault, Traces(nothing, nothing, said.said()), None, {"flags": {}})
     right = told(config, replace(fault, kind="ok", severity=None))
     found, base = (Instrument(each, seed, cold=True).run() for each in (wrong, right))
-    return outcome(seed, fault, found, base)
+    return outcome(seed, fault, found, base, base.said)
 
 
-def outcome(seed: int, fault: Fault, found: Traces, base: Traces | None) -> Outcome:
-    """What a run comes to, against another."""
-    far = np.zeros(3)
+def outcome(seed: int, fault: Fault, found: Traces, base: Traces | None, usual: Said) -> Outcome:
+    """What a run comes to, against another; what the run without a fault says too is no notice."""
+    said, far = dict(found.said), np.zeros(3)
+    stop = said.pop("stop_tick")
     if base is not None:
-        stop = found.said.pop("stop_tick")
         far = excursion(found.truth, base.truth, stop)
-    found.said.pop("stop_tick", None)
     if fault.kind in SHAKEN:
         far[fault.dof] = max(0.0, far[fault.dof] - fault.size * PER_MM[fault.dof])
+    own = {
+        name: at
+        for name, at in said.pop("flags").items()
+        if at < usual["flags"].get(name, math.inf)
+    }
     reached = float(far[0]), float(far[1]), float(far[2])
-    return Outcome(fault.kind, seed, fault, reached, **found.said)
+    spurious = tuple(sorted({*said.pop("spurious"), *usual["flags"]}))
+    detected = min(own.values(), default=math.nan)
+    return Outcome(
+        fault.kind, seed, fault, reached, detected, flags=tuple(own), spurious=spurious, **said
+    )
 
 
 def excursion(truth: Floats, base: Floats, stop: int | None) -> Floats:

@@ -80,7 +80,6 @@ class Watch:
         period: Of the tick [s].
         flags: What was raised, and when [s].
         reaction: The highest, of rank 0 to 7.
-        detected: When the first thing was said, from `since` [s].
         stop: When the motion was stopped [s].
         width: Largest insertion slack the loop believed in [m].
         step: Largest change of the insertion command in a tick [m].
@@ -93,7 +92,6 @@ class Watch:
     flags: dict[str, float] = field(default_factory=dict)
     reaction: str = "none"
     rank: int = 0
-    detected: float = math.nan
     stop: float = math.inf
     width: float = 0.0
     step: float = 0.0
@@ -132,29 +130,20 @@ class Watch:
         self.note(now, str(supervision.reaction), order.index(supervision.reaction))
         for flag in supervision.flags:
             self.flags.setdefault(str(flag), now)
-            self.notice(now)
 
     def note(self, now: float, reaction: str, rank: int) -> None:
         """A reaction of this rank."""
         if rank > self.rank:
             self.reaction, self.rank = reaction, rank
-        if rank > 0:
-            self.notice(now)
         if rank >= HOLD_MOTION:
             self.stop = min(self.stop, now)
 
-    def notice(self, now: float) -> None:
-        """Something was said."""
-        if math.isnan(self.detected):
-            self.detected = now - self.since
-
     def said(self) -> dict[str, Any]:
-        """What of it is kept; the stop in ticks from `since`."""
+        """What of it is kept, times from `since` [s]; the stop in ticks."""
         stopped = math.isfinite(self.stop)
         return {
-            "detected": self.detected,
             "reaction": self.reaction,
-            "flags": tuple(self.flags),
+            "flags": {name: at - self.since for name, at in self.flags.items()},
             "stopped": stopped,
             "step": self.step,
             "width": self.width,

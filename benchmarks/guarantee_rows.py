@@ -99,7 +99,7 @@ def _spurious(rows: Sequence[Row], seeds: str) -> Figure:
     """What was raised before the faults, and without one."""
     ok = [row for row in rows if row["kind"] == "ok"]
     hours = len(ok) * (LEARNING + WATCHED_FOR_GOOD) / 3600
-    raised = [flag for row in ok for flag in (*row["spurious"], *row["flags"])]
+    raised = [flag for row in ok for flag in row["spurious"]]
     text = f"{len(raised)} in {hours:.2f} h" + (
         f": {', '.join(sorted(set(raised)))}" * bool(raised)
     )

@@ -52,7 +52,7 @@ def test_a_row_comes_out_again_alone(tmp_path):
     assert alone["swapped", 201] == several["swapped", 201], "seed 201"
     for seed in (200, 201):
         assert several["ok", seed]["excursion"] == [0.0, 0.0, 0.0], seed
-        assert several["ok", seed]["ending"] in {"masked", "warned"}, seed
+        assert several["ok", seed]["ending"] == "masked", seed
         assert several["start_negative", seed]["ending"] == "stopped", seed
         assert several["swapped", seed]["fault"]["start"] >= runs.LEARNING, seed
 
@@ -139,7 +139,7 @@ def test_a_wrong_start_is_told_or_refused():
         with pytest.raises(ConfigError):
             runs.told(CONFIG, Fault(kind))
     refused = runs.started(CONFIG, 3, "start_negative")
-    assert (refused.ending, refused.reaction, refused.detected) == ("stopped", "disable", 0.0)
+    assert (refused.stopped, refused.reaction, refused.detected) == (True, "disable", 0.0)
 
 
 @pytest.mark.parametrize("kind", sorted(KINDS))
@@ -151,11 +151,25 @@ def test_drawn_faults_are_faults(kind):
     assert {each.dof for each in drawn} == set(Dof)
 
 
-def test_the_watch_notes_the_highest_and_the_first():
+def test_the_watch_notes_the_highest_and_when_motion_stopped():
     watch = Watch(lambda: 0.0, 2.0, 0.005)
     watch.note(2.5, "warn", 1)
     watch.note(3.0, "hold_motion", 5)
     watch.note(3.5, "fade", 3)
+    watch.flags["frozen"] = 2.5
     said = watch.said()
-    assert (said["detected"], said["reaction"], said["stopped"]) == (0.5, "hold_motion", True)
-    assert said["stop_tick"] == 200
+    assert (said["flags"], said["reaction"]) == ({"frozen": 0.5}, "hold_motion")
+    assert (said["stopped"], said["stop_tick"]) == (True, 200)
+
+
+def test_what_is_said_without_the_fault_too_is_no_notice():
+    def made(flags, usual):
+        watch = Watch(lambda: 0.0, 0.0, 0.005)
+        watch.flags |= flags
+        still = runs.Traces(np.zeros((3, 3)), np.zeros((3, 3)), watch.said())
+        return runs.outcome(0, Fault("frozen"), still, still, {"flags": usual})
+
+    both = made({"merged": 1.0, "frozen": 2.0}, {"merged": 1.0})
+    assert (both.detected, both.flags, both.spurious) == (2.0, ("frozen",), ("merged",))
+    assert math.isnan(made({"merged": 1.0}, {"merged": 0.5}).detected)
+    assert made({"merged": 0.4}, {"merged": 0.5}).detected == 0.4, "earlier is its own"
