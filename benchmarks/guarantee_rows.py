@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from fault_runs import LEARNING, PASSING, WATCHED_FOR_GOOD, configured
 from fault_watch import FeatureTwin, Hand, look
+from reactions import holding
 from tautscope import HysteresisReduction, Twin, load_config
 from tautscope.dof import Dof
 from tautscope.errors import RecordError
@@ -96,10 +97,10 @@ def campaign(rows: Sequence[Row]) -> dict[str, Figure]:
 
 
 def _spurious(rows: Sequence[Row], seeds: str) -> Figure:
-    """What was raised before the faults, and without one."""
+    """Flags that hold something, raised while nothing failed."""
     ok = [row for row in rows if row["kind"] == "ok"]
     hours = len(ok) * (LEARNING + WATCHED_FOR_GOOD) / 3600
-    raised = [flag for row in ok for flag in row["spurious"]]
+    raised = [flag for row in ok for flag in row["spurious"] if flag in holding()]
     text = f"{len(raised)} in {hours:.2f} h" + (
         f": {', '.join(sorted(set(raised)))}" * bool(raised)
     )
