@@ -82,10 +82,13 @@ def campaign(
             for done in as_completed(running):
                 found[running[done]] = done.result()
                 tell(len(found) / len(seeds))
+        except KeyboardInterrupt:
+            # What is done is worth having.
+            pool.shutdown(cancel_futures=True)
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
-    return [row for seed in seeds for row in found[seed]]
+    return [row for seed in seeds for row in found.get(seed, [])]
 
 
 def rows(
