@@ -44,14 +44,21 @@ def summary(rows: Sequence[Row]) -> str:
     passing = [row["excursion"][0] for row in rows if row["passing"]]
     lasting = [row["excursion"][0] for row in rows if not row["passing"]]
     counts = ", ".join(f"{ended[name]} {name}" for name in ENDINGS)
-    seeds, kinds = {row["seed"] for row in rows}, {row["kind"] for row in rows}
+    kinds = {row["kind"] for row in rows}
     return (
-        f"N = {len(rows)} runs of {len(kinds)} kinds, seeds {min(seeds)} to {max(seeds)}: "
-        f"{counts}. "
+        f"N = {len(rows)} runs of {len(kinds)} kinds, seeds {seeds(rows)}: {counts}. "
         f"k = {beyond} beyond the goal. Insertion, worst excursion: "
         f"{1e3 * max(passing, default=0):.2f} mm of faults that pass, "
         f"{1e3 * max(lasting, default=0):.2f} mm of those that stay."
     )
+
+
+def seeds(rows: Sequence[Row]) -> str:
+    """From which to which, or each where some are missing."""
+    used = sorted({row["seed"] for row in rows})
+    if len(used) > 1 and used == list(range(used[0], used[-1] + 1)):
+        return f"{used[0]} to {used[-1]}"
+    return ", ".join(str(seed) for seed in used)
 
 
 def table(rows: Sequence[Row]) -> str:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from fault_runs import LEARNING, PASSING, WATCHED_FOR_GOOD, configured
+from fault_tables import seeds as seeds_of
 from fault_watch import FeatureTwin, Hand, look
 from reactions import holding
 from tautscope import HysteresisReduction, Twin, load_config
@@ -56,7 +57,7 @@ class Figure:
 
 def campaign(rows: Sequence[Row]) -> dict[str, Figure]:
     """G5, G6, G8, G9, G10 and G23 from the rows of the fault campaign."""
-    seeds = f"{min(row['seed'] for row in rows)} to {max(row['seed'] for row in rows)}"
+    seeds = seeds_of(rows)
 
     def figure(text: str, used: Sequence[Row], failures: int) -> Figure:
         return Figure(text, str(len(used)), failures, seeds)
@@ -112,8 +113,7 @@ def each_off(found: dict[str, list[Row]]) -> Figure:
     passing = [row for part in found.values() for row in part if row["passing"]]
     far = [row["excursion"][0] for row in passing]
     worst = f"{1e3 * max(far):.2f} mm, {len(found)} detectors"
-    seeds = f"{min(row['seed'] for row in passing)} to {max(row['seed'] for row in passing)}"
-    return Figure(worst, str(len(passing)), sum(each > DORMANT for each in far), seeds)
+    return Figure(worst, str(len(passing)), sum(each > DORMANT for each in far), seeds_of(passing))
 
 
 def stalls(count: int) -> Figure:
