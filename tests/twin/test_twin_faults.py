@@ -10,9 +10,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from tautscope import Rig, Sample, Twin, load_config
+from tautscope.blocks import build_feature_model
 from tautscope.dof import Dof
 from tautscope.errors import FieldError
-from tautscope.reduction import build_feature_model
 from tautscope.twin.fault_frames import FEATURES, FRAMES, IMAGES
 from tautscope.twin.fault_motion import DRIVES, ENCODERS, HANDS, PHYSICS
 from tautscope.twin.faults import KINDS, Fault, FaultyHand, FaultyRig, FeatureFrame, Mode, Target
