@@ -24,7 +24,10 @@ NOTICED = {
     "V8": (("late",), {"late", "dropped"}),
     "V9": (("duplicate", "reordered"), {"duplicate"}),
     "V10": (("slow_camera",), {"dropped"}),
-    "V11": (("stamp_hour", "stamp_nan", "stamp_stuck"), {"clock", "late", "duplicate", "captured_at"}),
+    "V11": (
+        ("stamp_hour", "stamp_nan", "stamp_stuck"),
+        {"clock", "late", "duplicate", "captured_at"},
+    ),
     "V12": (("camera_off",), {"dropped"}),
     "V14": (("mirrored", "turned"), {"innovation", "swapped", "merged"}),
     "C3": (("not_finite", "hand_nan"), {"features", "reference", "reference_invalid"}),
