@@ -34,6 +34,8 @@ pub struct Clutch {
     raw: PerDof<f64>,
     admitted: Option<PerDof<f64>>,
     time: Option<f64>,
+    /// Whether the hand may be anywhere: the next reference is where it starts.
+    fresh: bool,
 }
 
 /// What became of a reference.
@@ -69,6 +71,7 @@ impl Clutch {
             raw: [f64::NAN; 3],
             admitted: None,
             time: None,
+            fresh: false,
         })
     }
 
@@ -86,7 +89,7 @@ impl Clutch {
         let (late, severe) = self.punctuality(time, stamp);
         let invalid = Flags::when(!all_finite(reference), Flag::ReferenceInvalid);
         let (wrong, severe) = (late.without(off), severe.without(off));
-        let stopped = held || !wrong.and(severe).is_empty();
+        let stopped = held || self.fresh || !wrong.and(severe).is_empty();
         let mut admission = Admission {
             reference: self.admitted,
             moved: [0.0; 3],
@@ -117,6 +120,7 @@ impl Clutch {
             .zip(&mut admission.moved);
         let inputs = reference.into_iter().zip(self.raw).zip(limit);
         self.raw = reference;
+        self.fresh = false;
         for (((next, offset), moved), ((raw, before), limit)) in axes.zip(inputs) {
             let last = *next;
             // A hand at rest moves nothing, whatever rounding makes of the offset.
@@ -158,9 +162,10 @@ impl Clutch {
         }
     }
 
-    /// The next tick may be late.
+    /// The next tick may be late, and the hand anywhere.
     pub const fn engage(&mut self) {
         self.time = None;
+        self.fresh = true;
     }
 
     fn punctuality(&mut self, time: f64, stamp: Option<f64>) -> (Flags, Flags) {

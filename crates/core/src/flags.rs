@@ -35,16 +35,10 @@ flags! {
     Swapped = "swapped",
     /// One marker alone.
     Merged = "merged",
-    /// No marker.
+    /// No marker, or none that could be believed.
     Lost = "lost",
     /// Both markers, and yet a DOF that they do not determine.
     Unobservable = "unobservable",
-    /// The tip outruns the reference after a reversal: more slack is compensated than there is.
-    Overcompensation = "overcompensation",
-    /// Reference and tip swing with growing amplitude.
-    LimitCycle = "limit_cycle",
-    /// Many small reversals of the reference.
-    Tremor = "tremor",
     /// A drive is not where it was told to be; the rig says so.
     FollowingError = "following_error",
     /// A reference faster than `reference_speed`.
@@ -57,7 +51,7 @@ flags! {
     LateTick = "late_tick",
     /// A drive or its bus failed; the rig says so.
     DriveFault = "drive_fault",
-    /// The tip does not go where the command goes, by sign or by scale.
+    /// The tip does not go where the command goes, by sign or by scale; the rig says so.
     StartCheck = "start_check",
     /// More slack was learnt than there can be.
     WidthLimit = "width_limit",

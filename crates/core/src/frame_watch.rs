@@ -125,9 +125,6 @@ impl FrameWatch {
             self.captured_at = Some(captured_at).filter(|_| has_jumped);
             return Flags::of(Flag::Clock);
         }
-        if since.is_some_and(|since| since <= 0.0) {
-            return Flags::of(Flag::Duplicate);
-        }
         self.captured_at = Some(captured_at);
         Flags::when(now - captured_at > self.settings.frame_age, Flag::Late)
             .and(Flags::when(self.repeats(arrival), Flag::Frozen))

@@ -166,7 +166,8 @@ impl HysteresisReduction {
         past: Option<Entry>,
         raised: &mut Flags,
     ) -> Report {
-        if captured_at <= self.last_used || raised.has(Flag::Duplicate) {
+        if captured_at <= self.last_used {
+            *raised = self.guards.watched(raised.and(Flags::of(Flag::Duplicate)));
             return self.unused(Status::Duplicate, None);
         }
         let Some(past) = past else {
@@ -186,20 +187,22 @@ impl HysteresisReduction {
         };
         let belief = self.whereabouts.at(&past);
         let fits = |seen: &Seen| {
-            let frames = &self.guards.frames;
-            seen.used != [false; 2]
-                && frames.fits(&belief, seen.image_state(), seen.output_deviation)
+            self.guards
+                .frames
+                .fits(&belief, seen.image_state(), seen.output_deviation)
         };
-        if !fits(&seen) {
+        let is_believed = seen.used != [false; 2];
+        let expected = self.feature_model.predict(belief.state);
+        let is_reversed = expected.is_some_and(|expected| reversed(expected.features, measured));
+        if is_reversed || !(is_believed && fits(&seen)) {
             let [ua, va, ub, vb] = measured;
             let exchanged = self.look(&past, [ub, vb, ua, va], covariance);
-            let swapped = exchanged.is_some_and(|other| other.used == [true; 2] && fits(&other));
-            let flag = if swapped {
-                Flag::Swapped
-            } else {
-                Flag::Innovation
-            };
-            *raised = self.guards.watched(Flags::of(flag));
+            let swapped = is_reversed
+                || exchanged.is_some_and(|other| other.used == [true; 2] && fits(&other));
+            *raised = self.guards.watched(
+                Flags::when(swapped, Flag::Swapped)
+                    .and(Flags::when(!swapped && is_believed, Flag::Innovation)),
+            );
             if !raised.is_empty() {
                 self.whereabouts.miss(&past);
                 return self.unused(Status::Refused, Some(past));
@@ -216,15 +219,27 @@ impl HysteresisReduction {
             ([true, true], [true, true, true]) => Status::Ok,
             _ => Status::Held,
         };
-        let triggers = if self.guards.may_learn() {
+        // Two markers of which one is where it cannot be: the other may be as wrong.
+        let is_doubtful = is_believed && seen.used != found(measured);
+        *raised = self
+            .guards
+            .watched(Flags::when(is_doubtful, Flag::Innovation));
+        let triggers = if raised.is_empty() && self.guards.may_learn() {
             self.learn(&past, &seen, raised)
         } else {
             [Triggers::default(); 3]
         };
         *raised = self.guards.watched(
             raised
-                .and(Flags::when(status == Status::Partial, Flag::Merged))
-                .and(Flags::when(status == Status::Held, Flag::Unobservable)),
+                .and(Flags::when(
+                    !is_doubtful && status == Status::Partial,
+                    Flag::Merged,
+                ))
+                .and(Flags::when(!is_believed, Flag::Lost))
+                .and(Flags::when(
+                    is_believed && status == Status::Held,
+                    Flag::Unobservable,
+                )),
         );
         Report {
             status,
@@ -441,6 +456,13 @@ const UNIT: [[f64; 4]; 4] = [
     [0.0, 0.0, 1.0, 0.0],
     [0.0, 0.0, 0.0, 1.0],
 ];
+
+/// Whether the way from one band to the other goes back rather than on, by more than 120 degrees.
+fn reversed([ua, va, ub, vb]: [f64; 4], [xa, ya, xb, yb]: [f64; 4]) -> bool {
+    let (u, v, x, y) = (ub - ua, vb - va, xb - xa, yb - ya);
+    let lengths = libm::sqrt((u * u + v * v) * (x * x + y * y));
+    u * x + v * y < -0.5 * lengths
+}
 
 /// Whether there is a band, and what there is is finite.
 fn usable([ua, va, ub, vb]: [f64; 4]) -> bool {

@@ -85,7 +85,7 @@ const fn rule(
 /// A frame without markers teaches nothing by itself, so `lost` need not hold before it fades; two markers
 /// that leave a DOF undetermined hold it by themselves.
 #[rustfmt::skip]
-pub static TABLE: [Rule; 22] = [
+pub static TABLE: [Rule; 19] = [
     rule(Flag::Frozen,           Frame, HOLD_THEN_FADE,                          true),
     rule(Flag::Late,             Frame, HOLD_THEN_FADE,                          true),
     rule(Flag::Duplicate,        Frame, WARN,                                    false),
@@ -96,16 +96,13 @@ pub static TABLE: [Rule; 22] = [
     rule(Flag::Merged,           Frame, &[(Warn, Auto), (HoldEstimate, Auto), (Fade, Auto)], true),
     rule(Flag::Lost,             Frame, &[(Warn, Auto), (Fade, Auto)],           true),
     rule(Flag::Unobservable,     Frame, WARN,                                    false),
-    rule(Flag::Overcompensation, Frame, WARN,                                    false),
-    rule(Flag::LimitCycle,       Frame, &[(Fade, Auto)],                         false),
-    rule(Flag::Tremor,           Tick,  &[(Fade, Auto)],                         false),
     rule(Flag::FollowingError,   Rig,   &[(QuickStop, Engage)],                  false),
     rule(Flag::ReferenceJump,    Tick,  WARN,                                    false),
     rule(Flag::ReferenceLate,    Tick,  &[(HoldMotion, Engage)],                 false),
     rule(Flag::ReferenceInvalid, Tick,  &[(HoldMotion, Engage)],                 false),
     rule(Flag::LateTick,         Tick,  &[(Warn, Auto), (HoldMotion, Engage)],   false),
     rule(Flag::DriveFault,       Rig,   &[(QuickStop, Engage), (Disable, Restart)], true),
-    rule(Flag::StartCheck,       Frame, &[(PassThrough, Engage)],                false),
+    rule(Flag::StartCheck,       Rig,   &[(PassThrough, Engage)],                false),
     rule(Flag::WidthLimit,       Frame, WARN,                                    false),
     rule(Flag::Monitor,          Tick,  &[(Warn, Auto), (Disable, Restart)],     false),
 ];
