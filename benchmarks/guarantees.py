@@ -126,7 +126,7 @@ def steps(count: int) -> dict[str, rows.Figure]:
 def printed(text: str) -> dict[str, rows.Figure]:
     """What those tests say."""
     said = re.findall(r"\b(G\d) (paper|best) (\d+) (\d+) (\S+)$", text, re.MULTILINE)
-    units = {"G1": "{:.2g} last places over", "G2": "", "G3": "{:.2g} mm", "G4": "{:.2g} mm"}
+    units = {"G1": "{:.2g} last places over", "G2": "exact", "G3": "{:.2g} mm", "G4": "{:.2g} mm"}
     found: dict[str, rows.Figure] = {}
     for name, law, number, broken, worst in said:
         figure = rows.Figure(f"{law}: {units[name].format(float(worst))}", number, int(broken))
