@@ -90,6 +90,22 @@ def test_the_report_says_what_was_found(demo: Demo) -> None:
     assert "nan" not in page.text
 
 
+def test_the_report_has_a_column_for_each_profile_that_was_run(demo: Demo) -> None:
+    worse = tuple(
+        {dof: replace(result, reduction=0.123) for dof, result in each.items()}
+        for each in demo.results
+    )
+    both = replace(
+        demo, config=demo.config.replace(profile="best"), seeds=(3, 4, 5), article_results=worse
+    )
+    text = demo_report(both, [])
+    assert text.count("<th>paper</th><th>best</th>") == len(Dof)
+    assert text.count("<td>12 %<small>(12 %)</small></td>") == len(Dof)
+    assert "in 9 runs" in text  # of three seeds: without, and under two profiles
+    assert "<th>best</th>" not in demo_report(demo, [])
+    assert "in 4 runs" in demo_report(demo, [])
+
+
 def test_figures_leave_no_trace_in_global_state(runs: tuple[Recording, Recording]) -> None:
     before = dict(matplotlib.rcParams)
     figure = figures.figure9(*runs)
@@ -103,8 +119,9 @@ def test_figures_leave_no_trace_in_global_state(runs: tuple[Recording, Recording
 
 def test_the_uncompensated_loop_is_drawn_wider(runs: tuple[Recording, Recording]) -> None:
     axis = figures.figure9(*runs).axes[4]
-    spread = [np.ptp(line.get_xdata() - line.get_ydata()) for line in axis.lines[:2]]
-    assert spread[0] > spread[1] > 0
+    before, after, first = (np.ptp(line.get_xdata() - line.get_ydata()) for line in axis.lines[:3])
+    assert before > after > 0
+    assert first > after, "the first period, in which it learns, is the wider one"
 
 
 def test_figure5_names_the_markers_where_they_are(runs: tuple[Recording, Recording]) -> None:
