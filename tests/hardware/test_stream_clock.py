@@ -5,7 +5,8 @@ import pytest
 from sources import camera
 from tautscope.config import SourceConfig
 from tautscope.errors import CameraError
-from tautscope.hardware.cameras import Capture, StreamClock, check_captures
+from tautscope.hardware.cameras import Capture, check_captures
+from tautscope.hardware.stream_clock import StreamClock
 from tautscope.rig import Frame
 
 

@@ -11,7 +11,6 @@ import threading
 import time
 from contextlib import ExitStack
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 import numpy as np
@@ -19,7 +18,8 @@ from numpy.typing import NDArray
 
 from tautscope.bench.camera import CameraStream, Centreline
 from tautscope.bench.can_bus import Hub, LocalBus
-from tautscope.bench.drives import Event, SimulatedDrives
+from tautscope.bench.drives import SimulatedDrives
+from tautscope.bench.events import Event
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError
@@ -101,12 +101,7 @@ class Bench:
         self._open.enter_context(self.drives)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *failure: object) -> None:
         self._open.close()
 
     def _plug(self, channel: str) -> LocalBus:

@@ -6,8 +6,8 @@ import math
 import threading
 import time
 from collections.abc import Callable
-from types import TracebackType
-from typing import Protocol, Self
+from contextlib import AbstractContextManager
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,7 +23,7 @@ _PATIENCE = 0.3
 """How long a cycle waits for a command that is late [share of the cycle]."""
 
 
-class Motors(Protocol):
+class Motors(AbstractContextManager["Motors"], Protocol):
     """What `tautscope.hardware.drives.Drives` is to this thread."""
 
     def start(self) -> Floats:
@@ -33,15 +33,6 @@ class Motors(Protocol):
     def exchange(self, command: ArrayLike) -> Floats:
         """Send a set-point (3,), and read where the motors are (3,) [m, rad, rad]."""
         ...
-
-    def __enter__(self) -> Self: ...
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-        /,
-    ) -> None: ...
 
 
 class Setpoints:
