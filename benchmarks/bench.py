@@ -239,9 +239,8 @@ def main() -> None:
     if arguments.json:
         print(json.dumps(document, indent=1))
         return
-    print("\n".join(bench_tables.punctuality(document.get("run", {}))))
-    print("\n".join(bench_tables.reductions(document.get("reductions", {}))))
-    print("\n".join(bench_tables.stops([*document.get("faults", []), *document.get("wrong", [])])))
+    for line in bench_tables.tables(document):
+        print(line)
 
 
 if __name__ == "__main__":

@@ -12,7 +12,14 @@ ROWS = {
 }
 
 
-def punctuality(runs: dict[str, Any]) -> Iterator[str]:
+def tables(document: dict[str, Any]) -> Iterator[str]:
+    """All of a document of benchmarks/bench.py."""
+    yield from _punctuality(document.get("run", {}))
+    yield from _reductions(document.get("reductions", {}))
+    yield from _stops([*document.get("faults", []), *document.get("wrong", [])])
+
+
+def _punctuality(runs: dict[str, Any]) -> Iterator[str]:
     """Cycles and frames of each run."""
     if not runs:
         return
@@ -33,7 +40,7 @@ def punctuality(runs: dict[str, Any]) -> Iterator[str]:
     yield f"| frames that show insertion, rotation, bending | {' | '.join(seen)} | |"
 
 
-def reductions(found: dict[str, Any]) -> Iterator[str]:
+def _reductions(found: dict[str, Any]) -> Iterator[str]:
     """The bench's beside the in-process twin's."""
     if not found:
         return
@@ -48,7 +55,7 @@ def reductions(found: dict[str, Any]) -> Iterator[str]:
         )
 
 
-def stops(rows: list[dict[str, Any]]) -> Iterator[str]:
+def _stops(rows: list[dict[str, Any]]) -> Iterator[str]:
     """What went wrong, how soon it ended, and what was said."""
     if not rows:
         return

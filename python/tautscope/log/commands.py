@@ -198,6 +198,12 @@ def _replay_video(options: argparse.Namespace) -> int:
     frames = read_video(options.video, config.camera, options.video_start)
     heard = listen_to_video(frames, options.motors, config)
     _tell(options, folder, heard.recording, None)
+    if not options.json:
+        images, motors = heard.recording.frames["captured_at"], heard.recording.trace["time"]
+        print(
+            f"Images from {images[0]:.2f} to {images[-1]:.2f} s of the motors' "
+            f"{motors[0]:.2f} to {motors[-1]:.2f} s; if that is not all of them, see --video-start."
+        )
     return 0
 
 
