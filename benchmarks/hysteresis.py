@@ -31,7 +31,7 @@ WITHOUT_IDEA = ("alone", "together", "changing", "too wide", "tremor")
 """The groups an ablation runs unless told otherwise."""
 ABLATION_SEEDS = range(100, 103)
 """Of an ablation, whose runs take true features with noise in place of images: what it compares
-is the law and the offsets, and it is done in ten minutes on one core."""
+is the law and the offsets."""
 
 Work = dict[tuple[str, str, int], Plan]
 """Group of rows, name of the configuration, seed: the runs."""
