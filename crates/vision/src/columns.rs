@@ -158,7 +158,9 @@ mod tests {
                 let ahead = rows.len().min(first + STRIP + reach);
                 for (n, row) in rows.iter().enumerate().take(ahead).skip(seen) {
                     let words = columns.seen(n + reach - first);
-                    row.iter().for_each(|b| words[b / 64] |= 1 << (b % 64));
+                    for b in row {
+                        words[b / 64] |= 1 << (b % 64);
+                    }
                 }
                 seen = ahead;
                 let any = columns.find_worked();
