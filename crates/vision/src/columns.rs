@@ -60,8 +60,15 @@ impl Columns {
         // No short way out: of one word to a row all can be looked at together.
         let any = self.seen.iter().fold(0, |all, word| all | word) != 0;
         if any {
-            for row in 0..STRIP {
-                self.join(row);
+            let strip = self.worked.get_mut(self.words..).unwrap_or_default();
+            for above in 0..=2 * self.reach {
+                let rows = self.seen.get(above * self.words..).unwrap_or_default();
+                for (worked, seen) in strip.iter_mut().zip(rows) {
+                    *worked |= seen;
+                }
+            }
+            for row in strip.chunks_exact_mut(self.words.max(1)) {
+                widen(row, self.blocks);
             }
         }
         any || self.matters(0)
@@ -93,33 +100,22 @@ impl Columns {
         let words = row * self.words..(row + 1) * self.words;
         self.worked.get(words).unwrap_or_default()
     }
+}
 
-    #[inline(always)]
-    fn join(&mut self, row: usize) {
-        let (mut before, mut here) = (0, self.joined(row, 0));
-        for index in 0..self.words {
-            let after = self.joined(row, index + 1);
-            let mut word = here | here << 1 | here >> 1 | before >> 63 | after << 63;
-            if index + 1 == self.words {
-                word &= u64::MAX >> ((64 - self.blocks % 64) % 64);
-            }
-            (before, here) = (here, after);
-            if let Some(worked) = self.worked.get_mut((row + 1) * self.words + index) {
-                *worked = word;
-            }
+/// Adds the neighbours of bits, as far as there are blocks.
+#[inline(always)]
+fn widen(row: &mut [u64], blocks: usize) {
+    let mut before = 0;
+    for index in 0..row.len() {
+        let after = row.get(index + 1).copied().unwrap_or_default();
+        if let Some(word) = row.get_mut(index) {
+            let here = *word;
+            *word |= here << 1 | here >> 1 | before >> 63 | after << 63;
+            before = here;
         }
     }
-
-    /// This word of all rows around one of the strip.
-    #[inline(always)]
-    fn joined(&self, row: usize, index: usize) -> u64 {
-        if index >= self.words {
-            return 0;
-        }
-        let around = row * self.words..(row + 2 * self.reach + 1) * self.words;
-        let rows = self.seen.get(around).unwrap_or_default();
-        let words = rows.iter().skip(index).step_by(self.words);
-        words.fold(0, |all, word| all | word)
+    if let Some(last) = row.last_mut() {
+        *last &= u64::MAX >> ((64 - blocks % 64) % 64);
     }
 }
 

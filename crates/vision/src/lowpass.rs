@@ -100,8 +100,7 @@ fn cut<'a>(row: &'a mut [Block], blocks: &Range<usize>) -> &'a mut [Block] {
 
 /// One block of a step, between the vectors before and after it.
 ///
-/// Neighbours are slid together in registers: to load them from where they were just stored, a value farther
-/// to the left or right, takes longer than all the rest.
+/// Neighbours are slid together in registers.
 #[inline(always)]
 fn step<S: Simd>(
     simd: S,
