@@ -278,6 +278,23 @@ pub(crate) mod tests {
             .collect()
     }
 
+    #[test]
+    fn each_pixel_of_a_block_counts_alone() {
+        for pixel in 0..BLOCK {
+            let mut bytes = [0_u8; BYTES];
+            bytes[3 * pixel..3 * pixel + 3].copy_from_slice(&[10, 200, 30]);
+            let sum = -2 * 10 + 3 * 200 + 30;
+            for (simd, above) in levels().into_iter().flat_map(|simd| [(simd, 0), (simd, 1)]) {
+                let mut hot = [0];
+                let can = dispatch!(simd, simd => {
+                    Pairs::new([-2, 3, 1], sum + above).mark(simd, &bytes, &mut hot);
+                    are_quick(simd)
+                });
+                assert_eq!(hot[0] == 1, can && above == 0, "{simd:?}, {pixel}");
+            }
+        }
+    }
+
     proptest! {
         #[test]
         fn marks_the_blocks_of_pixels_that_reach(
