@@ -205,6 +205,9 @@ impl Detector {
         };
         labeller.start(frame.width());
         segmenter.each_row_in(frame, window, |v, runs| {
+            if let Some(map) = &mut map {
+                map.end_rows(v);
+            }
             runs.each(|start, end| {
                 labeller.add(v, start, end);
                 if let Some(map) = &mut map {
@@ -212,9 +215,6 @@ impl Detector {
                 }
             });
             labeller.end_row(&mut keep);
-            if let Some(map) = &mut map {
-                map.end_rows(v + 1);
-            }
         });
         labeller.end_row(&mut keep);
     }

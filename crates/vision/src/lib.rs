@@ -25,6 +25,7 @@ mod linear;
 mod lowpass;
 mod numbers;
 mod pairing;
+mod pairs;
 mod patch;
 mod projection;
 pub mod regions;
