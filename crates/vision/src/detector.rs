@@ -82,41 +82,60 @@ impl Detector {
         demands: &Demands,
     ) -> (Verdict, &[Region]) {
         let before = expect.expect([0.0; 4], [f64::INFINITY; 4]);
-        let window = before.and_then(|expectation| expectation.window(frame));
-        if let Some(window) = window {
-            self.find(frame, window);
-            let verdict = judge(&self.regions, &self.map, expect, demands);
-            if verdict.is_clear() {
-                return (verdict, &self.regions);
-            }
-        }
-        self.find(frame, Window::whole(frame));
-        let mut verdict = judge(&self.regions, &self.map, expect, demands);
+        let near = before.filter(|blind| blind.window(frame).is_some());
+        let window = near.and_then(|blind| blind.window(frame));
+        let mut verdict = self.search(
+            frame,
+            window.unwrap_or(Window::whole(frame)),
+            expect,
+            demands,
+        );
         if verdict.is_clear() {
             return (verdict, &self.regions);
         }
-        // Light says less than edges: it is asked only where it is known where to look.
-        let near = before.filter(|_| window.is_some());
-        let lit = near.and_then(|blind| self.by_light(frame, expect, &blind, &verdict, demands));
-        if let Some(lit) = lit
-            && let Some(again) = judge_at(lit.features, [1.0; 4], &self.map, expect, demands)
-            && again.score() > verdict.score()
-        {
-            verdict = again;
-        }
-        self.try_alternatives(frame, expect, demands, &mut verdict);
-        if let Some(lit) = lit
-            && (verdict.reasons != [None; 2] || lit.is_blurred() && !verdict.is_clear())
-        {
-            verdict = lit.verdict();
+        if let Some(blind) = near {
+            // Light says less than edges: it is asked only where it is known where to look.
+            let lit = self.by_light(frame, expect, &blind, &verdict, demands);
+            if let Some(lit) = lit
+                && let Some(again) = judge_at(lit.features, [1.0; 4], &self.map, expect, demands)
+                && again.score() > verdict.score()
+            {
+                verdict = again;
+            }
+            if let Some(lit) = lit
+                && (verdict.reasons != [None; 2] || lit.is_blurred() && !verdict.is_clear())
+            {
+                verdict = lit.verdict();
+            }
+            if verdict.reasons.iter().all(Option::is_some) {
+                let anywhere = self.search(frame, Window::whole(frame), expect, demands);
+                if anywhere.score() > verdict.score() {
+                    verdict = anywhere;
+                }
+            }
         }
         (verdict, &self.regions)
+    }
+
+    /// The best verdict of all discriminants in a window, or the first that is clear.
+    fn search(
+        &mut self,
+        frame: &impl Frame,
+        window: Window,
+        expect: &impl Expect,
+        demands: &Demands,
+    ) -> Verdict {
+        self.find(frame, window);
+        let mut verdict = judge(&self.regions, &self.map, expect, demands);
+        self.try_alternatives(frame, window, expect, demands, &mut verdict);
+        verdict
     }
 
     /// Replaces a verdict that is not clear by a better one, from another discriminant.
     fn try_alternatives(
         &mut self,
         frame: &impl Frame,
+        window: Window,
         expect: &impl Expect,
         demands: &Demands,
         verdict: &mut Verdict,
@@ -127,7 +146,7 @@ impl Detector {
             }
             std::mem::swap(&mut self.best, &mut self.regions);
             self.exchange(index);
-            self.find(frame, Window::whole(frame));
+            self.find(frame, window);
             self.exchange(index);
             let other = judge(&self.regions, &self.map, expect, demands);
             if other.score() > verdict.score() {
