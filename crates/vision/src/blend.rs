@@ -7,7 +7,7 @@ use crate::layer::Layer;
 use crate::linear::{Square, apply, inverse, quadratic};
 use crate::numbers::whole;
 use crate::patch::{Patch, SIDE};
-use crate::samples::{Errors, Sums, left, sums};
+use crate::samples::{Errors, Sums, UNKNOWNS, left, sums};
 use crate::{Demands, Evidence, Expect, Expectation, Frame, Outline, Verdict};
 
 /// Steps to the best place.
@@ -191,9 +191,7 @@ impl Blend {
             let looseness = SPREAD_DEVIATION.powi(-2);
             normal[7][7] += looseness;
             right[7] += looseness * (SPREAD - spread);
-            for (index, row) in normal.iter_mut().enumerate().skip(6) {
-                row[index] += 1e-9;
-            }
+            (6..UNKNOWNS).for_each(|index| normal[index][index] += 1e-9);
             let covariance = inverse(normal)?;
             let found = apply(&covariance, right);
             let longest = found[..4].iter().fold(0.0_f64, |most, d| most.max(d.abs()));

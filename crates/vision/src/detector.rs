@@ -92,7 +92,7 @@ impl Detector {
         // Light says less than edges: it is asked only where it is known where to look.
         if let Some((blind, window)) = near {
             if let Some(lit) = self.by_light(frame, expect, &blind, &verdict, demands) {
-                verdict = self.weighed(frame, window, expect, demands, verdict, &lit);
+                verdict = self.weighed(frame, window, expect, demands, &verdict, &lit);
             }
             if verdict.reasons.iter().all(Option::is_some) {
                 let anywhere = self.search(frame, whole, expect, demands);
@@ -142,7 +142,7 @@ impl Detector {
         window: Window,
         expect: &impl Expect,
         demands: &Demands,
-        verdict: Verdict,
+        verdict: &Verdict,
         lit: &Blended,
     ) -> Verdict {
         std::mem::swap(&mut self.best, &mut self.regions);
@@ -152,7 +152,7 @@ impl Detector {
             Some(again) if again.score() > verdict.score() => again,
             _ => {
                 std::mem::swap(&mut self.best, &mut self.regions);
-                verdict
+                *verdict
             }
         };
         if edges.reasons != [None; 2] || lit.is_blurred() && !edges.is_clear() {

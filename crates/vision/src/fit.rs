@@ -107,8 +107,10 @@ pub fn fit(
                 let tolerance = TOLERANCE * width;
                 let reach = (tolerance + bloom[grown].abs()).min(contour.reach);
                 let at = [u + sample.away[0], v + sample.away[1]];
-                let Some(offset) = edge(map, at, sample.normal, reach) else {
-                    continue;
+                let offset = match edge(map, at, sample.normal, reach) {
+                    Edge::Unknown => continue,
+                    Edge::Missing => None,
+                    Edge::At(offset) => Some(offset),
                 };
                 inside[band] += 1.0;
                 rims_inside[band] += f64::from(u8::from(!sample.side));
@@ -234,19 +236,33 @@ impl Contour {
     }
 }
 
-/// How far out the markers' colour ends, if it does within `reach` (px); None where the image says nothing of it.
-fn edge(map: &RunMap, at: [f64; 2], normal: [f64; 2], reach: f64) -> Option<Option<f64>> {
+/// Where the markers' colour ends on a normal.
+enum Edge {
+    /// The image says nothing of it.
+    Unknown,
+    /// Not in reach.
+    Missing,
+    /// So far out (px).
+    At(f64),
+}
+
+/// Where the markers' colour ends along `normal`, within `reach` (px).
+fn edge(map: &RunMap, at: [f64; 2], normal: [f64; 2], reach: f64) -> Edge {
     let (width, height) = map.size();
     let within = |[u, v]: [f64; 2]| {
         (BORDER..width - 1.0 - BORDER).contains(&u) && (BORDER..height - 1.0 - BORDER).contains(&v)
     };
     if !within(at) {
-        return None;
+        return Edge::Unknown;
     }
     let offset = crossing(map, at, normal, reach);
     // At the border of the image the colour ends whether the band does or not.
     let there = offset.unwrap_or_default();
-    within([at[0] + there * normal[0], at[1] + there * normal[1]]).then_some(offset)
+    if within([at[0] + there * normal[0], at[1] + there * normal[1]]) {
+        offset.map_or(Edge::Missing, Edge::At)
+    } else {
+        Edge::Unknown
+    }
 }
 
 /// How far from `at` along `normal` the markers' colour ends, within `reach` (px).
