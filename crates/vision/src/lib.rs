@@ -32,6 +32,7 @@ pub mod regions;
 pub mod rejection;
 pub mod runmap;
 pub mod runs;
+mod samples;
 pub mod segment;
 mod triples;
 
