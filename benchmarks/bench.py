@@ -5,8 +5,8 @@ a camera stream, at 100 Hz in real time. The first part runs the protocol with a
 compensation and compares the reductions with those of the in-process twin of the same seed,
 profile, control period and history (the second run goes on with the same instrument); the bench
 writes where its tip truly was, for this evaluation alone. ``--minutes`` is how long each run
-streams set-points: periods are repeated until then. The second part asks for faults, the third for
-configurations that are wrong, each in a run of its own.
+streams set-points: periods are repeated until then; a minute of log takes 1 GB. The second part
+asks for faults, the third for configurations that are wrong, each in a run of its own.
 """
 
 from __future__ import annotations
@@ -14,21 +14,19 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import subprocess
-import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import bench_tables
 import numpy as np
+from bench_processes import PATIENCE, bench_config, rig, run
 from numpy.typing import ArrayLike
 from tautscope import tables
 from tautscope.bench.rig import read_truth
-from tautscope.config import Config, dump_config, load_config
+from tautscope.config import dump_config
 from tautscope.dof import Dof
 from tautscope.experiment import run_experiment
 from tautscope.hardware.timing import read_sent
@@ -38,11 +36,8 @@ from tautscope.results import Results, evaluate
 from tautscope.rig import Sample
 from tautscope.twin import Twin
 
-BENCH = Path(__file__).resolve().parents[1] / "configs" / "bench.toml"
 WITHIN = 0.03
 """How far a reduction may be from the in-process twin's."""
-PATIENCE = 60.0
-TAUTSCOPE = [sys.executable, "-c", "from tautscope.cli import main; raise SystemExit(main())"]
 FAULTS = {
     "a drive's emergency": ("fault rotation", "EmergencyError"),
     "a drive silent": ("drop rotation", "SilentDriveError"),
@@ -68,19 +63,6 @@ REPLUG = 3.0
 """After how long an unplugged camera comes back [s]."""
 
 
-def bench_config(folder: Path, arguments: argparse.Namespace) -> Config:
-    """The bench with its sockets in a folder."""
-    changes = {
-        "drives.channel": str(folder / "can"),
-        "camera.source.url": f"unix:{folder / 'video'}",
-        "twin.seed": arguments.seed,
-        "profile": arguments.profile,
-        "experiment.periods": arguments.periods,
-    }
-    changes |= {f"experiment.{dof.label}.period": arguments.period for dof in Dof}
-    return load_config(BENCH).replace(**changes)
-
-
 class GoingOn(Twin):
     """The in-process twin, which a second run finds as the first has left it, as on the bench."""
 
@@ -102,55 +84,6 @@ class GoingOn(Twin):
         """As the twin's."""
         self._command = np.array(command)
         return super().step(command)
-
-
-class Rig:
-    """The process that is the rig."""
-
-    def __init__(self, process: subprocess.Popen[str]) -> None:
-        self._process = process
-
-    def request(self, line: str) -> None:
-        """Ask for a fault."""
-        assert self._process.stdin is not None
-        print(line, file=self._process.stdin, flush=True)
-
-    def event(self, what: str, dof: str | None = None) -> float:
-        """When the next event of this kind was [s, monotonic clock]."""
-        assert self._process.stdout is not None
-        for text in self._process.stdout:
-            found = json.loads(text)
-            if found["what"] == what and dof in {None, found.get("dof")}:
-                return float(found["time"])
-        raise RuntimeError(f"the bench ended before {what!r}")
-
-
-@contextmanager
-def rig(config: Config, folder: Path, *more: str) -> Iterator[Rig]:
-    file = folder / "rig.toml"
-    file.write_text(dump_config(config), encoding="utf-8")
-    with subprocess.Popen(
-        [*TAUTSCOPE, "bench", "--config", str(file), *more],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    ) as process:
-        found = Rig(process)
-        found.event("ready")
-        try:
-            yield found
-        finally:
-            process.communicate(timeout=PATIENCE)
-
-
-def run(file: Path, out: Path, *more: str) -> subprocess.Popen[str]:
-    """The process that drives it."""
-    return subprocess.Popen(
-        [*TAUTSCOPE, "run", str(file), "--out", str(out), "--json", *more],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
 
 
 def with_truth(folder: Path, suffix: str, truth: Path) -> Recording:
@@ -266,23 +199,12 @@ def wrong(arguments: argparse.Namespace) -> list[dict[str, Any]]:
                 process = run(file, folder / "run")
                 _, errors = process.communicate()
                 found.request("clear camera")  # so that there is something to read to
-                events = _until(found, "fault: clear")
+                events = found.until("fault: clear")
             enabled = [at for at, what in events if what == "operation enabled"]
             stopped = [at for at, what in events if what == "quick stop active"]
             took = 1e3 * (max(stopped) - min(enabled)) if enabled and stopped else None
             rows.append(_row(what, process.returncode, errors, took))
     return rows
-
-
-def _until(found: Rig, what: str) -> list[tuple[float, str]]:
-    assert found._process.stdout is not None
-    events = []
-    for text in found._process.stdout:
-        line = json.loads(text)
-        if line["what"] == what:
-            break
-        events.append((line["time"], line["what"]))
-    return events
 
 
 def _row(what: str, status: int | None, errors: str, took: float | None) -> dict[str, Any]:
@@ -298,7 +220,7 @@ def main() -> None:
     parser.add_argument("--periods", type=int, default=5, help="per degree of freedom")
     parser.add_argument("--profile", default="paper")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--out", type=Path, help="keep the run's folder here")
+    parser.add_argument("--out", type=Path, help="keep the run's folder here, and bench.json")
     parser.add_argument("--only", choices=["compared", "faults", "wrong"])
     arguments = parser.parse_args()
     if arguments.minutes is not None:
@@ -310,16 +232,15 @@ def main() -> None:
         document["faults"] = faults(arguments)
     if arguments.only in {None, "wrong"}:
         document["wrong"] = wrong(arguments)
+    if arguments.out is not None:
+        arguments.out.mkdir(parents=True, exist_ok=True)
+        file = arguments.out / "bench.json"
+        file.write_text(json.dumps(document, indent=1), encoding="utf-8")
     if arguments.json:
         print(json.dumps(document, indent=1))
         return
-    for name, part in document.get("run", {}).items():
-        print(f"{name}: {json.dumps(part['timing'])}")
-    for dof, row in document.get("reductions", {}).items():
-        print(f"{dof}: {json.dumps(row)}")
-    for row in [*document.get("faults", []), *document.get("wrong", [])]:
-        took = "" if row["ms"] is None else f"{row['ms']:.1f} ms"
-        print(f"{row['what']:40} {took:>12}  {row['said']}")
+    for line in bench_tables.tables(document):
+        print(line)
 
 
 if __name__ == "__main__":

@@ -17,15 +17,21 @@ from pathlib import Path
 
 import hysteresis_ablation as ablation
 import hysteresis_table as tables
-from hysteresis_rows import GOALS, SCENARIOS, Plan
+from hysteresis_goals import GOALS
+from hysteresis_rows import SCENARIOS, Plan
 from hysteresis_runs import Recordings, Store
 from tautscope.config import Config, Profile, load_config
 from tautscope.dof import Dof
 from tautscope.progress import progress_bar
 
 PROFILES: tuple[Profile, ...] = ("paper", "best")
+SEEDS = range(5)
+"""Of the tables."""
 WITHOUT_IDEA = ("alone", "together", "changing", "too wide", "tremor")
 """The groups an ablation runs unless told otherwise."""
+ABLATION_SEEDS = range(100, 103)
+"""Of an ablation, whose runs take true features with noise in place of images: what it compares
+is the law and the offsets."""
 
 Work = dict[tuple[str, str, int], Plan]
 """Group of rows, name of the configuration, seed: the runs."""
@@ -60,8 +66,8 @@ def measure(store: Store, work: Work) -> tables.Figures:
 def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--json", action="store_true", help="one JSON object on stdout, no more")
-    parser.add_argument("--seeds", type=int, default=5, help="how many [%(default)s]")
-    parser.add_argument("--first-seed", type=int, default=0, help="[%(default)s]")
+    parser.add_argument("--seeds", type=int, help="how many [5; of an ablation 3]")
+    parser.add_argument("--first-seed", type=int, help="[0; of an ablation 100]")
     parser.add_argument("--features", action="store_true", help="true features, not images: fast")
     parser.add_argument("--profile", choices=PROFILES, help="only this one [both]")
     parser.add_argument("--only", choices=SCENARIOS, action="append", help="only this group [all]")
@@ -76,6 +82,10 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--write", action="store_true", help="make the documentation's tables")
     parser.add_argument("--figures", type=Path, metavar="DIR", help="draw the figures there")
     options = parser.parse_args()
+    usual = ABLATION_SEEDS if options.ablation else SEEDS
+    options.features |= options.ablation
+    options.seeds = options.seeds or len(usual)
+    options.first_seed = usual.start if options.first_seed is None else options.first_seed
     if options.write and (options.only or options.profile):
         parser.error("--write makes whole tables: not with --only or --profile")
     return options

@@ -13,14 +13,22 @@ from hysteresis_table import Row, show
 IDEAS: dict[str, dict[str, Any]] = {
     "lead made up in contact": {"adaptive.contact_gain": 1.0, "adaptive.cautious_gain": 1.0},
     "caution where an offset is hardly known": {"adaptive.cautious_deviation": 1e6},
+    "lower gain where an offset is hardly known": {"adaptive.cautious_gain": 2.0},
     "gain that falls before the contact": {"adaptive.taper": 1e-3},
     "gain that falls as the lead arrives": {"adaptive.settling": 1e-3},
     "tremor told from intention": {"adaptive.tremor_time": 0.0},
+    "offsets that adapt": {"adaptive.level_deviation": 1e-3, "adaptive.local_deviation": 0.0},
     "offsets over position": {"adaptive.local_deviation": 0.0, "adaptive.local_drift": 0.0},
     "offsets that drift": {"adaptive.level_drift": 0.0, "adaptive.local_drift": 0.0},
     "offsets that mirror each other": {"adaptive.symmetry": 0.0},
     "contact needs a slope near 1": {"adaptive.slope_tolerance": 0.99},
     "contact needs a tip that has moved": {"adaptive.contact_moved": 0.0},
+    "play state corrected by images": {"adaptive.state_correction": 0.0},
+    "more than one step, outliers left out": {
+        "state_estimation.steps": 1,
+        "state_estimation.outlier_distance": 1e6,
+    },
+    "a gain taken as known (0.3 instead)": {"adaptive.gain_deviation": 0.3},
 }
 """The idea, and the configuration of the profile without it."""
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from hysteresis_goals import LATENCIES
 from hysteresis_rows import (
     CHANGING_PERIODS,
-    LATENCIES,
     REST_FOR,
     STRAIGHT,
     gone,

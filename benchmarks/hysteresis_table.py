@@ -8,7 +8,7 @@ from statistics import median
 from typing import Any
 
 import numpy as np
-from hysteresis_rows import CONDITIONS, GOALS, LATENCIES, Goal
+from hysteresis_goals import CONDITIONS, GOALS, LATENCIES, Goal
 from tautscope.dof import Dof
 
 Row = dict[str, Any]

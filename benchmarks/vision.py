@@ -17,9 +17,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import shutil
 import statistics
-import subprocess
 import tempfile
 import time
 from collections.abc import Callable
@@ -34,16 +32,19 @@ from tautscope import Twin, load_config
 from tautscope.config import Config
 from tautscope.reduction import Expectation
 from tautscope.vision import MarkerDetector, Region
-
-try:
-    from skimage import filters, measure
-except ImportError:
-    measure = filters = None
+from vision_peers import (
+    HAS_SCIKIT_IMAGE,
+    Visp,
+    opencv_components,
+    opencv_contours,
+    opencv_planes,
+    opencv_textbook,
+    scikit_image,
+)
 
 Image = NDArray[np.uint8]
 SIZES = ((720, 576), (1920, 1080), (3840, 2160))
 MARGIN = 20  # px at 1920x1080: how far a window reaches beyond its band
-MINIMUM_AREA = 40
 POSTURE = np.array([0.012, 0.0, 0.5])
 COLD = 96 << 20  # bytes: more than the caches hold
 EXPECTATION = Expectation(POSTURE, np.array([2e-3, 0.1, 0.1]))
@@ -88,98 +89,6 @@ def windows_of(regions: tuple[Region, ...], width: int) -> list[tuple[int, int, 
     ]
 
 
-def opencv_textbook(image: Image, config: Config) -> int:
-    blurred = cv2.GaussianBlur(image, (3, 3), 0)
-    projected = cv2.transform(blurred, np.array([config.vision.weights]))
-    _, mask = cv2.threshold(projected, config.vision.threshold, 255, cv2.THRESH_BINARY)
-    count, _, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
-    return int((stats[1:count, cv2.CC_STAT_AREA] >= MINIMUM_AREA).sum())
-
-
-def _projected(image: Image, config: Config) -> Image:
-    projected = cv2.transform(image, np.array([config.vision.weights], np.float32))
-    return cv2.GaussianBlur(projected, (3, 3), 0)
-
-
-def _by_contours(mask: Image) -> int:
-    contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    return sum(cv2.moments(contour)["m00"] >= MINIMUM_AREA for contour in contours)
-
-
-def _by_components(mask: Image) -> int:
-    count, _, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
-    return int((stats[1:count, cv2.CC_STAT_AREA] >= MINIMUM_AREA).sum())
-
-
-def _thresholded(image: Image, config: Config) -> Image:
-    return cv2.threshold(
-        _projected(image, config), config.vision.threshold, 255, cv2.THRESH_BINARY
-    )[1]
-
-
-def opencv_contours(image: Image, config: Config) -> int:
-    return _by_contours(_thresholded(image, config))
-
-
-def opencv_components(image: Image, config: Config) -> int:
-    return _by_components(_thresholded(image, config))
-
-
-def opencv_planes(image: Image, config: Config) -> int:
-    """Channels apart, weighted in saturating 8-bit arithmetic."""
-    blue, green, red = cv2.split(image)
-    weights = config.vision.weights
-    other = cv2.addWeighted(blue, -weights[0], red, -weights[2], 0)
-    projected = cv2.blur(cv2.subtract(green, other), (3, 3))
-    mask = cv2.threshold(projected, config.vision.threshold, 255, cv2.THRESH_BINARY)[1]
-    return _by_contours(mask)
-
-
-def scikit_image(image: Image, config: Config) -> int:
-    projected = image @ np.array(config.vision.weights, np.float32)
-    mask = filters.gaussian(projected, 0.7, preserve_range=True) > config.vision.threshold
-    table = measure.regionprops_table(measure.label(mask), properties=("area", "centroid"))
-    return int((table["area"] >= MINIMUM_AREA).sum())
-
-
-class Visp:
-    """A program that tracks one blob with vpDot2, compiled when the headers are there."""
-
-    def __init__(self, folder: Path) -> None:
-        self.program = folder / "visp_dot"
-        self.missing = ""
-        flags = ["-I/usr/include/eigen3", "-lvisp_blob", "-lvisp_core"]
-        source = Path(__file__).with_name("visp_dot.cpp")
-        if shutil.which("c++") is None:
-            self.missing = "no C++ compiler"
-        elif not [*Path("/usr/include").glob("**/visp3/blob/vpDot2.h")]:
-            self.missing = "ViSP is not installed (Debian: libvisp-dev)"
-        else:
-            command = ["c++", "-O2", "-o", str(self.program), str(source), *flags]
-            built = subprocess.run(command, capture_output=True, text=True, check=False)
-            if built.returncode:
-                self.missing = "visp_dot.cpp does not compile: " + built.stderr.strip()[:200]
-
-    def microseconds(self, image: Image, regions: tuple[Region, ...], repeats: int) -> float | None:
-        """Per track of the first region, or None."""
-        if self.missing or not regions:
-            return None
-        height, width = image.shape[:2]
-        u, v, box_width, box_height = regions[0].box
-        grey = np.zeros((height, width), np.uint8)
-        centre = (u + box_width // 2, v + box_height // 2)
-        cv2.ellipse(grey, centre, (box_width // 2, box_height // 2), 0, 0, 360, 255, cv2.FILLED)
-        file = self.program.with_name("grey.raw")
-        grey.tofile(file)
-        numbers = [width, height, *centre, repeats]
-        command = [str(self.program), str(file), *map(str, numbers)]
-        run = subprocess.run(command, capture_output=True, text=True, check=False)
-        if run.returncode:
-            self.missing = "vpDot2 fails: " + run.stderr.strip()[:200]
-            return None
-        return float(run.stdout.split()[0])
-
-
 def measured(
     calls: dict[str, Callable[[], object]], repeats: int, prepare: Callable[[], object]
 ) -> dict[str, list[float]]:
@@ -220,7 +129,7 @@ def compared(image: Image, repeats: int, visp: Visp) -> dict[str, float]:
         "components": lambda: opencv_components(image, config),
         "planes": lambda: opencv_planes(image, config),
     }
-    if measure is not None:
+    if HAS_SCIKIT_IMAGE:
         calls["scikit_image_ms"] = lambda: scikit_image(image, config)
     if size == SIZES[0]:
         # Only this is the size of the configured camera, of which the model knows the lens.
@@ -253,7 +162,7 @@ def compared(image: Image, repeats: int, visp: Visp) -> dict[str, float]:
     }
     if "recognised_ms" in middle:
         figures["recognised_ms"] = middle["recognised_ms"]
-    if measure is not None:
+    if HAS_SCIKIT_IMAGE:
         figures["scikit_image_ms"] = middle["scikit_image_ms"]
     one_blob = visp.microseconds(image, regions, repeats)
     if one_blob is not None:
@@ -354,7 +263,7 @@ def main() -> None:
         for row in rows_of(name, figures[name], arguments.repeats)
     ]
     hint = "not installed (uv run --with scikit-image python benchmarks/vision.py)"
-    left_out = {"ViSP": visp.missing, "scikit-image": "" if measure else hint}
+    left_out = {"ViSP": visp.missing, "scikit-image": "" if HAS_SCIKIT_IMAGE else hint}
     left_out = {name: why for name, why in left_out.items() if why}
     if arguments.json:
         print(json.dumps({**figures, "worst_ms": worst, "left_out": left_out, "rows": rows}))

@@ -6,6 +6,10 @@ import os
 from pathlib import Path
 
 import pytest
+from drawn import DrawnRig, short_experiment
+from tautscope.experiment import run_experiment
+from tautscope.recording import Recording
+from tautscope.references import SineSequence
 
 
 def shared_data(*parts: str) -> Path:
@@ -27,3 +31,20 @@ def shared_data(*parts: str) -> Path:
 def colon_folder() -> Path:
     """The folder of the real colonoscopy frames."""
     return shared_data("colon_frames")
+
+
+@pytest.fixture(scope="session")
+def uncompensated() -> Recording:
+    """The article's experiment, shortened, on the drawn rig, without compensation."""
+    return _run(compensate=False)
+
+
+@pytest.fixture(scope="session")
+def compensated() -> Recording:
+    """The same with it."""
+    return _run(compensate=True)
+
+
+def _run(compensate: bool) -> Recording:
+    config = short_experiment()
+    return run_experiment(DrawnRig(config), SineSequence(config.experiment), config, compensate)

@@ -2,7 +2,6 @@
 
 from concurrent.futures import Executor, Future
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,18 +11,14 @@ from numpy.typing import ArrayLike, NDArray
 from tautscope.dof import Dof
 from tautscope.errors import (
     FrameError,
-    MissingPathError,
-    OutputError,
-    RecordError,
     SignalError,
 )
 from tautscope.experiment import run_experiment
-from tautscope.recording import Recording, Table, per_dof, per_feature
+from tautscope.recording import Recording, per_dof, per_feature
 from tautscope.reduction import HysteresisReduction, Report
 from tautscope.references import SineSequence
-from tautscope.results import DofResult, combine, evaluate
+from tautscope.results import evaluate
 from tautscope.rig import Frame, Rig, Sample
-from tautscope.trials import Trial, run_trials
 
 CONFIG = short_experiment()
 REFERENCE = SineSequence(CONFIG.experiment)
@@ -64,24 +59,8 @@ class StandingClock(DrawnRig):
         return replace(super().step(command), time=0.0)
 
 
-def assert_same(table: Table, other: Table) -> None:
-    assert table.dtype == other.dtype
-    for name in table.dtype.names or ():
-        np.testing.assert_array_equal(table[name], other[name], err_msg=name)
-
-
 def run(rig: Rig, compensate: bool = True) -> Recording:
     return run_experiment(rig, REFERENCE, CONFIG, compensate)
-
-
-@pytest.fixture(scope="module")
-def compensated() -> Recording:
-    return run(DrawnRig(CONFIG))
-
-
-@pytest.fixture(scope="module")
-def uncompensated() -> Recording:
-    return run(DrawnRig(CONFIG), compensate=False)
 
 
 def test_a_rig_of_forty_lines_is_a_rig() -> None:
@@ -185,61 +164,6 @@ def test_a_frame_from_before_the_start_is_not_used() -> None:
     np.testing.assert_allclose(frames["arrived_at"] - frames["captured_at"], 0.05)
 
 
-def test_the_snapshot_is_from_the_middle(compensated: Recording) -> None:
-    snapshot = compensated.snapshot
-    assert snapshot is not None
-    assert REFERENCE.duration / 2 - 1 < snapshot.captured_at < REFERENCE.duration / 2 + 2
-    assert snapshot.image.shape == (CONFIG.camera.height, CONFIG.camera.width, 3)
-    assert np.isfinite(snapshot.features).all()
-
-
-def test_a_recording_reads_back_equal(compensated: Recording, tmp_path: Path) -> None:
-    folder = tmp_path / "run"
-    compensated.save(folder)
-    names = {path.name for path in folder.iterdir()}
-    assert names == {"trace.csv", "frames.csv", "recording.toml", "config.toml"}
-    again = Recording.load(folder)
-    assert_same(again.trace, compensated.trace)
-    assert_same(again.frames, compensated.frames)
-    assert again.config == compensated.config
-    assert again.segments == compensated.segments
-    assert again.compensated
-
-
-def test_a_folder_in_use_is_left_alone(compensated: Recording, tmp_path: Path) -> None:
-    (tmp_path / "notes.txt").write_text("mine")
-    with pytest.raises(OutputError, match=r"out: got '.*', expected a folder that is empty"):
-        compensated.save(tmp_path)
-    assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
-
-
-def test_a_failed_save_leaves_nothing(
-    compensated: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def full(*_: object) -> str:
-        raise OSError("disk full")
-
-    monkeypatch.setattr("tautscope.recording.dump_config", full)
-    with pytest.raises(OSError, match="disk full"):
-        compensated.save(tmp_path / "run")
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_damaged_recording_is_named(compensated: Recording, tmp_path: Path) -> None:
-    with pytest.raises(MissingPathError, match=r"recording\.toml"):
-        Recording.load(tmp_path)
-    folder = tmp_path / "run"
-    compensated.save(folder)
-    trace = folder / "trace.csv"
-    whole = trace.read_text()
-    trace.write_text(whole.replace("reference_insertion", "u", 1))
-    with pytest.raises(RecordError, match=r"trace\.csv.*expected the columns time"):
-        Recording.load(folder)
-    trace.write_text(whole[: len(whole) // 2].rsplit(",", 3)[0])
-    with pytest.raises(RecordError, match=r"trace\.csv"):
-        Recording.load(folder)
-
-
 @pytest.mark.parametrize(
     "value",
     [[np.nan, 0, 0], [0, np.inf, 0], [0, 0], [[0, 0, 0]], ["a", 0, 0], None],
@@ -274,35 +198,6 @@ def test_progress_reaches_the_end() -> None:
         progress=lambda elapsed, duration: told.append((elapsed, duration)),
     )
     np.testing.assert_allclose(told, [(1.0, 2.0), (2.0, 2.0)])
-
-
-def test_runs_in_processes_are_the_same_runs(
-    uncompensated: Recording, compensated: Recording
-) -> None:
-    shares: list[float] = []
-    trials = [Trial(CONFIG, False), Trial(CONFIG, True)]
-    first, second = run_trials(trials, shares.append, DrawnRig, workers=2)
-    assert_same(first.trace, uncompensated.trace)
-    assert_same(second.trace, compensated.trace)
-    assert shares == sorted(shares)
-
-
-def test_an_error_in_a_process_arrives_with_its_facts() -> None:
-    with pytest.raises(FrameError) as error:
-        run_trials([Trial(CONFIG, True)] * 2, lambda share: None, BadFrameRig, workers=2)
-    assert error.value.allowed
-
-
-def test_medians_and_worst_leave_out_what_is_not_known() -> None:
-    def result(value: float) -> dict[Dof, DofResult]:
-        return {Dof.BENDING: DofResult(*[value] * len(DofResult.__dataclass_fields__))}
-
-    results = [result(1.0), result(np.nan), result(5.0), result(2.0)]
-    assert combine(results, "median")[Dof.BENDING].reduction == 2.0
-    ends = dict.fromkeys(DofResult.__dataclass_fields__, "max") | {"reduction": "min"}
-    assert combine(results, ends)[Dof.BENDING].reduction == 1.0
-    assert combine(results, ends)[Dof.BENDING].state_rms == 5.0
-    assert np.isnan(combine([result(np.nan)], "median")[Dof.BENDING].state_rms)
 
 
 class Answering(Executor):

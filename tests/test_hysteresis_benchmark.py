@@ -16,7 +16,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
 import hysteresis_ablation as ablation
 import hysteresis_pages as pages
 import hysteresis_table as tables
-from hysteresis_rows import GOALS, SCENARIOS, gone
+from hysteresis_goals import GOALS
+from hysteresis_rows import SCENARIOS, gone
 from hysteresis_runs import Sines, uncompensated
 
 NAME = "reduction of mean width"

@@ -9,7 +9,7 @@ from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.recording import FRAME_COLUMNS, TRACE_COLUMNS, Recording
 from tautscope.references import Segment
-from tautscope.results import DofResult, evaluate
+from tautscope.results import DofResult, combine, evaluate
 
 START = 100.0  # the rig's clock need not begin at 0
 TIME = np.arange(7000) * 1e-3  # the segment: 1 s to 6 s
@@ -92,3 +92,15 @@ def test_speeds_are_of_the_whole_segment(result: DofResult) -> None:
     assert result.tip_overspeed == pytest.approx(expected)
     assert expected > 1.2
     assert result.actuator_gain == pytest.approx(3.0)
+
+
+def test_medians_and_worst_leave_out_what_is_not_known() -> None:
+    def result(value: float) -> dict[Dof, DofResult]:
+        return {Dof.BENDING: DofResult(*[value] * len(DofResult.__dataclass_fields__))}
+
+    results = [result(1.0), result(np.nan), result(5.0), result(2.0)]
+    assert combine(results, "median")[Dof.BENDING].reduction == 2.0
+    ends = dict.fromkeys(DofResult.__dataclass_fields__, "max") | {"reduction": "min"}
+    assert combine(results, ends)[Dof.BENDING].reduction == 1.0
+    assert combine(results, ends)[Dof.BENDING].state_rms == 5.0
+    assert np.isnan(combine([result(np.nan)], "median")[Dof.BENDING].state_rms)

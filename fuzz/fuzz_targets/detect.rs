@@ -90,24 +90,7 @@ fuzz_target!(|input: Input<'_>| {
         .map(|region| region.area)
         .sum();
     assert!(whole <= (width * height) as u64);
-    let [
-        inside,
-        coverage,
-        spill,
-        edges,
-        edges_on_average,
-        edges_alone,
-        surprise,
-    ] = input.demands.map(|demand| f64::from(demand) / 128.0);
-    let demands = Demands {
-        inside,
-        coverage,
-        spill,
-        edges,
-        edges_on_average,
-        edges_alone,
-        surprise,
-    };
+    let demands = Demands::from(input.demands.map(|demand| f64::from(demand) / 128.0));
     detector.recognise(&frame, &input, &demands);
     detector.regions_in(&frame, &windows);
 });

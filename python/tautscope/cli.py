@@ -256,9 +256,7 @@ def _print_table1(demo: Demo, folder: Path) -> None:
 
     from tautscope import tables  # noqa: PLC0415
 
-    profiles = {demo.config.profile: demo.results}
-    if demo.article_results:
-        profiles = {"paper": demo.article_results, **profiles}
+    profiles = demo.by_profile
     several = len(demo.seeds) > 1
     title = "Table 1: the article, and the twin" + (
         f" (median of {len(demo.seeds)} seeds, worst in brackets)" if several else ""

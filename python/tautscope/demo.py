@@ -40,6 +40,12 @@ class Demo:
     wall_seconds: float
     article_results: tuple[Results, ...] = ()
 
+    @property
+    def by_profile(self) -> dict[str, tuple[Results, ...]]:
+        """Table 1 of each seed under each profile that was run, the configuration's own last."""
+        article = {"paper": self.article_results} if self.article_results else {}
+        return {**article, self.config.profile: self.results}
+
 
 def run_demo(
     config: Config,
@@ -96,8 +102,9 @@ def write_run_folder(demo: Demo, folder: str | PathLike[str]) -> None:
             figure9,
             f"Fig. 9, seed {demo.seeds[0]}. (a)-(c) with compensation, each degree of freedom "
             "while it moves: reference, command, estimate and both contact offsets. (d)-(f) loops: "
-            "the estimate over the command without, over the reference with compensation. The "
-            "dashed line is a perfect tip.",
+            "the estimate over the command without, over the reference with compensation; the "
+            "first period, in which the slack is learnt, is thin. The dashed line is a perfect "
+            "tip.",
         )
     ]
     if demo.compensated.snapshot is not None:

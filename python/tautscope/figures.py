@@ -70,7 +70,8 @@ def figure9(uncompensated: Recording, compensated: Recording) -> Figure:
     """The article's Fig. 9: one column per DOF.
 
     (a)-(c): reference, command, estimate and both contact offsets over time, with compensation.
-    (d)-(f): estimate over command without, and over reference with compensation.
+    (d)-(f): estimate over command without, and over reference with compensation, the first period
+    thin.
     """
     segments = compensated.segments
     with style():
@@ -114,13 +115,19 @@ def _over_time(axes: Axes, recording: Recording, segment: Segment) -> None:
 
 def _loops(axes: Axes, uncompensated: Recording, compensated: Recording, segment: Segment) -> None:
     dof = segment.dof
-    for recording, name, label, colour in (
-        (uncompensated, "command", "uncompensated: q̂ over c", GREY),
-        (compensated, "reference", "compensated: q̂ over u", BLUE),
+    scale = dof.display_scale
+    for recording, name, label, colour, width in (
+        (uncompensated, "command", "uncompensated: q̂ over c", GREY, 1.0),
+        (compensated, "reference", "compensated: q̂ over u", BLUE, 1.0),
+        (compensated, "reference", "compensated, first period", BLUE, 0.4),
     ):
         x, y = estimated_loop(recording, segment, name, first=0)
-        scale = dof.display_scale
-        axes.plot(x * scale, y * scale, color=colour, linewidth=0.8, label=label)
+        if recording is compensated:
+            settled, _ = estimated_loop(recording, segment, name, first=1)
+            begin = len(x) - len(settled)
+            shown = slice(begin, None) if width == 1.0 else slice(begin + 1)
+            x, y = x[shown], y[shown]
+        axes.plot(x * scale, y * scale, color=colour, linewidth=width, label=label)
     low, high = zip(axes.get_xlim(), axes.get_ylim(), strict=True)
     axes.axline((0, 0), slope=1, color=BLACK, linewidth=0.5, linestyle=(0, (4, 4)), zorder=0)
     axes.set_xlabel(f"c or u [{dof.display_unit}]")
@@ -196,7 +203,14 @@ def timing_figure(timing: Timing) -> Figure:
             row[1].set_ylabel("number")
         if held.any():
             axes[0, 0].plot(
-                cycles[held, 0] - begin, np.zeros(held.sum()), "|", color=ORANGE, label="held"
+                cycles[held, 0] - begin,
+                np.zeros(held.sum()),
+                "|",
+                color=ORANGE,
+                markersize=12,
+                clip_on=False,
+                zorder=3,
+                label="held",
             )
             axes[0, 0].legend(loc="upper right")
         axes[0, 0].set_title(f"(a) set-points: {len(cycles)} cycles, {timing.lost} lost")
@@ -257,6 +271,9 @@ def analysis_figure(found: Analysis) -> Figure:
             strip.axvspan(at[0], at[found.half], color="#f0f0f0", linewidth=0)
             strip.axhline(0, color=GREY, linewidth=0.5)
             strip.plot(at[tip], errors[row][tip], color=BLUE, linewidth=0.7)
+            if not np.isfinite(errors[row][: found.half]).any():
+                middle = (at[0] + at[found.half]) / 2
+                strip.text(middle, 0, "learning: no prediction", ha="center", va="bottom")
             strip.set_title(f"{entry.model.title}: {entry.rmse:.3g}")
             strip.set_ylabel("error")
             limit = reach[row] if plain[row] else common

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import tomllib
 from dataclasses import dataclass
 from os import PathLike
@@ -18,6 +17,7 @@ from tautscope.dof import Dof
 from tautscope.errors import MissingPathError, RecordError
 from tautscope.output import new_folder
 from tautscope.references import Segment
+from tautscope.table_files import read_csv, write_csv
 
 if TYPE_CHECKING:
     from tautscope.reduction import Report
@@ -269,39 +269,6 @@ def per_dof(table: Table, group: str) -> Floats:
 def per_feature(table: Table, group: str) -> Floats:
     """(n, 4) the columns ``<group>_a_x`` to ``<group>_b_y`` of a table [px]."""
     return np.stack([table[f"{group}_{name}"] for name in FEATURES], axis=1)
-
-
-def write_csv(path: Path, table: Table) -> None:
-    """A structured array as CSV with a header; numbers in full, so that they read back equal."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(table.dtype.names or ())
-        writer.writerows(table.tolist())
-
-
-def read_csv(path: Path, dtype: np.dtype[np.void]) -> Table:
-    """Read back what `write_csv` wrote.
-
-    Raises:
-        MissingPathError: There is no such file.
-        RecordError: Its columns or cells are others.
-    """
-    if not path.is_file():
-        raise MissingPathError("recording", str(path), "a file of a saved recording")
-    with path.open(newline="", encoding="utf-8") as file:
-        header, *rows = list(csv.reader(file)) or [[]]
-    names = dtype.names or ()
-    if tuple(header) != names:
-        raise RecordError(str(path), ",".join(header), f"the columns {', '.join(names)}")
-    table = np.empty(len(rows), dtype)
-    try:
-        columns = list(zip(*rows, strict=True)) or [()] * len(names)
-        for name, column in zip(names, columns, strict=True):
-            is_flag = dtype[name].kind == "b"
-            table[name] = [cell == "True" for cell in column] if is_flag else column
-    except ValueError as error:
-        raise RecordError(str(path), str(error), "a number in every cell") from None
-    return table
 
 
 def _between(

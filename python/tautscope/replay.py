@@ -258,7 +258,8 @@ def _column(file: Path, header: Sequence[str], name: str) -> int:
     found = [place for place, title in enumerate(header) if title == name.strip()]
     if len(found) != 1:
         what = "no such column" if not found else f"{len(found)} columns of this name"
-        raise RecordError(f"{file}: {name}", what, f"one of {', '.join(header) or 'no header'}")
+        known = f"the header has {', '.join(header)}" if header else "there is no header"
+        raise RecordError(f"{file}: {name}", what, f"one; {known}")
     return found[0]
 
 

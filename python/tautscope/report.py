@@ -6,7 +6,7 @@ import base64
 import importlib.metadata
 import io
 import platform
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING
@@ -31,12 +31,14 @@ figcaption, .note { color: #555; font-size: .88rem; max-width: 50rem; }
 figure img { width: 100%; height: auto; }
 .wide { overflow-x: auto; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
-th, td { padding: .28rem .8rem; text-align: right; white-space: nowrap; }
+th, td { padding: .28rem .5rem; text-align: right; white-space: nowrap; }
 th:first-child, td:first-child { text-align: left; padding-left: 0; }
 thead th { border-bottom: 1.5px solid #222; font-weight: 600; }
 thead tr:first-child:not(:last-child) th { border-bottom: 0; text-align: center; }
 tbody tr + tr td { border-top: 1px solid #e4e4e4; }
-td.ours { font-weight: 600; } td small { color: #777; font-weight: 400; }
+.first { padding-left: 2rem; color: #777; }
+td.ours { font-weight: 600; }
+td small { display: block; color: #777; font-weight: 400; line-height: 1.1; }
 pre { background: #f6f6f6; padding: .8rem 1rem; font-size: .8rem; line-height: 1.4;
       overflow-x: auto; }
 dl { display: grid; grid-template-columns: max-content auto; gap: .1rem 1.5rem; }
@@ -57,9 +59,16 @@ parameters are not in the article; the configuration below has the ones used. Th
 is set so that the uncompensated widths resemble the article's: agreement of those rows is by
 construction, agreement of the compensated ones is not.</li>
 <li>With a gain of K while slack is crossed and the width known exactly, 1 &minus; 1/K of it goes:
-80&nbsp;% at 5. A width estimated a little too wide removes more, one too narrow less.</li>
+80&nbsp;% at 5. A width estimated a little too wide removes more, one too narrow less. That is
+profile &ldquo;paper&rdquo;; in &ldquo;best&rdquo; the command goes on in contact until the whole
+offset is made up for.</li>
 </ul>
 """
+
+_PROFILES = {
+    "paper": "&ldquo;Paper&rdquo; is the article&rsquo;s scheme on the twin.",
+    "best": "&ldquo;Best&rdquo; is this project&rsquo;s own scheme on the same twin.",
+}
 
 
 @dataclass(frozen=True)
@@ -72,25 +81,28 @@ class Picture:
 
 def demo_report(demo: Demo, pictures: Sequence[Picture]) -> str:
     """The page of ``tautscope demo``, with the pictures in the order given."""
-    seeds = demo.seeds
-    count = f"{len(seeds)} seeds" if len(seeds) > 1 else "one seed"
+    seeds, profiles = demo.seeds, demo.by_profile
+    several = len(seeds) > 1
+    count = f"{len(seeds)} seeds" if several else "one seed"
     facts = {
         "tautscope": __version__,
         "Python": platform.python_version(),
         **{name: _version(name) for name in ("numpy", "mujoco", "opencv-python-headless")},
         "machine": f"{platform.system()} {platform.machine()}",
         "seeds": ", ".join(map(str, seeds)),
-        "simulated": f"{demo.sim_seconds:.0f} s in {2 * len(seeds)} runs",
+        "simulated": f"{demo.sim_seconds:.0f} s in {(1 + len(profiles)) * len(seeds)} runs",
         "took": f"{demo.wall_seconds:.0f} s",
     }
     return _page(
         f"on a simulated instrument, camera images the only feedback; {count}",
         f"""<h2>Table 1</h2>
-<div class="wide">{_table(demo.results, "twin")}</div>
-<p class="note">Median over the seeds{", the worst seed in brackets" if len(seeds) > 1 else ""}.
+<div class="wide">{_table(profiles)}</div>
+<p class="note">{"Median over the seeds, the worst seed in brackets. " if several else ""}{
+            " ".join(_PROFILES[name] for name in profiles)
+        }
 Widths over the last two periods of each degree of freedom: mean over 41 levels across the central
 80&nbsp;% of the tip&rsquo;s range, of the true tip unless said otherwise.</p>
-<h2>Figures</h2>
+<h2>Figures{f", profile {demo.config.profile}" if len(profiles) > 1 else ""}</h2>
 {_figures(pictures)}
 <h2>What this shows, and what it does not</h2>
 {_CAVEATS}""",
@@ -106,7 +118,7 @@ def run_report(
     table = ""
     if results is not None:
         table = f"""<h2>Table 1</h2>
-<div class="wide">{_table([results], "rig")}</div>
+<div class="wide">{_table({"rig": [results]})}</div>
 <p class="note">Widths as the camera sees them; no rig knows its true tip.</p>
 """
     return _page(
@@ -139,23 +151,28 @@ def _figures(pictures: Sequence[Picture]) -> str:
     return "".join(_figure(picture) for picture in pictures)
 
 
-def _table(results: Sequence[Results], ours: str) -> str:
-    middle, bad = tables.median(results), tables.worst(results)
-    dofs = list(middle)
-    heads = "".join(f'<th colspan="2">{tables.heading(dof)}</th>' for dof in dofs)
-    columns = f"<th>article</th><th>{ours}</th>" * len(dofs)
+def _table(columns: Mapping[str, Sequence[Results]]) -> str:
+    """The article beside each column, a result per seed; the last one stands out."""
+    figures = [(each, tables.median(each), tables.worst(each)) for each in columns.values()]
+    *_, (last, dofs, _) = figures
+    span = 1 + len(columns)
+    heads = "".join(f'<th colspan="{span}">{tables.heading(dof)}</th>' for dof in dofs)
+    names = "".join(f"<th>{escape(name)}</th>" for name in columns)
+    names = f'<th class="first">article</th>{names}' * len(dofs)
     lines = []
     for row in tables.ROWS:
         cells = []
         for dof in dofs:
-            value = tables.cell(row, dof, getattr(middle[dof], row.name))
-            worst = tables.cell(row, dof, getattr(bad[dof], row.name))
-            note = f" <small>({worst})</small>" if len(results) > 1 else ""
-            cells.append(f"<td>{tables.article_cell(row, dof)}</td>")
-            cells.append(f'<td class="ours">{value}{note}</td>')
+            cells.append(f'<td class="first">{tables.article_cell(row, dof)}</td>')
+            for results, middle, bad in figures:
+                value = tables.cell(row, dof, getattr(middle[dof], row.name))
+                worst = tables.cell(row, dof, getattr(bad[dof], row.name))
+                note = f"<small>({worst})</small>" if len(results) > 1 else ""
+                mark = ' class="ours"' if results is last else ""
+                cells.append(f"<td{mark}>{value}{note}</td>")
         lines.append(f"<tr><td>{escape(row.title)}</td>{''.join(cells)}</tr>")
     return (
-        f"<table><thead><tr><th></th>{heads}</tr><tr><th></th>{columns}</tr></thead>"
+        f"<table><thead><tr><th></th>{heads}</tr><tr><th></th>{names}</tr></thead>"
         f"<tbody>{''.join(lines)}</tbody></table>"
     )
 

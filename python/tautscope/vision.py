@@ -40,6 +40,10 @@ class Region(NamedTuple):
 class Evidence:
     """What speaks for a band.
 
+    Where the bands were placed by their light, because blur has left no edges (decision 0011),
+    there is no outline to judge: `edges` is the share of the light's variance that the two bands
+    explain, `bloom` the spread of the blur [px], and `inside`, `coverage`, `own`, `spill` are 0.
+
     Attributes:
         inside: Share of its outline's area that is in the image.
         coverage: Share of that which has the markers' colour.

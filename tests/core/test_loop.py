@@ -2,33 +2,17 @@
 
 from __future__ import annotations
 
-import sys
-from dataclasses import fields, replace
-from types import SimpleNamespace
+from dataclasses import fields
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from resting import CONFIG, REST, Floats, started
 from tautscope import _core
 from tautscope.blocks import build_feature_model
-from tautscope.config import Config
-from tautscope.dof import Dof
 from tautscope.errors import ConfigError, SignalError
 from tautscope.reduction import HysteresisReduction, Report, Status
-from tautscope.rig import Frame
 
-Floats = NDArray[np.float64]
-
-CONFIG = Config().replace(
-    **{
-        "insertion.observable_deviation": 5e-3,
-        "bending.observable_deviation": 0.1,
-        # Without noise, pictures repeat themselves while the slack is crossed.
-        "safety.frozen_travel": 1e6,
-    }
-)
 WIDTHS = np.array([10e-3, 1.8, 1.1])
-REST = np.array([0.025, 0.0, 0.9])
 AMPLITUDES = np.array([15e-3, 2.0, 1.1])
 PERIOD = CONFIG.control.period
 
@@ -104,13 +88,6 @@ def test_it_stands_noise(seed: int) -> None:
 def test_without_compensation_the_command_is_the_reference() -> None:
     traces = run(False, 16)
     np.testing.assert_allclose(traces["command"], traces["reference"], atol=1e-12)
-
-
-def started(ticks: int = 100, config: Config = CONFIG) -> HysteresisReduction:
-    loop = HysteresisReduction(config)
-    for _ in range(ticks):
-        loop.step(REST)
-    return loop
 
 
 def test_report_shows_its_working() -> None:
@@ -242,124 +219,3 @@ def test_batch_run_is_step_by_step() -> None:
     np.testing.assert_array_equal(
         one.run(references, times), [other.step(reference) for reference in references]
     )
-
-
-class FakeDetector:
-    """Sees what it is told; keeps where it was told to look."""
-
-    def __init__(self, config: Config) -> None:
-        self.looked: list[Floats | None] = []
-        self.found = SimpleNamespace(
-            features=np.zeros(4), covariance=np.eye(4), valid=False, found=(False, False)
-        )
-
-    def detect(
-        self, image: object, predicted_features: Floats | None, expectation: object
-    ) -> SimpleNamespace:
-        self.looked.append(predicted_features)
-        return self.found
-
-
-def test_a_frame_is_looked_at_where_it_was_captured(monkeypatch: pytest.MonkeyPatch) -> None:
-    vision = SimpleNamespace(MarkerDetector=FakeDetector)
-    monkeypatch.setitem(sys.modules, "tautscope.vision", vision)
-    loop = started()
-    predicted = loop.predicted_features(0.2)
-    assert predicted is not None
-    frame = Frame(np.zeros((576, 720, 3), np.uint8), captured_at=0.2, sequence=0)
-
-    lost = loop.on_frame(frame)
-    assert lost.status is Status.NO_MARKERS and lost.captured_at == 0.2
-    detector = loop._detector
-    assert isinstance(detector, FakeDetector) and lost.detection is detector.found
-    np.testing.assert_array_equal(detector.looked[0], predicted)
-
-    detector.found = SimpleNamespace(
-        features=predicted + 1.0, covariance=np.eye(4), valid=True, found=(True, True)
-    )
-    seen = loop.on_frame(frame)
-    assert seen.status is Status.OK
-    np.testing.assert_allclose(seen.innovation, 1.0, atol=1e-9)
-    with pytest.raises(SignalError, match="captured_at"):
-        loop.on_frame(replace(frame, captured_at=np.nan))
-
-
-def test_where_to_look_follows_the_images_and_widens_with_travel() -> None:
-    loop = started()
-    before = loop.expectation(0.3)
-    assert before is not None
-    np.testing.assert_array_equal(before.state, REST)
-    start = [CONFIG[dof].start_deviation for dof in Dof]
-    np.testing.assert_array_equal(before.deviation, start)
-
-    off = REST + np.array([1e-3, 0.05, -0.03])
-    seen = build_feature_model(CONFIG).predict(off)
-    assert seen is not None
-    report = loop.on_features(seen[0], 0.3)
-    after = loop.expectation(0.3)
-    assert after is not None
-    np.testing.assert_allclose(after.state, report.state_estimate)
-    assert (after.deviation < before.deviation).all()
-
-    for tick in range(20):
-        loop.step(REST + np.array([1e-4 * (tick + 1), 0.0, 0.0]))
-    later = loop.expectation(0.55)
-    assert later is not None
-    assert later.deviation[0] > 1.5 * after.deviation[0]
-    np.testing.assert_allclose(later.deviation[1:], after.deviation[1:])
-
-
-def test_a_search_that_finds_nothing_widens_and_one_that_finds_narrows() -> None:
-    loop = started()
-    seen = build_feature_model(CONFIG).predict(REST)
-    assert seen is not None
-    loop.on_features(seen[0], 0.3)
-    sure = loop.expectation(0.3)
-    assert sure is not None
-    last = sure.deviation
-    for missed in range(20):
-        loop.step(REST)
-        now = 0.31 + 0.01 * missed
-        assert loop.on_features(None, now).status is Status.NO_MARKERS
-        belief = loop.expectation(now)
-        assert belief is not None
-        np.testing.assert_array_equal(belief.state, sure.state)
-        assert (belief.deviation >= last).all()
-        last = belief.deviation
-    start = np.array([CONFIG[dof].start_deviation for dof in Dof])
-    assert (last >= 0.14 * start).all()
-    assert (last < 0.5 * start).all()
-    assert (last > 2 * sure.deviation).any()
-    loop.on_features(seen[0], 0.51)
-    again = loop.expectation(0.51)
-    assert again is not None
-    np.testing.assert_allclose(again.deviation, sure.deviation, rtol=0.1)
-
-
-@pytest.mark.parametrize("lost", [0, 1])
-def test_one_band_alone_informs_and_is_called_partial(lost: int) -> None:
-    loop = started()
-    seen = build_feature_model(CONFIG).predict(REST)
-    assert seen is not None
-    features = seen[0].copy()
-    features[2 * lost : 2 * lost + 2] = np.nan
-    report = loop.on_features(features, 0.3)
-    assert report.status is Status.PARTIAL
-    assert 1 <= report.observable.sum() <= 2
-    np.testing.assert_allclose(report.state_estimate, REST, atol=1e-9)
-    np.testing.assert_array_equal(np.isnan(report.state_deviation), ~report.observable)
-    with pytest.raises(SignalError, match="features"):
-        loop.on_features([np.nan] * 4, 0.31)
-
-
-def test_the_states_deviation_is_the_covariance_through_the_pseudo_inverse() -> None:
-    loop = started()
-    prediction = build_feature_model(CONFIG).predict(REST)
-    assert prediction is not None
-    features, matrix = prediction
-    root = np.random.default_rng(0).normal(size=(4, 4))
-    covariance = root @ root.T
-    report = loop._report(features, 0.3, None, covariance)
-    inverse = np.linalg.pinv(matrix, rcond=1e-15)
-    expected = np.sqrt(np.diag(inverse @ covariance @ inverse.T))
-    np.testing.assert_allclose(report.state_deviation, expected, rtol=1e-8)

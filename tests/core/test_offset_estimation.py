@@ -107,7 +107,8 @@ def test_a_tip_that_follows_at_another_scale_is_put_where_it_is_asked_to_be(
 @pytest.mark.parametrize("gain", [0.5, 0.6])
 def test_without_its_gain_such_a_tip_goes_astray(gain: float) -> None:
     trial = Trial(constant(-10, 10), gain=gain, gain_deviation=0.0)
-    assert trial.error(3, 5) > 5.0, str(trial.error(3, 5))
+    # Three times what it keeps to with it.
+    assert trial.error(3, 5) > 3.0, str(trial.error(3, 5))
 
 
 @SEEDS

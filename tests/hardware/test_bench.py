@@ -15,7 +15,7 @@ from drive_rig import drives_document
 from tautscope.bench.rig import Bench, read_truth
 from tautscope.config import Config, dump_config, from_document
 from tautscope.dof import Dof
-from tautscope.errors import ConfigError
+from tautscope.errors import ConfigError, OutputError
 from tautscope.hardware.cameras import Camera, Capture
 from tautscope.hardware.experiment import run_on_hardware, write_run_folder
 from tautscope.hardware.timing import read_sent
@@ -118,6 +118,20 @@ def test_a_configuration_of_hardware_is_no_bench(
 ) -> None:
     with pytest.raises(ConfigError, match=where):
         Bench(bench_config(tmp_path, **changes))
+
+
+def test_sockets_that_cannot_be_made_are_named(tmp_path: Path) -> None:
+    config = bench_config(tmp_path)
+    with (
+        Bench(config),
+        pytest.raises(ConfigError, match=r"drives\.channel.*in use.*another bench"),
+    ):
+        Bench(config)
+    nowhere = config.replace(**{"camera.source.url": f"unix:{tmp_path / 'none' / 'video'}"})
+    with pytest.raises(ConfigError, match=r"camera\.source\.url.*No such file"):
+        Bench(nowhere).__enter__()
+    with pytest.raises(OutputError, match=r"--truth.*No such file"):
+        Bench(config, tmp_path / "none" / "truth.csv")
 
 
 def test_a_fault_that_is_none_is_refused(tmp_path: Path) -> None:

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from drive_rig import drives_config
 from tautscope.bench.can_bus import Hub, LocalBus
-from tautscope.bench.canopen_node import CanopenNode
 from tautscope.bench.drives import SimulatedDrives
 from tautscope.config import DrivesConfig
 from tautscope.dof import Dof
@@ -20,9 +19,7 @@ from tautscope.errors import (
     EmergencyError,
     FollowingError,
     HeartbeatError,
-    ModeRefusedError,
     SecondMasterError,
-    SettingRefusedError,
     SignalError,
     SilentDriveError,
     StateError,
@@ -32,10 +29,6 @@ from tautscope.hardware.drives import Drives, open_drives
 
 SPEED = np.array([0.01, 1.5, 0.8])
 Bench = Callable[..., SimulatedDrives]
-
-
-def hex_of(key: tuple[int, int]) -> str:
-    return f"{key[0]:04X}:{key[1]}"
 
 
 def drive(drives: Drives, cycles: int, speed: np.ndarray = SPEED) -> None:
@@ -120,87 +113,6 @@ def test_a_fault_is_kept_until_it_is_acknowledged(hub: Hub, bench: Bench) -> Non
         assert set(rig.states.values()) == {State.OPERATION_ENABLED}
 
 
-def test_a_mode_that_is_refused(hub: Hub, bench: Bench) -> None:
-    config = drives_config(channel=str(hub.path), state_timeout=0.2)
-    rig = bench(config, modes=(7,))
-    rig.inject("refuse", Dof.BENDING)
-    wait_for(lambda: any(event.what == "fault: refuse" for event in rig.events))
-    with pytest.raises(ModeRefusedError, match=r"bending, node 3: mode 7.*says 0"):
-        open_drives(config)
-
-
-def test_a_drive_without_a_streaming_mode(hub: Hub, bench: Bench) -> None:
-    config = drives_config(channel=str(hub.path))
-    bench(config, modes=(1, 3, 6))
-    with pytest.raises(ModeRefusedError, match="0x00000025: neither"):
-        open_drives(config)
-
-
-def test_a_drive_that_is_not_there(hub: Hub, bench: Bench) -> None:
-    config = drives_config(channel=str(hub.path), request_timeout=0.3)
-    bench(drives_config())
-    axis = {name: getattr(config.rotation, name) for name in config.rotation.__struct_fields__}
-    other = drives_config(
-        channel=str(hub.path), request_timeout=0.3, rotation=without_none(axis) | {"node": 9}
-    )
-    with pytest.raises(SilentDriveError, match=r"rotation, node 9.*Check drives.rotation.node"):
-        open_drives(other)
-
-
-def without_none(values: dict[str, object]) -> dict[str, object]:
-    return {name: value for name, value in values.items() if value is not None}
-
-
-def test_a_protection_the_drive_lacks_must_be_waived(hub: Hub, bench: Bench) -> None:
-    config = drives_config(channel=str(hub.path))
-    bench(config, absent=(0x6007, 0x6080))
-    with pytest.raises(SettingRefusedError, match=r"add 6007 to drives\.waive"):
-        open_drives(config)
-    with open_drives(drives_config(channel=str(hub.path), waive=["6007"])) as drives:
-        for one in drives.commissioned:
-            assert [name[:6] for name in one.absent] == ["0x6007", "0x6080"]
-
-
-@pytest.mark.parametrize("index", [0x6502, 0x6064, 0x1401, 0x1016])
-def test_an_object_that_cannot_be_missed(hub: Hub, bench: Bench, index: int) -> None:
-    config = drives_config(channel=str(hub.path))
-    bench(config, absent=(index,))
-    with pytest.raises(SettingRefusedError, match=r"insertion, node 1"):
-        open_drives(config)
-
-
-@pytest.mark.parametrize("key", [(0x605A, 0), (0x607D, 2), (0x1017, 0), (0x1401, 2)], ids=hex_of)
-def test_a_setting_that_reads_back_differently(
-    hub: Hub, bench: Bench, monkeypatch: pytest.MonkeyPatch, key: tuple[int, int]
-) -> None:
-    store = CanopenNode._store
-
-    def other(self: CanopenNode, where: tuple[int, int], value: int, now: float) -> int | None:
-        return store(self, where, value - (where == key), now)
-
-    monkeypatch.setattr(CanopenNode, "_store", other)
-    config = drives_config(channel=str(hub.path))
-    bench(config)
-    with pytest.raises(SettingRefusedError, match=rf"0x{key[0]:04X}:{key[1]}.*reads back"):
-        open_drives(config)
-
-
-def test_protections_and_limits_are_in_the_drive(hub: Hub, bench: Bench) -> None:
-    """In counts, with the rotation's sign -1 and home 0.25 rad worked out by hand."""
-    config = drives_config(channel=str(hub.path))
-    rig = bench(config)
-    with open_drives(config):
-        values = rig._drives[Dof.ROTATION].values
-        assert values[0x6007, 0] == 3
-        assert values[0x605A, 0] == 6
-        assert values[0x607D, 1] == -32_500  # -(3.5 - 0.25) 10000
-        assert values[0x607D, 2] == 32_500  # -(-3.0 - 0.25) 10000
-        assert values[0x607F, 0] == 200_000  # 20 rad/s
-        assert values[0x6080, 0] == 2930  # 200000 60 / 4096 = 2929.7 per minute
-        assert values[0x1017, 0] == 100
-        assert values[0x1016, 1] == 127 << 16 | 3000
-
-
 @pytest.mark.parametrize(
     ("command", "says"),
     [
@@ -223,17 +135,6 @@ def test_a_command_that_must_not_be_sent(
             drives.exchange(command)  # type: ignore[arg-type]
         assert at_rest(rig)
         assert not drives.running
-
-
-def test_a_motor_outside_its_travel_is_not_enabled(hub: Hub, bench: Bench) -> None:
-    config = drives_config(channel=str(hub.path))
-    rig = bench(config, start=np.array([0.0, 0.0, 2.5]))
-    with (
-        open_drives(config) as drives,
-        pytest.raises(FollowingError, match=r"bending.*outside its travel.*home, sign"),
-    ):
-        drives.start()
-    assert not any(event.what == State.OPERATION_ENABLED for event in rig.events)
 
 
 def test_an_encoder_that_jumps(hub: Hub, bench: Bench) -> None:
@@ -298,15 +199,6 @@ def test_the_bus_is_unplugged(hub: Hub, bench: Bench) -> None:
         drive(drives, 10_000)
     drives.close()
     wait_for(lambda: set(rig.states.values()) == {State.QUICK_STOP_ACTIVE})
-
-
-def test_there_is_no_bus() -> None:
-    with pytest.raises(BusError, match=r"tautscope /nowhere cannot be opened.*drives.interface"):
-        open_drives(drives_config(channel="/nowhere"))
-    with pytest.raises(BusError, match="sudo ip link set can7 up type can bitrate 1000000"):
-        open_drives(drives_config(interface="socketcan", channel="can7"))
-    with pytest.raises(BusError, match="cannot be opened"):
-        open_drives(drives_config(interface="no_such_interface"))
 
 
 def test_a_fault_that_does_not_exist(bench: Bench) -> None:

@@ -6,104 +6,17 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from itertools import pairwise
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 import pytest
-from drive_rig import drives_document
-from numpy.typing import ArrayLike, NDArray
-from tautscope.config import Config, from_document
+from fake_rig import CYCLE, HOME, Setup, rig_config
+from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import CameraError, ConfigError, FollowingError, SignalError, StateError
-from tautscope.hardware.cameras import CameraState, Capture
 from tautscope.hardware.rig import HardwareRig
 from tautscope.hardware.timing import Timing, read_sent
-from tautscope.rig import Frame, Rig
-
-HOME = np.array([0.01, 0.5, 0.2])
-CYCLE = 0.01
-
-
-class FakeMotors:
-    """Motors that are where they are told to be, and remember it."""
-
-    def __init__(self) -> None:
-        self.told: list[NDArray[np.float64]] = []
-        self.threads: set[str] = set()
-        self.stopped = 0
-        self.meanwhile: Callable[[], object] = lambda: None
-
-    def start(self) -> NDArray[np.float64]:
-        return HOME.copy()
-
-    def exchange(self, command: ArrayLike) -> NDArray[np.float64]:
-        self.meanwhile()
-        self.threads.add(threading.current_thread().name)
-        self.told.append(np.array(command))
-        return np.array(command)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *failure: object) -> None:
-        self.stopped += 1
-
-
-class FakeEye:
-    """A camera that has one frame to give whenever it is told to."""
-
-    def __init__(self) -> None:
-        self.next: Capture | None = None
-        self.trouble = ""
-        self.closed = 0
-
-    def see(self, captured_at: float, value: int, sequence: int = 0) -> None:
-        image = np.full((4, 4, 3), value, np.uint8)
-        self.next = Capture(Frame(image, captured_at, sequence), captured_at)
-
-    @property
-    def state(self) -> CameraState:
-        return CameraState(trouble=self.trouble)
-
-    def newest(self) -> Capture | None:
-        taken, self.next = self.next, None
-        return taken
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *failure: object) -> None:
-        self.closed += 1
-
-
-class Setup:
-    """A rig with what it moves and sees."""
-
-    def __init__(self, **changes: Any) -> None:
-        self.motors, self.eye, self.said = FakeMotors(), FakeEye(), list[str]()
-        self.config = rig_config(**changes)
-        self.rig = HardwareRig(
-            self.config,
-            motors=lambda _: self.motors,
-            eye=lambda _: self.eye,
-            say=self.said.append,
-        )
-
-
-def rig_config(
-    drives: dict[str, Any] | None = None,
-    source: dict[str, Any] | None = None,
-    period: float = CYCLE,
-) -> Config:
-    known = {"cycle": CYCLE, "reply_timeout": 0.009, "command_timeout": 60.0, "start_speed": 0.9}
-    patient = {"timeout": 60.0, "lost_timeout": 60.0}
-    return from_document(
-        {
-            "control": {"period": period},
-            "drives": drives_document(**(known | (drives or {}))),
-            "camera": {"source": patient | (source or {})},
-        }
-    )
+from tautscope.rig import Rig
 
 
 @pytest.fixture

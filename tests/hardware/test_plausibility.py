@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
@@ -27,19 +28,26 @@ def watch(
     seen: bool = True,
     noise: float = 0.0,
     config: Config = CONFIG,
+    delay: int = 0,
 ) -> None:
-    """Five periods of the article's sine; the tip from where it was and where the motor is."""
+    """Five periods of a sine; the tip from where it was and where the motor is.
+
+    What the loop makes of a frame is known ``delay`` frames of 0.04 s after it was captured.
+    """
     sine, random = config.experiment[dof], np.random.default_rng(0)
     plausibility, tip = Plausibility(CONFIG, START), float(START[dof])
+    under_way: deque[tuple[float, Any]] = deque()
     for time in np.arange(0, 5 * sine.period, 0.04):
         motor = START.copy()
         motor[dof] += sine.amplitude * np.sin(2 * np.pi * time / sine.period)
-        plausibility.tick(motor)
+        plausibility.tick(float(time), motor)
         tip = tip_of(tip, motor[dof])
         estimate = START.copy()
         estimate[dof] = tip + noise * random.standard_normal()
         report: Any = SimpleNamespace(state_estimate=estimate, observable=np.full(3, seen))
-        plausibility.frame(report)
+        under_way.append((float(time), report))
+        if len(under_way) > delay:
+            plausibility.frame(*under_way.popleft())
 
 
 def play(width: float) -> Callable[[float, float], float]:
@@ -50,6 +58,13 @@ def play(width: float) -> Callable[[float, float], float]:
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
 def test_a_tip_behind_slack_passes(dof: Dof, share: float) -> None:
     watch(dof, play(share * SLACK[dof]), noise=0.05 * CONFIG[dof].update_distance)
+
+
+@dofs
+def test_a_quick_motor_seen_late_passes(dof: Dof) -> None:
+    """The motor is compared with the tip of the same moment, not with where it has gone since."""
+    quick = CONFIG.replace(**{f"experiment.{dof.label}.period": 2.0})
+    watch(dof, play(SLACK[dof]), config=quick, delay=5)
 
 
 @dofs

@@ -8,83 +8,24 @@ Bmx    Baumueller b maXX 1000 parameter manual 5.07004.03, B.3, page 182
 EAO    EAO series 09 CANopen manual, page 51, after the CAN poster of CiA
 S300   Kollmorgen S300-S700 CANopen, December 2019, pages 52 and 134; Beckhoff AX2000, page 128
 Elmo1  Elmo MAN-CAN301IG 2.1, pages 4-6 and 4-9
-Elmo2  Elmo MAN-CAN402IG 1.2, pages 27 (controlword) and 86 (0x60C2)
-DS402  statusword patterns of CiA DS402-2 V3.0, as printed by Toshiba for VF-S15, 6.1.2
+Elmo2  Elmo MAN-CAN402IG 1.2, page 86 (0x60C2)
 Vect   Bonfiglioli Active, CANopen, 8.1.9 (0x1016)
 """
 
 from __future__ import annotations
 
-import itertools
-import struct
-from collections.abc import Callable
-from contextlib import suppress
-from pathlib import Path
-
-import can
 import pytest
-from drive_rig import AXES, drives_config
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from tautscope.bench.can_bus import Hub
+from drive_rig import drives_config
 from tautscope.bench.canopen_node import CanopenNode
-from tautscope.bench.drives import SimulatedDrive
+from tautscope.bench.drive import SimulatedDrive
 from tautscope.dof import Dof
-from tautscope.errors import (
-    ConfigError,
-    DriveError,
-    EmergencyError,
-    SecondMasterError,
-    SettingRefusedError,
-)
+from tautscope.errors import DriveError, EmergencyError, SecondMasterError, SettingRefusedError
 from tautscope.hardware import cia402
 from tautscope.hardware import object_dictionary as objects
-from tautscope.hardware.canopen_drives import CanopenLink
 from tautscope.hardware.cia402 import Mode, State
-from tautscope.hardware.drives import open_drives
 from tautscope.hardware.link import AbsentError
 from tautscope.hardware.object_dictionary import Entry
-
-
-def frame(identifier: int, data: bytes) -> str:
-    return f"{identifier:03X}#{data.hex().upper()}"
-
-
-class Transcript(can.BusABC):
-    """A bus that writes down what is sent and answers from a table."""
-
-    def __init__(self, answer: Callable[[str], list[str]] = lambda sent: []) -> None:
-        super().__init__(channel="transcript")
-        self.sent: list[str] = []
-        self.waiting: list[str] = []
-        self._answer = answer
-
-    def send(self, msg: can.Message, timeout: float | None = None) -> None:
-        self.sent.append(frame(msg.arbitration_id, bytes(msg.data)))
-        self.waiting += self._answer(self.sent[-1])
-
-    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
-        if not self.waiting:
-            return None, False
-        identifier, data = self.waiting.pop(0).split("#")
-        message = can.Message(
-            arbitration_id=int(identifier, 16), data=bytes.fromhex(data), is_extended_id=False
-        )
-        return message, False
-
-
-QUICK = {"heartbeat_period": 0.001, "cycle": 0.001, "reply_timeout": 5e-4}
-
-
-def link_to(answers: dict[str, str], node: int = 1) -> tuple[CanopenLink, Transcript]:
-    """A link whose insertion drive has this node id."""
-    bus = Transcript(lambda sent: [answers[sent]] if sent in answers else [])
-    others = [other for other in range(1, 5) if other != node]
-    axes = {
-        dof.label: AXES[dof.label] | {"node": number}
-        for dof, number in zip(Dof, [node, *others], strict=False)
-    }
-    return CanopenLink(drives_config(**QUICK, **axes), bus), bus
+from transcript import frame, link_to
 
 
 @pytest.mark.parametrize(
@@ -246,56 +187,6 @@ def test_a_second_master_is_an_error(foreign: str) -> None:
         link.close()
 
 
-MAPPINGS = {
-    objects.CONTROLWORD: 0x60400010,  # S300
-    objects.TARGET_POSITION: 0x607A0020,  # S300
-    objects.MODE_DISPLAY: 0x60610008,  # Bmx
-}
-
-
-@pytest.mark.parametrize("entry", MAPPINGS, ids=str)
-def test_mapping_of_an_object(entry: Entry) -> None:
-    assert entry.mapping == MAPPINGS[entry]
-
-
-PATTERNS = {  # DS402
-    State.NOT_READY: "x0xx0000",
-    State.SWITCH_ON_DISABLED: "x1xx0000",
-    State.READY: "x01x0001",
-    State.SWITCHED_ON: "x01x0011",
-    State.OPERATION_ENABLED: "x01x0111",
-    State.QUICK_STOP_ACTIVE: "x00x0111",
-    State.FAULT: "x0xx1000",
-    State.FAULT_REACTION: "x0xx1111",
-}
-COMMANDS = {  # Elmo2: bits 7, 3, 2, 1, 0; the other bits are not part of the command
-    cia402.SHUTDOWN: "0xxxx110",
-    cia402.SWITCH_ON: "0xxx0111",
-    cia402.DISABLE_VOLTAGE: "0xxxxx0x",
-    cia402.QUICK_STOP: "0xxxx01x",
-    cia402.ENABLE_OPERATION: "0xxx1111",
-    cia402.INTERPOLATE: "0xx11111",
-    cia402.FAULT_RESET: "1xxxxxxx",
-}
-
-
-def words(pattern: str) -> list[int]:
-    bits = [("0", "1") if bit == "x" else (bit,) for bit in pattern]
-    return [int("".join(chosen), 2) for chosen in itertools.product(*bits)]
-
-
-def test_every_statusword_of_the_standard() -> None:
-    for high in (0x00, 0x02, 0x16, 0xFF):
-        for state, pattern in PATTERNS.items():
-            for word in words(pattern):
-                assert cia402.state_of(high << 8 | word) is state, f"0x{high << 8 | word:04X}"
-
-
-@pytest.mark.parametrize("command", COMMANDS)
-def test_every_controlword_of_the_standard(command: int) -> None:
-    assert command in words(COMMANDS[command])
-
-
 def test_the_simulated_drive_answers_as_printed() -> None:
     """EPOS and Elmo1, from the other side: the drive's own statuswords, and its refusals."""
     said: list[str] = []
@@ -322,93 +213,3 @@ def test_the_simulated_drive_answers_as_printed() -> None:
     said.clear()
     drive.fail(0.0)
     assert said[0].startswith("082#1043")
-
-
-EDS = """[FileInfo]
-FileName=drive.eds
-[DeviceInfo]
-VendorNumber={vendor}
-[607F]
-ParameterName=Max profile velocity
-ObjectType=0x7
-DataType=0x0006
-AccessType=rw
-[6060]
-ParameterName=Modes of operation
-ObjectType=0x7
-DataType=0x0002
-AccessType=rw
-"""
-
-
-def test_the_eds_file_says_how_long_an_object_is(tmp_path: Path) -> None:
-    """Festo: 2B is a download of two bytes. Type 0x0006 is UNSIGNED16, as some drives have it."""
-    file = tmp_path / "drive.eds"
-    file.write_text(EDS.format(vendor=0), encoding="utf-8")
-    sent = "601#2B7F6000E8030000"
-    bus = Transcript(lambda frame: ["581#607F600000000000"] if frame == sent else [])
-    axis = AXES["insertion"] | {"eds": str(file)}
-    link = CanopenLink(drives_config(**QUICK, insertion=axis), bus)
-    try:
-        link.write(Dof.INSERTION, objects.PROFILE_SPEED_LIMIT, 0x03E8)
-        assert bus.sent == [sent]
-        with pytest.raises(SettingRefusedError, match=r"cannot hold 65536.*EDS"):
-            link.write(Dof.INSERTION, objects.PROFILE_SPEED_LIMIT, 65536)
-    finally:
-        link.close()
-
-
-def test_the_eds_file_of_another_drive_is_refused(
-    tmp_path: Path, hub: Hub, bench: Callable[..., object]
-) -> None:
-    file = tmp_path / "drive.eds"
-    file.write_text(EDS.format(vendor="0x9A"), encoding="utf-8")
-    axis = AXES["insertion"] | {"eds": str(file)}
-    config = drives_config(channel=str(hub.path), insertion=axis)
-    bench(config)
-    with pytest.raises(ConfigError, match=r"Vendor id\) is 0x0, not 0x9A") as found:
-        open_drives(config)
-    assert found.value.field == "drives.insertion.eds"
-
-
-frames = st.tuples(st.integers(0, 0x7FF), st.binary(max_size=8))
-requests = st.tuples(  # such as reach the server behind the SDO
-    st.just(0x602),
-    st.builds(
-        lambda command, entry, value: struct.pack("<BHBI", command, *entry, value),
-        st.sampled_from([0x40, 0x23, 0x2B, 0x2F, 0x80, 0x60]),
-        st.sampled_from([(entry.index, entry.subindex) for entry in objects.profile(2)]),
-        st.integers(0, 2**32 - 1) | st.integers(0, 255),
-    ),
-)
-
-
-def test_no_frame_brings_either_side_down() -> None:
-    """Whatever comes: the drive answers or ignores it, the master's errors are its own."""
-    link, bus = link_to({})
-    drive = SimulatedDrive(
-        Dof.ROTATION,
-        drives_config(),
-        lambda identifier, data: None,
-        lambda now, what: None,
-        modes=frozenset({7, 8}),
-    )
-
-    @settings(deadline=None)
-    @given(st.lists(frames | requests | st.just((0x080, b"")), max_size=40))
-    def check(received: list[tuple[int, bytes]]) -> None:
-        drive.boot(0.0)
-        drive.take(0x000, bytes.fromhex("0102"), 0.0)
-        for number, (identifier, data) in enumerate(received):
-            drive.take(identifier, data, number * 0.01)
-            drive.tick(number * 0.01)
-        link.operational()
-        bus.waiting += [frame(identifier, data) for identifier, data in received]
-        with suppress(DriveError):
-            link.cycle([0] * 3, [0] * 3)
-
-    try:
-        check()
-    finally:
-        link.abandon([])
-        link.close()

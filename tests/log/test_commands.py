@@ -62,14 +62,16 @@ def test_recover_mends_a_torn_log(capsys: Capture, torn: Path) -> None:
 def test_export_writes_csv_and_a_bag(capsys: Capture, torn: Path, recorded: Recorded) -> None:
     assert main(["export", str(torn), "--csv"]) == 0
     folder = torn.with_name("torn-csv")
-    assert str(folder) in capsys.readouterr().out
+    assert str(folder) in (said := capsys.readouterr().out)
+    assert f"{torn} is torn" in said
     trace = Recording.load(folder).trace
     np.testing.assert_array_equal(
         per_dof(trace, "command"), per_dof(recorded[1].trace, "command")[: len(trace)]
     )
     assert main(["export", str(torn), "--rosbag", str(torn.with_name("bag"))]) == 0
     with AnyReader([torn.with_name("bag")]) as reader:
-        assert f"{reader.message_count} messages" in capsys.readouterr().out
+        assert f"{reader.message_count} messages" in (said := capsys.readouterr().out)
+    assert f"{torn} is torn" in said
     with pytest.raises(SystemExit):
         main(["export", str(torn)])
 

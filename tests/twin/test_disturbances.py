@@ -11,10 +11,7 @@ import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tautscope import demo
-from tautscope.cli import main
-from tautscope.config import DISTURBANCES, Config, dump_config, load_config
-from tautscope.errors import ConfigError
+from tautscope.config import DISTURBANCES, Config
 from tautscope.rig import Frame
 from tautscope.twin import Twin, obstacles, optics
 from tautscope.twin.camera import Picture, TwinCamera
@@ -23,7 +20,6 @@ from tautscope.twin.drift import Bands, Drift
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 import condition_frames as frames_of
-import conditions
 
 Array = NDArray[Any]
 
@@ -278,42 +274,6 @@ def test_all_at_once_at_any_pose_and_size() -> None:
             np.testing.assert_array_equal(known, np.repeat(picture.true_visible > 0, 2))
 
 
-def test_an_unknown_name_is_refused_with_those_there_are(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    with pytest.raises(ConfigError) as error:
-        Config().replace(**{"twin.disturb": ("smoke", "smog")})
-    assert error.value.field == "twin.disturb[1]"
-    assert all(name in error.value.allowed for name in DISTURBANCES)
-    assert main(["demo", "--disturb", "smoke,smog"]) == 2
-    message = capsys.readouterr().err
-    assert "'smog'" in message and "white_balance" in message
-
-
-def test_the_command_line_takes_several_names_and_a_background(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    seen: list[Config] = []
-
-    def stop(config: Config, *_: object) -> None:
-        seen.append(config)
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(demo, "run_demo", stop)
-    monkeypatch.chdir(tmp_path)
-    assert main(["demo", "--background", str(tmp_path), "--disturb", "smoke, debris"]) == 130
-    assert seen[0].twin.disturb == ("smoke", "debris")
-    assert seen[0].twin.background == str(tmp_path)
-
-
-def test_a_configuration_with_disturbances_is_read_back(tmp_path: Path) -> None:
-    config = Config().replace(**{"twin.disturb": ["smoke", "debris"]})
-    assert config.twin.disturb == ("smoke", "debris")
-    file = tmp_path / "c.toml"
-    file.write_text(dump_config(config), encoding="utf-8")
-    assert load_config(file) == config
-
-
 def test_frames_of_the_twin_carry_the_visible_share() -> None:
     config = Config().replace(**{"twin.disturb": ("debris",), "twin.latency_jitter": 0.0})
     twin = Twin(config)
@@ -326,34 +286,3 @@ def test_frames_of_the_twin_carry_the_visible_share() -> None:
     for frame in frames:
         assert frame.true_visible is not None and frame.true_visible.shape == (2,)
         assert ((frame.true_visible >= 0) & (frame.true_visible <= 1)).all()
-
-
-def test_the_benchmark_counts_what_it_says() -> None:
-    names = ("clean", "debris", "no instrument")
-    looks = [
-        look
-        for name in names
-        for look in frames_of.judge(frames_of.Job(name, seed=0, real=False, frames=4))
-    ]
-    assert len(looks) == 12
-    rows = conditions.to_rows(looks)
-    assert {row["profile"] for row in rows} == {*names, "all"}
-    for row in rows:
-        good = (
-            row["pooled"] <= row["goal"] if row["sense"] == "max" else row["pooled"] >= row["goal"]
-        )
-        assert row["holds"] == good
-    errors = [k.error[0] for k in looks if k.condition == "clean" and k.valid[0]]
-    rms = next(
-        row["pooled"]
-        for row in rows
-        if row["profile"] == "clean" and row["what"] == "marker error, with prediction"
-    )
-    assert rms == pytest.approx(np.sqrt(np.mean(np.square(errors))))
-    assert conditions.table(rows).count("\n") == 1 + len(names) + 1
-    # Something reported where there is nothing is wrong, however near.
-    wrong = frames_of.Look(
-        "no instrument", 0, False, 0, STATE, 0.0, (True, False), (np.full(2, np.inf),) * 2
-    )
-    assert wrong.wrong(0) and not wrong.wrong(1)
-    assert conditions.wrong_accepted([wrong], 0) == 100

@@ -66,28 +66,11 @@ impl MarkerDetector {
             .into_iter()
             .map(|(weights, threshold)| ColorDiscriminant::new(weights, threshold))
             .collect();
-        let [
-            inside,
-            coverage,
-            spill,
-            edges,
-            edges_on_average,
-            edges_alone,
-            surprise,
-        ] = demands;
         Ok(Self {
             format: PixelFormat::named(pixel_format).map_err(refused(py))?,
             model: model.0,
             model_deviation,
-            demands: Demands {
-                inside,
-                coverage,
-                spill,
-                edges,
-                edges_on_average,
-                edges_alone,
-                surprise,
-            },
+            demands: demands.into(),
             segmenter: Segmenter::new(discriminant, smoothing),
             detector: Mutex::new(
                 detector

@@ -70,9 +70,7 @@ impl WeightedEstimator {
         measured_features: Vector<'py>,
         covariance: Option<Table<'py>>,
     ) -> PyResult<Option<Estimate<'py>>> {
-        let covariance = covariance
-            .map(|covariance| square("covariance", &covariance))
-            .transpose()?;
+        let covariance = known(covariance)?;
         let belief = core::Belief {
             state: fixed("belief", &belief)?,
             deviation: fixed("deviation", &deviation)?,
@@ -109,9 +107,7 @@ impl WeightedEstimator {
         measured_features: Table<'py>,
         covariance: Option<Table<'py>>,
     ) -> PyResult<Estimates<'py>> {
-        let covariance = covariance
-            .map(|covariance| square("covariance", &covariance))
-            .transpose()?;
+        let covariance = known(covariance)?;
         let states: Vec<[f64; 3]> = rows("beliefs", &beliefs)?;
         let measured: Vec<[f64; 4]> = rows("measured_features", &measured_features)?;
         same_length(py, "measured_features", measured.len(), states.len())?;
@@ -136,4 +132,9 @@ impl WeightedEstimator {
             table(py, &found.2)?,
         ))
     }
+}
+
+fn known(covariance: Option<Table<'_>>) -> PyResult<Option<[[f64; 4]; 4]>> {
+    let table = covariance.as_ref();
+    table.map(|table| square("covariance", table)).transpose()
 }

@@ -18,6 +18,11 @@ pub fn scale(factor: f64, vector: Vector) -> Vector {
     vector.map(|value| factor * value)
 }
 
+/// Entry by entry.
+pub fn times([a, b, c]: Vector, [x, y, z]: Vector) -> Vector {
+    [a * x, b * y, c * z]
+}
+
 pub fn rotate(rows: &Matrix, vector: Vector) -> Vector {
     rows.map(|row| dot(row, vector))
 }

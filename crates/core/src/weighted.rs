@@ -1,13 +1,13 @@
 //! The state estimate of profile `best`: weighted, iterated, and not led astray by a wrong marker.
 
-use crate::dof::{PerDof, all_finite};
+use crate::dof::PerDof;
 use crate::error::{ConfigError, require, require_non_negative, require_positive};
 use crate::features::FeatureModel;
-use crate::linear::{
-    Matrix, add, diagonal_of_inverse, dot, rotate, scale, solve_symmetric, square,
-};
+use crate::linear::{add, diagonal_of_inverse, dot, rotate, square, times};
+use crate::normal_equations::NormalEquations;
 use crate::posture::Belief;
-use crate::state::{StateEstimate, StateEstimator, found};
+use crate::sight::{Sights, both, only, sights};
+use crate::state::{StateEstimate, StateEstimator};
 
 /// A step goes no farther, in the belief's standard deviations: bent to the other side and turned by half a turn the
 /// instrument looks the same, and a long step may end there.
@@ -25,7 +25,6 @@ const STARTS: [PerDof<f64>; 6] = [
     [1.0, 0.0, 0.0],
     [-1.0, 0.0, 0.0],
 ];
-const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 /// What a [`WeightedEstimator`] is set to.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -86,24 +85,6 @@ pub struct WeightedEstimate {
     pub used: [bool; 2],
 }
 
-/// A marker's place, and the rows that make its error white.
-#[derive(Clone, Copy)]
-struct Sight {
-    place: [f64; 2],
-    whitener: [[f64; 2]; 2],
-}
-
-/// The problem about one state, in units of the belief's deviations, w eliminated.
-#[derive(Clone, Copy)]
-struct Linear {
-    /// Of the image alone.
-    normal: Matrix,
-    right: PerDof<f64>,
-    /// (q - belief) / deviation.
-    away: PerDof<f64>,
-    cost: f64,
-}
-
 impl WeightedEstimator {
     /// An estimator that watches the rank by `watch`.
     ///
@@ -136,7 +117,12 @@ impl WeightedEstimator {
         measured: [f64; 4],
         covariance: Option<&[[f64; 4]; 4]>,
     ) -> Option<WeightedEstimate> {
-        let sights = self.sights(measured, covariance);
+        let sights = sights(
+            measured,
+            covariance,
+            self.settings.marker_deviation,
+            self.settings.model_deviation,
+        );
         let (state, used) = self.most_probable(model, belief, sights)?;
         let [a, b] = used;
         let [ua, va, ub, vb] = measured;
@@ -145,9 +131,10 @@ impl WeightedEstimator {
 
         let prediction = model.predict(state)?;
         let watched = self.watch.estimate(state, &prediction, kept);
-        let linear = self.linear(model, belief, state, only(used, sights))?;
-        let variance = diagonal_of_inverse(linear.whole())?;
-        let (image_state, image_deviation) = linear.alone(belief, state, watched.observable);
+        let equations = self.equations(model, belief, state, only(used, sights))?;
+        let variance = diagonal_of_inverse(equations.whole())?;
+        let (image_state, image_deviation) =
+            equations.image_alone(belief, state, watched.observable);
         let start = model.predict(belief.state)?;
         let mut innovation = measured;
         for (value, predicted) in innovation.iter_mut().zip(start.features) {
@@ -167,45 +154,12 @@ impl WeightedEstimator {
         })
     }
 
-    fn sights(&self, measured: [f64; 4], covariance: Option<&[[f64; 4]; 4]>) -> [Option<Sight>; 2] {
-        let model = square(self.settings.model_deviation);
-        let own = square(self.settings.marker_deviation);
-        let ((a, b, c), (d, e, f)) = match covariance {
-            Some(&[[a, b, _, _], [_, c, _, _], [_, _, d, e], [_, _, _, f]]) => {
-                ((a, b, c), (d, e, f))
-            }
-            None => ((own, 0.0, own), (own, 0.0, own)),
-        };
-        let [ua, va, ub, vb] = measured;
-        let [found_a, found_b] = found(measured);
-        let sight = |place: [f64; 2], uu: f64, uv: f64, vv: f64| {
-            // The inverse of Cholesky's factor.
-            let first = 1.0 / libm::sqrt(uu + model);
-            let mixed = uv * first;
-            let second = 1.0 / libm::sqrt(vv + model - mixed * mixed);
-            let whitener = [[first, 0.0], [-second * mixed * first, second]];
-            let finite = all_finite(place) && first.is_finite() && second.is_finite();
-            finite.then_some(Sight { place, whitener })
-        };
-        let seen_a = if found_a {
-            sight([ua, va], a, b, c)
-        } else {
-            None
-        };
-        let seen_b = if found_b {
-            sight([ub, vb], d, e, f)
-        } else {
-            None
-        };
-        [seen_a, seen_b]
-    }
-
     /// The state, and which markers it rests on.
     fn most_probable(
         &self,
         model: &FeatureModel,
         belief: &Belief,
-        sights: [Option<Sight>; 2],
+        sights: Sights,
     ) -> Option<(PerDof<f64>, [bool; 2])> {
         let seen = sights.map(|sight| sight.is_some());
         let price = square(self.settings.outlier_distance);
@@ -246,10 +200,10 @@ impl WeightedEstimator {
         model: &FeatureModel,
         belief: &Belief,
         start: PerDof<f64>,
-        sights: [Option<Sight>; 2],
+        sights: Sights,
     ) -> Option<(PerDof<f64>, f64)> {
         let mut state = start;
-        let mut here = self.linear(model, belief, state, sights)?;
+        let mut here = self.equations(model, belief, state, sights)?;
         for _ in 0..self.settings.steps {
             let Some(step) = here.step() else { break };
             let size = dot(step, rotate(&here.whole(), step));
@@ -260,7 +214,7 @@ impl WeightedEstimator {
             let better = (0..HALVINGS).find_map(|_| {
                 let trial = add(state, share, times(step, belief.deviation));
                 share /= 2.0;
-                let there = self.linear(model, belief, trial, sights)?;
+                let there = self.equations(model, belief, trial, sights)?;
                 (there.cost <= here.cost).then_some((trial, there))
             });
             let Some((trial, there)) = better else { break };
@@ -272,112 +226,14 @@ impl WeightedEstimator {
         Some((state, here.cost))
     }
 
-    fn linear(
+    fn equations(
         &self,
         model: &FeatureModel,
         belief: &Belief,
         state: PerDof<f64>,
-        sights: [Option<Sight>; 2],
-    ) -> Option<Linear> {
-        let prediction = model.predict(state)?;
-        let sideways = scaled(self.settings.sideways_deviation, model.sideways(state)?);
-        let [q1, q2, q3] = state;
-        let [b1, b2, b3] = belief.state;
-        let [d1, d2, d3] = belief.deviation;
-        let away = [(q1 - b1) / d1, (q2 - b2) / d2, (q3 - b3) / d3];
-        let [c1, c2, c3] = prediction.columns;
-        let [c1, c2, c3] = [scaled(d1, c1), scaled(d2, c2), scaled(d3, c3)];
-
-        let mut normal = [[0.0; 3]; 3];
-        let mut right = [0.0; 3];
-        let mut cost = dot(away, away);
-        // Of w: its own normal entry, those with q, and its right side.
-        let (mut own, mut with, mut pull) = (1.0, [0.0; 3], 0.0);
-        let halves = |[a0, a1, b0, b1]: [f64; 4]| [[a0, a1], [b0, b1]];
-        let [features, c1, c2, c3, sideways] =
-            [prediction.features, c1, c2, c3, sideways].map(halves);
-        let columns = c1.iter().zip(c2).zip(c3).zip(sideways);
-        for ((sight, predicted), (((c1, c2), c3), g)) in sights.iter().zip(features).zip(columns) {
-            let Some(Sight { place, whitener }) = sight else {
-                continue;
-            };
-            let ([u, v], [pu, pv]) = (*place, predicted);
-            for [first, second] in *whitener {
-                let white = |[u, v]: [f64; 2]| first * u + second * v;
-                let row = [white(*c1), white(c2), white(c3)];
-                let (misfit, g) = (white([u - pu, v - pv]), white(g));
-                for (line, entry) in normal.iter_mut().zip(row) {
-                    *line = add(*line, entry, row);
-                }
-                right = add(right, misfit, row);
-                with = add(with, g, row);
-                own += g * g;
-                pull += g * misfit;
-                cost += misfit * misfit;
-            }
-        }
-        for (line, entry) in normal.iter_mut().zip(with) {
-            *line = add(*line, -entry / own, with);
-        }
-        Some(Linear {
-            normal,
-            right: add(right, -pull / own, with),
-            away,
-            cost: cost - pull * pull / own,
-        })
-        .filter(|linear| linear.cost.is_finite())
+        sights: Sights,
+    ) -> Option<NormalEquations> {
+        let sideways = self.settings.sideways_deviation;
+        NormalEquations::about(state, model, belief, sights, sideways)
     }
-}
-
-impl Linear {
-    /// Of image and belief.
-    fn whole(&self) -> Matrix {
-        let mut whole = self.normal;
-        for (line, unit) in whole.iter_mut().zip(IDENTITY) {
-            *line = add(*line, 1.0, unit);
-        }
-        whole
-    }
-
-    fn step(&self) -> Option<PerDof<f64>> {
-        solve_symmetric(self.whole(), add(self.right, -1.0, self.away))
-    }
-
-    /// State and deviation from the image alone, the DOFs it does not determine left where they are.
-    fn alone(
-        &self,
-        belief: &Belief,
-        state: PerDof<f64>,
-        observable: PerDof<bool>,
-    ) -> (PerDof<f64>, PerDof<f64>) {
-        let mask = observable.map(|seen| if seen { 1.0 } else { 0.0 });
-        let mut normal = self.normal;
-        for ((line, unit), own) in normal.iter_mut().zip(IDENTITY).zip(mask) {
-            *line = add(scale(own, times(*line, mask)), 1.0 - own, unit);
-        }
-        let solved = solve_symmetric(normal, times(self.right, mask));
-        let (Some(step), Some(variance)) = (solved, diagonal_of_inverse(normal)) else {
-            return ([f64::NAN; 3], [f64::NAN; 3]);
-        };
-        let seen = observable.map(|seen| if seen { 1.0 } else { f64::NAN });
-        let moved = add(state, 1.0, times(step, belief.deviation));
-        let deviation = times(variance.map(libm::sqrt), belief.deviation);
-        (times(moved, seen), times(deviation, seen))
-    }
-}
-
-fn only([a, b]: [bool; 2], [sight_a, sight_b]: [Option<Sight>; 2]) -> [Option<Sight>; 2] {
-    [sight_a.filter(|_| a), sight_b.filter(|_| b)]
-}
-
-fn both([a, b]: [bool; 2], [c, d]: [bool; 2]) -> [bool; 2] {
-    [a && c, b && d]
-}
-
-fn scaled(factor: f64, column: [f64; 4]) -> [f64; 4] {
-    column.map(|value| factor * value)
-}
-
-fn times([a, b, c]: PerDof<f64>, [x, y, z]: PerDof<f64>) -> PerDof<f64> {
-    [a * x, b * y, c * z]
 }

@@ -7,10 +7,16 @@ use crate::layer::Layer;
 use crate::linear::{Square, apply, inverse, quadratic};
 use crate::numbers::whole;
 use crate::patch::{Patch, SIDE};
+use crate::samples::{Errors, Sums, UNKNOWNS, left, sums};
 use crate::{Demands, Evidence, Expect, Expectation, Frame, Outline, Verdict};
 
 /// Steps to the best place.
 const STEPS: usize = 16;
+/// After so many, less than this share of the light explained is not worth the others.
+const TRIAL: usize = 4;
+const HOPELESS: f64 = 0.3;
+/// Places that move by less than this are found (px).
+const STILL: f64 = 0.05;
 /// The longest of a place, in one step (px).
 const STRIDE: f64 = 2.5;
 /// Spread of the blur (px): where it starts, its own standard deviation, and its limits.
@@ -31,13 +37,10 @@ const SURE: f64 = 1.2;
 const MODEL: f64 = 0.25;
 /// Largest spread of the blur in a sharp frame (px).
 const SHARP: f64 = 1.0;
-/// Deviation of the tissue's colour relative to its redness: where it starts, and the least.
+/// Deviation of the tissue's colour relative to its redness, where it starts.
 const MOTLEY: f64 = 0.05;
-const LEAST_MOTLEY: f64 = 0.015;
 /// How far around the outlines light is looked at (px).
 const AROUND: f64 = 14.0;
-/// Places, light of A and B, ground, spread, and how the tissue's colour changes.
-const UNKNOWNS: usize = 12;
 
 /// Two bands in place by their light.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -172,7 +175,7 @@ impl Blend {
             let Sums {
                 mut normal,
                 mut right,
-            } = self.sums(light, spread, &errors);
+            } = sums(&self.patch, &self.layers, light, spread, &errors);
             let away: [f64; 4] = std::array::from_fn(|i| blind.features[i] - place[i]);
             for (row, pull) in apply(&prior, away).into_iter().enumerate() {
                 right[row] += pull;
@@ -188,9 +191,7 @@ impl Blend {
             let looseness = SPREAD_DEVIATION.powi(-2);
             normal[7][7] += looseness;
             right[7] += looseness * (SPREAD - spread);
-            for (index, row) in normal.iter_mut().enumerate().skip(6) {
-                row[index] += 1e-9;
-            }
+            (6..UNKNOWNS).for_each(|index| normal[index][index] += 1e-9);
             let covariance = inverse(normal)?;
             let found = apply(&covariance, right);
             let longest = found[..4].iter().fold(0.0_f64, |most, d| most.max(d.abs()));
@@ -211,7 +212,7 @@ impl Blend {
                     found[7].clamp(-0.5, 0.5)
                 })
             .clamp(SPREADS[0], SPREADS[1]);
-            let left = self.left(&found, light, grain);
+            let left = left(&self.patch, &self.layers, &found, light, grain);
             motley = left.motley;
             let away: [f64; 4] = std::array::from_fn(|i| blind.features[i] - place[i]);
             result = Some(Blended {
@@ -228,7 +229,10 @@ impl Blend {
                 surprise: quadratic(&prior, away),
                 outlines,
             });
-            if step > STEPS / 2 && longest < 0.02 {
+            if step == TRIAL && left.explained < HOPELESS {
+                return None;
+            }
+            if step > STEPS / 2 && longest < STILL {
                 break;
             }
         }
@@ -253,122 +257,4 @@ impl Blend {
         self.patch.unmix(&grown);
         Some(self.patch.grain())
     }
-
-    /// The normal equations over all samples: steps of the four places, light of A and B, ground, step of the spread.
-    fn sums(&self, light: [f64; 2], spread: f64, errors: &Errors) -> Sums {
-        let columns = self.patch.columns;
-        let rows = self.patch.green.len() / columns.max(1);
-        let step = self.patch.step;
-        let mut sums = Sums {
-            normal: [[0.0; UNKNOWNS]; UNKNOWNS],
-            right: [0.0; UNKNOWNS],
-        };
-        for v in 1..rows.saturating_sub(1) {
-            for u in 1..columns.saturating_sub(1) {
-                let at = v * columns + u;
-                let mut row = [0.0; UNKNOWNS];
-                row[6] = 1.0;
-                row[8..].copy_from_slice(&self.patch.tissue(at));
-                for (band, layer) in self.layers.iter().enumerate() {
-                    let [here, left, right, above, below] =
-                        [at, at - 1, at + 1, at - columns, at + columns].map(|index| {
-                            f64::from(layer.share.get(index).copied().unwrap_or_default())
-                        });
-                    row[2 * band] = -light[band] * (right - left) / (2.0 * step);
-                    row[2 * band + 1] = -light[band] * (below - above) / (2.0 * step);
-                    row[4 + band] = here;
-                    row[7] += light[band] * spread * (left + right + above + below - 4.0 * here)
-                        / (step * step);
-                }
-                let green = f64::from(self.patch.green.get(at).copied().unwrap_or_default());
-                let weight = errors.weight(self.patch.redness(at));
-                for (index, own) in row.iter().enumerate() {
-                    let weighted = weight * own;
-                    sums.right[index] += weighted * green;
-                    let below = sums.normal[index].iter_mut().zip(row).take(index + 1);
-                    for (entry, other) in below {
-                        *entry += weighted * other;
-                    }
-                }
-            }
-        }
-        for i in 0..UNKNOWNS {
-            for j in 0..i {
-                sums.normal[j][i] = sums.normal[i][j];
-            }
-        }
-        sums
-    }
-
-    /// What is left of the light when the bands are taken out.
-    fn left(&self, found: &[f64; UNKNOWNS], light: [f64; 2], grain: f64) -> Left {
-        let (mut count, mut sum, mut square, mut left) = (0.0, 0.0, 0.0, 0.0);
-        let (mut hue, mut fourth) = (0.0, 0.0);
-        let [a, b] = &self.layers;
-        for (at, ((green, a), b)) in self
-            .patch
-            .green
-            .iter()
-            .zip(&a.share)
-            .zip(&b.share)
-            .enumerate()
-        {
-            let tissue = self.patch.tissue(at);
-            let tissue: f64 = tissue
-                .iter()
-                .zip(&found[8..])
-                .map(|(value, by)| value * by)
-                .sum();
-            let green = f64::from(*green) - tissue - found[6];
-            let model = light[0] * f64::from(*a) + light[1] * f64::from(*b);
-            let red = self.patch.redness(at).powi(2);
-            let missed = (green - model).powi(2);
-            count += 1.0;
-            sum += green;
-            square += green * green;
-            left += missed;
-            hue += (missed - grain) * red;
-            fourth += red * red;
-        }
-        let variance = square - sum * sum / f64::max(count, 1.0) - count * grain;
-        Left {
-            explained: 1.0 - f64::max(left - count * grain, 0.0) / f64::max(variance, 1.0),
-            noise: (left / f64::max(count, 1.0)).sqrt(),
-            motley: (hue / f64::max(fourth, 1.0))
-                .max(0.0)
-                .sqrt()
-                .max(LEAST_MOTLEY),
-        }
-    }
-}
-
-struct Left {
-    explained: f64,
-    noise: f64,
-    motley: f64,
-}
-
-/// How far a sample may be from the model.
-struct Errors {
-    /// Variance of the sensor's noise (grey levels squared).
-    grain: f64,
-    /// Samples that err alike.
-    alike: f64,
-    /// Deviation of a band's light (grey levels).
-    uneven: f64,
-    /// Deviation of the tissue's colour, relative to its redness.
-    motley: f64,
-}
-
-impl Errors {
-    /// One over the variance of a sample so red.
-    fn weight(&self, redness: f64) -> f64 {
-        let own = self.uneven.powi(2) + (self.motley * redness).powi(2);
-        1.0 / (self.grain + self.alike * own).max(1.0)
-    }
-}
-
-struct Sums {
-    normal: Square<UNKNOWNS>,
-    right: [f64; UNKNOWNS],
 }

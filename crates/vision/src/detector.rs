@@ -72,7 +72,7 @@ impl Detector {
     }
 
     /// Recognises the markers by what `expect` says of them: in the window where they should be if
-    /// that is small, and in the whole frame if they are not clear there.
+    /// that is small, there by their light if their edges are not clear, and in the whole frame if neither is there.
     ///
     /// Allocates only when a frame is larger than those before.
     pub fn recognise(
@@ -81,57 +81,50 @@ impl Detector {
         expect: &impl Expect,
         demands: &Demands,
     ) -> (Verdict, &[Region]) {
-        let before = expect.expect([0.0; 4], [f64::INFINITY; 4]);
-        let window = before.and_then(|expectation| expectation.window(frame));
-        if let Some(window) = window {
-            self.find(frame, window);
-            let verdict = judge(&self.regions, &self.map, expect, demands);
-            if verdict.is_clear() {
-                return (verdict, &self.regions);
-            }
-        }
-        self.find(frame, Window::whole(frame));
-        let mut verdict = judge(&self.regions, &self.map, expect, demands);
+        let blind = expect.expect([0.0; 4], [f64::INFINITY; 4]);
+        let near = blind.and_then(|blind| Some((blind, blind.window(frame)?)));
+        let whole = Window::whole(frame);
+        let window = near.map_or(whole, |(_, window)| window);
+        let mut verdict = self.search(frame, window, expect, demands);
         if verdict.is_clear() {
             return (verdict, &self.regions);
         }
         // Light says less than edges: it is asked only where it is known where to look.
-        let near = before.filter(|_| window.is_some());
-        let lit = near.and_then(|blind| self.by_light(frame, expect, &blind, &verdict, demands));
-        if let Some(lit) = lit
-            && let Some(again) = judge_at(lit.features, [1.0; 4], &self.map, expect, demands)
-            && again.score() > verdict.score()
-        {
-            verdict = again;
-        }
-        self.try_alternatives(frame, expect, demands, &mut verdict);
-        if let Some(lit) = lit
-            && (verdict.reasons != [None; 2] || lit.is_blurred() && !verdict.is_clear())
-        {
-            verdict = lit.verdict();
+        if let Some((blind, window)) = near {
+            if let Some(lit) = self.by_light(frame, expect, &blind, &verdict, demands) {
+                verdict = self.weighed(frame, window, expect, demands, &verdict, &lit);
+            }
+            if verdict.reasons.iter().all(Option::is_some) {
+                let anywhere = self.search(frame, whole, expect, demands);
+                if anywhere.score() > verdict.score() {
+                    verdict = anywhere;
+                }
+            }
         }
         (verdict, &self.regions)
     }
 
-    /// Replaces a verdict that is not clear by a better one, from another discriminant.
-    fn try_alternatives(
+    /// The best verdict of all discriminants in a window, or the first that is clear.
+    fn search(
         &mut self,
         frame: &impl Frame,
+        window: Window,
         expect: &impl Expect,
         demands: &Demands,
-        verdict: &mut Verdict,
-    ) {
+    ) -> Verdict {
+        self.find(frame, window);
+        let mut verdict = judge(&self.regions, &self.map, expect, demands);
         for index in 0..self.alternatives.len() {
             if verdict.is_clear() {
                 break;
             }
             std::mem::swap(&mut self.best, &mut self.regions);
             self.exchange(index);
-            self.find(frame, Window::whole(frame));
+            self.find(frame, window);
             self.exchange(index);
             let other = judge(&self.regions, &self.map, expect, demands);
             if other.score() > verdict.score() {
-                *verdict = Verdict {
+                verdict = Verdict {
                     discriminant: index + 1,
                     ..other
                 };
@@ -139,9 +132,37 @@ impl Detector {
                 std::mem::swap(&mut self.best, &mut self.regions);
             }
         }
+        verdict
     }
 
-    /// The bands by their light, if that is good: from where the outlines were laid, and from where they are expected.
+    /// The best of a verdict that is not clear, what edges say where the light has the bands, and the light itself.
+    fn weighed(
+        &mut self,
+        frame: &impl Frame,
+        window: Window,
+        expect: &impl Expect,
+        demands: &Demands,
+        verdict: &Verdict,
+        lit: &Blended,
+    ) -> Verdict {
+        std::mem::swap(&mut self.best, &mut self.regions);
+        self.find(frame, window);
+        let again = judge_at(lit.features, [1.0; 4], &self.map, expect, demands);
+        let edges = match again {
+            Some(again) if again.score() > verdict.score() => again,
+            _ => {
+                std::mem::swap(&mut self.best, &mut self.regions);
+                *verdict
+            }
+        };
+        if edges.reasons != [None; 2] || lit.is_blurred() && !edges.is_clear() {
+            lit.verdict()
+        } else {
+            edges
+        }
+    }
+
+    /// The bands by their light, if that is good: from where the outlines were laid, or else from where they are expected.
     fn by_light(
         &mut self,
         frame: &impl Frame,
@@ -152,16 +173,12 @@ impl Detector {
     ) -> Option<Blended> {
         let [[ua, va], [ub, vb]] = verdict.bands.map(|band| band.centroid);
         let starts = [[ua, va, ub, vb], blind.features];
-        let mut best: Option<Blended> = None;
-        for start in starts {
-            if start.iter().all(|value| value.is_finite())
-                && let Some(found) = self.blend.fit(frame, expect, blind, start)
-                && best.is_none_or(|best| found.explained > best.explained)
-            {
-                best = Some(found);
-            }
-        }
-        best.filter(|found| found.is_good(demands))
+        let finite = starts
+            .into_iter()
+            .filter(|start| start.iter().all(|value| value.is_finite()));
+        finite
+            .filter_map(|start| self.blend.fit(frame, expect, blind, start))
+            .find(|found| found.is_good(demands))
     }
 
     /// The regions in some windows, the largest first, at most [`CANDIDATES`]; each ends where its
@@ -205,6 +222,9 @@ impl Detector {
         };
         labeller.start(frame.width());
         segmenter.each_row_in(frame, window, |v, runs| {
+            if let Some(map) = &mut map {
+                map.end_rows(v);
+            }
             runs.each(|start, end| {
                 labeller.add(v, start, end);
                 if let Some(map) = &mut map {
@@ -212,9 +232,6 @@ impl Detector {
                 }
             });
             labeller.end_row(&mut keep);
-            if let Some(map) = &mut map {
-                map.end_rows(v + 1);
-            }
         });
         labeller.end_row(&mut keep);
     }

@@ -49,6 +49,30 @@ pub struct Demands {
     pub surprise: f64,
 }
 
+impl From<[f64; 7]> for Demands {
+    /// In the order of the fields.
+    fn from(values: [f64; 7]) -> Self {
+        let [
+            inside,
+            coverage,
+            spill,
+            edges,
+            edges_on_average,
+            edges_alone,
+            surprise,
+        ] = values;
+        Self {
+            inside,
+            coverage,
+            spill,
+            edges,
+            edges_on_average,
+            edges_alone,
+            surprise,
+        }
+    }
+}
+
 impl Demands {
     /// Where nothing is known of the place, only what is all but whole is a band.
     #[must_use]

@@ -1,6 +1,7 @@
 //! The bands' outlines laid over what was segmented.
 
 use crate::linear::{Square, apply, inverse};
+use crate::numbers::real;
 use crate::{Expectation, OUTLINE, Outline, RunMap};
 
 /// Places along an outline where its edge is sought.
@@ -57,15 +58,6 @@ pub struct Bloom {
     pub sides: f64,
 }
 
-#[derive(Clone, Copy)]
-struct Edge {
-    /// On a side, not on a rim.
-    side: bool,
-    normal: [f64; 2],
-    /// How far out the edge is from the outline where it was first laid (px); none if none is in reach.
-    offset: Option<f64>,
-}
-
 /// Lays the outlines of `expected` over `map`, from centroids `start` on.
 ///
 /// Robust least squares for the two places d and a growth b of each outline: with n the outward normal and
@@ -86,12 +78,14 @@ pub fn fit(
 ) -> Option<Fit> {
     let prior = inverse(expected.covariance)?;
     let [a, b] = &expected.bands;
+    let contours = [Contour::of(a), Contour::of(b)];
+    let size = f64::midpoint(a.radius(), b.radius());
+    let common = (BLOOM + SCALE * size).powi(-2);
+    let apart = (BLOOM_APART + SCALE_APART * size).powi(-2);
     let mut place = start;
-    let mut bloom = [0.0; 4];
+    let mut bloom = [0.0_f64; 4];
     let mut result = None;
     for width in rounds {
-        let [ua, va, ub, vb] = place;
-        let laid = [settle(a, [ua, va]), settle(b, [ub, vb])];
         let mut normal = [[0.0; 8]; 8];
         let mut right = [0.0; 8];
         let away = difference(expected.features, place);
@@ -99,9 +93,6 @@ pub fn fit(
             right[row] = pull;
             normal[row][..4].copy_from_slice(&prior[row]);
         }
-        let size = f64::midpoint(a.radius(), b.radius());
-        let common = (BLOOM + SCALE * size).powi(-2);
-        let apart = (BLOOM_APART + SCALE_APART * size).powi(-2);
         for (index, row) in normal.iter_mut().enumerate().skip(4) {
             let other = if index < 6 { index + 2 } else { index - 2 };
             row[index] = common + apart;
@@ -109,31 +100,37 @@ pub fn fit(
         }
         let (mut edges, mut inside) = ([0.0; 2], [0.0; 2]);
         let (mut rims, mut rims_inside) = ([0.0; 2], [0.0; 2]);
-        for (band, outline) in laid.iter().enumerate().filter(|(band, _)| seen[*band]) {
-            each_edge(outline, map, |edge| {
+        for (band, contour) in contours.iter().enumerate().filter(|(band, _)| seen[*band]) {
+            let [u, v] = [place[2 * band], place[2 * band + 1]];
+            for sample in contour.samples() {
+                let grown = 2 * band + usize::from(sample.side);
+                let tolerance = TOLERANCE * width;
+                let reach = (tolerance + bloom[grown].abs()).min(contour.reach);
+                let at = [u + sample.away[0], v + sample.away[1]];
+                let offset = match edge(map, at, sample.normal, reach) {
+                    Edge::Unknown => continue,
+                    Edge::Missing => None,
+                    Edge::At(offset) => Some(offset),
+                };
                 inside[band] += 1.0;
-                rims_inside[band] += f64::from(u8::from(!edge.side));
-                let Some(offset) = edge.offset else { return };
-                let grown = 2 * band + usize::from(edge.side);
-                let left = offset - bloom[grown];
-                let share = left / (TOLERANCE * width);
+                rims_inside[band] += f64::from(u8::from(!sample.side));
+                let Some(offset) = offset else { continue };
+                let share = (offset - bloom[grown]) / tolerance;
                 if share.abs() >= 1.0 {
-                    return;
+                    continue;
                 }
-                let weight = (1.0 - share * share).powi(2);
                 edges[band] += 1.0;
-                rims[band] += f64::from(u8::from(!edge.side));
-                let mut row = [0.0; 8];
-                row[2 * band..2 * band + 2].copy_from_slice(&edge.normal);
-                row[4 + grown] = 1.0;
-                let weight = weight / (EDGE * EDGE);
-                for (i, own) in row.iter().enumerate() {
+                rims[band] += f64::from(u8::from(!sample.side));
+                let weight = (1.0 - share * share).powi(2) / (EDGE * EDGE);
+                let [nu, nv] = sample.normal;
+                let row = [(2 * band, nu), (2 * band + 1, nv), (4 + grown, 1.0)];
+                for (i, own) in row {
                     right[i] += weight * own * offset;
-                    for (j, other) in row.iter().enumerate() {
+                    for (j, other) in row {
                         normal[i][j] += weight * own * other;
                     }
                 }
-            });
+            }
         }
         let covariance = inverse(normal)?;
         let [du_a, dv_a, du_b, dv_b, rims_a, sides_a, rims_b, sides_b] = apply(&covariance, right);
@@ -173,52 +170,98 @@ pub fn settle(outline: &Outline, [u, v]: [f64; 2]) -> Outline {
     outline.moved([u - cu, v - cv])
 }
 
-/// At equal steps around an outline, where they are in the image.
-fn each_edge(outline: &Outline, map: &RunMap, mut found: impl FnMut(Edge)) {
+/// A place on an outline.
+#[derive(Clone, Copy, Default)]
+struct Sample {
+    /// From the centroid (px).
+    away: [f64; 2],
+    /// Outward, of length 1.
+    normal: [f64; 2],
+    /// On a side, not on a rim.
+    side: bool,
+}
+
+/// An outline at equal steps, but for where a rim meets a side.
+struct Contour {
+    samples: [Sample; SAMPLES],
+    count: usize,
+    /// How far from it an edge is sought (px).
+    reach: f64,
+}
+
+impl Contour {
+    fn of(outline: &Outline) -> Self {
+        let [cu, cv] = outline.centroid;
+        let corners = outline.corners.map(|[u, v]| [u - cu, v - cv]);
+        let sides = || corners.iter().zip(corners.iter().cycle().skip(1));
+        let around: f64 = sides()
+            .map(|([u0, v0], [u1, v1])| (u1 - u0).hypot(v1 - v0))
+            .sum();
+        let signed: f64 = sides().map(|([u0, v0], [u1, v1])| u0 * v1 - u1 * v0).sum();
+        let turn = signed.signum();
+        let ends = CORNERS.map(|index| corners[index]);
+        let step = around / real(SAMPLES);
+        let mut contour = Self {
+            samples: [Sample::default(); SAMPLES],
+            count: 0,
+            reach: REACH.min(0.8 * outline.radius()),
+        };
+        let mut due = step / 2.0;
+        for (index, ([u0, v0], [u1, v1])) in sides().enumerate() {
+            let (du, dv) = (u1 - u0, v1 - v0);
+            let long = du.hypot(dv);
+            while due < long {
+                let away = [u0 + du * due / long, v0 + dv * due / long];
+                due += step;
+                let square = |[u, v]: [f64; 2]| (u - away[0]).powi(2) + (v - away[1]).powi(2);
+                if ends.iter().any(|end| square(*end) < CORNER * CORNER) {
+                    continue;
+                }
+                if let Some(place) = contour.samples.get_mut(contour.count) {
+                    *place = Sample {
+                        away,
+                        normal: [turn * dv / long, -turn * du / long],
+                        side: index % (OUTLINE / 2) == OUTLINE / 2 - 1,
+                    };
+                    contour.count += 1;
+                }
+            }
+            due -= long;
+        }
+        contour
+    }
+
+    fn samples(&self) -> &[Sample] {
+        self.samples.get(..self.count).unwrap_or_default()
+    }
+}
+
+/// Where the markers' colour ends on a normal.
+enum Edge {
+    /// The image says nothing of it.
+    Unknown,
+    /// Not in reach.
+    Missing,
+    /// So far out (px).
+    At(f64),
+}
+
+/// Where the markers' colour ends along `normal`, within `reach` (px).
+fn edge(map: &RunMap, at: [f64; 2], normal: [f64; 2], reach: f64) -> Edge {
     let (width, height) = map.size();
     let within = |[u, v]: [f64; 2]| {
         (BORDER..width - 1.0 - BORDER).contains(&u) && (BORDER..height - 1.0 - BORDER).contains(&v)
     };
-    let corners = &outline.corners;
-    let sides = || corners.iter().zip(corners.iter().cycle().skip(1));
-    let side = |([u0, v0], [u1, v1]): (&[f64; 2], &[f64; 2])| [u1 - u0, v1 - v0];
-    let length = |[u, v]: [f64; 2]| u.hypot(v);
-    let around: f64 = sides().map(|pair| length(side(pair))).sum();
-    let signed: f64 = sides().map(|([u0, v0], [u1, v1])| u0 * v1 - u1 * v0).sum();
-    let reach = REACH.min(0.8 * outline.radius());
-    #[expect(clippy::cast_precision_loss, reason = "a few samples")]
-    let step = around / SAMPLES as f64;
-    let mut due = step / 2.0;
-    for (index, (from, to)) in sides().enumerate() {
-        let [du, dv] = side((from, to));
-        let long = length([du, dv]);
-        let outward = if signed > 0.0 {
-            [dv / long, -du / long]
-        } else {
-            [-dv / long, du / long]
-        };
-        while due < long {
-            let at = [from[0] + du * due / long, from[1] + dv * due / long];
-            due += step;
-            let cut_off = CORNERS
-                .iter()
-                .filter_map(|corner| corners.get(*corner))
-                .any(|[u, v]| length([u - at[0], v - at[1]]) < CORNER);
-            if cut_off || !within(at) {
-                continue;
-            }
-            let offset = crossing(map, at, outward, reach);
-            // At the border of the image the colour ends whether the band does or not.
-            let there = offset.unwrap_or_default();
-            if within([at[0] + there * outward[0], at[1] + there * outward[1]]) {
-                found(Edge {
-                    side: index % (OUTLINE / 2) == OUTLINE / 2 - 1,
-                    normal: outward,
-                    offset,
-                });
-            }
-        }
-        due -= long;
+    if !within(at) {
+        return Edge::Unknown;
+    }
+    let offset = crossing(map, at, normal, reach);
+    // At the border of the image the colour ends whether the band does or not.
+    let there = offset.unwrap_or_default();
+    if within([at[0] + there * normal[0], at[1] + there * normal[1]]) {
+        offset.map_or(Edge::Missing, Edge::At)
+    } else {
+        Edge::Unknown
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::evidence::{Demands, Evidence, weigh};
 use crate::fit::{COARSE, FINE, Fit, fit};
-use crate::pairing::{Pair, likely, shift};
+use crate::pairing::{Pair, TRIALS, likely, shift};
 use crate::{Expect, Expectation, Region, Rejection, RunMap};
 
 /// How the two bands were recognised, or why not.
@@ -24,6 +24,8 @@ const NOWHERE: [f64; 4] = [f64::NAN; 4];
 /// Outlines are laid again at most so often, and until they stay within so much (px).
 const LAYS: usize = 4;
 const STILL: f64 = 0.2;
+/// Two pairs whose outlines come to lie nearer than this to each other are one (px).
+const SAME: f64 = 0.7;
 /// A lone band must be nearer to its place than to the other's by this squared Mahalanobis distance.
 const AMBIGUOUS: f64 = 9.0;
 /// Share of edges of both bands with which a verdict needs no other.
@@ -46,8 +48,20 @@ pub fn judge(regions: &[Region], map: &RunMap, expect: &impl Expect, demands: &D
         return nothing(Rejection::NoRegion);
     }
     let mut best: Option<(f64, Verdict)> = None;
-    for pair in likely(regions, &blind).into_iter().flatten() {
-        let Some(verdict) = attempt(pair, &blind, regions, map, expect, demands) else {
+    let mut tried: [[f64; 4]; TRIALS] = [NOWHERE; TRIALS];
+    for (index, pair) in likely(regions, &blind).into_iter().flatten().enumerate() {
+        let seen = places(pair, &blind, regions);
+        let Some((_, first)) = lay(seen, [4.0; 4], [true; 2], COARSE, map, expect) else {
+            continue;
+        };
+        // Many pairs lead to one place.
+        let again =
+            |before: &[f64; 4]| (0..4).all(|i| (before[i] - first.features[i]).abs() < SAME);
+        if tried.iter().any(again) {
+            continue;
+        }
+        tried[index] = first.features;
+        let Some(verdict) = refined(first, map, expect, demands) else {
             continue;
         };
         let score = verdict.score();
@@ -86,7 +100,7 @@ fn alone(
     let order = (0..regions.len()).min_by(|a, b| away(&regions[*a]).total_cmp(&away(&regions[*b])));
     let mut pair = [None; 2];
     pair[1 - band] = order;
-    let other = attempt(pair, blind, regions, map, expect, demands);
+    let other = judge_at(places(pair, blind, regions), [4.0; 4], map, expect, demands);
     let Evidence {
         edges, coverage, ..
     } = verdict.bands[band];
@@ -118,14 +132,8 @@ impl Verdict {
     }
 }
 
-fn attempt(
-    pair: Pair,
-    blind: &Expectation,
-    regions: &[Region],
-    map: &RunMap,
-    expect: &impl Expect,
-    demands: &Demands,
-) -> Option<Verdict> {
+/// Where the bands are if these regions are they.
+fn places(pair: Pair, blind: &Expectation, regions: &[Region]) -> [f64; 4] {
     let mut seen = NOWHERE;
     for (band, region) in pair.into_iter().enumerate() {
         if let Some(region) = region.and_then(|index| regions.get(index)) {
@@ -139,7 +147,7 @@ fn attempt(
         let [ua, va, ub, vb] = blind.features;
         seen = [ua + u, va + v, ub + u, vb + v];
     }
-    judge_at(seen, [4.0; 4], map, expect, demands)
+    seen
 }
 
 /// The verdict on outlines laid from there on, features (4,) in px with standard deviations (4,) in px.
@@ -150,19 +158,31 @@ pub fn judge_at(
     expect: &impl Expect,
     demands: &Demands,
 ) -> Option<Verdict> {
-    let (mut laid, mut found) = lay(seen, deviation, [true; 2], COARSE, map, expect)?;
+    let (_, first) = lay(seen, deviation, [true; 2], COARSE, map, expect)?;
+    refined(first, map, expect, demands)
+}
+
+/// The verdict on outlines that lie where they belong, but for a little.
+fn refined(
+    mut found: Fit,
+    map: &RunMap,
+    expect: &impl Expect,
+    demands: &Demands,
+) -> Option<Verdict> {
+    let mut laid = None;
     // The better the place is known, the better the outlines.
     for _ in 0..LAYS {
         let before = found.features;
         let again = lay(before, sureness(&found), [true; 2], FINE, map, expect);
         let Some(again) = again else { break };
-        (laid, found) = again;
+        found = again.1;
+        laid = Some(again.0);
         let moved = before.iter().zip(found.features);
         if moved.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) < STILL {
             break;
         }
     }
-    let verdict = Verdict::of(&laid, &found, map, demands);
+    let verdict = Verdict::of(&laid?, &found, map, demands);
     match verdict.reasons {
         [None, None] | [Some(_), Some(_)] => Some(verdict),
         reasons => {

@@ -25,12 +25,14 @@ mod linear;
 mod lowpass;
 mod numbers;
 mod pairing;
+mod pairs;
 mod patch;
 mod projection;
 pub mod regions;
 pub mod rejection;
 pub mod runmap;
 pub mod runs;
+mod samples;
 pub mod segment;
 mod triples;
 

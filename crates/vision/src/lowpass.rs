@@ -19,7 +19,8 @@ pub(crate) struct LowPass {
     below: Vec<Block>,
 }
 
-type Block = [i16; BLOCK];
+/// The values of a block of columns.
+pub(crate) type Block = [i16; BLOCK];
 
 /// Below every projected value, and still four of it fit an `i16`.
 const NEVER: i16 = -8191;
@@ -46,10 +47,8 @@ impl LowPass {
         }
     }
 
-    /// Takes these blocks of row `n` and gives those of the filtered row `n - 1`.
-    ///
-    /// Both have one value more on either side. Of `row` these are read: they are to repeat what is beside
-    /// them where the image ends.
+    /// Takes these blocks of row `n` and gives those of the filtered row `n - 1`; what is beside them is as at
+    /// their ends.
     ///
     /// To be called for `n` = 0, 1, ..., `height`, each followed by [`advance`](Self::advance). The first
     /// call gives nothing of use, and the last, which asks for the bottom row, does not look at `row`.
@@ -58,18 +57,33 @@ impl LowPass {
     pub(crate) fn step<S: Simd>(
         &mut self,
         simd: S,
-        row: &[i16],
-        filtered: &mut [i16],
+        row: &[Block],
+        filtered: &mut [Block],
         blocks: &Range<usize>,
         at: At,
     ) {
         let [above, here, below] =
             [&mut self.above, &mut self.here, &mut self.below].map(|row| cut(row, blocks));
+        let (Some([first, ..]), Some([.., last])) = (row.first(), row.last()) else {
+            return;
+        };
+        let (mut before, beyond) = (S::i16s::splat(simd, *first), S::i16s::splat(simd, *last));
+        let following = row.get(1..).unwrap_or_default().iter().map(Some);
         let three = above.iter_mut().zip(here).zip(below);
-        let rows = row.windows(BLOCK + 2).step_by(BLOCK).zip(three);
-        let filtered = filtered.get_mut(1..).unwrap_or_default().as_chunks_mut().0;
-        for ((row, ((above, here), below)), filtered) in rows.zip(filtered) {
-            step(simd, row, [above, here, below, filtered], at);
+        let rows = row.iter().zip(following.chain([None])).zip(three);
+        for (((row, following), ((above, here), below)), filtered) in rows.zip(filtered) {
+            let after = match following {
+                Some(block) => S::i16s::from_slice(simd, &block[..S::i16s::LEN]),
+                None => beyond,
+            };
+            step(
+                simd,
+                [before, after],
+                row,
+                [above, here, below, filtered],
+                at,
+            );
+            before = S::i16s::from_slice(simd, &row[BLOCK - S::i16s::LEN..]);
         }
     }
 
@@ -84,18 +98,32 @@ fn cut<'a>(row: &'a mut [Block], blocks: &Range<usize>) -> &'a mut [Block] {
     row.get_mut(blocks.clone()).unwrap_or_default()
 }
 
-/// One block of a step: `row` has a value more on either side.
+/// One block of a step, between the vectors before and after it.
+///
+/// Neighbours are slid together in registers.
 #[inline(always)]
-fn step<S: Simd>(simd: S, row: &[i16], [above, here, below, filtered]: [&mut Block; 4], at: At) {
+fn step<S: Simd>(
+    simd: S,
+    [mut before, after]: [S::i16s; 2],
+    row: &Block,
+    [above, here, below, filtered]: [&mut Block; 4],
+    at: At,
+) {
     let lanes = S::i16s::LEN;
+    let mut middle = S::i16s::from_slice(simd, &row[..lanes]);
     for start in (0..BLOCK).step_by(lanes) {
         let end = start + lanes;
+        let next = match row.get(end..end + lanes) {
+            Some(values) => S::i16s::from_slice(simd, values),
+            None => after,
+        };
         let at_it = S::i16s::from_slice(simd, &here[start..end]);
         let under = if at.n < at.height {
-            let left = S::i16s::from_slice(simd, &row[start..end]);
-            let middle = S::i16s::from_slice(simd, &row[start + 1..=end]);
-            let right = S::i16s::from_slice(simd, &row[start + 2..end + 2]);
-            mean::<S>(left, middle, right)
+            mean::<S>(
+                last_and::<S>(before, middle),
+                middle,
+                middle.slide::<1>(next),
+            )
         } else {
             at_it
         };
@@ -105,16 +133,26 @@ fn step<S: Simd>(simd: S, row: &[i16], [above, here, below, filtered]: [&mut Blo
         }
         let over = S::i16s::from_slice(simd, &above[start..end]);
         mean::<S>(over, at_it, under).store_slice(&mut filtered[start..end]);
+        (before, middle) = (middle, next);
     }
 }
 
-/// Makes a row of `width` values that has at least one more on either side repeat its ends there.
+/// The last value of one vector and all but the last of the next.
 #[inline(always)]
-pub(crate) fn repeat_ends(row: &mut [i16], width: usize) {
-    if let [left, first, ..] = row {
-        *left = *first;
+fn last_and<S: Simd>(before: S::i16s, values: S::i16s) -> S::i16s {
+    match S::i16s::LEN {
+        32 => before.slide::<31>(values),
+        16 => before.slide::<15>(values),
+        _ => before.slide::<7>(values),
     }
-    if let Some([last, beyond @ ..]) = row.get_mut(width..) {
+}
+
+/// Makes what follows so many values repeat the last of them.
+#[inline(always)]
+pub(crate) fn repeat_end(row: &mut [Block], width: usize) {
+    if !width.is_multiple_of(BLOCK)
+        && let Some([last, beyond @ ..]) = row.as_flattened_mut().get_mut(width.saturating_sub(1)..)
+    {
         beyond.fill(*last);
     }
 }
@@ -147,17 +185,17 @@ mod tests {
             let blocks = 0..width.div_ceil(BLOCK);
             pass.prepare(blocks.end);
             for n in 0..=height {
-                let mut row = vec![0; blocks.end * BLOCK + 2];
+                let mut row = vec![[0; BLOCK]; blocks.end];
                 let mut filtered = row.clone();
                 if let Some(values) = rows.get(n) {
-                    row[1..=width].copy_from_slice(values);
-                    repeat_ends(&mut row, width);
+                    row.as_flattened_mut()[..width].copy_from_slice(values);
+                    repeat_end(&mut row, width);
                 }
                 let at = At { n, height };
                 dispatch!(level, simd => pass.step(simd, &row, &mut filtered, &blocks, at));
                 pass.advance();
                 let Some(v) = n.checked_sub(1) else { continue };
-                for (u, filtered) in filtered[1..=width].iter().enumerate() {
+                for (u, filtered) in filtered.as_flattened()[..width].iter().enumerate() {
                     let mut exact = 0;
                     for (dv, weight_v) in [(0, 1), (1, 2), (2, 1)] {
                         for (du, weight_u) in [(0, 1), (1, 2), (2, 1)] {

@@ -5,7 +5,7 @@ use crate::regions::real;
 use crate::{Expectation, Region};
 
 /// Pairs of regions that are tried, the likeliest first.
-const TRIALS: usize = 6;
+pub const TRIALS: usize = 6;
 
 /// A region for A and one for B; none: not among the regions; one for both: they run into each other.
 pub type Pair = [Option<usize>; 2];

@@ -7,7 +7,8 @@ use fearless_simd::Simd;
 use crate::PixelFormat;
 use crate::columns::BLOCK;
 use crate::format::{Consumer, Group, Row};
-use crate::triples::{self, Pairs};
+use crate::pairs::{self, Pairs};
+use crate::triples;
 
 /// Pixels that are scanned together where the compiler vectorises: whole blocks.
 const AT_ONCE: usize = 4 * BLOCK;
@@ -98,7 +99,7 @@ impl Projection {
     #[inline(always)]
     pub(crate) fn mark<S: Simd>(&self, simd: S, row: Row<'_>, width: usize, hot: &mut [u64]) {
         if let Row::Triples(bytes) = row
-            && triples::are_quick(simd)
+            && pairs::are_quick(simd)
         {
             self.pairs.mark(simd, bytes, hot);
             return;
@@ -127,7 +128,7 @@ impl Projection {
 #[inline(always)]
 pub(crate) fn worth_a_look<S: Simd>(simd: S, format: PixelFormat) -> usize {
     let triples = matches!(format, PixelFormat::Bgr | PixelFormat::Rgb);
-    if triples && triples::are_quick(simd) {
+    if triples && pairs::are_quick(simd) {
         BLOCK
     } else {
         AT_ONCE

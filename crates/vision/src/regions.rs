@@ -147,7 +147,23 @@ impl Labeller {
         }
     }
 
-    fn end_busy_row(&mut self, mut finished: impl FnMut(Region)) {
+    fn end_busy_row(&mut self, finished: impl FnMut(Region)) {
+        if !self.goes_on() {
+            self.rename(finished);
+        }
+        std::mem::swap(&mut self.above, &mut self.here);
+        self.here.clear();
+        self.cursor = 0;
+    }
+
+    /// Whether each label has one run in this row, as most rows of a region have: then all stay as they are.
+    fn goes_on(&self) -> bool {
+        let mut labels = self.here.iter().zip(&self.parts).zip(0..);
+        self.here.len() == self.parts.len()
+            && labels.all(|((run, part), label)| run.label == label && part.parent == label)
+    }
+
+    fn rename(&mut self, mut finished: impl FnMut(Region)) {
         let Self {
             here, parts, next, ..
         } = self;
@@ -166,9 +182,6 @@ impl Labeller {
             }
         }
         std::mem::swap(&mut self.parts, &mut self.next);
-        std::mem::swap(&mut self.above, &mut self.here);
-        self.here.clear();
-        self.cursor = 0;
     }
 }
 

@@ -1,6 +1,7 @@
 //! All marker pixels of a frame as runs, to be looked at again without the frame.
 
 use crate::frame::MAX_SIDE;
+use crate::numbers::{real, whole};
 
 /// More runs than this are noise, and are dropped (2^16; a frame with two bands has some hundred).
 pub const MAX_RUNS: usize = 1 << 16;
@@ -41,15 +42,17 @@ impl RunMap {
 
     /// Columns and rows (px).
     pub fn size(&self) -> (f64, f64) {
-        (float(self.width), float(self.ends.len()))
+        (real(self.width), real(self.ends.len()))
     }
 
     /// Whether the pixel at `[u, v]` (px), rounded, is marker; none outside the image is.
     pub fn marker(&self, [u, v]: [f64; 2]) -> bool {
-        let Some(column) = pixel(u) else { return false };
-        let runs = pixel(v).map_or(&[][..], |row| self.row(row));
-        let after = runs.partition_point(|run| float32(run.1) <= column);
-        runs.get(after).is_some_and(|run| float32(run.0) <= column)
+        let (Some(column), Some(row)) = (pixel(u), pixel(v)) else {
+            return false;
+        };
+        let runs = self.row(row);
+        let after = runs.partition_point(|run| run.1 as usize <= column);
+        runs.get(after).is_some_and(|run| run.0 as usize <= column)
     }
 
     /// How many marker pixels row `v` has from `from` to `to`, both included (px).
@@ -68,13 +71,7 @@ impl RunMap {
             .sum()
     }
 
-    fn row(&self, v: f64) -> &[(u32, u32)] {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "`pixel` has made it a whole number from 0 to MAX_SIDE"
-        )]
-        let v = v as usize;
+    fn row(&self, v: usize) -> &[(u32, u32)] {
         let Some(end) = self.ends.get(v) else {
             return &[];
         };
@@ -85,14 +82,9 @@ impl RunMap {
     }
 }
 
-/// The nearest pixel, if it can be one.
-fn pixel(place: f64) -> Option<f64> {
-    let place = place.round();
-    (0.0..65536.0).contains(&place).then_some(place)
-}
-
-fn float(pixels: usize) -> f64 {
-    u32::try_from(pixels).map_or(f64::INFINITY, f64::from)
+/// The nearest pixel, if it can be one. Not by `round`, which is a call: this is asked many thousand times a frame.
+fn pixel(place: f64) -> Option<usize> {
+    (-0.5..65535.5).contains(&place).then(|| whole(place + 0.5))
 }
 
 fn float32(pixels: u32) -> f64 {

@@ -5,16 +5,20 @@
 //! So each row is first scanned, coarsely and quickly, for blocks in which there may be one; rows
 //! and columns around those go through the exact arithmetic. What comes out is what would come out
 //! if all of the frame did.
+//!
+//! That is done strip by strip: some rows are scanned, then worked, then handed over. Each of the three
+//! is short and always does the same; where a processor guesses wrong in one, which happens at runs, it does
+//! not have to do the others again.
 
 use std::ops::Range;
 
 use fearless_simd::{Level, dispatch, prelude::*};
 
-use crate::columns::{BLOCK, Columns};
+use crate::columns::{BLOCK, Columns, STRIP};
 use crate::format::Row;
-use crate::lowpass::{At, LowPass, repeat_ends};
+use crate::lowpass::{At, Block, LowPass, repeat_end};
 use crate::projection::{Projection, worth_a_look};
-use crate::runs::Runs;
+use crate::runs::{Runs, runs_of_bits};
 use crate::{ColorDiscriminant, Frame, PixelFormat, Window};
 
 /// Gives the rows of a frame as marker or not, top to bottom, in memory that does not grow with the
@@ -32,10 +36,12 @@ pub struct Segmenter {
 /// What becomes of a row on its way.
 #[derive(Clone, Debug)]
 struct Rows {
+    blocks: usize,
     passes: Vec<LowPass>,
-    /// What goes into a pass and what comes out, with a value more on either side.
-    values: [Vec<i16>; 2],
-    /// By block, a bit for each pixel: which are marker; kept up within the spans alone.
+    /// What goes into a pass and what comes out.
+    values: [Vec<Block>; 2],
+    /// By row of the strip and by block, a bit for each pixel: which are marker; kept up in the blocks that
+    /// are worked alone.
     marker: Vec<u64>,
 }
 
@@ -48,6 +54,7 @@ impl Segmenter {
             prepared: None,
             columns: Columns::default(),
             rows: Rows {
+                blocks: 0,
                 passes: vec![LowPass::default(); smoothing],
                 values: [const { Vec::new() }; 2],
                 marker: Vec::new(),
@@ -55,8 +62,8 @@ impl Segmenter {
         }
     }
 
-    /// Calls `visit(v, runs)` for every row; `runs` calls back with `start..end` of each run of
-    /// marker pixels, left to right.
+    /// Calls `visit(v, runs)` top to bottom for every row that has marker pixels, and some others, among them
+    /// the next; `runs` calls back with `start..end` of each run of marker pixels, left to right.
     ///
     /// Allocates only when a frame is wider than those before.
     pub fn each_row(&mut self, frame: &impl Frame, visit: impl FnMut(usize, Runs<'_>)) {
@@ -108,82 +115,50 @@ fn sweep<S: Simd>(
     // A pixel seen in row n matters to the filtered rows n - delay to n + delay, and these need the
     // rows from n - 2 delay to n + 2 delay: scanning goes so far ahead.
     let reach = 2 * delay;
-    seen.start(width, 2 * reach + 1);
+    seen.start(width, reach);
     rows.start(width);
     // In a window so narrow, looking first would cost more than it spares.
     let looks = width >= worth_a_look(simd, frame.format());
-    let ahead = if looks { reach } else { 0 };
-    if !looks {
-        seen.next_row().fill(u64::MAX);
-        seen.end_row();
-        seen.find_spans(|fresh| rows.forget(&fresh));
-    }
-    for n in 0..height + delay + ahead {
-        if looks {
-            let hot = seen.next_row();
-            if n < height {
+    let mut scanned = 0;
+    // In step n row n comes in, and the filtered row n - delay comes out.
+    let steps = height + delay;
+    for first in (0..steps).step_by(STRIP) {
+        seen.next_strip();
+        let ahead = height.min(first + STRIP + reach);
+        for n in scanned..ahead {
+            let hot = seen.seen(n + reach - first);
+            if looks {
                 projection.mark(simd, line(n), width, hot);
+            } else {
+                hot.fill(u64::MAX);
             }
-            seen.end_row();
         }
-        let Some(step) = n.checked_sub(ahead) else {
+        scanned = ahead;
+        let steps = first..steps.min(first + STRIP);
+        if !seen.find_worked() {
             continue;
-        };
-        if looks {
-            seen.find_spans(|fresh| rows.forget(&fresh));
         }
-        if !seen.spans().is_empty() {
+        for step in steps.clone() {
+            let source = (step < height).then(|| line(step));
             let place = Place {
-                source: (step < height).then(|| line(step)),
+                source,
                 step,
+                width,
                 height,
             };
-            filter(simd, rows, seen.spans(), place, projection);
-            rows.advance();
+            rows.filter(simd, seen, step - first, place, projection);
         }
-        let Some(v) = step.checked_sub(delay).map(|v| v + read.top) else {
-            continue;
-        };
-        if (window.top..window.bottom).contains(&v) {
-            let within = [window.left, window.right];
-            visit(
-                v,
-                Runs::new(&rows.marker, seen.spans(), columns.start, within),
-            );
-        }
-    }
-}
-
-impl Rows {
-    fn start(&mut self, width: usize) {
-        let blocks = width.div_ceil(BLOCK);
-        for values in &mut self.values {
-            values.resize(blocks * BLOCK + 2, 0);
-        }
-        self.marker.resize(blocks, 0);
-        for pass in &mut self.passes {
-            pass.prepare(blocks);
+        for step in steps {
+            let Some(v) = step.checked_sub(delay).map(|v| v + read.top) else {
+                continue;
+            };
+            if (window.top..window.bottom).contains(&v) && seen.matters(step - first) {
+                let (marker, worked) = (rows.marker(step - first), seen.worked(step - first));
+                let within = [window.left, window.right];
+                visit(v, Runs::new(marker, worked, columns.start, within));
+            }
         }
     }
-
-    fn forget(&mut self, columns: &Range<usize>) {
-        for pass in &mut self.passes {
-            pass.forget(&blocks_of(columns));
-        }
-    }
-
-    fn advance(&mut self) {
-        for pass in &mut self.passes {
-            pass.advance();
-        }
-    }
-}
-
-/// These columns and as many more as make whole blocks, if the frame has them.
-fn whole_blocks(columns: Range<usize>, width: usize) -> Range<usize> {
-    let wanted = columns.len().next_multiple_of(BLOCK).min(width);
-    let start = columns.start.min(width - wanted);
-    start..start + wanted
 }
 
 /// Where the pass over the frame is.
@@ -192,57 +167,107 @@ struct Place<'a> {
     /// The row that comes in, unless all of them have.
     source: Option<Row<'a>>,
     step: usize,
+    width: usize,
     height: usize,
 }
 
-/// Projects a row where it matters, takes it through the low-passes, of which pass k is k rows
-/// behind, and holds what comes out against the threshold.
-#[inline(always)]
-fn filter<S: Simd>(
-    simd: S,
-    rows: &mut Rows,
-    spans: &[Range<usize>],
-    Place {
-        source,
-        step,
-        height,
-    }: Place<'_>,
-    projection: &Projection,
-) {
-    for span in spans {
-        let blocks = blocks_of(span);
-        let padded = span.start..blocks.end * BLOCK + 2;
-        let [values, filtered] = rows.values.each_mut();
-        let Some(mut values) = values.get_mut(padded.clone()) else {
-            continue;
-        };
-        let Some(mut filtered) = filtered.get_mut(padded) else {
-            continue;
-        };
-        if let (Some(source), Some(values)) = (source, values.get_mut(1..=span.len())) {
-            projection.project(simd, source.columns(span.clone()), values);
+impl Rows {
+    fn start(&mut self, width: usize) {
+        self.blocks = width.div_ceil(BLOCK);
+        for values in &mut self.values {
+            values.resize(self.blocks, [0; BLOCK]);
         }
-        for (n, pass) in (0..=step).rev().zip(&mut rows.passes) {
-            repeat_ends(values, span.len());
-            pass.step(simd, values, filtered, &blocks, At { n, height });
+        self.marker.resize(STRIP * self.blocks, 0);
+        for pass in &mut self.passes {
+            pass.prepare(self.blocks);
+        }
+    }
+
+    /// Projects a row where it matters, takes it through the low-passes, of which pass k is k rows
+    /// behind, and holds what comes out against the threshold.
+    #[inline(always)]
+    fn filter<S: Simd>(
+        &mut self,
+        simd: S,
+        seen: &Columns,
+        row: usize,
+        place: Place<'_>,
+        projection: &Projection,
+    ) {
+        for blocks in runs_of_bits(seen.fresh(row)) {
+            for pass in &mut self.passes {
+                pass.forget(&blocks);
+            }
+        }
+        let mut worked = false;
+        for blocks in runs_of_bits(seen.worked(row).iter().copied()) {
+            self.filter_blocks(simd, row, &blocks, place, projection);
+            worked = true;
+        }
+        if worked {
+            for pass in &mut self.passes {
+                pass.advance();
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn filter_blocks<S: Simd>(
+        &mut self,
+        simd: S,
+        row: usize,
+        blocks: &Range<usize>,
+        Place {
+            source,
+            step,
+            width,
+            height,
+        }: Place<'_>,
+        projection: &Projection,
+    ) {
+        let columns = blocks.start * BLOCK..width.min(blocks.end * BLOCK);
+        let [values, filtered] = self.values.each_mut();
+        let (Some(mut values), Some(mut filtered)) = (
+            values.get_mut(blocks.clone()),
+            filtered.get_mut(blocks.clone()),
+        ) else {
+            return;
+        };
+        if let (Some(source), Some(values)) =
+            (source, values.as_flattened_mut().get_mut(..columns.len()))
+        {
+            projection.project(simd, source.columns(columns.clone()), values);
+        }
+        for (n, pass) in (0..=step).rev().zip(&mut self.passes) {
+            repeat_end(values, columns.len());
+            pass.step(simd, values, filtered, blocks, At { n, height });
             (values, filtered) = (filtered, values);
         }
-        let values = values.get(1..).unwrap_or_default().as_chunks().0;
-        let words = rows.marker.get_mut(blocks).unwrap_or_default();
-        for (word, values) in words.iter_mut().zip(values) {
+        let words = row * self.blocks + blocks.start..row * self.blocks + blocks.end;
+        let words = self.marker.get_mut(words).unwrap_or_default();
+        for (word, values) in words.iter_mut().zip(&*values) {
             *word = above(simd, values, projection.threshold());
         }
         // What lies beyond the image is no pixel.
-        let beyond = words.len() * BLOCK - span.len();
+        let beyond = words.len() * BLOCK - columns.len();
         if let Some(word) = words.last_mut() {
             *word &= u64::MAX >> beyond;
         }
     }
+
+    /// The marker pixels of a row of the strip, by block.
+    #[inline(always)]
+    fn marker(&self, row: usize) -> &[u64] {
+        let words = row * self.blocks..(row + 1) * self.blocks;
+        self.marker.get(words).unwrap_or_default()
+    }
 }
 
-/// The blocks of columns that begin with one.
-fn blocks_of(columns: &Range<usize>) -> Range<usize> {
-    columns.start / BLOCK..columns.end.div_ceil(BLOCK)
+/// These columns and as many more as make whole blocks, if the frame has them.
+fn whole_blocks(columns: Range<usize>, width: usize) -> Range<usize> {
+    let wanted = columns.len().next_multiple_of(BLOCK).min(width);
+    let start = columns.start.min(width - wanted);
+    start..start + wanted
 }
 
 /// Bit i is whether value i exceeds the threshold.

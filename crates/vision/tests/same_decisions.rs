@@ -6,18 +6,28 @@ use proptest::prelude::*;
 use support::{Memory, memory, weights};
 use tautscope_vision::{ColorDiscriminant, Segmenter, Window};
 
-/// By row of the window: its runs.
+/// By row of the window: its marker pixels. What is after a row with some is visited too.
 fn segmented(
     segmenter: &mut Segmenter,
     memory: &Memory,
     window: Window,
 ) -> Vec<(usize, Vec<usize>)> {
-    let mut rows = Vec::new();
+    let window = window.within(&memory.frame());
+    let mut rows: Vec<(usize, Vec<usize>)> = (window.top..window.bottom)
+        .filter(|_| window.left < window.right)
+        .map(|v| (v, Vec::new()))
+        .collect();
+    let mut unended = None;
     segmenter.each_row_in(&memory.frame(), window, |v, runs| {
-        let mut inside = Vec::new();
+        let row = unended.take().unwrap_or(v);
+        assert!(row == v, "row {row} was left out");
+        let inside = &mut rows[v - window.top].1;
         runs.each(|start, end| inside.extend(start..end));
-        rows.push((v, inside));
+        if !inside.is_empty() {
+            unended = Some(v + 1);
+        }
     });
+    assert!(unended.is_none_or(|row| row == window.bottom));
     rows
 }
 

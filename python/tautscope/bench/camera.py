@@ -15,7 +15,6 @@ from collections.abc import Callable
 from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
-from types import TracebackType
 from typing import Literal, Self, get_args
 
 import av
@@ -101,15 +100,15 @@ class CameraStream:
         self._faults = {}
 
     def __enter__(self) -> Self:
+        try:
+            self._listen()
+        except OSError as error:
+            allowed = f"unix:PATH of a socket that can be made ({error})"
+            raise ConfigError("camera.source.url", f"unix:{self._path}", allowed) from None
         self._thread.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *failure: object) -> None:
         self._ending.set()
         self._thread.join()
         self._unplug()
@@ -120,11 +119,12 @@ class CameraStream:
                 self._unplug()
             else:
                 self._accept()
-            patience = _LOOK_PERIOD
+            due = self._due + self._period
             if self._under_way:
-                patience = min(max(self._under_way[0][0] - time.monotonic(), 0.0), patience)
+                due = min(due, self._under_way[0][0])
+            patience = min(due - time.monotonic(), _LOOK_PERIOD)
             try:
-                self._draw(*self._captures.get(timeout=patience))
+                self._draw(*self._captures.get(timeout=max(patience, 0.0)))
             except queue.Empty:
                 self._idle()
             while self._under_way and self._under_way[0][0] <= time.monotonic():
@@ -134,7 +134,7 @@ class CameraStream:
     def _idle(self) -> None:
         """The motors are off, and nobody captures: the instrument is still seen."""
         now = time.monotonic()
-        if now > self._due + self._period:
+        if now >= self._due + self._period:
             self.capture(now, self._look())
 
     def _draw(self, at: float, centreline: Centreline) -> None:
@@ -150,15 +150,23 @@ class CameraStream:
         if "drop" not in faults:
             self._under_way.append((at + delay + faults.get("delay", 0.0), at, image))
 
-    def _accept(self) -> None:
-        if self._server is None:
-            self._path.unlink(missing_ok=True)
-            self._server = socket.socket(socket.AF_UNIX)
-            self._server.bind(str(self._path))
-            self._server.listen()
-            self._server.setblocking(False)
+    def _listen(self) -> socket.socket:
+        self._path.unlink(missing_ok=True)
+        server = socket.socket(socket.AF_UNIX)
         try:
-            connection, _ = self._server.accept()
+            server.bind(str(self._path))
+        except OSError:
+            server.close()
+            raise
+        server.listen()
+        server.setblocking(False)
+        self._server = server
+        return server
+
+    def _accept(self) -> None:
+        server = self._listen() if self._server is None else self._server
+        try:
+            connection, _ = server.accept()
         except BlockingIOError:
             return
         if self._client is not None:

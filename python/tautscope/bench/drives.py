@@ -18,8 +18,6 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from types import TracebackType
 from typing import Literal, Self, get_args
 
 import can
@@ -29,6 +27,7 @@ from numpy.typing import NDArray
 from tautscope.bench.can_bus import Hub, LocalBus
 from tautscope.bench.canopen_node import OPERATIONAL, Send
 from tautscope.bench.drive import SimulatedDrive
+from tautscope.bench.events import Event, Reporter
 from tautscope.config import DrivesConfig, load_config
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError
@@ -42,21 +41,6 @@ takes no mode from now on."""
 OnSync = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 """Takes where the motors are told to be (3,) [m, rad, rad] and gives where they are; called once
 per SYNC, after the drives have answered it."""
-
-
-@dataclass(frozen=True, slots=True)
-class Event:
-    """Something a drive did.
-
-    Attributes:
-        time: [s], the computer's monotonic clock, the same in all its processes.
-        dof: Which drive, or ``camera``.
-        what: The state it went to, or ``fault: <kind>``.
-    """
-
-    time: float
-    dof: str
-    what: str
 
 
 class SimulatedDrives:
@@ -155,12 +139,7 @@ class SimulatedDrives:
         self.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *failure: object) -> None:
         self.stop()
 
     def _run(self) -> None:
@@ -275,35 +254,6 @@ def main() -> None:
                 dof = Dof[label.upper()]
                 drives.clear(dof) if kind == "clear" else drives.inject(kind, dof)  # type: ignore[arg-type]
         said.close()
-
-
-class Reporter:
-    """Writes events as they come, a JSON line each; a thread, as the main one waits for input.
-
-    Args:
-        events: All that happened so far; each is written once.
-    """
-
-    def __init__(self, events: Callable[[], list[Event]]) -> None:
-        self._events = events
-        self._ending = threading.Event()
-        self._thread = threading.Thread(target=self._run, daemon=True)
-        self._thread.start()
-
-    def close(self) -> None:
-        """Write the last of them."""
-        self._ending.set()
-        self._thread.join()
-
-    def _run(self) -> None:
-        told = 0
-        last = False
-        while not last:
-            last = self._ending.wait(0.02)
-            for event in self._events()[told:]:
-                told += 1
-                line = {"time": event.time, "dof": event.dof, "what": event.what}
-                print(json.dumps(line), flush=True)
 
 
 if __name__ == "__main__":

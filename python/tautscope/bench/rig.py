@@ -11,7 +11,6 @@ import threading
 import time
 from contextlib import ExitStack
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 import numpy as np
@@ -19,10 +18,11 @@ from numpy.typing import NDArray
 
 from tautscope.bench.camera import CameraStream, Centreline
 from tautscope.bench.can_bus import Hub, LocalBus
-from tautscope.bench.drives import Event, SimulatedDrives
+from tautscope.bench.drives import SimulatedDrives
+from tautscope.bench.events import Event
 from tautscope.config import Config
 from tautscope.dof import Dof
-from tautscope.errors import ConfigError
+from tautscope.errors import ConfigError, OutputError
 from tautscope.hardware.rig import rig_drives
 from tautscope.recording import per_dof
 from tautscope.twin.plant import Plant
@@ -45,7 +45,8 @@ class Bench:
         modes: Of the drives.
 
     Raises:
-        ConfigError: The configuration is not one of a bench.
+        ConfigError: The configuration is not one of a bench, or its sockets cannot be made.
+        OutputError: `truth` cannot be written.
     """
 
     def __init__(
@@ -65,7 +66,11 @@ class Bench:
         self._lock = threading.Lock()
         self._camera = CameraStream(config, url.removeprefix("unix:"), self._centreline, timing)
         self._open = ExitStack()
-        self._truth = None if truth is None else truth.open("w", encoding="utf-8")
+        try:
+            self._truth = None if truth is None else truth.open("w", encoding="utf-8")
+        except OSError as error:
+            place = f"a place that can be written ({error})"
+            raise OutputError("--truth", str(truth), place) from None
         try:
             bus = self._plug(drives.channel)
             start = self._plant.applied
@@ -97,23 +102,26 @@ class Bench:
         return self.drives.events
 
     def __enter__(self) -> Self:
-        self._open.enter_context(self._camera)
-        self._open.enter_context(self.drives)
+        try:
+            self._open.enter_context(self._camera)
+            self._open.enter_context(self.drives)
+        except BaseException:
+            self._open.close()
+            raise
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *failure: object) -> None:
         self._open.close()
 
     def _plug(self, channel: str) -> LocalBus:
         if self._truth is not None:
             self._open.enter_context(self._truth)
             self._truth.write(",".join(TRUTH.names or ()) + "\n")
-        self._open.enter_context(Hub(channel))
+        try:
+            self._open.enter_context(Hub(channel))
+        except OSError as error:
+            allowed = f"a socket that can be made ({error}); does another bench run?"
+            raise ConfigError("drives.channel", channel, allowed) from None
         return self._open.enter_context(LocalBus(channel))
 
     def _centreline(self) -> Centreline:

@@ -16,15 +16,15 @@ class AdaptiveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     free_gain, gain_limit, delta_minus and delta_plus are those of `DofConfig`.
     """
 
-    contact_gain: Gain = 2.1
+    contact_gain: Gain = 2.05
     """Largest speed of the tip over that of the reference in contact, until the lead is what it
     should be."""
     cautious_gain: Gain = 1.4
     """The same for a stroke that begins with an offset hardly known."""
-    cautious_deviation: Positive = 3.0
+    cautious_deviation: Positive = 12.0
     """Standard deviation of an offset from which on it counts as hardly known. The free zone ends
     deviation^2 / cautious_deviation before the contact."""
-    taper: Positive = 1.5
+    taper: Positive = 4.0
     """End of the gap over which free_gain falls to contact_gain."""
     settling: Positive = 1.5
     """Lead yet missing below which the gain in contact falls to 1; an offset's standard deviation

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from threading import Event, Lock, Thread
-from types import TracebackType
 
 import numpy as np
 
-from tautscope.config import CameraConfig, SourceConfig
+from tautscope.config import CameraConfig
 from tautscope.errors import CameraError, CameraMismatchError
+from tautscope.hardware.stream_clock import JUMP, StreamClock
 from tautscope.hardware.video import Decoder, Image, Picture, opened
 from tautscope.rig import Frame
 
@@ -22,8 +21,6 @@ TEST_FRAMES = 8
 
 _LIVE = {"fflags": "nobuffer"}
 """FFmpeg's options for every source: what is read to learn its format is not shown late."""
-_JUMP = 1.0
-"""Time stamps that go on by more, or back, are another clock [s]."""
 _OLDEST = 1.0
 """A frame that arrives later after its capture has another clock's time stamp [s]."""
 
@@ -63,43 +60,6 @@ class CameraState:
     is_interlaced: bool | None = None
     age: float = float("inf")
     trouble: str = ""
-
-
-class StreamClock:
-    """Time stamps of a source put on our clock.
-
-    A frame can come late, never early: of all in the last `clock_window`, the one that came
-    soonest after its time stamp tells how far apart the clocks are,
-    ``captured_at = stamp + min(arrival - stamp) - delay``. A constant delay cannot be seen so and
-    is to be configured. A source that drifts by 1 s per day errs by 0.1 ms in a window of 10 s.
-
-    Args:
-        source: Its `clock`, `clock_window` and `delay`.
-    """
-
-    def __init__(self, source: SourceConfig) -> None:
-        self._source = source
-        self._shortest: deque[tuple[float, float]] = deque()
-        """(arrival, arrival - stamp), the second rising: the first is the smallest."""
-        self._last: float | None = None
-
-    def captured_at(self, stamp: float | None, arrived_at: float) -> float:
-        """When a frame was captured [s, the clock of `arrived_at`], never after it arrived."""
-        source = self._source
-        if stamp is None or source.clock == "arrival":
-            return arrived_at - source.delay
-        if source.clock == "device":
-            return stamp - source.delay
-        if self._last is not None and not 0 <= stamp - self._last <= _JUMP:
-            self._shortest.clear()
-        self._last = stamp
-        lag = arrived_at - stamp
-        while self._shortest and self._shortest[-1][1] >= lag:
-            self._shortest.pop()
-        self._shortest.append((arrived_at, lag))
-        while self._shortest[0][0] < arrived_at - source.clock_window:
-            self._shortest.popleft()
-        return stamp + self._shortest[0][1] - source.delay
 
 
 class Camera:
@@ -173,12 +133,7 @@ class Camera:
         self.open()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *failure: object) -> None:
         self.close()
 
     def _work(self) -> None:
@@ -246,7 +201,7 @@ def _gap(last: float | None, picture: Picture, decoder: Decoder) -> int:
     if last is None or picture.stamp is None or period is None:
         return 0
     step = picture.stamp - last
-    return max(round(step / period) - 1, 0) if 0 < step <= _JUMP else 0
+    return max(round(step / period) - 1, 0) if 0 < step <= JUMP else 0
 
 
 def check_captures(captures: Sequence[Capture], config: CameraConfig) -> None:

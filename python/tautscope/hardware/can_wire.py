@@ -29,14 +29,13 @@ from tautscope.errors import (
     SecondMasterError,
     StateError,
 )
-from tautscope.hardware.link import Feedback
+from tautscope.hardware.link import ANSWER_SIZE, NO_ANSWER, Answer, Feedback
 
 NMT, SYNC, EMERGENCY = 0x000, 0x080, 0x080
 ANSWER, CONTROLWORD, SET_POINT = 0x180, 0x200, 0x300
 SDO_ANSWER, SDO_REQUEST, HEARTBEAT = 0x580, 0x600, 0x700
 START, STOP, PRE_OPERATIONAL = 0x01, 0x02, 0x80
 BOOT_UP, OPERATIONAL, PRE_OPERATIONAL_STATE = 0x00, 0x05, 0x7F
-_ANSWER = struct.Struct("<Hib")
 
 
 @dataclass(slots=True)
@@ -46,7 +45,7 @@ class Node:
     Attributes:
         name: As a person finds it.
         id: Its node id.
-        statusword, position, mode: What it said last.
+        said: What it said last.
         age: Cycles since it said so.
         answers: How often it answered a SYNC.
         heard, beat: When it last answered, and when its heartbeat came [s].
@@ -58,9 +57,7 @@ class Node:
 
     name: str
     id: int
-    statusword: int = 0
-    position: int = 0
-    mode: int = 0
+    said: Answer = NO_ANSWER
     age: int = 0
     answers: int = 0
     heard: float = 0.0
@@ -102,7 +99,8 @@ class Wire:
         for node in self.nodes.values():
             node.beat = node.heard = now
             node.beating, node.was_operational = PRE_OPERATIONAL_STATE, False
-            node.statusword, node.controlword, node.age, node.emergency = 0, None, 0, b""
+            node.said = node.said._replace(statusword=0)
+            node.controlword, node.age, node.emergency = None, 0, b""
             self.nmt(START, node.id)
         self.watching = True
 
@@ -129,14 +127,7 @@ class Wire:
                 break
         now = time.monotonic()
         return [
-            Feedback(
-                statusword=node.statusword,
-                position=node.position,
-                mode=node.mode,
-                age=node.age,
-                answers=node.answers,
-                silence=now - node.heard,
-            )
+            Feedback(*node.said, age=node.age, answers=node.answers, silence=now - node.heard)
             for node in self.nodes.values()
         ]
 
@@ -181,8 +172,8 @@ class Wire:
             return
         function = identifier & 0x780
         now = time.monotonic()
-        if function == ANSWER and len(data) >= _ANSWER.size:
-            node.statusword, node.position, node.mode = _ANSWER.unpack_from(data)
+        if function == ANSWER and len(data) >= ANSWER_SIZE:
+            node.said = Answer.unpack(data)
             node.age, node.heard = 0, now
             node.answers += 1
         elif function == SDO_ANSWER and len(data) == 8:

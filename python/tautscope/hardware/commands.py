@@ -119,7 +119,7 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _bench(options: argparse.Namespace) -> None:
-    from tautscope.bench.drives import Reporter  # noqa: PLC0415
+    from tautscope.bench.events import Reporter  # noqa: PLC0415
     from tautscope.bench.rig import Bench  # noqa: PLC0415
     from tautscope.hardware.realtime import SETPOINTS, quick_switching, realtime  # noqa: PLC0415
     from tautscope.hardware.signals import exit_on_signals  # noqa: PLC0415

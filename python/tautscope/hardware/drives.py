@@ -12,9 +12,6 @@ back. Anything unexpected is a `DriveError`: the motors have then been brought t
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
-from types import TracebackType
 from typing import Self
 
 import numpy as np
@@ -22,22 +19,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from tautscope.config import DrivesConfig
 from tautscope.dof import Dof
-from tautscope.errors import (
-    BusError,
-    DriveError,
-    SignalError,
-    StateError,
-)
-from tautscope.hardware import cia402
-from tautscope.hardware import object_dictionary as objects
-from tautscope.hardware.cia402 import Mode, Scale, State
+from tautscope.errors import BusError, DriveError, SignalError, StateError
+from tautscope.hardware.cia402 import Scale
 from tautscope.hardware.commissioning import commission
-from tautscope.hardware.link import Feedback, Link
+from tautscope.hardware.cycles import Cycles
+from tautscope.hardware.link import Link
 from tautscope.hardware.signals import signals_deferred
 from tautscope.hardware.watch import Traffic, Watch
-
-CONFIRMATIONS = 2
-"""Answers in a row that show a motor at rest; one may have been under way before the stop."""
 
 
 def open_drives(config: DrivesConfig) -> Drives:
@@ -88,16 +76,13 @@ class Drives:
         self._scales = [Scale(config[dof], dof.label) for dof in Dof]
         self._running = False
         self._closed = False
-        self._words = [cia402.DISABLE_VOLTAGE] * 3
-        self._targets = [0, 0, 0]
-        self._feedback: list[Feedback] = []
         self._previous: NDArray[np.float64] = np.zeros(3)
-        self._last_cycle = time.monotonic()
         try:
             self.commissioned = tuple(commission(link, config, dof) for dof in Dof)
-            self._modes = {dof: self.commissioned[dof].mode for dof in Dof}
-            self._watch = Watch(config, [link.name(dof) for dof in Dof], self._modes)
-            link.prepare(self._modes)
+            modes = {dof: self.commissioned[dof].mode for dof in Dof}
+            self._watch = Watch(config, [link.name(dof) for dof in Dof], modes)
+            self._cycles = Cycles(config, link, modes, self._watch)
+            link.prepare(modes)
         except BaseException:
             link.close()
             raise
@@ -139,21 +124,11 @@ class Drives:
         if self._running or self._closed:
             raise StateError("drives", "started while running or closed", "Open them anew")
         try:
-            self._targets = [self._link.read(dof, objects.POSITION) for dof in Dof]
-            self._watch.check_start(self._targets)
-            self._link.operational()
-            if reset_faults:
-                self._walk(self._reset)
-            self._words = [cia402.DISABLE_VOLTAGE] * 3
-            self._walk(self._enable)
-            if Mode.INTERPOLATED_POSITION in self._modes.values():
-                for _ in range(self.config.lead_points):
-                    self._paced_cycle()
-            self._walk(self._follow)
+            said = self._cycles.enable(reset_faults=reset_faults)
         except BaseException as error:
             self._stop_because(error)
             raise
-        self._previous = self._watch.begin(self._feedback)
+        self._previous = self._watch.begin(said)
         self._running = True
         return self._previous.copy()
 
@@ -184,12 +159,11 @@ class Drives:
             raise StateError("drives", "a command before start or after stop", "Call start first")
         try:
             wanted = _three(command)
-            self._targets = [
+            targets = [
                 scale.checked(wanted[dof], self._previous[dof], self.cycle)
                 for dof, scale in enumerate(self._scales)
             ]
-            self._cycle()
-            applied = self._watch.check(wanted, self._feedback)
+            applied = self._watch.check(wanted, self._cycles.send(targets))
         except BaseException as error:
             self._stop_because(error)
             raise
@@ -229,83 +203,13 @@ class Drives:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         try:
             self.close()
         except DriveError as failed:
             if error is None:
                 raise
             error.add_note(str(failed))
-
-    # The cycle
-
-    def _cycle(self) -> None:
-        now, traffic = time.monotonic(), self.traffic
-        if traffic.cycles:
-            traffic.longest_pause = max(traffic.longest_pause, now - self._last_cycle)
-        self._last_cycle = now
-        traffic.cycles += 1
-        self._feedback = self._link.cycle(self._words, self._targets)
-
-    def _paced_cycle(self) -> None:
-        began = time.monotonic()
-        self._cycle()
-        time.sleep(max(0.0, self.cycle - (time.monotonic() - began)))
-
-    # Enabling
-
-    def _walk(self, step: Callable[[Dof, State | None, Feedback], bool]) -> None:
-        """Cycle until `step` is content with every drive; each state has its own time."""
-        seen: list[int | None] = [None] * 3
-        since = [time.monotonic()] * 3
-        while True:
-            self._paced_cycle()
-            done = True
-            for dof in Dof:
-                said = self._feedback[dof]
-                if said.age and not said.statusword:
-                    content = False  # it has not spoken yet
-                else:
-                    content = step(dof, cia402.state_of(said.statusword), said)
-                done = done and content
-                if content or said.statusword != seen[dof]:
-                    seen[dof], since[dof] = said.statusword, time.monotonic()
-                elif time.monotonic() - since[dof] > self.config.state_timeout:
-                    raise self._watch.stuck(dof, said)
-            if done:
-                return
-
-    def _reset(self, dof: Dof, state: State | None, said: Feedback) -> bool:
-        if state in (State.FAULT, State.FAULT_REACTION):
-            # Only the change of bit 7 from 0 to 1 counts.
-            self._words[dof] ^= cia402.FAULT_RESET
-            return False
-        self._words[dof] = cia402.DISABLE_VOLTAGE
-        return True
-
-    def _enable(self, dof: Dof, state: State | None, said: Feedback) -> bool:
-        if state is State.FAULT:
-            raise self._watch.wrong_state(dof, said)
-        word = cia402.towards_enabled(state)
-        if word is not None:
-            self._words[dof] = word
-        if state is not State.OPERATION_ENABLED:
-            self._targets[dof] = said.position  # what it stands at is what it shall hold
-        return state is State.OPERATION_ENABLED
-
-    def _follow(self, dof: Dof, state: State | None, said: Feedback) -> bool:
-        if state is not State.OPERATION_ENABLED:
-            raise self._watch.wrong_state(dof, said)
-        if self._modes[dof] is Mode.INTERPOLATED_POSITION:
-            self._words[dof] = cia402.INTERPOLATE
-        return bool(said.statusword & cia402.FOLLOWS)
-
-    # Stopping
 
     def _stop_because(self, error: BaseException) -> None:
         with signals_deferred():
@@ -316,25 +220,7 @@ class Drives:
     def _quick_stop(self) -> list[str]:
         """Quick-stop all drives; the names of those that do not confirm it."""
         self._running = False
-        if not self._feedback:
-            return []  # at rest: never cycled, or stopped before
-        confirmed = [0, 0, 0]
-        deadline = time.monotonic() + self.config.state_timeout
-        while min(confirmed) < CONFIRMATIONS and time.monotonic() < deadline:
-            try:
-                said = self._link.quick_stop(self._targets)
-            except DriveError:
-                break  # the bus itself is gone
-            for dof, one in enumerate(said):
-                rests = not one.age and cia402.state_of(one.statusword) in cia402.AT_REST
-                confirmed[dof] = confirmed[dof] + 1 if rests else 0
-            if not all(confirmed):
-                time.sleep(self.cycle / 4)
-        self._feedback = []
-        pending = [dof for dof in Dof if confirmed[dof] < CONFIRMATIONS]
-        if pending:
-            self._link.abandon(pending)
-        return [self._link.name(dof) for dof in pending]
+        return self._cycles.quick_stop()
 
 
 def _three(command: ArrayLike) -> NDArray[np.float64]:

@@ -27,13 +27,12 @@ from tautscope.errors import (
 from tautscope.hardware import cia402
 from tautscope.hardware import object_dictionary as objects
 from tautscope.hardware.cia402 import Mode, State
-from tautscope.hardware.link import AbsentError, Feedback
+from tautscope.hardware.link import NO_ANSWER, AbsentError, Answer, Feedback
 from tautscope.hardware.object_dictionary import Entry
 
 ABSENT = (0x0602_0000, 0x0609_0011)
 """SDO abort codes: object, sub-index does not exist."""
 _COMMAND = struct.Struct("<Hi")
-_ANSWER = struct.Struct("<Hib")
 
 
 @dataclass(slots=True)
@@ -42,9 +41,7 @@ class _Slave:
 
     name: str
     device: Any
-    statusword: int = 0
-    position: int = 0
-    mode: int = 0
+    said: Answer = NO_ANSWER
     enabled: bool = False
 
 
@@ -134,7 +131,7 @@ class EthercatLink:
     def operational(self) -> None:
         """Bring the line to operational; process data flows from here on."""
         self._heard, self._age = time.monotonic(), 0
-        targets = [self._slaves[dof].position for dof in Dof]
+        targets = [self._slaves[dof].said.position for dof in Dof]
         self._exchange([cia402.DISABLE_VOLTAGE] * 3, targets)
         self._reach(self._soem.OP_STATE, "operational")
 
@@ -147,7 +144,7 @@ class EthercatLink:
         """
         said = self._exchange(controlwords, targets)
         for dof, slave in self._slaves.items():
-            state = cia402.state_of(slave.statusword)
+            state = cia402.state_of(slave.said.statusword)
             if slave.enabled and state in (State.FAULT, State.FAULT_REACTION):
                 slave.enabled = False
                 code = self.read(dof, objects.ERROR_CODE)
@@ -199,18 +196,9 @@ class EthercatLink:
             self._age, self._heard = 0, now
             self._answers += 1
             for slave in self._slaves.values():
-                slave.statusword, slave.position, slave.mode = _ANSWER.unpack_from(
-                    bytes(slave.device.input)
-                )
+                slave.said = Answer.unpack(bytes(slave.device.input))
         return [
-            Feedback(
-                statusword=slave.statusword,
-                position=slave.position,
-                mode=slave.mode,
-                age=self._age,
-                answers=self._answers,
-                silence=now - self._heard,
-            )
+            Feedback(*slave.said, age=self._age, answers=self._answers, silence=now - self._heard)
             for slave in self._slaves.values()
         ]
 

@@ -221,7 +221,7 @@ class _Watched:
         self._log.tick(sample, reference, command)
         if self._watch is None:
             self._watch = Plausibility(self._config, sample.applied)
-        self._watch.tick(sample.applied)
+        self._watch.tick(sample.time, sample.applied)
 
     def frame(self, now: float, frame: Frame, report: Report) -> None:
         self._log.frame(now, frame, report)
@@ -233,7 +233,7 @@ class _Watched:
                 "The motors are stopped. What was noticed is in the log",
             )
         if self._watch is not None:
-            self._watch.frame(report)
+            self._watch.frame(frame.captured_at, report)
 
 
 @contextmanager

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from tautscope.dof import Dof
 from tautscope.errors import SettingRefusedError
@@ -12,14 +13,30 @@ from tautscope.hardware.cia402 import Mode
 from tautscope.hardware.object_dictionary import Entry
 
 
+class Answer(NamedTuple):
+    """What a drive says in a cycle, on every bus: 0x6041, 0x6064 [counts], 0x6061."""
+
+    statusword: int
+    position: int
+    mode: int
+
+    @classmethod
+    def unpack(cls, data: bytes) -> Answer:
+        """From process data of at least `ANSWER_SIZE` bytes."""
+        return cls(*_ANSWER.unpack_from(data))
+
+
+_ANSWER = struct.Struct("<Hib")
+ANSWER_SIZE = _ANSWER.size
+NO_ANSWER = Answer(0, 0, 0)
+
+
 @dataclass(frozen=True, slots=True)
 class Feedback:
     """What a drive last said.
 
     Attributes:
-        statusword: 0x6041.
-        position: 0x6064 [counts].
-        mode: 0x6061.
+        statusword, position, mode: As in `Answer`.
         age: Cycles since it said so; 0 in this one.
         answers: How often it has said so since the link began.
         silence: Time since it said so [s].

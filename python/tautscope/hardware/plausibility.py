@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import deque
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,7 +27,8 @@ OUTRUNS = 3.0
 class Plausibility:
     """Compares what the camera sees with what the drives report, from the start of a run on.
 
-    Per DOF, over the frames that measured it, with q the state estimate and p the motor,
+    Per DOF, over the frames that measured it, with q the state estimate and p the motor when the
+    frame was captured,
 
         R = max p - min p,    D = q(where p was largest) - q(where p was smallest).
 
@@ -40,19 +43,22 @@ class Plausibility:
     def __init__(self, config: Config, applied: NDArray[np.float64]) -> None:
         self._scale = np.array([config[dof].start_deviation for dof in Dof])
         self._last = np.array(applied)
+        span = round(config.control.history / config.control.period)
+        self._applied: deque[tuple[float, NDArray[np.float64]]] = deque(maxlen=span)
         self._unseen = np.zeros(3)
         self._ends: list[tuple[tuple[float, float], tuple[float, float]] | None] = [None] * 3
         """Per DOF (motor, estimate) at the least and at the largest position of the motor."""
         self._settled = [False] * 3
 
-    def tick(self, applied: NDArray[np.float64]) -> None:
-        """Where the motors are (3,), once per control period.
+    def tick(self, time: float, applied: NDArray[np.float64]) -> None:
+        """Where the motors are (3,) at a time of the rig's clock [s], once per control period.
 
         Raises:
             ConfigError: The markers have not been seen for too long a travel.
         """
         self._unseen += np.abs(applied - self._last)
         self._last = np.array(applied)
+        self._applied.append((time, self._last))
         for dof in np.flatnonzero(self._unseen > UNSEEN * self._scale):
             label = Dof(int(dof)).label
             raise ConfigError(
@@ -62,17 +68,25 @@ class Plausibility:
                 f"drives.{label}.sign and counts_per_unit, and the calibration",
             )
 
-    def frame(self, report: Report) -> None:
-        """What the loop made of a frame.
+    def frame(self, captured_at: float, report: Report) -> None:
+        """What the loop made of a frame captured at a time of the rig's clock [s].
 
         Raises:
             ConfigError: A tip goes against its motor, further than it, or not at all.
         """
+        motor = self._at(captured_at)
         for dof in Dof:
             if report.observable[dof]:
                 self._unseen[dof] = 0.0
                 if not self._settled[dof]:
-                    self._judge(dof, (float(self._last[dof]), float(report.state_estimate[dof])))
+                    self._judge(dof, (float(motor[dof]), float(report.state_estimate[dof])))
+
+    def _at(self, time: float) -> NDArray[np.float64]:
+        """Where the motors were; a frame is older than they are by the camera's delay."""
+        for at, applied in reversed(self._applied):
+            if at <= time:
+                return applied
+        return self._applied[0][1] if self._applied else self._last
 
     def _judge(self, dof: Dof, now: tuple[float, float]) -> None:
         least, largest = self._ends[dof] or (now, now)

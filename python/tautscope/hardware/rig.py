@@ -7,9 +7,8 @@ import time
 from bisect import bisect_right
 from collections import deque
 from collections.abc import Callable
-from contextlib import ExitStack
-from types import TracebackType
-from typing import Protocol, Self
+from contextlib import AbstractContextManager, ExitStack
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,7 +24,7 @@ from tautscope.hardware.timing import Timing
 from tautscope.rig import Frame, Sample
 
 
-class Eye(Protocol):
+class Eye(AbstractContextManager["Eye"], Protocol):
     """What `tautscope.hardware.cameras.Camera` is to the rig."""
 
     @property
@@ -36,15 +35,6 @@ class Eye(Protocol):
     def newest(self) -> Capture | None:
         """The newest frame that was not taken yet, times on the monotonic clock."""
         ...
-
-    def __enter__(self) -> Self: ...
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-        /,
-    ) -> None: ...
 
 
 def _say(text: str) -> None:

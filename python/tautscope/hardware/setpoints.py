@@ -6,24 +6,25 @@ import math
 import threading
 import time
 from collections.abc import Callable
-from types import TracebackType
-from typing import Protocol, Self
+from contextlib import AbstractContextManager
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tautscope.config import DrivesConfig
 from tautscope.dof import Dof
-from tautscope.errors import FollowingError, StateError
+from tautscope.errors import StateError
 from tautscope.hardware.realtime import SETPOINTS, realtime
 from tautscope.hardware.timing import Timing
+from tautscope.hardware.watch import outside_travel
 
 Floats = NDArray[np.float64]
 _PATIENCE = 0.3
 """How long a cycle waits for a command that is late [share of the cycle]."""
 
 
-class Motors(Protocol):
+class Motors(AbstractContextManager["Motors"], Protocol):
     """What `tautscope.hardware.drives.Drives` is to this thread."""
 
     def start(self) -> Floats:
@@ -33,15 +34,6 @@ class Motors(Protocol):
     def exchange(self, command: ArrayLike) -> Floats:
         """Send a set-point (3,), and read where the motors are (3,) [m, rad, rad]."""
         ...
-
-    def __enter__(self) -> Self: ...
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-        /,
-    ) -> None: ...
 
 
 class Setpoints:
@@ -147,13 +139,7 @@ class Setpoints:
         for dof in Dof:
             axis, at = config[dof], float(position[dof])
             if not axis.travel[0] <= at <= axis.travel[1]:
-                raise FollowingError(
-                    f"{dof.label}, node {axis.node}",
-                    f"it stands at {at:.6g}, outside its travel {axis.travel[0]:g} to "
-                    f"{axis.travel[1]:g}",
-                    f"Move it there by hand, or check drives.{dof.label}.home, sign and "
-                    "counts_per_unit",
-                )
+                raise outside_travel(f"{dof.label}, node {axis.node}", dof, at, axis.travel)
         way = self._start - position
         speeds = np.array([config[dof].speed_limit for dof in Dof]) * config.start_speed
         # The cosine's largest speed is pi / 2 times its mean.

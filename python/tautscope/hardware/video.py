@@ -77,6 +77,8 @@ def opened(
                 raise CameraMismatchError("camera.source.url", url, "a source with a video stream")
             yield container
     except av.error.FFmpegError as error:
+        if Path(url).is_file():
+            raise CameraError("video", url, f"a video file that FFmpeg reads ({error})") from None
         hint = "a source that opens and goes on; is it connected, and is another program using it?"
         raise CameraError("camera.source.url", url, f"{hint} ({error})") from None
 

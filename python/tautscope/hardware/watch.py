@@ -35,6 +35,17 @@ class Traffic:
     longest_pause: float = 0.0
 
 
+def outside_travel(
+    name: str, dof: Dof, position: float, travel: tuple[float, float]
+) -> FollowingError:
+    """The error of a motor that stands where it may not be [m or rad]."""
+    return FollowingError(
+        name,
+        f"it stands at {position:.6g}, outside its travel {travel[0]:g} to {travel[1]:g}",
+        f"Move it there by hand, or check drives.{dof.label}.home, sign and counts_per_unit",
+    )
+
+
 class Watch:
     """Judges what three drives say in each cycle.
 
@@ -103,12 +114,7 @@ class Watch:
             lower, upper = self._config[dof].travel
             slack = self._config[dof].following_error
             if not lower - slack <= position <= upper + slack:
-                raise FollowingError(
-                    self._names[dof],
-                    f"it stands at {position:.6g}, outside its travel {lower} to {upper}",
-                    f"Move it there by hand, or check drives.{dof.label}.home, sign and "
-                    "counts_per_unit",
-                )
+                raise outside_travel(self._names[dof], dof, position, (lower, upper))
 
     def stuck(self, dof: Dof, said: Feedback) -> SilentDriveError | StateError:
         """The error of a drive that does not reach the next state."""

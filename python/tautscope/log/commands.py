@@ -13,7 +13,7 @@ from tautscope.errors import FieldError
 
 if TYPE_CHECKING:
     from tautscope.log.comparison import Estimation
-    from tautscope.log.reader import Log
+    from tautscope.log.reader import Damage, Log
     from tautscope.recording import Recording
 
 
@@ -97,13 +97,9 @@ def _recover(options: argparse.Namespace) -> None:
     found = recover(file, options.out or file.with_name(f"{file.stem}-recovered.mcap"))
     span = (found.last - found.first) / 1e9
     print(f"{found.path}: {sum(found.messages.values())} messages over {span:.1f} s.")
-    damage = found.damage
-    if not damage:
+    if not found.damage:
         print(f"{file} was whole.")
-    if damage.is_torn:
-        print(f"{file} is torn: its last {damage.lost_bytes} bytes are no whole record.")
-    if damage.bad_chunks:
-        print(f"{damage.bad_chunks} damaged chunks were left out.")
+    _print_damage(file, found.damage)
 
 
 def _export(options: argparse.Namespace) -> None:
@@ -113,10 +109,19 @@ def _export(options: argparse.Namespace) -> None:
     if options.rosbag is not None:
         found = export_rosbag(file, options.rosbag)
         print(f"{options.rosbag}: {sum(found.messages.values())} messages.")
+        _print_damage(file, found.damage)
         return
     folder = options.csv if options.csv != Path() else file.with_name(f"{file.stem}-csv")
-    export_csv(file, folder)
+    damage = export_csv(file, folder)
     print(f"{folder}: trace.csv, frames.csv, recording.toml, config.toml.")
+    _print_damage(file, damage)
+
+
+def _print_damage(file: Path, damage: Damage) -> None:
+    if damage.is_torn:
+        print(f"{file} is torn: its last {damage.lost_bytes} bytes are no whole record.")
+    if damage.bad_chunks:
+        print(f"{file}: damaged chunks that were left out: {damage.bad_chunks}.")
 
 
 def _replay(options: argparse.Namespace) -> int:
@@ -198,6 +203,12 @@ def _replay_video(options: argparse.Namespace) -> int:
     frames = read_video(options.video, config.camera, options.video_start)
     heard = listen_to_video(frames, options.motors, config)
     _tell(options, folder, heard.recording, None)
+    if not options.json:
+        images, motors = heard.recording.frames["captured_at"], heard.recording.trace["time"]
+        print(
+            f"Images from {images[0]:.2f} to {images[-1]:.2f} s of the motors' "
+            f"{motors[0]:.2f} to {motors[-1]:.2f} s; if that is not all of them, see --video-start."
+        )
     return 0
 
 

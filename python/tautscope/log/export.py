@@ -65,14 +65,19 @@ def recover(path: str | PathLike[str], out: str | PathLike[str]) -> Recovery:
     return Recovery(target, dict(whole.counts), first, last, damage)
 
 
-def export_csv(path: str | PathLike[str], folder: str | PathLike[str]) -> None:
+def export_csv(path: str | PathLike[str], folder: str | PathLike[str]) -> Damage:
     """Make the folder of CSV and TOML that `Recording.save` makes.
+
+    Returns:
+        What of the log could not be read.
 
     Raises:
         MissingPathError, RecordError, ConfigError: As `read_log`.
         OutputError: The folder holds something already, or cannot be written.
     """
-    read_log(path).recording().save(folder)
+    log = read_log(path)
+    log.recording().save(folder)
+    return log.damage
 
 
 def export_rosbag(path: str | PathLike[str], folder: str | PathLike[str]) -> Recovery:

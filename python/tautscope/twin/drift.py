@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zlib
 from dataclasses import dataclass
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -58,28 +59,46 @@ class Drift:
         A sum of plane waves whose phases advance by ``speed`` [rad per picture] times a number
         near one, bent by two slow ones so that no wave shows.
         """
-        chance = self.generator(tag)
-        columns = 120
-        rows = max(1, round(columns * height / width))
-        x, y = np.meshgrid(np.arange(columns) / columns, np.arange(rows) / columns)
-        x, y = (
-            x + 0.08 * np.sin(5 * y + chance.uniform(0, 2 * np.pi)),
-            y + 0.08 * np.sin(5 * x + chance.uniform(0, 2 * np.pi)),
+        waves, weight, pace = _waves(self.seed, self.name, tag, height / width, cells)
+        turn = speed * pace * self.sequence
+        coarse = np.tensordot(
+            np.concatenate([weight * np.cos(turn), weight * np.sin(turn)]), waves, 1
         )
-        total = np.zeros_like(x)
-        power = 0.0
-        for wave in range(18):
-            pitch = cells * 2.0 ** (wave / 5)
-            weight = 2.0 ** (-wave / 6)
-            turn, phase = chance.uniform(0, 2 * np.pi, 2)
-            pace = speed * chance.uniform(0.6, 1.4)
-            along = np.pi * pitch * (np.cos(turn) * x + np.sin(turn) * y)
-            total += weight * np.sin(along + phase + pace * self.sequence)
-            power += 0.5 * weight**2
-        coarse = (total / np.sqrt(power)).astype(np.float32)
         return np.asarray(
-            cv2.resize(coarse, (width, height), interpolation=cv2.INTER_CUBIC), dtype=np.float32
+            cv2.resize(coarse.astype(np.float32), (width, height), interpolation=cv2.INTER_CUBIC),
+            dtype=np.float32,
         )
+
+
+@lru_cache(maxsize=16)
+def _waves(
+    seed: int, name: str, tag: str, aspect: float, cells: float
+) -> tuple[Floats, Floats, Floats]:
+    """What of `Drift.clouds` does not move, for a picture ``aspect`` as high as wide.
+
+    Returns:
+        Sines, then cosines, of each wave's place (2 n, rows, columns); weights (n,) that give the
+        sum unit deviation; pace (n,).
+    """
+    chance = Drift(seed, name, 0).generator(tag)
+    columns = 120
+    rows = max(1, round(columns * aspect))
+    x, y = np.meshgrid(np.arange(columns) / columns, np.arange(rows) / columns)
+    x, y = (
+        x + 0.08 * np.sin(5 * y + chance.uniform(0, 2 * np.pi)),
+        y + 0.08 * np.sin(5 * x + chance.uniform(0, 2 * np.pi)),
+    )
+    count = np.arange(18)
+    weight = 2.0 ** (-count / 6)
+    turn, phase, pace = chance.uniform((0, 0, 0.6), (2 * np.pi, 2 * np.pi, 1.4), (18, 3)).T
+    pitch = np.pi * cells * 2.0 ** (count / 5)
+    along = np.multiply.outer(pitch * np.cos(turn), x) + np.multiply.outer(pitch * np.sin(turn), y)
+    along += phase[:, None, None]
+    return (
+        np.concatenate([np.sin(along), np.cos(along)]),
+        weight / np.sqrt(0.5 * np.sum(weight**2)),
+        pace,
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -102,7 +102,8 @@ def _judge(what: str, config: CameraConfig, seen: list[Capture], state: CameraSt
     }
     if state.lost:
         todo = "See whether cable, hub or processor is too slow; other programs closed?"
-        return Finding("camera", what, "note", f"{found}; {state.lost} frames lost", todo, data)
+        lost = f"{state.lost} frame{'s' if state.lost > 1 else ''} lost"
+        return Finding("camera", what, "note", f"{found}; {lost}", todo, data)
     return Finding("camera", what, "ok", found, data=data)
 
 

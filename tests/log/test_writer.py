@@ -1,0 +1,116 @@
+"""Disks that are full or slow, runs that fail: the run goes on and what was written is there."""
+
+import os
+import time
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+import pytest
+from drawn import DrawnRig
+from tautscope.config import Config
+from tautscope.errors import OutputError, RecordError
+from tautscope.log.reader import Tick, Update, read_log
+from tautscope.log.writer import LogWriter
+from tautscope.reduction import HysteresisReduction
+from tautscope.rig import Sample
+
+
+def test_a_log_in_the_way_is_left_alone(tmp_path: Path, config: Config) -> None:
+    (tmp_path / "run.mcap").write_text("mine")
+    with pytest.raises(OutputError, match="a file that does not exist yet"):
+        LogWriter(tmp_path / "run.mcap", config)
+    assert (tmp_path / "run.mcap").read_text() == "mine"
+
+
+def test_a_full_disk_ends_the_recording_and_not_the_run(
+    tmp_path: Path, config: Config, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(path: Path) -> IO[bytes]:
+        return Path("/dev/full").open("wb", buffering=0)
+
+    monkeypatch.setattr("tautscope.log.journal._open", full)
+    said: list[str] = []
+    log = LogWriter(tmp_path / "run.mcap", config, say=said.append)
+    log._journal._thread.join()
+    for tick in range(5):
+        log.tick(Sample(0.01 * tick, np.zeros(3)), np.zeros(3), np.zeros(3))
+    summary = log.close()
+    assert "No space left" in summary.failure
+    assert summary.dropped == log.dropped == 5
+    assert not summary.is_complete
+    (text,) = said
+    assert "recording ended" in text
+    assert "the run goes on" in text
+
+
+def test_a_disk_that_stands_still_drops_and_says_so(tmp_path: Path, config: Config) -> None:
+    """A pipe nobody reads takes 64 kB and then no more."""
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    small = config.replace(**{"recording.queue_events": 500, "recording.close_timeout": 0.2})
+    said: list[str] = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("tautscope.log.journal._open", lambda path: path.open("wb", buffering=0))
+        patch.setattr("tautscope.log.journal.os.fsync", lambda number: None)
+        log = LogWriter(pipe, small, say=said.append)
+    rng = np.random.default_rng(2)
+    ticks = 0
+    while not log.dropped:
+        if ticks % 400 == 0:
+            time.sleep(0.3)
+        noise = rng.normal(size=3)
+        log.tick(Sample(0.01 * ticks, noise), noise, noise)
+        ticks += 1
+    summary = log.close()
+    assert summary.ticks == ticks
+    assert summary.dropped == 1
+    assert any("the disk did not take the rest" in text for text in said)
+    os.close(reader)  # the thread's write fails, and it ends
+    log._journal._thread.join()
+
+
+def test_images_are_dropped_before_ticks(tmp_path: Path, config: Config) -> None:
+    one = config.replace(**{"recording.queue_images": 1})
+    said: list[str] = []
+    rig, loop = DrawnRig(one), HysteresisReduction(one)
+    sample = rig.reset()
+    loop.step(sample.applied, 0.0)
+    report = loop.on_frame(sample.frame)
+    with LogWriter(tmp_path / "run.mcap", one, say=said.append) as log:
+        for _ in range(200):
+            log.tick(sample, sample.applied, sample.applied)
+            log.frame(sample.time, sample.frame, report)
+    summary = log.close()
+    assert summary.dropped == 0
+    assert 0 < summary.dropped_images < 200
+    read = read_log(tmp_path / "run.mcap")
+    assert len(read.events) == 400
+    assert sum(map(read.has_image, read.events)) == 200 - summary.dropped_images
+    assert any("dropped" in warning for warning in read.warnings)
+    assert any("dropped" in text for text in said)
+    updates = [index for index, event in read.events.items() if isinstance(event, Update)]
+    lost = next(index for index in updates if not read.has_image(index))
+    with pytest.raises(RecordError, match="an update with its image"):
+        read.image(lost)
+
+
+def test_arrays_may_be_used_again(tmp_path: Path, config: Config) -> None:
+    applied, reference = np.ones(3), np.ones(3)
+    with LogWriter(tmp_path / "run.mcap", config) as log:
+        log.tick(Sample(0.0, applied), reference, reference)
+        applied[:] = reference[:] = 7.0
+    (tick,) = read_log(tmp_path / "run.mcap").events.values()
+    assert isinstance(tick, Tick)
+    assert tick.sample.applied.tolist() == tick.reference.tolist() == [1.0, 1.0, 1.0]
+
+
+def test_a_run_that_fails_leaves_its_log_and_why(tmp_path: Path, config: Config) -> None:
+    with pytest.raises(ZeroDivisionError), LogWriter(tmp_path / "run.mcap", config) as log:
+        log.tick(Sample(0.0, np.zeros(3)), np.zeros(3), np.zeros(3))
+        raise ZeroDivisionError("the rig fell over")
+    read = read_log(tmp_path / "run.mcap")
+    assert not read.damage
+    assert len(read.events) == 1
+    assert any("ZeroDivisionError: the rig fell over" in warning for warning in read.warnings)
