@@ -23,9 +23,11 @@ from tautscope.recording import Recording
 from tautscope.reduction import HysteresisReduction, Report
 from tautscope.references import Segment, SineSequence
 from tautscope.rig import Frame, Sample
+from tautscope.twin.fault_frames import FeatureFrame
 
 Floats = NDArray[np.float64]
 
+NO_IMAGE = np.empty((0, 0, 3), np.uint8)
 NOISE = 0.2
 """Of the true features that stand in for images [px]."""
 
@@ -107,7 +109,7 @@ class Simulation:
                 self.reference,
                 self.config,
                 self.compensate,
-                look=HysteresisReduction.on_frame if self.images else _take_features,
+                look=HysteresisReduction.on_frame if self.images else take_features,
             )
         finally:
             rig.close()
@@ -141,7 +143,7 @@ class BenchTwin:
         self._knots = np.array(simulation.bends).reshape(-1, 2)
         self._twin = Twin(config, images=simulation.compensate and simulation.images)
         blind = simulation.compensate and not simulation.images
-        self._features = _FeatureCamera(config) if blind else None
+        self._features = FeatureCamera(config) if blind else None
         self._time = 0.0
 
     @property
@@ -172,24 +174,26 @@ class BenchTwin:
         return replace(sample, frame=self._features.look(sample))
 
 
-class _FeatureCamera:
+class FeatureCamera:
     """True features by the loop's own model, noise on top, at the camera's rate and delay."""
 
     def __init__(self, config: Config) -> None:
         self._twin = config.twin
-        self._model = build_feature_model(config)
+        self.model = build_feature_model(config)
         self._noise = np.random.default_rng([config.twin.seed, 1])
         self._every = round(1 / (config.twin.frame_rate * config.control.period))
         self._tick = 0
         self._pending: deque[Frame] = deque()
 
     def look(self, sample: Sample) -> Frame | None:
+        """The frame that arrives with a sample, if any."""
         if self._tick % self._every == 0 and sample.true_state is not None:
-            seen = self._model.predict(sample.true_state)
+            seen = self.model.predict(sample.true_state)
             if seen is not None:
                 noisy = seen[0] + NOISE * self._noise.standard_normal(4)
-                nothing = np.empty((0, 0, 3), np.uint8)
-                self._pending.append(Frame(nothing, sample.time, self._tick, noisy))
+                self._pending.append(
+                    FeatureFrame(NO_IMAGE, sample.time, self._tick, seen[0], features=noisy)
+                )
         self._tick += 1
         late = self._twin.latency - 1e-9
         if self._pending and sample.time >= self._pending[0].captured_at + late:
@@ -197,8 +201,10 @@ class _FeatureCamera:
         return None
 
 
-def _take_features(loop: HysteresisReduction, frame: Frame) -> Report:
-    return loop.on_features(frame.true_features, frame.captured_at)
+def take_features(loop: HysteresisReduction, frame: Frame) -> Report:
+    """What the loop does with the features that stand in for an image."""
+    assert isinstance(frame, FeatureFrame)
+    return loop.on_features(frame.features, frame.captured_at)
 
 
 class Store:
@@ -228,7 +234,7 @@ class Store:
         with ProcessPoolExecutor(
             min(workers, len(todo)),
             mp_context=multiprocessing.get_context("spawn"),
-            initializer=_one_thread,
+            initializer=one_thread,
         ) as pool:
             running = {pool.submit(_simulate, each, self._file(each)): each for each in todo}
             try:
@@ -273,7 +279,8 @@ class Recordings(Mapping[str, Recording]):
         return len(self._runs)
 
 
-def _one_thread() -> None:
+def one_thread() -> None:
+    """So that as many processes as cores do not get into each other's way."""
     os.environ["OMP_NUM_THREADS"] = "1"
     import cv2  # noqa: PLC0415  the parent draws no pictures
 

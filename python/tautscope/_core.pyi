@@ -5,11 +5,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
+    "DETECTORS",
     "AdaptiveAxis",
     "Camera",
     "Compensator",
     "Estimator",
     "FeatureModel",
+    "Guards",
     "Instrument",
     "MarkerDetector",
     "Play",
@@ -22,6 +24,7 @@ __all__ = [
 ]
 
 __version__: str
+DETECTORS: tuple[str, ...]
 
 # The control law: crates/core.
 
@@ -222,6 +225,37 @@ class AdaptiveAxis:
     def deviation(self) -> tuple[float, float]: ...
 
 @final
+class Guards:
+    def __new__(
+        cls,
+        *,
+        period: float,
+        gain_limit: _Vector3,
+        reference_speed: _Vector3,
+        reference_age: float,
+        late_tick: float,
+        stall: float,
+        command_speed: _Vector3,
+        command_travel: Sequence[tuple[float, float]],
+        width_limit: _Vector3,
+        offset_limit: _Vector3,
+        frame_age: float,
+        frame_gap: float,
+        frozen_travel: _Vector3,
+        innovation_limit: float,
+        start_deviation: _Vector3,
+        innovation_floor: _Vector3,
+        blind_growth: float,
+        hold_time: float,
+        hold_travel: float,
+        fade_travel: float,
+        restore_travel: float,
+        good_frames: int,
+        good_ticks: int,
+        off: Sequence[str],
+    ) -> Guards: ...
+
+@final
 class Reduction:
     def __new__(
         cls,
@@ -229,6 +263,7 @@ class Reduction:
         estimators: Sequence[Estimator],
         model: FeatureModel,
         state_estimator: StateEstimator,
+        guards: Guards,
         *,
         span: float,
         period: float,
@@ -239,16 +274,21 @@ class Reduction:
         axes: Sequence[AdaptiveAxis],
         model: FeatureModel,
         state_estimator: WeightedEstimator,
+        guards: Guards,
         *,
         span: float,
         period: float,
         start_deviation: _Vector3,
         rest_deviation: _Vector3,
     ) -> Reduction: ...
-    def step(self, reference: ArrayLike, time: float) -> _Floats: ...
+    def step(self, reference: ArrayLike, time: float, stamp: float | None = None) -> _Floats: ...
     def run(self, references: ArrayLike, times: ArrayLike) -> _Floats: ...
     def on_features(
-        self, features: ArrayLike | None, captured_at: float, covariance: ArrayLike | None = None
+        self,
+        features: ArrayLike | None,
+        captured_at: float,
+        covariance: ArrayLike | None = None,
+        checksum: int | None = None,
     ) -> tuple[
         str,
         _Floats,
@@ -262,6 +302,11 @@ class Reduction:
         _Floats,
         _Floats,
     ]: ...
+    @property
+    def supervision(self) -> tuple[str, list[str], list[str], float]: ...
+    def engage(self) -> None: ...
+    def acknowledge(self) -> None: ...
+    def raise_flag(self, name: str) -> None: ...
     def predicted_features(self, captured_at: float) -> _Floats | None: ...
     def expectation(self, captured_at: float) -> tuple[_Floats, _Floats] | None: ...
     @property

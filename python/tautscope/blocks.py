@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from tautscope import _core
 from tautscope.config import Config, DofConfig
@@ -117,6 +118,42 @@ def build_weighted_estimator(config: Config) -> _core.WeightedEstimator:
     )
 
 
+def build_guards(config: Config) -> _core.Guards:
+    """What watches the loop: reference, command, frames, and the reactions to them."""
+    safety = config.safety
+
+    def each(of: Callable[[DofConfig], float]) -> tuple[float, float, float]:
+        insertion, rotation, bending = (of(config[dof]) for dof in Dof)
+        return insertion, rotation, bending
+
+    return _core.Guards(
+        period=config.control.period,
+        gain_limit=each(lambda dof: dof.gain_limit),
+        reference_speed=safety.reference_speed,
+        reference_age=safety.reference_age,
+        late_tick=safety.late_tick,
+        stall=safety.stall,
+        command_speed=safety.command_speed,
+        command_travel=safety.command_travel,
+        width_limit=safety.width_limit,
+        offset_limit=safety.offset_limit,
+        frame_age=safety.frame_age,
+        frame_gap=safety.frame_gap,
+        frozen_travel=each(lambda dof: dof.update_distance * safety.frozen_travel),
+        innovation_limit=safety.innovation_limit,
+        start_deviation=each(lambda dof: dof.start_deviation),
+        innovation_floor=each(lambda dof: dof.start_deviation * safety.innovation_floor),
+        blind_growth=safety.blind_growth,
+        hold_time=safety.hold_time,
+        hold_travel=safety.hold_travel,
+        fade_travel=safety.fade_travel,
+        restore_travel=safety.restore_travel,
+        good_frames=safety.good_frames,
+        good_ticks=safety.good_ticks,
+        off=safety.off,
+    )
+
+
 def build_loop(config: Config, compensate: bool = True) -> _core.Reduction:
     """The whole loop, Fig. 6, without checks of what goes in: `HysteresisReduction` has those."""
     insertion, rotation, bending = (config[dof] for dof in Dof)
@@ -140,6 +177,7 @@ def build_loop(config: Config, compensate: bool = True) -> _core.Reduction:
             ),
             model,
             build_weighted_estimator(config),
+            build_guards(config),
             span=span,
             period=period,
             start_deviation=start_deviation,
@@ -154,6 +192,7 @@ def build_loop(config: Config, compensate: bool = True) -> _core.Reduction:
         (build_estimator(insertion), build_estimator(rotation), build_estimator(bending)),
         model,
         build_state_estimator(config),
+        build_guards(config),
         span=span,
         period=period,
         start_deviation=start_deviation,

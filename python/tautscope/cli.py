@@ -287,6 +287,8 @@ def _print_table1(demo: Demo, folder: Path) -> None:
         f"\n{demo.sim_seconds:.0f} s simulated in {demo.wall_seconds:.0f} s. "
         f"Widths in the last two periods, of the true tip unless said."
     )
+    for warning in demo.compensated.warnings:
+        console.print(f"Warning: {warning}", soft_wrap=True)
     console.print(f"Report, figures and traces: {folder / 'report.html'}", soft_wrap=True)
 
 

@@ -14,6 +14,7 @@ from tautscope.recording import Floats, Recording, Snapshot, Tables, frame_row
 from tautscope.reduction import HysteresisReduction, Report
 from tautscope.references import Reference
 from tautscope.rig import Frame, Rig, Sample
+from tautscope.safety import switched_off
 
 if TYPE_CHECKING:
     from tautscope.vision import Detection
@@ -93,7 +94,8 @@ def run_experiment(
             progress(sample.time - start, reference.duration)
     trace, frames = recorder.tables()
     segments = tuple(reference.segments)
-    return Recording(trace, frames, config, compensate, segments, recorder.snapshot)
+    warnings = (*switched_off(config), *reduction.supervision.latched)
+    return Recording(trace, frames, config, compensate, segments, recorder.snapshot, warnings)
 
 
 Seen = Iterator[tuple[Frame, Report]]

@@ -94,6 +94,8 @@ class Recording:
         compensated: Whether the compensator was on.
         segments: Which DOF moved when.
         snapshot: One frame from about the middle; not saved.
+        warnings: What the guards noticed, by the names of `tautscope.safety.DETECTORS`, and a line
+            for each that is off; not saved.
     """
 
     trace: Table
@@ -102,6 +104,7 @@ class Recording:
     compensated: bool
     segments: tuple[Segment, ...]
     snapshot: Snapshot | None = None
+    warnings: tuple[str, ...] = ()
 
     def during(self, segment: Segment, first: float, last: float) -> NDArray[np.bool_]:
         """(ticks,) which rows of the trace lie in periods `first` to `last` of a segment."""

@@ -16,6 +16,7 @@ from tautscope.blocks import build_loop
 from tautscope.config import Config
 from tautscope.errors import SignalError
 from tautscope.rig import Frame
+from tautscope.safety import Reaction, Supervision, checksum, switched_off
 
 if TYPE_CHECKING:
     from tautscope.vision import Detection, MarkerDetector
@@ -38,6 +39,8 @@ class Status(StrEnum):
     """Captured at a time the command history does not reach."""
     DUPLICATE = "duplicate"
     """Captured no later than a frame already used."""
+    REFUSED = "refused"
+    """A guard did not believe it: it taught nothing. `Report.warnings` has which."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,6 +79,9 @@ class Report:
             "violation", Eq. (5), or None.
         delta_minus: (3,) contact offsets after this frame, input minus output.
         delta_plus: (3,) contact offsets after this frame, input minus output.
+        reaction: What is in force after this frame.
+        warnings: Why, by the names of `tautscope.safety.DETECTORS`; and a line for every guard
+            that ``safety.off`` names.
     """
 
     detection: Detection | None
@@ -91,6 +97,8 @@ class Report:
     triggers: tuple[Triggers, Triggers, Triggers]
     delta_minus: NDArray[np.float64]
     delta_plus: NDArray[np.float64]
+    reaction: Reaction
+    warnings: tuple[str, ...]
 
 
 class HysteresisReduction:
@@ -104,17 +112,23 @@ class HysteresisReduction:
     def __init__(self, config: Config, compensate: bool = True) -> None:
         self._config = config
         self._ticks = 0
+        self._off = switched_off(config)
         self._loop = build_loop(config, compensate)
 
-    def step(self, reference: ArrayLike, time: float | None = None) -> NDArray[np.float64]:
+    def step(
+        self, reference: ArrayLike, time: float | None = None, made_at: float | None = None
+    ) -> NDArray[np.float64]:
         """One control tick: the command for a reference, Eqs. (2)-(3).
 
         Args:
             reference: u (3,) [m, rad, rad].
             time: The rig's clock [s]; without it, ticks of `control.period` from 0 on.
+            made_at: When the reference was made [s, the same clock], if that is known: one older
+                than ``safety.reference_age`` moves nothing.
 
         Returns:
-            c (3,) [m, rad, rad]. The first reference is passed through.
+            c (3,) [m, rad, rad]. The first reference is passed through. While motion is held, the
+            last command.
 
         Raises:
             SignalError: The reference is not three finite numbers, or the time is not finite;
@@ -123,7 +137,7 @@ class HysteresisReduction:
         values = _finite("reference", reference, (3,))
         at = self._ticks * self._config.control.period if time is None else _time("time", time)
         self._ticks += 1
-        return self._loop.step(values, at)
+        return self._loop.step(values, at, None if made_at is None else _time("made_at", made_at))
 
     def on_frame(self, frame: Frame) -> Report:
         """Image update: find the markers, estimate the state, learn the slack, Eqs. (4)-(16).
@@ -154,9 +168,12 @@ class HysteresisReduction:
     def on_detection(self, frame: Frame, detection: Detection) -> Report:
         """The rest of `on_frame`, with the answer to `question`."""
         captured_at = _time("captured_at", frame.captured_at)
+        picture = checksum(frame.image)
         if not any(detection.found):
-            return self._report(None, captured_at, detection)
-        return self._report(detection.features, captured_at, detection, detection.covariance)
+            return self._report(None, captured_at, detection, None, picture)
+        return self._report(
+            detection.features, captured_at, detection, detection.covariance, picture
+        )
 
     def on_features(self, features: ArrayLike | None, captured_at: float) -> Report:
         """Image update from a marker detector of your own.
@@ -172,6 +189,31 @@ class HysteresisReduction:
         """
         values = None if features is None else _features(features)
         return self._report(values, _time("captured_at", captured_at), None)
+
+    @property
+    def supervision(self) -> Supervision:
+        """How the loop stands now."""
+        reaction, flags, latched, lead = self._loop.supervision
+        return Supervision(Reaction(reaction), tuple(flags), tuple(latched), lead)
+
+    def engage(self) -> None:
+        """The operator re-engages: held motion goes on, its first increment zero.
+
+        What is still wrong stops it again at once; what only a restart clears stays.
+        """
+        self._loop.engage()
+
+    def acknowledge(self) -> None:
+        """The operator has seen the warnings; faded compensation may come back, with motion."""
+        self._loop.acknowledge()
+
+    def raise_flag(self, name: str) -> None:
+        """Something only the rig can see: ``drive_fault``, ``following_error``.
+
+        Raises:
+            ConfigError: It is none of `tautscope.safety.DETECTORS`.
+        """
+        self._loop.raise_flag(name)
 
     def expectation(self, captured_at: float) -> Expectation | None:
         """Where the instrument should be in a frame captured at this time, to the best knowledge.
@@ -215,9 +257,12 @@ class HysteresisReduction:
         captured_at: float,
         detection: Detection | None,
         covariance: NDArray[np.float64] | None = None,
+        picture: int | None = None,
     ) -> Report:
-        facts = self._loop.on_features(features, captured_at, covariance)
-        return Report(detection, captured_at, Status(facts[0]), *facts[1:])
+        facts = self._loop.on_features(features, captured_at, covariance, picture)
+        now = self.supervision
+        warnings = (*self._off, *now.flags)
+        return Report(detection, captured_at, Status(facts[0]), *facts[1:], now.reaction, warnings)
 
 
 def _features(values: ArrayLike) -> NDArray[np.float64]:

@@ -11,7 +11,12 @@ Floats = NDArray[np.float64]
 
 
 CONFIG = Config().replace(
-    **{"insertion.observable_deviation": 5e-3, "bending.observable_deviation": 0.1}
+    **{
+        "insertion.observable_deviation": 5e-3,
+        "bending.observable_deviation": 0.1,
+        # Without noise, pictures repeat themselves while the slack is crossed.
+        "safety.frozen_travel": 1e6,
+    }
 )
 
 

@@ -74,8 +74,8 @@ def test_where_to_look_follows_the_images_and_widens_with_travel() -> None:
     np.testing.assert_allclose(after.state, report.state_estimate)
     assert (after.deviation < before.deviation).all()
 
-    for _ in range(20):
-        loop.step(REST + np.array([2e-3, 0.0, 0.0]))
+    for tick in range(20):
+        loop.step(REST + np.array([1e-4 * (tick + 1), 0.0, 0.0]))
     later = loop.expectation(0.55)
     assert later is not None
     assert later.deviation[0] > 1.5 * after.deviation[0]

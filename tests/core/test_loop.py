@@ -143,7 +143,7 @@ def test_a_held_dof_learns_nothing() -> None:
     loop = HysteresisReduction(strict)
     for tick in range(2000):
         wave = np.sin(2 * np.pi * tick / 1000)
-        loop.step(REST + 0.5 * AMPLITUDES * wave)
+        loop.step(REST + 0.25 * AMPLITUDES * wave)
         if tick % 8:
             continue
         features = build_feature_model(strict).predict(REST)

@@ -239,9 +239,13 @@ def test_a_correction_is_not_added_twice() -> None:
 
 
 def test_a_wrong_belief_gives_way_in_the_end() -> None:
-    """Both markers say the same, again and again, against a belief that was sure."""
+    """Both markers say the same, again and again, against a belief that was sure.
+
+    Without the guard, which would hold what was believed for ``safety.hold_time`` first.
+    """
     period = CONFIG.control.period
-    loop, model = HysteresisReduction(CONFIG), build_feature_model(CONFIG)
+    config = CONFIG.replace(**{"safety.off": ["innovation", "swapped"]})
+    loop, model = HysteresisReduction(config), build_feature_model(CONFIG)
     reference = np.array([0.025, 0.0, 0.9])
     tick = 0
     for truth in (reference, reference + np.array([4e-3, 0.4, 0.4])):

@@ -9,6 +9,11 @@ pub fn config(py: Python<'_>) -> impl Fn(ConfigError) -> PyErr {
     move |error| raised(py, "ConfigError", error.field, error.value, error.allowed)
 }
 
+/// A `tautscope.errors.ConfigError` on a name that is not one of those allowed.
+pub fn choice(py: Python<'_>, field: &str, name: &str, allowed: &str) -> PyErr {
+    raised(py, "ConfigError", field, name, allowed)
+}
+
 /// A `tautscope.errors.SignalError` on an array of the wrong length.
 pub fn length(py: Python<'_>, field: &str, length: usize, allowed: &str) -> PyErr {
     let value = format!("{length} values");

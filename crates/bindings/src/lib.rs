@@ -11,6 +11,7 @@ mod errors;
 mod estimator;
 mod features;
 mod frame;
+mod guards;
 mod instrument;
 mod play;
 mod reduction;
@@ -21,10 +22,11 @@ mod vision;
 mod weighted;
 
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 
 #[pymodule]
 mod _core {
-    use super::{Bound, PyModule, PyModuleMethods, PyResult};
+    use super::{Bound, PyModule, PyModuleMethods, PyResult, PyTuple};
 
     #[pymodule_export]
     use super::adaptive::AdaptiveAxis;
@@ -36,6 +38,8 @@ mod _core {
     use super::estimator::Estimator;
     #[pymodule_export]
     use super::features::FeatureModel;
+    #[pymodule_export]
+    use super::guards::Guards;
     #[pymodule_export]
     use super::instrument::Instrument;
     #[pymodule_export]
@@ -53,6 +57,10 @@ mod _core {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add(
+            "DETECTORS",
+            PyTuple::new(module.py(), super::guards::names())?,
+        )?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

@@ -10,6 +10,7 @@ use crate::compensator::Compensator;
 use crate::errors;
 use crate::estimator::{Estimator, TriggerNames, trigger_names};
 use crate::features::FeatureModel;
+use crate::guards::{self, Guards};
 use crate::state::StateEstimator;
 use crate::weighted::WeightedEstimator;
 
@@ -39,13 +40,14 @@ pub struct Reduction(core::HysteresisReduction);
 impl Reduction {
     #[new]
     #[expect(clippy::too_many_arguments, reason = "named in Python")]
-    #[pyo3(signature = (compensators, estimators, model, state_estimator, *, span, period, start_deviation))]
+    #[pyo3(signature = (compensators, estimators, model, state_estimator, guards, *, span, period, start_deviation))]
     fn new(
         py: Python<'_>,
         compensators: [PyRef<'_, Compensator>; 3],
         estimators: [PyRef<'_, Estimator>; 3],
         model: &FeatureModel,
         state_estimator: &StateEstimator,
+        guards: &Guards,
         span: f64,
         period: f64,
         start_deviation: [f64; 3],
@@ -63,18 +65,20 @@ impl Reduction {
             core::StateEstimation::Article(state_estimator.0),
             history,
             whereabouts,
+            guards.0,
         )))
     }
 
     /// The loop of profile `best`, from its three axes.
     #[staticmethod]
     #[expect(clippy::too_many_arguments, reason = "named in Python")]
-    #[pyo3(signature = (axes, model, state_estimator, *, span, period, start_deviation, rest_deviation))]
+    #[pyo3(signature = (axes, model, state_estimator, guards, *, span, period, start_deviation, rest_deviation))]
     fn adaptive(
         py: Python<'_>,
         axes: [PyRef<'_, AdaptiveAxis>; 3],
         model: &FeatureModel,
         state_estimator: &WeightedEstimator,
+        guards: &Guards,
         span: f64,
         period: f64,
         start_deviation: [f64; 3],
@@ -90,17 +94,20 @@ impl Reduction {
             core::StateEstimation::Weighted(state_estimator.0),
             history,
             whereabouts,
+            guards.0,
         )))
     }
 
-    /// One control tick at `time` in s: reference (3,) in, command (3,) out.
+    /// One control tick at `time` in s: reference (3,), made at `stamp` in s, in, command (3,) out.
+    #[pyo3(signature = (reference, time, stamp=None))]
     fn step<'py>(
         &mut self,
         py: Python<'py>,
         reference: Vector<'py>,
         time: f64,
+        stamp: Option<f64>,
     ) -> PyResult<Floats<'py>> {
-        let command = self.0.step(fixed("reference", &reference)?, time);
+        let command = self.0.step(fixed("reference", &reference)?, stamp, time);
         Ok(PyArray1::from_slice(py, &command))
     }
 
@@ -117,20 +124,22 @@ impl Reduction {
         let commands: Vec<[f64; 3]> = references
             .into_iter()
             .zip(times)
-            .map(|(reference, time)| self.0.step(reference, *time))
+            .map(|(reference, time)| self.0.step(reference, None, *time))
             .collect();
         table(py, &commands)
     }
 
     /// Image update: features (4,) in px, NaN for a band that was not found, and their covariance (4, 4) in
-    /// px^2. Returns the fields of `tautscope.reduction.Report` from `status` on.
-    #[pyo3(signature = (features, captured_at, covariance=None))]
+    /// px^2, and a checksum of the image. Returns the fields of `tautscope.reduction.Report` from `status`
+    /// to `delta_plus`.
+    #[pyo3(signature = (features, captured_at, covariance=None, checksum=None))]
     fn on_features<'py>(
         &mut self,
         py: Python<'py>,
         features: Option<Vector<'py>>,
         captured_at: f64,
         covariance: Option<Table<'py>>,
+        checksum: Option<u64>,
     ) -> PyResult<Report<'py>> {
         let features = features
             .map(|features| fixed("features", &features))
@@ -140,7 +149,7 @@ impl Reduction {
             .transpose()?;
         let report = self
             .0
-            .on_features(features, covariance.as_ref(), captured_at);
+            .on_features(features, covariance.as_ref(), captured_at, checksum);
         let estimate = &report.estimate;
         let [insertion, rotation, bending] = report.triggers.map(trigger_names);
         Ok((
@@ -156,6 +165,35 @@ impl Reduction {
             self.delta_minus(py),
             self.delta_plus(py),
         ))
+    }
+
+    /// Reaction, names of the flags in force, names of those not acknowledged, and the share of the free
+    /// gain in use.
+    #[getter]
+    fn supervision(&self) -> (&'static str, Vec<&'static str>, Vec<&'static str>, f64) {
+        let now = self.0.guards().supervision();
+        (
+            guards::reaction_name(now.reaction),
+            guards::set(now.flags),
+            guards::set(now.latched),
+            now.lead,
+        )
+    }
+
+    /// The operator goes on: the first increment of the reference is zero.
+    fn engage(&mut self) {
+        self.0.guards_mut().engage();
+    }
+
+    /// The operator has seen the warnings.
+    fn acknowledge(&mut self) {
+        self.0.guards_mut().acknowledge();
+    }
+
+    /// Something only the rig can see, by its name.
+    fn raise_flag(&mut self, py: Python<'_>, name: &str) -> PyResult<()> {
+        self.0.guards_mut().raise(guards::flag(py, "flag", name)?);
+        Ok(())
     }
 
     /// Features (4,) in px to expect at a capture time; None if not known.
@@ -203,5 +241,6 @@ fn status_name(status: core::Status) -> &'static str {
         core::Status::NoMarkers => "no_markers",
         core::Status::Stale => "stale",
         core::Status::Duplicate => "duplicate",
+        core::Status::Refused => "refused",
     }
 }

@@ -4,6 +4,7 @@ use crate::contact::{ContactTest, Stroke};
 use crate::error::{ConfigError, require, require_non_negative, require_positive};
 use crate::estimator::{Trigger, Triggers};
 use crate::lead::LeadLaw;
+use crate::limits::PlayLimit;
 use crate::offset_map::{OffsetMap, OffsetPrior, Side, TILTS};
 use crate::play::Play;
 use crate::smoother::Smoother;
@@ -56,6 +57,8 @@ pub struct AdaptiveAxis {
     upwards: Option<bool>,
     landed: bool,
     cautious: bool,
+    share: f64,
+    limit: PlayLimit,
 }
 
 impl AdaptiveAxis {
@@ -107,6 +110,8 @@ impl AdaptiveAxis {
             upwards: None,
             landed: false,
             cautious: false,
+            share: 1.0,
+            limit: PlayLimit::NONE,
         })
     }
 
@@ -187,9 +192,9 @@ impl AdaptiveAxis {
             self.cautious = deviation > settings.cautious_deviation;
         }
         let stretch = self.stretch();
-        let missing = sign * (self.offsets.offset(side, reference) - self.lead);
+        let missing = sign * (self.offset(side, reference) - self.lead);
         let position = self.command - self.tip;
-        let gap = sign * (self.offsets.offset(side, self.tip) - position);
+        let gap = sign * (self.offset(side, self.tip) - position);
         // Up to where the contact may already be.
         let sure = gap - deviation * deviation / settings.cautious_deviation;
         self.landed |= sure <= 0.0;
@@ -197,6 +202,10 @@ impl AdaptiveAxis {
         law.settling += deviation;
         if self.cautious {
             law.contact_gain = settings.cautious_gain;
+        }
+        if self.share < 1.0 {
+            law.free_gain = 1.0 + self.share * (law.free_gain - 1.0);
+            law.contact_gain = law.contact_gain.min(law.free_gain);
         }
         let gap = if self.landed { 0.0 } else { sure };
         self.lead += sign * law.gain(intention.abs(), stretch, gap, missing);
@@ -268,7 +277,7 @@ impl AdaptiveAxis {
     /// change with where the tip is.
     fn carried(&self, tip: f64, command: f64) -> f64 {
         let [plus, minus] = [Side::Plus, Side::Minus].map(|side| {
-            let beyond = command - self.offsets.offset(side, tip) - tip;
+            let beyond = command - self.offset(side, tip) - tip;
             tip + beyond / (1.0 + self.offsets.tilt().0)
         });
         tip.max(plus.min(minus)).min(plus.max(minus))
@@ -287,9 +296,60 @@ impl AdaptiveAxis {
         (1.0 / least, (1.0 / most).min(1.0).max(1.0 / (1.0 + tilt)))
     }
 
-    fn play_at(&self, position: f64) -> Play {
+    /// Use a share of the gains beyond 1: all of them with 1, no compensation with 0. Bumpless.
+    pub(crate) const fn set_share(&mut self, share: f64) {
+        self.share = share;
+    }
+
+    /// Believe in no more slack than that.
+    pub(crate) const fn limit(&mut self, limit: PlayLimit) {
+        self.limit = limit;
+    }
+
+    pub(crate) const fn play_limit(&self) -> PlayLimit {
+        self.limit
+    }
+
+    /// Whether more slack than may be was learnt where the reference is.
+    pub(crate) fn is_limited(&self) -> bool {
+        let at = self.reference.unwrap_or(0.0);
+        let [minus, plus] = [Side::Minus, Side::Plus].map(|side| self.offsets.offset(side, at));
+        self.limit.exceeds(minus, plus)
+    }
+
+    /// Go on from another command than that of the last step, with the reference counted from elsewhere by `shift`, and
+    /// the predicted state from before that step.
+    pub(crate) fn amend(&mut self, shift: f64, command: f64, predicted_state: f64) {
+        if let Some(reference) = self.reference {
+            self.reference = Some(reference + shift);
+            self.intended += shift;
+            self.smoother.shift(shift);
+            self.command = command;
+            let tip = if predicted_state.is_finite() {
+                predicted_state
+            } else {
+                command
+            };
+            self.tip = self.carried(tip, command);
+        }
+    }
+
+    fn offset(&self, side: Side, position: f64) -> f64 {
+        let [minus, plus] = self.offsets_at(position);
+        match side {
+            Side::Minus => minus,
+            Side::Plus => plus,
+        }
+    }
+
+    fn offsets_at(&self, position: f64) -> [f64; 2] {
         let [minus, plus] =
             [Side::Minus, Side::Plus].map(|side| self.offsets.offset(side, position));
+        self.limit.clamp(minus, plus)
+    }
+
+    fn play_at(&self, position: f64) -> Play {
+        let [minus, plus] = self.offsets_at(position);
         Play::from_ordered(minus.min(plus), minus.max(plus))
     }
 }

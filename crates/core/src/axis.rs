@@ -3,6 +3,7 @@
 use crate::adaptive::AdaptiveAxis;
 use crate::compensator::{Compensator, CompensatorState};
 use crate::estimator::{Estimator, EstimatorState, Triggers};
+use crate::limits::PlayLimit;
 use crate::play::Play;
 
 /// One DOF of the loop, each scheme with its memory.
@@ -19,21 +20,63 @@ pub enum Axis {
 /// The article's compensator and estimator, each with its memory.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ArticleAxis {
+    /// As set, and with the share of its free gain in use.
+    whole: Compensator,
     compensator: Compensator,
     estimator: Estimator,
     compensation: CompensatorState,
     estimation: EstimatorState,
+    limit: PlayLimit,
+}
+
+/// What an image taught.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Lesson {
+    /// Which offsets were updated, and why.
+    pub triggers: Triggers,
+    /// Whether it would have been more slack than may be.
+    pub is_limited: bool,
 }
 
 impl Axis {
     /// A DOF that works as in the article and starts from the offsets of `play`.
     pub const fn new(compensator: Compensator, estimator: Estimator, play: Play) -> Self {
         Self::Article(ArticleAxis {
+            whole: compensator,
             compensator,
             estimator,
             compensation: CompensatorState::new(play),
             estimation: EstimatorState::new(play),
+            limit: PlayLimit::NONE,
         })
+    }
+
+    /// Believe in no more slack than that.
+    pub(crate) const fn limit(&mut self, limit: PlayLimit) {
+        match self {
+            Self::Article(axis) => axis.limit = limit,
+            Self::Adaptive(axis) => axis.limit(limit),
+        }
+    }
+
+    /// Use a share of the free gain: all of it with 1, no compensation with 0. Bumpless.
+    pub(crate) fn set_share(&mut self, share: f64) {
+        match self {
+            Self::Article(axis) => axis.set_share(share),
+            Self::Adaptive(axis) => axis.set_share(share),
+        }
+    }
+
+    /// Go on from another command than that of the last step, with the reference counted from elsewhere by `shift`, and
+    /// the predicted state from before that step.
+    pub(crate) fn amend(&mut self, shift: f64, command: f64, predicted_state: f64) {
+        match self {
+            Self::Article(axis) => {
+                axis.compensator
+                    .amend(&mut axis.compensation, shift, command, predicted_state);
+            }
+            Self::Adaptive(axis) => axis.amend(shift, command, predicted_state),
+        }
     }
 
     /// Control tick: take the next reference.
@@ -56,10 +99,23 @@ impl Axis {
         measured: f64,
         deviation: f64,
         since: impl Iterator<Item = f64>,
-    ) -> Triggers {
+    ) -> Lesson {
+        let limit = match self {
+            Self::Article(axis) => axis.limit,
+            Self::Adaptive(axis) => axis.play_limit(),
+        };
+        if !limit.allows(command - measured) {
+            return Lesson {
+                is_limited: true,
+                ..Lesson::default()
+            };
+        }
         match self {
             Self::Article(axis) => axis.learn(command, measured),
-            Self::Adaptive(axis) => axis.learn(command, measured, deviation, since),
+            Self::Adaptive(axis) => Lesson {
+                triggers: axis.learn(command, measured, deviation, since),
+                is_limited: axis.is_limited(),
+            },
         }
     }
 
@@ -87,14 +143,24 @@ impl Axis {
 }
 
 impl ArticleAxis {
-    fn learn(&mut self, command: f64, measured: f64) -> Triggers {
+    fn learn(&mut self, command: f64, measured: f64) -> Lesson {
         let triggers = self
             .estimator
             .update(&mut self.estimation, command, measured);
+        let is_limited = self.estimation.limit(self.limit);
         if triggers.any() {
             self.compensator
                 .retune(&mut self.compensation, self.estimation.play());
         }
-        triggers
+        Lesson {
+            triggers,
+            is_limited,
+        }
+    }
+
+    fn set_share(&mut self, share: f64) {
+        self.compensator = self.whole.with_share(share);
+        let play = self.compensation.play();
+        self.compensator.retune(&mut self.compensation, play);
     }
 }

@@ -129,6 +129,13 @@ impl Compensator {
         Ok(Self { recovery, ..self })
     }
 
+    /// The same with a share of the free gain beyond 1: all of it with 1, no compensation with 0.
+    #[must_use]
+    pub const fn with_share(self, share: f64) -> Self {
+        let free_gain = 1.0 + share * (self.free_gain - 1.0);
+        Self { free_gain, ..self }
+    }
+
     /// The command for the next reference.
     ///
     /// The first reference is passed through. A reference that has not changed, or is not
@@ -174,6 +181,27 @@ impl Compensator {
         if let Some(reference) = state.reference {
             play.step(&mut state.tip, state.command);
             self.hold(state, reference);
+        }
+    }
+
+    /// Go on from another command than that of the last step, with the reference counted from elsewhere by `shift`, and
+    /// the predicted state from before that step.
+    pub(crate) fn amend(
+        &self,
+        state: &mut CompensatorState,
+        shift: f64,
+        command: f64,
+        predicted_state: f64,
+    ) {
+        if let Some(reference) = state.reference {
+            state.reference = Some(reference + shift);
+            state.command = command;
+            state.tip.output = if predicted_state.is_finite() {
+                predicted_state
+            } else {
+                command - state.play.clamp(0.0)
+            };
+            self.retune(state, state.play);
         }
     }
 

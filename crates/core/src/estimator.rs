@@ -1,6 +1,7 @@
 //! On-line estimation of the contact offsets, Eqs. (4)-(6), Fig. 3.
 
 use crate::error::{ConfigError, require_fraction, require_positive};
+use crate::limits::PlayLimit;
 use crate::play::Play;
 
 /// Learns the two contact offsets from command and measured output while the DOF moves.
@@ -66,6 +67,17 @@ impl EstimatorState {
     /// Before the first measurement, from offsets to start with.
     pub const fn new(play: Play) -> Self {
         Self { play, last: None }
+    }
+
+    /// Believe in no more slack than that from now on; whether it did.
+    pub(crate) fn limit(&mut self, limit: PlayLimit) -> bool {
+        let (minus, plus) = (self.play.delta_minus(), self.play.delta_plus());
+        let exceeds = limit.exceeds(minus, plus);
+        if exceeds {
+            let [minus, plus] = limit.clamp(minus, plus);
+            self.play = Play::from_ordered(minus, plus);
+        }
+        exceeds
     }
 
     /// The play operator estimated so far.

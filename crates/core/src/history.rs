@@ -126,6 +126,11 @@ impl History {
         (0..count).rev().filter_map(|age| self.aged(age))
     }
 
+    /// The time of the newest tick in s, NaN without one.
+    pub fn newest_time(&self) -> f64 {
+        self.newest().map_or(f64::NAN, |newest| newest.time)
+    }
+
     fn newest(&self) -> Option<&Entry> {
         self.aged(0)
     }

@@ -1,9 +1,15 @@
 //! The whole loop, Fig. 6.
 
+mod look;
+
+use self::look::{Seen, reversed, usable};
 use crate::axis::Axis;
-use crate::dof::{PerDof, all_finite};
+use crate::dof::PerDof;
 use crate::estimator::Triggers;
 use crate::features::FeatureModel;
+use crate::flags::{Flag, Flags};
+use crate::frame_watch::{Arrival, Picture};
+use crate::guards::{Guards, Supervision};
 use crate::history::{Entry, History};
 use crate::play::Play;
 use crate::posture::Belief;
@@ -26,6 +32,8 @@ pub enum Status {
     Stale,
     /// Captured no later than a frame already used.
     Duplicate,
+    /// A guard did not believe it: it taught nothing.
+    Refused,
 }
 
 /// How an image becomes a state.
@@ -54,6 +62,8 @@ pub struct Report {
     pub triggers: PerDof<Triggers>,
     /// The offsets from now on [m, rad, rad].
     pub play: PerDof<Play>,
+    /// What is in force from now on, and why.
+    pub supervision: Supervision,
 }
 
 /// Image-based hysteresis reduction, Fig. 6: reference in, command out; images teach it the slack.
@@ -64,6 +74,7 @@ pub struct HysteresisReduction {
     state_estimation: StateEstimation,
     history: History,
     whereabouts: Whereabouts,
+    guards: Guards,
     travel: PerDof<f64>,
     corrected: PerDof<f64>,
     last_used: f64,
@@ -71,19 +82,22 @@ pub struct HysteresisReduction {
 
 impl HysteresisReduction {
     /// The loop from its blocks.
-    pub const fn new(
-        axes: PerDof<Axis>,
+    pub fn new(
+        mut axes: PerDof<Axis>,
         feature_model: FeatureModel,
         state_estimation: StateEstimation,
         history: History,
         whereabouts: Whereabouts,
+        guards: Guards,
     ) -> Self {
+        guards.limit(&mut axes);
         Self {
             axes,
             feature_model,
             state_estimation,
             history,
             whereabouts,
+            guards,
             travel: [0.0; 3],
             corrected: [0.0; 3],
             last_used: f64::NEG_INFINITY,
@@ -92,18 +106,16 @@ impl HysteresisReduction {
 
     /// Control tick at `time` in s: reference (3,) in, command (3,) out [m, rad, rad].
     ///
-    /// A reference that is not finite holds the command, which before the first reference is NaN.
-    pub fn step(&mut self, reference: PerDof<f64>, time: f64) -> PerDof<f64> {
-        if all_finite(reference) {
-            let axes = self.axes.iter_mut().zip(&mut self.travel);
-            for ((axis, travel), reference) in axes.zip(reference) {
-                let before = axis.command();
-                axis.step(reference);
-                let moved = (axis.command() - before).abs();
-                *travel += if moved.is_finite() { moved } else { 0.0 };
-            }
-        }
+    /// `stamp` in s is when the reference was made, if that is known. A reference that is not finite
+    /// holds the command, which before the first reference is NaN.
+    pub fn step(&mut self, reference: PerDof<f64>, stamp: Option<f64>, time: f64) -> PerDof<f64> {
+        let before = self.axes.each_ref().map(Axis::command);
+        self.guards.tick(&mut self.axes, reference, stamp, time);
         let command = self.axes.each_ref().map(Axis::command);
+        for ((travel, command), before) in self.travel.iter_mut().zip(command).zip(before) {
+            let moved = (command - before).abs();
+            *travel += if moved.is_finite() { moved } else { 0.0 };
+        }
         let jumped_back = self.history.push(Entry {
             time,
             command,
@@ -123,100 +135,135 @@ impl HysteresisReduction {
     ///
     /// Two NaN for a band say that it was not found; None, or features that are not finite
     /// otherwise, that neither was. With one band the article's step too starts from `expectation` and not
-    /// from the prediction: what is held must be as right as is known.
+    /// from the prediction: what is held must be as right as is known. A `checksum` of the pixels tells a
+    /// frozen picture; without it, equal features do.
     pub fn on_features(
         &mut self,
         measured: Option<[f64; 4]>,
         covariance: Option<&[[f64; 4]; 4]>,
         captured_at: f64,
+        checksum: Option<u64>,
+    ) -> Report {
+        let past = self.history.at(captured_at);
+        let mut raised = self.guards.arrive(&Arrival {
+            captured_at,
+            now: self.history.newest_time(),
+            picture: checksum.map_or_else(
+                || measured.map(|features| Picture::Features(features.map(f64::to_bits))),
+                |sum| Some(Picture::Checksum(sum)),
+            ),
+            travel: past.map(|past| past.travel),
+        });
+        let mut report = self.image_update(measured, covariance, captured_at, past, &mut raised);
+        self.guards.judged(raised);
+        report.supervision = self.guards.supervision();
+        report
+    }
+
+    /// The image update of a frame of which guards have said what is wrong so far.
+    fn image_update(
+        &mut self,
+        measured: Option<[f64; 4]>,
+        covariance: Option<&[[f64; 4]; 4]>,
+        captured_at: f64,
+        past: Option<Entry>,
+        raised: &mut Flags,
     ) -> Report {
         if captured_at <= self.last_used {
+            *raised = self.guards.watched(raised.and(Flags::of(Flag::Duplicate)));
             return self.unused(Status::Duplicate, None);
         }
-        let Some(past) = self.history.at(captured_at) else {
+        let Some(past) = past else {
             return self.unused(Status::Stale, None);
         };
+        if !raised.is_empty() {
+            return self.unused(Status::Refused, Some(past));
+        }
         let Some(measured) = measured.filter(|features| usable(*features)) else {
             self.whereabouts.miss(&past);
+            self.guards.frames.miss(past.travel);
+            *raised = self.guards.watched(Flags::of(Flag::Lost));
             return self.unused(Status::NoMarkers, Some(past));
         };
-        let seen = match self.state_estimation {
-            StateEstimation::Article(estimator) => {
-                self.linear_step(&estimator, &past, measured, covariance.unwrap_or(&UNIT))
-            }
-            StateEstimation::Weighted(estimator) => {
-                self.most_probable(&estimator, &past, measured, covariance)
-            }
-        };
-        let Some(seen) = seen else {
+        let Some(seen) = self.look(&past, measured, covariance) else {
             return self.unused(Status::Held, Some(past));
         };
+        let belief = self.whereabouts.at(&past);
+        let fits = |seen: &Seen| {
+            self.guards
+                .frames
+                .fits(&belief, seen.image_state(), seen.output_deviation)
+        };
+        let is_believed = seen.used != [false; 2];
+        let expected = self.feature_model.predict(belief.state);
+        let is_reversed = expected.is_some_and(|expected| reversed(expected.features, measured));
+        if is_reversed || !(is_believed && fits(&seen)) {
+            let [ua, va, ub, vb] = measured;
+            let exchanged = self.look(&past, [ub, vb, ua, va], covariance);
+            let swapped = is_reversed
+                || exchanged.is_some_and(|other| other.used == [true; 2] && fits(&other));
+            *raised = self.guards.watched(
+                Flags::when(swapped, Flag::Swapped)
+                    .and(Flags::when(!swapped && is_believed, Flag::Innovation)),
+            );
+            if !raised.is_empty() {
+                self.whereabouts.miss(&past);
+                return self.unused(Status::Refused, Some(past));
+            }
+        }
+        // Two markers of which one is where it cannot be: the other may be as wrong.
+        let is_doubtful = is_believed && seen.used != found(measured);
+        let doubt = self
+            .guards
+            .watched(Flags::when(is_doubtful, Flag::Innovation));
+        if !(doubt.is_empty() || self.guards.may_learn()) {
+            // One after the other they would lead the belief away from what is seen once all is well.
+            *raised = doubt;
+            self.whereabouts.miss(&past);
+            return self.unused(Status::Refused, Some(past));
+        }
+        self.guards
+            .frames
+            .accept(&belief, seen.image_state(), past.travel);
         self.last_used = captured_at;
+        self.settle(&past, &seen, measured);
         let estimate = seen.estimate;
+        let status = match (seen.used, estimate.observable) {
+            ([true, false] | [false, true], _) => Status::Partial,
+            ([true, true], [true, true, true]) => Status::Ok,
+            _ => Status::Held,
+        };
+        *raised = doubt;
+        let triggers = if raised.is_empty() && self.guards.may_learn() {
+            self.learn(&past, &seen, raised)
+        } else {
+            [Triggers::default(); 3]
+        };
+        *raised = self.guards.watched(
+            raised
+                .and(Flags::when(
+                    !is_doubtful && status == Status::Partial,
+                    Flag::Merged,
+                ))
+                .and(Flags::when(!is_believed, Flag::Lost))
+                .and(Flags::when(
+                    is_believed && status == Status::Held,
+                    Flag::Unobservable,
+                )),
+        );
         Report {
-            status: match (seen.used, estimate.observable) {
-                ([true, false] | [false, true], _) => Status::Partial,
-                ([true, true], [true, true, true]) => Status::Ok,
-                _ => Status::Held,
-            },
+            status,
             predicted_state: past.predicted_state,
             predicted_features: seen.predicted_features,
-            triggers: self.learn(&past, &seen),
+            triggers,
             estimate,
             state_deviation: seen.state_deviation,
             play: self.play(),
+            supervision: self.guards.supervision(),
         }
     }
 
-    fn linear_step(
-        &mut self,
-        estimator: &StateEstimator,
-        past: &Entry,
-        measured: [f64; 4],
-        covariance: &[[f64; 4]; 4],
-    ) -> Option<Seen> {
-        let used = found(measured);
-        let start = if used == [true; 2] {
-            past.predicted_state
-        } else {
-            self.whereabouts.at(past).state
-        };
-        let prediction = self.feature_model.predict(start)?;
-        let estimate = estimator.estimate(start, &prediction, measured);
-        let state_deviation = estimate.state_deviation(covariance);
-        self.whereabouts.learn(past, &estimate, state_deviation);
-        Some(Seen {
-            estimate,
-            used,
-            predicted_features: prediction.features,
-            state_deviation,
-            output: estimate.state,
-            output_deviation: state_deviation,
-        })
-    }
-
-    fn most_probable(
-        &mut self,
-        estimator: &WeightedEstimator,
-        past: &Entry,
-        measured: [f64; 4],
-        covariance: Option<&[[f64; 4]; 4]>,
-    ) -> Option<Seen> {
-        let belief = self.whereabouts.at(past);
-        let seen = estimator.estimate(&self.feature_model, &belief, measured, covariance)?;
-        let left_out = seen.used != found(measured);
-        self.whereabouts.settle(past, &seen, left_out);
-        Some(Seen {
-            estimate: seen.estimate,
-            used: seen.used,
-            predicted_features: seen.predicted_features,
-            state_deviation: seen.deviation,
-            output: seen.image_state,
-            output_deviation: seen.image_deviation,
-        })
-    }
-
-    fn learn(&mut self, past: &Entry, seen: &Seen) -> PerDof<Triggers> {
+    fn learn(&mut self, past: &Entry, seen: &Seen, raised: &mut Flags) -> PerDof<Triggers> {
         let mut triggers = [Triggers::default(); 3];
         let history = &self.history;
         let outputs = seen.output.iter().zip(seen.output_deviation);
@@ -240,7 +287,9 @@ impl HysteresisReduction {
                     .since(past.time)
                     .filter_map(|entry| entry.command.get(dof).copied());
                 let before = axis.predicted_state();
-                *triggers = axis.learn(command, *output, deviation, since);
+                let lesson = axis.learn(command, *output, deviation, since);
+                *triggers = lesson.triggers;
+                *raised = raised.and(Flags::when(lesson.is_limited, Flag::WidthLimit));
                 let moved = axis.predicted_state() - before;
                 *corrected += if moved.is_finite() { moved } else { 0.0 };
             }
@@ -266,6 +315,7 @@ impl HysteresisReduction {
             state_deviation: [f64::NAN; 3],
             triggers: [Triggers::default(); 3],
             play: self.play(),
+            supervision: self.guards.supervision(),
         }
     }
 
@@ -296,29 +346,14 @@ impl HysteresisReduction {
     pub fn play(&self) -> PerDof<Play> {
         self.axes.each_ref().map(Axis::play)
     }
-}
 
-/// What an image said.
-struct Seen {
-    estimate: StateEstimate,
-    used: [bool; 2],
-    predicted_features: [f64; 4],
-    state_deviation: PerDof<f64>,
-    /// What the estimators of the slack are told, and its standard deviation.
-    output: PerDof<f64>,
-    output_deviation: PerDof<f64>,
-}
+    /// What watches the loop.
+    pub const fn guards(&self) -> &Guards {
+        &self.guards
+    }
 
-/// Px^2.
-const UNIT: [[f64; 4]; 4] = [
-    [1.0, 0.0, 0.0, 0.0],
-    [0.0, 1.0, 0.0, 0.0],
-    [0.0, 0.0, 1.0, 0.0],
-    [0.0, 0.0, 0.0, 1.0],
-];
-
-/// Whether there is a band, and what there is is finite.
-fn usable([ua, va, ub, vb]: [f64; 4]) -> bool {
-    let [a, b] = found([ua, va, ub, vb]);
-    (a || b) && (!a || all_finite([ua, va])) && (!b || all_finite([ub, vb]))
+    /// What watches the loop, to re-engage, to acknowledge, and to raise what only the rig can see.
+    pub const fn guards_mut(&mut self) -> &mut Guards {
+        &mut self.guards
+    }
 }

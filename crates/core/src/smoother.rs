@@ -29,6 +29,12 @@ impl Smoother {
         }
     }
 
+    /// The signal is from now on counted from elsewhere.
+    pub fn shift(&mut self, shift: f64) {
+        self.once += shift;
+        self.twice += shift;
+    }
+
     /// The smoothed signal at the next tick; the first value is where it starts.
     pub fn step(&mut self, input: f64) -> f64 {
         if self.once.is_nan() {

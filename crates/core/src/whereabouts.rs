@@ -6,7 +6,6 @@ use crate::history::Entry;
 use crate::linear::square;
 use crate::posture::Belief;
 use crate::state::StateEstimate;
-use crate::weighted::WeightedEstimate;
 
 /// One linear step from far away misses by a part of itself.
 const STEP_ERROR: f64 = 0.25;
@@ -101,13 +100,19 @@ impl Whereabouts {
     }
 
     /// Takes in what was most probable.
-    pub(crate) fn settle(&mut self, past: &Entry, seen: &WeightedEstimate, left_out: bool) {
+    pub(crate) fn settle(
+        &mut self,
+        past: &Entry,
+        state: PerDof<f64>,
+        deviation: PerDof<f64>,
+        left_out: bool,
+    ) {
         let deviation = if left_out {
             self.at(past).deviation.map(|value| DOUBT * value)
         } else {
-            seen.deviation
+            deviation
         };
-        self.set(past, seen.estimate.state, deviation, [true; 3]);
+        self.set(past, state, deviation, [true; 3]);
     }
 
     /// Takes in that the markers were not found where they should be.

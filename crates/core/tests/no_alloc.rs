@@ -3,12 +3,14 @@
 // An allocator that aborts leaves the stack only.
 #![allow(clippy::large_stack_arrays)]
 
+mod support;
+
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
+use support::UNITS;
 use tautscope_core::{
-    AdaptiveAxis, AdaptiveSettings, Axis, Camera, Compensator, ContactTest, Estimator,
-    FeatureModel, History, HysteresisReduction, Instrument, LeadLaw, OffsetPrior, PerDof, Play,
-    Pose, StateEstimation, StateEstimator, Status, Triggers, WeightedEstimator, WeightedSettings,
-    Whereabouts,
+    Axis, Camera, Compensator, Estimator, FeatureModel, Flag, Guards, History, HysteresisReduction,
+    Instrument, PerDof, Play, Pose, Reaction, StateEstimation, StateEstimator, Status, Triggers,
+    WeightedEstimator, WeightedSettings, Whereabouts,
 };
 
 #[global_allocator]
@@ -22,45 +24,11 @@ fn article() -> PerDof<Axis> {
             Play::new(0.0, 0.0).unwrap(),
         )
     };
-    [axis(0.4e-3), axis(0.04), axis(0.02)]
+    UNITS.map(axis)
 }
 
 fn adaptive() -> PerDof<Axis> {
-    let axis = |unit: f64| {
-        let settings = AdaptiveSettings {
-            law: LeadLaw {
-                free_gain: 5.0,
-                contact_gain: 2.0,
-                taper: unit,
-                settling: unit,
-            },
-            cautious_gain: 1.5,
-            cautious_deviation: 3.0 * unit,
-            prior: OffsetPrior {
-                spacing: 6.0 * unit,
-                level: 20.0 * unit,
-                tilt: 0.3,
-                local: unit,
-                correlation: 40.0 * unit,
-                level_drift: unit,
-                tilt_drift: 0.1,
-                local_drift: unit,
-                symmetry: 0.8,
-            },
-            contact: ContactTest {
-                distance: 3.0 * unit,
-                moved: 3.0 * unit,
-                tolerance: 0.25,
-            },
-            model_deviation: unit,
-            correction: 1.0,
-            gain_limit: 5.0,
-            tremor_time: 0.15,
-            period: 0.005,
-        };
-        Axis::Adaptive(AdaptiveAxis::new(settings, Play::new(0.0, 0.0).unwrap()).unwrap())
-    };
-    [axis(0.4e-3), axis(0.04), axis(0.02)]
+    UNITS.map(|unit| Axis::Adaptive(support::axis(unit)))
 }
 
 fn weighted(outlier_distance: f64) -> StateEstimation {
@@ -91,6 +59,7 @@ fn reduction(axes: PerDof<Axis>, estimation: StateEstimation) -> HysteresisReduc
         estimation,
         History::new(2.0, 0.005).unwrap(),
         Whereabouts::new([5e-3, 0.6, 0.5], [2e-4, 0.02, 0.01]).unwrap(),
+        Guards::new(support::guards()).unwrap(),
     )
 }
 
@@ -103,7 +72,7 @@ fn step_and_image_update_do_not_allocate() {
 }
 
 fn run(mut reduction: HysteresisReduction) {
-    let (mut used, mut learnt) = (0, 0);
+    let (mut used, mut learnt, mut worst) = (0, 0, Reaction::None);
     let truth = model();
     let posture = |time: f64| {
         let wave = time.sin();
@@ -112,7 +81,7 @@ fn run(mut reduction: HysteresisReduction) {
     assert_no_alloc(|| {
         for tick in 0..4000_u32 {
             let time = f64::from(tick) * 0.005;
-            reduction.step(posture(time), time);
+            reduction.step(posture(time), None, time);
             if tick % 8 == 0 {
                 let captured_at = time - 0.08;
                 let seen = truth.predict(posture(captured_at - 0.3));
@@ -121,14 +90,30 @@ fn run(mut reduction: HysteresisReduction) {
                     let [ua, va, ub, vb] = seen.features;
                     [ua, va, ub + wrong, vb]
                 });
-                let report = reduction.on_features(measured, None, captured_at);
+                let report = reduction.on_features(measured, None, captured_at, None);
                 used += u32::from(report.status == Status::Ok);
                 learnt += u32::from(report.triggers.iter().any(Triggers::any));
             }
         }
-        reduction.step([f64::NAN; 3], 20.0);
-        reduction.on_features(None, None, 20.0);
+        reduction.step([f64::NAN; 3], None, 20.0);
+        reduction.on_features(None, None, 20.0, None);
+        // Every flag, long enough for every rung of its ladder.
+        for (flag, minute) in Flag::ALL.iter().zip(1_u32..) {
+            reduction.guards_mut().engage();
+            for tick in 0..2000_u32 {
+                let time = 60.0 * f64::from(minute) + f64::from(tick) * 0.005;
+                reduction.guards_mut().raise(*flag);
+                reduction.step(posture(time), Some(time), time);
+                if tick % 8 == 0 {
+                    let seen = truth.predict(posture(time)).map(|seen| seen.features);
+                    reduction.on_features(seen, None, time, Some(u64::from(tick)));
+                }
+                worst = worst.max(reduction.guards().supervision().reaction);
+            }
+            reduction.guards_mut().acknowledge();
+        }
     });
+    assert_eq!(worst, Reaction::Disable);
     assert!(
         used > 400 && learnt > 40,
         "the whole path ran: {used} {learnt}"

@@ -30,6 +30,7 @@ from tautscope.config.instrument import InstrumentConfig
 from tautscope.config.load import dump_config, load_config
 from tautscope.config.recording import ImageFormat, RecordingConfig
 from tautscope.config.root import Config, Profile, from_document, to_document
+from tautscope.config.safety import SafetyConfig
 from tautscope.config.state_estimation import StateEstimationConfig
 from tautscope.config.twin import (
     DISTURBANCES,
@@ -64,6 +65,7 @@ __all__ = [
     "Positive",
     "Profile",
     "RecordingConfig",
+    "SafetyConfig",
     "ShaftConfig",
     "Sine",
     "SourceConfig",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
+from tautscope._core import DETECTORS
 from tautscope.config.twin import DISTURBANCES
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError
@@ -116,8 +117,32 @@ def check_relations(config: Config) -> None:
             config.control.history,
             f"1 to 1024 ticks of control.period = {config.control.period}",
         )
+    _check_safety(config)
     if config.drives is not None:
         _check_drives(config.drives)
+
+
+def _check_safety(config: Config) -> None:
+    safety = config.safety
+    for index, name in enumerate(safety.off):
+        if name not in DETECTORS:
+            raise ConfigError(f"safety.off[{index}]", name, "one of " + ", ".join(DETECTORS))
+    for index, (least, largest) in enumerate(safety.command_travel):
+        if least >= largest:
+            raise ConfigError(
+                f"safety.command_travel[{index}]",
+                (least, largest),
+                "the lesser end, then the larger",
+            )
+    for dof, noise in zip(Dof, safety.state_noise, strict=True):
+        tolerated = config[dof].contact_tolerance * config[dof].update_distance
+        if not 0 <= 3 * noise < tolerated:
+            raise ConfigError(
+                f"safety.state_noise[{dof}]",
+                noise,
+                f"three of it below {dof.label}.contact_tolerance times "
+                f"{dof.label}.update_distance = {tolerated:.3g}",
+            )
 
 
 def _check_drives(drives: DrivesConfig) -> None:

@@ -16,6 +16,7 @@ from tautscope.config.drives import DrivesConfig
 from tautscope.config.experiment import ExperimentConfig
 from tautscope.config.instrument import InstrumentConfig
 from tautscope.config.recording import RecordingConfig
+from tautscope.config.safety import SafetyConfig
 from tautscope.config.state_estimation import StateEstimationConfig
 from tautscope.config.twin import TwinConfig
 from tautscope.config.vision import VisionConfig
@@ -51,6 +52,7 @@ class Config(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     camera: CameraConfig = field(default_factory=CameraConfig)
     vision: VisionConfig = field(default_factory=VisionConfig)
     control: ControlConfig = field(default_factory=ControlConfig)
+    safety: SafetyConfig = field(default_factory=SafetyConfig)
     recording: RecordingConfig = field(default_factory=RecordingConfig)
     experiment: ExperimentConfig = field(default_factory=ExperimentConfig)
     twin: TwinConfig = field(default_factory=TwinConfig)

@@ -24,6 +24,6 @@ class StateEstimationConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_
     """Mahalanobis distance beyond which a marker is left out."""
     steps: Annotated[int, Meta(ge=1, le=100)] = 12
     """Gauss-Newton steps, at most."""
-    rest_deviation: NonNegative = 0.5
+    rest_deviation: NonNegative = 0.25
     """How far a tip moves between two images while its command rests: standard deviation [in units
     of the DOF's update_distance]."""

@@ -112,6 +112,8 @@ def _run(options: argparse.Namespace) -> int:
     for dof, widths in document.get("by_camera", {}).items():
         known = widths["reduction"]
         print(f"{dof}: reduction {'not known' if known is None else f'{known:.0%}'}, by camera")
+    for warning in found.compensated.recording.warnings:
+        print(f"Warning: {warning}")
     print(f"Report, figures and traces: {folder / 'report.html'}")
     return 0
 

@@ -15,7 +15,7 @@ from typing import Any
 
 from tautscope.config import Config
 from tautscope.dof import Dof
-from tautscope.errors import OutputError
+from tautscope.errors import DriveError, OutputError
 from tautscope.experiment import run_experiment
 from tautscope.hardware.plausibility import Plausibility
 from tautscope.hardware.realtime import OTHERS, VISION, realtime, settle
@@ -29,6 +29,7 @@ from tautscope.reduction import Report
 from tautscope.references import SineSequence
 from tautscope.results import Results, evaluate
 from tautscope.rig import Frame, Sample
+from tautscope.safety import Reaction
 from tautscope.tables import finite_or_none
 
 RigMaker = Callable[[Config], HardwareRig]
@@ -224,6 +225,13 @@ class _Watched:
 
     def frame(self, now: float, frame: Frame, report: Report) -> None:
         self._log.frame(now, frame, report)
+        if report.reaction.rank >= Reaction.QUICK_STOP.rank:
+            # Whoever closes the rig brings the drives to quick stop.
+            raise DriveError(
+                "loop",
+                f"{report.reaction} ({', '.join(report.warnings)})",
+                "The motors are stopped. What was noticed is in the log",
+            )
         if self._watch is not None:
             self._watch.frame(frame.captured_at, report)
 
@@ -255,6 +263,7 @@ def _facts(part: Part) -> dict[str, Any]:
         "status": dict(Counter(frames["status"].tolist())),
         "observable": _shares(frames),
         "timing": part.timing.summary(),
+        "warnings": list(part.recording.warnings),
     }
 
 

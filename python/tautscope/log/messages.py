@@ -241,6 +241,7 @@ def _status(header: Message, report: Report) -> bytes:
         f"trigger_{dof.label}": ",".join(each or "none" for each in triggers)
         for dof, triggers in zip(Dof, report.triggers, strict=True)
     }
+    values |= {"reaction": str(report.reaction), "warnings": ",".join(report.warnings)}
     if report.detection is not None:
         values |= {
             "reason_a": report.detection.reasons[0],

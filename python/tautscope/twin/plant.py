@@ -26,6 +26,7 @@ class Plant:
 
     Attributes:
         bends: Of the scope; may be changed at any time.
+        tip_force: What pushes the end of the shaft outwards [N]; likewise.
     """
 
     def __init__(self, config: Config, generator: np.random.Generator) -> None:
@@ -47,11 +48,13 @@ class Plant:
 
         self._load_share = 1 + shaft.load_spread * generator.standard_normal(shaft.segments)
         spread = 1 + cables.joint_spread * generator.standard_normal(cables.joints)
-        self._model.dof_frictionloss[self._hinges] *= spread
+        self._joint_friction = self._model.dof_frictionloss[self._hinges] * spread
+        self.section_friction = 1.0
         self._speed_limit = np.array(config.twin.drives.speed_limit)
         self._encoder_step: NDArray[np.float64] = np.array(config.twin.drives.encoder_step)
         self._setpoint = np.array([config.experiment[dof].centre for dof in Dof])
         self.bends = config.twin.bends
+        self.tip_force = 0.0
         self._start()
 
     def step(self, command: NDArray[np.float64]) -> None:
@@ -59,6 +62,7 @@ class Plant:
         data, shaft = self._data, self._config.twin.shaft
         load = shaft.straight_load + shaft.load_per_bend * self.bends
         data.qfrc_applied[self._presses] = -load * self._load_share
+        data.qfrc_applied[self._slides[-1]] = self.tip_force
         limit = self._speed_limit * self._timestep
         for _ in range(self._substeps):
             travel = np.minimum(np.maximum(command - self._setpoint, -limit), limit)
@@ -67,6 +71,16 @@ class Plant:
             angles = data.qpos[self._turns] - shaft.set_angle
             data.qfrc_applied[self._turns] = -shaft.set_torque * np.sin(angles)
             mujoco.mj_step(self._model, data)
+
+    @property
+    def section_friction(self) -> float:
+        """Friction of the section's joints over what it was at the start; may be set."""
+        return self._section_friction
+
+    @section_friction.setter
+    def section_friction(self, value: float) -> None:
+        self._section_friction = value
+        self._model.dof_frictionloss[self._hinges] = value * self._joint_friction
 
     @property
     def applied(self) -> NDArray[np.float64]:

@@ -32,6 +32,31 @@ class Twin:
         self._config = config
         self._camera = TwinCamera(config) if images else None
         self._plant: Plant | None = None
+        self._ticks = 0
+
+    @property
+    def time(self) -> float:
+        """Its clock [s]."""
+        return self._ticks * self.control_period
+
+    @property
+    def config(self) -> Config:
+        """What it was made from."""
+        return self._config
+
+    @property
+    def draws(self) -> bool:
+        """Whether its frames are pictures."""
+        return self._camera is not None
+
+    @property
+    def plant(self) -> Plant:
+        """The physics, to look into and to disturb.
+
+        Raises:
+            SignalError: Before `reset` or after `close`.
+        """
+        return self._running()
 
     @property
     def control_period(self) -> float:
@@ -86,10 +111,9 @@ class Twin:
         return self._plant
 
     def _sample(self, plant: Plant) -> Sample:
-        time = self._ticks * self.control_period
         state = plant.true_state
-        self._capture(plant, time)
-        return Sample(time, plant.applied, self._arrived(time), state)
+        self._capture(plant, self.time)
+        return Sample(self.time, plant.applied, self._arrived(self.time), state)
 
     def _capture(self, plant: Plant, time: float) -> None:
         twin = self._config.twin

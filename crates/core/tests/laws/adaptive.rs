@@ -8,7 +8,7 @@ use crate::{config, plays};
 
 const PERIOD: f64 = 0.005;
 
-fn settings(tremor_time: f64, period: f64) -> AdaptiveSettings {
+pub(crate) fn settings(tremor_time: f64, period: f64) -> AdaptiveSettings {
     AdaptiveSettings {
         law: LeadLaw {
             free_gain: 5.0,

@@ -7,11 +7,17 @@ mod adaptive;
 mod compensator;
 mod estimator;
 mod expectation;
+mod guarantees;
+mod guards;
 mod history;
 mod lead;
+mod monitor;
 mod offset_map;
 mod play;
 mod state;
+mod supervisor;
+#[path = "../support/mod.rs"]
+mod support;
 mod weighted;
 
 use proptest::prelude::*;

@@ -1,0 +1,304 @@
+"""What surrounds the loop in a run with a fault: hand, the drives' own protection, a witness."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from hysteresis_runs import FeatureCamera
+from numpy.typing import ArrayLike, NDArray
+from tautscope.config import Config
+from tautscope.dof import Dof
+from tautscope.reduction import HysteresisReduction, Report
+from tautscope.references import Segment
+from tautscope.rig import Frame, Sample
+from tautscope.twin import Twin
+from tautscope.twin.faults import FaultyHand, FaultyRig, FeatureFrame
+
+Floats = NDArray[np.float64]
+
+STILL = 1.0
+"""How long a motion that was stopped is watched [s]."""
+FOLLOWING_ERROR = np.array([4e-3, 0.4, 0.3])
+"""Of the bench's drives, configs/bench.toml [m, rad, rad]."""
+FOLLOWING_TIME = 0.1
+"""Commands to which a drive's position is compared [s], as on hardware."""
+HOLD_MOTION = 5
+QUICK_STOP = 6
+"""Ranks of reactions."""
+
+
+class FeatureTwin(Twin):
+    """A twin without pictures: true features with noise on top are what a detector would say.
+
+    Attributes:
+        truth: True state after each tick (3,) [m, rad, rad].
+        commands: What the motors were told in each.
+    """
+
+    def __init__(self, config: Config) -> None:
+        super().__init__(config, images=False)
+        self._eye = FeatureCamera(config)
+        self.truth: list[Floats] = []
+        self.commands: list[Floats] = []
+
+    def reset(self) -> Sample:
+        """As `Twin.reset`."""
+        return self._looked(super().reset())
+
+    def step(self, command: ArrayLike) -> Sample:
+        """As `Twin.step`."""
+        sample = self._looked(super().step(command))
+        if sample.true_state is not None:
+            self.truth.append(sample.true_state)
+        self.commands.append(np.array(command, dtype=np.float64))
+        return sample
+
+    def _looked(self, sample: Sample) -> Sample:
+        frame = self._eye.look(sample)
+        return sample if frame is None else replace(sample, frame=frame)
+
+
+def look(loop: HysteresisReduction, frame: Frame) -> Report:
+    """What the loop does with what a detector says: bands, or none."""
+    assert isinstance(frame, FeatureFrame)
+    lost = np.isnan(frame.features).all()
+    return loop.on_features(None if lost else frame.features, frame.captured_at)
+
+
+@dataclass
+class Watch:
+    """Sees what the loop says of itself, tick by tick; a `tautscope.experiment.Log`.
+
+    Attributes:
+        clock: The twin's own [s].
+        since: When the fault begins; before, nothing is noted [s].
+        period: Of the tick [s].
+        flags: What was raised, and when [s].
+        reaction: The highest, of rank 0 to 7.
+        stop: When the motion was stopped [s].
+        width: Largest insertion slack the loop believed in [m].
+        step: Largest change of the insertion command in a tick [m].
+        spurious: What was raised before the fault.
+    """
+
+    clock: Callable[[], float]
+    since: float
+    period: float
+    flags: dict[str, float] = field(default_factory=dict)
+    reaction: str = "none"
+    rank: int = 0
+    stop: float = math.inf
+    width: float = 0.0
+    step: float = 0.0
+    spurious: set[str] = field(default_factory=set)
+    loop: HysteresisReduction | None = None
+    _last: Floats | None = None
+
+    def look(self, loop: HysteresisReduction, frame: Frame) -> Report:
+        """An image update."""
+        self.loop = loop
+        report = look(loop, frame)
+        if self.clock() >= self.since:
+            self.width = max(self.width, float(report.delta_plus[0] - report.delta_minus[0]))
+        return report
+
+    def tick(self, sample: Sample, reference: Floats, command: Floats) -> None:
+        """A control tick."""
+        now = self.clock()
+        if now >= self.since and self._last is not None:
+            self.step = max(self.step, abs(float(command[0] - self._last[0])))
+        self.read(now)
+        self._last = command
+
+    def frame(self, now: float, frame: Frame, report: Report) -> None:
+        """Nothing: `look` has seen it."""
+
+    def read(self, now: float) -> None:
+        """What the supervisor says, if there is one."""
+        supervision = getattr(self.loop, "supervision", None)
+        if supervision is None:
+            return
+        if now < self.since:
+            self.spurious.update(supervision.flags)
+            return
+        order = list(type(supervision.reaction))
+        self.note(now, str(supervision.reaction), order.index(supervision.reaction))
+        for flag in supervision.flags:
+            self.flags.setdefault(str(flag), now)
+
+    def note(self, now: float, reaction: str, rank: int) -> None:
+        """A reaction of this rank."""
+        if rank > self.rank:
+            self.reaction, self.rank = reaction, rank
+        if rank >= HOLD_MOTION:
+            self.stop = min(self.stop, now)
+
+    def said(self) -> dict[str, Any]:
+        """What of it is kept, times from `since` [s]; the stop in ticks."""
+        stopped = math.isfinite(self.stop)
+        return {
+            "reaction": self.reaction,
+            "flags": {name: at - self.since for name, at in self.flags.items()},
+            "stopped": stopped,
+            "step": self.step,
+            "width": self.width,
+            "spurious": tuple(sorted(self.spurious)),
+            "stop_tick": round((self.stop - self.since) / self.period) if stopped else None,
+        }
+
+
+class Driven:
+    """The rig with what drives do of themselves: they watch their error, and can be stopped.
+
+    Args:
+        rig: What they move; may be exchanged during a run.
+        watch: Told what the drives do; says when the loop wants them stopped.
+        watching: Whether they watch their error, and report their faults.
+        at: When `then` is called [s].
+        then: Before the first tick at that time.
+    """
+
+    def __init__(
+        self,
+        rig: FaultyRig,
+        watch: Watch,
+        watching: bool,
+        at: float = math.inf,
+        then: Callable[[], None] | None = None,
+    ) -> None:
+        self.rig, self._watch, self._watching = rig, watch, watching
+        self._at, self._then = at, then
+        self._recent: deque[Floats] = deque(maxlen=round(FOLLOWING_TIME / rig.control_period))
+        self._held: Floats | None = None
+        self._applied = np.zeros(3)
+
+    @property
+    def control_period(self) -> float:
+        """[s]."""
+        return self.rig.control_period
+
+    def reset(self) -> Sample:
+        """As the rig."""
+        return self.rig.reset()
+
+    def step(self, command: ArrayLike) -> Sample:
+        """As the rig, unless the drives were stopped."""
+        if self._then is not None and self.rig.true_time >= self._at - 1e-9:
+            then, self._then = self._then, None
+            then()
+        said = np.asarray(command, dtype=np.float64)
+        if self._watch.rank >= QUICK_STOP and self._held is None:
+            self.stop()
+        sample = self.rig.step(said if self._held is None else self._held)
+        self._applied = sample.applied
+        if self._watching and self._held is None:
+            self._check(said)
+        return sample
+
+    def close(self) -> None:
+        """As the rig."""
+        self.rig.close()
+
+    def stop(self) -> None:
+        """Quick stop: each motor is held where its encoder says it is."""
+        self._held = self._applied.copy()
+
+    def _check(self, said: Floats) -> None:
+        self._recent.append(said)
+        recent = np.stack(self._recent)
+        error = np.maximum(recent.min(axis=0) - self._applied, self._applied - recent.max(axis=0))
+        if self.rig.drive_fault:
+            self._give_up("drive_fault")
+        elif (error > FOLLOWING_ERROR).any():
+            self._give_up("following_error")
+
+    def _give_up(self, flag: str) -> None:
+        now = self.rig.true_time
+        self.stop()
+        raise_flag = getattr(self._watch.loop, "raise_flag", None)
+        if raise_flag is not None:
+            raise_flag(flag)
+        self._watch.flags.setdefault(flag, now)
+        self._watch.note(now, "quick_stop", QUICK_STOP)
+
+
+class Hand:
+    """What the hand does, on the twin's own clock, until all has been seen; a `Reference`.
+
+    Args:
+        config: Centres and amplitudes.
+        periods: Of the sine of each DOF that moves [s].
+        clock: The twin's own [s].
+        end: When the run is over [s].
+
+    Attributes:
+        pauses: (start, end) [s] in which the hand means no motion, whatever it does.
+        paused: Of which DOFs.
+    """
+
+    segments: tuple[Segment, ...] = ()
+
+    def __init__(
+        self, config: Config, periods: dict[Dof, float], clock: Callable[[], float], end: float
+    ) -> None:
+        self.clock, self.end = clock, end
+        self.pauses: Sequence[tuple[float, float]] = ()
+        self.paused: Sequence[int] = tuple(Dof)
+        self._centre = np.array([config.experiment[dof].centre for dof in Dof])
+        self._sines = [
+            (int(dof), config.experiment[dof].amplitude, 2 * math.pi / period)
+            for dof, period in periods.items()
+        ]
+
+    @property
+    def duration(self) -> float:
+        """Infinite, until it is over: the loop's clock may be wrong, the twin's is not."""
+        return 0.0 if self.clock() >= self.end - 1e-9 else math.inf
+
+    def __call__(self, time: float) -> Floats:
+        """(3,) [m, rad, rad]; the argument is what the loop takes for the time."""
+        now = self.clock()
+        position = self._at(now)
+        for start, end in self.pauses:
+            if now > start:
+                moved = self._at(min(now, end)) - self._at(start)
+                position[list(self.paused)] -= moved[list(self.paused)]
+        return position
+
+    def _at(self, time: float) -> Floats:
+        position = self._centre.copy()
+        for dof, amplitude, rate in self._sines:
+            position[dof] += amplitude * math.sin(rate * time)
+        return position
+
+
+@dataclass
+class Device:
+    """Between hand and loop, exchangeable during a run; a `Reference`.
+
+    Attributes:
+        hand: What it means.
+        watch: Ends the run a while after a stop.
+        faulty: What comes of it.
+    """
+
+    hand: Hand
+    watch: Watch
+    faulty: FaultyHand | None = None
+    segments: tuple[Segment, ...] = ()
+
+    @property
+    def duration(self) -> float:
+        """As the hand's, and a while after a stop."""
+        stopped = self.hand.clock() >= self.watch.stop + STILL - 1e-9
+        return 0.0 if stopped else self.hand.duration
+
+    def __call__(self, time: float) -> Floats:
+        """(3,) [m, rad, rad]."""
+        now = self.hand.clock()
+        return self.hand(now) if self.faulty is None else self.faulty(now)

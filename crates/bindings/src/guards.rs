@@ -1,0 +1,124 @@
+//! `Guards`: what `Reduction` is watched by.
+
+use pyo3::prelude::*;
+use tautscope_core as core;
+
+use crate::errors;
+
+/// Guards of a loop, to be given to `Reduction`. Raises `ConfigError`.
+#[pyclass(name = "Guards", module = "tautscope._core", frozen)]
+pub struct Guards(pub core::Guards);
+
+#[pymethods]
+impl Guards {
+    #[new]
+    #[pyo3(signature = (
+        *, period, gain_limit, reference_speed, reference_age, late_tick, stall,
+        command_speed, command_travel, width_limit, offset_limit,
+        frame_age, frame_gap, frozen_travel, innovation_limit, start_deviation,
+        innovation_floor, blind_growth,
+        hold_time, hold_travel, fade_travel, restore_travel, good_frames, good_ticks, off
+    ))]
+    // One argument per setting, by keyword only.
+    #[allow(clippy::too_many_arguments)]
+    fn new(
+        py: Python<'_>,
+        period: f64,
+        gain_limit: [f64; 3],
+        reference_speed: [f64; 3],
+        reference_age: f64,
+        late_tick: f64,
+        stall: f64,
+        command_speed: [f64; 3],
+        command_travel: [(f64, f64); 3],
+        width_limit: [f64; 3],
+        offset_limit: [f64; 3],
+        frame_age: f64,
+        frame_gap: f64,
+        frozen_travel: [f64; 3],
+        innovation_limit: f64,
+        start_deviation: [f64; 3],
+        innovation_floor: [f64; 3],
+        blind_growth: f64,
+        hold_time: f64,
+        hold_travel: f64,
+        fade_travel: f64,
+        restore_travel: f64,
+        good_frames: u32,
+        good_ticks: u32,
+        off: Vec<String>,
+    ) -> PyResult<Self> {
+        let monitor = |dof: usize| core::MonitorSettings {
+            gain_limit: gain_limit[dof],
+            step_limit: command_speed[dof] * period,
+            travel: command_travel[dof],
+            lead_limit: width_limit[dof],
+        };
+        let settings = core::GuardSettings {
+            clutch: core::ClutchSettings {
+                period,
+                reference_speed,
+                reference_age,
+                late_tick,
+                stall,
+            },
+            monitors: [0, 1, 2].map(monitor),
+            frames: core::FrameSettings {
+                frame_age,
+                frame_gap,
+                frozen_travel,
+                innovation_limit,
+                start_deviation,
+                least_deviation: innovation_floor,
+                blind_growth,
+            },
+            supervisor: core::SupervisorSettings {
+                hold_time,
+                hold_travel,
+                fade_travel,
+                restore_travel,
+                good_frames,
+                good_ticks,
+            },
+            width_limit,
+            offset_limit,
+            off: off
+                .iter()
+                .map(|name| flag(py, "off", name).map(core::Flags::of))
+                .try_fold(core::Flags::NONE, |all, one| one.map(|one| all.and(one)))?,
+        };
+        core::Guards::new(settings)
+            .map(Self)
+            .map_err(errors::config(py))
+    }
+}
+
+/// The names of all flags.
+pub fn names() -> Vec<&'static str> {
+    core::Flag::ALL.iter().map(|flag| flag.name()).collect()
+}
+
+/// The names of those in a set.
+pub fn set(flags: core::Flags) -> Vec<&'static str> {
+    flags.iter().map(core::Flag::name).collect()
+}
+
+/// The flag of a name, or a `ConfigError` on `field`.
+pub fn flag(py: Python<'_>, field: &str, name: &str) -> PyResult<core::Flag> {
+    core::Flag::named(name)
+        .ok_or_else(|| errors::choice(py, field, name, &format!("one of {}", names().join(", "))))
+}
+
+/// A reaction as Python calls it.
+pub fn reaction_name(reaction: core::Reaction) -> &'static str {
+    match reaction {
+        core::Reaction::None => "none",
+        core::Reaction::Warn => "warn",
+        core::Reaction::HoldEstimate => "hold_estimate",
+        core::Reaction::Fade => "fade",
+        core::Reaction::PassThrough => "pass_through",
+        core::Reaction::HoldMotion => "hold_motion",
+        core::Reaction::QuickStop => "quick_stop",
+        core::Reaction::Disable => "disable",
+    }
+}

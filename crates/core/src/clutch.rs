@@ -1,0 +1,187 @@
+//! Between the hand and the law: only fresh, finite increments of the reference, taken in time, move anything.
+
+use crate::dof::{PerDof, all_finite};
+use crate::error::{ConfigError, require, require_positive};
+use crate::flags::{Flag, Flags};
+
+/// Which increments of the reference are taken.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ClutchSettings {
+    /// Control period, in s.
+    pub period: f64,
+    /// Largest speed of the reference [m/s, rad/s, rad/s].
+    pub reference_speed: PerDof<f64>,
+    /// Oldest reference that moves anything, in s.
+    pub reference_age: f64,
+    /// Periods from one tick to the next beyond which an increment is thrown away.
+    pub late_tick: f64,
+    /// Time from one tick to the next beyond which motion stops, in s.
+    pub stall: f64,
+}
+
+/// Admits increments of the reference.
+///
+/// ```text
+/// admitted = reference + offset
+/// ```
+///
+/// Whatever is thrown away of a motion goes into the offset, so that nothing catches up later. With nothing
+/// thrown away the reference passes bit for bit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Clutch {
+    settings: ClutchSettings,
+    offset: PerDof<f64>,
+    raw: PerDof<f64>,
+    admitted: Option<PerDof<f64>>,
+    time: Option<f64>,
+    /// Whether the hand may be anywhere: the next reference is where it starts.
+    fresh: bool,
+}
+
+/// What became of a reference.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Admission {
+    /// What the law is to follow (3,) [m, rad, rad]; None before the first that is finite.
+    pub reference: Option<PerDof<f64>>,
+    /// Its increments, 0 for the first.
+    pub moved: PerDof<f64>,
+    /// What was wrong.
+    pub raised: Flags,
+    /// What of it stops the motion although its first rung would not.
+    pub severe: Flags,
+}
+
+impl Clutch {
+    /// Before the first reference.
+    ///
+    /// # Errors
+    /// A value is not a finite number above 0, or `late_tick` not above 1.
+    pub fn new(settings: ClutchSettings) -> Result<Self, ConfigError> {
+        require_positive("period", settings.period)?;
+        for speed in settings.reference_speed {
+            require_positive("reference_speed", speed)?;
+        }
+        require_positive("reference_age", settings.reference_age)?;
+        let late = settings.late_tick.is_finite() && settings.late_tick > 1.0;
+        require(late, "late_tick", settings.late_tick, "finite, above 1")?;
+        require_positive("stall", settings.stall)?;
+        Ok(Self {
+            settings,
+            offset: [0.0; 3],
+            raw: [f64::NAN; 3],
+            admitted: None,
+            time: None,
+            fresh: false,
+        })
+    }
+
+    /// The reference at `time` in s, made at `stamp` in s if that is known; nothing of it moves while `held`.
+    ///
+    /// What is in `off` is not looked at.
+    pub fn admit(
+        &mut self,
+        reference: PerDof<f64>,
+        time: f64,
+        stamp: Option<f64>,
+        held: bool,
+        off: Flags,
+    ) -> Admission {
+        let (late, severe) = self.punctuality(time, stamp);
+        let invalid = Flags::when(!all_finite(reference), Flag::ReferenceInvalid);
+        let (wrong, severe) = (late.without(off), severe.without(off));
+        let stopped = held || self.fresh || !wrong.and(severe).is_empty();
+        let mut admission = Admission {
+            reference: self.admitted,
+            moved: [0.0; 3],
+            raised: wrong.and(invalid.without(off)),
+            severe,
+        };
+        if !invalid.is_empty() {
+            return admission;
+        }
+        let Some(last) = self.admitted else {
+            if !held {
+                self.admitted = Some(reference);
+                admission.reference = self.admitted;
+            }
+            return admission;
+        };
+        let limit = if off.has(Flag::ReferenceJump) {
+            [f64::INFINITY; 3]
+        } else {
+            self.settings
+                .reference_speed
+                .map(|speed| speed * self.settings.period)
+        };
+        let mut next = last;
+        let axes = next
+            .iter_mut()
+            .zip(&mut self.offset)
+            .zip(&mut admission.moved);
+        let inputs = reference.into_iter().zip(self.raw).zip(limit);
+        self.raw = reference;
+        self.fresh = false;
+        for (((next, offset), moved), ((raw, before), limit)) in axes.zip(inputs) {
+            let last = *next;
+            // A hand at rest moves nothing, whatever rounding makes of the offset.
+            let wanted = if (raw - before).abs() == 0.0 {
+                last
+            } else if *offset == 0.0 {
+                raw
+            } else {
+                raw + *offset
+            };
+            let increment = wanted - last;
+            if stopped {
+                *offset = last - raw;
+            } else if increment.abs() > limit {
+                *next = last + limit.copysign(increment);
+                *offset = *next - raw;
+                admission.raised = admission.raised.and(Flags::of(Flag::ReferenceJump));
+            } else {
+                *next = wanted;
+            }
+            *moved = *next - last;
+        }
+        self.admitted = Some(next);
+        admission.reference = self.admitted;
+        admission
+    }
+
+    /// The law was kept from following by `shift` (3,) [m, rad, rad]: that part of the motion is thrown away as well.
+    pub fn shift(&mut self, shift: PerDof<f64>) {
+        let Some(admitted) = &mut self.admitted else {
+            return;
+        };
+        for ((admitted, offset), shift) in admitted.iter_mut().zip(&mut self.offset).zip(shift) {
+            // Minus zero plus zero is another number.
+            if shift != 0.0 {
+                *admitted += shift;
+                *offset += shift;
+            }
+        }
+    }
+
+    /// The next tick may be late, and the hand anywhere.
+    pub const fn engage(&mut self) {
+        self.time = None;
+        self.fresh = true;
+    }
+
+    fn punctuality(&mut self, time: f64, stamp: Option<f64>) -> (Flags, Flags) {
+        let settings = &self.settings;
+        let gap = self.time.map_or(settings.period, |last| time - last);
+        if time.is_finite() {
+            self.time = Some(time);
+        }
+        // Clocks that count ticks differ in the last digits.
+        let late = gap > settings.late_tick * settings.period * (1.0 + 1e-6);
+        let jumped = !time.is_finite() || gap < 0.0;
+        let age = stamp.map_or(0.0, |stamp| (time - stamp).abs());
+        let old = age.is_nan() || age > settings.reference_age;
+        let raised = Flags::when(late, Flag::LateTick)
+            .and(Flags::when(jumped, Flag::Clock))
+            .and(Flags::when(old, Flag::ReferenceLate));
+        (raised, Flags::when(gap > settings.stall, Flag::LateTick))
+    }
+}

@@ -1,0 +1,134 @@
+//! What can be noticed to be wrong. The one place where it has a name.
+
+macro_rules! flags {
+    ($($(#[$doc:meta])+ $flag:ident = $name:literal,)+) => {
+        /// What a guard noticed, or the rig reported.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub enum Flag { $($(#[$doc])+ $flag,)+ }
+
+        impl Flag {
+            /// Every flag, in the order of its bit in [`Flags`].
+            pub const ALL: &[Self] = &[$(Self::$flag,)+];
+
+            /// As configuration, reports and logs call it.
+            pub const fn name(self) -> &'static str {
+                match self { $(Self::$flag => $name,)+ }
+            }
+        }
+    };
+}
+
+flags! {
+    /// The picture is the same to the last bit although the command moved.
+    Frozen = "frozen",
+    /// A frame older than `frame_age` when it came.
+    Late = "late",
+    /// A frame that was captured no later than the one before.
+    Duplicate = "duplicate",
+    /// No frame for longer than `frame_gap`.
+    Dropped = "dropped",
+    /// A time that is ahead of the control tick, goes back, or is no number.
+    Clock = "clock",
+    /// An image too far from what model and last images make one expect.
+    Innovation = "innovation",
+    /// The same, and it would fit with the markers exchanged.
+    Swapped = "swapped",
+    /// One marker alone.
+    Merged = "merged",
+    /// No marker, or none that could be believed.
+    Lost = "lost",
+    /// Both markers, and yet a DOF that they do not determine.
+    Unobservable = "unobservable",
+    /// A drive is not where it was told to be; the rig says so.
+    FollowingError = "following_error",
+    /// A reference faster than `reference_speed`.
+    ReferenceJump = "reference_jump",
+    /// A reference older than `reference_age`.
+    ReferenceLate = "reference_late",
+    /// A reference that is no number.
+    ReferenceInvalid = "reference_invalid",
+    /// A control tick that came too late.
+    LateTick = "late_tick",
+    /// A drive or its bus failed; the rig says so.
+    DriveFault = "drive_fault",
+    /// The tip does not go where the command goes, by sign or by scale; the rig says so.
+    StartCheck = "start_check",
+    /// More slack was learnt than there can be.
+    WidthLimit = "width_limit",
+    /// The monitor changed a command.
+    Monitor = "monitor",
+}
+
+impl Flag {
+    /// The flag of that name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|flag| flag.name() == name)
+    }
+}
+
+/// A set of flags.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Flags(u32);
+
+impl Flags {
+    /// None of them.
+    pub const NONE: Self = Self(0);
+
+    /// One of them.
+    pub const fn of(flag: Flag) -> Self {
+        Self(1 << flag as u32)
+    }
+
+    /// One of them, if it holds.
+    pub const fn when(holds: bool, flag: Flag) -> Self {
+        if holds { Self::of(flag) } else { Self::NONE }
+    }
+
+    /// Those in either.
+    #[must_use]
+    pub const fn and(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// Those that are not in the other.
+    #[must_use]
+    pub const fn without(self, other: Self) -> Self {
+        Self(self.0 & !other.0)
+    }
+
+    /// Whether the flag is in it.
+    pub const fn has(self, flag: Flag) -> bool {
+        self.0 & (1 << flag as u32) != 0
+    }
+
+    /// Whether there is none.
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// Each of them, in order.
+    pub fn iter(self) -> impl Iterator<Item = Flag> {
+        Flag::ALL
+            .iter()
+            .copied()
+            .filter(move |flag| self.has(*flag))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_flag_has_a_bit_and_a_name_of_its_own() {
+        let mut seen = Flags::NONE;
+        for flag in Flag::ALL {
+            assert!(!seen.has(*flag));
+            seen = seen.and(Flags::of(*flag));
+            assert_eq!(Flag::named(flag.name()), Some(*flag));
+        }
+        assert!(seen.iter().eq(Flag::ALL.iter().copied()));
+        assert!(seen.without(seen).is_empty());
+        assert_eq!(Flag::named("nothing"), None);
+    }
+}

@@ -1,0 +1,138 @@
+//! The last word on a command: the law's bounds once more, by code and state that share nothing with it.
+
+use crate::error::{ConfigError, require, require_positive};
+
+/// What no command may do; one DOF, in its unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MonitorSettings {
+    /// Largest dc / du.
+    pub gain_limit: f64,
+    /// Largest |dc| in a tick.
+    pub step_limit: f64,
+    /// Least and largest command.
+    pub travel: (f64, f64),
+    /// Largest |c - u|.
+    pub lead_limit: f64,
+}
+
+/// Watches one DOF.
+///
+/// ```text
+/// 0 <= dc / du <= gain_limit,   dc = 0 where du = 0,   |dc| <= step_limit,
+/// least <= c <= largest,   |c - u| <= lead_limit
+/// ```
+///
+/// A command outside of the last two, which another bound keeps it from entering at once, comes no farther
+/// out. What is permitted is what is sent, and what the law goes on from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Monitor {
+    settings: MonitorSettings,
+    last: Option<(f64, f64)>,
+}
+
+/// What became of a command.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// It was within all bounds and is what it was, bit for bit.
+    Same,
+    /// A limit of speed, travel or lead changed it.
+    Limited,
+    /// It broke the law: the software is wrong.
+    Broken,
+}
+
+impl Monitor {
+    /// Before the first command.
+    ///
+    /// # Errors
+    /// A limit is not above 0, the gain's below 1, or the travel's ends are not in order.
+    pub fn new(settings: MonitorSettings) -> Result<Self, ConfigError> {
+        let gain = settings.gain_limit.is_finite() && settings.gain_limit >= 1.0;
+        require(
+            gain,
+            "gain_limit",
+            settings.gain_limit,
+            "finite, 1 or above",
+        )?;
+        require_positive("command_speed", settings.step_limit)?;
+        require_positive("lead_limit", settings.lead_limit)?;
+        let (least, largest) = settings.travel;
+        let ordered = least < largest && (largest - least).is_finite();
+        require(
+            ordered,
+            "travel",
+            least,
+            "finite, below the largest position",
+        )?;
+        Ok(Self {
+            settings,
+            last: None,
+        })
+    }
+
+    /// The command that may be sent for an admitted reference.
+    ///
+    /// One that is not finite becomes the last, or NaN before there is one.
+    pub fn permit(&mut self, reference: f64, command: f64) -> (f64, Verdict) {
+        let MonitorSettings {
+            gain_limit,
+            step_limit,
+            travel: (least, largest),
+            lead_limit,
+        } = self.settings;
+        let Some((last_reference, last)) = self.last else {
+            if !(reference.is_finite() && command.is_finite()) {
+                return (f64::NAN, Verdict::Broken);
+            }
+            let permitted = command.max(least).min(largest);
+            self.last = Some((reference, permitted));
+            return (permitted, verdict(command, command, permitted));
+        };
+        let increment = reference - last_reference;
+        let farthest = last + gain_limit * increment;
+        let lawful = if command.is_finite() && farthest.is_finite() {
+            command.max(last.min(farthest)).min(last.max(farthest))
+        } else {
+            last
+        };
+        // Never beyond the last command's own distance, so that a limit cannot move anything by itself.
+        let ahead = (last - last_reference).max(lead_limit);
+        let behind = (last - last_reference).min(-lead_limit);
+        let limited = lawful
+            .max(reference + behind)
+            .min(reference + ahead)
+            .max(least.min(last))
+            .min(largest.max(last))
+            .max(last - step_limit)
+            .min(last + step_limit);
+        // Rounding of the lead's bounds may not break the law.
+        let permitted = limited.max(last.min(farthest)).min(last.max(farthest));
+        let permitted = if permitted.is_finite() {
+            permitted
+        } else {
+            last
+        };
+        if reference.is_finite() {
+            self.last = Some((reference, permitted));
+        }
+        (permitted, verdict(command, lawful, permitted))
+    }
+
+    /// The reference is from now on counted from elsewhere.
+    pub fn shift(&mut self, shift: f64) {
+        if let Some((reference, _)) = &mut self.last {
+            *reference += shift;
+        }
+    }
+}
+
+#[allow(clippy::float_cmp)] // bit for bit is what it says
+fn verdict(command: f64, lawful: f64, permitted: f64) -> Verdict {
+    if lawful != command {
+        Verdict::Broken
+    } else if permitted != command {
+        Verdict::Limited
+    } else {
+        Verdict::Same
+    }
+}

@@ -1,0 +1,266 @@
+//! The whole loop, guards included, under anything that may come.
+
+use tautscope_core::{
+    Axis, Camera, Compensator, Estimator, FeatureModel, Flag, Guards, History, HysteresisReduction,
+    Instrument, PerDof, Play, Pose, Reaction, StateEstimation, StateEstimator, Status,
+    WeightedEstimator, WeightedSettings, Whereabouts,
+};
+
+use crate::support::{self, PERIOD, UNITS, guards};
+
+pub fn model() -> FeatureModel {
+    let distortion = [-0.18, 0.05, 0.001, -0.001, -0.005, 0.0, 0.0, 0.0];
+    FeatureModel::new(
+        Instrument::new(18.5e-3, 5e-3, 15e-3, 1.75e-3, 4e-3).unwrap(),
+        Camera::new([424.0, 454.0], [349.6, 285.0], distortion).unwrap(),
+        Pose::new([9e-3, 7e-3, 8e-3], [0.29, -0.37, 0.0]).unwrap(),
+    )
+}
+
+fn article(play: impl Fn(f64) -> Play) -> HysteresisReduction {
+    let axes = UNITS.map(|unit| {
+        Axis::new(
+            Compensator::new(5.0, 5.0).unwrap(),
+            Estimator::new(unit, 0.4, 0.25).unwrap(),
+            play(unit),
+        )
+    });
+    let step = StateEstimation::Article(StateEstimator::new([1.0; 3]).unwrap());
+    reduction(axes, step)
+}
+
+fn adaptive() -> HysteresisReduction {
+    let axes = UNITS.map(|unit| Axis::Adaptive(support::axis(unit)));
+    let watch = StateEstimator::new([1.0; 3]).unwrap();
+    let weights = WeightedSettings {
+        marker_deviation: 0.3,
+        model_deviation: 0.3,
+        sideways_deviation: 0.3e-3,
+        outlier_distance: 4.0,
+        steps: 8,
+    };
+    let estimator = WeightedEstimator::new(watch, weights).unwrap();
+    reduction(axes, StateEstimation::Weighted(estimator))
+}
+
+fn reduction(axes: PerDof<Axis>, estimation: StateEstimation) -> HysteresisReduction {
+    HysteresisReduction::new(
+        axes,
+        model(),
+        estimation,
+        History::new(2.0, PERIOD).unwrap(),
+        Whereabouts::new([5e-3, 0.6, 0.5], [2e-4, 0.02, 0.01]).unwrap(),
+        Guards::new(guards()).unwrap(),
+    )
+}
+
+/// Xorshift.
+struct Chance(u64);
+
+impl Chance {
+    fn bits(&mut self) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        self.0
+    }
+
+    /// From -1 to 1.
+    fn share(&mut self) -> f64 {
+        #[allow(clippy::cast_precision_loss)]
+        let whole = (self.bits() >> 11) as f64;
+        whole / f64::from(2_u32).powi(52) - 1.0
+    }
+
+    fn once_in(&mut self, count: u64) -> bool {
+        self.bits().is_multiple_of(count)
+    }
+}
+
+/// How many control ticks; `TAUTSCOPE_STEPS=1000000000 cargo test --release` is the long run.
+fn steps() -> u64 {
+    std::env::var("TAUTSCOPE_STEPS").map_or(500_000, |text| text.parse().unwrap())
+}
+
+/// A hand that moves, rests, trembles and jumps, ticks that come late, images of every kind, an operator who goes on:
+/// every command keeps the law.
+fn torture(mut reduction: HysteresisReduction, seed: u64) {
+    let mut chance = Chance(seed);
+    let truth = model();
+    let (mut reference, mut speed, mut time) = ([0.025, 0.0, 0.9], [0.0; 3], 0.0);
+    let mut command = reduction.step(reference, None, time);
+    let (mut learnt, mut worst) = (0_u64, Reaction::None);
+    for tick in 0..steps() {
+        let mut next = reference;
+        for ((next, speed), unit) in next.iter_mut().zip(&mut speed).zip(UNITS) {
+            if chance.once_in(200) {
+                *speed = if chance.once_in(4) {
+                    0.0
+                } else {
+                    0.3 * unit * chance.share()
+                };
+            }
+            *next += *speed;
+            // Never out of the world.
+            *next = next.clamp(-90.0 * unit, 190.0 * unit);
+        }
+        match chance.bits() % 20_000 {
+            0 => next[0] += 0.01 * chance.share(),
+            1 => next[1] = f64::NAN,
+            2 => time += 0.5 * chance.share().abs(),
+            3 => time -= 0.3,
+            4 => reduction.guards_mut().raise(Flag::FollowingError),
+            _ => {}
+        }
+        if chance.once_in(1000) {
+            reduction.guards_mut().engage();
+        }
+        if chance.once_in(5000) {
+            reduction.guards_mut().acknowledge();
+        }
+        time += PERIOD;
+        let stamp = (!chance.once_in(20_000))
+            .then_some(time - 0.06 * f64::from(u8::from(chance.once_in(20_000))));
+        let now = reduction.step(next, stamp, time);
+        let limits = UNITS.map(support::monitor);
+        for dof in 0..3 {
+            let dc = now[dof] - command[dof];
+            let du = next[dof] - reference[dof];
+            // The clutch's offset, which no one sees, is as large as the travel.
+            let (least, largest) = limits[dof].travel;
+            let rounding = 16.0 * f64::EPSILON * (largest - least);
+            let facts = format!("seed {seed}, tick {tick}, DOF {dof}: {dc} for {du}");
+            assert!(now[dof].is_finite(), "{facts}");
+            if du.is_nan() || du == 0.0 {
+                assert_eq!(dc, 0.0, "{facts}");
+                continue;
+            }
+            assert!(dc * du >= 0.0 || dc.abs() <= rounding, "{facts}");
+            assert!(dc.abs() <= 5.0 * du.abs() + rounding, "{facts}");
+            assert!(dc.abs() <= limits[dof].step_limit + rounding, "{facts}");
+            assert!((least..=largest).contains(&now[dof]), "{facts}");
+        }
+        command = now;
+        for (reference, next) in reference.iter_mut().zip(next) {
+            *reference = if next.is_nan() { *reference } else { next };
+        }
+        if tick % 8 == 0 && !chance.once_in(50) {
+            let mut state = reduction.predicted_state();
+            for (value, unit) in state.iter_mut().zip(UNITS) {
+                *value += unit * chance.share();
+            }
+            let measured = truth.predict(state).map(|seen| {
+                let [ua, va, ub, vb] = seen.features;
+                match chance.bits() % 400 {
+                    0..20 => [ub, vb, ua, va],
+                    20..30 => [f64::NAN, f64::NAN, ub, vb],
+                    30..40 => [ua + 100.0 * chance.share(), va, ub, vb],
+                    40 => [f64::INFINITY, va, ub, vb],
+                    _ => [ua, va, ub, vb],
+                }
+            });
+            let report =
+                reduction.on_features(measured, None, time - 0.05 * chance.share().abs(), None);
+            learnt += u64::from(report.status == Status::Ok);
+            worst = worst.max(report.supervision.reaction);
+            for (play, unit) in report.play.iter().zip(UNITS) {
+                assert!(
+                    (0.0..=30.0 * unit * (1.0 + 1e-12)).contains(&play.width()),
+                    "{play:?}"
+                );
+            }
+        }
+    }
+    assert!(learnt > 100, "images were used: {learnt}");
+    assert_eq!(worst, Reaction::QuickStop, "every kind of trouble came");
+}
+
+#[test]
+fn no_command_ever_breaks_the_law_in_the_articles_scheme() {
+    torture(article(|_| Play::new(0.0, 0.0).unwrap()), 2013);
+}
+
+#[test]
+fn no_command_ever_breaks_the_law_in_the_best_profile() {
+    torture(adaptive(), 652);
+}
+
+/// c - u - (1 - 1 / `K_b`) p is what it was, however many reversals came.
+#[test]
+fn nothing_drifts() {
+    let mut reduction = article(|unit| Play::new(-12.0 * unit, 12.0 * unit).unwrap());
+    let start = [0.025, 0.0, 0.9];
+    reduction.step(start, None, 0.0);
+    let mut worst = 0.0_f64;
+    let mut tick = 0.0;
+    for count in 1..=steps() {
+        tick += PERIOD;
+        let mut reference = start;
+        let way = 15.0 * (3.1 * tick).sin();
+        for (value, unit) in reference.iter_mut().zip(UNITS) {
+            *value += unit * way;
+        }
+        let command = reduction.step(reference, None, tick);
+        if count % 97 == 0 {
+            let tip = reduction.predicted_state();
+            worst = worst.max((command[0] - reference[0] - 0.8 * (command[0] - tip[0])).abs());
+        }
+    }
+    assert_eq!(reduction.guards().supervision().reaction, Reaction::None);
+    assert!(worst <= 1e-12, "{worst} m");
+}
+
+#[test]
+fn a_stall_throws_its_motion_away_and_stops_until_re_engaged() {
+    let mut reduction = article(|unit| Play::new(-12.0 * unit, 12.0 * unit).unwrap());
+    let (mut time, mut hand) = (0.0, 0.025);
+    let mut last = reduction.step([hand, 0.0, 0.9], None, time);
+    let mut tick = |reduction: &mut HysteresisReduction, dt: f64, move_by: f64| {
+        time += dt;
+        hand += move_by;
+        let now = reduction.step([hand, 0.0, 0.9], None, time);
+        let moved = now[0] - last[0];
+        last = now;
+        moved
+    };
+    let (still, step) = (0.0, 1e-4);
+    assert!(tick(&mut reduction, PERIOD, step) > 0.0);
+    assert_eq!(tick(&mut reduction, 4.0 * PERIOD, 7e-3), still);
+    assert_eq!(reduction.guards().supervision().reaction, Reaction::Warn);
+    assert!(tick(&mut reduction, PERIOD, step) > 0.0);
+    assert_eq!(tick(&mut reduction, 0.117, 7e-3), still);
+    assert_eq!(
+        reduction.guards().supervision().reaction,
+        Reaction::HoldMotion
+    );
+    assert_eq!(tick(&mut reduction, PERIOD, step), still);
+    reduction.guards_mut().engage();
+    assert_eq!(tick(&mut reduction, 2.0, 0.0), still);
+    let moved = tick(&mut reduction, PERIOD, step);
+    assert!(moved > 0.0 && moved <= 5.0 * step * (1.0 + 1e-9), "{moved}");
+}
+
+#[test]
+fn a_reference_that_is_old_invalid_or_too_fast_is_met() {
+    let start = [0.025, 0.0, 0.9];
+    let loops = || {
+        let mut reduction = article(|_| Play::new(0.0, 0.0).unwrap());
+        reduction.step(start, Some(0.0), 0.0);
+        reduction
+    };
+    let mut old = loops();
+    assert_eq!(old.step([0.0251, 0.0, 0.9], Some(-0.06), PERIOD), start);
+    assert_eq!(old.guards().supervision().reaction, Reaction::HoldMotion);
+    let mut invalid = loops();
+    assert_eq!(invalid.step([f64::NAN, 0.0, 0.9], Some(0.0), PERIOD), start);
+    assert_eq!(
+        invalid.guards().supervision().reaction,
+        Reaction::HoldMotion
+    );
+    let mut fast = loops();
+    let [command, ..] = fast.step([0.035, 0.0, 0.9], Some(0.0), PERIOD);
+    assert!((command - 0.025 - UNITS[0]).abs() < 1e-12);
+    let again = fast.step([0.035, 0.0, 0.9], Some(0.0), 2.0 * PERIOD);
+    assert_eq!(again[0], command, "nothing catches up");
+    assert!(fast.guards().supervision().flags.has(Flag::ReferenceJump));
+}

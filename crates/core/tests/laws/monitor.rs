@@ -1,0 +1,115 @@
+//! What leaves the loop, whatever goes in.
+
+use proptest::prelude::*;
+use tautscope_core::{Monitor, MonitorSettings, Verdict};
+
+use crate::{config, support};
+
+fn any_number() -> impl Strategy<Value = f64> {
+    prop_oneof![8 => -300.0..300.0, 1 => any::<f64>(), 1 => Just(f64::NAN)]
+}
+
+#[test]
+fn settings_out_of_range_are_named() {
+    let good = support::monitor(1.0);
+    let cases = [
+        (
+            "gain_limit",
+            MonitorSettings {
+                gain_limit: 0.9,
+                ..good
+            },
+        ),
+        (
+            "command_speed",
+            MonitorSettings {
+                step_limit: 0.0,
+                ..good
+            },
+        ),
+        (
+            "lead_limit",
+            MonitorSettings {
+                lead_limit: f64::NAN,
+                ..good
+            },
+        ),
+        (
+            "travel",
+            MonitorSettings {
+                travel: (1.0, 1.0),
+                ..good
+            },
+        ),
+        (
+            "travel",
+            MonitorSettings {
+                travel: (f64::NEG_INFINITY, 1.0),
+                ..good
+            },
+        ),
+    ];
+    for (field, settings) in cases {
+        assert_eq!(Monitor::new(settings).unwrap_err().field, field);
+    }
+}
+
+#[test]
+fn each_limit_binds_and_a_broken_law_is_told_from_a_limit() {
+    let start = || {
+        let mut monitor = Monitor::new(support::monitor(1.0)).unwrap();
+        assert_eq!(monitor.permit(0.0, 0.0), (0.0, Verdict::Same));
+        monitor
+    };
+    assert_eq!(start().permit(1.0, 5.0), (5.0, Verdict::Same));
+    assert_eq!(start().permit(1.0, 5.1), (5.0, Verdict::Broken));
+    assert_eq!(start().permit(1.0, -0.1), (0.0, Verdict::Broken));
+    assert_eq!(start().permit(0.0, 1e-300), (0.0, Verdict::Broken));
+    assert_eq!(start().permit(1.0, f64::NAN), (0.0, Verdict::Broken));
+    assert_eq!(start().permit(2.0, 9.0), (5.0, Verdict::Limited));
+    let mut far = start();
+    for step in 1..=200 {
+        far.permit(f64::from(step), f64::from(step));
+    }
+    assert_eq!(far.permit(201.0, 201.0), (200.0, Verdict::Limited));
+    let mut ahead = start();
+    let mut command: f64 = 0.0;
+    for step in 1..=20 {
+        command = ahead.permit(f64::from(step), command + 5.0).0;
+        assert!(command - f64::from(step) <= 30.0);
+    }
+    assert!((command - 50.0).abs() < 1e-12, "{command}");
+}
+
+proptest! {
+    #![proptest_config(config())]
+
+    #[test]
+    fn what_leaves_keeps_the_law_and_what_keeps_it_passes(
+        samples in prop::collection::vec((any_number(), any_number(), 0.0..5.0, any::<bool>()), 1..200)
+    ) {
+        let settings = support::monitor(1.0);
+        let mut monitor = Monitor::new(settings).unwrap();
+        prop_assert_eq!(monitor.permit(1.0, 1.0), (1.0, Verdict::Same));
+        let (mut reference, mut command) = (1.0, 1.0);
+        for (next, wild, gain, lawful) in samples {
+            // One step of the reference, or anything at all.
+            let next: f64 = if lawful { reference + next.clamp(-1.0, 1.0) } else { next };
+            let proposed = if lawful { command + gain * (next - reference) } else { wild };
+            let (permitted, verdict) = monitor.permit(next, proposed);
+            let du = if next.is_finite() { next - reference } else { 0.0 };
+            let dc = permitted - command;
+            let rounding = 8.0 * f64::EPSILON * (command.abs() + reference.abs() + 5.0 * du.abs());
+            prop_assert!(permitted.is_finite());
+            prop_assert!(dc * du >= 0.0 && dc.abs() <= 5.0 * du.abs() + rounding);
+            prop_assert!(dc.abs() <= settings.step_limit + rounding);
+            let (least, largest) = settings.travel;
+            prop_assert!(permitted >= least.min(command) && permitted <= largest.max(command));
+            prop_assert_eq!(verdict == Verdict::Same, permitted.to_bits() == proposed.to_bits() || permitted == proposed);
+            command = permitted;
+            if next.is_finite() {
+                reference = next;
+            }
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! Guards for the tests of the loop: lengths in units of 0.4 mm, 0.04 rad, 0.02 rad.
+
+use tautscope_core::{
+    AdaptiveAxis, AdaptiveSettings, ClutchSettings, ContactTest, Flags, FrameSettings,
+    GuardSettings, LeadLaw, MonitorSettings, OffsetPrior, PerDof, Play, SupervisorSettings,
+};
+
+pub const UNITS: PerDof<f64> = [0.4e-3, 0.04, 0.02];
+pub const PERIOD: f64 = 0.005;
+
+pub fn monitor(unit: f64) -> MonitorSettings {
+    MonitorSettings {
+        gain_limit: 5.0,
+        step_limit: 5.0 * unit,
+        travel: (-100.0 * unit, 200.0 * unit),
+        lead_limit: 30.0 * unit,
+    }
+}
+
+pub fn clutch() -> ClutchSettings {
+    ClutchSettings {
+        period: PERIOD,
+        reference_speed: UNITS.map(|unit| unit / PERIOD),
+        reference_age: 0.05,
+        late_tick: 3.0,
+        stall: 0.1,
+    }
+}
+
+pub fn supervisor() -> SupervisorSettings {
+    SupervisorSettings {
+        hold_time: 4.0,
+        hold_travel: 4.0,
+        fade_travel: 2.0,
+        restore_travel: 2.0,
+        good_frames: 5,
+        good_ticks: 200,
+    }
+}
+
+pub fn guards() -> GuardSettings {
+    GuardSettings {
+        clutch: clutch(),
+        monitors: UNITS.map(monitor),
+        frames: FrameSettings {
+            frame_age: 0.3,
+            frame_gap: 0.18,
+            frozen_travel: UNITS,
+            innovation_limit: 5.0,
+            start_deviation: [5e-3, 0.6, 0.5],
+            least_deviation: UNITS,
+            blind_growth: 0.1,
+        },
+        supervisor: supervisor(),
+        width_limit: UNITS.map(|unit| 30.0 * unit),
+        offset_limit: UNITS.map(|unit| 20.0 * unit),
+        off: Flags::NONE,
+    }
+}
+
+/// A DOF of profile `best` with lengths in units of `unit`.
+pub fn axis(unit: f64) -> AdaptiveAxis {
+    let settings = AdaptiveSettings {
+        law: LeadLaw {
+            free_gain: 5.0,
+            contact_gain: 2.0,
+            taper: unit,
+            settling: unit,
+        },
+        cautious_gain: 1.5,
+        cautious_deviation: 3.0 * unit,
+        prior: OffsetPrior {
+            spacing: 6.0 * unit,
+            level: 20.0 * unit,
+            tilt: 0.3,
+            local: unit,
+            correlation: 40.0 * unit,
+            level_drift: unit,
+            tilt_drift: 0.1,
+            local_drift: unit,
+            symmetry: 0.8,
+        },
+        contact: ContactTest {
+            distance: 3.0 * unit,
+            moved: 3.0 * unit,
+            tolerance: 0.25,
+        },
+        model_deviation: unit,
+        correction: 1.0,
+        gain_limit: 5.0,
+        tremor_time: 0.15,
+        period: 0.005,
+    };
+    AdaptiveAxis::new(settings, Play::new(0.0, 0.0).unwrap()).unwrap()
+}

@@ -1,0 +1,71 @@
+"""What is watched, where the limits are, and how long a reaction lasts."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from msgspec import Meta, Struct
+
+from tautscope.config.fields import NonNegative, Positive, Vector3
+
+PerDof = tuple[Positive, Positive, Positive]
+Range = tuple[float, float]
+Count = Annotated[int, Meta(ge=1, le=1_000_000)]
+
+
+class SafetyConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Guards of the loop; crates/core/src/supervisor.rs has the table of reactions. All [ours].
+
+    Per degree of freedom: [m, rad, rad], or those per second. Nothing of it changes a run in which
+    nothing goes wrong.
+    """
+
+    off: tuple[str, ...] = ()
+    """Guards that do not look, by the names of `tautscope.safety.DETECTORS`; every one named here
+    is said in every report."""
+    width_limit: PerDof = (12e-3, 2.6, 1.5)
+    """Largest width of the slack that is believed; the article's are 10 mm, 1.8 rad, 1.1 rad. Also
+    how far a command may lead its reference, and the unit of the travels below."""
+    offset_limit: PerDof = (8e-3, 1.6, 0.9)
+    """Largest contact offset either way that is believed."""
+    reference_speed: PerDof = (0.05, 5.0, 3.0)
+    """A faster reference is slowed down to this, and the rest of its motion is thrown away."""
+    command_speed: PerDof = (0.15, 20.0, 10.0)
+    """No command changes faster."""
+    command_travel: tuple[Range, Range, Range] = ((-0.1, 0.3), (-12.6, 12.6), (-4.0, 4.0))
+    """Least and largest command [m, rad, rad]."""
+    reference_age: Positive = 0.05
+    """A reference made longer ago moves nothing, where that is known [s]."""
+    late_tick: Annotated[float, Meta(gt=1)] = 3.0
+    """Control periods from one tick to the next beyond which that motion is thrown away."""
+    stall: Positive = 0.1
+    """Time from one tick to the next beyond which motion stops until the operator re-engages
+    [s]."""
+    frame_age: Positive = 0.3
+    """An older frame is refused when it comes [s]."""
+    frame_gap: Positive = 0.18
+    """So long without a frame, and the camera counts as lost [s]."""
+    frozen_travel: Positive = 1.0
+    """Travel of the command after which no picture repeats itself [in update_distance]. Sensor
+    noise makes every picture different; a source without noise needs more than the slack."""
+    innovation_limit: Positive = 5.0
+    """An image further from what is expected is refused [in standard deviations]."""
+    innovation_floor: Positive = 0.08
+    """Least standard deviation of what is expected [in start_deviation]."""
+    blind_growth: NonNegative = 0.1
+    """What it grows by, per travel of the command, while no marker is seen."""
+    state_noise: Vector3 = (0.03e-3, 1.5e-3, 1.5e-3)
+    """Standard deviation of the state estimate in a still scene [m, rad, rad], twin; three of it
+    must be below contact_tolerance times update_distance, or noise passes for contact."""
+    hold_time: NonNegative = 4.0
+    """How long a reaction lasts before the next takes its place [s]."""
+    hold_travel: NonNegative = 4.0
+    """The same as travel of the reference, all degrees of freedom together [in width_limit]."""
+    fade_travel: Positive = 2.0
+    """Travel over which compensation fades to nothing [in width_limit]."""
+    restore_travel: Positive = 2.0
+    """Travel over which it comes back, once warnings have been acknowledged [in width_limit]."""
+    good_frames: Count = 5
+    """Frames in a row with nothing wrong after which learning goes on."""
+    good_ticks: Count = 200
+    """The same for what is seen at the control tick."""

@@ -1,0 +1,175 @@
+"""The fault campaign: how it counts, and that a row comes out again."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tautscope.config import load_config
+from tautscope.dof import Dof
+from tautscope.errors import ConfigError
+from tautscope.twin.faults import KINDS, Fault
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
+
+import fault_runs as runs
+import fault_tables as tables
+from fault_watch import Hand, Watch
+
+ROOT = Path(__file__).resolve().parents[1]
+CONFIG = load_config()
+needs_fork = pytest.mark.skipif(sys.platform == "win32", reason="the campaign forks")
+
+
+def outcome(excursion=(0.0, 0.0, 0.0), detected=math.nan, stopped=False, duration=1.0):
+    fault = Fault("frozen", 0.0, duration)
+    rest = ("none", (), stopped, 0.0, 0.0, ())
+    return runs.Outcome("frozen", 0, fault, excursion, detected, *rest)
+
+
+def campaign(folder, *arguments):
+    file = folder / "rows.json"
+    command = [sys.executable, "benchmarks/faults.py", "--workers", "1", "--json", str(file)]
+    found = subprocess.run(
+        [*command, *arguments], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert found.returncode == 0, found.stderr
+    (rows,) = json.loads(file.read_text(encoding="utf-8")).values()
+    return {(row["kind"], row["seed"]): row for row in rows}
+
+
+@needs_fork
+def test_a_row_comes_out_again_alone(tmp_path):
+    kinds = ["--kind", "swapped", "--kind", "ok", "--kind", "stall", "--kind", "start_negative"]
+    several = campaign(tmp_path, *kinds, "--runs", "8", "--first-seed", "200")
+    assert set(several) == {(kind, seed) for kind in kinds[1::2] for seed in (200, 201)}
+    alone = campaign(tmp_path, "--kind", "swapped", "--seed", "201")
+    assert alone["swapped", 201] == several["swapped", 201], "seed 201"
+    for seed in (200, 201):
+        assert several["ok", seed]["excursion"] == [0.0, 0.0, 0.0], seed
+        assert several["ok", seed]["ending"] == "masked", seed
+        assert several["start_negative", seed]["ending"] == "stopped", seed
+        assert several["swapped", seed]["fault"]["start"] >= runs.LEARNING, seed
+
+
+def test_shards_are_all_seeds_once():
+    import faults
+
+    def seeds(shard):
+        sys.argv = ["faults.py", "--runs", "1000", "--first-seed", "5", "--shard", shard]
+        return faults.chosen(faults.arguments(), 1000)
+
+    whole = seeds("1/1")
+    assert len(whole) * len(KINDS) >= 1000
+    assert sorted(seed for part in ("1/3", "2/3", "3/3") for seed in seeds(part)) == whole
+
+
+def test_the_excursion_is_against_the_run_without_the_fault():
+    base = np.zeros((5, 3))
+    truth = base.copy()
+    truth[2, 0], truth[3, 1], truth[4, 2] = -2e-3, 0.3, -0.1
+    np.testing.assert_allclose(runs.excursion(truth, base, None), [2e-3, 0.3, 0.1])
+
+
+def test_after_a_stop_it_is_against_the_way_that_was_to_come():
+    base = np.outer(np.arange(6.0), [1.0, 0.0, 0.0])
+    truth = base.copy()
+    truth[3:, 0] = [3.0, 3.5, 3.5]
+    assert runs.excursion(truth, base, 3)[0] == 0, "coming to rest on the way"
+    assert runs.excursion(truth, base, None)[0] == 1.5
+    truth[3:, 0] = [3.0, 2.0, 2.0]
+    assert runs.excursion(truth, base, 3)[0] == 1, "back"
+    truth[3:, 0] = [3.0, 6.0, 6.0]
+    assert runs.excursion(truth, base, 3)[0] == 2, "ahead of it"
+    truth[1, 0] = 11.0
+    assert runs.excursion(truth, base, 3)[0] == 10, "before the stop too"
+
+
+@pytest.mark.parametrize(
+    ("made", "ending", "beyond"),
+    [
+        (outcome(), "masked", False),
+        (outcome((0.9e-3, 0.17, 0.1)), "masked", False),
+        (outcome((1.1e-3, 0, 0)), "SILENT", True),
+        (outcome((0, 0.19, 0)), "SILENT", True),
+        (outcome((1.1e-3, 0, 0), duration=math.inf), "SILENT", False),
+        (outcome((1.1e-3, 0, 0), detected=0.1), "warned", True),
+        (outcome((1.1e-3, 0, 0), detected=0.1, stopped=True), "stopped", True),
+        (outcome((10.2e-3, 0, 0), detected=0.1, duration=math.inf), "warned", False),
+        (outcome((10.4e-3, 0, 0), detected=0.1, duration=math.inf), "warned", True),
+    ],
+)
+def test_endings(made, ending, beyond):
+    row = tables.to_row(made)
+    assert (row["ending"], row["beyond"]) == (ending, beyond)
+
+
+def test_what_a_profile_makes_up_for_may_be_given_back():
+    np.testing.assert_allclose(runs.lasting("paper")[0], 8.3e-3)
+    np.testing.assert_allclose(runs.lasting("best")[0], 10.3e-3)
+
+
+def test_the_hand_rests_in_pauses_and_goes_on_from_there():
+    now = 0.0
+    hand = Hand(CONFIG, {Dof.INSERTION: 7.5}, lambda: now, 10.0)
+    speed = 2 * math.pi / 7.5 * CONFIG.experiment.insertion.amplitude
+    assert speed == pytest.approx(12.6e-3, rel=0.01), "the hand's largest"
+    hand.pauses = [(1.0, 2.0), (3.0, 3.5)]
+    free = Hand(CONFIG, {Dof.INSERTION: 7.5}, lambda: now, 10.0)
+    positions = {}
+    for now in (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.25, 4.0):
+        positions[now] = hand(0.0)[0], free(0.0)[0]
+    assert positions[0.5][0] == positions[0.5][1]
+    assert positions[1.0][0] == positions[1.5][0] == positions[2.0][0]
+    moved = [positions[2.5][i] - positions[2.0][i] for i in (0, 1)]
+    assert moved[0] == pytest.approx(moved[1])
+    assert positions[3.25][0] == pytest.approx(positions[3.0][0])
+    assert positions[4.0][0] != positions[3.25][0]
+
+
+def test_a_wrong_start_is_told_or_refused():
+    wide = runs.told(CONFIG, Fault("start_wide", severity=1.5))
+    assert wide.insertion.delta_plus - wide.insertion.delta_minus == pytest.approx(15e-3)
+    for kind in ("start_negative", "start_nan"):
+        with pytest.raises(ConfigError):
+            runs.told(CONFIG, Fault(kind))
+    refused = runs.started(CONFIG, 3, "start_negative")
+    assert (refused.stopped, refused.reaction, refused.detected) == (True, "disable", 0.0)
+
+
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_drawn_faults_are_faults(kind):
+    drawn = [runs.drawn(kind, seed, 10.0) for seed in range(100)]
+    assert drawn[3] == runs.drawn(kind, 3, 10.0)
+    passing = sum(math.isfinite(each.duration) for each in drawn)
+    assert passing == 0 if not KINDS[kind].lasts else 50 < passing < 90, "seeds 0 to 99"
+    assert {each.dof for each in drawn} == set(Dof)
+
+
+def test_the_watch_notes_the_highest_and_when_motion_stopped():
+    watch = Watch(lambda: 0.0, 2.0, 0.005)
+    watch.note(2.5, "warn", 1)
+    watch.note(3.0, "hold_motion", 5)
+    watch.note(3.5, "fade", 3)
+    watch.flags["frozen"] = 2.5
+    said = watch.said()
+    assert (said["flags"], said["reaction"]) == ({"frozen": 0.5}, "hold_motion")
+    assert (said["stopped"], said["stop_tick"]) == (True, 200)
+
+
+def test_what_is_said_without_the_fault_too_is_no_notice():
+    def made(flags, usual):
+        watch = Watch(lambda: 0.0, 0.0, 0.005)
+        watch.flags |= flags
+        still = runs.Traces(np.zeros((3, 3)), np.zeros((3, 3)), watch.said())
+        return runs.outcome(0, Fault("frozen"), still, still, {"flags": usual})
+
+    both = made({"merged": 1.0, "frozen": 2.0}, {"merged": 1.0})
+    assert (both.detected, both.flags, both.spurious) == (2.0, ("frozen",), ("merged",))
+    assert math.isnan(made({"merged": 1.0}, {"merged": 0.5}).detected)
+    assert made({"merged": 0.4}, {"merged": 0.5}).detected == 0.4, "earlier is its own"
