@@ -18,7 +18,7 @@ NOTICED = {
     "V1": (("band_a_lost", "band_b_lost"), {"merged"}),
     "V2": (("swapped",), {"swapped"}),
     "V3": (("merged",), {"innovation", "merged"}),
-    "V4": (("outlier", "random"), {"innovation", "merged"}),
+    "V4": (("outlier", "random"), {"innovation", "merged", "lost"}),
     "V5": (("bands_lost",), {"lost"}),
     "V7": (("frozen",), {"frozen"}),
     "V8": (("late",), {"late", "dropped"}),
