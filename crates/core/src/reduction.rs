@@ -211,17 +211,6 @@ impl HysteresisReduction {
                 return self.unused(Status::Refused, Some(past));
             }
         }
-        // Two markers of which one is where it cannot be: the other may be as wrong.
-        let is_doubtful = is_believed && seen.used != found(measured);
-        let doubt = self
-            .guards
-            .watched(Flags::when(is_doubtful, Flag::Innovation));
-        if !(doubt.is_empty() || self.guards.may_learn()) {
-            // One after the other they would lead the belief away from what is seen once all is well.
-            *raised = doubt;
-            self.whereabouts.miss(&past);
-            return self.unused(Status::Refused, Some(past));
-        }
         self.guards
             .frames
             .accept(&belief, seen.image_state(), past.travel);
@@ -233,7 +222,11 @@ impl HysteresisReduction {
             ([true, true], [true, true, true]) => Status::Ok,
             _ => Status::Held,
         };
-        *raised = doubt;
+        // Two markers of which one is where it cannot be: the other may be as wrong.
+        let is_doubtful = is_believed && seen.used != found(measured);
+        *raised = self
+            .guards
+            .watched(Flags::when(is_doubtful, Flag::Innovation));
         let triggers = if raised.is_empty() && self.guards.may_learn() {
             self.learn(&past, &seen, raised)
         } else {
