@@ -33,7 +33,7 @@ flags! {
     Innovation = "innovation",
     /// The same, and it would fit with the markers exchanged.
     Swapped = "swapped",
-    /// One marker alone.
+    /// One marker alone, or two of which one is where it cannot be.
     Merged = "merged",
     /// No marker, or none that could be believed.
     Lost = "lost",

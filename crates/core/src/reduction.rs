@@ -224,20 +224,17 @@ impl HysteresisReduction {
         };
         // Two markers of which one is where it cannot be: the other may be as wrong.
         let is_doubtful = is_believed && seen.used != found(measured);
-        *raised = self
+        let doubt = self
             .guards
             .watched(Flags::when(is_doubtful, Flag::Innovation));
-        let triggers = if raised.is_empty() && self.guards.may_learn() {
+        let triggers = if doubt.is_empty() && self.guards.may_learn() {
             self.learn(&past, &seen, raised)
         } else {
             [Triggers::default(); 3]
         };
         *raised = self.guards.watched(
             raised
-                .and(Flags::when(
-                    !is_doubtful && status == Status::Partial,
-                    Flag::Merged,
-                ))
+                .and(Flags::when(status == Status::Partial, Flag::Merged))
                 .and(Flags::when(!is_believed, Flag::Lost))
                 .and(Flags::when(
                     is_believed && status == Status::Held,

@@ -28,9 +28,9 @@ class SafetyConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     how far a command may lead its reference, and the unit of the travels below."""
     offset_limit: PerDof = (8e-3, 1.6, 0.9)
     """Largest contact offset either way that is believed."""
-    reference_speed: PerDof = (0.05, 5.0, 3.0)
+    reference_speed: PerDof = (0.15, 10.0, 6.0)
     """A faster reference is slowed down to this, and the rest of its motion is thrown away."""
-    command_speed: PerDof = (0.15, 20.0, 10.0)
+    command_speed: PerDof = (0.75, 50.0, 30.0)
     """No command changes faster."""
     command_travel: tuple[Range, Range, Range] = ((-0.1, 0.3), (-12.6, 12.6), (-4.0, 4.0))
     """Least and largest command [m, rad, rad]."""
@@ -48,7 +48,7 @@ class SafetyConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     frozen_travel: Positive = 1.0
     """Travel of the command after which no picture repeats itself [in update_distance]. Sensor
     noise makes every picture different; a source without noise needs more than the slack."""
-    innovation_limit: Positive = 5.0
+    innovation_limit: Positive = 8.0
     """An image further from what is expected is refused [in standard deviations]."""
     innovation_floor: Positive = 0.08
     """Least standard deviation of what is expected [in start_deviation]."""
