@@ -25,7 +25,7 @@ import numpy as np
 from bench_processes import PATIENCE, bench_config, rig, run
 from numpy.typing import ArrayLike
 from tautscope import tables
-from tautscope.bench.rig import read_truth
+from tautscope.bench.truth import read_truth
 from tautscope.config import dump_config
 from tautscope.dof import Dof
 from tautscope.experiment import run_experiment

@@ -170,6 +170,7 @@ class CanopenLink:
             SecondMasterError: Another master's frames were heard.
             BusError: The bus is gone.
         """
+        self._wire.drain()
         self._wire.alarm()  # what came since the last cycle
         said = self._wire.exchange(controlwords, targets)
         self._wire.alarm()

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import gc
 import json
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,7 +16,14 @@ from tautscope.dof import Dof
 from tautscope.errors import DriveError, OutputError
 from tautscope.experiment import run_experiment
 from tautscope.hardware.plausibility import Plausibility
-from tautscope.hardware.realtime import OTHERS, VISION, realtime, settle
+from tautscope.hardware.realtime import (
+    OTHERS,
+    VISION,
+    little_collection,
+    memory_kept,
+    realtime,
+    settle,
+)
 from tautscope.hardware.rig import HardwareRig
 from tautscope.hardware.signals import exit_on_signals
 from tautscope.hardware.timing import Timing
@@ -120,7 +125,7 @@ def run_on_hardware(
     rig = make_rig(config)  # a configuration that cannot work leaves no folder
     _make(check_free(folder))
     parts = []
-    with exit_on_signals(), _little_collection(), realtime(OTHERS):
+    with exit_on_signals(), little_collection(), memory_kept(), realtime(OTHERS):
         for index, compensate in enumerate(kinds):
             parts.append(
                 _run(
@@ -234,17 +239,6 @@ class _Watched:
             )
         if self._watch is not None:
             self._watch.frame(frame.captured_at, report)
-
-
-@contextmanager
-def _little_collection() -> Iterator[None]:
-    """Python's search for cycles of dead objects stops all threads: spare it what is there now."""
-    gc.collect()
-    gc.freeze()
-    try:
-        yield
-    finally:
-        gc.unfreeze()
 
 
 def _make(folder: Path) -> None:
