@@ -85,6 +85,20 @@ def wait_for(condition: Callable[[], bool]) -> None:
         time.sleep(0.01)
 
 
+def test_a_pause_of_ours_is_not_blamed_on_a_drive(hub: Hub, bench: Bench) -> None:
+    """The drives' heartbeats came meanwhile and wait to be read; ours stayed away, they say."""
+    config = drives_config(channel=str(hub.path), heartbeat_timeout=0.6, heartbeat_period=0.02)
+    rig = bench(config)
+    with open_drives(config) as drives:
+        drives.start()
+        drive(drives, 3)
+        time.sleep(2 * config.heartbeat_timeout)
+        with pytest.raises(EmergencyError, match="emergency 0x8130") as found:
+            drive(drives, 1)
+        assert "This computer paused for" in str(found.value.__notes__)
+        assert at_rest(rig)
+
+
 def test_answers_that_are_a_little_late_are_counted(hub: Hub, bench: Bench) -> None:
     config = drives_config(channel=str(hub.path))
     rig = bench(config)

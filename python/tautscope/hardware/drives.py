@@ -216,6 +216,8 @@ class Drives:
             unconfirmed = self._quick_stop()
         if unconfirmed:
             error.add_note(str(_unconfirmed(unconfirmed)))
+        if own_pause := self._watch.own_pause:
+            error.add_note(own_pause)
 
     def _quick_stop(self) -> list[str]:
         """Quick-stop all drives; the names of those that do not confirm it."""
