@@ -14,7 +14,7 @@ from tautscope.recording import Floats, Recording, Snapshot, Tables, frame_row
 from tautscope.reduction import HysteresisReduction, Report
 from tautscope.references import Reference
 from tautscope.rig import Frame, Rig, Sample
-from tautscope.safety import switched_off
+from tautscope.safety import Supervision, switched_off
 
 if TYPE_CHECKING:
     from tautscope.vision import Detection
@@ -47,6 +47,7 @@ def run_experiment(
     look: Look = HysteresisReduction.on_frame,
     log: Log | None = None,
     aside: Executor | None = None,
+    watch: Callable[[Supervision], None] | None = None,
 ) -> Recording:
     """Run a reference on a rig, with the camera as the only feedback.
 
@@ -66,6 +67,7 @@ def run_experiment(
         log: Written while the run goes on, so that it survives whatever ends it; left open.
         aside: Looks at the images, in place of `look`, while ticks go on; of frames that come
             meanwhile, the newest is next. For a rig whose time does not wait.
+        watch: Told how the loop stands before each command is sent; what it raises ends the run.
 
     Raises:
         SignalError: The reference is not three finite numbers, or the rig's clock does not run.
@@ -87,6 +89,8 @@ def run_experiment(
             recorder.seen(sample.time, frame, report, elapsed)
             if log is not None:
                 log.frame(sample.time, frame, report)
+        if watch is not None:
+            watch(reduction.supervision)
         before, sample = sample, rig.step(command)
         if not sample.time > before.time:
             raise SignalError("sample.time", sample.time, f"later than the last, {before.time}")

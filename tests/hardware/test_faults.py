@@ -127,6 +127,41 @@ def test_a_fault_is_kept_until_it_is_acknowledged(hub: Hub, bench: Bench) -> Non
         assert set(rig.states.values()) == {State.OPERATION_ENABLED}
 
 
+@pytest.mark.parametrize("is_running", [True, False])
+def test_disabling_stops_first_and_then_takes_the_power(
+    hub: Hub, bench: Bench, *, is_running: bool
+) -> None:
+    config = drives_config(channel=str(hub.path))
+    rig = bench(config)
+    with open_drives(config) as drives:
+        drives.disable()  # never enabled: nothing to do
+        drives.start()
+        drive(drives, 5)
+        if not is_running:
+            drives.stop()
+        drives.disable()
+        assert set(rig.states.values()) == {State.SWITCH_ON_DISABLED}
+        with pytest.raises(StateError, match="before start or after stop"):
+            drives.exchange([0, 0, 0])
+    went = [(event.dof, event.what) for event in rig.events if not event.what.startswith("fault")]
+    for dof in Dof:
+        states = [what for who, what in went if who == dof.label]
+        assert states[-3:] == ["operation enabled", "quick stop active", "switch on disabled"]
+
+
+def test_a_drive_that_is_not_disabled_is_said(hub: Hub, bench: Bench) -> None:
+    config = drives_config(channel=str(hub.path), state_timeout=1.0)
+    rig = bench(config)
+    with open_drives(config) as drives:
+        drives.start()
+        drives.stop()
+        rig.inject("drop", Dof.ROTATION)
+        with pytest.raises(StateError, match="rotation, node 2: disabling is not confirmed"):
+            drives.disable()
+        assert rig.states[Dof.INSERTION] is State.SWITCH_ON_DISABLED
+        rig.clear(Dof.ROTATION)
+
+
 @pytest.mark.parametrize(
     ("command", "says"),
     [

@@ -183,6 +183,18 @@ class Drives:
         if unconfirmed:
             raise _unconfirmed(unconfirmed)
 
+    def disable(self) -> None:
+        """`stop`, then take the power from the motors: nothing holds them any more.
+
+        Raises:
+            StateError: A drive does not confirm; use the emergency stop.
+        """
+        with signals_deferred():
+            self._running = False
+            unconfirmed = self._cycles.disable()
+        if unconfirmed:
+            raise _unconfirmed(unconfirmed, "disabling")
+
     def close(self) -> None:
         """`stop`, then release the bus; may be called twice.
 
@@ -235,9 +247,9 @@ def _three(command: ArrayLike) -> NDArray[np.float64]:
     return wanted
 
 
-def _unconfirmed(names: list[str]) -> StateError:
+def _unconfirmed(names: list[str], what: str = "quick stop") -> StateError:
     return StateError(
         "; ".join(names),
-        "quick stop is not confirmed",
+        f"{what} is not confirmed",
         "Use the emergency stop: the motor may be moving",
     )

@@ -13,7 +13,7 @@ from typing import Any
 
 from tautscope.config import Config
 from tautscope.dof import Dof
-from tautscope.errors import DriveError, OutputError
+from tautscope.errors import DriveError, OutputError, TautscopeError
 from tautscope.experiment import run_experiment
 from tautscope.hardware.plausibility import Plausibility
 from tautscope.hardware.realtime import (
@@ -34,7 +34,7 @@ from tautscope.reduction import Report
 from tautscope.references import SineSequence
 from tautscope.results import Results, evaluate
 from tautscope.rig import Frame, Sample
-from tautscope.safety import Reaction
+from tautscope.safety import Reaction, Supervision
 from tautscope.tables import finite_or_none
 
 RigMaker = Callable[[Config], HardwareRig]
@@ -202,6 +202,7 @@ def _run(
                 lambda elapsed, duration: progress(min(elapsed / duration, 1.0)),
                 log=_Watched(log, config),
                 aside=eyes,
+                watch=lambda standing: _obey(rig, standing),
             )
         except BaseException as error:
             log.warn(f"{type(error).__name__}: {error}")
@@ -212,6 +213,25 @@ def _run(
             eyes.shutdown()
     progress(1.0)
     return Part(recording, rig.timing, log.close())
+
+
+def _obey(rig: HardwareRig, standing: Supervision) -> None:
+    """Do with the drives what the loop's guards say, in the tick in which they say it."""
+    reaction = standing.reaction
+    if reaction.rank < Reaction.QUICK_STOP.rank:
+        return
+    disables = reaction is Reaction.DISABLE
+    stop = DriveError(
+        "loop",
+        f"{reaction} ({', '.join(standing.flags)})",
+        f"The motors are {'without power' if disables else 'stopped'}. See docs/safety.md for "
+        "what was noticed, and the log for what led to it",
+    )
+    try:
+        rig.disable() if disables else rig.close()
+    except TautscopeError as failed:
+        stop.add_note(str(failed))
+    raise stop
 
 
 class _Watched:
@@ -230,13 +250,6 @@ class _Watched:
 
     def frame(self, now: float, frame: Frame, report: Report) -> None:
         self._log.frame(now, frame, report)
-        if report.reaction.rank >= Reaction.QUICK_STOP.rank:
-            # Whoever closes the rig brings the drives to quick stop.
-            raise DriveError(
-                "loop",
-                f"{report.reaction} ({', '.join(report.warnings)})",
-                "The motors are stopped. What was noticed is in the log",
-            )
         if self._watch is not None:
             self._watch.frame(frame.captured_at, report)
 
