@@ -39,16 +39,18 @@ from tautscope.twin import Twin
 WITHIN = 0.03
 """How far a reduction may be from the in-process twin's."""
 FAULTS = {
-    "a drive's emergency": ("fault rotation", "EmergencyError"),
-    "a drive silent": ("drop rotation", "SilentDriveError"),
-    "a drive answers 0.3 s late": ("delay rotation", "SilentDriveError"),
-    "heartbeat of a drive lost": ("heartbeat rotation", "HeartbeatError"),
-    "a drive leaves its mode": ("refuse rotation", "StateError"),
-    "a motor stands still": ("freeze insertion", "FollowingError"),
-    "camera unplugged": ("fault camera", "CameraError"),
-    "camera frozen": ("freeze camera", "CameraError"),
+    "a drive's emergency": ("fault rotation", "rotation, node 2: emergency 0x4310"),
+    "a drive silent": ("drop rotation", "rotation, node 2: no "),
+    "a drive answers 0.3 s late": ("delay rotation", "rotation, node 2: no "),
+    "heartbeat of a drive lost": ("heartbeat rotation", "rotation, node 2: no heartbeat"),
+    "a drive leaves its mode": ("refuse rotation", "rotation, node 2: it changed from mode"),
+    "a motor stands still": ("freeze insertion", "insertion, node 1: it is at"),
+    "camera unplugged": ("fault camera", "camera.source: got 'no picture"),
+    "camera frozen": ("freeze camera", "camera.source: got 'the same picture"),
 }
-"""What -> request, and the error that ends the run."""
+"""What -> request, and how the error that ends the run begins."""
+LIMITS = {"a drive's emergency": 100.0, "heartbeat of a drive lost": 100.0, "a drive silent": 100.0}
+"""What -> to quick stop at most [ms]."""
 WRONG: dict[str, dict[str, Any]] = {
     "wrong node id": {"drives.rotation.node": 9},
     "wrong sign, insertion": {"drives.insertion.sign": -1},
@@ -59,6 +61,8 @@ WRONG: dict[str, dict[str, Any]] = {
     "degrees for counts per rad, rotation": {"drives.rotation.counts_per_unit": 1e4 * 180 / np.pi},
     "counts per degree, bending": {"drives.bending.counts_per_unit": 1e4 * np.pi / 180},
 }
+ENDED_BY_ERROR = 2
+"""Exit status of `tautscope run`."""
 REPLUG = 3.0
 """After how long an unplugged camera comes back [s]."""
 
@@ -143,7 +147,7 @@ def _widths(results: Results) -> dict[str, dict[str, float | None]]:
 def faults(arguments: argparse.Namespace) -> list[dict[str, Any]]:
     """Each fault in a run of its own: the error, what it says, and when the motors were stopped."""
     rows = []
-    for what, (request, _) in FAULTS.items():
+    for what, (request, says) in FAULTS.items():
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
             config = bench_config(folder, arguments)
@@ -155,7 +159,14 @@ def faults(arguments: argparse.Namespace) -> list[dict[str, Any]]:
                 began = found.event(f"fault: {request.split()[0]}")
                 stopped = found.event("quick stop active", "bending")
                 _, errors = process.communicate(timeout=PATIENCE)
-            rows.append(_row(what, process.returncode, errors, 1e3 * (stopped - began)))
+            row = _row(what, process.returncode, errors, 1e3 * (stopped - began))
+            row["limit_ms"] = LIMITS.get(what)
+            row["holds"] = (
+                row["status"] == ENDED_BY_ERROR
+                and row["said"].startswith(f"error: {says}")
+                and row["ms"] <= LIMITS.get(what, np.inf)
+            )
+            rows.append(row)
     rows.append(replugged(arguments))
     return rows
 

@@ -59,8 +59,11 @@ def _stops(rows: list[dict[str, Any]]) -> Iterator[str]:
     """What went wrong, how soon it ended, and what was said."""
     if not rows:
         return
-    yield "\n| what | time | exit status | said |\n|---|---|---|---|"
+    yield "\n| what | time | goal | exit status | said |\n|---|---|---|---|---|"
     for row in rows:
         took = "" if row["ms"] is None else f"{row['ms']:.3g} ms"
         status = "" if row["status"] is None else row["status"]
-        yield f"| {row['what']} | {took} | {status} | {row['said']} |"
+        limit = row.get("limit_ms")
+        goal = "" if limit is None else f"{limit:g} ms"
+        goal += "" if row.get("holds", True) else " missed"
+        yield f"| {row['what']} | {took} | {goal} | {status} | {row['said']} |"
