@@ -15,6 +15,7 @@ ROWS = {
 def tables(document: dict[str, Any]) -> Iterator[str]:
     """All of a document of benchmarks/bench.py."""
     yield from _punctuality(document.get("run", {}))
+    yield from _replays(document.get("replays", {}))
     yield from _reductions(document.get("reductions", {}))
     yield from _stops([*document.get("faults", []), *document.get("wrong", [])])
 
@@ -38,6 +39,14 @@ def _punctuality(runs: dict[str, Any]) -> Iterator[str]:
         for part in runs.values()
     ]
     yield f"| frames that show insertion, rotation, bending | {' | '.join(seen)} | |"
+
+
+def _replays(found: dict[str, Any]) -> Iterator[str]:
+    """Whether each log gives the same again."""
+    for name, row in found.items():
+        verdict = "bit for bit" if row["identical"] else f"differs: {row['said']}"
+        ticks, updates = row["ticks"], row["updates"]
+        yield f"\nReplay, {name}: {ticks} ticks, {updates} image updates, {verdict}"
 
 
 def _reductions(found: dict[str, Any]) -> Iterator[str]:
