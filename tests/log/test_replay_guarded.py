@@ -13,10 +13,12 @@ from tautscope.experiment import run_experiment
 from tautscope.log.reader import read_log
 from tautscope.log.replay import replay_same
 from tautscope.log.writer import LogWriter
+from tautscope.recording import per_dof
 from tautscope.references import SineSequence
 from tautscope.rig import Sample
 
 SECONDS = 7.0
+SILENT_FROM = 6.6
 PAUSE = 0.2
 """A stall [s], beyond `safety.stall`."""
 
@@ -43,13 +45,16 @@ class Troubled(DrawnRig):
 
 
 class Jumping(SineSequence):
-    """A hand that lets go, and takes hold elsewhere."""
+    """A hand that lets go, and takes hold elsewhere; in the end it is silent."""
+
+    made_at = 0.0
 
     def __call__(self, time: float) -> NDArray[np.float64]:
+        self.made_at = time if time < SILENT_FROM else SILENT_FROM
         return super().__call__(time) + (0.01 if time > 4.5 else 0.0)
 
 
-NOTICED = {"dropped", "late", "clock", "reference_jump", "late_tick"}
+NOTICED = {"dropped", "late", "clock", "reference_jump", "late_tick", "reference_late"}
 
 
 @pytest.mark.parametrize("profile", ["paper", "best"])
@@ -66,7 +71,9 @@ def test_a_replay_is_identical_where_guards_acted(
         run = run_experiment(Troubled(config), reference, config, log=log, aside=aside)
     if not is_aside:  # which frames are seen aside is a matter of time
         assert set(run.warnings) >= NOTICED
-    assert "reference_jump" in run.warnings
+    assert set(run.warnings) >= {"reference_jump", "reference_late"}
+    silent = run.trace["time"] - PAUSE > SILENT_FROM + config.safety.reference_age
+    assert np.ptp(per_dof(run.trace[silent], "command"), axis=0).max() == 0.0
     found, again = replay_same(read_log(path))
     assert found.first_difference == found.ended == ""
     assert found.same_ticks == found.ticks == len(run.trace)

@@ -242,8 +242,10 @@ class _Watched:
         self._config = config
         self._watch: Plausibility | None = None
 
-    def tick(self, sample: Sample, reference: Floats, command: Floats) -> None:
-        self._log.tick(sample, reference, command)
+    def tick(
+        self, sample: Sample, reference: Floats, command: Floats, made_at: float | None = None
+    ) -> None:
+        self._log.tick(sample, reference, command, made_at)
         if self._watch is None:
             self._watch = Plausibility(self._config, sample.applied)
         self._watch.tick(sample.time, sample.applied)
