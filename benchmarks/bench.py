@@ -4,9 +4,10 @@ One process is the rig (`tautscope bench`), another drives it (`tautscope run`),
 a camera stream, at 100 Hz in real time. The first part runs the protocol with and without
 compensation and compares the reductions with those of the in-process twin of the same seed,
 profile, control period and history (the second run goes on with the same instrument); the bench
-writes where its tip truly was, for this evaluation alone. ``--minutes`` is how long each run
-streams set-points: periods are repeated until then; a minute of log takes 1 GB. The second part
-asks for faults, the third for configurations that are wrong, each in a run of its own.
+writes where its tip truly was, for this evaluation alone. Both logs are replayed. ``--minutes`` is
+how long each run streams set-points: periods are repeated until then; a minute of log takes 1 GB.
+The second part asks for faults, the third for configurations that are wrong, each in a run of its
+own.
 """
 
 from __future__ import annotations
@@ -25,11 +26,13 @@ import numpy as np
 from bench_processes import PATIENCE, bench_config, rig, run
 from numpy.typing import ArrayLike
 from tautscope import tables
-from tautscope.bench.rig import read_truth
+from tautscope.bench.truth import read_truth
 from tautscope.config import dump_config
 from tautscope.dof import Dof
 from tautscope.experiment import run_experiment
 from tautscope.hardware.timing import read_sent
+from tautscope.log.reader import read_log
+from tautscope.log.replay import replay_same
 from tautscope.recording import Recording
 from tautscope.references import SineSequence
 from tautscope.results import Results, evaluate
@@ -39,26 +42,43 @@ from tautscope.twin import Twin
 WITHIN = 0.03
 """How far a reduction may be from the in-process twin's."""
 FAULTS = {
-    "a drive's emergency": ("fault rotation", "EmergencyError"),
-    "a drive silent": ("drop rotation", "SilentDriveError"),
-    "a drive answers 0.3 s late": ("delay rotation", "SilentDriveError"),
-    "heartbeat of a drive lost": ("heartbeat rotation", "HeartbeatError"),
-    "a drive leaves its mode": ("refuse rotation", "StateError"),
-    "a motor stands still": ("freeze insertion", "FollowingError"),
-    "camera unplugged": ("fault camera", "CameraError"),
-    "camera frozen": ("freeze camera", "CameraError"),
+    "a drive's emergency": ("fault rotation", "rotation, node 2: emergency 0x4310"),
+    "a drive silent": ("drop rotation", "rotation, node 2: no "),
+    "a drive answers 0.3 s late": ("delay rotation", "rotation, node 2: no "),
+    "heartbeat of a drive lost": ("heartbeat rotation", "rotation, node 2: no heartbeat"),
+    "a drive leaves its mode": ("refuse rotation", "rotation, node 2: it changed from mode"),
+    "a motor stands still": ("freeze insertion", "insertion, node 1: it is at"),
+    "camera unplugged": ("fault camera", "camera.source: got 'no picture"),
+    "camera frozen": ("freeze camera", "camera.source: got 'the same picture"),
 }
-"""What -> request, and the error that ends the run."""
-WRONG: dict[str, dict[str, Any]] = {
-    "wrong node id": {"drives.rotation.node": 9},
-    "wrong sign, insertion": {"drives.insertion.sign": -1},
-    "wrong sign, rotation": {"drives.rotation.sign": 1},
-    "wrong sign, bending": {"drives.bending.sign": -1},
-    "counts per mm, insertion": {"drives.insertion.counts_per_unit": 1e3},
-    "counts per degree, rotation": {"drives.rotation.counts_per_unit": 1e4 * np.pi / 180},
-    "degrees for counts per rad, rotation": {"drives.rotation.counts_per_unit": 1e4 * 180 / np.pi},
-    "counts per degree, bending": {"drives.bending.counts_per_unit": 1e4 * np.pi / 180},
+"""What -> request, and how the error that ends the run begins."""
+LIMITS = {"a drive's emergency": 100.0, "heartbeat of a drive lost": 100.0, "a drive silent": 100.0}
+"""What -> to quick stop at most [ms]."""
+WRONG: dict[str, tuple[dict[str, Any], str]] = {
+    "wrong node id": ({"drives.rotation.node": 9}, "rotation, node 9: no answer"),
+    "wrong sign, insertion": ({"drives.insertion.sign": -1}, "insertion, node 1: it stands at"),
+    "wrong sign, rotation": ({"drives.rotation.sign": 1}, "drives.rotation"),
+    "wrong sign, bending": ({"drives.bending.sign": -1}, "bending, node 3: it stands at"),
+    "counts per mm, insertion": (
+        {"drives.insertion.counts_per_unit": 1e3},
+        "insertion, node 1: it stands at",
+    ),
+    "counts per degree, rotation": (
+        {"drives.rotation.counts_per_unit": 1e4 * np.pi / 180},
+        "drives.rotation",
+    ),
+    "degrees for counts per rad, rotation": (
+        {"drives.rotation.counts_per_unit": 1e4 * 180 / np.pi},
+        "rotation, node 2: it is at",
+    ),
+    "counts per degree, bending": (
+        {"drives.bending.counts_per_unit": 1e4 * np.pi / 180},
+        "bending, node 3: it stands at",
+    ),
 }
+"""What -> a change of the configuration, and how the error that ends the run begins."""
+ENDED_BY_ERROR = 2
+"""Exit status of `tautscope run`."""
 REPLUG = 3.0
 """After how long an unplugged camera comes back [s]."""
 
@@ -115,10 +135,12 @@ def compared(arguments: argparse.Namespace, out: Path | None) -> dict[str, Any]:
             raise RuntimeError(errors)
         pair = [with_truth(place, suffix, truth) for suffix in ("_uncompensated", "")]
         bench = evaluate(*pair)
+        replays = {name: _replayed(place / f"{name}.mcap") for name in json.loads(text)["runs"]}
     one = GoingOn(config)
     reference = SineSequence(config.experiment)
     twin = evaluate(*(run_experiment(one, reference, config, kind) for kind in (False, True)))
     document: dict[str, Any] = {"run": json.loads(text)["runs"], "reductions": {}}
+    document["replays"] = replays
     for dof in Dof:
         ours, theirs = bench[dof].reduction, twin[dof].reduction
         document["reductions"][dof.label] = {
@@ -132,6 +154,17 @@ def compared(arguments: argparse.Namespace, out: Path | None) -> dict[str, Any]:
     return document
 
 
+def _replayed(log: Path) -> dict[str, Any]:
+    """Whether a log gives the same again, bit for bit."""
+    found, _ = replay_same(read_log(log))
+    return {
+        "identical": found.is_identical and not found.ended,
+        "ticks": found.ticks,
+        "updates": found.updates,
+        "said": found.first_difference or found.ended,
+    }
+
+
 def _widths(results: Results) -> dict[str, dict[str, float | None]]:
     names = ("uncompensated", "compensated", "tracking_rms", "state_rms", "frames_used")
     return {
@@ -143,7 +176,7 @@ def _widths(results: Results) -> dict[str, dict[str, float | None]]:
 def faults(arguments: argparse.Namespace) -> list[dict[str, Any]]:
     """Each fault in a run of its own: the error, what it says, and when the motors were stopped."""
     rows = []
-    for what, (request, _) in FAULTS.items():
+    for what, (request, says) in FAULTS.items():
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
             config = bench_config(folder, arguments)
@@ -155,7 +188,10 @@ def faults(arguments: argparse.Namespace) -> list[dict[str, Any]]:
                 began = found.event(f"fault: {request.split()[0]}")
                 stopped = found.event("quick stop active", "bending")
                 _, errors = process.communicate(timeout=PATIENCE)
-            rows.append(_row(what, process.returncode, errors, 1e3 * (stopped - began)))
+            row = _row(what, process.returncode, errors, 1e3 * (stopped - began))
+            row["limit_ms"] = LIMITS.get(what)
+            row["holds"] = _ended_by(row, says) and row["ms"] <= LIMITS.get(what, np.inf)
+            rows.append(row)
     rows.append(replugged(arguments))
     return rows
 
@@ -189,7 +225,7 @@ def replugged(arguments: argparse.Namespace) -> dict[str, Any]:
 def wrong(arguments: argparse.Namespace) -> list[dict[str, Any]]:
     """Each wrong configuration against a right rig; from enabled to stopped, if it moved."""
     rows = []
-    for what, changes in WRONG.items():
+    for what, (changes, says) in WRONG.items():
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
             config = bench_config(folder, arguments)
@@ -203,8 +239,13 @@ def wrong(arguments: argparse.Namespace) -> list[dict[str, Any]]:
             enabled = [at for at, what in events if what == "operation enabled"]
             stopped = [at for at, what in events if what == "quick stop active"]
             took = 1e3 * (max(stopped) - min(enabled)) if enabled and stopped else None
-            rows.append(_row(what, process.returncode, errors, took))
+            row = _row(what, process.returncode, errors, took)
+            rows.append(row | {"holds": _ended_by(row, says)})
     return rows
+
+
+def _ended_by(row: dict[str, Any], says: str) -> bool:
+    return row["status"] == ENDED_BY_ERROR and row["said"].startswith(f"error: {says}")
 
 
 def _row(what: str, status: int | None, errors: str, took: float | None) -> dict[str, Any]:

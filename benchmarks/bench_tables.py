@@ -15,6 +15,7 @@ ROWS = {
 def tables(document: dict[str, Any]) -> Iterator[str]:
     """All of a document of benchmarks/bench.py."""
     yield from _punctuality(document.get("run", {}))
+    yield from _replays(document.get("replays", {}))
     yield from _reductions(document.get("reductions", {}))
     yield from _stops([*document.get("faults", []), *document.get("wrong", [])])
 
@@ -40,6 +41,14 @@ def _punctuality(runs: dict[str, Any]) -> Iterator[str]:
     yield f"| frames that show insertion, rotation, bending | {' | '.join(seen)} | |"
 
 
+def _replays(found: dict[str, Any]) -> Iterator[str]:
+    """Whether each log gives the same again."""
+    for name, row in found.items():
+        verdict = "bit for bit" if row["identical"] else f"differs: {row['said']}"
+        ticks, updates = row["ticks"], row["updates"]
+        yield f"\nReplay, {name}: {ticks} ticks, {updates} image updates, {verdict}"
+
+
 def _reductions(found: dict[str, Any]) -> Iterator[str]:
     """The bench's beside the in-process twin's."""
     if not found:
@@ -59,8 +68,11 @@ def _stops(rows: list[dict[str, Any]]) -> Iterator[str]:
     """What went wrong, how soon it ended, and what was said."""
     if not rows:
         return
-    yield "\n| what | time | exit status | said |\n|---|---|---|---|"
+    yield "\n| what | time | goal | exit status | said |\n|---|---|---|---|---|"
     for row in rows:
         took = "" if row["ms"] is None else f"{row['ms']:.3g} ms"
         status = "" if row["status"] is None else row["status"]
-        yield f"| {row['what']} | {took} | {status} | {row['said']} |"
+        limit = row.get("limit_ms")
+        goal = "" if limit is None else f"{limit:g} ms"
+        goal += "" if row.get("holds", True) else " missed"
+        yield f"| {row['what']} | {took} | {goal} | {status} | {row['said']} |"

@@ -107,7 +107,9 @@ class Watch:
             self.width = max(self.width, float(report.delta_plus[0] - report.delta_minus[0]))
         return report
 
-    def tick(self, sample: Sample, reference: Floats, command: Floats) -> None:
+    def tick(
+        self, sample: Sample, reference: Floats, command: Floats, made_at: float | None = None
+    ) -> None:
         """A control tick."""
         now = self.clock()
         if now >= self.since and self._last is not None:

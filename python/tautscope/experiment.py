@@ -12,9 +12,9 @@ from tautscope.config import Config
 from tautscope.errors import SignalError
 from tautscope.recording import Floats, Recording, Snapshot, Tables, frame_row
 from tautscope.reduction import HysteresisReduction, Report
-from tautscope.references import Reference
+from tautscope.references import DatedReference, Reference
 from tautscope.rig import Frame, Rig, Sample
-from tautscope.safety import switched_off
+from tautscope.safety import Supervision, switched_off
 
 if TYPE_CHECKING:
     from tautscope.vision import Detection
@@ -28,8 +28,10 @@ Look = Callable[[HysteresisReduction, Frame], Report]
 class Log(Protocol):
     """Told everything as it happens; `tautscope.log.writer.LogWriter` for one."""
 
-    def tick(self, sample: Sample, reference: Floats, command: Floats) -> None:
-        """A control tick."""
+    def tick(
+        self, sample: Sample, reference: Floats, command: Floats, made_at: float | None = None
+    ) -> None:
+        """A control tick; when its reference was made [s, the rig's clock], if that is known."""
         ...
 
     def frame(self, now: float, frame: Frame, report: Report) -> None:
@@ -47,6 +49,7 @@ def run_experiment(
     look: Look = HysteresisReduction.on_frame,
     log: Log | None = None,
     aside: Executor | None = None,
+    watch: Callable[[Supervision], None] | None = None,
 ) -> Recording:
     """Run a reference on a rig, with the camera as the only feedback.
 
@@ -57,7 +60,8 @@ def run_experiment(
     Args:
         rig: Any object with the methods of `tautscope.rig.Rig`. It is reset first and left open:
             whoever made it closes it.
-        reference: (time [s]) -> (3,) [m, rad, rad], with `duration` and `segments`.
+        reference: (time [s]) -> (3,) [m, rad, rad], with `duration` and `segments`; with `made_at`
+            too, one that is old moves nothing (`tautscope.references.DatedReference`).
         config: Of the loop.
         compensate: Without, the command is the reference, and the estimators only listen.
         progress: Told how far the run is.
@@ -66,6 +70,7 @@ def run_experiment(
         log: Written while the run goes on, so that it survives whatever ends it; left open.
         aside: Looks at the images, in place of `look`, while ticks go on; of frames that come
             meanwhile, the newest is next. For a rig whose time does not wait.
+        watch: Told how the loop stands before each command is sent; what it raises ends the run.
 
     Raises:
         SignalError: The reference is not three finite numbers, or the rig's clock does not run.
@@ -78,15 +83,18 @@ def run_experiment(
     start = sample.time
     while (elapsed := sample.time - start) < reference.duration:
         desired = reference(elapsed)
-        command = reduction.step(desired, time=sample.time)
+        made_at = start + reference.made_at if isinstance(reference, DatedReference) else None
+        command = reduction.step(desired, time=sample.time, made_at=made_at)
         recorder.tick(sample, desired, command)
         if log is not None:
-            log.tick(sample, desired, command)
+            log.tick(sample, desired, command, made_at)
         # After the command, which never waits for an image.
         for frame, report in eyes.see(reduction, sample.frame):
             recorder.seen(sample.time, frame, report, elapsed)
             if log is not None:
                 log.frame(sample.time, frame, report)
+        if watch is not None:
+            watch(reduction.supervision)
         before, sample = sample, rig.step(command)
         if not sample.time > before.time:
             raise SignalError("sample.time", sample.time, f"later than the last, {before.time}")

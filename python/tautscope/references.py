@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +50,19 @@ class Reference(Protocol):
 
     def __call__(self, time: float) -> NDArray[np.float64]:
         """(3,) [m, rad, rad] at `time` [s from the start of the reference]."""
+        ...
+
+
+@runtime_checkable
+class DatedReference(Reference, Protocol):
+    """A reference that comes from elsewhere, a hand for one, and may be late or stay away.
+
+    One that is made when it is asked for needs no date.
+    """
+
+    @property
+    def made_at(self) -> float:
+        """When what was returned last was made [s from the start of the reference]."""
         ...
 
 

@@ -24,7 +24,7 @@ class FakeMotors:
     def __init__(self) -> None:
         self.told: list[NDArray[np.float64]] = []
         self.threads: set[str] = set()
-        self.stopped = 0
+        self.stopped = self.disabled = 0
         self.meanwhile: Callable[[], object] = lambda: None
 
     def start(self) -> NDArray[np.float64]:
@@ -35,6 +35,9 @@ class FakeMotors:
         self.threads.add(threading.current_thread().name)
         self.told.append(np.array(command))
         return np.array(command)
+
+    def disable(self) -> None:
+        self.disabled += 1
 
     def __enter__(self) -> Self:
         return self

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 from drive_rig import drives_document
-from tautscope.bench.rig import Bench, read_truth
+from tautscope.bench.rig import Bench
+from tautscope.bench.truth import read_truth
 from tautscope.config import Config, dump_config, from_document
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError, OutputError

@@ -199,7 +199,10 @@ def test_motors_follow_and_stop(mode: int) -> None:
             applied = drives.exchange(command)
         np.testing.assert_allclose(applied, command, atol=1e-4)
         assert states(master) == {State.OPERATION_ENABLED}
-    assert states(master) == {State.QUICK_STOP_ACTIVE}
+        drives.stop()
+        assert states(master) == {State.QUICK_STOP_ACTIVE}
+        drives.disable()
+    assert states(master) == {State.SWITCH_ON_DISABLED}
     assert master.open_on is None
     assert master.state == INIT
 

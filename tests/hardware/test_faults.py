@@ -85,6 +85,20 @@ def wait_for(condition: Callable[[], bool]) -> None:
         time.sleep(0.01)
 
 
+def test_a_pause_of_ours_is_not_blamed_on_a_drive(hub: Hub, bench: Bench) -> None:
+    """The drives' heartbeats came meanwhile and wait to be read; ours stayed away, they say."""
+    config = drives_config(channel=str(hub.path), heartbeat_timeout=0.6, heartbeat_period=0.02)
+    rig = bench(config)
+    with open_drives(config) as drives:
+        drives.start()
+        drive(drives, 3)
+        time.sleep(2 * config.heartbeat_timeout)
+        with pytest.raises(EmergencyError, match="emergency 0x8130") as found:
+            drive(drives, 1)
+        assert "This computer paused for" in str(found.value.__notes__)
+        assert at_rest(rig)
+
+
 def test_answers_that_are_a_little_late_are_counted(hub: Hub, bench: Bench) -> None:
     config = drives_config(channel=str(hub.path))
     rig = bench(config)
@@ -111,6 +125,41 @@ def test_a_fault_is_kept_until_it_is_acknowledged(hub: Hub, bench: Bench) -> Non
         assert at_rest(rig)
         drives.start(reset_faults=True)
         assert set(rig.states.values()) == {State.OPERATION_ENABLED}
+
+
+@pytest.mark.parametrize("is_running", [True, False])
+def test_disabling_stops_first_and_then_takes_the_power(
+    hub: Hub, bench: Bench, *, is_running: bool
+) -> None:
+    config = drives_config(channel=str(hub.path))
+    rig = bench(config)
+    with open_drives(config) as drives:
+        drives.disable()  # never enabled: nothing to do
+        drives.start()
+        drive(drives, 5)
+        if not is_running:
+            drives.stop()
+        drives.disable()
+        assert set(rig.states.values()) == {State.SWITCH_ON_DISABLED}
+        with pytest.raises(StateError, match="before start or after stop"):
+            drives.exchange([0, 0, 0])
+    went = [(event.dof, event.what) for event in rig.events if not event.what.startswith("fault")]
+    for dof in Dof:
+        states = [what for who, what in went if who == dof.label]
+        assert states[-3:] == ["operation enabled", "quick stop active", "switch on disabled"]
+
+
+def test_a_drive_that_is_not_disabled_is_said(hub: Hub, bench: Bench) -> None:
+    config = drives_config(channel=str(hub.path), state_timeout=1.0)
+    rig = bench(config)
+    with open_drives(config) as drives:
+        drives.start()
+        drives.stop()
+        rig.inject("drop", Dof.ROTATION)
+        with pytest.raises(StateError, match="rotation, node 2: disabling is not confirmed"):
+            drives.disable()
+        assert rig.states[Dof.INSERTION] is State.SWITCH_ON_DISABLED
+        rig.clear(Dof.ROTATION)
 
 
 @pytest.mark.parametrize(

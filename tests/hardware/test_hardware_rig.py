@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import threading
 import time
 from collections.abc import Callable, Iterator
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,9 +15,18 @@ import pytest
 from fake_rig import CYCLE, HOME, Setup, rig_config
 from tautscope.config import Config
 from tautscope.dof import Dof
-from tautscope.errors import CameraError, ConfigError, FollowingError, SignalError, StateError
+from tautscope.errors import (
+    CameraError,
+    ConfigError,
+    DriveError,
+    FollowingError,
+    SignalError,
+    StateError,
+)
+from tautscope.hardware.experiment import run_on_hardware
 from tautscope.hardware.rig import HardwareRig
 from tautscope.hardware.timing import Timing, read_sent
+from tautscope.reduction import HysteresisReduction
 from tautscope.rig import Rig
 
 
@@ -218,6 +229,29 @@ def test_close_stops_the_motors_and_the_rig_can_start_again(setup: Callable[...,
     sample = one.rig.step(one.rig.reset().applied)
     assert sample.time == CYCLE
     assert len(one.rig.timing.sent) == 1
+
+
+@pytest.mark.parametrize(("raised", "disabled"), [(1, 0), (2, 1)], ids=["quick_stop", "disable"])
+def test_what_the_guards_say_is_done_to_the_drives_in_that_tick(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, raised: int, disabled: int
+) -> None:
+    """No frame comes: it is the tick that tells. A drive fault raised again climbs to disable."""
+    one = Setup()
+    config = one.config.replace(**{"safety.hold_time": 0.0, "safety.hold_travel": 0.0})
+    step, ticks = HysteresisReduction.step, itertools.count(1)
+
+    def guarded(loop: HysteresisReduction, *values: Any, **more: Any) -> Any:
+        if next(ticks) == 20:
+            for _ in range(raised):
+                loop.raise_flag("drive_fault")
+        return step(loop, *values, **more)
+
+    monkeypatch.setattr(HysteresisReduction, "step", guarded)
+    says = r"loop: disable \(drive_fault\).*without power" if disabled else r"loop: quick_stop"
+    with pytest.raises(DriveError, match=says):
+        run_on_hardware(config, tmp_path / "run", lambda share: None, make_rig=lambda _: one.rig)
+    assert (one.motors.stopped, one.motors.disabled, one.eye.closed) == (1, disabled, 1)
+    assert next(ticks) == 21  # not one more
 
 
 def test_a_configuration_that_cannot_be_driven_is_refused() -> None:

@@ -8,7 +8,7 @@ Bmx    Baumueller b maXX 1000 parameter manual 5.07004.03, B.3, page 182
 EAO    EAO series 09 CANopen manual, page 51, after the CAN poster of CiA
 S300   Kollmorgen S300-S700 CANopen, December 2019, pages 52 and 134; Beckhoff AX2000, page 128
 Elmo1  Elmo MAN-CAN301IG 2.1, pages 4-6 and 4-9
-Elmo2  Elmo MAN-CAN402IG 1.2, page 86 (0x60C2)
+Elmo2  Elmo MAN-CAN402IG 1.2, pages 27 (controlword) and 86 (0x60C2)
 Vect   Bonfiglioli Active, CANopen, 8.1.9 (0x1016)
 """
 
@@ -114,6 +114,26 @@ def test_a_drive_is_enabled_as_the_trace_has_it() -> None:
         assert f"202#{controlword}" in bus.sent
         assert bus.sent[-1] == "080#"  # S300: SYNC
     assert cia402.state_of(0x0737) is State.OPERATION_ENABLED
+
+
+def test_stopping_and_disabling_are_the_commands_of_the_standard() -> None:
+    """Elmo2: bits 2, 1 of the controlword are 0, 1 for quick stop; bit 1 is 0 for disable voltage.
+
+    Sent again and again, also after the emergency of S300.
+    """
+    link, bus = link_to({})
+    try:
+        bus.waiting.append("081#1043080100000000")
+        for word, data in ((cia402.QUICK_STOP, "0200"), (cia402.DISABLE_VOLTAGE, "0000")):
+            for _ in range(2):
+                bus.sent.clear()
+                link.halt(word, [0] * 3)
+                assert [f"20{node}#{data}" for node in (1, 2, 3)] == [
+                    one for one in bus.sent if one.startswith("20")
+                ]
+                assert bus.sent[-1] == "080#"
+    finally:
+        link.close()
 
 
 def test_interpolation_is_prepared_and_enabled() -> None:

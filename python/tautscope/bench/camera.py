@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from tautscope.config import Config
 from tautscope.errors import ConfigError
+from tautscope.hardware.realtime import OTHERS, step_back
 from tautscope.twin.camera import TwinCamera
 
 CameraFault = Literal["drop", "delay", "fault", "freeze"]
@@ -114,6 +115,7 @@ class CameraStream:
         self._unplug()
 
     def _run(self) -> None:
+        step_back(OTHERS)  # drawing takes longer than a cycle may wait
         while not self._ending.is_set():
             if "fault" in self._faults:
                 self._unplug()

@@ -7,6 +7,8 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from tautscope.hardware.realtime import OTHERS, step_back
+
 
 @dataclass(frozen=True, slots=True)
 class Event:
@@ -42,6 +44,7 @@ class Reporter:
         self._thread.join()
 
     def _run(self) -> None:
+        step_back(OTHERS)
         told = 0
         last = False
         while not last:

@@ -20,16 +20,14 @@ from tautscope.bench.camera import CameraStream, Centreline
 from tautscope.bench.can_bus import Hub, LocalBus
 from tautscope.bench.drives import SimulatedDrives
 from tautscope.bench.events import Event
+from tautscope.bench.truth import TruthFile
 from tautscope.config import Config
 from tautscope.dof import Dof
-from tautscope.errors import ConfigError, OutputError
+from tautscope.errors import ConfigError
 from tautscope.hardware.rig import rig_drives
-from tautscope.recording import per_dof
 from tautscope.twin.plant import Plant
 
 CAMERA = "camera"
-TRUTH = np.dtype([("time", "f8")] + [(f"true_{dof.label}", "f8") for dof in Dof])
-"""A line of the truth: the tip (3,) [m, rad, rad] at an instant of the monotonic clock [s]."""
 
 
 class Bench:
@@ -66,12 +64,10 @@ class Bench:
         self._lock = threading.Lock()
         self._camera = CameraStream(config, url.removeprefix("unix:"), self._centreline, timing)
         self._open = ExitStack()
+        self._truth: TruthFile | None = None
         try:
-            self._truth = None if truth is None else truth.open("w", encoding="utf-8")
-        except OSError as error:
-            place = f"a place that can be written ({error})"
-            raise OutputError("--truth", str(truth), place) from None
-        try:
+            if truth is not None:
+                self._truth = self._open.enter_context(TruthFile(truth))
             bus = self._plug(drives.channel)
             start = self._plant.applied
             self.drives = SimulatedDrives(bus, drives, self._on_sync, start=start, modes=modes)
@@ -114,9 +110,6 @@ class Bench:
         self._open.close()
 
     def _plug(self, channel: str) -> LocalBus:
-        if self._truth is not None:
-            self._open.enter_context(self._truth)
-            self._truth.write(",".join(TRUTH.names or ()) + "\n")
         try:
             self._open.enter_context(Hub(channel))
         except OSError as error:
@@ -133,15 +126,8 @@ class Bench:
         with self._lock:
             plant = self._plant
             if self._truth is not None:
-                state = plant.true_state
-                self._truth.write(f"{now!r},{state[0]:.9g},{state[1]:.9g},{state[2]:.9g}\n")
+                self._truth.add(now, plant.true_state)
             if self._camera.is_due:
                 self._camera.capture(now, plant.centreline())
             plant.step(told)
             return plant.applied
-
-
-def read_truth(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Instants (n,) [s, monotonic clock] and true tip states (n, 3) [m, rad, rad] of a bench."""
-    table = np.loadtxt(path, TRUTH, delimiter=",", skiprows=1)
-    return table["time"], per_dof(table, "true")

@@ -28,7 +28,6 @@ from tautscope.errors import (
     SettingRefusedError,
     SilentDriveError,
 )
-from tautscope.hardware import cia402
 from tautscope.hardware import object_dictionary as objects
 from tautscope.hardware.can_wire import (
     ANSWER,
@@ -170,16 +169,17 @@ class CanopenLink:
             SecondMasterError: Another master's frames were heard.
             BusError: The bus is gone.
         """
+        self._wire.drain()
         self._wire.alarm()  # what came since the last cycle
         said = self._wire.exchange(controlwords, targets)
         self._wire.alarm()
         return said
 
-    def quick_stop(self, targets: Sequence[int]) -> list[Feedback]:
-        """As `cycle` with a quick stop for all, but nothing else stands in its way."""
+    def halt(self, controlword: int, targets: Sequence[int]) -> list[Feedback]:
+        """As `cycle` with one controlword for all, but nothing else stands in its way."""
         for node in self._wire.nodes.values():
             node.controlword = None  # sent again every time, until it is confirmed
-        return self._wire.exchange([cia402.QUICK_STOP] * 3, targets)
+        return self._wire.exchange([controlword] * 3, targets)
 
     def abandon(self, dofs: Sequence[Dof]) -> None:
         """Stop these nodes (NMT); with our heartbeat gone, they quick-stop by themselves."""

@@ -61,6 +61,9 @@ AT_REST = frozenset(
 )
 """States in which a drive follows no set-points."""
 
+UNPOWERED = frozenset({State.NOT_READY, State.SWITCH_ON_DISABLED, State.READY, State.FAULT})
+"""States in which the motor has no power."""
+
 FOLLOWS = 1 << 12
 """Statusword: the drive follows the set-points (mode 8), interpolation is active (mode 7)."""
 LIMIT = 1 << 11

@@ -121,13 +121,21 @@ def _run(options: argparse.Namespace) -> int:
 def _bench(options: argparse.Namespace) -> None:
     from tautscope.bench.events import Reporter  # noqa: PLC0415
     from tautscope.bench.rig import Bench  # noqa: PLC0415
-    from tautscope.hardware.realtime import SETPOINTS, quick_switching, realtime  # noqa: PLC0415
+    from tautscope.hardware.realtime import (  # noqa: PLC0415
+        SETPOINTS,
+        little_collection,
+        memory_kept,
+        quick_switching,
+        realtime,
+    )
     from tautscope.hardware.signals import exit_on_signals  # noqa: PLC0415
 
     config = load_config(options.config)
     with (
         exit_on_signals(),
         quick_switching(),
+        little_collection(),
+        memory_kept(),
         realtime(SETPOINTS) as trouble,
         Bench(config, options.truth, modes=tuple(options.modes)) as bench,
     ):

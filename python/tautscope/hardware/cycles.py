@@ -41,6 +41,7 @@ class Cycles:
         self._targets = [0, 0, 0]
         self._feedback: list[Feedback] = []
         self._last_cycle = time.monotonic()
+        self._is_operational = False
 
     def send(self, targets: list[int]) -> list[Feedback]:
         """One cycle with new targets [counts]."""
@@ -62,6 +63,7 @@ class Cycles:
         self._targets = [self._link.read(dof, objects.POSITION) for dof in Dof]
         self._watch.check_start(self._targets)
         self._link.operational()
+        self._is_operational = True
         if reset_faults:
             self._walk(self._reset)
         self._words = [cia402.DISABLE_VOLTAGE] * 3
@@ -79,19 +81,33 @@ class Cycles:
         """
         if not self._feedback:
             return []
+        self._feedback = []
+        return self._until(cia402.QUICK_STOP, cia402.AT_REST)
+
+    def disable(self) -> list[str]:
+        """`quick_stop`, then take the power from the motors; the names of those not confirmed.
+
+        From operation enabled, disable voltage alone would let a moving motor coast. Does nothing
+        where they never cycled.
+        """
+        if not self._is_operational:
+            return []
+        return self.quick_stop() or self._until(cia402.DISABLE_VOLTAGE, cia402.UNPOWERED)
+
+    def _until(self, controlword: int, states: frozenset[State]) -> list[str]:
+        """Tell all drives, until each confirms one of these states; names of those that do not."""
         confirmed = [0, 0, 0]
         deadline = time.monotonic() + self._config.state_timeout
         while min(confirmed) < CONFIRMATIONS and time.monotonic() < deadline:
             try:
-                said = self._link.quick_stop(self._targets)
+                said = self._link.halt(controlword, self._targets)
             except DriveError:
                 break  # the bus itself is gone
             for dof, one in enumerate(said):
-                rests = not one.age and cia402.state_of(one.statusword) in cia402.AT_REST
-                confirmed[dof] = confirmed[dof] + 1 if rests else 0
+                there = not one.age and cia402.state_of(one.statusword) in states
+                confirmed[dof] = confirmed[dof] + 1 if there else 0
             if not all(confirmed):
                 time.sleep(self._config.cycle / 4)
-        self._feedback = []
         pending = [dof for dof in Dof if confirmed[dof] < CONFIRMATIONS]
         if pending:
             self._link.abandon(pending)

@@ -183,6 +183,18 @@ class Drives:
         if unconfirmed:
             raise _unconfirmed(unconfirmed)
 
+    def disable(self) -> None:
+        """`stop`, then take the power from the motors: nothing holds them any more.
+
+        Raises:
+            StateError: A drive does not confirm; use the emergency stop.
+        """
+        with signals_deferred():
+            self._running = False
+            unconfirmed = self._cycles.disable()
+        if unconfirmed:
+            raise _unconfirmed(unconfirmed, "disabling")
+
     def close(self) -> None:
         """`stop`, then release the bus; may be called twice.
 
@@ -216,6 +228,8 @@ class Drives:
             unconfirmed = self._quick_stop()
         if unconfirmed:
             error.add_note(str(_unconfirmed(unconfirmed)))
+        if own_pause := self._watch.own_pause:
+            error.add_note(own_pause)
 
     def _quick_stop(self) -> list[str]:
         """Quick-stop all drives; the names of those that do not confirm it."""
@@ -233,9 +247,9 @@ def _three(command: ArrayLike) -> NDArray[np.float64]:
     return wanted
 
 
-def _unconfirmed(names: list[str]) -> StateError:
+def _unconfirmed(names: list[str], what: str = "quick stop") -> StateError:
     return StateError(
         "; ".join(names),
-        "quick stop is not confirmed",
+        f"{what} is not confirmed",
         "Use the emergency stop: the motor may be moving",
     )

@@ -156,9 +156,9 @@ class EthercatLink:
             slave.enabled = state is State.OPERATION_ENABLED
         return said
 
-    def quick_stop(self, targets: Sequence[int]) -> list[Feedback]:
-        """As `cycle` with a quick stop for all, but nothing else stands in its way."""
-        return self._exchange([cia402.QUICK_STOP] * 3, targets)
+    def halt(self, controlword: int, targets: Sequence[int]) -> list[Feedback]:
+        """As `cycle` with one controlword for all, but nothing else stands in its way."""
+        return self._exchange([controlword] * 3, targets)
 
     def abandon(self, dofs: Sequence[Dof]) -> None:
         """End the process data of all: the drives' watchdogs stop the motors."""

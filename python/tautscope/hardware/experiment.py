@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-import gc
 import json
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from tautscope.config import Config
 from tautscope.dof import Dof
-from tautscope.errors import DriveError, OutputError
+from tautscope.errors import DriveError, OutputError, TautscopeError
 from tautscope.experiment import run_experiment
 from tautscope.hardware.plausibility import Plausibility
-from tautscope.hardware.realtime import OTHERS, VISION, realtime, settle
+from tautscope.hardware.realtime import (
+    OTHERS,
+    VISION,
+    little_collection,
+    memory_kept,
+    realtime,
+    settle,
+)
 from tautscope.hardware.rig import HardwareRig
 from tautscope.hardware.signals import exit_on_signals
 from tautscope.hardware.timing import Timing
@@ -29,7 +34,7 @@ from tautscope.reduction import Report
 from tautscope.references import SineSequence
 from tautscope.results import Results, evaluate
 from tautscope.rig import Frame, Sample
-from tautscope.safety import Reaction
+from tautscope.safety import Reaction, Supervision
 from tautscope.tables import finite_or_none
 
 RigMaker = Callable[[Config], HardwareRig]
@@ -120,7 +125,7 @@ def run_on_hardware(
     rig = make_rig(config)  # a configuration that cannot work leaves no folder
     _make(check_free(folder))
     parts = []
-    with exit_on_signals(), _little_collection(), realtime(OTHERS):
+    with exit_on_signals(), little_collection(), memory_kept(), realtime(OTHERS):
         for index, compensate in enumerate(kinds):
             parts.append(
                 _run(
@@ -197,6 +202,7 @@ def _run(
                 lambda elapsed, duration: progress(min(elapsed / duration, 1.0)),
                 log=_Watched(log, config),
                 aside=eyes,
+                watch=lambda standing: _obey(rig, standing),
             )
         except BaseException as error:
             log.warn(f"{type(error).__name__}: {error}")
@@ -209,6 +215,25 @@ def _run(
     return Part(recording, rig.timing, log.close())
 
 
+def _obey(rig: HardwareRig, standing: Supervision) -> None:
+    """Do with the drives what the loop's guards say, in the tick in which they say it."""
+    reaction = standing.reaction
+    if reaction.rank < Reaction.QUICK_STOP.rank:
+        return
+    disables = reaction is Reaction.DISABLE
+    stop = DriveError(
+        "loop",
+        f"{reaction} ({', '.join(standing.flags)})",
+        f"The motors are {'without power' if disables else 'stopped'}. See docs/safety.md for "
+        "what was noticed, and the log for what led to it",
+    )
+    try:
+        rig.disable() if disables else rig.close()
+    except TautscopeError as failed:
+        stop.add_note(str(failed))
+    raise stop
+
+
 class _Watched:
     """A log, and a watch that the tip goes where the motors go."""
 
@@ -217,34 +242,18 @@ class _Watched:
         self._config = config
         self._watch: Plausibility | None = None
 
-    def tick(self, sample: Sample, reference: Floats, command: Floats) -> None:
-        self._log.tick(sample, reference, command)
+    def tick(
+        self, sample: Sample, reference: Floats, command: Floats, made_at: float | None = None
+    ) -> None:
+        self._log.tick(sample, reference, command, made_at)
         if self._watch is None:
             self._watch = Plausibility(self._config, sample.applied)
         self._watch.tick(sample.time, sample.applied)
 
     def frame(self, now: float, frame: Frame, report: Report) -> None:
         self._log.frame(now, frame, report)
-        if report.reaction.rank >= Reaction.QUICK_STOP.rank:
-            # Whoever closes the rig brings the drives to quick stop.
-            raise DriveError(
-                "loop",
-                f"{report.reaction} ({', '.join(report.warnings)})",
-                "The motors are stopped. What was noticed is in the log",
-            )
         if self._watch is not None:
             self._watch.frame(frame.captured_at, report)
-
-
-@contextmanager
-def _little_collection() -> Iterator[None]:
-    """Python's search for cycles of dead objects stops all threads: spare it what is there now."""
-    gc.collect()
-    gc.freeze()
-    try:
-        yield
-    finally:
-        gc.unfreeze()
 
 
 def _make(folder: Path) -> None:

@@ -97,8 +97,8 @@ class Link(Protocol):
         """
         ...
 
-    def quick_stop(self, targets: Sequence[int]) -> list[Feedback]:
-        """As `cycle`, with a quick stop for every drive, whatever else is wrong on the bus."""
+    def halt(self, controlword: int, targets: Sequence[int]) -> list[Feedback]:
+        """As `cycle`, with one controlword for every drive, whatever else is wrong on the bus."""
         ...
 
     def abandon(self, dofs: Sequence[Dof]) -> None:

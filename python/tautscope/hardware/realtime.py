@@ -1,7 +1,9 @@
-"""Priority over other programs, for what moves motors."""
+"""For what moves motors: priority over other programs, memory that stays, few pauses."""
 
 from __future__ import annotations
 
+import ctypes
+import gc
 import os
 import sys
 from collections.abc import Iterator
@@ -12,10 +14,12 @@ SETPOINTS, LOOP, VISION, OTHERS = 60, 40, 20, 10
 at images, and of what else runs in their process: a thread that holds Python's lock and is kept
 waiting by another program would keep them waiting too."""
 REMEDY = (
-    f'echo "$USER - rtprio {SETPOINTS}" | sudo tee /etc/security/limits.d/90-tautscope.conf, then '
-    "log in again"
+    f'printf \'%s\\n\' "$USER - rtprio {SETPOINTS}" "$USER - memlock unlimited" | '
+    "sudo tee /etc/security/limits.d/90-tautscope.conf, then log in again"
 )
-"""What gives the priority where it is refused."""
+"""What gives the priority and keeps the memory where that is refused."""
+_LOCK_AS_TOUCHED = 1 | 2 | 4
+"""mlockall's MCL_CURRENT, MCL_FUTURE, MCL_ONFAULT on x86 and ARM: what was touched stays."""
 _SWITCH_INTERVAL = 5e-4
 """For how long a thread may keep Python's lock when another wants it [s]; 5 ms is the default."""
 
@@ -51,6 +55,12 @@ def settle(priority: int) -> None:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
 
 
+def step_back(priority: int) -> None:
+    """A lower SCHED_FIFO priority for the calling thread for good, if it inherited one."""
+    if hasattr(os, "sched_getscheduler") and os.sched_getscheduler(0) == os.SCHED_FIFO:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+
+
 @contextmanager
 def quick_switching() -> Iterator[None]:
     """Python's threads wait less for each other while the block lasts."""
@@ -60,3 +70,37 @@ def quick_switching() -> Iterator[None]:
         yield
     finally:
         sys.setswitchinterval(before)
+
+
+@contextmanager
+def little_collection() -> Iterator[None]:
+    """Python's search for cycles of dead objects stops all threads: spare it what is there now."""
+    gc.collect()
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
+
+
+@contextmanager
+def memory_kept() -> Iterator[str]:
+    """What this process has touched stays in memory while the block lasts (mlockall).
+
+    Else code that has not run for a while, that of a stop for one, is read from a disk that a
+    recording keeps busy.
+
+    Yields:
+        Nothing if it was granted, else why not and what to do.
+    """
+    if sys.platform != "linux":
+        yield f"{sys.platform}: memory is not kept from being paged out"
+        return
+    system = ctypes.CDLL(None, use_errno=True)
+    if system.mlockall(_LOCK_AS_TOUCHED):
+        yield f"memory may be paged out ({os.strerror(ctypes.get_errno())}). Run: {REMEDY}"
+        return
+    try:
+        yield ""
+    finally:
+        system.munlockall()

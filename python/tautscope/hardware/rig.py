@@ -153,6 +153,18 @@ class HardwareRig:
         self._setpoints = self._eye = None
         self._held.close()
 
+    def disable(self) -> None:
+        """`close`, and the motors are without power: nothing holds them any more.
+
+        Raises:
+            StateError: A drive does not confirm; use the emergency stop.
+        """
+        try:
+            if self._setpoints is not None:
+                self._setpoints.stop(disable=True)
+        finally:
+            self.close()
+
     def on_clock(self, instant: float) -> float:
         """An instant of the computer's monotonic clock on the rig's clock [s]."""
         if not self._sent:

@@ -35,6 +35,10 @@ class Motors(AbstractContextManager["Motors"], Protocol):
         """Send a set-point (3,), and read where the motors are (3,) [m, rad, rad]."""
         ...
 
+    def disable(self) -> None:
+        """Quick stop, then take the power from the motors."""
+        ...
+
 
 class Setpoints:
     """Opens the drives, goes to the start, and sends a set-point in every cycle.
@@ -62,7 +66,7 @@ class Setpoints:
         self._command: Floats | None = None
         self._sent: tuple[float, Floats] | None = None
         self._has_begun = self._is_ending = self._is_over = self._is_told = False
-        self._is_abandoned = False
+        self._is_abandoned = self._is_disabling = False
         self._failure: BaseException | None = None
         self._due = 0.0
         self._patience = _PATIENCE * config.cycle
@@ -93,14 +97,17 @@ class Setpoints:
             self._news.notify_all()
             return self._take()
 
-    def stop(self) -> None:
+    def stop(self, *, disable: bool = False) -> None:
         """Quick stop, confirmed by the drives, and the bus released; may be called twice.
+
+        Args:
+            disable: Take the power from the motors too.
 
         Raises:
             TautscopeError: What went wrong in the thread, if nobody was told yet.
         """
         with self._news:
-            self._is_ending = True
+            self._is_ending, self._is_disabling = True, disable
         if self._thread.ident is not None:
             self._thread.join()
         if not (self._is_told or self._is_abandoned):
@@ -127,6 +134,8 @@ class Setpoints:
             with realtime(SETPOINTS) as self._timing.realtime, self._motors() as motors:
                 self._approach(motors, motors.start())
                 self._follow(motors)
+                if self._is_disabling:
+                    motors.disable()
         except BaseException as error:
             failure = error
         with self._news:

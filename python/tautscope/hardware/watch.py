@@ -116,6 +116,17 @@ class Watch:
             if not lower - slack <= position <= upper + slack:
                 raise outside_travel(self._names[dof], dof, position, (lower, upper))
 
+    @property
+    def own_pause(self) -> str:
+        """What to know if set-points stayed away so long that the drives stopped by themselves."""
+        pause = self.traffic.longest_pause
+        if pause <= self._config.heartbeat_timeout:
+            return ""
+        return (
+            f"This computer paused for {pause * 1e3:.0f} ms between two set-points: see what else "
+            "loads it, and its real-time priority (tautscope doctor)"
+        )
+
     def stuck(self, dof: Dof, said: Feedback) -> SilentDriveError | StateError:
         """The error of a drive that does not reach the next state."""
         if said.age:
@@ -132,11 +143,8 @@ class Watch:
         """The error of a drive that is not in the state it should be in."""
         state = cia402.state_of(said.statusword)
         shown = "a state CiA 402 does not have" if state is None else state.value
-        pause = self.traffic.longest_pause
         if state in (State.FAULT, State.FAULT_REACTION):
             remedy = "Find the fault's cause in its manual (0x603F), then start with reset_faults"
-        elif pause > self._config.heartbeat_timeout:
-            remedy = f"This computer paused for {pause * 1e3:.0f} ms: see what else loads it"
         else:
             remedy = "Check its supply, its enable input and its limits"
         return StateError(

@@ -125,7 +125,7 @@ class Journal:
                 file.flush()
                 flushed = now
             if now - synced >= self._settings.sync_period:
-                os.fsync(self._file.fileno())
+                self._sync()
                 synced = time.monotonic()
             time.sleep(LOOK_PERIOD)
         if is_told:
@@ -134,7 +134,13 @@ class Journal:
             )
             self._write_events(file)
         file.finish()
+        self._sync()
+
+    def _sync(self) -> None:
+        """To the disk, and out of memory: gigabytes nobody reads would push out what others run."""
         os.fsync(self._file.fileno())
+        with suppress(OSError, AttributeError):  # advice, which not every system takes
+            os.posix_fadvise(self._file.fileno(), 0, 0, os.POSIX_FADV_DONTNEED)
 
     def _trouble(self, text: str) -> None:
         self._say(f"{self.path}: {text}")

@@ -41,6 +41,7 @@ COMMAND = "/instrument/actuators/setpoint_js"
 APPLIED = "/instrument/actuators/measured_js"
 TRUTH = "/twin/measured_js"
 TICK = "/tautscope/tick"
+MADE_AT = "/tautscope/made_at"
 IMAGE = "/endoscope/image_raw/compressed"
 ESTIMATE = "/instrument/measured_js"
 DELTA = "/instrument/hysteresis/delta"
@@ -59,6 +60,7 @@ TOPICS = {
     APPLIED: "sensor_msgs/msg/JointState",
     TRUTH: "sensor_msgs/msg/JointState",
     TICK: "std_msgs/msg/Float64",
+    MADE_AT: "std_msgs/msg/Float64",
     IMAGE: "sensor_msgs/msg/CompressedImage",
     ESTIMATE: "sensor_msgs/msg/JointState",
     DELTA: "std_msgs/msg/Float64MultiArray",
@@ -171,20 +173,26 @@ def read_head(messages: Mapping[str, bytes]) -> tuple[Facts, dict[str, str]]:
 
 
 def tick_messages(
-    clock: Clock, sample: Sample, reference: Iterable[float], command: Iterable[float]
+    clock: Clock,
+    sample: Sample,
+    reference: Iterable[float],
+    command: Iterable[float],
+    made_at: float | None = None,
 ) -> Messages:
-    """One control tick."""
+    """One control tick; when its reference was made [s, the rig's clock], if that is known."""
     header = _header(clock.nanoseconds(sample.time), "")
     joints = {REFERENCE: reference, COMMAND: command, APPLIED: sample.applied}
     if sample.true_state is not None:
         joints[TRUTH] = sample.true_state
-    messages = {topic: _joints(topic, header, values) for topic, values in joints.items()}
+    # The date first: where a torn log has the rest of a tick, it has its date.
+    messages = {} if made_at is None else {MADE_AT: _encoded(MADE_AT, {"data": made_at})}
+    messages |= {topic: _joints(topic, header, values) for topic, values in joints.items()}
     messages[TICK] = _encoded(TICK, {"data": sample.time})
     return messages
 
 
-def read_tick(messages: Mapping[str, bytes]) -> tuple[Sample, Floats, Floats]:
-    """Sample without its frame, reference and command."""
+def read_tick(messages: Mapping[str, bytes]) -> tuple[Sample, Floats, Floats, float | None]:
+    """Sample without its frame, reference, command, and when the reference was made."""
     joints = {
         topic: np.array(decode(TOPICS[topic], messages[topic])["position"], np.float64)
         for topic in (REFERENCE, COMMAND, APPLIED, TRUTH)
@@ -192,7 +200,8 @@ def read_tick(messages: Mapping[str, bytes]) -> tuple[Sample, Floats, Floats]:
     }
     time = decode(TOPICS[TICK], messages[TICK])["data"]
     sample = Sample(time, joints[APPLIED], None, joints.get(TRUTH))
-    return sample, joints[REFERENCE], joints[COMMAND]
+    made_at = decode(TOPICS[MADE_AT], messages[MADE_AT])["data"] if MADE_AT in messages else None
+    return sample, joints[REFERENCE], joints[COMMAND], made_at
 
 
 def update_messages(clock: Clock, now: float, frame: Frame, report: Report) -> Messages:

@@ -60,6 +60,7 @@ class Tick:
     sample: Sample
     reference: msg.Floats
     command: msg.Floats
+    made_at: float | None
     raw: msg.Messages
 
 

@@ -70,9 +70,10 @@ def replay_same(log: Log) -> tuple[Identity, Recording]:
     for index in range(1, max(log.events, default=0) + 1):
         event = log.events.get(index)
         if isinstance(event, Tick):
-            command = loop.step(event.reference, event.sample.time)
+            command = loop.step(event.reference, event.sample.time, event.made_at)
             tables.tick(event.sample, event.reference, command)
-            again = msg.tick_messages(clock, event.sample, event.reference, command)
+            inputs = event.sample, event.reference
+            again = msg.tick_messages(clock, *inputs, command, event.made_at)
             found.ticks += 1
             found.same_ticks += _is_same(found, event, again, f"tick at {event.sample.time:g} s")
         elif event is not None and log.has_image(index):

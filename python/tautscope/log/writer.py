@@ -91,14 +91,23 @@ class LogWriter:
         facts = msg.Facts(config, compensate, tuple(segments))
         self._journal = Journal(Path(path), facts, say)
 
-    def tick(self, sample: Sample, reference: Iterable[float], command: Iterable[float]) -> None:
-        """One control tick: the sample before it, reference u (3,) and command c (3,)."""
+    def tick(
+        self,
+        sample: Sample,
+        reference: Iterable[float],
+        command: Iterable[float],
+        made_at: float | None = None,
+    ) -> None:
+        """One control tick: the sample before it, reference u (3,) and command c (3,).
+
+        With when the reference was made, if the loop was told.
+        """
         self._begin(sample.time)
         self._ticks += 1
         # Copies: the caller may use its arrays again before they are written.
         truth = None if sample.true_state is None else np.array(sample.true_state)
         kept = Sample(sample.time, np.array(sample.applied), None, truth)
-        self._put(sample.time, (kept, np.array(reference), np.array(command)))
+        self._put(sample.time, (kept, np.array(reference), np.array(command), made_at))
 
     def frame(self, now: float, frame: Frame, report: Report) -> None:
         """One image update, after the tick in whose sample the frame came.

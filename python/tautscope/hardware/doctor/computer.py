@@ -1,4 +1,4 @@
-"""The computer a rig runs on: libraries, priority, disk."""
+"""The computer a rig runs on: libraries, priority, memory, disk."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pathlib import Path
 from tautscope._core import __version__
 from tautscope.config import Config
 from tautscope.hardware.doctor.finding import Finding
-from tautscope.hardware.realtime import REMEDY, SETPOINTS, realtime
+from tautscope.hardware.realtime import REMEDY, SETPOINTS, memory_kept, realtime
 from tautscope.pixels import FrameLayout
 
 PACKED = {"png": 0.55, "jpeg": 0.12}
@@ -26,7 +26,7 @@ _PROBE = 32 << 20
 
 
 def check_computer(config: Config) -> list[Finding]:
-    """Libraries and priority."""
+    """Libraries, priority, memory."""
     system = f"tautscope {__version__}, Python {platform.python_version()}, {platform.platform()}"
     try:
         load = f", load {os.getloadavg()[0]:.1f}"
@@ -39,6 +39,7 @@ def check_computer(config: Config) -> list[Finding]:
         _extra("hardware", ("av", "can", "canopen")),
         *([_extra("ethercat", ("pysoem",))] if is_ethercat else []),
         _priority(),
+        _memory(),
     ]
 
 
@@ -87,6 +88,17 @@ def _priority() -> Finding:
     if platform.system() != "Linux":
         return Finding("computer", what, "note", refusal, "Use Linux for a rig")
     return Finding("computer", what, "missing", "SCHED_FIFO is not permitted", REMEDY)
+
+
+def _memory() -> Finding:
+    what = "memory kept"
+    with memory_kept() as refusal:
+        if not refusal:
+            return Finding("computer", what, "ok", "what a run uses is not paged out")
+    if platform.system() != "Linux":
+        return Finding("computer", what, "note", refusal)
+    found = "it may be paged out, and set-points wait for the disk"
+    return Finding("computer", what, "note", found, REMEDY)
 
 
 def _speed(folder: Path, size: int) -> float:
