@@ -3,7 +3,7 @@
 use crate::dof::PerDof;
 use crate::error::{ConfigError, require_non_negative, require_positive};
 use crate::history::Entry;
-use crate::linear::square;
+use crate::linear::{add, square, times};
 use crate::posture::Belief;
 use crate::state::StateEstimate;
 
@@ -19,74 +19,109 @@ const MISS: f64 = 1.5;
 /// turn on, is found as well.
 const MISSED: f64 = 0.15;
 
+/// What a [`Whereabouts`] is set to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WhereaboutsSettings {
+    /// Before the first image, from the prediction: standard deviation [m, rad, rad].
+    pub start_deviation: PerDof<f64>,
+    /// How far an idle tip moves between two images: standard deviation [m, rad, rad].
+    pub rest_deviation: PerDof<f64>,
+    /// How long a tip still moves after its command has come to rest: time constant in s.
+    pub settling_time: f64,
+    /// What motion of the DOFs moves each of them, in the units of `start_deviation`.
+    pub coupling: f64,
+}
+
 /// What the last images said, per DOF, and how it has aged.
 ///
 /// ```text
 /// state = q + (q_hat - q)_last - (what images have moved q by since)
-/// deviation^2 = deviation_last^2 + rest_deviation^2 + (travel - travel_last)^2,  at most start_deviation^2
+/// deviation^2 = deviation_last^2 + rest_deviation^2 + moved^2 + shared^2,  at most start_deviation^2
+/// moved = max(travel - travel_last, arrived - arrived_last)
+/// shared = coupling start_deviation sqrt(sum over the DOFs of (moved / start_deviation)^2)
 /// ```
 ///
-/// with the travel of the command, forth and back: whatever the slack does, the tip has moved no
-/// farther than the command, but for `rest_deviation`. `deviation_last` has the image's own and, of the linear
+/// with the travel of the command, forth and back, and `arrived`, the same through a lag of `settling_time`: whatever
+/// the slack does, the tip moves no farther than the command, but it does so later, and goes on when the command has
+/// stopped. `shared` is what friction that is shared moves: a DOF that slides lets go of the others.
+/// `deviation_last` has the image's own and, of the linear
 /// step of Eq. (16), a quarter of the correction. Every image without markers makes it half as large again,
 /// up to a part of `start_deviation`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Whereabouts {
-    start_deviation: PerDof<f64>,
-    rest_deviation: PerDof<f64>,
+    settings: WhereaboutsSettings,
     /// `q_hat - q`, and what images had moved q by when it was taken.
     correction: PerDof<f64>,
     /// At the last image that determined the DOF.
     deviation: PerDof<f64>,
     travel: PerDof<f64>,
+    arrived: PerDof<f64>,
 }
 
 impl Whereabouts {
-    /// Before the first image: at the prediction, with `start_deviation` (3,); between two images an
-    /// idle tip moves by `rest_deviation` (3,); standard deviations [m, rad, rad].
+    /// Before the first image: at the prediction.
     ///
     /// # Errors
-    /// A start deviation is not a finite number above 0, or another not one from 0 on.
-    pub fn new(
-        start_deviation: PerDof<f64>,
-        rest_deviation: PerDof<f64>,
-    ) -> Result<Self, ConfigError> {
-        for (start, rest) in start_deviation.into_iter().zip(rest_deviation) {
+    /// A start deviation is not a finite number above 0, or another setting not one from 0 on.
+    pub fn new(settings: WhereaboutsSettings) -> Result<Self, ConfigError> {
+        for start in settings.start_deviation {
             require_positive("start_deviation", start)?;
+        }
+        for rest in settings.rest_deviation {
             require_non_negative("rest_deviation", rest)?;
         }
+        require_non_negative("settling_time", settings.settling_time)?;
+        require_non_negative("coupling", settings.coupling)?;
         Ok(Self {
-            start_deviation,
-            rest_deviation,
+            settings,
             correction: [0.0; 3],
-            deviation: start_deviation,
+            deviation: settings.start_deviation,
             travel: [0.0; 3],
+            arrived: [0.0; 3],
         })
+    }
+
+    /// How far of the travel the tip has had the time to go `elapsed` in s after `arrived`.
+    pub(crate) fn arrive(
+        &self,
+        arrived: PerDof<f64>,
+        travel: PerDof<f64>,
+        elapsed: f64,
+    ) -> PerDof<f64> {
+        let share = elapsed / (self.settings.settling_time + elapsed);
+        // The first tick has none before it, and a clock may go back.
+        let share = if elapsed > 0.0 { share } else { 0.0 };
+        add(arrived, share, add(travel, -1.0, arrived))
     }
 
     /// What is believed of the state at a moment of the history.
     pub(crate) fn at(&self, past: &Entry) -> Belief {
-        let mut belief = Belief {
-            state: past.predicted_state,
-            deviation: self.start_deviation,
-        };
-        let known = self.correction.iter().zip(self.deviation).zip(self.travel);
-        let then = past.corrected.iter().zip(past.travel);
-        let now = belief
-            .state
-            .iter_mut()
-            .zip(&mut belief.deviation)
-            .zip(self.rest_deviation);
-        for (
-            (((state, deviation), rest), (corrected, travel)),
-            ((correction, last), travel_last),
-        ) in now.zip(then).zip(known)
-        {
-            *state += correction - corrected;
-            let moved = square(rest) + square(travel - travel_last);
-            *deviation = deviation.min(libm::sqrt(square(last) + moved));
+        let start = self.settings.start_deviation;
+        let commanded = add(past.travel, -1.0, self.travel);
+        let late = add(past.arrived, -1.0, self.arrived);
+        let (mut moved, mut shared) = (commanded, 0.0);
+        for ((moved, late), unit) in moved.iter_mut().zip(late).zip(start) {
+            *moved = moved.max(late);
+            shared += square(self.settings.coupling * *moved / unit);
         }
-        belief
+        let variance = [
+            (self.deviation, 1.0),
+            (self.settings.rest_deviation, 1.0),
+            (moved, 1.0),
+            (start, shared),
+        ];
+        let variance = variance.iter().fold([0.0; 3], |sum, (each, share)| {
+            add(sum, *share, times(*each, *each))
+        });
+        let state = add(past.predicted_state, 1.0, self.correction);
+        let mut deviation = start;
+        for (deviation, variance) in deviation.iter_mut().zip(variance) {
+            *deviation = deviation.min(libm::sqrt(variance));
+        }
+        Belief {
+            state: add(state, -1.0, past.corrected),
+            deviation,
+        }
     }
 
     /// Takes in what one linear step determined.
@@ -118,10 +153,10 @@ impl Whereabouts {
     /// Takes in that the markers were not found where they should be.
     pub(crate) fn miss(&mut self, past: &Entry) {
         self.deviation = self.at(past).deviation;
-        for (deviation, start) in self.deviation.iter_mut().zip(self.start_deviation) {
+        for (deviation, start) in self.deviation.iter_mut().zip(self.settings.start_deviation) {
             *deviation = deviation.max((MISS * *deviation).min(MISSED * start));
         }
-        self.travel = past.travel;
+        (self.travel, self.arrived) = (past.travel, past.arrived);
     }
 
     fn set(
@@ -133,19 +168,16 @@ impl Whereabouts {
     ) {
         let now = state.iter().zip(deviation).zip(known);
         let then = past.predicted_state.iter().zip(past.corrected);
-        let mine = self
-            .correction
-            .iter_mut()
-            .zip(&mut self.deviation)
-            .zip(self.travel.iter_mut().zip(past.travel));
-        for ((((correction, last), (travel_last, travel)), (predicted, corrected)), new) in
-            mine.zip(then).zip(now)
+        let when = past.travel.iter().zip(past.arrived);
+        let mine = self.correction.iter_mut().zip(&mut self.deviation);
+        let ages = self.travel.iter_mut().zip(&mut self.arrived);
+        for ((((state, deviation), known), (predicted, corrected)), (mine, (ages, when))) in
+            now.zip(then).zip(mine.zip(ages.zip(when)))
         {
-            let ((state, deviation), known) = new;
             if known && deviation.is_finite() {
-                *correction = state - predicted + corrected;
-                *last = deviation;
-                *travel_last = travel;
+                *mine.0 = state - predicted + corrected;
+                *mine.1 = deviation;
+                (*ages.0, *ages.1) = (*when.0, when.1);
             }
         }
     }
