@@ -18,8 +18,6 @@ pub struct Entry {
     pub corrected: PerDof<f64>,
     /// How far the command has gone so far, forth and back [m, rad, rad].
     pub travel: PerDof<f64>,
-    /// How far of that the tip has had the time to go [m, rad, rad].
-    pub arrived: PerDof<f64>,
 }
 
 /// The latest control ticks, at most 1024; it never allocates.
@@ -47,7 +45,6 @@ impl History {
             predicted_state: [0.0; 3],
             corrected: [0.0; 3],
             travel: [0.0; 3],
-            arrived: [0.0; 3],
         };
         Ok(Self {
             ring: core::array::from_fn(|_| blank),
@@ -118,7 +115,6 @@ impl History {
             predicted_state: between(before.predicted_state, after.predicted_state, share),
             corrected: between(before.corrected, after.corrected, share),
             travel: between(before.travel, after.travel, share),
-            arrived: between(before.arrived, after.arrived, share),
         })
     }
 

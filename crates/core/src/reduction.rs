@@ -76,7 +76,6 @@ pub struct HysteresisReduction {
     whereabouts: Whereabouts,
     guards: Guards,
     travel: PerDof<f64>,
-    arrived: PerDof<f64>,
     corrected: PerDof<f64>,
     last_used: f64,
 }
@@ -100,7 +99,6 @@ impl HysteresisReduction {
             whereabouts,
             guards,
             travel: [0.0; 3],
-            arrived: [0.0; 3],
             corrected: [0.0; 3],
             last_used: f64::NEG_INFINITY,
         }
@@ -118,15 +116,12 @@ impl HysteresisReduction {
             let moved = (command - before).abs();
             *travel += if moved.is_finite() { moved } else { 0.0 };
         }
-        let elapsed = time - self.history.newest_time();
-        self.arrived = self.whereabouts.arrive(self.arrived, self.travel, elapsed);
         let jumped_back = self.history.push(Entry {
             time,
             command,
             predicted_state: self.predicted_state(),
             corrected: self.corrected,
             travel: self.travel,
-            arrived: self.arrived,
         });
         if jumped_back {
             self.last_used = f64::NEG_INFINITY;

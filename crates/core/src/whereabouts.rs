@@ -3,7 +3,7 @@
 use crate::dof::PerDof;
 use crate::error::{ConfigError, require_non_negative, require_positive};
 use crate::history::Entry;
-use crate::linear::{add, square, times};
+use crate::linear::{add, square};
 use crate::posture::Belief;
 use crate::state::StateEstimate;
 
@@ -39,23 +39,42 @@ pub struct WhereaboutsSettings {
 /// deviation^2 = deviation_last^2 + rest_deviation^2 + moved^2 + shared^2,  at most start_deviation^2
 /// moved = max(travel - travel_last, arrived - arrived_last)
 /// shared = coupling start_deviation sqrt(sum over the DOFs of (moved / start_deviation)^2)
+/// arrived = arrived_last + (travel - arrived_last) elapsed / (settling_time + elapsed)
 /// ```
 ///
-/// with the travel of the command, forth and back, and `arrived`, the same through a lag of `settling_time`: whatever
-/// the slack does, the tip moves no farther than the command, but it does so later, and goes on when the command has
-/// stopped. `shared` is what friction that is shared moves: a DOF that slides lets go of the others.
-/// `deviation_last` has the image's own and, of the linear
-/// step of Eq. (16), a quarter of the correction. Every image without markers makes it half as large again,
-/// up to a part of `start_deviation`.
+/// with the travel of the command, forth and back: whatever the slack does, the tip moves no farther. But it does so
+/// later, and goes on when the command has come to rest; `arrived` is how far of the travel it has had the time to go.
+/// `shared` is the friction the DOFs share: one that slides lets go of the others. `deviation_last` has the
+/// image's own and, of the linear step of Eq. (16), a quarter of the correction. Every image without markers makes it
+/// half as large again, up to a part of `start_deviation`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Whereabouts {
     settings: WhereaboutsSettings,
+    last: PerDof<Last>,
+}
+
+/// One DOF at the last image that determined it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Last {
     /// `q_hat - q`, and what images had moved q by when it was taken.
-    correction: PerDof<f64>,
-    /// At the last image that determined the DOF.
-    deviation: PerDof<f64>,
-    travel: PerDof<f64>,
-    arrived: PerDof<f64>,
+    correction: f64,
+    deviation: f64,
+    time: f64,
+    travel: f64,
+    arrived: f64,
+}
+
+impl Last {
+    fn arrived(&self, settling_time: f64, time: f64, travel: f64) -> f64 {
+        let elapsed = time - self.time;
+        // A clock may go back.
+        let share = if elapsed > 0.0 {
+            elapsed / (settling_time + elapsed)
+        } else {
+            0.0
+        };
+        self.arrived + share * (travel - self.arrived)
+    }
 }
 
 impl Whereabouts {
@@ -72,56 +91,42 @@ impl Whereabouts {
         }
         require_non_negative("settling_time", settings.settling_time)?;
         require_non_negative("coupling", settings.coupling)?;
-        Ok(Self {
-            settings,
-            correction: [0.0; 3],
-            deviation: settings.start_deviation,
-            travel: [0.0; 3],
-            arrived: [0.0; 3],
-        })
-    }
-
-    /// How far of the travel the tip has had the time to go `elapsed` in s after `arrived`.
-    pub(crate) fn arrive(
-        &self,
-        arrived: PerDof<f64>,
-        travel: PerDof<f64>,
-        elapsed: f64,
-    ) -> PerDof<f64> {
-        let share = elapsed / (self.settings.settling_time + elapsed);
-        // The first tick has none before it, and a clock may go back.
-        let share = if elapsed > 0.0 { share } else { 0.0 };
-        add(arrived, share, add(travel, -1.0, arrived))
+        let last = settings.start_deviation.map(|deviation| Last {
+            correction: 0.0,
+            deviation,
+            time: 0.0,
+            travel: 0.0,
+            arrived: 0.0,
+        });
+        Ok(Self { settings, last })
     }
 
     /// What is believed of the state at a moment of the history.
     pub(crate) fn at(&self, past: &Entry) -> Belief {
-        let start = self.settings.start_deviation;
-        let commanded = add(past.travel, -1.0, self.travel);
-        let late = add(past.arrived, -1.0, self.arrived);
-        let (mut moved, mut shared) = (commanded, 0.0);
-        for ((moved, late), unit) in moved.iter_mut().zip(late).zip(start) {
-            *moved = moved.max(late);
-            shared += square(self.settings.coupling * *moved / unit);
+        let settings = &self.settings;
+        let mut moved = past.travel;
+        let mut shared = 0.0;
+        for ((moved, last), start) in moved
+            .iter_mut()
+            .zip(self.last)
+            .zip(settings.start_deviation)
+        {
+            let arrived = last.arrived(settings.settling_time, past.time, *moved);
+            *moved = (*moved - last.travel).max(arrived - last.arrived);
+            shared += square(settings.coupling * *moved / start);
         }
-        let variance = [
-            (self.deviation, 1.0),
-            (self.settings.rest_deviation, 1.0),
-            (moved, 1.0),
-            (start, shared),
-        ];
-        let variance = variance.iter().fold([0.0; 3], |sum, (each, share)| {
-            add(sum, *share, times(*each, *each))
-        });
-        let state = add(past.predicted_state, 1.0, self.correction);
-        let mut deviation = start;
-        for (deviation, variance) in deviation.iter_mut().zip(variance) {
-            *deviation = deviation.min(libm::sqrt(variance));
+        let mut belief = Belief {
+            state: add(past.predicted_state, -1.0, past.corrected),
+            deviation: settings.start_deviation,
+        };
+        let grown = moved.iter().zip(settings.rest_deviation);
+        let now = belief.state.iter_mut().zip(&mut belief.deviation);
+        for ((state, deviation), ((moved, rest), last)) in now.zip(grown.zip(self.last)) {
+            *state += last.correction;
+            let own = square(last.deviation) + square(rest) + square(*moved);
+            *deviation = deviation.min(libm::sqrt(own + shared * square(*deviation)));
         }
-        Belief {
-            state: add(state, -1.0, past.corrected),
-            deviation,
-        }
+        belief
     }
 
     /// Takes in what one linear step determined.
@@ -152,11 +157,12 @@ impl Whereabouts {
 
     /// Takes in that the markers were not found where they should be.
     pub(crate) fn miss(&mut self, past: &Entry) {
-        self.deviation = self.at(past).deviation;
-        for (deviation, start) in self.deviation.iter_mut().zip(self.settings.start_deviation) {
+        let Belief { state, deviation } = self.at(past);
+        let mut wider = deviation;
+        for (deviation, start) in wider.iter_mut().zip(self.settings.start_deviation) {
             *deviation = deviation.max((MISS * *deviation).min(MISSED * start));
         }
-        (self.travel, self.arrived) = (past.travel, past.arrived);
+        self.set(past, state, wider, [true; 3]);
     }
 
     fn set(
@@ -166,18 +172,20 @@ impl Whereabouts {
         deviation: PerDof<f64>,
         known: PerDof<bool>,
     ) {
-        let now = state.iter().zip(deviation).zip(known);
-        let then = past.predicted_state.iter().zip(past.corrected);
-        let when = past.travel.iter().zip(past.arrived);
-        let mine = self.correction.iter_mut().zip(&mut self.deviation);
-        let ages = self.travel.iter_mut().zip(&mut self.arrived);
-        for ((((state, deviation), known), (predicted, corrected)), (mine, (ages, when))) in
-            now.zip(then).zip(mine.zip(ages.zip(when)))
+        let settling_time = self.settings.settling_time;
+        let correction = add(add(state, -1.0, past.predicted_state), 1.0, past.corrected);
+        let new = correction.iter().zip(deviation).zip(past.travel);
+        for ((last, known), ((correction, deviation), travel)) in
+            self.last.iter_mut().zip(known).zip(new)
         {
             if known && deviation.is_finite() {
-                *mine.0 = state - predicted + corrected;
-                *mine.1 = deviation;
-                (*ages.0, *ages.1) = (*when.0, when.1);
+                *last = Last {
+                    correction: *correction,
+                    deviation,
+                    time: past.time,
+                    travel,
+                    arrived: last.arrived(settling_time, past.time, travel),
+                };
             }
         }
     }
