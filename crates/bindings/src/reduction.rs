@@ -57,8 +57,13 @@ impl Reduction {
             core::Axis::new(compensator.inner, estimator.inner, estimator.state.play())
         });
         let history = core::History::new(span, period).map_err(errors::config(py))?;
-        let whereabouts =
-            core::Whereabouts::new(start_deviation, [0.0; 3]).map_err(errors::config(py))?;
+        let whereabouts = core::Whereabouts::new(core::WhereaboutsSettings {
+            start_deviation,
+            rest_deviation: [0.0; 3],
+            settling_time: 0.0,
+            coupling: 0.0,
+        })
+        .map_err(errors::config(py))?;
         Ok(Self(core::HysteresisReduction::new(
             axes,
             model.0,
@@ -72,7 +77,7 @@ impl Reduction {
     /// The loop of profile `best`, from its three axes.
     #[staticmethod]
     #[expect(clippy::too_many_arguments, reason = "named in Python")]
-    #[pyo3(signature = (axes, model, state_estimator, guards, *, span, period, start_deviation, rest_deviation))]
+    #[pyo3(signature = (axes, model, state_estimator, guards, *, span, period, start_deviation, rest_deviation, settling_time, coupling))]
     fn adaptive(
         py: Python<'_>,
         axes: [PyRef<'_, AdaptiveAxis>; 3],
@@ -83,11 +88,18 @@ impl Reduction {
         period: f64,
         start_deviation: [f64; 3],
         rest_deviation: [f64; 3],
+        settling_time: f64,
+        coupling: f64,
     ) -> PyResult<Self> {
         let axes = axes.map(|axis| core::Axis::Adaptive(axis.0.clone()));
         let history = core::History::new(span, period).map_err(errors::config(py))?;
-        let whereabouts =
-            core::Whereabouts::new(start_deviation, rest_deviation).map_err(errors::config(py))?;
+        let whereabouts = core::Whereabouts::new(core::WhereaboutsSettings {
+            start_deviation,
+            rest_deviation,
+            settling_time,
+            coupling,
+        })
+        .map_err(errors::config(py))?;
         Ok(Self(core::HysteresisReduction::new(
             axes,
             model.0,

@@ -349,7 +349,10 @@ impl AdaptiveAxis {
     }
 
     fn play_at(&self, position: f64) -> Play {
-        let [minus, plus] = self.offsets_at(position);
-        Play::from_ordered(minus.min(plus), minus.max(plus))
+        let [minus, plus] =
+            [Side::Minus, Side::Plus].map(|side| self.offsets.offset(side, position));
+        // Sides that have crossed are a width too, and limited as one.
+        let [minus, plus] = self.limit.clamp(minus.min(plus), minus.max(plus));
+        Play::from_ordered(minus, plus)
     }
 }

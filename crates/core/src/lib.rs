@@ -80,4 +80,4 @@ pub use smoother::Smoother;
 pub use state::{StateEstimate, StateEstimator};
 pub use supervisor::{Clear, Event, Reaction, Rule, Source, Supervisor, SupervisorSettings, TABLE};
 pub use weighted::{WeightedEstimate, WeightedEstimator, WeightedSettings};
-pub use whereabouts::Whereabouts;
+pub use whereabouts::{Whereabouts, WhereaboutsSettings};

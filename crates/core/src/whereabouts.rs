@@ -3,7 +3,7 @@
 use crate::dof::PerDof;
 use crate::error::{ConfigError, require_non_negative, require_positive};
 use crate::history::Entry;
-use crate::linear::square;
+use crate::linear::{add, square};
 use crate::posture::Belief;
 use crate::state::StateEstimate;
 
@@ -19,72 +19,112 @@ const MISS: f64 = 1.5;
 /// turn on, is found as well.
 const MISSED: f64 = 0.15;
 
+/// What a [`Whereabouts`] is set to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WhereaboutsSettings {
+    /// Before the first image, from the prediction: standard deviation [m, rad, rad].
+    pub start_deviation: PerDof<f64>,
+    /// How far an idle tip moves between two images: standard deviation [m, rad, rad].
+    pub rest_deviation: PerDof<f64>,
+    /// How long a tip still moves after its command has come to rest: time constant in s.
+    pub settling_time: f64,
+    /// What motion of the DOFs moves each of them, in the units of `start_deviation`.
+    pub coupling: f64,
+}
+
 /// What the last images said, per DOF, and how it has aged.
 ///
 /// ```text
 /// state = q + (q_hat - q)_last - (what images have moved q by since)
-/// deviation^2 = deviation_last^2 + rest_deviation^2 + (travel - travel_last)^2,  at most start_deviation^2
+/// deviation^2 = deviation_last^2 + rest_deviation^2 + moved^2 + shared^2,  at most start_deviation^2
+/// moved = max(travel - travel_last, arrived - arrived_last)
+/// shared = coupling start_deviation sqrt(sum over the DOFs of (moved / start_deviation)^2)
+/// arrived = arrived_last + (travel - arrived_last) elapsed / (settling_time + elapsed)
 /// ```
 ///
-/// with the travel of the command, forth and back: whatever the slack does, the tip has moved no
-/// farther than the command, but for `rest_deviation`. `deviation_last` has the image's own and, of the linear
-/// step of Eq. (16), a quarter of the correction. Every image without markers makes it half as large again,
-/// up to a part of `start_deviation`.
+/// with the travel of the command, forth and back: whatever the slack does, the tip moves no farther. But it does so
+/// later, and goes on when the command has come to rest; `arrived` is how far of the travel it has had the time to go.
+/// `shared` is the friction the DOFs share: one that slides lets go of the others. `deviation_last` has the
+/// image's own and, of the linear step of Eq. (16), a quarter of the correction. Every image without markers makes it
+/// half as large again, up to a part of `start_deviation`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Whereabouts {
-    start_deviation: PerDof<f64>,
-    rest_deviation: PerDof<f64>,
+    settings: WhereaboutsSettings,
+    last: PerDof<Last>,
+}
+
+/// One DOF at the last image that determined it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Last {
     /// `q_hat - q`, and what images had moved q by when it was taken.
-    correction: PerDof<f64>,
-    /// At the last image that determined the DOF.
-    deviation: PerDof<f64>,
-    travel: PerDof<f64>,
+    correction: f64,
+    deviation: f64,
+    time: f64,
+    travel: f64,
+    arrived: f64,
+}
+
+impl Last {
+    fn arrived(&self, settling_time: f64, time: f64, travel: f64) -> f64 {
+        let elapsed = time - self.time;
+        // A clock may go back.
+        let share = if elapsed > 0.0 {
+            elapsed / (settling_time + elapsed)
+        } else {
+            0.0
+        };
+        self.arrived + share * (travel - self.arrived)
+    }
 }
 
 impl Whereabouts {
-    /// Before the first image: at the prediction, with `start_deviation` (3,); between two images an
-    /// idle tip moves by `rest_deviation` (3,); standard deviations [m, rad, rad].
+    /// Before the first image: at the prediction.
     ///
     /// # Errors
-    /// A start deviation is not a finite number above 0, or another not one from 0 on.
-    pub fn new(
-        start_deviation: PerDof<f64>,
-        rest_deviation: PerDof<f64>,
-    ) -> Result<Self, ConfigError> {
-        for (start, rest) in start_deviation.into_iter().zip(rest_deviation) {
+    /// A start deviation is not a finite number above 0, or another setting not one from 0 on.
+    pub fn new(settings: WhereaboutsSettings) -> Result<Self, ConfigError> {
+        for start in settings.start_deviation {
             require_positive("start_deviation", start)?;
+        }
+        for rest in settings.rest_deviation {
             require_non_negative("rest_deviation", rest)?;
         }
-        Ok(Self {
-            start_deviation,
-            rest_deviation,
-            correction: [0.0; 3],
-            deviation: start_deviation,
-            travel: [0.0; 3],
-        })
+        require_non_negative("settling_time", settings.settling_time)?;
+        require_non_negative("coupling", settings.coupling)?;
+        let last = settings.start_deviation.map(|deviation| Last {
+            correction: 0.0,
+            deviation,
+            time: 0.0,
+            travel: 0.0,
+            arrived: 0.0,
+        });
+        Ok(Self { settings, last })
     }
 
     /// What is believed of the state at a moment of the history.
     pub(crate) fn at(&self, past: &Entry) -> Belief {
-        let mut belief = Belief {
-            state: past.predicted_state,
-            deviation: self.start_deviation,
-        };
-        let known = self.correction.iter().zip(self.deviation).zip(self.travel);
-        let then = past.corrected.iter().zip(past.travel);
-        let now = belief
-            .state
+        let settings = &self.settings;
+        let mut moved = past.travel;
+        let mut shared = 0.0;
+        for ((moved, last), start) in moved
             .iter_mut()
-            .zip(&mut belief.deviation)
-            .zip(self.rest_deviation);
-        for (
-            (((state, deviation), rest), (corrected, travel)),
-            ((correction, last), travel_last),
-        ) in now.zip(then).zip(known)
+            .zip(self.last)
+            .zip(settings.start_deviation)
         {
-            *state += correction - corrected;
-            let moved = square(rest) + square(travel - travel_last);
-            *deviation = deviation.min(libm::sqrt(square(last) + moved));
+            let arrived = last.arrived(settings.settling_time, past.time, *moved);
+            *moved = (*moved - last.travel).max(arrived - last.arrived);
+            shared += square(settings.coupling * *moved / start);
+        }
+        let mut belief = Belief {
+            state: add(past.predicted_state, -1.0, past.corrected),
+            deviation: settings.start_deviation,
+        };
+        let grown = moved.iter().zip(settings.rest_deviation);
+        let now = belief.state.iter_mut().zip(&mut belief.deviation);
+        for ((state, deviation), ((moved, rest), last)) in now.zip(grown.zip(self.last)) {
+            *state += last.correction;
+            let own = square(last.deviation) + square(rest) + square(*moved);
+            *deviation = deviation.min(libm::sqrt(own + shared * square(*deviation)));
         }
         belief
     }
@@ -117,11 +157,12 @@ impl Whereabouts {
 
     /// Takes in that the markers were not found where they should be.
     pub(crate) fn miss(&mut self, past: &Entry) {
-        self.deviation = self.at(past).deviation;
-        for (deviation, start) in self.deviation.iter_mut().zip(self.start_deviation) {
+        let Belief { state, deviation } = self.at(past);
+        let mut wider = deviation;
+        for (deviation, start) in wider.iter_mut().zip(self.settings.start_deviation) {
             *deviation = deviation.max((MISS * *deviation).min(MISSED * start));
         }
-        self.travel = past.travel;
+        self.set(past, state, wider, [true; 3]);
     }
 
     fn set(
@@ -131,21 +172,20 @@ impl Whereabouts {
         deviation: PerDof<f64>,
         known: PerDof<bool>,
     ) {
-        let now = state.iter().zip(deviation).zip(known);
-        let then = past.predicted_state.iter().zip(past.corrected);
-        let mine = self
-            .correction
-            .iter_mut()
-            .zip(&mut self.deviation)
-            .zip(self.travel.iter_mut().zip(past.travel));
-        for ((((correction, last), (travel_last, travel)), (predicted, corrected)), new) in
-            mine.zip(then).zip(now)
+        let settling_time = self.settings.settling_time;
+        let correction = add(add(state, -1.0, past.predicted_state), 1.0, past.corrected);
+        let new = correction.iter().zip(deviation).zip(past.travel);
+        for ((last, known), ((correction, deviation), travel)) in
+            self.last.iter_mut().zip(known).zip(new)
         {
-            let ((state, deviation), known) = new;
             if known && deviation.is_finite() {
-                *correction = state - predicted + corrected;
-                *last = deviation;
-                *travel_last = travel;
+                *last = Last {
+                    correction: *correction,
+                    deviation,
+                    time: past.time,
+                    travel,
+                    arrived: last.arrived(settling_time, past.time, travel),
+                };
             }
         }
     }

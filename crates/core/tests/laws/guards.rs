@@ -3,7 +3,7 @@
 use tautscope_core::{
     Axis, Camera, Compensator, Estimator, FeatureModel, Flag, Guards, History, HysteresisReduction,
     Instrument, PerDof, Play, Pose, Reaction, StateEstimation, StateEstimator, Status,
-    WeightedEstimator, WeightedSettings, Whereabouts,
+    WeightedEstimator, WeightedSettings, Whereabouts, WhereaboutsSettings,
 };
 
 use crate::support::{self, PERIOD, UNITS, guards};
@@ -49,7 +49,13 @@ fn reduction(axes: PerDof<Axis>, estimation: StateEstimation) -> HysteresisReduc
         model(),
         estimation,
         History::new(2.0, PERIOD).unwrap(),
-        Whereabouts::new([5e-3, 0.6, 0.5], [2e-4, 0.02, 0.01]).unwrap(),
+        Whereabouts::new(WhereaboutsSettings {
+            start_deviation: [5e-3, 0.6, 0.5],
+            rest_deviation: [2e-4, 0.02, 0.01],
+            settling_time: 0.15,
+            coupling: 0.05,
+        })
+        .unwrap(),
         Guards::new(guards()).unwrap(),
     )
 }
