@@ -9,12 +9,13 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from fault_runs import PASSING, PLAY, Outcome, judged, lasting
+from fault_draws import PLAY
+from fault_judgement import MOVED, PASSING, Outcome, judged, lasting
 from tautscope.twin.faults import KINDS
 
 Row = dict[str, Any]
 
-ENDINGS = ("masked", "warned", "stopped", "SILENT")
+ENDINGS = ("masked", "warned", "stopped", "unnoticed", "SILENT")
 
 
 def to_row(outcome: Outcome, profile: str = "best") -> Row:
@@ -30,7 +31,7 @@ def judge(row: Row) -> Row:
     """With what is to be said of it; the goals may have changed since it was kept."""
     noticed = row["detected"] is not None
     goal = PASSING if row["passing"] else lasting(row["profile"])
-    return row | judged(row["excursion"], goal, noticed, row["stopped"])
+    return row | judged(row["excursion"], row["tip"], goal, noticed, row["stopped"])
 
 
 def _finite(value: float) -> float | None:
@@ -64,9 +65,9 @@ def seeds(rows: Sequence[Row]) -> str:
 def table(rows: Sequence[Row]) -> str:
     """A line per kind and duration."""
     lines = [
-        "| fault | hazard | stays | N | k | worst excursion [mm, rad, rad] | noticed after, median "
-        "(worst) [s] | noticed | masked | warned | stopped | SILENT | highest reactions |",
-        "|---|---|---|---|---|---|---|---|---|---|---|---|---|",
+        "| fault | hazard | stays | N | k | worst excursion [mm, rad, rad] | tip [mm] | noticed "
+        f"after, median (worst) [s] | noticed | {' | '.join(ENDINGS)} | highest reactions |",
+        "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for name, kind in KINDS.items():
         for passing in (True, False):
@@ -87,6 +88,7 @@ def _cells(own: Sequence[Row]) -> str:
         len(own),
         sum(row["beyond"] for row in own),
         f"{1e3 * far[0]:.2f}, {far[1]:.3f}, {far[2]:.3f}",
+        f"{1e3 * max(row['tip'][0] for row in own):.2f}" if own[0]["kind"] in MOVED else "",
         noticed,
         len(known),
         *(ended[name] or "" for name in ENDINGS),
@@ -108,9 +110,9 @@ def kinds_table() -> str:
 def off_table(found: dict[str, Sequence[Row]]) -> str:
     """A line per detector switched off."""
     lines = [
-        "| detector off | N | worst, passes [mm] | worst, stays [mm] | k beyond 3 mm, passes "
-        "| SILENT | worst kinds |",
-        "|---|---|---|---|---|---|---|",
+        "| detector off | N | of them run again | worst, passes [mm] | worst, stays [mm] | k "
+        "beyond 3 mm, passes | SILENT | worst kinds |",
+        "|---|---|---|---|---|---|---|---|",
     ]
     for name, rows in found.items():
         passing = [row for row in rows if row["passing"]]
@@ -120,6 +122,7 @@ def off_table(found: dict[str, Sequence[Row]]) -> str:
         cells = [
             name,
             len(rows),
+            sum(name in row["raised"] for row in rows),
             f"{_worst(passing):.2f}",
             f"{_worst(lasting):.2f}",
             sum(row["excursion"][0] > DORMANT for row in passing),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -16,6 +16,7 @@ from tautscope.dof import Dof
 from tautscope.reduction import HysteresisReduction, Report
 from tautscope.references import Segment
 from tautscope.rig import Frame, Sample
+from tautscope.safety import Reaction, Supervision
 from tautscope.twin import Twin
 from tautscope.twin.faults import FaultyHand, FaultyRig, FeatureFrame
 
@@ -27,9 +28,10 @@ FOLLOWING_ERROR = np.array([4e-3, 0.4, 0.3])
 """Of the bench's drives, configs/bench.toml [m, rad, rad]."""
 FOLLOWING_TIME = 0.1
 """Commands to which a drive's position is compared [s], as on hardware."""
-HOLD_MOTION = 5
-QUICK_STOP = 6
-"""Ranks of reactions."""
+RANKS = {reaction: reaction.rank for reaction in Reaction}
+HOLD_ESTIMATE = RANKS[Reaction.HOLD_ESTIMATE]
+HOLD_MOTION = RANKS[Reaction.HOLD_MOTION]
+QUICK_STOP = RANKS[Reaction.QUICK_STOP]
 
 
 class FeatureTwin(Twin):
@@ -76,28 +78,32 @@ class Watch:
 
     Attributes:
         clock: The twin's own [s].
-        since: When the fault begins; before, nothing is noted [s].
+        since: When the fault begins [s].
         period: Of the tick [s].
-        flags: What was raised, and when [s].
-        reaction: The highest, of rank 0 to 7.
-        stop: When the motion was stopped [s].
-        width: Largest insertion slack the loop believed in [m].
-        step: Largest change of the insertion command in a tick [m].
-        spurious: What was raised before the fault.
+        flags: From when to when each was raised [s]; infinite while it is.
+        reaction: The highest since then, of rank 0 to 7.
+        stop: When the motion was stopped since then [s].
+        width: Largest insertion slack the loop believed in since then [m].
+        step: Largest change of the insertion command in a tick since then [m].
+        holds: How often learning was held or more, from the first tick on.
+        stops: How often motion was held or more, likewise.
     """
 
     clock: Callable[[], float]
     since: float
     period: float
-    flags: dict[str, float] = field(default_factory=dict)
+    flags: dict[str, list[list[float]]] = field(default_factory=dict)
     reaction: str = "none"
     rank: int = 0
     stop: float = math.inf
     width: float = 0.0
     step: float = 0.0
-    spurious: set[str] = field(default_factory=set)
+    holds: int = 0
+    stops: int = 0
     loop: HysteresisReduction | None = None
     _last: Floats | None = None
+    _raised: tuple[str, ...] = ()
+    _reaction: Reaction = Reaction.NONE
 
     def look(self, loop: HysteresisReduction, frame: Frame) -> Report:
         """An image update."""
@@ -114,29 +120,42 @@ class Watch:
         now = self.clock()
         if now >= self.since and self._last is not None:
             self.step = max(self.step, abs(float(command[0] - self._last[0])))
-        self.read(now)
         self._last = command
+        if self.loop is not None:
+            self.read(now, self.loop.supervision)
 
     def frame(self, now: float, frame: Frame, report: Report) -> None:
         """Nothing: `look` has seen it."""
 
-    def read(self, now: float) -> None:
-        """What the supervisor says, if there is one."""
-        supervision = getattr(self.loop, "supervision", None)
-        if supervision is None:
-            return
-        if now < self.since:
-            self.spurious.update(supervision.flags)
-            return
-        order = list(type(supervision.reaction))
-        self.note(now, str(supervision.reaction), order.index(supervision.reaction))
-        for flag in supervision.flags:
-            self.flags.setdefault(str(flag), now)
+    def read(self, now: float, supervision: Supervision) -> None:
+        """What the supervisor says."""
+        if supervision.flags != self._raised:
+            for name in self._raised:
+                if name not in supervision.flags:
+                    self.flags[name][-1][1] = now
+            self._raised = supervision.flags
+            for name in self._raised:
+                self.raised(name, now)
+        reaction = supervision.reaction
+        if reaction is not self._reaction:
+            before, rank = RANKS[self._reaction], RANKS[reaction]
+            self.holds += before < HOLD_ESTIMATE <= rank
+            self.stops += before < HOLD_MOTION <= rank
+            self._reaction = reaction
+        if now >= self.since:
+            self.note(now, reaction)
 
-    def note(self, now: float, reaction: str, rank: int) -> None:
-        """A reaction of this rank."""
+    def raised(self, name: str, now: float) -> None:
+        """A flag, from now on."""
+        times = self.flags.setdefault(name, [])
+        if not times or math.isfinite(times[-1][1]):
+            times.append([now, math.inf])
+
+    def note(self, now: float, reaction: Reaction) -> None:
+        """A reaction in force."""
+        rank = RANKS[reaction]
         if rank > self.rank:
-            self.reaction, self.rank = reaction, rank
+            self.reaction, self.rank = str(reaction), rank
         if rank >= HOLD_MOTION:
             self.stop = min(self.stop, now)
 
@@ -145,11 +164,15 @@ class Watch:
         stopped = math.isfinite(self.stop)
         return {
             "reaction": self.reaction,
-            "flags": {name: at - self.since for name, at in self.flags.items()},
+            "flags": {
+                name: [(begin - self.since, end - self.since) for begin, end in times]
+                for name, times in self.flags.items()
+            },
             "stopped": stopped,
             "step": self.step,
             "width": self.width,
-            "spurious": tuple(sorted(self.spurious)),
+            "holds": self.holds,
+            "stops": self.stops,
             "stop_tick": round((self.stop - self.since) / self.period) if stopped else None,
         }
 
@@ -160,7 +183,7 @@ class Driven:
     Args:
         rig: What they move; may be exchanged during a run.
         watch: Told what the drives do; says when the loop wants them stopped.
-        watching: Whether they watch their error, and report their faults.
+        watching: What they look at, of `following_error` and `drive_fault`.
         at: When `then` is called [s].
         then: Before the first tick at that time.
     """
@@ -169,15 +192,14 @@ class Driven:
         self,
         rig: FaultyRig,
         watch: Watch,
-        watching: bool,
+        watching: Collection[str] = ("following_error", "drive_fault"),
         at: float = math.inf,
         then: Callable[[], None] | None = None,
     ) -> None:
         self.rig, self._watch, self._watching = rig, watch, watching
         self._at, self._then = at, then
         self._recent: deque[Floats] = deque(maxlen=round(FOLLOWING_TIME / rig.control_period))
-        self._held: Floats | None = None
-        self._applied = np.zeros(3)
+        self._stopped = False
 
     @property
     def control_period(self) -> float:
@@ -193,13 +215,12 @@ class Driven:
         if self._then is not None and self.rig.true_time >= self._at - 1e-9:
             then, self._then = self._then, None
             then()
-        said = np.asarray(command, dtype=np.float64)
-        if self._watch.rank >= QUICK_STOP and self._held is None:
+        if self._watch.rank >= QUICK_STOP and not self._stopped:
             self.stop()
-        sample = self.rig.step(said if self._held is None else self._held)
-        self._applied = sample.applied
-        if self._watching and self._held is None:
-            self._check(said)
+        said = np.asarray(command, dtype=np.float64)
+        sample = self.rig.step(said)
+        if self._watching and not self._stopped:
+            self._check(said, sample.applied)
         return sample
 
     def close(self) -> None:
@@ -207,26 +228,28 @@ class Driven:
         self.rig.close()
 
     def stop(self) -> None:
-        """Quick stop: each motor is held where its encoder says it is."""
-        self._held = self._applied.copy()
+        """Quick stop, and the brakes close."""
+        self._stopped = True
+        self.rig.brake()
 
-    def _check(self, said: Floats) -> None:
+    def _check(self, said: Floats, applied: Floats) -> None:
         self._recent.append(said)
-        recent = np.stack(self._recent)
-        error = np.maximum(recent.min(axis=0) - self._applied, self._applied - recent.max(axis=0))
-        if self.rig.drive_fault:
+        if "drive_fault" in self._watching and self.rig.drive_fault:
             self._give_up("drive_fault")
-        elif (error > FOLLOWING_ERROR).any():
-            self._give_up("following_error")
+        # The last command is one of the recent ones: who is near it needs no closer look.
+        elif "following_error" in self._watching and (abs(said - applied) > FOLLOWING_ERROR).any():
+            recent = np.stack(self._recent)
+            error = np.maximum(recent.min(axis=0) - applied, applied - recent.max(axis=0))
+            if (error > FOLLOWING_ERROR).any():
+                self._give_up("following_error")
 
     def _give_up(self, flag: str) -> None:
         now = self.rig.true_time
         self.stop()
-        raise_flag = getattr(self._watch.loop, "raise_flag", None)
-        if raise_flag is not None:
-            raise_flag(flag)
-        self._watch.flags.setdefault(flag, now)
-        self._watch.note(now, "quick_stop", QUICK_STOP)
+        if self._watch.loop is not None:
+            self._watch.loop.raise_flag(flag)
+        self._watch.raised(flag, now)
+        self._watch.note(now, Reaction.QUICK_STOP)
 
 
 class Hand:
@@ -279,6 +302,10 @@ class Hand:
         return position
 
 
+class AllSeen(Exception):  # noqa: N818
+    """The run is over; what the loop recorded of it is not made up, as nobody reads it."""
+
+
 @dataclass
 class Device:
     """Between hand and loop, exchangeable during a run; a `Reference`.
@@ -287,20 +314,31 @@ class Device:
         hand: What it means.
         watch: Ends the run a while after a stop.
         faulty: What comes of it.
+        meant: What the hand meant since it may be faulty (3,) [m, rad, rad].
+        told: What came of it.
     """
 
     hand: Hand
     watch: Watch
     faulty: FaultyHand | None = None
     segments: tuple[Segment, ...] = ()
-
-    @property
-    def duration(self) -> float:
-        """As the hand's, and a while after a stop."""
-        stopped = self.hand.clock() >= self.watch.stop + STILL - 1e-9
-        return 0.0 if stopped else self.hand.duration
+    duration: float = math.inf
+    meant: list[Floats] = field(default_factory=list)
+    told: list[Floats] = field(default_factory=list)
 
     def __call__(self, time: float) -> Floats:
-        """(3,) [m, rad, rad]."""
+        """(3,) [m, rad, rad].
+
+        Raises:
+            AllSeen: The hand is done, or was stopped a while ago.
+        """
         now = self.hand.clock()
-        return self.hand(now) if self.faulty is None else self.faulty(now)
+        if now >= min(self.watch.stop + STILL, self.hand.end) - 1e-9:
+            raise AllSeen
+        meant = self.hand(now)
+        if self.faulty is None:
+            return meant
+        told = self.faulty(now)
+        self.meant.append(meant)
+        self.told.append(told)
+        return told

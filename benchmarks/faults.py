@@ -19,16 +19,17 @@ from pathlib import Path
 
 import fault_tables as tables
 from doc_pages import ROOT, insert
-from fault_runs import study
+from fault_runs import each_off, study
 from hysteresis_runs import one_thread
 from tautscope.config import Profile
 from tautscope.progress import progress_bar
+from tautscope.safety import DETECTORS
 from tautscope.twin.faults import KINDS
 
 PAGE = ROOT / "docs" / "faults.md"
 RUNS = 20_000
 DETECTOR_RUNS = 2_000
-"""For each detector that is switched off."""
+"""For each detector that is switched off; most need not be made, see `fault_runs.each_off`."""
 
 
 def arguments() -> argparse.Namespace:
@@ -57,23 +58,18 @@ def arguments() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def detectors() -> tuple[str, ...]:
-    """All there are."""
-    try:
-        from tautscope.safety import DETECTORS  # noqa: PLC0415
-    except ImportError:
-        return ()
-    return tuple(DETECTORS)
+Found = dict[str, list[tables.Row]]
+"""Rows by what is switched off, ``-name`` for one of all detectors in turn."""
 
 
 def campaign(
     seeds: Sequence[int],
-    one: Callable[[int], list[tables.Row]],
+    one: Callable[[int], Found],
     workers: int,
     tell: Callable[[float], None] = lambda _: None,
-) -> list[tables.Row]:
+) -> Found:
     """The rows of many seeds, in the order of the seeds."""
-    found: dict[int, list[tables.Row]] = {}
+    found: dict[int, Found] = {}
     with ProcessPoolExecutor(
         workers, mp_context=multiprocessing.get_context("spawn"), initializer=one_thread
     ) as pool:
@@ -88,14 +84,27 @@ def campaign(
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
-    return [row for seed in seeds for row in found.get(seed, [])]
+    return together(found[seed] for seed in seeds if seed in found)
 
 
-def rows(
-    seed: int, *, kinds: Sequence[str], profile: Profile, off: tuple[str, ...]
-) -> list[tables.Row]:
+def together(parts: Iterable[Found]) -> Found:
+    """Rows of several seeds, or files."""
+    whole: Found = {}
+    for part in parts:
+        for name, each in part.items():
+            whole.setdefault(name, []).extend(each)
+    return whole
+
+
+def rows(seed: int, *, kinds: Sequence[str], profile: Profile, off: str) -> Found:
     """Those of one seed."""
-    return [tables.to_row(each, profile) for each in study(seed, kinds, profile, off)]
+    if off == "each":
+        found = {f"-{name}": each for name, each in each_off(seed, kinds, profile).items()}
+    else:
+        names = DETECTORS if off == "all" else tuple(filter(None, off.split(",")))
+        name = "unguarded" if off == "all" else off
+        found = {name: study(seed, kinds, profile, names)}
+    return {name: [tables.to_row(run, profile) for run in runs] for name, runs in found.items()}
 
 
 def chosen(options: argparse.Namespace, runs: int) -> list[int]:
@@ -107,38 +116,26 @@ def chosen(options: argparse.Namespace, runs: int) -> list[int]:
     return list(range(options.first_seed, options.first_seed + count))[part - 1 :: parts]
 
 
-def measure(options: argparse.Namespace, off: tuple[str, ...], runs: int) -> list[tables.Row]:
-    """One campaign."""
+def measure(options: argparse.Namespace) -> Found:
+    """A campaign."""
+    runs = options.runs or (DETECTOR_RUNS if options.off == "each" else RUNS)
     seeds, kinds = chosen(options, runs), options.kind or list(KINDS)
-    one = partial(rows, kinds=kinds, profile=options.profile, off=off)
+    one = partial(rows, kinds=kinds, profile=options.profile, off=options.off)
     if len(seeds) == 1:
         return one(seeds[0])
-    with progress_bar("faults" + "".join(f" without {name}" for name in off[:1])) as tell:
+    with progress_bar("faults") as tell:
         return campaign(seeds, one, options.workers, tell)
 
 
-def read(files: Iterable[Path]) -> dict[str, list[tables.Row]]:
+def read(files: Iterable[Path]) -> Found:
     """Rows of several parts."""
-    found: dict[str, list[tables.Row]] = {}
-    for file in files:
-        for name, each in json.loads(file.read_text(encoding="utf-8")).items():
-            found.setdefault(name, []).extend(tables.judge(row) for row in each)
-    return found
+    found = together(json.loads(file.read_text(encoding="utf-8")) for file in files)
+    return {name: [tables.judge(row) for row in each] for name, each in found.items()}
 
 
 def main() -> None:
     options = arguments()
-    if options.read:
-        found = read(options.read)
-    elif options.off == "each":
-        found = {
-            f"-{name}": measure(options, (name,), options.runs or DETECTOR_RUNS)
-            for name in detectors()
-        }
-    else:
-        off = detectors() if options.off == "all" else tuple(filter(None, options.off.split(",")))
-        name = "unguarded" if options.off == "all" or not detectors() else ",".join(off)
-        found = {name: measure(options, off, options.runs or RUNS)}
+    found = read(options.read) if options.read else measure(options)
     if options.json:
         options.json.write_text(json.dumps(found), encoding="utf-8")
     apart = {name.removeprefix("-"): each for name, each in found.items() if name.startswith("-")}

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from fault_runs import LEARNING, PASSING, WATCHED_FOR_GOOD, configured
+from fault_draws import WATCHED, WATCHED_FOR_GOOD, configured
+from fault_judgement import PASSING
 from fault_tables import seeds as seeds_of
 from fault_watch import FeatureTwin, Hand, look
-from reactions import holding
 from tautscope import HysteresisReduction, Twin, load_config
 from tautscope.dof import Dof
 from tautscope.errors import RecordError
@@ -63,7 +63,9 @@ def campaign(rows: Sequence[Row]) -> dict[str, Figure]:
         return Figure(text, str(len(used)), failures, seeds)
 
     silent = [row for row in rows if row["ending"] == "SILENT"]
-    found = {"G5": figure(f"{len(silent)} silent", rows, len(silent))}
+    quiet = sum(row["ending"] == "unnoticed" for row in rows)
+    text = f"{len(silent)} silent, {quiet} unnoticed within the goal"
+    found = {"G5": figure(text, rows, len(silent))}
     for name, passing, goal in (("G6", True, PASSING[0]), ("G6b", False, LASTING)):
         own = [row for row in rows if row["passing"] is passing]
         far = [row["excursion"][0] for row in own]
@@ -98,14 +100,16 @@ def campaign(rows: Sequence[Row]) -> dict[str, Figure]:
 
 
 def _spurious(rows: Sequence[Row], seeds: str) -> Figure:
-    """Flags that hold something, raised while nothing failed."""
+    """Learning or motion held while nothing failed, from the first tick of the loop on."""
     ok = [row for row in rows if row["kind"] == "ok"]
-    hours = len(ok) * (LEARNING + WATCHED_FOR_GOOD) / 3600
-    raised = [flag for row in ok for flag in row["spurious"] if flag in holding()]
-    text = f"{len(raised)} in {hours:.2f} h" + (
-        f": {', '.join(sorted(set(raised)))}" * bool(raised)
-    )
-    return Figure(text, str(len(ok)), int(len(raised) > max(hours, 1)), seeds)
+    seconds = [
+        row["fault"]["start"] + (row["fault"]["duration"] or WATCHED_FOR_GOOD - WATCHED) + WATCHED
+        for row in ok
+    ]
+    hours = sum(seconds) / 3600
+    holds, stops = (sum(row[what] for row in ok) for what in ("holds", "stops"))
+    text = f"{holds} in {hours:.2f} h, {stops} of them of motion"
+    return Figure(text, str(len(ok)), int(holds > max(hours, 1)) + stops, seeds)
 
 
 def each_off(found: dict[str, list[Row]]) -> Figure:

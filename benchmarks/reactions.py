@@ -27,12 +27,6 @@ def table() -> str:
     return "\n".join(lines)
 
 
-def holding() -> set[str]:
-    """The flags that do more than warn."""
-    lines = (line.split(" | ") for line in table().splitlines()[2:])
-    return {cells[0].removeprefix("| ") for cells in lines if cells[2] != "warn (auto)"}
-
-
 def snake(name: str) -> str:
     """HoldEstimate to hold_estimate."""
     return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()

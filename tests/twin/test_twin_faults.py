@@ -425,6 +425,21 @@ def test_encoders_that_lie():
     assert 1e-3 < np.abs(read - real).max() <= 5e-3
 
 
+@pytest.mark.parametrize("name", ["ok", "axis_reversed", "axis_runs", "encoder_stuck"])
+def test_with_the_brakes_on_motors_stay_where_they_are(name):
+    twin = SeenTwin()
+    rig = FaultyRig(twin, (fault(name, start=0.0),), SEED)
+    rig.reset()
+    for tick in range(40):
+        rig.step(command(tick * PERIOD))
+    at = twin.plant.applied
+    assert (at - CENTRE)[0] > 1e-3 or name != "ok"
+    rig.brake()
+    for tick in range(40, 120):
+        rig.step(command(tick * PERIOD))
+    assert (np.abs(twin.plant.applied - at) < np.array([LAG, 0.1, 0.05])).all()
+
+
 def test_a_stall_lets_time_pass_at_once_and_physics_go_on():
     times = np.array([s.time for s in run(fault("stall", severity=0.3, duration=math.inf))])
     gaps = np.diff(times)

@@ -34,6 +34,13 @@ __all__ = [
 
 Floats = NDArray[np.float64]
 
+_TOGETHER = (
+    (Target.FEATURES, Target.FRAMES),
+    (Target.PHYSICS,),
+    (Target.DRIVE,),
+    (Target.TICK,),
+)
+"""What is asked for at once; only these are."""
 _PUSH = 1e-4
 """Over which the features' way along the channel is taken [m]."""
 
@@ -101,11 +108,18 @@ class FaultyRig:
                 sample = replace(sample, frame=frame)
         return sample
 
+    def brake(self) -> None:
+        """From now on the motors stay where they are, whatever they are told, and whatever their
+        encoders say; a motor that runs against its brake is none of the faults.
+        """  # noqa: D205
+        self._held = self._twin.plant.applied
+
     def close(self) -> None:
         """As `Twin.close`."""
         self._twin.close()
 
     def _forget(self) -> None:
+        self._held: Floats | None = None
         self._time = self._twin.time
         self._under_way: Arrivals = []
         camera, instrument = self._twin.config.camera, self._twin.config.instrument
@@ -115,20 +129,26 @@ class FaultyRig:
             _moment(fault, self._seed, index, (camera.width, camera.height), self._along)
             for index, fault in enumerate(self._faults)
         ]
+        self._together = {
+            targets: [each for each in self._moments if each.fault.row.target in targets]
+            for targets in _TOGETHER
+        }
 
     def _along(self) -> Floats:
         return self._eye.along(self._twin.plant)
 
     def _active(self, *targets: Target) -> list[Moment]:
         found = []
-        for moment in self._moments:
-            if moment.fault.active(self._time) and moment.fault.row.target in targets:
+        for moment in self._together[targets]:
+            if moment.fault.active(self._time):
                 moment.since = self._time - moment.fault.start
                 found.append(moment)
         return found
 
     def _once(self, command: ArrayLike) -> Sample:
-        told = _acted(DRIVES, np.asarray(command, dtype=np.float64), self._active(Target.DRIVE))
+        told = self._held
+        if told is None:
+            told = _acted(DRIVES, np.asarray(command, dtype=np.float64), self._active(Target.DRIVE))
         self._disturb(self._twin.plant)
         return self._seen(self._twin.step(told))
 
@@ -136,7 +156,7 @@ class FaultyRig:
         for moment in self._active(Target.PHYSICS):
             moment.memory["acted"] = True
             PHYSICS[moment.fault.kind](plant, moment)
-        for moment in self._moments:
+        for moment in self._together[(Target.PHYSICS,)]:
             # What a fault changed, it gives back once: later it may be another's.
             over = not moment.fault.active(self._time)
             if over and moment.memory.pop("acted", False):

@@ -30,6 +30,7 @@ class Twin:
 
     def __init__(self, config: Config, *, images: bool = True) -> None:
         self._config = config
+        self._period = config.control.period
         self._camera = TwinCamera(config) if images else None
         self._plant: Plant | None = None
         self._ticks = 0
@@ -37,7 +38,7 @@ class Twin:
     @property
     def time(self) -> float:
         """Its clock [s]."""
-        return self._ticks * self.control_period
+        return self._ticks * self._period
 
     @property
     def config(self) -> Config:
@@ -61,7 +62,7 @@ class Twin:
     @property
     def control_period(self) -> float:
         """Time from one command to the next [s]."""
-        return self._config.control.period
+        return self._period
 
     @property
     def bends(self) -> float:
@@ -111,19 +112,17 @@ class Twin:
         return self._plant
 
     def _sample(self, plant: Plant) -> Sample:
-        state = plant.true_state
-        self._capture(plant, self.time)
-        return Sample(self.time, plant.applied, self._arrived(self.time), state)
+        time, state = self.time, plant.true_state
+        if self._camera is not None:
+            self._capture(self._camera, plant, time)
+        return Sample(time, plant.applied, self._arrived(time), state)
 
-    def _capture(self, plant: Plant, time: float) -> None:
+    def _capture(self, camera: TwinCamera, plant: Plant, time: float) -> None:
         twin = self._config.twin
         # Half a tick of tolerance: n / frame_rate and n * period differ in the last digits.
-        if (
-            self._camera is None
-            or time + self.control_period / 2 < self._sequence / twin.frame_rate
-        ):
+        if time + self._period / 2 < self._sequence / twin.frame_rate:
             return
-        picture = self._camera.draw(*plant.centreline(), self._sequence)
+        picture = camera.draw(*plant.centreline(), self._sequence)
         truth = picture.true_features, picture.true_visible
         frame = Frame(picture.image, time, self._sequence, *truth)
         delay = twin.latency + twin.latency_jitter * self._timing.uniform(-1, 1)
