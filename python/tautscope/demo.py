@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from os import PathLike
-from pathlib import Path
 
 from tautscope import tables
 from tautscope.config import Config
@@ -127,8 +126,3 @@ def write_run_folder(demo: Demo, folder: str | PathLike[str]) -> None:
                 picture.figure.savefig(place / "fig5.png")
             page = report.demo_report(demo, pictures)
         (place / "report.html").write_text(page, encoding="utf-8")
-
-
-def default_folder(verb: str) -> Path:
-    """runs/<date-time>-<verb>."""
-    return Path("runs") / f"{time.strftime('%Y-%m-%d-%H%M%S')}-{verb}"

@@ -8,15 +8,15 @@ import sys
 import threading
 import time
 from pathlib import Path
-from typing import get_args
 
-from tautscope.config import Profile, load_config
+from tautscope.commands.arguments import Verbs, add_json, add_out, add_profile, print_json
+from tautscope.config import load_config
 from tautscope.errors import ConfigError
 
 BENCH = "configs/bench.toml"
 
 
-def add_parsers(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parsers(verbs: Verbs) -> None:
     """Add the verbs to the command's."""
     run = verbs.add_parser(
         "run",
@@ -28,16 +28,14 @@ def add_parsers(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
         "medical device; have an emergency stop within reach.",
     )
     run.add_argument("config", metavar="CONFIG.toml", help="the rig")
-    run.add_argument("--profile", choices=get_args(Profile), help="how slack is compensated")
+    add_profile(run, "how slack is compensated")
     run.add_argument(
         "--compare",
         action="store_true",
         help="run without compensation first, and print Table 1 as the camera sees it",
     )
-    run.add_argument(
-        "--out", type=Path, metavar="DIR", help="folder, new or empty [runs/<date-time>-run]"
-    )
-    run.add_argument("--json", action="store_true", help="print one JSON object and no more")
+    add_out(run, "run")
+    add_json(run)
     run.set_defaults(run=_run)
 
     bench = verbs.add_parser(
@@ -82,11 +80,11 @@ def _fault(text: str) -> tuple[float, str]:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from tautscope.demo import default_folder  # noqa: PLC0415
     from tautscope.hardware.experiment import (  # noqa: PLC0415
         run_on_hardware,
         write_run_folder,
     )
+    from tautscope.output import default_folder  # noqa: PLC0415
     from tautscope.progress import progress_bar  # noqa: PLC0415
 
     config = load_config(options.config, options.profile)
@@ -101,7 +99,7 @@ def _run(options: argparse.Namespace) -> int:
     write_run_folder(found, folder)
     document = found.to_json()
     if options.json:
-        print(json.dumps(document, allow_nan=False))
+        print_json(document)
         return 0
     timing = found.compensated.timing.summary()
     print(
@@ -113,7 +111,7 @@ def _run(options: argparse.Namespace) -> int:
         known = widths["reduction"]
         print(f"{dof}: reduction {'not known' if known is None else f'{known:.0%}'}, by camera")
     for warning in found.compensated.recording.warnings:
-        print(f"Warning: {warning}")
+        print(f"Noticed: {warning}.")
     print(f"Report, figures and traces: {folder / 'report.html'}")
     return 0
 
