@@ -96,11 +96,12 @@ def test_demo_fills_a_run_folder_and_prints_one_object(
         assert np.ptp(picture) > 0
     assert (out / "fig9.pdf").read_bytes().startswith(b"%PDF")
     header, *lines = (out / "table1.csv").read_text().splitlines()
-    assert header.split(",")[3:] == [row.name for row in ROWS]
-    assert [line.split(",")[2] for line in lines[:5]] == [
+    assert header.split(",")[4:] == [row.name for row in ROWS]
+    assert [line.split(",")[3] for line in lines[:5]] == [
         "article", "seed 3", "seed 4", "median", "worst",
     ]  # fmt: skip
-    assert lines[0].split(",")[3] == "10"
+    assert {line.split(",")[2] for line in lines} == {"", "paper"}
+    assert lines[0].split(",")[4] == "10"
 
 
 @pytest.mark.usefixtures("on_drawn_rig")

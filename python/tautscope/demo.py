@@ -118,7 +118,7 @@ def write_run_folder(demo: Demo, folder: str | PathLike[str]) -> None:
     with new_folder(folder) as place:
         demo.compensated.write(place)
         demo.uncompensated.write(place, "_uncompensated")
-        tables.write_csv(place / "table1.csv", demo.seeds, demo.results)
+        tables.write_csv(place / "table1.csv", demo.seeds, demo.by_profile)
         with figures.style():
             figure9.savefig(place / "fig9.png")
             figure9.savefig(place / "fig9.pdf", metadata={"CreationDate": None})

@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import sys
 import threading
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tautscope.commands.arguments import Verbs, add_json, add_out, add_profile, print_json
 from tautscope.config import load_config
+from tautscope.dof import Dof
 from tautscope.errors import ConfigError
+
+if TYPE_CHECKING:
+    from tautscope.results import DofResult
 
 BENCH = "configs/bench.toml"
 
@@ -97,9 +103,8 @@ def _run(options: argparse.Namespace) -> int:
         print("\n".join(["interrupted; the motors are stopped", *notes]), file=sys.stderr)
         return 130
     write_run_folder(found, folder)
-    document = found.to_json()
     if options.json:
-        print_json(document)
+        print_json(found.to_json())
         return 0
     timing = found.compensated.timing.summary()
     print(
@@ -107,13 +112,26 @@ def _run(options: argparse.Namespace) -> int:
         f"{timing['jitter_ms']['worst']:.2g} ms late; {timing['frames']} frames, age "
         f"{timing['frame_age_ms']['median']:.3g} ms (median)."
     )
-    for dof, widths in document.get("by_camera", {}).items():
-        known = widths["reduction"]
-        print(f"{dof}: reduction {'not known' if known is None else f'{known:.0%}'}, by camera")
+    for dof, result in found.results.items():
+        print(_seen(dof, result))
     for warning in found.compensated.recording.warnings:
         print(f"Noticed: {warning}.")
     print(f"Report, figures and traces: {folder / 'report.html'}")
     return 0
+
+
+def _seen(dof: Dof, found: DofResult) -> str:
+    """What the camera saw of a DOF in a line; a dash for what is not known."""
+
+    def shown(value: float) -> str:
+        return "-" if math.isnan(value) else f"{dof.display_scale * value:.3g} {dof.display_unit}"
+
+    line = f"{dof.label}: slack left {shown(found.compensated_estimate)}"
+    if not math.isnan(found.uncompensated_estimate):
+        gone = found.reduction_estimate
+        share = "-" if math.isnan(gone) else f"{gone:.0%}"
+        line += f" of {shown(found.uncompensated_estimate)}, reduction {share}"
+    return f"{line}; tracking error {shown(found.tracking_estimate)} RMS; by camera"
 
 
 def _bench(options: argparse.Namespace) -> None:
