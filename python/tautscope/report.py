@@ -125,7 +125,8 @@ def run_report(
         "on the drives and the camera named below",
         f"""<h2>Table 1</h2>
 <div class="wide">{_table({"rig": [results]}, by_camera=True)}</div>
-<p class="note">As the camera sees it; no rig knows its true tip.</p>
+<p class="note">As the camera sees it; no rig knows its true tip. The tracking error includes
+the first period, in which the slack is learnt. The article&rsquo;s figures are of its own rig.</p>
 {_noticed(noticed)}
 <h2>Figures</h2>
 {_figures(pictures)}""",
