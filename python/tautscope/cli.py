@@ -7,8 +7,7 @@ import sys
 from collections.abc import Sequence
 
 from tautscope._core import __version__
-from tautscope.commands import analyze, demo
-from tautscope.commands.arguments import Verbs, add_config
+from tautscope.commands import analyze, arguments, demo
 from tautscope.config import dump_config, load_config
 from tautscope.errors import TautscopeError
 from tautscope.hardware import commands as hardware
@@ -51,14 +50,14 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _add_config_parser(verbs: Verbs) -> None:
+def _add_config_parser(verbs: arguments.Verbs) -> None:
     config = verbs.add_parser(
         "config",
         allow_abbrev=False,
         help="print the configuration",
         description="Print the configuration as TOML, every default written out.",
     )
-    add_config(config)
+    arguments.add_config(config)
     config.set_defaults(run=_config)
 
 

@@ -7,23 +7,15 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tautscope.commands.arguments import (
-    Verbs,
-    above_zero,
-    add_config,
-    add_json,
-    add_out,
-    console,
-    not_zero,
-    print_json,
-)
+from tautscope.commands import arguments
+from tautscope.commands.printing import console, print_json
 from tautscope.config import load_config
 
 if TYPE_CHECKING:
     from tautscope.analysis import Analysis
 
 
-def add_parser(verbs: Verbs) -> None:
+def add_parser(verbs: arguments.Verbs) -> None:
     """Add the verb to the command's."""
     analyze = verbs.add_parser(
         "analyze",
@@ -40,20 +32,20 @@ def add_parser(verbs: Verbs) -> None:
     analyze.add_argument("--time", metavar="COL", help="column: time, to clean and draw by")
     analyze.add_argument(
         "--update-distance",
-        type=above_zero,
+        type=arguments.above_zero,
         metavar="X",
         help="command travel between two updates of the on-line estimators, the tip's unit "
         "[1 %% of the command's range]",
     )
     analyze.add_argument(
         "--gain",
-        type=not_zero,
+        type=arguments.not_zero,
         metavar="G",
         help="tip travel per command travel in contact, 1 for one unit [learnt from first half]",
     )
-    add_out(analyze, "analyze")
-    add_config(analyze)
-    add_json(analyze)
+    arguments.add_out(analyze, "analyze")
+    arguments.add_config(analyze)
+    arguments.add_json(analyze)
     analyze.set_defaults(run=_run)
 
 

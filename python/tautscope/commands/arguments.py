@@ -1,18 +1,13 @@
-"""Options and kinds of numbers that several verbs have, and what they print."""
+"""Options and kinds of numbers that several verbs have."""
 
 from __future__ import annotations
 
 import argparse
-import json
 import math
-import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias, get_args
+from typing import TypeAlias, get_args
 
 from tautscope.config import Profile
-
-if TYPE_CHECKING:
-    from rich.console import Console
 
 Verbs: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 
@@ -89,16 +84,3 @@ def _number(text: str) -> float:
     except ValueError:
         return math.nan
     return value if math.isfinite(value) else math.nan
-
-
-def print_json(document: dict[str, Any]) -> None:
-    """Print one line; NaN has no place in it."""
-    print(json.dumps(document, allow_nan=False))
-
-
-def console() -> Console:
-    """Prints tables; without a terminal wide enough for all of them."""
-    from rich.console import Console  # noqa: PLC0415
-
-    width = None if sys.stdout.isatty() else 200
-    return Console(highlight=False, markup=False, width=width)

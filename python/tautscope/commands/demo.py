@@ -6,17 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tautscope.commands.arguments import (
-    Verbs,
-    add_config,
-    add_json,
-    add_out,
-    add_profile,
-    console,
-    natural,
-    positive,
-    print_json,
-)
+from tautscope.commands import arguments
+from tautscope.commands.printing import console, print_json
 from tautscope.config import DISTURBANCES, Config, load_config
 from tautscope.errors import MissingPathError
 
@@ -24,7 +15,7 @@ if TYPE_CHECKING:
     from tautscope.demo import Demo
 
 
-def add_parser(verbs: Verbs) -> None:
+def add_parser(verbs: arguments.Verbs) -> None:
     """Add the verb to the command's."""
     demo = verbs.add_parser(
         "demo",
@@ -34,12 +25,21 @@ def add_parser(verbs: Verbs) -> None:
         "compensation, camera images the only feedback. Prints Table 1, the article beside ours, "
         "and writes a run folder with tables, traces, figures and a report.",
     )
-    add_profile(demo, "how slack is compensated: as in the article, or ours beside it", "best")
-    demo.add_argument(
-        "--seed", type=natural, metavar="N", help="first seed [twin.seed of the configuration]"
+    arguments.add_profile(
+        demo, "how slack is compensated: as in the article, or ours beside it", "best"
     )
     demo.add_argument(
-        "--seeds", type=positive, default=1, metavar="N", help="number of seeds [%(default)s]"
+        "--seed",
+        type=arguments.natural,
+        metavar="N",
+        help="first seed [twin.seed of the configuration]",
+    )
+    demo.add_argument(
+        "--seeds",
+        type=arguments.positive,
+        default=1,
+        metavar="N",
+        help="number of seeds [%(default)s]",
     )
     demo.add_argument(
         "--background", metavar="DIR", help="folder of images to use as tissue [procedural mucosa]"
@@ -49,9 +49,9 @@ def add_parser(verbs: Verbs) -> None:
         metavar="NAME[,NAME]",
         help=f"disturb the pictures: {', '.join(DISTURBANCES)} [twin.disturb of the configuration]",
     )
-    add_out(demo, "demo")
-    add_config(demo)
-    add_json(demo)
+    arguments.add_out(demo, "demo")
+    arguments.add_config(demo)
+    arguments.add_json(demo)
     demo.set_defaults(run=_run)
 
 

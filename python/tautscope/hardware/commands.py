@@ -11,7 +11,8 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tautscope.commands.arguments import Verbs, add_json, add_out, add_profile, print_json
+from tautscope.commands import arguments
+from tautscope.commands.printing import print_json
 from tautscope.config import load_config
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 BENCH = "configs/bench.toml"
 
 
-def add_parsers(verbs: Verbs) -> None:
+def add_parsers(verbs: arguments.Verbs) -> None:
     """Add the verbs to the command's."""
     run = verbs.add_parser(
         "run",
@@ -34,14 +35,14 @@ def add_parsers(verbs: Verbs) -> None:
         "medical device; have an emergency stop within reach.",
     )
     run.add_argument("config", metavar="CONFIG.toml", help="the rig")
-    add_profile(run, "how slack is compensated")
+    arguments.add_profile(run, "how slack is compensated")
     run.add_argument(
         "--compare",
         action="store_true",
         help="run without compensation first, and print Table 1 as the camera sees it",
     )
-    add_out(run, "run")
-    add_json(run)
+    arguments.add_out(run, "run")
+    arguments.add_json(run)
     run.set_defaults(run=_run)
 
     bench = verbs.add_parser(

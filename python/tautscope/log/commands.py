@@ -7,16 +7,8 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tautscope.commands.arguments import (
-    Verbs,
-    add_config,
-    add_json,
-    add_out,
-    add_profile,
-    console,
-    print_json,
-    seconds,
-)
+from tautscope.commands import arguments
+from tautscope.commands.printing import console, print_json
 from tautscope.config import Config, load_config
 from tautscope.errors import FieldError
 
@@ -26,7 +18,7 @@ if TYPE_CHECKING:
     from tautscope.recording import Recording
 
 
-def add_parsers(verbs: Verbs) -> None:
+def add_parsers(verbs: arguments.Verbs) -> None:
     """Add the verbs to the command's."""
     recover = verbs.add_parser(
         "recover",
@@ -75,15 +67,15 @@ def add_parsers(verbs: Verbs) -> None:
     replay.add_argument("--motors", type=Path, metavar="FILE.csv", help="motor positions")
     replay.add_argument(
         "--video-start",
-        type=seconds,
+        type=arguments.seconds,
         default=0.0,
         metavar="S",
         help="time of the video's first frame in the CSV's [s] [%(default)s]",
     )
-    add_config(replay)
-    add_profile(replay, "how slack is learnt")
-    add_out(replay, "replay")
-    add_json(replay)
+    arguments.add_config(replay)
+    arguments.add_profile(replay, "how slack is learnt")
+    arguments.add_out(replay, "replay")
+    arguments.add_json(replay)
     replay.set_defaults(run=_replay)
 
 

@@ -6,7 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tautscope.commands.arguments import Verbs, add_json, print_json
+from tautscope.commands import arguments
+from tautscope.commands.printing import print_json
 from tautscope.config import load_config
 
 if TYPE_CHECKING:
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from tautscope.hardware.doctor.finding import Finding
 
 
-def add_parser(verbs: Verbs) -> None:
+def add_parser(verbs: arguments.Verbs) -> None:
     """Add the verb to the command's."""
     doctor = verbs.add_parser(
         "doctor",
@@ -27,7 +28,7 @@ def add_parser(verbs: Verbs) -> None:
         "if all is there, 1 if something is missing.",
     )
     doctor.add_argument("config", nargs="?", metavar="CONFIG", help="TOML file of a rig")
-    add_json(doctor)
+    arguments.add_json(doctor)
     doctor.set_defaults(run=_doctor)
 
 
