@@ -29,8 +29,9 @@ def numbers(example: str) -> list[float]:
     return [float(number) for number in re.findall(r"-?\d+(?:\.\d+)?", found.stdout)]
 
 
-def test_your_own_rig_loses_its_slack() -> None:
-    reductions = numbers("own_rig.py")
+@pytest.mark.parametrize("example", ["own_rig.py", "own_detector.py"])
+def test_your_own_rig_loses_its_slack(example: str) -> None:
+    reductions = numbers(example)
     assert len(reductions) == 3
     assert all(70 <= reduction <= 82 for reduction in reductions)
 

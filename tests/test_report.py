@@ -13,7 +13,7 @@ from tautscope import figures, tables
 from tautscope.demo import Demo
 from tautscope.dof import Dof
 from tautscope.recording import Recording
-from tautscope.report import Picture, demo_report
+from tautscope.report import Picture, demo_report, run_report
 from tautscope.results import DofResult, evaluate
 from tautscope.tables import ROWS, article_cell, cell
 
@@ -95,6 +95,36 @@ def test_the_report_has_a_column_for_each_profile_that_was_run(demo: Demo) -> No
     assert "in 9 runs" in text  # of three seeds: without, and under two profiles
     assert "<th>best</th>" not in demo_report(demo, [])
     assert "in 4 runs" in demo_report(demo, [])
+
+
+def test_the_report_of_one_run_shows_what_one_run_can(runs: tuple[Recording, Recording]) -> None:
+    """On a rig: no truth, no run without compensation; the camera's figures stand there."""
+    recording = runs[1]
+    blind = replace(recording, trace=recording.trace.copy(), frames=recording.frames.copy())
+    for dof in Dof:
+        blind.trace[f"true_{dof.label}"] = blind.frames[f"true_{dof.label}"] = np.nan
+    results = evaluate(None, blind)
+    page = run_report(blind.config, {}, results, [], ["lost (nothing) at 1 of 2 images"])
+    for title in ("compensated width, by camera", "tracking error, RMS, by camera", "frames used"):
+        assert f"<td>{title}</td>" in page
+    for title in ("reduction", "state error, RMS", "uncompensated width, by camera"):
+        assert f"<td>{title}</td>" not in page
+    assert "lost (nothing) at 1 of 2 images" in page
+    assert "nan" not in page.split("profile =")[0].lower()
+    axis = figures.figure9(None, blind).axes[4]
+    assert axis.get_xlabel() == "u [rad]"
+    both = run_report(blind.config, {}, evaluate(runs[0], blind), [], [])
+    assert "<td>reduction, by camera</td>" in both
+    assert '<td class="first">78 %</td>' in both  # the article's rotation
+
+
+def test_what_the_camera_sees_of_tracking_is_what_the_truth_says(
+    runs: tuple[Recording, Recording],
+) -> None:
+    """The drawn rig's estimate is good, so both errors agree."""
+    for dof, found in evaluate(None, runs[1]).items():
+        assert found.tracking_estimate == pytest.approx(found.tracking_rms, rel=0.2), dof
+        assert np.isnan(found.uncompensated) and np.isnan(found.reduction_estimate)
 
 
 def test_figures_leave_no_trace_in_global_state(runs: tuple[Recording, Recording]) -> None:

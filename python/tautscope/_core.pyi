@@ -6,6 +6,7 @@ from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
     "DETECTORS",
+    "MEANINGS",
     "AdaptiveAxis",
     "Camera",
     "Compensator",
@@ -25,6 +26,7 @@ __all__ = [
 
 __version__: str
 DETECTORS: tuple[str, ...]
+MEANINGS: tuple[str, ...]
 
 # The control law: crates/core.
 

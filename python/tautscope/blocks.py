@@ -4,10 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import TypeVar
 
 from tautscope import _core
 from tautscope.config import Config, DofConfig
 from tautscope.dof import Dof
+
+T = TypeVar("T")
+
+
+def each_dof(of: Callable[[Dof], T]) -> tuple[T, T, T]:
+    """One thing per degree of freedom, in their order."""
+    return of(Dof.INSERTION), of(Dof.ROTATION), of(Dof.BENDING)
 
 
 def build_compensator(dof: DofConfig, compensate: bool = True) -> _core.Compensator:
@@ -101,8 +109,9 @@ def build_feature_model(config: Config) -> _core.FeatureModel:
 
 def build_state_estimator(config: Config) -> _core.StateEstimator:
     """The state estimation with its rank watch, Eqs. (13)-(16)."""
-    insertion, rotation, bending = (config[dof].observable_deviation for dof in Dof)
-    return _core.StateEstimator(observable_deviation=(insertion, rotation, bending))
+    return _core.StateEstimator(
+        observable_deviation=each_dof(lambda dof: config[dof].observable_deviation)
+    )
 
 
 def build_weighted_estimator(config: Config) -> _core.WeightedEstimator:
@@ -123,8 +132,7 @@ def build_guards(config: Config) -> _core.Guards:
     safety = config.safety
 
     def each(of: Callable[[DofConfig], float]) -> tuple[float, float, float]:
-        insertion, rotation, bending = (of(config[dof]) for dof in Dof)
-        return insertion, rotation, bending
+        return each_dof(lambda dof: of(config[dof]))
 
     return _core.Guards(
         period=config.control.period,
@@ -156,45 +164,30 @@ def build_guards(config: Config) -> _core.Guards:
 
 def build_loop(config: Config, compensate: bool = True) -> _core.Reduction:
     """The whole loop, Fig. 6, without checks of what goes in: `HysteresisReduction` has those."""
-    insertion, rotation, bending = (config[dof] for dof in Dof)
     model = build_feature_model(config)
+    guards = build_guards(config)
     span, period = config.control.history, config.control.period
-    start_deviation = (
-        insertion.start_deviation,
-        rotation.start_deviation,
-        bending.start_deviation,
-    )
+    start_deviation = each_dof(lambda dof: config[dof].start_deviation)
     if config.profile == "best":
-
-        def rest(dof: DofConfig) -> float:
-            return dof.update_distance * config.state_estimation.rest_deviation
-
+        rest = config.state_estimation.rest_deviation
         return _core.Reduction.adaptive(
-            (
-                build_adaptive_axis(config, Dof.INSERTION, compensate),
-                build_adaptive_axis(config, Dof.ROTATION, compensate),
-                build_adaptive_axis(config, Dof.BENDING, compensate),
-            ),
+            each_dof(lambda dof: build_adaptive_axis(config, dof, compensate)),
             model,
             build_weighted_estimator(config),
-            build_guards(config),
+            guards,
             span=span,
             period=period,
             start_deviation=start_deviation,
-            rest_deviation=(rest(insertion), rest(rotation), rest(bending)),
+            rest_deviation=each_dof(lambda dof: config[dof].update_distance * rest),
             settling_time=config.state_estimation.settling_time,
             coupling=config.state_estimation.coupling,
         )
     return _core.Reduction(
-        (
-            build_compensator(insertion, compensate),
-            build_compensator(rotation, compensate),
-            build_compensator(bending, compensate),
-        ),
-        (build_estimator(insertion), build_estimator(rotation), build_estimator(bending)),
+        each_dof(lambda dof: build_compensator(config[dof], compensate)),
+        each_dof(lambda dof: build_estimator(config[dof])),
         model,
         build_state_estimator(config),
-        build_guards(config),
+        guards,
         span=span,
         period=period,
         start_deviation=start_deviation,

@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from os import PathLike
-from pathlib import Path
 
 from tautscope import tables
 from tautscope.config import Config
@@ -119,7 +118,7 @@ def write_run_folder(demo: Demo, folder: str | PathLike[str]) -> None:
     with new_folder(folder) as place:
         demo.compensated.write(place)
         demo.uncompensated.write(place, "_uncompensated")
-        tables.write_csv(place / "table1.csv", demo.seeds, demo.results)
+        tables.write_csv(place / "table1.csv", demo.seeds, demo.by_profile)
         with figures.style():
             figure9.savefig(place / "fig9.png")
             figure9.savefig(place / "fig9.pdf", metadata={"CreationDate": None})
@@ -127,8 +126,3 @@ def write_run_folder(demo: Demo, folder: str | PathLike[str]) -> None:
                 picture.figure.savefig(place / "fig5.png")
             page = report.demo_report(demo, pictures)
         (place / "report.html").write_text(page, encoding="utf-8")
-
-
-def default_folder(verb: str) -> Path:
-    """runs/<date-time>-<verb>."""
-    return Path("runs") / f"{time.strftime('%Y-%m-%d-%H%M%S')}-{verb}"

@@ -10,6 +10,7 @@ import numpy as np
 
 from tautscope.config import Config
 from tautscope.errors import SignalError
+from tautscope.noticed import Noticed
 from tautscope.recording import Floats, Recording, Snapshot, Tables, frame_row
 from tautscope.reduction import HysteresisReduction, Report
 from tautscope.references import DatedReference, Reference
@@ -102,7 +103,7 @@ def run_experiment(
             progress(sample.time - start, reference.duration)
     trace, frames = recorder.tables()
     segments = tuple(reference.segments)
-    warnings = (*switched_off(config), *reduction.supervision.latched)
+    warnings = (*switched_off(config), *recorder.noticed.lines(reduction.supervision.latched))
     return Recording(trace, frames, config, compensate, segments, recorder.snapshot, warnings)
 
 
@@ -144,11 +145,13 @@ class _Recorder(Tables):
     def __init__(self, config: Config, snapshot_after: float) -> None:
         super().__init__(config)
         self.snapshot: Snapshot | None = None
+        self.noticed = Noticed()
         self._snapshot_after = snapshot_after
         self._is_late = False
 
     def seen(self, now: float, frame: Frame, report: Report, elapsed: float) -> None:
         self.frame(frame_row(now, frame, report), report.delta_minus, report.delta_plus)
+        self.noticed.image(elapsed, report)
         detection = report.detection
         is_late = elapsed >= self._snapshot_after
         if (

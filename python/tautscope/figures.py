@@ -66,12 +66,12 @@ def style() -> Iterator[None]:
         yield
 
 
-def figure9(uncompensated: Recording, compensated: Recording) -> Figure:
+def figure9(uncompensated: Recording | None, compensated: Recording) -> Figure:
     """The article's Fig. 9: one column per DOF.
 
     (a)-(c): reference, command, estimate and both contact offsets over time, with compensation.
-    (d)-(f): estimate over command without, and over reference with compensation, the first period
-    thin.
+    (d)-(f): estimate over command without, if there was such a run, and over reference with
+    compensation, the first period thin.
     """
     segments = compensated.segments
     with style():
@@ -113,7 +113,9 @@ def _over_time(axes: Axes, recording: Recording, segment: Segment) -> None:
     axes.set_xlim(0, segment.period * segment.periods)
 
 
-def _loops(axes: Axes, uncompensated: Recording, compensated: Recording, segment: Segment) -> None:
+def _loops(
+    axes: Axes, uncompensated: Recording | None, compensated: Recording, segment: Segment
+) -> None:
     dof = segment.dof
     scale = dof.display_scale
     for recording, name, label, colour, width in (
@@ -121,6 +123,8 @@ def _loops(axes: Axes, uncompensated: Recording, compensated: Recording, segment
         (compensated, "reference", "compensated: q̂ over u", BLUE, 1.0),
         (compensated, "reference", "compensated, first period", BLUE, 0.4),
     ):
+        if recording is None:
+            continue
         x, y = estimated_loop(recording, segment, name, first=0)
         if recording is compensated:
             settled, _ = estimated_loop(recording, segment, name, first=1)
@@ -130,7 +134,7 @@ def _loops(axes: Axes, uncompensated: Recording, compensated: Recording, segment
         axes.plot(x * scale, y * scale, color=colour, linewidth=width, label=label)
     low, high = zip(axes.get_xlim(), axes.get_ylim(), strict=True)
     axes.axline((0, 0), slope=1, color=BLACK, linewidth=0.5, linestyle=(0, (4, 4)), zorder=0)
-    axes.set_xlabel(f"c or u [{dof.display_unit}]")
+    axes.set_xlabel(f"{'u' if uncompensated is None else 'c or u'} [{dof.display_unit}]")
     axes.set_ylabel(f"estimate q̂ [{dof.display_unit}]")
     axes.set_box_aspect(1)
     axes.set_xlim(min(low), max(high))

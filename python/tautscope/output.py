@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from os import PathLike
@@ -22,6 +23,11 @@ def check_free(path: str | PathLike[str]) -> Path:
     if target.exists() and not (target.is_dir() and not any(target.iterdir())):
         raise OutputError("out", str(target), "a folder that is empty or does not exist yet")
     return target
+
+
+def default_folder(verb: str) -> Path:
+    """runs/<date-time>-<verb>."""
+    return Path("runs") / f"{time.strftime('%Y-%m-%d-%H%M%S')}-{verb}"
 
 
 @contextmanager

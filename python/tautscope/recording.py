@@ -94,8 +94,8 @@ class Recording:
         compensated: Whether the compensator was on.
         segments: Which DOF moved when.
         snapshot: One frame from about the middle; not saved.
-        warnings: What the guards noticed, by the names of `tautscope.safety.DETECTORS`, and a line
-            for each that is off; not saved.
+        warnings: A line for each guard that noticed something, `tautscope.noticed`, and for each
+            that is off; not saved.
     """
 
     trace: Table

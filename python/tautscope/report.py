@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import importlib.metadata
 import io
+import math
 import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -102,6 +103,7 @@ def demo_report(demo: Demo, pictures: Sequence[Picture]) -> str:
         }
 Widths over the last two periods of each degree of freedom: mean over 41 levels across the central
 80&nbsp;% of the tip&rsquo;s range, of the true tip unless said otherwise.</p>
+{_noticed(demo.compensated.warnings)}
 <h2>Figures{f", profile {demo.config.profile}" if len(profiles) > 1 else ""}</h2>
 {_figures(pictures)}
 <h2>What this shows, and what it does not</h2>
@@ -112,18 +114,22 @@ Widths over the last two periods of each degree of freedom: mean over 41 levels 
 
 
 def run_report(
-    config: Config, facts: dict[str, str], results: Results | None, pictures: Sequence[Picture]
+    config: Config,
+    facts: dict[str, str],
+    results: Results,
+    pictures: Sequence[Picture],
+    noticed: Sequence[str],
 ) -> str:
-    """The page of ``tautscope run``; Table 1 if the run was compared with an uncompensated one."""
-    table = ""
-    if results is not None:
-        table = f"""<h2>Table 1</h2>
-<div class="wide">{_table({"rig": [results]})}</div>
-<p class="note">Widths as the camera sees them; no rig knows its true tip.</p>
-"""
+    """The page of ``tautscope run``: what the camera saw, of one run or of two."""
     return _page(
         "on the drives and the camera named below",
-        f"{table}<h2>Figures</h2>\n{_figures(pictures)}",
+        f"""<h2>Table 1</h2>
+<div class="wide">{_table({"rig": [results]}, by_camera=True)}</div>
+<p class="note">As the camera sees it; no rig knows its true tip. The tracking error includes
+the first period, in which the slack is learnt. The article&rsquo;s figures are of its own rig.</p>
+{_noticed(noticed)}
+<h2>Figures</h2>
+{_figures(pictures)}""",
         {"tautscope": __version__, **facts},
         config,
     )
@@ -151,8 +157,18 @@ def _figures(pictures: Sequence[Picture]) -> str:
     return "".join(_figure(picture) for picture in pictures)
 
 
-def _table(columns: Mapping[str, Sequence[Results]]) -> str:
-    """The article beside each column, a result per seed; the last one stands out."""
+def _noticed(lines: Sequence[str]) -> str:
+    """What the guards noticed in the compensated run, of the first seed if there are several."""
+    said = "".join(f"<li>{escape(line)}</li>" for line in lines) or "<li>nothing</li>"
+    return f'<h2>Noticed by the guards</h2><ul class="note">{said}</ul>'
+
+
+def _table(columns: Mapping[str, Sequence[Results]], by_camera: bool = False) -> str:
+    """The article beside each column, a result per seed; the last one stands out.
+
+    By camera, the article stands beside what the camera saw, and rows of which nothing is known
+    are left out.
+    """
     figures = [(each, tables.median(each), tables.worst(each)) for each in columns.values()]
     *_, (last, dofs, _) = figures
     span = 1 + len(columns)
@@ -161,9 +177,12 @@ def _table(columns: Mapping[str, Sequence[Results]]) -> str:
     names = f'<th class="first">article</th>{names}' * len(dofs)
     lines = []
     for row in tables.ROWS:
+        if by_camera and all(math.isnan(getattr(found, row.name)) for found in dofs.values()):
+            continue
         cells = []
         for dof in dofs:
-            cells.append(f'<td class="first">{tables.article_cell(row, dof)}</td>')
+            article = tables.article_cell(row, dof, by_camera)
+            cells.append(f'<td class="first">{article}</td>')
             for results, middle, bad in figures:
                 value = tables.cell(row, dof, getattr(middle[dof], row.name))
                 worst = tables.cell(row, dof, getattr(bad[dof], row.name))

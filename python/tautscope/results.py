@@ -19,11 +19,11 @@ LAST_PERIODS = 2
 
 @dataclass(frozen=True, slots=True)
 class DofResult:
-    """What two runs, without and with compensation, say about one DOF [m or rad].
+    """What a run with compensation, and one without, say about one DOF [m or rad].
 
     Widths are of y over x in the last two periods of the DOF's segment; x is the command without
     and the reference with compensation; y is the true tip, or the estimate where the name says so.
-    NaN where the rig has no truth.
+    NaN where the rig has no truth, or there was no run without compensation.
 
     Attributes:
         uncompensated: Mean width without compensation.
@@ -37,6 +37,8 @@ class DofResult:
         reduction_estimate: The reduction, as the camera sees it; this is the article's.
         start_periods: Periods until the compensated mean width stays within 1.2 times its last.
         tracking_rms: RMS of (true tip - reference) after the start, with compensation.
+        tracking_estimate: The same of the estimate, as the camera sees it; of the whole segment
+            where the rig has no truth to tell the start.
         state_rms: RMS of (state_estimate - true_state at the capture time) over all frames of the
             whole compensated run that measured this DOF.
         marker_rms_px: RMS distance of measured from true features in the DOF's segment [px].
@@ -56,6 +58,7 @@ class DofResult:
     reduction_estimate: float
     start_periods: float
     tracking_rms: float
+    tracking_estimate: float
     state_rms: float
     marker_rms_px: float
     frames_used: float
@@ -66,8 +69,8 @@ class DofResult:
 Results = dict[Dof, DofResult]
 
 
-def evaluate(uncompensated: Recording, compensated: Recording) -> Results:
-    """The figures of every DOF that has a segment of its own."""
+def evaluate(uncompensated: Recording | None, compensated: Recording) -> Results:
+    """The figures of every DOF that has a segment of its own; without the first run, of one run."""
     return {
         segment.dof: _dof_result(segment, uncompensated, compensated)
         for segment in compensated.segments
@@ -133,11 +136,17 @@ def used_frames(recording: Recording, segment: Segment, first: float = 0) -> Tab
     return frames
 
 
-def _dof_result(segment: Segment, uncompensated: Recording, compensated: Recording) -> DofResult:
+def _dof_result(
+    segment: Segment, uncompensated: Recording | None, compensated: Recording
+) -> DofResult:
     label = segment.dof.label
-    before = metrics.loop_width(*true_loop(uncompensated, segment, "command"))
+    nothing = np.empty(0)
+    plain, seen_plain = (nothing, nothing), (nothing, nothing)
+    if uncompensated is not None:
+        plain = true_loop(uncompensated, segment, "command")
+        seen_plain = estimated_loop(uncompensated, segment, "command")
+    before, seen_before = metrics.loop_width(*plain), metrics.loop_width(*seen_plain)
     after = metrics.loop_width(*true_loop(compensated, segment, "reference"))
-    seen_before = metrics.loop_width(*estimated_loop(uncompensated, segment, "command"))
     seen_after = metrics.loop_width(*estimated_loop(compensated, segment, "reference"))
 
     rows = compensated.trace[compensated.during(segment, 0, segment.periods)]
@@ -152,7 +161,8 @@ def _dof_result(segment: Segment, uncompensated: Recording, compensated: Recordi
             periods=segment.periods,
         )
     )
-    settled = compensated.trace[compensated.during(segment, np.nan_to_num(start), segment.periods)]
+    begin = float(np.nan_to_num(start))
+    settled = compensated.trace[compensated.during(segment, begin, segment.periods)]
     frames = compensated.frames[compensated.frames[f"observable_{label}"]]
     own_used = used_frames(compensated, segment)
     own_count = int(compensated.frames_during(segment, 0, segment.periods).sum())
@@ -168,6 +178,9 @@ def _dof_result(segment: Segment, uncompensated: Recording, compensated: Recordi
         reduction_estimate=metrics.reduction(seen_before.mean, seen_after.mean),
         start_periods=start,
         tracking_rms=metrics.tracking_rms(settled[f"reference_{label}"], settled[f"true_{label}"]),
+        tracking_estimate=metrics.tracking_rms(
+            *estimated_loop(compensated, segment, "reference", begin)
+        ),
         state_rms=metrics.state_rms(frames[f"estimate_{label}"], frames[f"true_{label}"]),
         marker_rms_px=metrics.marker_rms(
             per_feature(own_used, "features"), per_feature(own_used, "true_features")

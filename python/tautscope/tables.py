@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -47,6 +47,7 @@ ROWS = (
     Row("reduction_estimate", "reduction, by camera", "share", "min"),
     Row("start_periods", "periods until settled", "count", in_summary=True),
     Row("tracking_rms", "tracking error, RMS", "length", in_summary=True),
+    Row("tracking_estimate", "tracking error, RMS, by camera", "length"),
     Row("state_rms", "state error, RMS", "length", in_summary=True),
     Row("marker_rms_px", "marker error, RMS [px]", "number", in_summary=True),
     Row("frames_used", "frames used", "share", "min"),
@@ -94,28 +95,39 @@ def cell(row: Row, dof: Dof, value: float) -> str:
     return f"{shown:.3g}" if abs(shown) >= 1 else f"{shown:.2g}"
 
 
-def article_cell(row: Row, dof: Dof) -> str:
-    """The article's figure as its Table 1 prints it, or nothing."""
-    value = ARTICLE.get(row.name, {}).get(dof)
+def article_cell(row: Row, dof: Dof, by_camera: bool = False) -> str:
+    """The article's figure as its Table 1 prints it, or nothing.
+
+    Its figures are the camera's: on a rig without truth they stand beside what the camera saw.
+    """
+    name = row.name.removesuffix("_estimate") if by_camera else row.name
+    value = ARTICLE.get(name, {}).get(dof)
     return "" if value is None else cell(row, dof, value)
 
 
-def write_csv(path: Path, seeds: Sequence[int], results: Sequence[Results]) -> None:
-    """table1.csv: per DOF the article, every seed, the median and the worst, in display units."""
-    lines: list[tuple[str, Results]] = [
-        *((f"seed {seed}", result) for seed, result in zip(seeds, results, strict=True)),
-        ("median", median(results)),
-        ("worst", worst(results)),
+def write_csv(
+    path: Path, seeds: Sequence[int], by_profile: Mapping[str, Sequence[Results]]
+) -> None:
+    """table1.csv in display units: per DOF the article, per profile all seeds, median and worst."""
+    lines: list[tuple[str, str, Results]] = [
+        (profile, source, found)
+        for profile, results in by_profile.items()
+        for source, found in (
+            *((f"seed {seed}", result) for seed, result in zip(seeds, results, strict=True)),
+            ("median", median(results)),
+            ("worst", worst(results)),
+        )
     ]
+    dofs = lines[0][2]
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(["dof", "unit", "source", *(row.name for row in ROWS)])
-        for dof in results[0]:
+        writer.writerow(["dof", "unit", "profile", "source", *(row.name for row in ROWS)])
+        for dof in dofs:
             article = [_number(row, dof, ARTICLE.get(row.name, {}).get(dof)) for row in ROWS]
-            writer.writerow([dof.label, dof.display_unit, "article", *article])
-            for source, result in lines:
+            writer.writerow([dof.label, dof.display_unit, "", "article", *article])
+            for profile, source, result in lines:
                 values = [_number(row, dof, getattr(result[dof], row.name)) for row in ROWS]
-                writer.writerow([dof.label, dof.display_unit, source, *values])
+                writer.writerow([dof.label, dof.display_unit, profile, source, *values])
 
 
 def to_json(

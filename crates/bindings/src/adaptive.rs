@@ -24,8 +24,7 @@ impl AdaptiveAxis {
         slope_tolerance, model_deviation, state_correction, tremor_time, period,
         delta_minus, delta_plus
     ))]
-    // One argument per setting, by keyword only.
-    #[allow(clippy::too_many_arguments)]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
     fn new(
         py: Python<'_>,
         free_gain: f64,

@@ -69,8 +69,14 @@ fn row<const N: usize>(view: ArrayView1<'_, f64>) -> Option<[f64; N]> {
     Some(values)
 }
 
-/// A covariance (4, 4).
-pub fn square(field: &str, table: &Table<'_>) -> PyResult<[[f64; 4]; 4]> {
+/// A covariance (4, 4) of features, if there is one.
+pub fn covariance(table: Option<Table<'_>>) -> PyResult<Option<[[f64; 4]; 4]>> {
+    let table = table.as_ref();
+    table.map(|table| four("covariance", table)).transpose()
+}
+
+/// A table with a row per feature.
+pub fn four<const N: usize>(field: &str, table: &Table<'_>) -> PyResult<[[f64; N]; 4]> {
     let lines = rows(field, table)?;
     let found = lines.len();
     lines

@@ -98,6 +98,11 @@ pub fn names() -> Vec<&'static str> {
     core::Flag::ALL.iter().map(|flag| flag.name()).collect()
 }
 
+/// What each of them says.
+pub fn meanings() -> Vec<&'static str> {
+    core::Flag::ALL.iter().map(|flag| flag.meaning()).collect()
+}
+
 /// The names of those in a set.
 pub fn set(flags: core::Flags) -> Vec<&'static str> {
     flags.iter().map(core::Flag::name).collect()

@@ -61,6 +61,10 @@ mod _core {
             "DETECTORS",
             PyTuple::new(module.py(), super::guards::names())?,
         )?;
+        module.add(
+            "MEANINGS",
+            PyTuple::new(module.py(), super::guards::meanings())?,
+        )?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use tautscope_core as core;
 
 use crate::adaptive::AdaptiveAxis;
-use crate::arrays::{Table, Vector, fixed, rows, same_length, square, table};
+use crate::arrays::{Table, Vector, covariance as known, fixed, rows, same_length, table};
 use crate::compensator::Compensator;
 use crate::errors;
 use crate::estimator::{Estimator, TriggerNames, trigger_names};
@@ -39,7 +39,7 @@ pub struct Reduction(core::HysteresisReduction);
 #[pymethods]
 impl Reduction {
     #[new]
-    #[expect(clippy::too_many_arguments, reason = "named in Python")]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
     #[pyo3(signature = (compensators, estimators, model, state_estimator, guards, *, span, period, start_deviation))]
     fn new(
         py: Python<'_>,
@@ -56,27 +56,20 @@ impl Reduction {
             let (compensator, estimator) = (&compensators[dof], &estimators[dof]);
             core::Axis::new(compensator.inner, estimator.inner, estimator.state.play())
         });
-        let history = core::History::new(span, period).map_err(errors::config(py))?;
+        let estimation = core::StateEstimation::Article(state_estimator.0);
         let whereabouts = core::Whereabouts::new(core::WhereaboutsSettings {
             start_deviation,
             rest_deviation: [0.0; 3],
             settling_time: 0.0,
             coupling: 0.0,
-        })
-        .map_err(errors::config(py))?;
-        Ok(Self(core::HysteresisReduction::new(
-            axes,
-            model.0,
-            core::StateEstimation::Article(state_estimator.0),
-            history,
-            whereabouts,
-            guards.0,
-        )))
+        });
+        let history = core::History::new(span, period);
+        Self::joined(py, axes, model, estimation, history, whereabouts, guards)
     }
 
     /// The loop of profile `best`, from its three axes.
     #[staticmethod]
-    #[expect(clippy::too_many_arguments, reason = "named in Python")]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
     #[pyo3(signature = (axes, model, state_estimator, guards, *, span, period, start_deviation, rest_deviation, settling_time, coupling))]
     fn adaptive(
         py: Python<'_>,
@@ -92,22 +85,15 @@ impl Reduction {
         coupling: f64,
     ) -> PyResult<Self> {
         let axes = axes.map(|axis| core::Axis::Adaptive(axis.0.clone()));
-        let history = core::History::new(span, period).map_err(errors::config(py))?;
+        let estimation = core::StateEstimation::Weighted(state_estimator.0);
         let whereabouts = core::Whereabouts::new(core::WhereaboutsSettings {
             start_deviation,
             rest_deviation,
             settling_time,
             coupling,
-        })
-        .map_err(errors::config(py))?;
-        Ok(Self(core::HysteresisReduction::new(
-            axes,
-            model.0,
-            core::StateEstimation::Weighted(state_estimator.0),
-            history,
-            whereabouts,
-            guards.0,
-        )))
+        });
+        let history = core::History::new(span, period);
+        Self::joined(py, axes, model, estimation, history, whereabouts, guards)
     }
 
     /// One control tick at `time` in s: reference (3,), made at `stamp` in s, in, command (3,) out.
@@ -156,9 +142,7 @@ impl Reduction {
         let features = features
             .map(|features| fixed("features", &features))
             .transpose()?;
-        let covariance = covariance
-            .map(|covariance| square("covariance", &covariance))
-            .transpose()?;
+        let covariance = known(covariance)?;
         let report = self
             .0
             .on_features(features, covariance.as_ref(), captured_at, checksum);
@@ -242,6 +226,27 @@ impl Reduction {
     #[getter]
     fn delta_plus<'py>(&self, py: Python<'py>) -> Floats<'py> {
         PyArray1::from_slice(py, &self.0.play().map(|play| play.delta_plus()))
+    }
+}
+
+impl Reduction {
+    fn joined(
+        py: Python<'_>,
+        axes: [core::Axis; 3],
+        model: &FeatureModel,
+        estimation: core::StateEstimation,
+        history: Result<core::History, core::ConfigError>,
+        whereabouts: Result<core::Whereabouts, core::ConfigError>,
+        guards: &Guards,
+    ) -> PyResult<Self> {
+        Ok(Self(core::HysteresisReduction::new(
+            axes,
+            model.0,
+            estimation,
+            history.map_err(errors::config(py))?,
+            whereabouts.map_err(errors::config(py))?,
+            guards.0,
+        )))
     }
 }
 

@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use tautscope_core as core;
 
-use crate::arrays::{Table, Vector, fixed, rows, same_length, table};
+use crate::arrays::{Table, Vector, fixed, four, rows, same_length, table};
 use crate::errors;
 use crate::features::FeatureModel;
 
@@ -43,11 +43,7 @@ impl StateEstimator {
         interaction_matrix: Table<'py>,
         measured_features: Vector<'py>,
     ) -> PyResult<Estimate<'py>> {
-        let rows = rows("interaction_matrix", &interaction_matrix)?;
-        let found = rows.len();
-        let [a, b, c, d]: [[f64; 3]; 4] = rows
-            .try_into()
-            .map_err(|_| errors::length(py, "interaction_matrix", found, "4 rows"))?;
+        let [a, b, c, d]: [[f64; 3]; 4] = four("interaction_matrix", &interaction_matrix)?;
         let prediction = core::FeaturePrediction {
             features: fixed("predicted_features", &predicted_features)?,
             columns: [0, 1, 2].map(|dof| [a[dof], b[dof], c[dof], d[dof]]),

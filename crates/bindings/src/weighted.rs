@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use tautscope_core as core;
 
-use crate::arrays::{Table, Vector, fixed, rows, same_length, square, table};
+use crate::arrays::{Table, Vector, covariance as known, fixed, rows, same_length, table};
 use crate::errors;
 use crate::features::FeatureModel;
 use crate::state::StateEstimator;
@@ -132,9 +132,4 @@ impl WeightedEstimator {
             table(py, &found.2)?,
         ))
     }
-}
-
-fn known(covariance: Option<Table<'_>>) -> PyResult<Option<[[f64; 4]; 4]>> {
-    let table = covariance.as_ref();
-    table.map(|table| square("covariance", table)).transpose()
 }

@@ -2,11 +2,12 @@
 
 use crate::contact::{ContactTest, Stroke};
 use crate::error::{ConfigError, require, require_non_negative, require_positive};
-use crate::estimator::{Trigger, Triggers};
+use crate::estimator::Triggers;
 use crate::lead::LeadLaw;
 use crate::limits::PlayLimit;
-use crate::offset_map::{OffsetMap, OffsetPrior, Side, TILTS};
+use crate::offset_map::{OffsetPrior, Side};
 use crate::play::Play;
+use crate::slack::Slack;
 use crate::smoother::Smoother;
 
 /// What an [`AdaptiveAxis`] is set to; lengths in the unit of the DOF.
@@ -37,6 +38,42 @@ pub struct AdaptiveSettings {
     pub period: f64,
 }
 
+impl AdaptiveSettings {
+    fn checked(self) -> Result<Self, ConfigError> {
+        let law = self.law.checked()?;
+        self.prior.checked()?;
+        let limit = self.gain_limit.is_finite() && self.gain_limit >= law.free_gain;
+        require(
+            limit,
+            "gain_limit",
+            self.gain_limit,
+            "finite, at least free_gain",
+        )?;
+        let cautious = (1.0..=law.contact_gain).contains(&self.cautious_gain);
+        require(
+            cautious,
+            "cautious_gain",
+            self.cautious_gain,
+            "at least 1, at most contact_gain",
+        )?;
+        require_positive("cautious_deviation", self.cautious_deviation)?;
+        require_positive("contact_distance", self.contact.distance)?;
+        require_non_negative("contact_moved", self.contact.moved)?;
+        require_positive("slope_tolerance", self.contact.tolerance)?;
+        require_positive("model_deviation", self.model_deviation)?;
+        let share = (0.0..=1.0).contains(&self.correction);
+        require(
+            share,
+            "state_correction",
+            self.correction,
+            "at least 0, at most 1",
+        )?;
+        require_non_negative("tremor_time", self.tremor_time)?;
+        require_positive("period", self.period)?;
+        Ok(self)
+    }
+}
+
 /// Compensates one DOF and learns its offsets; every quantity in the unit of the DOF.
 ///
 /// `step` moves the command, `learn` takes in the image. The lead law runs on the smoothed
@@ -45,7 +82,7 @@ pub struct AdaptiveSettings {
 #[derive(Debug, Clone, PartialEq)]
 pub struct AdaptiveAxis {
     settings: AdaptiveSettings,
-    offsets: OffsetMap,
+    slack: Slack,
     smoother: Smoother,
     stroke: Stroke,
     reference: Option<f64>,
@@ -58,7 +95,6 @@ pub struct AdaptiveAxis {
     landed: bool,
     cautious: bool,
     share: f64,
-    limit: PlayLimit,
 }
 
 impl AdaptiveAxis {
@@ -67,39 +103,10 @@ impl AdaptiveAxis {
     /// # Errors
     /// A setting is out of range.
     pub fn new(settings: AdaptiveSettings, play: Play) -> Result<Self, ConfigError> {
-        let law = settings.law.checked()?;
-        let prior = settings.prior.checked()?;
-        let limit = settings.gain_limit.is_finite() && settings.gain_limit >= law.free_gain;
-        require(
-            limit,
-            "gain_limit",
-            settings.gain_limit,
-            "finite, at least free_gain",
-        )?;
-        let cautious = (1.0..=law.contact_gain).contains(&settings.cautious_gain);
-        require(
-            cautious,
-            "cautious_gain",
-            settings.cautious_gain,
-            "at least 1, at most contact_gain",
-        )?;
-        require_positive("cautious_deviation", settings.cautious_deviation)?;
-        require_positive("contact_distance", settings.contact.distance)?;
-        require_non_negative("contact_moved", settings.contact.moved)?;
-        require_positive("slope_tolerance", settings.contact.tolerance)?;
-        require_positive("model_deviation", settings.model_deviation)?;
-        let share = (0.0..=1.0).contains(&settings.correction);
-        require(
-            share,
-            "state_correction",
-            settings.correction,
-            "at least 0, at most 1",
-        )?;
-        require_non_negative("tremor_time", settings.tremor_time)?;
-        require_positive("period", settings.period)?;
+        let settings = settings.checked()?;
         Ok(Self {
             settings,
-            offsets: OffsetMap::new(prior, play.delta_minus(), play.delta_plus()),
+            slack: Slack::new(settings.prior, play),
             smoother: Smoother::new(settings.tremor_time, settings.period),
             stroke: Stroke::new(),
             reference: None,
@@ -111,7 +118,6 @@ impl AdaptiveAxis {
             landed: false,
             cautious: false,
             share: 1.0,
-            limit: PlayLimit::NONE,
         })
     }
 
@@ -127,21 +133,19 @@ impl AdaptiveAxis {
 
     /// The offsets where the reference is now.
     pub fn play(&self) -> Play {
-        self.play_at(self.reference.unwrap_or(0.0))
+        self.slack.play(self.reference.unwrap_or(0.0))
     }
 
     /// Standard deviation of (`delta_minus`, `delta_plus`) where the reference is now.
     pub fn deviation(&self) -> (f64, f64) {
         let at = self.reference.unwrap_or(0.0);
-        let root = |side| libm::sqrt(self.offsets.variance(side, at));
-        (root(Side::Minus), root(Side::Plus))
+        let [minus, plus] = Side::BOTH.map(|side| libm::sqrt(self.slack.variance(side, at)));
+        (minus, plus)
     }
 
     /// Travel of the tip over the command's in contact: mean and standard deviation.
     pub fn gain(&self) -> (f64, f64) {
-        let (tilt, deviation) = self.offsets.tilt();
-        let gain = 1.0 / (1.0 + tilt);
-        (gain, gain * gain * deviation)
+        self.slack.gain()
     }
 
     /// The command for the next reference.
@@ -154,9 +158,9 @@ impl AdaptiveAxis {
         }
         let smooth = self.smoother.step(reference);
         let Some(last) = self.reference.replace(reference) else {
-            self.offsets.centre(reference);
+            self.slack.centre(reference);
             (self.intended, self.command) = (smooth, reference);
-            self.tip = self.carried(reference, reference);
+            self.tip = self.slack.carried(reference, reference);
             return self.command;
         };
         let increment = reference - last;
@@ -173,7 +177,7 @@ impl AdaptiveAxis {
         self.command = (reference + self.lead)
             .max(self.command.min(farthest))
             .min(self.command.max(farthest));
-        self.tip = self.carried(self.tip, self.command);
+        self.tip = self.slack.carried(self.tip, self.command);
         self.command
     }
 
@@ -185,16 +189,16 @@ impl AdaptiveAxis {
         } else {
             (Side::Minus, -1.0)
         };
-        let deviation = libm::sqrt(self.offsets.variance(side, reference));
+        let deviation = libm::sqrt(self.slack.variance(side, reference));
         if self.upwards != Some(upwards) {
             self.upwards = Some(upwards);
             self.landed = false;
             self.cautious = deviation > settings.cautious_deviation;
         }
-        let stretch = self.stretch();
-        let missing = sign * (self.offset(side, reference) - self.lead);
+        let stretch = self.slack.stretch().min(settings.gain_limit);
+        let missing = sign * (self.slack.offset(side, reference) - self.lead);
         let position = self.command - self.tip;
-        let gap = sign * (self.offset(side, self.tip) - position);
+        let gap = sign * (self.slack.offset(side, self.tip) - position);
         // Up to where the contact may already be.
         let sure = gap - deviation * deviation / settings.cautious_deviation;
         self.landed |= sure <= 0.0;
@@ -223,32 +227,16 @@ impl AdaptiveAxis {
         let settings = self.settings;
         let model = settings.model_deviation;
         let variance = deviation * deviation + model * model;
-        let mut triggers = Triggers::default();
         if !(command.is_finite() && measured.is_finite() && variance.is_finite()) {
-            return triggers;
+            return Triggers::default();
         }
-        let gains = self.gains();
+        let gains = self.slack.gains();
         let motion = self
             .stroke
             .follow(&settings.contact, gains, command, measured);
-        if let Some(motion) = motion {
-            self.offsets.travel(motion.travel);
-            let offset = command - measured;
-            let (side, sign, trigger) = if motion.upwards {
-                (Side::Plus, 1.0, &mut triggers.plus)
-            } else {
-                (Side::Minus, -1.0, &mut triggers.minus)
-            };
-            let beyond =
-                sign * (offset - self.offsets.offset(side, measured)) > libm::sqrt(variance);
-            if motion.together {
-                self.offsets.measure(side, measured, offset, variance);
-                *trigger = Some(Trigger::Contact);
-            } else if beyond {
-                self.offsets.bound(side, measured, offset, variance);
-                *trigger = Some(Trigger::Violation);
-            }
-        }
+        let triggers = motion.map_or_else(Triggers::default, |motion| {
+            self.slack.learn(motion, command, measured, variance)
+        });
         self.observe(command, measured, variance, since);
         triggers
     }
@@ -261,39 +249,15 @@ impl AdaptiveAxis {
         variance: f64,
         since: impl Iterator<Item = f64>,
     ) {
-        let mut tip = self.carried(measured, command);
+        let mut tip = self.slack.carried(measured, command);
         for command in since {
-            tip = self.carried(tip, command);
+            tip = self.slack.carried(tip, command);
         }
         let model = self.settings.model_deviation;
-        let [minus, plus] =
-            [Side::Minus, Side::Plus].map(|side| self.offsets.variance(side, measured));
+        let [minus, plus] = Side::BOTH.map(|side| self.slack.variance(side, measured));
         let own = model * model + minus.min(plus);
         self.tip += self.settings.correction * own / (own + variance) * (tip - self.tip);
-        self.tip = self.carried(self.tip, self.command);
-    }
-
-    /// Where the tip is when the command comes to be there: between the contacts, whose offsets
-    /// change with where the tip is.
-    fn carried(&self, tip: f64, command: f64) -> f64 {
-        let [plus, minus] = [Side::Plus, Side::Minus].map(|side| {
-            let beyond = command - self.offset(side, tip) - tip;
-            tip + beyond / (1.0 + self.offsets.tilt().0)
-        });
-        tip.max(plus.min(minus)).min(plus.max(minus))
-    }
-
-    /// Travel of the command for a tip in contact to travel 1, as far as the limit allows it.
-    fn stretch(&self) -> f64 {
-        (1.0 + self.offsets.tilt().0).min(self.settings.gain_limit)
-    }
-
-    /// Between which a contact's gain, tip over command, may be. One does not exclude 1.
-    fn gains(&self) -> (f64, f64) {
-        let (tilt, deviation) = self.offsets.tilt();
-        let [most, least] =
-            [-2.0, 2.0].map(|by| 1.0 + (tilt + by * deviation).clamp(TILTS.0, TILTS.1));
-        (1.0 / least, (1.0 / most).min(1.0).max(1.0 / (1.0 + tilt)))
+        self.tip = self.slack.carried(self.tip, self.command);
     }
 
     /// Use a share of the gains beyond 1: all of them with 1, no compensation with 0. Bumpless.
@@ -303,18 +267,16 @@ impl AdaptiveAxis {
 
     /// Believe in no more slack than that.
     pub(crate) const fn limit(&mut self, limit: PlayLimit) {
-        self.limit = limit;
+        self.slack.set_limit(limit);
     }
 
     pub(crate) const fn play_limit(&self) -> PlayLimit {
-        self.limit
+        self.slack.limit()
     }
 
     /// Whether more slack than may be was learnt where the reference is.
     pub(crate) fn is_limited(&self) -> bool {
-        let at = self.reference.unwrap_or(0.0);
-        let [minus, plus] = [Side::Minus, Side::Plus].map(|side| self.offsets.offset(side, at));
-        self.limit.exceeds(minus, plus)
+        self.slack.is_limited(self.reference.unwrap_or(0.0))
     }
 
     /// Go on from another command than that of the last step, with the reference counted from elsewhere by `shift`, and
@@ -330,29 +292,7 @@ impl AdaptiveAxis {
             } else {
                 command
             };
-            self.tip = self.carried(tip, command);
+            self.tip = self.slack.carried(tip, command);
         }
-    }
-
-    fn offset(&self, side: Side, position: f64) -> f64 {
-        let [minus, plus] = self.offsets_at(position);
-        match side {
-            Side::Minus => minus,
-            Side::Plus => plus,
-        }
-    }
-
-    fn offsets_at(&self, position: f64) -> [f64; 2] {
-        let [minus, plus] =
-            [Side::Minus, Side::Plus].map(|side| self.offsets.offset(side, position));
-        self.limit.clamp(minus, plus)
-    }
-
-    fn play_at(&self, position: f64) -> Play {
-        let [minus, plus] =
-            [Side::Minus, Side::Plus].map(|side| self.offsets.offset(side, position));
-        // Sides that have crossed are a width too, and limited as one.
-        let [minus, plus] = self.limit.clamp(minus.min(plus), minus.max(plus));
-        Play::from_ordered(minus, plus)
     }
 }

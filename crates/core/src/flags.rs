@@ -1,10 +1,10 @@
 //! What can be noticed to be wrong. The one place where it has a name.
 
 macro_rules! flags {
-    ($($(#[$doc:meta])+ $flag:ident = $name:literal,)+) => {
+    ($($(#[doc = $doc:literal])+ $flag:ident = $name:literal,)+) => {
         /// What a guard noticed, or the rig reported.
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-        pub enum Flag { $($(#[$doc])+ $flag,)+ }
+        pub enum Flag { $($(#[doc = $doc])+ $flag,)+ }
 
         impl Flag {
             /// Every flag, in the order of its bit in [`Flags`].
@@ -13,6 +13,11 @@ macro_rules! flags {
             /// As configuration, reports and logs call it.
             pub const fn name(self) -> &'static str {
                 match self { $(Self::$flag => $name,)+ }
+            }
+
+            /// What it says, in a sentence.
+            pub const fn meaning(self) -> &'static str {
+                match self { $(Self::$flag => concat!($($doc),+).trim_ascii(),)+ }
             }
         }
     };
@@ -31,7 +36,7 @@ flags! {
     Clock = "clock",
     /// An image too far from what model and last images make one expect.
     Innovation = "innovation",
-    /// The same, and it would fit with the markers exchanged.
+    /// An image that would be as expected with the markers exchanged.
     Swapped = "swapped",
     /// One marker alone, or two of which one is where it cannot be.
     Merged = "merged",

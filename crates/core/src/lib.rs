@@ -46,6 +46,7 @@ mod play;
 mod posture;
 mod reduction;
 mod sight;
+mod slack;
 mod smoother;
 mod state;
 mod supervisor;

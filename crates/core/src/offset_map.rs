@@ -82,6 +82,11 @@ pub enum Side {
     Plus,
 }
 
+impl Side {
+    /// Minus, then plus.
+    pub(crate) const BOTH: [Self; 2] = [Self::Minus, Self::Plus];
+}
+
 /// Both contact offsets over position: the tilt, and what is left of them at nodes, linear between
 /// them, constant beyond the outermost; mean and joint covariance. A Kalman filter, one scalar
 /// measurement at a time.

@@ -32,7 +32,7 @@ def load_config(path: str | PathLike[str] | None = None, profile: Profile | None
     try:
         document = tomllib.loads(file.read_text(encoding="utf-8"))
     except (FileNotFoundError, IsADirectoryError):
-        raise MissingPathError("config", str(file), "a TOML file") from None
+        raise MissingPathError("config", str(file), "a TOML file that is there") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ConfigError("config", str(file), f"TOML ({error})") from None
     _place_files(document, file.absolute().parent)

@@ -4,19 +4,26 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import sys
 import threading
 import time
 from pathlib import Path
-from typing import get_args
+from typing import TYPE_CHECKING
 
-from tautscope.config import Profile, load_config
+from tautscope.commands import arguments
+from tautscope.commands.printing import print_json
+from tautscope.config import load_config
+from tautscope.dof import Dof
 from tautscope.errors import ConfigError
+
+if TYPE_CHECKING:
+    from tautscope.results import DofResult
 
 BENCH = "configs/bench.toml"
 
 
-def add_parsers(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parsers(verbs: arguments.Verbs) -> None:
     """Add the verbs to the command's."""
     run = verbs.add_parser(
         "run",
@@ -28,16 +35,14 @@ def add_parsers(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
         "medical device; have an emergency stop within reach.",
     )
     run.add_argument("config", metavar="CONFIG.toml", help="the rig")
-    run.add_argument("--profile", choices=get_args(Profile), help="how slack is compensated")
+    arguments.add_profile(run, "how slack is compensated")
     run.add_argument(
         "--compare",
         action="store_true",
         help="run without compensation first, and print Table 1 as the camera sees it",
     )
-    run.add_argument(
-        "--out", type=Path, metavar="DIR", help="folder, new or empty [runs/<date-time>-run]"
-    )
-    run.add_argument("--json", action="store_true", help="print one JSON object and no more")
+    arguments.add_out(run, "run")
+    arguments.add_json(run)
     run.set_defaults(run=_run)
 
     bench = verbs.add_parser(
@@ -82,11 +87,11 @@ def _fault(text: str) -> tuple[float, str]:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from tautscope.demo import default_folder  # noqa: PLC0415
     from tautscope.hardware.experiment import (  # noqa: PLC0415
         run_on_hardware,
         write_run_folder,
     )
+    from tautscope.output import default_folder  # noqa: PLC0415
     from tautscope.progress import progress_bar  # noqa: PLC0415
 
     config = load_config(options.config, options.profile)
@@ -99,9 +104,8 @@ def _run(options: argparse.Namespace) -> int:
         print("\n".join(["interrupted; the motors are stopped", *notes]), file=sys.stderr)
         return 130
     write_run_folder(found, folder)
-    document = found.to_json()
     if options.json:
-        print(json.dumps(document, allow_nan=False))
+        print_json(found.to_json())
         return 0
     timing = found.compensated.timing.summary()
     print(
@@ -109,13 +113,26 @@ def _run(options: argparse.Namespace) -> int:
         f"{timing['jitter_ms']['worst']:.2g} ms late; {timing['frames']} frames, age "
         f"{timing['frame_age_ms']['median']:.3g} ms (median)."
     )
-    for dof, widths in document.get("by_camera", {}).items():
-        known = widths["reduction"]
-        print(f"{dof}: reduction {'not known' if known is None else f'{known:.0%}'}, by camera")
+    for dof, result in found.results.items():
+        print(_seen(dof, result))
     for warning in found.compensated.recording.warnings:
-        print(f"Warning: {warning}")
+        print(f"Noticed: {warning}.")
     print(f"Report, figures and traces: {folder / 'report.html'}")
     return 0
+
+
+def _seen(dof: Dof, found: DofResult) -> str:
+    """What the camera saw of a DOF in a line; a dash for what is not known."""
+
+    def shown(value: float) -> str:
+        return "-" if math.isnan(value) else f"{dof.display_scale * value:.3g} {dof.display_unit}"
+
+    line = f"{dof.label}: slack left {shown(found.compensated_estimate)}"
+    if not math.isnan(found.uncompensated_estimate):
+        gone = found.reduction_estimate
+        share = "-" if math.isnan(gone) else f"{gone:.0%}"
+        line += f" of {shown(found.uncompensated_estimate)}, reduction {share}"
+    return f"{line}; tracking error {shown(found.tracking_estimate)} RMS; by camera"
 
 
 def _bench(options: argparse.Namespace) -> None:

@@ -70,31 +70,29 @@ class HardwareRun:
     uncompensated: Part | None = None
 
     @property
-    def results(self) -> Results | None:
-        """Table 1 as the camera sees it; None without an uncompensated run."""
-        if self.uncompensated is None:
-            return None
-        return evaluate(self.uncompensated.recording, self.compensated.recording)
+    def results(self) -> Results:
+        """Table 1 as the camera sees it; half of it NaN without an uncompensated run."""
+        plain = None if self.uncompensated is None else self.uncompensated.recording
+        return evaluate(plain, self.compensated.recording)
 
     def to_json(self) -> dict[str, Any]:
         """What ``tautscope run --json`` prints; widths in m or rad, None if not known."""
         parts = {"compensated": self.compensated}
         if self.uncompensated is not None:
             parts = {"uncompensated": self.uncompensated, **parts}
-        document: dict[str, Any] = {
+        return {
             "profile": self.config.profile,
             "runs": {name: _facts(part) for name, part in parts.items()},
-        }
-        if (results := self.results) is not None:
-            document["by_camera"] = {
+            "by_camera": {
                 dof.label: {
                     "uncompensated": finite_or_none(found.uncompensated_estimate),
                     "compensated": finite_or_none(found.compensated_estimate),
                     "reduction": finite_or_none(found.reduction_estimate),
+                    "tracking_rms": finite_or_none(found.tracking_estimate),
                 }
-                for dof, found in results.items()
-            }
-        return document
+                for dof, found in self.results.items()
+            },
+        }
 
 
 def run_on_hardware(
@@ -146,32 +144,33 @@ def write_run_folder(run: HardwareRun, folder: Path) -> None:
     first, results = run.compensated, run.results
     first.recording.write(folder)
     picture = figures.timing_figure(first.timing)
+    plain = None if run.uncompensated is None else run.uncompensated.recording
+    loops = figures.figure9(plain, first.recording)
     pictures = [
+        report.Picture(
+            loops,
+            "Fig. 9. (a)-(c) with compensation: reference, command, estimate and both contact "
+            "offsets. (d)-(f) loops of the estimate; the first period, in which the slack is "
+            "learnt, is thin. The dashed line is a perfect tip.",
+        ),
         report.Picture(
             picture,
             "How punctual the run was. (a), (b) how much later than due each set-point was sent; "
             "(c), (d) from capture until the loop was given the frame.",
-        )
+        ),
     ]
-    if run.uncompensated is not None and results is not None:
+    if run.uncompensated is not None:
         run.uncompensated.recording.write(folder, "_uncompensated")
         run.uncompensated.timing.write(folder, "_uncompensated")
-        tables.write_csv(folder / "table1.csv", [run.config.twin.seed], [results])
-        compared = figures.figure9(run.uncompensated.recording, first.recording)
-        caption = (
-            "Fig. 9. (a)-(c) with compensation: reference, command, estimate and both contact "
-            "offsets. (d)-(f) loops of the estimate."
-        )
-        pictures.insert(0, report.Picture(compared, caption))
+    tables.write_csv(folder / "table1.csv", [run.config.twin.seed], {run.config.profile: [results]})
     facts = {
         "control": f"{1 / first.timing.cycle:g} Hz, {first.timing.lost} cycles lost",
         "log": first.log.path.name,
     }
     with figures.style():
         picture.savefig(folder / "timing.png")
-        if len(pictures) > 1:
-            pictures[0].figure.savefig(folder / "fig9.png")
-        page = report.run_report(run.config, facts, results, pictures)
+        loops.savefig(folder / "fig9.png")
+        page = report.run_report(run.config, facts, results, pictures, first.recording.warnings)
     (folder / "report.html").write_text(page, encoding="utf-8")
     (folder / "run.json").write_text(json.dumps(run.to_json(), indent=1), encoding="utf-8")
     first.timing.write(folder)

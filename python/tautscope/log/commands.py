@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import json
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any
 
-from tautscope.config import Config, Profile, load_config
+from tautscope.commands import arguments
+from tautscope.commands.printing import console, print_json
+from tautscope.config import Config, load_config
 from tautscope.errors import FieldError
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from tautscope.recording import Recording
 
 
-def add_parsers(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parsers(verbs: arguments.Verbs) -> None:
     """Add the verbs to the command's."""
     recover = verbs.add_parser(
         "recover",
@@ -66,28 +67,16 @@ def add_parsers(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
     replay.add_argument("--motors", type=Path, metavar="FILE.csv", help="motor positions")
     replay.add_argument(
         "--video-start",
-        type=_seconds,
+        type=arguments.seconds,
         default=0.0,
         metavar="S",
         help="time of the video's first frame in the CSV's [s] [%(default)s]",
     )
-    replay.add_argument("--config", metavar="FILE", help="TOML file; what it leaves out is default")
-    replay.add_argument("--profile", choices=get_args(Profile), help="how slack is learnt")
-    replay.add_argument(
-        "--out", type=Path, metavar="DIR", help="folder, new or empty [runs/<date-time>-replay]"
-    )
-    replay.add_argument("--json", action="store_true", help="print one JSON object and no more")
+    arguments.add_config(replay)
+    arguments.add_profile(replay, "how slack is learnt")
+    arguments.add_out(replay, "replay")
+    arguments.add_json(replay)
     replay.set_defaults(run=_replay)
-
-
-def _seconds(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f"got {text!r}, expected a number of seconds")
-    return value
 
 
 def _recover(options: argparse.Namespace) -> None:
@@ -151,7 +140,7 @@ def _replay_same(options: argparse.Namespace, log: Log) -> int:
     if options.out is not None:
         write_replay(options.out, replayed, log.recording())
     if options.json:
-        _print_json(
+        print_json(
             {
                 "identical": found.is_identical,
                 "ticks": found.ticks,
@@ -213,8 +202,7 @@ def _replay_video(options: argparse.Namespace) -> int:
 
 
 def _folder(options: argparse.Namespace) -> Path:
-    from tautscope.demo import default_folder  # noqa: PLC0415
-    from tautscope.output import check_free  # noqa: PLC0415
+    from tautscope.output import check_free, default_folder  # noqa: PLC0415
 
     return check_free(options.out or default_folder("replay"))
 
@@ -234,7 +222,7 @@ def _tell(
             if before is not None:
                 entry["recorded"] = _finite(before[dof])
             document["dof"][dof.label] = entry
-        _print_json(document)
+        print_json(document)
         return
     _print_table(replayed, before, after)
     print(f"\nFigure and samples: {folder / 'replay.png'}")
@@ -245,7 +233,6 @@ def _print_table(
     before: dict[Any, Estimation] | None,
     after: dict[Any, Estimation],
 ) -> None:
-    from rich.console import Console  # noqa: PLC0415
     from rich.table import Table  # noqa: PLC0415
 
     table = Table(box=None, pad_edge=False, title_justify="left", title_style="bold")
@@ -268,7 +255,7 @@ def _print_table(
             cells += [_cell(getattr(each, name), name, dof.display_scale) for each in pair]
         if any(cells):
             table.add_row(title, *cells)
-    Console(highlight=False, markup=False, width=120).print(table)
+    console().print(table)
 
 
 def _cell(value: float, name: str, scale: float) -> str:
@@ -289,7 +276,3 @@ def _print_troubles(log: Log) -> None:
         print("The log is damaged; `tautscope recover` makes it one that every reader opens.")
     for warning in log.warnings:
         print(f"The log warns: {warning}.")
-
-
-def _print_json(document: dict[str, Any]) -> None:
-    print(json.dumps(document, allow_nan=False))

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tautscope.commands import arguments
+from tautscope.commands.printing import print_json
 from tautscope.config import load_config
 
 if TYPE_CHECKING:
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from tautscope.hardware.doctor.finding import Finding
 
 
-def add_parser(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(verbs: arguments.Verbs) -> None:
     """Add the verb to the command's."""
     doctor = verbs.add_parser(
         "doctor",
@@ -27,7 +28,7 @@ def add_parser(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> No
         "if all is there, 1 if something is missing.",
     )
     doctor.add_argument("config", nargs="?", metavar="CONFIG", help="TOML file of a rig")
-    doctor.add_argument("--json", action="store_true", help="print one JSON object and no more")
+    arguments.add_json(doctor)
     doctor.set_defaults(run=_doctor)
 
 
@@ -75,8 +76,7 @@ def _doctor(options: argparse.Namespace) -> int:
                 _print(found)
     missing = sum(found.status == "missing" for found in findings)
     if options.json:
-        document = {"complete": not missing, "findings": [found.to_json() for found in findings]}
-        print(json.dumps(document, allow_nan=False))
+        print_json({"complete": not missing, "findings": [found.to_json() for found in findings]})
     elif missing:
         print(f"\n{missing} missing. No motor was enabled.")
     else:

@@ -1,0 +1,129 @@
+//! The slack of one DOF as profile `best` believes in it: a play whose offsets change with the tip's position.
+
+use crate::contact::Motion;
+use crate::estimator::{Trigger, Triggers};
+use crate::limits::PlayLimit;
+use crate::offset_map::{OffsetMap, OffsetPrior, Side, TILTS};
+use crate::play::Play;
+
+/// What was learnt of both contact offsets, and the most of it that is believed; in the unit of the DOF.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Slack {
+    learnt: OffsetMap,
+    limit: PlayLimit,
+}
+
+impl Slack {
+    /// The offsets of `play` everywhere, trusted as far as the prior says, without limit.
+    pub fn new(prior: OffsetPrior, play: Play) -> Self {
+        Self {
+            learnt: OffsetMap::new(prior, play.delta_minus(), play.delta_plus()),
+            limit: PlayLimit::NONE,
+        }
+    }
+
+    /// See [`OffsetMap::centre`].
+    pub const fn centre(&mut self, position: f64) {
+        self.learnt.centre(position);
+    }
+
+    /// Believe in no more slack than that.
+    pub const fn set_limit(&mut self, limit: PlayLimit) {
+        self.limit = limit;
+    }
+
+    /// The most slack that is believed.
+    pub const fn limit(&self) -> PlayLimit {
+        self.limit
+    }
+
+    /// Whether more slack than may be was learnt at a position.
+    pub fn is_limited(&self, position: f64) -> bool {
+        let [minus, plus] = Side::BOTH.map(|side| self.learnt.offset(side, position));
+        self.limit.exceeds(minus, plus)
+    }
+
+    /// Both offsets at a position, within the limit.
+    fn offsets(&self, position: f64) -> [f64; 2] {
+        let [minus, plus] = Side::BOTH.map(|side| self.learnt.offset(side, position));
+        self.limit.clamp(minus, plus)
+    }
+
+    /// One of them.
+    pub fn offset(&self, side: Side, position: f64) -> f64 {
+        let [minus, plus] = self.offsets(position);
+        match side {
+            Side::Minus => minus,
+            Side::Plus => plus,
+        }
+    }
+
+    /// The variance of an offset at a position.
+    pub fn variance(&self, side: Side, position: f64) -> f64 {
+        self.learnt.variance(side, position)
+    }
+
+    /// The play operator at a position.
+    pub fn play(&self, position: f64) -> Play {
+        let [minus, plus] = Side::BOTH.map(|side| self.learnt.offset(side, position));
+        // Sides that have crossed are a width too, and limited as one.
+        let [minus, plus] = self.limit.clamp(minus.min(plus), minus.max(plus));
+        Play::from_ordered(minus, plus)
+    }
+
+    /// Travel of the command for a tip in contact to travel 1.
+    pub fn stretch(&self) -> f64 {
+        1.0 + self.learnt.tilt().0
+    }
+
+    /// Travel of the tip over the command's in contact: mean and standard deviation.
+    pub fn gain(&self) -> (f64, f64) {
+        let gain = 1.0 / self.stretch();
+        (gain, gain * gain * self.learnt.tilt().1)
+    }
+
+    /// Between which the gain in contact may be. One does not exclude 1.
+    pub fn gains(&self) -> (f64, f64) {
+        let (tilt, deviation) = self.learnt.tilt();
+        let [most, least] =
+            [-2.0, 2.0].map(|by| 1.0 + (tilt + by * deviation).clamp(TILTS.0, TILTS.1));
+        (1.0 / least, (1.0 / most).min(1.0).max(1.0 / (1.0 + tilt)))
+    }
+
+    /// Where the tip is when the command comes to be there: between the contacts, whose offsets
+    /// change with where the tip is.
+    pub fn carried(&self, tip: f64, command: f64) -> f64 {
+        let [minus, plus] = Side::BOTH.map(|side| {
+            let beyond = command - self.offset(side, tip) - tip;
+            tip + beyond / self.stretch()
+        });
+        tip.max(plus.min(minus)).min(plus.max(minus))
+    }
+
+    /// Learn from how a measurement with this variance belongs to the others of its stroke: in contact it is an
+    /// offset; beyond the contact believed in, a bound of one.
+    pub fn learn(
+        &mut self,
+        motion: Motion,
+        command: f64,
+        measured: f64,
+        variance: f64,
+    ) -> Triggers {
+        self.learnt.travel(motion.travel);
+        let mut triggers = Triggers::default();
+        let offset = command - measured;
+        let (side, sign, trigger) = if motion.upwards {
+            (Side::Plus, 1.0, &mut triggers.plus)
+        } else {
+            (Side::Minus, -1.0, &mut triggers.minus)
+        };
+        if motion.together {
+            self.learnt.measure(side, measured, offset, variance);
+            *trigger = Some(Trigger::Contact);
+        } else if sign * (offset - self.learnt.offset(side, measured)) > libm::sqrt(variance) {
+            self.learnt.bound(side, measured, offset, variance);
+            *trigger = Some(Trigger::Violation);
+        }
+        triggers
+    }
+}

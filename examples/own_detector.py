@@ -1,0 +1,56 @@
+"""A marker detector of your own, here twenty lines of OpenCV, in place of ours.
+
+The loop takes two centroids in px and the time of capture; where they come from is up to you.
+Run it with ``uv run python examples/own_detector.py``.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from own_rig import DrawnRig, short_experiment
+from tautscope import Frame, HysteresisReduction, Report, run_experiment
+from tautscope.references import SineSequence
+from tautscope.results import evaluate
+
+LEAST_AREA = 20
+"""Smaller regions are noise [px^2]."""
+
+
+def find_bands(
+    image: NDArray[np.uint8], predicted: NDArray[np.float64] | None
+) -> NDArray[np.float64] | None:
+    """Centroids u, v of band A and of band B (4,) [px]: the two largest green regions."""
+    blue, green, red = cv2.split(image)
+    mask = (cv2.subtract(green, cv2.max(blue, red)) > 40).astype(np.uint8)
+    _, _, stats, centroids = cv2.connectedComponentsWithStats(mask)
+    areas = stats[1:, cv2.CC_STAT_AREA]  # the first is the background
+    largest = 1 + np.argsort(areas)[:-3:-1]
+    if predicted is None or len(largest) < 2 or areas[largest - 1].min() < LEAST_AREA:
+        return None
+    first, second = centroids[largest]
+    if np.linalg.norm(first - predicted[:2]) > np.linalg.norm(second - predicted[:2]):
+        first, second = second, first
+    return np.concatenate([first, second])
+
+
+def look(loop: HysteresisReduction, frame: Frame) -> Report:
+    """The image update with it."""
+    predicted = loop.predicted_features(frame.captured_at)
+    return loop.on_features(find_bands(frame.image, predicted), frame.captured_at)
+
+
+def main() -> None:
+    config = short_experiment()
+    reference = SineSequence(config.experiment)
+    runs = [
+        run_experiment(DrawnRig(config), reference, config, compensate, look=look)
+        for compensate in (False, True)
+    ]
+    for dof, result in evaluate(*runs).items():
+        print(f"{dof.label}: {result.reduction:.0%} of the hysteresis is gone")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,86 @@
+"""Options and kinds of numbers that several verbs have."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+from typing import TypeAlias, get_args
+
+from tautscope.config import Profile
+
+Verbs: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
+
+
+def add_config(parser: argparse.ArgumentParser) -> None:
+    """``--config``."""
+    parser.add_argument("--config", metavar="FILE", help="TOML file; what it leaves out is default")
+
+
+def add_profile(parser: argparse.ArgumentParser, what: str, default: str | None = None) -> None:
+    """``--profile``: `what` it changes."""
+    shown = "the configuration's" if default is None else default
+    parser.add_argument(
+        "--profile", choices=get_args(Profile), default=default, help=f"{what} [{shown}]"
+    )
+
+
+def add_out(parser: argparse.ArgumentParser, verb: str) -> None:
+    """``--out``, by default `tautscope.output.default_folder` of the verb."""
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help=f"folder, new or empty [runs/<date-time>-{verb}]"
+    )
+
+
+def add_json(parser: argparse.ArgumentParser) -> None:
+    """``--json``."""
+    parser.add_argument("--json", action="store_true", help="print one JSON object and no more")
+
+
+def natural(text: str) -> int:
+    """An integer of at least 0."""
+    return _integer(text, 0)
+
+
+def positive(text: str) -> int:
+    """An integer of at least 1."""
+    return _integer(text, 1)
+
+
+def _integer(text: str, least: int) -> int:
+    if not text.isdecimal() or int(text) < least:
+        raise argparse.ArgumentTypeError(f"got {text!r}, expected an integer of at least {least}")
+    return int(text)
+
+
+def above_zero(text: str) -> float:
+    """A finite number above 0."""
+    value = _number(text)
+    if not value > 0:
+        raise argparse.ArgumentTypeError(f"got {text!r}, expected a number above 0")
+    return value
+
+
+def not_zero(text: str) -> float:
+    """A finite number other than 0."""
+    value = _number(text)
+    if math.isnan(value) or value == 0:
+        raise argparse.ArgumentTypeError(f"got {text!r}, expected a number other than 0")
+    return value
+
+
+def seconds(text: str) -> float:
+    """A finite number."""
+    value = _number(text)
+    if math.isnan(value):
+        raise argparse.ArgumentTypeError(f"got {text!r}, expected a number of seconds")
+    return value
+
+
+def _number(text: str) -> float:
+    """The finite number in a text, or NaN."""
+    try:
+        value = float(text)
+    except ValueError:
+        return math.nan
+    return value if math.isfinite(value) else math.nan

@@ -1,0 +1,140 @@
+"""``tautscope demo``."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tautscope.commands import arguments
+from tautscope.commands.printing import console, print_json
+from tautscope.config import DISTURBANCES, Config, load_config
+from tautscope.errors import MissingPathError
+
+if TYPE_CHECKING:
+    from tautscope.demo import Demo
+
+
+def add_parser(verbs: arguments.Verbs) -> None:
+    """Add the verb to the command's."""
+    demo = verbs.add_parser(
+        "demo",
+        allow_abbrev=False,
+        help="run the article's experiment on the simulated instrument",
+        description="Run the article's experiment on the simulated instrument, with and without "
+        "compensation, camera images the only feedback. Prints Table 1, the article beside ours, "
+        "and writes a run folder with tables, traces, figures and a report.",
+    )
+    arguments.add_profile(
+        demo, "how slack is compensated: as in the article, or ours beside it", "best"
+    )
+    demo.add_argument(
+        "--seed",
+        type=arguments.natural,
+        metavar="N",
+        help="first seed [twin.seed of the configuration]",
+    )
+    demo.add_argument(
+        "--seeds",
+        type=arguments.positive,
+        default=1,
+        metavar="N",
+        help="number of seeds [%(default)s]",
+    )
+    demo.add_argument(
+        "--background", metavar="DIR", help="folder of images to use as tissue [procedural mucosa]"
+    )
+    demo.add_argument(
+        "--disturb",
+        metavar="NAME[,NAME]",
+        help=f"disturb the pictures: {', '.join(DISTURBANCES)} [twin.disturb of the configuration]",
+    )
+    arguments.add_out(demo, "demo")
+    arguments.add_config(demo)
+    arguments.add_json(demo)
+    demo.set_defaults(run=_run)
+
+
+def _run(options: argparse.Namespace) -> None:
+    from tautscope import demo, tables  # noqa: PLC0415
+    from tautscope.output import check_free, default_folder  # noqa: PLC0415
+    from tautscope.progress import progress_bar  # noqa: PLC0415
+
+    config = _configured(options)
+    folder = check_free(options.out or default_folder("demo"))
+    first = config.twin.seed
+    seeds = range(first, first + options.seeds)
+    each = 2 if config.profile == "paper" else 3
+    with progress_bar(f"{each * len(seeds)} runs") as progress:
+        found = demo.run_demo(config, seeds, progress)
+    demo.write_run_folder(found, folder)
+    if options.json:
+        print_json(
+            tables.to_json(
+                options.profile,
+                seeds,
+                found.results,
+                found.sim_seconds,
+                found.wall_seconds,
+                article_results=found.article_results,
+            )
+        )
+    else:
+        _print_table1(found, folder)
+
+
+def _configured(options: argparse.Namespace) -> Config:
+    config = load_config(options.config, options.profile)
+    changes: dict[str, Any] = {}
+    if options.seed is not None:
+        changes["twin.seed"] = options.seed
+    if options.background is not None:
+        changes["twin.background"] = options.background
+    if options.disturb is not None:
+        changes["twin.disturb"] = [name.strip() for name in options.disturb.split(",")]
+    config = config.replace(**changes)
+    background = config.twin.background
+    if background is not None and not Path(background).is_dir():
+        raise MissingPathError("twin.background", background, "a folder of images")
+    return config
+
+
+def _print_table1(demo: Demo, folder: Path) -> None:
+    from rich.table import Table  # noqa: PLC0415
+
+    from tautscope import tables  # noqa: PLC0415
+
+    profiles = demo.by_profile
+    several = len(demo.seeds) > 1
+    title = "Table 1: the article, and the twin" + (
+        f" (median of {len(demo.seeds)} seeds, worst in brackets)" if several else ""
+    )
+    figures = [
+        (name, tables.median(results), tables.worst(results)) for name, results in profiles.items()
+    ]
+    table = Table(title=title, box=None, title_justify="left", title_style="bold", pad_edge=False)
+    table.add_column("", no_wrap=True)
+    for dof in demo.results[0]:
+        table.add_column(
+            f"{tables.heading(dof)}\narticle", justify="right", style="dim", no_wrap=True
+        )
+        for name in profiles:
+            table.add_column(f"\n{name}", justify="right")
+    for row in tables.ROWS:
+        cells = []
+        for dof in demo.results[0]:
+            cells.append(tables.article_cell(row, dof))
+            for _, middle, bad in figures:
+                ours = tables.cell(row, dof, getattr(middle[dof], row.name))
+                worst = f" ({tables.cell(row, dof, getattr(bad[dof], row.name))})"
+                cells.append(ours + worst * several)
+        table.add_row(row.title, *cells)
+    screen = console()
+    screen.print(table)
+    screen.print(
+        f"\n{demo.sim_seconds:.0f} s simulated in {demo.wall_seconds:.0f} s. "
+        f"Widths in the last two periods, of the true tip unless said."
+    )
+    for line in demo.compensated.warnings:
+        screen.print(f"Noticed: {line}.", soft_wrap=True)
+    screen.print(f"Report, figures and traces: {folder / 'report.html'}", soft_wrap=True)
