@@ -114,6 +114,8 @@ def test_demo_prints_the_article_beside_ours(
     assert next(line.split() for line in out.splitlines() if "article" in line and "paper" in line)[
         :3
     ] == ["article", "paper", "best"]
+    table = (tmp_path / "run" / "table1.csv").read_text().splitlines()
+    assert {line.split(",")[2] for line in table[1:]} == {"", "paper", "best"}
     reduction = next(line for line in out.splitlines() if line.startswith("reduction "))
     assert [cell for cell in reduction.split("  ") if cell.strip()][1].strip() == "75 %"
     assert "rotation [rad]" in out

@@ -145,6 +145,13 @@ def test_the_uncompensated_loop_is_drawn_wider(runs: tuple[Recording, Recording]
     assert first > after, "the first period, in which it learns, is the wider one"
 
 
+def test_a_loop_that_was_never_seen_is_said(runs: tuple[Recording, Recording]) -> None:
+    recording = replace(runs[1], frames=runs[1].frames.copy())
+    recording.frames["observable_rotation"] = False
+    for index, axis in enumerate(figures.figure9(None, recording).axes[3:]):
+        assert [text.get_text() for text in axis.texts] == ["not seen"] * (index == 1)
+
+
 def test_figure5_names_the_markers_where_they_are(runs: tuple[Recording, Recording]) -> None:
     snapshot = runs[1].snapshot
     assert snapshot is not None

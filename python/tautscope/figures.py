@@ -132,6 +132,9 @@ def _loops(
             shown = slice(begin, None) if width == 1.0 else slice(begin + 1)
             x, y = x[shown], y[shown]
         axes.plot(x * scale, y * scale, color=colour, linewidth=width, label=label)
+    if not any(np.size(line.get_xydata()) for line in axes.lines):
+        axes.text(0.25, 0.75, "not seen", transform=axes.transAxes, ha="center")
+        axes.set(xticks=[], yticks=[])
     low, high = zip(axes.get_xlim(), axes.get_ylim(), strict=True)
     axes.axline((0, 0), slope=1, color=BLACK, linewidth=0.5, linestyle=(0, (4, 4)), zorder=0)
     axes.set_xlabel(f"{'u' if uncompensated is None else 'c or u'} [{dof.display_unit}]")

@@ -7,6 +7,30 @@
 //!
 //! Constructors check their arguments and say which is wrong ([`ConfigError`]); what runs in the
 //! loop cannot fail, does not allocate, reads no clock and does no I/O. Units are m, rad, s, px.
+//!
+//! One DOF in the article's way; `tests/no_alloc.rs` puts a whole loop together.
+//!
+//! ```
+//! use tautscope_core::{Compensator, CompensatorState, Estimator, EstimatorState, Play, PlayState};
+//!
+//! # fn main() -> Result<(), tautscope_core::ConfigError> {
+//! let unknown = Play::new(0.0, 0.0)?;
+//! let (compensator, mut lead) = (Compensator::new(5.0, 5.0)?, CompensatorState::new(unknown));
+//! let (estimator, mut learnt) = (Estimator::new(0.4, 0.4, 0.25)?, EstimatorState::new(unknown));
+//! let (instrument, mut tip) = (Play::new(-5.0, 5.0)?, PlayState { output: 0.0 }); // 10 mm
+//!
+//! for tick in 0..20_000 {
+//!     let reference = 15.0 * (f64::from(tick) / 1000.0).sin();
+//!     let command = compensator.step(&mut lead, reference);
+//!     let measured = instrument.step(&mut tip, command); // yours: what the image says
+//!     if estimator.update(&mut learnt, command, measured).any() {
+//!         compensator.retune(&mut lead, learnt.play());
+//!     }
+//! }
+//! assert!((learnt.play().width() - 10.0).abs() < 0.5);
+//! # Ok(())
+//! # }
+//! ```
 #![no_std]
 #![forbid(unsafe_code)]
 #![cfg_attr(
