@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -13,7 +15,7 @@ import numpy as np
 import pytest
 from drive_rig import drives_document
 from tautscope.bench.rig import Bench
-from tautscope.bench.truth import read_truth
+from tautscope.bench.truth import TruthFile, read_truth
 from tautscope.config import Config, dump_config, from_document
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError, OutputError
@@ -140,6 +142,29 @@ def test_a_fault_that_is_none_is_refused(tmp_path: Path) -> None:
         for line in ("explode camera", "freeze", "freeze tail", "explode rotation"):
             with pytest.raises(ConfigError, match="fault"):
                 bench.request(line)
+
+
+def test_a_disk_that_stalls_holds_no_drive_up(tmp_path: Path) -> None:
+    """A pipe that nobody reads is a disk that takes nothing; what waits is written in the end."""
+    pipe = tmp_path / "truth.csv"
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    told = np.arange(4 * 5000, dtype=float).reshape(-1, 4)
+    with TruthFile(pipe) as truth:
+        for now, *state in told:
+            truth.add(now, np.array(state))  # 100 kB: more than a pipe holds
+        time.sleep(0.3)
+        os.set_blocking(reader, True)
+        drain = threading.Thread(target=lambda: _copy(reader, tmp_path / "copy.csv"))
+        drain.start()
+    drain.join()
+    instants, states = read_truth(tmp_path / "copy.csv")
+    np.testing.assert_array_equal(np.column_stack([instants, states]), told)
+
+
+def _copy(reader: int, file: Path) -> None:
+    with os.fdopen(reader, "rb") as pipe:
+        file.write_bytes(pipe.read())
 
 
 @pytest.fixture

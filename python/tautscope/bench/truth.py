@@ -44,7 +44,7 @@ class TruthFile:
 
     def add(self, now: float, state: NDArray[np.float64]) -> None:
         """The tip (3,) [m, rad, rad] at an instant of the monotonic clock [s]."""
-        self._lines.append((now, float(state[0]), float(state[1]), float(state[2])))
+        self._lines.append((float(now), float(state[0]), float(state[1]), float(state[2])))
 
     def __enter__(self) -> Self:
         return self
