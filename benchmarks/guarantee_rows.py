@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,12 +12,9 @@ from fault_draws import WATCHED, WATCHED_FOR_GOOD, configured
 from fault_judgement import PASSING
 from fault_tables import seeds as seeds_of
 from fault_watch import FeatureTwin, Hand, look
-from tautscope import HysteresisReduction, Twin, load_config
+from tautscope import HysteresisReduction, load_config
 from tautscope.dof import Dof
-from tautscope.errors import RecordError
 from tautscope.experiment import run_experiment
-from tautscope.log.reader import read_log
-from tautscope.log.writer import LogWriter
 
 Row = dict[str, Any]
 
@@ -29,8 +24,6 @@ LASTING = 8.3e-3
 """Goal of the tip when compensation is lost for good [m]."""
 DORMANT = 3e-3
 """Goal of the tip with a detector off [m]."""
-FLIPS = 1_000
-"""Bits flipped, beside the cuts."""
 
 
 @dataclass(frozen=True)
@@ -124,8 +117,7 @@ def stalls(count: int) -> Figure:
     """G14: the loop is not called for a while, and the hand goes on."""
     config = load_config(profile="best")
     period, chance = config.control.period, np.random.default_rng(14)
-    safety = getattr(config, "safety", None)
-    speed = 0.15 if safety is None else safety.command_speed[0]
+    speed = config.safety.command_speed[0]
     worst, broken = 0.0, 0
     loop, time, last = HysteresisReduction(config), 0.0, 0.0
     for stall in range(count):
@@ -138,9 +130,7 @@ def stalls(count: int) -> Figure:
             step = abs(command - last) if stall % 50 or tick else 0.0
             worst, broken = max(worst, step), broken + (step > speed * period * (1 + 1e-9))
             last = command
-        engage = getattr(loop, "engage", None)
-        if engage is not None:
-            engage()
+        loop.engage()
     text = f"{1e3 * worst:.3f} mm, v_max dt = {1e3 * speed * period:.3f} mm"
     return Figure(text, str(count), broken, "14")
 
@@ -157,42 +147,3 @@ def _digest() -> str:
     hand = Hand(config, dict.fromkeys(Dof, 3.0), lambda: twin.time, 2.0)
     recording = run_experiment(twin, hand, config, look=look)
     return hashlib.sha256(recording.trace.tobytes() + recording.frames.tobytes()).hexdigest()
-
-
-def cuts(every: int) -> Figure:
-    """G18: a log cut at every n-th byte, and with a bit flipped, is read or refused by name."""
-    with tempfile.TemporaryDirectory() as folder:
-        whole = _recorded(Path(folder) / "whole.mcap")
-        torn = Path(folder) / "torn.mcap"
-        ticks, tried, broken, before = 0, 0, 0, 0
-        for end in range(0, len(whole), every):
-            torn.write_bytes(whole[:end])
-            ticks = _readable(torn)
-            # What could be read of less is there of more.
-            broken += ticks < before
-            before, tried = max(before, ticks), tried + 1
-        chance = np.random.default_rng(18)
-        for _ in range(FLIPS):
-            spoilt = bytearray(whole)
-            spoilt[chance.integers(len(whole))] ^= 1 << int(chance.integers(8))
-            torn.write_bytes(spoilt)
-            _readable(torn)
-            tried += 1
-    return Figure(f"{len(whole)} bytes, every {every}, {FLIPS} flips", str(tried), broken, "18")
-
-
-def _recorded(path: Path) -> bytes:
-    config = configured(18, "best", ())
-    twin = Twin(config, images=False)
-    hand = Hand(config, dict.fromkeys(Dof, 3.0), lambda: twin.time, 2.0)
-    with LogWriter(path, config) as log:
-        run_experiment(twin, hand, config, log=log)
-    return path.read_bytes()
-
-
-def _readable(path: Path) -> int:
-    """How many events are read; anything but a named error would come out."""
-    try:
-        return len(read_log(path).events)
-    except (RecordError, ValueError):
-        return 0

@@ -69,15 +69,27 @@ fn reduction(axes: PerDof<Axis>, estimation: StateEstimation) -> HysteresisReduc
     )
 }
 
+/// Over as many ticks as `TAUTSCOPE_TICKS` says, each loop at least once through every flag.
 #[test]
 fn step_and_image_update_do_not_allocate() {
-    let step = StateEstimation::Article(StateEstimator::new([1.0; 3]).unwrap());
-    run(reduction(article(), step));
-    run(reduction(adaptive(), weighted(4.0)));
-    run(reduction(adaptive(), weighted(f64::INFINITY)));
+    let wanted = std::env::var("TAUTSCOPE_TICKS");
+    let wanted: u64 = wanted.map_or(0, |text| text.parse().unwrap());
+    let mut ticks = 0;
+    loop {
+        let step = StateEstimation::Article(StateEstimator::new([1.0; 3]).unwrap());
+        ticks += run(reduction(article(), step));
+        ticks += run(reduction(adaptive(), weighted(4.0)));
+        ticks += run(reduction(adaptive(), weighted(f64::INFINITY)));
+        if ticks >= wanted {
+            break;
+        }
+    }
+    println!("G12 both {ticks} 0 0");
 }
 
-fn run(mut reduction: HysteresisReduction) {
+/// How many ticks there were.
+fn run(mut reduction: HysteresisReduction) -> u64 {
+    let mut ticks = 1;
     let (mut used, mut learnt, mut worst) = (0, 0, Reaction::None);
     let truth = model();
     let posture = |time: f64| {
@@ -88,6 +100,7 @@ fn run(mut reduction: HysteresisReduction) {
         for tick in 0..4000_u32 {
             let time = f64::from(tick) * 0.005;
             reduction.step(posture(time), None, time);
+            ticks += 1;
             if tick % 8 == 0 {
                 let captured_at = time - 0.08;
                 let seen = truth.predict(posture(captured_at - 0.3));
@@ -110,6 +123,7 @@ fn run(mut reduction: HysteresisReduction) {
                 let time = 60.0 * f64::from(minute) + f64::from(tick) * 0.005;
                 reduction.guards_mut().raise(*flag);
                 reduction.step(posture(time), Some(time), time);
+                ticks += 1;
                 if tick % 8 == 0 {
                     let seen = truth.predict(posture(time)).map(|seen| seen.features);
                     reduction.on_features(seen, None, time, Some(u64::from(tick)));
@@ -124,4 +138,5 @@ fn run(mut reduction: HysteresisReduction) {
         used > 400 && learnt > 40,
         "the whole path ran: {used} {learnt}"
     );
+    ticks
 }

@@ -34,7 +34,7 @@ __all__ = [
 
 Floats = NDArray[np.float64]
 
-_TOGETHER = (
+_TOGETHER: tuple[tuple[Target, ...], ...] = (
     (Target.FEATURES, Target.FRAMES),
     (Target.PHYSICS,),
     (Target.DRIVE,),
@@ -75,6 +75,7 @@ class FaultyRig:
         self._twin = twin
         self._faults = tuple(faults)
         self._seed = seed
+        self._held: Floats | None = None
         self._forget()
 
     @property
@@ -119,7 +120,7 @@ class FaultyRig:
         self._twin.close()
 
     def _forget(self) -> None:
-        self._held: Floats | None = None
+        self._held = None
         self._time = self._twin.time
         self._under_way: Arrivals = []
         camera, instrument = self._twin.config.camera, self._twin.config.instrument

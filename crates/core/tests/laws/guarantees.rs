@@ -82,6 +82,15 @@ impl Count {
         self.still += u64::from(before.to_bits() != after.to_bits());
     }
 
+    fn with(&self, other: &Self) -> Self {
+        Self {
+            steps: self.steps + other.steps,
+            gain: self.gain + other.gain,
+            still: self.still + other.still,
+            excess: self.excess.max(other.excess),
+        }
+    }
+
     fn report(&self, law: &str) {
         println!("G1 {law} {} {} {}", self.steps, self.gain, self.excess);
         println!("G2 {law} {} {} 0", self.steps, self.still);
@@ -128,13 +137,30 @@ fn gain_of_the_articles_law() {
     count.report("paper");
 }
 
+/// A fiftieth of the steps where nobody asks for more, as it learns; each core its share of them.
 #[test]
 fn gain_of_the_adaptive_law() {
-    let (mut chance, mut count) = (Chance(2026), Count::default());
+    let asked = std::env::var("TAUTSCOPE_STEPS").is_ok();
+    let wanted = if asked { steps() } else { steps() / 50 };
+    let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get() as u64);
+    let mut count = Count::default();
+    std::thread::scope(|scope| {
+        let parts: Vec<_> = (0..cores)
+            .map(|core| scope.spawn(move || adaptive_walk(2026 + core, wanted.div_ceil(cores))))
+            .collect();
+        for part in parts {
+            count = count.with(&part.join().unwrap());
+        }
+    });
+    count.report("best");
+}
+
+fn adaptive_walk(seed: u64, wanted: u64) -> Count {
+    let (mut chance, mut count) = (Chance(seed), Count::default());
     let mut axis = AdaptiveAxis::new(settings(0.0, 0.005), chance.play()).unwrap();
     let mut reference = 0.3;
     axis.step(reference);
-    while count.steps < steps() / 50 {
+    while count.steps < wanted {
         let before = axis.command();
         match chance.below(40) {
             0 => {
@@ -159,7 +185,7 @@ fn gain_of_the_adaptive_law() {
         }
         count.event(before, axis.command());
     }
-    count.report("best");
+    count
 }
 
 /// c - u - (1 - 1/K) p, in m, over reversals at every 1000 ticks.
