@@ -15,6 +15,7 @@ __all__ = [
     "Guards",
     "Instrument",
     "MarkerDetector",
+    "MotionWatch",
     "Play",
     "Reduction",
     "Renderer",
@@ -234,6 +235,7 @@ class Guards:
         period: float,
         gain_limit: _Vector3,
         reference_speed: _Vector3,
+        reference_time: float,
         reference_age: float,
         late_tick: float,
         stall: float,
@@ -248,6 +250,7 @@ class Guards:
         start_deviation: _Vector3,
         innovation_floor: _Vector3,
         blind_growth: float,
+        motion: MotionWatch,
         hold_time: float,
         hold_travel: float,
         fade_travel: float,
@@ -256,6 +259,21 @@ class Guards:
         good_ticks: int,
         off: Sequence[str],
     ) -> Guards: ...
+
+@final
+class MotionWatch:
+    def __new__(
+        cls,
+        *,
+        period: float,
+        tremor_swing: _Vector3,
+        slack: _Vector3,
+        tremor_rate: float,
+        turn: _Vector3,
+        ahead_limit: _Vector3,
+        cycle_swings: int,
+        cycle_time: float,
+    ) -> MotionWatch: ...
 
 @final
 class Reduction:

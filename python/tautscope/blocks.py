@@ -134,10 +134,22 @@ def build_guards(config: Config) -> _core.Guards:
     def each(of: Callable[[DofConfig], float]) -> tuple[float, float, float]:
         return each_dof(lambda dof: of(config[dof]))
 
+    insertion, rotation, bending = (safety.ahead_limit * width for width in safety.width_limit)
+    motion = _core.MotionWatch(
+        period=config.control.period,
+        tremor_swing=each(lambda dof: dof.update_distance * safety.tremor_swing),
+        slack=safety.width_limit,
+        tremor_rate=safety.tremor_rate,
+        turn=each(lambda dof: dof.update_distance),
+        ahead_limit=(insertion, rotation, bending),
+        cycle_swings=safety.cycle_swings,
+        cycle_time=safety.cycle_time,
+    )
     return _core.Guards(
         period=config.control.period,
         gain_limit=each(lambda dof: dof.gain_limit),
         reference_speed=safety.reference_speed,
+        reference_time=safety.reference_time,
         reference_age=safety.reference_age,
         late_tick=safety.late_tick,
         stall=safety.stall,
@@ -152,6 +164,7 @@ def build_guards(config: Config) -> _core.Guards:
         start_deviation=each(lambda dof: dof.start_deviation),
         innovation_floor=each(lambda dof: dof.start_deviation * safety.innovation_floor),
         blind_growth=safety.blind_growth,
+        motion=motion,
         hold_time=safety.hold_time,
         hold_travel=safety.hold_travel,
         fade_travel=safety.fade_travel,

@@ -13,10 +13,11 @@ pub struct Guards(pub core::Guards);
 impl Guards {
     #[new]
     #[pyo3(signature = (
-        *, period, gain_limit, reference_speed, reference_age, late_tick, stall,
+        *, period, gain_limit, reference_speed, reference_time, reference_age, late_tick, stall,
         command_speed, command_travel, width_limit, offset_limit,
         frame_age, frame_gap, frozen_travel, innovation_limit, start_deviation,
         innovation_floor, blind_growth,
+        motion,
         hold_time, hold_travel, fade_travel, restore_travel, good_frames, good_ticks, off
     ))]
     // One argument per setting, by keyword only.
@@ -26,6 +27,7 @@ impl Guards {
         period: f64,
         gain_limit: [f64; 3],
         reference_speed: [f64; 3],
+        reference_time: f64,
         reference_age: f64,
         late_tick: f64,
         stall: f64,
@@ -40,6 +42,7 @@ impl Guards {
         start_deviation: [f64; 3],
         innovation_floor: [f64; 3],
         blind_growth: f64,
+        motion: &MotionWatch,
         hold_time: f64,
         hold_travel: f64,
         fade_travel: f64,
@@ -58,6 +61,7 @@ impl Guards {
             clutch: core::ClutchSettings {
                 period,
                 reference_speed,
+                reference_time,
                 reference_age,
                 late_tick,
                 stall,
@@ -72,6 +76,7 @@ impl Guards {
                 least_deviation: innovation_floor,
                 blind_growth,
             },
+            motion: motion.0,
             supervisor: core::SupervisorSettings {
                 hold_time,
                 hold_travel,
@@ -90,6 +95,41 @@ impl Guards {
         core::Guards::new(settings)
             .map(Self)
             .map_err(errors::config(py))
+    }
+}
+
+/// What of hand and tip is watched, to be given to `Guards`, which checks it.
+#[pyclass(name = "MotionWatch", module = "tautscope._core", frozen)]
+pub struct MotionWatch(core::MotionSettings);
+
+#[pymethods]
+impl MotionWatch {
+    #[new]
+    #[pyo3(signature = (
+        *, period, tremor_swing, slack, tremor_rate, turn, ahead_limit, cycle_swings, cycle_time
+    ))]
+    // One argument per setting, by keyword only.
+    #[allow(clippy::too_many_arguments)]
+    fn new(
+        period: f64,
+        tremor_swing: [f64; 3],
+        slack: [f64; 3],
+        tremor_rate: f64,
+        turn: [f64; 3],
+        ahead_limit: [f64; 3],
+        cycle_swings: u32,
+        cycle_time: f64,
+    ) -> Self {
+        Self(core::MotionSettings {
+            period,
+            tremor_swing,
+            slack,
+            tremor_rate,
+            turn,
+            ahead: ahead_limit,
+            cycle_swings,
+            cycle_time,
+        })
     }
 }
 

@@ -39,7 +39,7 @@ mod _core {
     #[pymodule_export]
     use super::features::FeatureModel;
     #[pymodule_export]
-    use super::guards::Guards;
+    use super::guards::{Guards, MotionWatch};
     #[pymodule_export]
     use super::instrument::Instrument;
     #[pymodule_export]

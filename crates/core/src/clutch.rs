@@ -9,8 +9,10 @@ use crate::flags::{Flag, Flags};
 pub struct ClutchSettings {
     /// Control period, in s.
     pub period: f64,
-    /// Largest speed of the reference [m/s, rad/s, rad/s].
+    /// Largest speed of the reference over `reference_time` [m/s, rad/s, rad/s].
     pub reference_speed: PerDof<f64>,
+    /// Over which a speed counts, in s.
+    pub reference_time: f64,
     /// Oldest reference that moves anything, in s.
     pub reference_age: f64,
     /// Periods from one tick to the next beyond which an increment is thrown away.
@@ -27,9 +29,23 @@ pub struct ClutchSettings {
 ///
 /// Whatever is thrown away of a motion goes into the offset, so that nothing catches up later. With nothing
 /// thrown away the reference passes bit for bit.
+///
+/// What a reference has gained of late, one way, is
+///
+/// ```text
+/// gained <- k gained + du,   k = exp(-period / reference_time)
+/// |gained| <= reference_speed period / (1 - k)
+/// ```
+///
+/// which a steady `reference_speed` just reaches. An increment that would break it is no hand's: it is thrown away,
+/// and motion stops. A tremor comes back before it has gained much; a hand that runs away slower than
+/// `reference_speed` is followed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clutch {
     settings: ClutchSettings,
+    /// k.
+    kept: f64,
+    gained: PerDof<f64>,
     offset: PerDof<f64>,
     raw: PerDof<f64>,
     admitted: Option<PerDof<f64>>,
@@ -61,12 +77,15 @@ impl Clutch {
         for speed in settings.reference_speed {
             require_positive("reference_speed", speed)?;
         }
+        require_positive("reference_time", settings.reference_time)?;
         require_positive("reference_age", settings.reference_age)?;
         let late = settings.late_tick.is_finite() && settings.late_tick > 1.0;
         require(late, "late_tick", settings.late_tick, "finite, above 1")?;
         require_positive("stall", settings.stall)?;
         Ok(Self {
             settings,
+            kept: libm::exp(-settings.period / settings.reference_time),
+            gained: [0.0; 3],
             offset: [0.0; 3],
             raw: [f64::NAN; 3],
             admitted: None,
@@ -89,7 +108,7 @@ impl Clutch {
         let (late, severe) = self.punctuality(time, stamp);
         let invalid = Flags::when(!all_finite(reference), Flag::ReferenceInvalid);
         let (wrong, severe) = (late.without(off), severe.without(off));
-        let stopped = held || self.fresh || !wrong.and(severe).is_empty();
+        let mut stopped = held || self.fresh || !wrong.and(severe).is_empty();
         let mut admission = Admission {
             reference: self.admitted,
             moved: [0.0; 3],
@@ -106,46 +125,56 @@ impl Clutch {
             }
             return admission;
         };
-        let limit = if off.has(Flag::ReferenceJump) {
-            [f64::INFINITY; 3]
-        } else {
-            self.settings
-                .reference_speed
-                .map(|speed| speed * self.settings.period)
-        };
-        let mut next = last;
-        let axes = next
-            .iter_mut()
-            .zip(&mut self.offset)
-            .zip(&mut admission.moved);
-        let inputs = reference.into_iter().zip(self.raw).zip(limit);
+        let wanted = self.wanted(reference, last);
         self.raw = reference;
         self.fresh = false;
-        for (((next, offset), moved), ((raw, before), limit)) in axes.zip(inputs) {
-            let last = *next;
-            // A hand at rest moves nothing, whatever rounding makes of the offset.
-            let wanted = if (raw - before).abs() == 0.0 {
-                last
-            } else if *offset == 0.0 {
-                raw
-            } else {
-                raw + *offset
-            };
-            let increment = wanted - last;
-            if stopped {
-                *offset = last - raw;
-            } else if increment.abs() > limit {
-                *next = last + limit.copysign(increment);
-                *offset = *next - raw;
-                admission.raised = admission.raised.and(Flags::of(Flag::ReferenceJump));
-            } else {
-                *next = wanted;
-            }
-            *moved = *next - last;
+        if !stopped && self.outruns(wanted, last) && !off.has(Flag::ReferenceJump) {
+            admission.raised = admission.raised.and(Flags::of(Flag::ReferenceJump));
+            stopped = true;
         }
-        self.admitted = Some(next);
+        if stopped {
+            self.gained = [0.0; 3];
+            for ((offset, last), raw) in self.offset.iter_mut().zip(last).zip(reference) {
+                *offset = last - raw;
+            }
+            return admission;
+        }
+        for ((moved, wanted), last) in admission.moved.iter_mut().zip(wanted).zip(last) {
+            *moved = wanted - last;
+        }
+        self.admitted = Some(wanted);
         admission.reference = self.admitted;
         admission
+    }
+
+    /// What the reference comes to, with all that was thrown away.
+    fn wanted(&self, reference: PerDof<f64>, last: PerDof<f64>) -> PerDof<f64> {
+        let mut wanted = last;
+        let raws = reference.into_iter().zip(self.raw).zip(self.offset);
+        for (wanted, ((raw, before), offset)) in wanted.iter_mut().zip(raws) {
+            // A hand at rest moves nothing, whatever rounding makes of the offset.
+            if (raw - before).abs() != 0.0 {
+                *wanted = if offset == 0.0 { raw } else { raw + offset };
+            }
+        }
+        wanted
+    }
+
+    /// Whether a DOF would gain more than a hand can, counting this increment.
+    fn outruns(&mut self, wanted: PerDof<f64>, last: PerDof<f64>) -> bool {
+        let steady = self.settings.period / (1.0 - self.kept);
+        let axes = self.gained.iter_mut().zip(wanted).zip(last);
+        let mut outruns = false;
+        for (((gained, wanted), last), speed) in axes.zip(self.settings.reference_speed) {
+            *gained = self.kept * *gained + (wanted - last);
+            outruns |= gained.abs() > speed * steady;
+        }
+        outruns
+    }
+
+    /// The reference as far as it was admitted (3,) [m, rad, rad]; NaN before the first.
+    pub fn admitted(&self) -> PerDof<f64> {
+        self.admitted.unwrap_or([f64::NAN; 3])
     }
 
     /// The law was kept from following by `shift` (3,) [m, rad, rad]: that part of the motion is thrown away as well.

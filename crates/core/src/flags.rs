@@ -46,7 +46,7 @@ flags! {
     Unobservable = "unobservable",
     /// A drive is not where it was told to be; the rig says so.
     FollowingError = "following_error",
-    /// A reference faster than `reference_speed`.
+    /// A reference that gained more in `reference_time` than `reference_speed` allows.
     ReferenceJump = "reference_jump",
     /// A reference older than `reference_age`.
     ReferenceLate = "reference_late",
@@ -62,6 +62,12 @@ flags! {
     WidthLimit = "width_limit",
     /// The monitor changed a command.
     Monitor = "monitor",
+    /// A hand that trembles: `tremor_rate` reversals in a second, each within the slack.
+    Tremor = "tremor",
+    /// A tip that came farther than its reference since the reference turned.
+    Overcompensation = "overcompensation",
+    /// Reference and tip that swing farther each time, one after the other.
+    LimitCycle = "limit_cycle",
 }
 
 impl Flag {

@@ -8,6 +8,8 @@ use crate::flags::{Flag, Flags};
 use crate::frame_watch::{Arrival, FrameSettings, FrameWatch};
 use crate::limits::PlayLimit;
 use crate::monitor::{Monitor, MonitorSettings, Verdict};
+use crate::motion_watch::{MotionSettings, MotionWatch};
+use crate::play::Play;
 use crate::supervisor::{Event, Reaction, Source, Supervisor, SupervisorSettings};
 
 /// What the guards are set to.
@@ -19,6 +21,8 @@ pub struct GuardSettings {
     pub monitors: PerDof<MonitorSettings>,
     /// Of the frames.
     pub frames: FrameSettings,
+    /// Of hand and tip.
+    pub motion: MotionSettings,
     /// Of the reactions.
     pub supervisor: SupervisorSettings,
     /// Largest width of the slack [m, rad, rad]; the unit of travel for every reaction.
@@ -48,6 +52,7 @@ pub struct Guards {
     clutch: Clutch,
     monitors: PerDof<Monitor>,
     pub(crate) frames: FrameWatch,
+    motion: MotionWatch,
     supervisor: Supervisor,
     limits: PerDof<PlayLimit>,
     unit: PerDof<f64>,
@@ -73,6 +78,7 @@ impl Guards {
             clutch: Clutch::new(settings.clutch)?,
             monitors: [Monitor::new(m1)?, Monitor::new(m2)?, Monitor::new(m3)?],
             frames: FrameWatch::new(settings.frames)?,
+            motion: MotionWatch::new(settings.motion)?,
             supervisor: Supervisor::new(settings.supervisor)?,
             limits: [
                 PlayLimit::new(w1, o1)?,
@@ -118,6 +124,8 @@ impl Guards {
             event.travel += moved.abs() / unit;
         }
         if let Some(reference) = admission.reference {
+            let motion = self.motion.tick(reference);
+            event.raised = event.raised.and(self.watched(motion));
             self.tell(axes);
             self.step(axes, reference, &mut event);
         }
@@ -172,6 +180,24 @@ impl Guards {
     /// What is in the set and looked for.
     pub(crate) const fn watched(&self, flags: Flags) -> Flags {
         flags.without(self.off)
+    }
+
+    /// The reference as far as it was admitted [m, rad, rad].
+    pub(crate) fn admitted(&self) -> PerDof<f64> {
+        self.clutch.admitted()
+    }
+
+    /// What an image says of hand and tip, and which DOFs are over-compensated, in which direction.
+    pub(crate) fn look(
+        &mut self,
+        time: f64,
+        reference: PerDof<f64>,
+        measured: PerDof<f64>,
+        play: PerDof<Play>,
+    ) -> (Flags, PerDof<f64>) {
+        let (flags, over) = self.motion.look(time, reference, measured, play);
+        let is_off = self.off.has(Flag::Overcompensation);
+        (self.watched(flags), if is_off { [0.0; 3] } else { over })
     }
 
     /// Whether images may teach.

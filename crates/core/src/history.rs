@@ -10,6 +10,8 @@ const CAPACITY: usize = 1024;
 pub struct Entry {
     /// On the clock of the control tick, in s.
     pub time: f64,
+    /// The reference u, as far as it was admitted [m, rad, rad].
+    pub reference: PerDof<f64>,
     /// The command c [m, rad, rad].
     pub command: PerDof<f64>,
     /// The predicted state q [m, rad, rad].
@@ -41,6 +43,7 @@ impl History {
         require_positive("period", period)?;
         let blank = Entry {
             time: 0.0,
+            reference: [0.0; 3],
             command: [0.0; 3],
             predicted_state: [0.0; 3],
             corrected: [0.0; 3],
@@ -111,6 +114,7 @@ impl History {
         let share = (time - before.time) / (after.time - before.time);
         Some(Entry {
             time,
+            reference: between(before.reference, after.reference, share),
             command: between(before.command, after.command, share),
             predicted_state: between(before.predicted_state, after.predicted_state, share),
             corrected: between(before.corrected, after.corrected, share),

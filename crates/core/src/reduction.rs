@@ -118,6 +118,7 @@ impl HysteresisReduction {
         }
         let jumped_back = self.history.push(Entry {
             time,
+            reference: self.guards.admitted(),
             command,
             predicted_state: self.predicted_state(),
             corrected: self.corrected,
@@ -255,6 +256,8 @@ impl HysteresisReduction {
 
     fn learn(&mut self, past: &Entry, seen: &Seen, raised: &mut Flags) -> PerDof<Triggers> {
         let mut triggers = [Triggers::default(); 3];
+        let (flags, over) = self.watch(past, seen);
+        *raised = raised.and(flags);
         let history = &self.history;
         let outputs = seen.output.iter().zip(seen.output_deviation);
         let signals = seen
@@ -268,11 +271,17 @@ impl HysteresisReduction {
             .iter_mut()
             .zip(&mut triggers)
             .zip(&mut self.corrected)
+            .zip(over)
             .enumerate();
-        for ((dof, ((axis, triggers), corrected)), ((observable, command), (output, deviation))) in
-            axes.zip(signals)
+        for (
+            (dof, (((axis, triggers), corrected), over)),
+            ((observable, command), (output, deviation)),
+        ) in axes.zip(signals)
         {
             if *observable {
+                if over != 0.0 {
+                    axis.shrink(over > 0.0, command, *output);
+                }
                 let since = history
                     .since(past.time)
                     .filter_map(|entry| entry.command.get(dof).copied());
@@ -285,6 +294,16 @@ impl HysteresisReduction {
             }
         }
         triggers
+    }
+
+    /// What the image says of hand and tip.
+    fn watch(&mut self, past: &Entry, seen: &Seen) -> (Flags, PerDof<f64>) {
+        let mut measured = seen.output;
+        for (value, observable) in measured.iter_mut().zip(seen.estimate.observable) {
+            *value = if observable { *value } else { f64::NAN };
+        }
+        let play = self.play();
+        self.guards.look(past.time, past.reference, measured, play)
     }
 
     /// The report on a frame that taught nothing.

@@ -85,7 +85,7 @@ const fn rule(
 /// A frame without markers teaches nothing by itself, so `lost` need not hold before it fades; two markers
 /// that leave a DOF undetermined hold it by themselves.
 #[rustfmt::skip]
-pub static TABLE: [Rule; 19] = [
+pub static TABLE: [Rule; 22] = [
     rule(Flag::Frozen,           Frame, HOLD_THEN_FADE,                          true),
     rule(Flag::Late,             Frame, HOLD_THEN_FADE,                          true),
     rule(Flag::Duplicate,        Frame, WARN,                                    false),
@@ -97,7 +97,7 @@ pub static TABLE: [Rule; 19] = [
     rule(Flag::Lost,             Frame, &[(Warn, Auto), (Fade, Auto)],           true),
     rule(Flag::Unobservable,     Frame, WARN,                                    false),
     rule(Flag::FollowingError,   Rig,   &[(QuickStop, Engage)],                  false),
-    rule(Flag::ReferenceJump,    Tick,  WARN,                                    false),
+    rule(Flag::ReferenceJump,    Tick,  &[(HoldMotion, Engage)],                 false),
     rule(Flag::ReferenceLate,    Tick,  &[(HoldMotion, Engage)],                 false),
     rule(Flag::ReferenceInvalid, Tick,  &[(HoldMotion, Engage)],                 false),
     rule(Flag::LateTick,         Tick,  &[(Warn, Auto), (HoldMotion, Engage)],   false),
@@ -105,6 +105,9 @@ pub static TABLE: [Rule; 19] = [
     rule(Flag::StartCheck,       Rig,   &[(PassThrough, Engage)],                false),
     rule(Flag::WidthLimit,       Frame, WARN,                                    false),
     rule(Flag::Monitor,          Tick,  &[(Warn, Auto), (Disable, Restart)],     false),
+    rule(Flag::Tremor,           Tick,  WARN,                                    false),
+    rule(Flag::Overcompensation, Frame, WARN,                                    false),
+    rule(Flag::LimitCycle,       Frame, &[(Fade, Auto)],                         false),
 ];
 
 /// The bounds of the table's reactions.

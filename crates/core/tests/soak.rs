@@ -2,13 +2,15 @@
 //!
 //! Three degrees of freedom with play, a hand that never repeats itself, images every 40 ms.
 
+#![allow(clippy::large_stack_arrays)]
+
 mod support;
 
 use support::{PERIOD, UNITS};
 use tautscope_core::{
     Axis, Camera, Compensator, Estimator, FeatureModel, Guards, History, HysteresisReduction,
     Instrument, PerDof, Play, PlayState, Pose, Reaction, StateEstimation, StateEstimator,
-    WeightedEstimator, WeightedSettings, Whereabouts,
+    WeightedEstimator, WeightedSettings, Whereabouts, WhereaboutsSettings,
 };
 
 const HAND: [(f64, f64, f64); 3] = [(0.025, 15e-3, 7.5), (0.0, 1.2, 11.3), (0.9, 0.5, 17.9)];
@@ -30,13 +32,19 @@ fn looped(axes: PerDof<Axis>, estimation: StateEstimation) -> HysteresisReductio
         model(),
         estimation,
         History::new(0.5, PERIOD).unwrap(),
-        Whereabouts::new([5e-3, 0.6, 0.5], [2e-4, 0.02, 0.01]).unwrap(),
+        Whereabouts::new(WhereaboutsSettings {
+            start_deviation: [5e-3, 0.6, 0.5],
+            rest_deviation: [2e-4, 0.02, 0.01],
+            settling_time: 0.15,
+            coupling: 0.05,
+        })
+        .unwrap(),
         Guards::new(support::guards()).unwrap(),
     )
 }
 
 /// Resident memory in pages, and open files; none where the system does not say.
-fn resources() -> Option<(u64, usize)> {
+fn resources() -> Option<(u32, usize)> {
     let memory = std::fs::read_to_string("/proc/self/statm").ok()?;
     let files = std::fs::read_dir("/proc/self/fd").ok()?.count();
     Some((memory.split(' ').nth(1)?.parse().ok()?, files))
@@ -98,7 +106,7 @@ fn soak(law: &str, mut reduction: HysteresisReduction) {
     let grown = match (before, resources()) {
         (Some((memory, files)), Some((more, now))) => {
             assert_eq!(files, now, "{law}: open files");
-            (more as f64 / memory as f64 - 1.0).max(0.0)
+            (f64::from(more) / f64::from(memory) - 1.0).max(0.0)
         }
         _ => 0.0,
     };

@@ -28,8 +28,11 @@ class SafetyConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     how far a command may lead its reference, and the unit of the travels below."""
     offset_limit: PerDof = (8e-3, 1.6, 0.9)
     """Largest contact offset either way that is believed."""
-    reference_speed: PerDof = (0.15, 10.0, 6.0)
-    """A faster reference is slowed down to this, and the rest of its motion is thrown away."""
+    reference_speed: PerDof = (0.04, 4.0, 2.0)
+    """A reference that is faster than this over `reference_time` stops motion until the operator
+    re-engages: three times the fastest hand of docs/faults.md."""
+    reference_time: Positive = 0.04
+    """Over which a speed counts: a tremor of 1 mm passes, a jump of 2 mm does not [s]."""
     command_speed: PerDof = (0.75, 50.0, 30.0)
     """No command changes faster."""
     command_travel: tuple[Range, Range, Range] = ((-0.1, 0.3), (-12.6, 12.6), (-4.0, 4.0))
@@ -57,6 +60,18 @@ class SafetyConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     state_noise: Vector3 = (0.03e-3, 1.5e-3, 1.5e-3)
     """Standard deviation of the state estimate in a still scene [m, rad, rad], twin; three of it
     must be below contact_tolerance times update_distance, or noise passes for contact."""
+    tremor_swing: Positive = 0.5
+    """Least swing of the reference that is a tremor, one way [in update_distance]."""
+    tremor_rate: Positive = 4.0
+    """Reversals of the reference, swings within width_limit, that are a tremor [1/s]."""
+    ahead_limit: Positive = 0.1
+    """How much farther than the reference the tip may come in a stroke; beyond it less slack is
+    there than is made up for [in width_limit]."""
+    cycle_swings: Count = 4
+    """So many swings of reference and tip, each 1.1 times the one before it, and the loop with the
+    operator in it builds up an oscillation."""
+    cycle_time: Positive = 2.0
+    """Longest swing of such an oscillation, one way [s]."""
     hold_time: NonNegative = 4.0
     """How long a reaction lasts before the next takes its place [s]."""
     hold_travel: NonNegative = 4.0

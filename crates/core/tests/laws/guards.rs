@@ -1,9 +1,9 @@
 //! The whole loop, guards included, under anything that may come.
 
 use tautscope_core::{
-    Axis, Camera, Compensator, Estimator, FeatureModel, Flag, Guards, History, HysteresisReduction,
-    Instrument, PerDof, Play, Pose, Reaction, StateEstimation, StateEstimator, Status,
-    WeightedEstimator, WeightedSettings, Whereabouts, WhereaboutsSettings,
+    Axis, Camera, Clutch, Compensator, Estimator, FeatureModel, Flag, Flags, Guards, History,
+    HysteresisReduction, Instrument, PerDof, Play, Pose, Reaction, StateEstimation, StateEstimator,
+    Status, WeightedEstimator, WeightedSettings, Whereabouts, WhereaboutsSettings,
 };
 
 use crate::support::{self, PERIOD, UNITS, guards};
@@ -246,27 +246,80 @@ fn a_stall_throws_its_motion_away_and_stops_until_re_engaged() {
     assert!(moved > 0.0 && moved <= 5.0 * step * (1.0 + 1e-9), "{moved}");
 }
 
+const START: PerDof<f64> = [0.025, 0.0, 0.9];
+
+fn begun() -> HysteresisReduction {
+    let mut reduction = article(|_| Play::new(0.0, 0.0).unwrap());
+    reduction.step(START, Some(0.0), 0.0);
+    reduction
+}
+
 #[test]
-fn a_reference_that_is_old_invalid_or_too_fast_is_met() {
-    let start = [0.025, 0.0, 0.9];
-    let loops = || {
-        let mut reduction = article(|_| Play::new(0.0, 0.0).unwrap());
-        reduction.step(start, Some(0.0), 0.0);
-        reduction
-    };
-    let mut old = loops();
-    assert_eq!(old.step([0.0251, 0.0, 0.9], Some(-0.06), PERIOD), start);
-    assert_eq!(old.guards().supervision().reaction, Reaction::HoldMotion);
-    let mut invalid = loops();
-    assert_eq!(invalid.step([f64::NAN, 0.0, 0.9], Some(0.0), PERIOD), start);
-    assert_eq!(
-        invalid.guards().supervision().reaction,
-        Reaction::HoldMotion
-    );
-    let mut fast = loops();
-    let [command, ..] = fast.step([0.035, 0.0, 0.9], Some(0.0), PERIOD);
-    assert!((command - 0.025 - UNITS[0]).abs() < 1e-12);
-    let again = fast.step([0.035, 0.0, 0.9], Some(0.0), 2.0 * PERIOD);
-    assert_eq!(again[0], command, "nothing catches up");
+fn a_reference_that_is_old_or_invalid_stops_motion() {
+    for (hand, stamp) in [(0.0251, -0.06), (f64::NAN, 0.0)] {
+        let mut reduction = begun();
+        let command = reduction.step([hand, 0.0, 0.9], Some(stamp), PERIOD);
+        assert_eq!(command, START);
+        let reaction = reduction.guards().supervision().reaction;
+        assert_eq!(reaction, Reaction::HoldMotion, "{hand} of {stamp} s");
+    }
+}
+
+#[test]
+fn a_reference_that_is_too_fast_stops_motion() {
+    let mut fast = begun();
+    assert_eq!(fast.step([0.035, 0.0, 0.9], Some(0.0), PERIOD), START);
     assert!(fast.guards().supervision().flags.has(Flag::ReferenceJump));
+    assert_eq!(fast.guards().supervision().reaction, Reaction::HoldMotion);
+    fast.guards_mut().engage();
+    let [time, then] = [2.0 * PERIOD, 3.0 * PERIOD];
+    assert_eq!(fast.step([0.035, 0.0, 0.9], Some(time), time), START);
+    let [command, ..] = fast.step([0.0351, 0.0, 0.9], Some(then), then);
+    let moved = command - 0.025;
+    assert!((moved - 1e-4).abs() < 1e-12, "nothing catches up: {moved}");
+}
+
+/// How far a hand at this speed in m/s comes before it is stopped, in m; None if it never is.
+fn followed(speed: f64) -> Option<f64> {
+    let mut clutch = Clutch::new(support::clutch()).unwrap();
+    let mut gone = 0.0;
+    for tick in 0..2000 {
+        let time = f64::from(tick) * PERIOD;
+        let reference = [speed * time, 0.0, 0.0];
+        let admission = clutch.admit(reference, time, None, false, Flags::NONE);
+        gone += admission.moved[0];
+        if admission.raised.has(Flag::ReferenceJump) {
+            assert_eq!(admission.moved, [0.0; 3]);
+            return Some(gone);
+        }
+    }
+    None
+}
+
+#[test]
+fn a_hand_is_followed_at_its_speed_limit_and_a_faster_one_no_farther_than_the_law_says() {
+    let settings = support::clutch();
+    let (limit, over) = (settings.reference_speed[0], settings.reference_time);
+    assert_eq!(followed(limit * (1.0 - 1e-9)), None);
+    let steady = limit * PERIOD / -libm::expm1(-PERIOD / over);
+    for ratio in [1.1, 1.5, 3.0, 10.0, 100.0] {
+        let gone = followed(-ratio * limit).unwrap().abs();
+        // gained = v dt (1 - k^n) / (1 - k) within its limit
+        let ticks = (-over / PERIOD * (1.0_f64 - 1.0 / ratio).ln()).floor();
+        let most = ratio * limit * PERIOD * ticks;
+        assert!((gone - most).abs() <= 1e-9, "{ratio}: {gone} m, not {most}");
+        assert!(ratio < 3.0 || gone <= 1.25 * steady, "{ratio}: {gone} m");
+    }
+}
+
+#[test]
+fn a_trembling_hand_is_no_fast_one() {
+    let mut clutch = Clutch::new(support::clutch()).unwrap();
+    for tick in 0..4000 {
+        let time = f64::from(tick) * PERIOD;
+        let shake = 3e-3 * (60.0 * time).sin();
+        let admission = clutch.admit([shake, 0.0, 0.0], time, None, false, Flags::NONE);
+        assert_eq!(admission.raised, Flags::NONE, "tick {tick}");
+        assert_eq!(admission.reference, Some([shake, 0.0, 0.0]));
+    }
 }

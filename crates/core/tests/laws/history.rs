@@ -10,6 +10,7 @@ const PERIOD: f64 = 0.005;
 fn entry(time: f64) -> Entry {
     Entry {
         time,
+        reference: [-2.0 * time; 3],
         command: [time, 2.0 * time, -time],
         predicted_state: [3.0 * time, time, 0.5],
         corrected: [0.5 * time; 3],

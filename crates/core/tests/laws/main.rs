@@ -12,6 +12,7 @@ mod guards;
 mod history;
 mod lead;
 mod monitor;
+mod motion_watch;
 mod offset_map;
 mod play;
 mod state;

@@ -2,7 +2,8 @@
 
 use tautscope_core::{
     AdaptiveAxis, AdaptiveSettings, ClutchSettings, ContactTest, Flags, FrameSettings,
-    GuardSettings, LeadLaw, MonitorSettings, OffsetPrior, PerDof, Play, SupervisorSettings,
+    GuardSettings, LeadLaw, MonitorSettings, MotionSettings, OffsetPrior, PerDof, Play,
+    SupervisorSettings,
 };
 
 pub const UNITS: PerDof<f64> = [0.4e-3, 0.04, 0.02];
@@ -21,6 +22,7 @@ pub fn clutch() -> ClutchSettings {
     ClutchSettings {
         period: PERIOD,
         reference_speed: UNITS.map(|unit| unit / PERIOD),
+        reference_time: 0.05,
         reference_age: 0.05,
         late_tick: 3.0,
         stall: 0.1,
@@ -50,6 +52,16 @@ pub fn guards() -> GuardSettings {
             start_deviation: [5e-3, 0.6, 0.5],
             least_deviation: UNITS,
             blind_growth: 0.1,
+        },
+        motion: MotionSettings {
+            period: PERIOD,
+            tremor_swing: UNITS.map(|unit| 0.5 * unit),
+            slack: UNITS.map(|unit| 30.0 * unit),
+            tremor_rate: 4.0,
+            turn: UNITS,
+            ahead: UNITS.map(|unit| 3.0 * unit),
+            cycle_swings: 4,
+            cycle_time: 2.0,
         },
         supervisor: supervisor(),
         width_limit: UNITS.map(|unit| 30.0 * unit),
