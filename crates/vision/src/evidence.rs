@@ -9,6 +9,13 @@ const RIMS: f64 = 0.2;
 /// Share of its colour that a band has to itself: two outlines on one band share theirs.
 const APART: f64 = 0.8;
 
+/// Share of a band's edges with which it needs no further look.
+const ENOUGH: f64 = 0.75;
+/// And of its area.
+const WHOLE: f64 = 0.8;
+/// And the squared Mahalanobis distance.
+const UNSURPRISING: f64 = 8.0;
+
 /// What speaks for a band.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Evidence {
@@ -28,6 +35,18 @@ pub struct Evidence {
     pub surprise: f64,
     /// Centroid of the outline, u, v (px).
     pub centroid: [f64; 2],
+}
+
+impl Evidence {
+    /// Whether there is no need to look further.
+    pub(crate) fn is_clear(&self) -> bool {
+        self.edges >= ENOUGH && self.coverage >= WHOLE && self.surprise <= UNSURPRISING
+    }
+
+    /// The fewer edges, the nearer to where it is expected a band must be: 1 where it has enough.
+    fn trust(&self) -> f64 {
+        (self.edges / ENOUGH).min(1.0).powi(2)
+    }
 }
 
 /// What a band must show.
@@ -159,7 +178,7 @@ fn refusal(band: &Evidence, demands: &Demands) -> Option<Rejection> {
         Some(Rejection::Larger { share: band.spill })
     } else if band.edges < demands.edges {
         Some(Rejection::Shape { share: band.edges })
-    } else if band.surprise.is_nan() || band.surprise > demands.surprise {
+    } else if band.surprise.is_nan() || band.surprise > demands.surprise * band.trust() {
         Some(Rejection::Elsewhere {
             distance: band.surprise.sqrt(),
         })

@@ -6,6 +6,9 @@ use crate::{Frame, RunMap, Window};
 /// How far a band's colour may reach beyond its outline, motion and defocus included (px).
 const BLUR: f64 = 12.0;
 
+/// The piece of a band that the border of the image leaves says where the band is if it is more than this share of it.
+const LEFT: f64 = 0.15;
+
 /// Corners of an outline.
 pub const OUTLINE: usize = 26;
 
@@ -127,6 +130,23 @@ impl Outline {
             v += 1.0;
         }
         count
+    }
+
+    /// Mean place u, v (px) of the part of it that is in the image; None where that is too small a share of it.
+    pub fn centroid_within(&self, map: &RunMap) -> Option<[f64; 2]> {
+        let (width, height) = map.size();
+        let (mut pixels, mut sum) = (0.0, [0.0; 2]);
+        let (mut v, last) = self.rows(height);
+        while v <= last {
+            for (from, to) in self.spans(v, width).each() {
+                let count = to - from + 1.0;
+                pixels += count;
+                sum[0] += count * f64::midpoint(from, to);
+                sum[1] += count * v;
+            }
+            v += 1.0;
+        }
+        (pixels > LEFT * self.area).then(|| sum.map(|sum| sum / pixels))
     }
 
     /// Whether a place is inside.

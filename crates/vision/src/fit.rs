@@ -5,25 +5,26 @@ use crate::numbers::real;
 use crate::{Expectation, OUTLINE, Outline, RunMap};
 
 /// Places along an outline where its edge is sought.
-const SAMPLES: usize = 48;
+const SAMPLES: usize = 96;
 /// How far from the outline an edge is sought (px), at most.
 const REACH: f64 = 9.0;
 /// Standard deviation of an edge (px), neighbours taken as independent.
-const EDGE: f64 = 0.4;
+const EDGE: f64 = 0.5;
 /// Edges farther than this from where they should be have no say in the end (px).
 const TOLERANCE: f64 = 1.8;
 /// Standard deviation of the growth of the outlines: blur and threshold (px), and unknown scale (1).
 const BLOOM: f64 = 1.2;
 const SCALE: f64 = 0.06;
-/// The same for the difference of the two bands: they are blurred alike.
-const BLOOM_APART: f64 = 0.4;
-const SCALE_APART: f64 = 0.03;
+/// The same for the difference of the two bands: they are blurred alike. Of a band of which one rim is beyond the border
+/// it says where along the axis it is.
+const BLOOM_APART: f64 = 0.2;
+const SCALE_APART: f64 = 0.01;
 /// Edges nearer than this to the border of the image say nothing (px).
 const BORDER: f64 = 2.0;
 /// Nearer than this to where a rim meets a side the low-pass rounds the outline off (px).
 const CORNER: f64 = 2.5;
 /// Fewer samples of a rim than this say nothing of how much of it is there.
-const FEW: f64 = 4.0;
+const FEW: f64 = 8.0;
 /// Where they meet.
 const CORNERS: [usize; 4] = [0, OUTLINE / 2 - 1, OUTLINE / 2, OUTLINE - 1];
 /// The tolerance, round by round: from a region's centroid, and from where the outlines have lain before.

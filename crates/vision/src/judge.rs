@@ -1,9 +1,9 @@
 //! Which of what has the markers' colour is a band: by place, size, outline, and both together.
 
 use crate::evidence::{Demands, Evidence, weigh};
-use crate::fit::{COARSE, FINE, Fit, fit};
+use crate::fit::{COARSE, FINE, Fit, fit, settle};
 use crate::pairing::{Pair, TRIALS, likely, shift};
-use crate::{Expect, Expectation, Region, Rejection, RunMap};
+use crate::{Expect, Expectation, Outline, Region, Rejection, RunMap};
 
 /// How the two bands were recognised, or why not.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,18 +22,14 @@ pub struct Verdict {
 
 const NOWHERE: [f64; 4] = [f64::NAN; 4];
 /// Outlines are laid again at most so often, and until they stay within so much (px).
-const LAYS: usize = 4;
-const STILL: f64 = 0.2;
+const LAYS: usize = 6;
+const STILL: f64 = 0.1;
+/// A band is moved at most so often to where the image would cut it as it did.
+const SHIFTS: usize = 10;
 /// Two pairs whose outlines come to lie nearer than this to each other are one (px).
 const SAME: f64 = 0.7;
 /// A lone band must be nearer to its place than to the other's by this squared Mahalanobis distance.
 const AMBIGUOUS: f64 = 9.0;
-/// Share of edges of both bands with which a verdict needs no other.
-const ENOUGH: f64 = 0.75;
-/// And of its area.
-const WHOLE: f64 = 0.8;
-/// And the squared Mahalanobis distance.
-const UNSURPRISING: f64 = 8.0;
 /// Variance that a band has more of for its missing edges.
 const HIDDEN: f64 = 5.0;
 /// What a unit of that distance takes from a score that edges make.
@@ -48,9 +44,13 @@ pub fn judge(regions: &[Region], map: &RunMap, expect: &impl Expect, demands: &D
         return nothing(Rejection::NoRegion);
     }
     let mut best: Option<(f64, Verdict)> = None;
-    let mut tried: [[f64; 4]; TRIALS] = [NOWHERE; TRIALS];
-    for (index, pair) in likely(regions, &blind).into_iter().flatten().enumerate() {
+    let mut tried: [[f64; 4]; 2 * TRIALS] = [NOWHERE; 2 * TRIALS];
+    let pairs = likely(regions, &blind);
+    let starts = pairs.into_iter().flatten().flat_map(|pair| {
         let seen = places(pair, &blind, regions);
+        [Some(seen), beyond(seen, &blind, map)]
+    });
+    for (index, seen) in starts.flatten().enumerate() {
         let Some((_, first)) = lay(seen, [4.0; 4], [true; 2], COARSE, map, expect) else {
             continue;
         };
@@ -122,11 +122,22 @@ fn alone(
 
 impl Verdict {
     /// Each band found counts one and its edges; where they are surprising counts against it.
+    ///
+    /// So does a band of which too much is outside the image, if the rest is clear: else outlines that lie worse, but
+    /// farther inside, would win.
     pub(crate) fn score(&self) -> f64 {
         let bands = self.bands.iter().zip(&self.reasons);
-        let shown = |(band, reason): (&Evidence, &Option<Rejection>)| match reason {
-            None => 1.0 + band.edges - DOUBT * band.surprise,
-            Some(_) => 0.1 * band.edges,
+        let shown = |(band, reason): (&Evidence, &Option<Rejection>)| {
+            let located = match reason {
+                None => true,
+                Some(Rejection::Outside { .. }) => band.is_clear(),
+                Some(_) => false,
+            };
+            if located {
+                1.0 + band.edges - DOUBT * band.surprise
+            } else {
+                0.1 * band.edges
+            }
         };
         bands.map(shown).sum()
     }
@@ -148,6 +159,28 @@ fn places(pair: Pair, blind: &Expectation, regions: &[Region]) -> [f64; 4] {
         seen = [ua + u, va + v, ub + u, vb + v];
     }
     seen
+}
+
+/// Where the bands are if these are the centroids of what the border of the image leaves of them; None if it cuts neither.
+fn beyond(mut seen: [f64; 4], blind: &Expectation, map: &RunMap) -> Option<[f64; 4]> {
+    let mut cut = false;
+    for (outline, place) in blind.bands.iter().zip(seen.chunks_exact_mut(2)) {
+        let part = [place[0], place[1]];
+        let mut outline = settle(outline, part);
+        for _ in 0..SHIFTS {
+            let Some([u, v]) = outline.centroid_within(map) else {
+                break;
+            };
+            let [du, dv] = [part[0] - u, part[1] - v];
+            if du.hypot(dv) < SAME {
+                break;
+            }
+            cut = true;
+            outline = outline.moved([du, dv]);
+        }
+        place.copy_from_slice(&outline.centroid);
+    }
+    cut.then_some(seen)
 }
 
 /// The verdict on outlines laid from there on, features (4,) in px with standard deviations (4,) in px.
@@ -246,12 +279,7 @@ impl Verdict {
     /// Whether there is no need to look further.
     pub(crate) fn is_clear(&self) -> bool {
         let mut bands = self.bands.iter().zip(&self.reasons);
-        bands.all(|(band, reason)| {
-            reason.is_none()
-                && band.edges >= ENOUGH
-                && band.coverage >= WHOLE
-                && band.surprise <= UNSURPRISING
-        })
+        bands.all(|(band, reason)| reason.is_none() && band.is_clear())
     }
 
     /// What is not found has no features.

@@ -39,7 +39,7 @@ class VisionConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     coverage] [ours]."""
     least_edges: Fraction = 0.4
     """A band at less of whose outline the colour ends is refused [share of it] [ours]."""
-    least_edges_on_average: Fraction = 0.65
+    least_edges_on_average: Fraction = 0.6
     """The same for the mean of both bands [ours]."""
     least_edges_alone: Fraction = 0.85
     """The same for a band that is found alone, and 4/3 of its coverage [ours]."""
