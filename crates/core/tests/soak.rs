@@ -2,6 +2,7 @@
 //!
 //! Three degrees of freedom with play, a hand that never repeats itself, images every 40 ms.
 
+// Three axes are more than the lint allows, and are moved once.
 #![allow(clippy::large_stack_arrays)]
 
 mod support;
@@ -50,7 +51,8 @@ fn resources() -> Option<(u32, usize)> {
     Some((memory.split(' ').nth(1)?.parse().ok()?, files))
 }
 
-fn soak(law: &str, mut reduction: HysteresisReduction) {
+/// What grew or drifted, in words; nothing if nothing did.
+fn soak(law: &str, mut reduction: HysteresisReduction) -> String {
     let hours = std::env::var("TAUTSCOPE_HOURS");
     let hours: f64 = hours.map_or(0.05, |text| text.parse().unwrap());
     #[expect(
@@ -104,24 +106,22 @@ fn soak(law: &str, mut reduction: HysteresisReduction) {
         }
     }
     let grown = match (before, resources()) {
-        (Some((memory, files)), Some((more, now))) => {
-            assert_eq!(files, now, "{law}: open files");
-            (f64::from(more) / f64::from(memory) - 1.0).max(0.0)
-        }
-        _ => 0.0,
+        (Some((memory, files)), Some((more, now))) => files != now || 100 * more > 101 * memory,
+        _ => false,
     };
     let drifted = late_error > 1.2 * early_error;
     let stopped = worst >= Reaction::HoldMotion;
-    let broken = u64::from(grown > 0.01) + u64::from(drifted) + u64::from(stopped);
+    let broken = u64::from(grown) + u64::from(drifted) + u64::from(stopped);
     println!("G15 {law} {ticks} {broken} {}", late_error / early_error);
-    assert_eq!(
-        broken, 0,
-        "{law}: memory {grown}, tip off by {early_error} m in all, later {late_error} m, {worst:?}"
-    );
+    if broken == 0 {
+        return String::new();
+    }
+    format!(
+        "{law}: more memory or files: {grown}, tip off by {early_error} m in all, later {late_error} m, {worst:?}. "
+    )
 }
 
-#[test]
-fn the_articles_law() {
+fn paper() -> HysteresisReduction {
     let [insertion, rotation, bending] = UNITS;
     let axis = |unit: f64| {
         Axis::new(
@@ -131,14 +131,10 @@ fn the_articles_law() {
         )
     };
     let step = StateEstimation::Article(StateEstimator::new([1.0; 3]).unwrap());
-    soak(
-        "paper",
-        looped([axis(insertion), axis(rotation), axis(bending)], step),
-    );
+    looped([axis(insertion), axis(rotation), axis(bending)], step)
 }
 
-#[test]
-fn profile_best() {
+fn best() -> HysteresisReduction {
     let settings = WeightedSettings {
         marker_deviation: 0.3,
         model_deviation: 0.3,
@@ -149,5 +145,12 @@ fn profile_best() {
     let watch = StateEstimator::new([1.0; 3]).unwrap();
     let estimation = StateEstimation::Weighted(WeightedEstimator::new(watch, settings).unwrap());
     let axes = UNITS.map(|unit| Axis::Adaptive(support::axis(unit)));
-    soak("best", looped(axes, estimation));
+    looped(axes, estimation)
+}
+
+/// One after the other: files and memory are those of the process.
+#[test]
+fn nothing_grows_and_nothing_drifts() {
+    let grown = soak("best", best()) + &soak("paper", paper());
+    assert!(grown.is_empty(), "{grown}");
 }
