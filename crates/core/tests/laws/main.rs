@@ -11,6 +11,7 @@ mod guarantees;
 mod guards;
 mod history;
 mod lead;
+mod limits;
 mod monitor;
 mod offset_map;
 mod play;
