@@ -11,6 +11,7 @@ mod guarantees;
 mod guards;
 mod history;
 mod lead;
+mod limits;
 mod monitor;
 mod motion_watch;
 mod offset_map;
