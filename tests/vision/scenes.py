@@ -69,7 +69,7 @@ def scenes(count: int, seed: int, background: str | None = None) -> list[Scene]:
 
 
 def cut_scenes(count: int, seed: int) -> list[Scene]:
-    """Postures in which the border of the picture cuts a band and leaves little more than half of it."""
+    """Postures in which the border of the picture leaves little more than half of a band."""
     rng = np.random.default_rng(seed)
     camera = TwinCamera(CONFIG.replace(**{"twin.seed": seed}))
     found: list[Scene] = []
