@@ -66,3 +66,17 @@ def scenes(count: int, seed: int, background: str | None = None) -> list[Scene]:
         if inside and abs(whole - picture.true_features).max() < 0.5:
             found.append(Scene(state, picture.image, picture.true_features))
     return found
+
+
+def cut_scenes(count: int, seed: int) -> list[Scene]:
+    """Postures in which the border of the picture leaves little more than half of a band."""
+    rng = np.random.default_rng(seed)
+    camera = TwinCamera(CONFIG.replace(**{"twin.seed": seed}))
+    found: list[Scene] = []
+    while len(found) < count:
+        # Bent up, so that the bands come to lie at the upper border.
+        state = rng.uniform([0.010, -2.0, 1.4], [0.020, -1.3, 1.75])
+        picture = camera.draw(*centreline(state), 25 * len(found))
+        if 0.52 < picture.true_visible.min() < 0.62:
+            found.append(Scene(state, picture.image, picture.true_features))
+    return found

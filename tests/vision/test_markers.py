@@ -6,13 +6,14 @@ import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scenes import CONFIG, DEVIATION, MODEL, Scene, scenes
+from scenes import CONFIG, DEVIATION, MODEL, Scene, cut_scenes, scenes
 from tautscope.reduction import Expectation
 from tautscope.vision import Detection, MarkerDetector
 
 Image = NDArray[np.uint8]
 
 SCENES = scenes(8, seed=3)
+CUT = cut_scenes(24, seed=8)
 DETECTOR = MarkerDetector(CONFIG)
 MUCOSA = (60, 70, 140)
 GREEN = (70, 190, 60)
@@ -62,6 +63,15 @@ def test_found_with_an_expectation_with_features_and_without_either(number: int)
         assert detection.valid and detection.found == (True, True), detection.reason
         assert detection.reason == ""
         assert error(detection, scene) < 1.2
+
+
+@pytest.mark.parametrize("number", range(len(CUT)))
+def test_a_band_cut_by_the_border_is_found_whole(number: int) -> None:
+    scene = CUT[number]
+    detection = DETECTOR.detect(scene.image, expectation=scene.expectation(number))
+    assert detection.valid, (scene.state, detection.reason)
+    assert min(each.inside for each in detection.evidence) < 0.7
+    assert error(detection, scene) < 1.5, scene.state
 
 
 @pytest.mark.parametrize("number", range(len(SCENES)))

@@ -8,7 +8,7 @@ use crate::linear::{Square, apply, inverse, quadratic};
 use crate::numbers::whole;
 use crate::patch::{Patch, SIDE};
 use crate::samples::{Errors, Sums, UNKNOWNS, left, sums};
-use crate::{Demands, Evidence, Expect, Expectation, Frame, Outline, Verdict};
+use crate::{Demands, Evidence, Expect, Expectation, Frame, Outline, RunMap, Verdict};
 
 /// Steps to the best place.
 const STEPS: usize = 16;
@@ -74,6 +74,15 @@ impl Blended {
             && least >= ALIKE * most
             && self.surprise <= demands.surprise
             && (0..4).all(|index| self.covariance[index][index] <= SURE * SURE)
+    }
+
+    /// Whether enough of each band is in the image: light beyond the border is not seen.
+    pub(crate) fn is_inside(&self, map: &RunMap, demands: &Demands) -> bool {
+        let [a, b] = &self.outlines;
+        let inside = |own: &Outline, other: &Outline| {
+            own.count(map, other).pixels >= demands.inside * own.area
+        };
+        inside(a, b) && inside(b, a)
     }
 
     /// Whether the blur is more than what a frame that is sharp has.

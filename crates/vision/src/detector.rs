@@ -178,7 +178,7 @@ impl Detector {
             .filter(|start| start.iter().all(|value| value.is_finite()));
         finite
             .filter_map(|start| self.blend.fit(frame, expect, blind, start))
-            .find(|found| found.is_good(demands))
+            .find(|found| found.is_good(demands) && found.is_inside(&self.map, demands))
     }
 
     /// The regions in some windows, the largest first, at most [`CANDIDATES`]; each ends where its

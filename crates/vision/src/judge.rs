@@ -3,7 +3,7 @@
 use crate::evidence::{Demands, Evidence, weigh};
 use crate::fit::{COARSE, FINE, Fit, fit, settle};
 use crate::pairing::{Pair, TRIALS, likely, shift};
-use crate::{Expect, Expectation, Outline, Region, Rejection, RunMap};
+use crate::{Expect, Expectation, Region, Rejection, RunMap};
 
 /// How the two bands were recognised, or why not.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,7 +100,8 @@ fn alone(
     let order = (0..regions.len()).min_by(|a, b| away(&regions[*a]).total_cmp(&away(&regions[*b])));
     let mut pair = [None; 2];
     pair[1 - band] = order;
-    let other = judge_at(places(pair, blind, regions), [4.0; 4], map, expect, demands);
+    let mut here = NOWHERE;
+    [here[2 - 2 * band], here[3 - 2 * band]] = [u, v];
     let Evidence {
         edges, coverage, ..
     } = verdict.bands[band];
@@ -109,9 +110,11 @@ fn alone(
         verdict.conceal();
         return verdict;
     }
-    let as_good = other.is_some_and(|other| {
-        other.reasons[1 - band].is_none()
-            && other.bands[1 - band].surprise < verdict.bands[band].surprise + AMBIGUOUS
+    let as_good = [here, places(pair, blind, regions)].iter().any(|seen| {
+        judge_at(*seen, [4.0; 4], map, expect, demands).is_some_and(|other| {
+            other.reasons[1 - band].is_none()
+                && other.bands[1 - band].surprise < verdict.bands[band].surprise + AMBIGUOUS
+        })
     });
     if as_good {
         verdict.reasons[band] = Some(Rejection::Either);

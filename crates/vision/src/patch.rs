@@ -170,3 +170,57 @@ impl Consumer for Sample<'_> {
         }));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Image, OUTLINE, PixelFormat};
+
+    /// B, G, R of tissue, of grey plastic and of a band; tissue is red: green minus red is below 0.
+    const TISSUE: [u8; 3] = [40, 60, 160];
+    const GREY: [u8; 3] = [90, 90, 90];
+    const BAND: [u8; 3] = [50, 180, 60];
+
+    #[test]
+    fn what_is_left_of_a_mixture_is_the_share_of_the_band() {
+        // Tissue, grey, half and half of these, band, and a quarter of a band in tissue, 16 columns each.
+        let quarter = [0, 1, 2].map(|i| (BAND[i] / 4) + 3 * (TISSUE[i] / 4));
+        let half = [0, 1, 2].map(|i| TISSUE[i] / 2 + GREY[i] / 2);
+        let fields = [TISSUE, GREY, half, BAND, quarter];
+        let (width, height) = (16 * fields.len(), 16);
+        let row = fields.iter().flat_map(|field| field.repeat(16));
+        let data = row.collect::<Vec<u8>>().repeat(height);
+        let frame = Image::new(&data, PixelFormat::Bgr, [width, height], 3 * width).unwrap();
+        // Only the tissue on the left says what its colour is.
+        let corner = |index: usize| {
+            let share = real(index % (OUTLINE / 2)) / real(OUTLINE / 2 - 1);
+            let along = 15.5
+                + 70.0
+                    * if index < OUTLINE / 2 {
+                        share
+                    } else {
+                        1.0 - share
+                    };
+            [along, if index < OUTLINE / 2 { -1.0 } else { 17.0 }]
+        };
+        let outline = Outline {
+            corners: std::array::from_fn(corner),
+            centroid: [50.5, 8.0],
+            area: 70.0 * 18.0,
+        };
+        let mut patch = Patch::default();
+        patch.read(&frame, 0..width, 0..height);
+        patch.unmix(&[outline; 2]);
+        let at = |u: f64| {
+            let index = (0..patch.green.len()).find(|index| {
+                let [place, _] = patch.place(*index);
+                place >= u
+            });
+            patch.green[index.unwrap()]
+        };
+        let [tissue, grey, half, band, quarter] = [4.0, 20.0, 36.0, 52.0, 68.0].map(at);
+        assert!(tissue.abs() < 0.01 && grey.abs() < 0.01 && half.abs() < 0.5);
+        assert!(band > 50.0, "{band}");
+        assert!((quarter / band - 0.25).abs() < 0.02, "{quarter} of {band}");
+    }
+}
