@@ -144,7 +144,8 @@ def deviations(still: Floats, stop_after: float, until: float) -> Floats:
     """
     config = CONFIG.replace(profile="best")
     loop, model = HysteresisReduction(config), build_feature_model(config)
-    period, found = config.control.period, []
+    period = config.control.period
+    found: list[Floats] = []
     for tick in range(round(until / period)):
         moved = min(tick * period, stop_after) * np.array([5e-3, 0.5, 0.2]) * (1 - still)
         loop.step(np.asarray(REST) + moved, tick * period)

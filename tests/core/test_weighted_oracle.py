@@ -219,7 +219,7 @@ def test_close_to_straight_rotation_is_held_where_it_is_believed(seed: int) -> N
     model, ours = build_feature_model(CONFIG), estimator()
     state = np.array([0.03, rng.uniform(-1, 1), 2e-3])
     measured = features(CONFIG, state) + rng.normal(0, 0.3, 4)
-    belief = state + [0.5e-3, 0.2, 0.01]
+    belief = state + np.array([0.5e-3, 0.2, 0.01])
     found = ours.estimate(model, belief, DEVIATION, measured, 0.09 * np.eye(4))
     assert found is not None
     assert list(found[2]) == [True, False, True]
