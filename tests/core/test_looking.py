@@ -138,11 +138,12 @@ def test_the_states_deviation_is_the_covariance_through_the_pseudo_inverse() -> 
     np.testing.assert_allclose(report.state_deviation, expected, rtol=1e-8)
 
 
-def deviations(still: Floats, stop_after: float, until: float) -> Floats:
+def deviations(still: Floats, stop_after: float, until: float, coupling: float = 0.0) -> Floats:
     """Expected deviations (n, 3) just before each of the images that come every 40 ms and show what
     is predicted; the hand moves but where it is `still`, and rests from `stop_after` [s] on.
     """
-    config = CONFIG.replace(profile="best")
+    changes: dict[str, object] = {"profile": "best", "state_estimation.coupling": coupling}
+    config = CONFIG.replace(**changes)
     loop, model = HysteresisReduction(config), build_feature_model(config)
     period = config.control.period
     found: list[Floats] = []
@@ -166,6 +167,7 @@ def test_a_tip_may_go_on_for_a_while_when_its_command_rests() -> None:
 
 
 def test_a_dof_that_slides_makes_the_others_less_sure() -> None:
-    alone = deviations(still=np.array([0, 1, 1]), stop_after=1.0, until=1.0)[20]
-    still = deviations(still=np.ones(3), stop_after=1.0, until=1.0)[20]
-    assert np.all(alone > still), (alone, still)
+    slides = np.array([0, 1, 1])
+    apart = deviations(slides, stop_after=1.0, until=1.0, coupling=0.0)[20]
+    coupled = deviations(slides, stop_after=1.0, until=1.0, coupling=0.5)[20]
+    assert np.all(coupled[1:] > 1.2 * apart[1:]), (coupled, apart)
