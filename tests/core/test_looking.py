@@ -13,7 +13,7 @@ from tautscope.blocks import build_feature_model
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import SignalError
-from tautscope.reduction import Status
+from tautscope.reduction import HysteresisReduction, Status
 from tautscope.rig import Frame
 
 
@@ -136,3 +136,38 @@ def test_the_states_deviation_is_the_covariance_through_the_pseudo_inverse() -> 
     inverse = np.linalg.pinv(matrix, rcond=1e-15)
     expected = np.sqrt(np.diag(inverse @ covariance @ inverse.T))
     np.testing.assert_allclose(report.state_deviation, expected, rtol=1e-8)
+
+
+def deviations(still: Floats, stop_after: float, until: float, coupling: float = 0.0) -> Floats:
+    """Expected deviations (n, 3) just before each of the images that come every 40 ms and show what
+    is predicted; the hand moves but where it is `still`, and rests from `stop_after` [s] on.
+    """
+    changes: dict[str, object] = {"profile": "best", "state_estimation.coupling": coupling}
+    config = CONFIG.replace(**changes)
+    loop, model = HysteresisReduction(config), build_feature_model(config)
+    period = config.control.period
+    found: list[Floats] = []
+    for tick in range(round(until / period)):
+        moved = min(tick * period, stop_after) * np.array([5e-3, 0.5, 0.2]) * (1 - still)
+        loop.step(np.asarray(REST) + moved, tick * period)
+        if tick % 8 == 7:
+            expectation = loop.expectation(tick * period)
+            seen = model.predict(loop.predicted_state)
+            assert expectation is not None and seen is not None
+            found.append(expectation.deviation)
+            loop.on_features(seen[0], tick * period)
+    return np.array(found)
+
+
+def test_a_tip_may_go_on_for_a_while_when_its_command_rests() -> None:
+    moves = deviations(still=np.zeros(3), stop_after=1.0, until=2.0)
+    stopped, rested = moves[26], moves[-1]
+    assert np.all(stopped > 1.25 * rested), (stopped, rested)
+    assert np.all(np.diff(moves[26:36], axis=0) < 0), moves[26:36]
+
+
+def test_a_dof_that_slides_makes_the_others_less_sure() -> None:
+    slides = np.array([0, 1, 1])
+    apart = deviations(slides, stop_after=1.0, until=1.0, coupling=0.0)[20]
+    coupled = deviations(slides, stop_after=1.0, until=1.0, coupling=0.5)[20]
+    assert np.all(coupled[1:] > 1.2 * apart[1:]), (coupled, apart)

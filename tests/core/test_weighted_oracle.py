@@ -213,6 +213,30 @@ def test_a_lost_marker_holds_what_the_other_does_not_say() -> None:
     assert np.isfinite(deviation).all() and np.all(deviation <= DEVIATION)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_close_to_straight_rotation_is_held_where_it_is_believed(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    model, ours = build_feature_model(CONFIG), estimator()
+    state = np.array([0.03, rng.uniform(-1, 1), 2e-3])
+    measured = features(CONFIG, state) + rng.normal(0, 0.3, 4)
+    belief = state + np.array([0.5e-3, 0.2, 0.01])
+    found = ours.estimate(model, belief, DEVIATION, measured, 0.09 * np.eye(4))
+    assert found is not None
+    assert list(found[2]) == [True, False, True]
+    assert abs(found[0][1] - belief[1]) < 1e-3 * DEVIATION[1]
+    assert found[1][1] == DEVIATION[1]
+    assert np.all(np.abs(found[0] - state)[[0, 2]] < 5 * found[1][[0, 2]])
+
+
+def test_half_a_turn_on_and_bent_the_other_way_is_the_same_posture() -> None:
+    model = build_feature_model(CONFIG)
+    for half in (np.pi, -np.pi):
+        one = model.predict(np.array([0.03, 0.4, 0.9]))
+        other = model.predict(np.array([0.03, 0.4 + half, -0.9]))
+        assert one is not None and other is not None
+        np.testing.assert_allclose(one[0], other[0], atol=1e-9)
+
+
 def test_a_correction_is_not_added_twice() -> None:
     """The model is corrected when an image arrives, the belief when it was taken: 80 ms between."""
     period, latency = CONFIG.control.period, 16

@@ -1,5 +1,7 @@
 //! From features back to the state: the posture that explains what is seen.
 
+use core::f64::consts::{FRAC_PI_2, PI};
+
 use crate::dof::{PerDof, all_finite};
 use crate::features::FeatureModel;
 use crate::linear::{solve_symmetric, square};
@@ -13,6 +15,29 @@ pub struct Belief {
     pub state: PerDof<f64>,
     /// Standard deviations (3,) [m, rad, rad].
     pub deviation: PerDof<f64>,
+}
+
+/// By how much to [`turn`] a state, in rad, for the name of its posture that is nearer to an expected one; 0: not.
+///
+/// Wrong where the rotation is expected a quarter of a turn off.
+pub fn half_turn(expected: PerDof<f64>, state: PerDof<f64>) -> f64 {
+    let ([_, expected, _], [_, rotation, _]) = (expected, state);
+    let away = rotation - expected;
+    if away.abs() > FRAC_PI_2 {
+        -PI.copysign(away)
+    } else {
+        0.0
+    }
+}
+
+/// The same posture by another name, `half_turn` being pi, -pi or 0; images never tell them apart:
+///
+/// ```text
+/// (q1, q2, q3) = (q1, q2 + pi, -q3) = (q1, q2 - pi, -q3)
+/// ```
+pub fn turn([insertion, rotation, bending]: PerDof<f64>, half_turn: f64) -> PerDof<f64> {
+    let side = if half_turn.abs() > 0.0 { -1.0 } else { 1.0 };
+    [insertion, rotation + half_turn, side * bending]
 }
 
 impl FeatureModel {
@@ -132,5 +157,26 @@ fn weight(measured: f64, deviation: f64) -> f64 {
         1.0 / deviation
     } else {
         0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_posture_goes_by_the_name_nearer_to_what_is_expected() {
+        for turns in -8_i32..=8 {
+            let rotation = 0.1 + 0.35 * f64::from(turns);
+            let state = [0.03, rotation, 0.9];
+            let expected = [0.0, 0.2, 1.0];
+            let [insertion, named, bending] = turn(state, half_turn(expected, state));
+            assert!((named - 0.2).abs() <= FRAC_PI_2 + 1e-12, "{rotation}");
+            let turns = (named - rotation) / PI;
+            assert!((turns - turns.round()).abs() < 1e-12 && turns.abs() < 1.5);
+            let side = if turns.abs() > 0.5 { -0.9 } else { 0.9 };
+            assert!((insertion - 0.03).abs() < 1e-15, "{rotation}");
+            assert!((bending - side).abs() < 1e-15, "{rotation}");
+        }
     }
 }

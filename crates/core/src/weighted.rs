@@ -26,6 +26,11 @@ const STARTS: [PerDof<f64>; 6] = [
     [-1.0, 0.0, 0.0],
 ];
 
+/// Share of its variance that an image leaves a DOF that it does not determine, from which the DOF is held.
+const LEFT: f64 = 0.5;
+/// Share that is left of the deviation of a DOF that is held.
+const HELD: f64 = 1e-3;
+
 /// What a [`WeightedEstimator`] is set to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WeightedSettings {
@@ -57,6 +62,9 @@ pub struct WeightedSettings {
 /// but hardly where along the section. With two markers every choice is tried, if the first, both, costs more
 /// than leaving one out, so the least is found and not a local one. By Gauss-Newton, each step halved while it
 /// makes things worse.
+///
+/// Where two markers do not determine a DOF, and say less of it than the belief does, it is held there: close to straight, rotation follows what
+/// noise and an uneven bend make of it, and comes out half a turn on and bent the other way.
 ///
 /// With one step, equal covariances, a belief that knows nothing, no w and no outliers it is Eq. (16).
 ///
@@ -129,10 +137,33 @@ impl WeightedEstimator {
         let shown = |used: bool, value: f64| if used { value } else { f64::NAN };
         let kept = [shown(a, ua), shown(a, va), shown(b, ub), shown(b, vb)];
 
-        let prediction = model.predict(state)?;
-        let watched = self.watch.estimate(state, &prediction, kept);
-        let equations = self.equations(model, belief, state, only(used, sights))?;
+        let kept_sights = only(used, sights);
+        let watch = |state| Some(self.watch.estimate(state, &model.predict(state)?, kept));
+        let (mut state, mut watched) = (state, watch(state)?);
+        let mut free = [true; 3];
+        if used == [true; 2] && watched.observable != free {
+            let around = self.equations(model, belief, state, kept_sights)?;
+            let left = diagonal_of_inverse(around.whole())?;
+            for (free, (observable, left)) in
+                free.iter_mut().zip(watched.observable.iter().zip(left))
+            {
+                *free = *observable || left < LEFT;
+            }
+        }
+        if free != [true; 3] {
+            let narrow = holding(belief, free);
+            (state, _) = self.minimum(model, &narrow, narrow.state, kept_sights)?;
+            watched = watch(state)?;
+            for (observable, free) in watched.observable.iter_mut().zip(free) {
+                *observable &= free;
+            }
+        }
+        let equations = self.equations(model, belief, state, kept_sights)?;
         let variance = diagonal_of_inverse(equations.whole())?;
+        let mut shares = variance.map(libm::sqrt);
+        for (share, free) in shares.iter_mut().zip(free) {
+            *share = if free { *share } else { 1.0 };
+        }
         let (image_state, image_deviation) =
             equations.image_alone(belief, state, watched.observable);
         let start = model.predict(belief.state)?;
@@ -146,7 +177,7 @@ impl WeightedEstimator {
                 innovation,
                 ..watched
             },
-            deviation: times(variance.map(libm::sqrt), belief.deviation),
+            deviation: times(shares, belief.deviation),
             image_state,
             image_deviation,
             predicted_features: start.features,
@@ -235,5 +266,14 @@ impl WeightedEstimator {
     ) -> Option<NormalEquations> {
         let sideways = self.settings.sideways_deviation;
         NormalEquations::about(state, model, belief, sights, sideways)
+    }
+}
+
+/// The belief with no doubt about what is held.
+fn holding(belief: &Belief, free: PerDof<bool>) -> Belief {
+    let shares = free.map(|free| if free { 1.0 } else { HELD });
+    Belief {
+        deviation: times(shares, belief.deviation),
+        ..*belief
     }
 }

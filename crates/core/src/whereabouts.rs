@@ -4,7 +4,7 @@ use crate::dof::PerDof;
 use crate::error::{ConfigError, require_non_negative, require_positive};
 use crate::history::Entry;
 use crate::linear::{add, square};
-use crate::posture::Belief;
+use crate::posture::{Belief, half_turn, turn};
 use crate::state::StateEstimate;
 
 /// One linear step from far away misses by a part of itself.
@@ -126,6 +126,7 @@ impl Whereabouts {
             let own = square(last.deviation) + square(rest) + square(*moved);
             *deviation = deviation.min(libm::sqrt(own + shared * square(*deviation)));
         }
+        belief.state = turn(belief.state, half_turn(past.predicted_state, belief.state));
         belief
     }
 

@@ -3,6 +3,7 @@
 use super::{HysteresisReduction, StateEstimation};
 use crate::dof::{PerDof, all_finite};
 use crate::history::Entry;
+use crate::posture::{half_turn, turn};
 use crate::state::{StateEstimate, StateEstimator, found};
 use crate::weighted::WeightedEstimator;
 
@@ -104,12 +105,16 @@ impl HysteresisReduction {
     ) -> Option<Seen> {
         let belief = self.whereabouts.at(past);
         let seen = estimator.estimate(&self.feature_model, &belief, measured, covariance)?;
+        let half_turn = half_turn(belief.state, seen.estimate.state);
         Some(Seen {
-            estimate: seen.estimate,
+            estimate: StateEstimate {
+                state: turn(seen.estimate.state, half_turn),
+                ..seen.estimate
+            },
             used: seen.used,
             predicted_features: seen.predicted_features,
             state_deviation: seen.deviation,
-            output: seen.image_state,
+            output: turn(seen.image_state, half_turn),
             output_deviation: seen.image_deviation,
         })
     }
