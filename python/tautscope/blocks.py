@@ -183,7 +183,6 @@ def build_loop(config: Config, compensate: bool = True) -> _core.Reduction:
             start_deviation=start_deviation,
             rest_deviation=(rest(insertion), rest(rotation), rest(bending)),
             settling_time=config.state_estimation.settling_time,
-            coupling=config.state_estimation.coupling,
         )
     return _core.Reduction(
         (

@@ -61,7 +61,6 @@ impl Reduction {
             start_deviation,
             rest_deviation: [0.0; 3],
             settling_time: 0.0,
-            coupling: 0.0,
         })
         .map_err(errors::config(py))?;
         Ok(Self(core::HysteresisReduction::new(
@@ -77,7 +76,7 @@ impl Reduction {
     /// The loop of profile `best`, from its three axes.
     #[staticmethod]
     #[expect(clippy::too_many_arguments, reason = "named in Python")]
-    #[pyo3(signature = (axes, model, state_estimator, guards, *, span, period, start_deviation, rest_deviation, settling_time, coupling))]
+    #[pyo3(signature = (axes, model, state_estimator, guards, *, span, period, start_deviation, rest_deviation, settling_time))]
     fn adaptive(
         py: Python<'_>,
         axes: [PyRef<'_, AdaptiveAxis>; 3],
@@ -89,7 +88,6 @@ impl Reduction {
         start_deviation: [f64; 3],
         rest_deviation: [f64; 3],
         settling_time: f64,
-        coupling: f64,
     ) -> PyResult<Self> {
         let axes = axes.map(|axis| core::Axis::Adaptive(axis.0.clone()));
         let history = core::History::new(span, period).map_err(errors::config(py))?;
@@ -97,7 +95,6 @@ impl Reduction {
             start_deviation,
             rest_deviation,
             settling_time,
-            coupling,
         })
         .map_err(errors::config(py))?;
         Ok(Self(core::HysteresisReduction::new(
