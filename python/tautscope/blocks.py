@@ -193,7 +193,6 @@ def build_loop(config: Config, compensate: bool = True) -> _core.Reduction:
             start_deviation=start_deviation,
             rest_deviation=each_dof(lambda dof: config[dof].update_distance * rest),
             settling_time=config.state_estimation.settling_time,
-            coupling=config.state_estimation.coupling,
         )
     return _core.Reduction(
         each_dof(lambda dof: build_compensator(config[dof], compensate)),

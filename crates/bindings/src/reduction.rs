@@ -61,7 +61,6 @@ impl Reduction {
             start_deviation,
             rest_deviation: [0.0; 3],
             settling_time: 0.0,
-            coupling: 0.0,
         });
         let history = core::History::new(span, period);
         Self::joined(py, axes, model, estimation, history, whereabouts, guards)
@@ -70,7 +69,7 @@ impl Reduction {
     /// The loop of profile `best`, from its three axes.
     #[staticmethod]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
-    #[pyo3(signature = (axes, model, state_estimator, guards, *, span, period, start_deviation, rest_deviation, settling_time, coupling))]
+    #[pyo3(signature = (axes, model, state_estimator, guards, *, span, period, start_deviation, rest_deviation, settling_time))]
     fn adaptive(
         py: Python<'_>,
         axes: [PyRef<'_, AdaptiveAxis>; 3],
@@ -82,7 +81,6 @@ impl Reduction {
         start_deviation: [f64; 3],
         rest_deviation: [f64; 3],
         settling_time: f64,
-        coupling: f64,
     ) -> PyResult<Self> {
         let axes = axes.map(|axis| core::Axis::Adaptive(axis.0.clone()));
         let estimation = core::StateEstimation::Weighted(state_estimator.0);
@@ -90,7 +88,6 @@ impl Reduction {
             start_deviation,
             rest_deviation,
             settling_time,
-            coupling,
         });
         let history = core::History::new(span, period);
         Self::joined(py, axes, model, estimation, history, whereabouts, guards)

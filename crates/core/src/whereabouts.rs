@@ -28,23 +28,20 @@ pub struct WhereaboutsSettings {
     pub rest_deviation: PerDof<f64>,
     /// How long a tip still moves after its command has come to rest: time constant in s.
     pub settling_time: f64,
-    /// What motion of the DOFs moves each of them, in the units of `start_deviation`.
-    pub coupling: f64,
 }
 
 /// What the last images said, per DOF, and how it has aged.
 ///
 /// ```text
 /// state = q + (q_hat - q)_last - (what images have moved q by since)
-/// deviation^2 = deviation_last^2 + rest_deviation^2 + moved^2 + shared^2,  at most start_deviation^2
+/// deviation^2 = deviation_last^2 + rest_deviation^2 + moved^2,  at most start_deviation^2
 /// moved = max(travel - travel_last, arrived - arrived_last)
-/// shared = coupling start_deviation sqrt(sum over the DOFs of (moved / start_deviation)^2)
 /// arrived = arrived_last + (travel - arrived_last) elapsed / (settling_time + elapsed)
 /// ```
 ///
 /// with the travel of the command, forth and back: whatever the slack does, the tip moves no farther. But it does so
 /// later, and goes on when the command has come to rest; `arrived` is how far of the travel it has had the time to go.
-/// `shared` is the friction the DOFs share: one that slides lets go of the others. `deviation_last` has the
+/// `deviation_last` has the
 /// image's own and, of the linear step of Eq. (16), a quarter of the correction. Every image without markers makes it
 /// half as large again, up to a part of `start_deviation`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -90,7 +87,6 @@ impl Whereabouts {
             require_non_negative("rest_deviation", rest)?;
         }
         require_non_negative("settling_time", settings.settling_time)?;
-        require_non_negative("coupling", settings.coupling)?;
         let last = settings.start_deviation.map(|deviation| Last {
             correction: 0.0,
             deviation,
@@ -104,27 +100,18 @@ impl Whereabouts {
     /// What is believed of the state at a moment of the history.
     pub(crate) fn at(&self, past: &Entry) -> Belief {
         let settings = &self.settings;
-        let mut moved = past.travel;
-        let mut shared = 0.0;
-        for ((moved, last), start) in moved
-            .iter_mut()
-            .zip(self.last)
-            .zip(settings.start_deviation)
-        {
-            let arrived = last.arrived(settings.settling_time, past.time, *moved);
-            *moved = (*moved - last.travel).max(arrived - last.arrived);
-            shared += square(settings.coupling * *moved / start);
-        }
         let mut belief = Belief {
             state: add(past.predicted_state, -1.0, past.corrected),
             deviation: settings.start_deviation,
         };
-        let grown = moved.iter().zip(settings.rest_deviation);
         let now = belief.state.iter_mut().zip(&mut belief.deviation);
-        for ((state, deviation), ((moved, rest), last)) in now.zip(grown.zip(self.last)) {
+        let grown = past.travel.iter().zip(settings.rest_deviation);
+        for ((state, deviation), ((travel, rest), last)) in now.zip(grown.zip(self.last)) {
+            let arrived = last.arrived(settings.settling_time, past.time, *travel);
+            let moved = (travel - last.travel).max(arrived - last.arrived);
             *state += last.correction;
-            let own = square(last.deviation) + square(rest) + square(*moved);
-            *deviation = deviation.min(libm::sqrt(own + shared * square(*deviation)));
+            let variance = square(last.deviation) + square(rest) + square(moved);
+            *deviation = deviation.min(libm::sqrt(variance));
         }
         belief.state = turn(belief.state, half_turn(past.predicted_state, belief.state));
         belief

@@ -37,7 +37,6 @@ fn looped(axes: PerDof<Axis>, estimation: StateEstimation) -> HysteresisReductio
             start_deviation: [5e-3, 0.6, 0.5],
             rest_deviation: [2e-4, 0.02, 0.01],
             settling_time: 0.15,
-            coupling: 0.05,
         })
         .unwrap(),
         Guards::new(support::guards()).unwrap(),

@@ -29,6 +29,3 @@ class StateEstimationConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_
     of the DOF's update_distance]."""
     settling_time: NonNegative = 0.15
     """How long a tip still moves after its command has come to rest: time constant [s]."""
-    coupling: NonNegative = 0.05
-    """How far motion of the others moves a degree of freedom, by the friction they share:
-    standard deviation [in start_deviation, per start_deviation]."""
