@@ -14,6 +14,14 @@ macro_rules! flags {
             pub const fn name(self) -> &'static str {
                 match self { $(Self::$flag => $name,)+ }
             }
+
+            /// The flag of that name.
+            pub fn named(name: &str) -> Option<Self> {
+                match name {
+                    $($name => Some(Self::$flag),)+
+                    _ => None,
+                }
+            }
         }
     };
 }
@@ -63,13 +71,6 @@ flags! {
     Overcompensation = "overcompensation",
     /// Reference and tip that swing farther each time, one after the other.
     LimitCycle = "limit_cycle",
-}
-
-impl Flag {
-    /// The flag of that name.
-    pub fn named(name: &str) -> Option<Self> {
-        Self::ALL.iter().copied().find(|flag| flag.name() == name)
-    }
 }
 
 /// A set of flags.
