@@ -334,19 +334,6 @@ impl AdaptiveAxis {
         }
     }
 
-    /// In this direction there is no more slack than command minus output.
-    pub(crate) fn shrink(&mut self, upwards: bool, command: f64, measured: f64) {
-        let (side, sign) = if upwards {
-            (Side::Plus, 1.0)
-        } else {
-            (Side::Minus, -1.0)
-        };
-        let offset = command - measured;
-        if sign * (self.offset(side, measured) - offset) > 0.0 {
-            self.offsets.bound(side, measured, offset, 0.0);
-        }
-    }
-
     fn offset(&self, side: Side, position: f64) -> f64 {
         let [minus, plus] = self.offsets_at(position);
         match side {
