@@ -134,6 +134,8 @@ impl MotionWatch {
 }
 
 /// The names of all flags.
+// Inlined into what joins them, they would take many minutes to compile.
+#[inline(never)]
 pub fn names() -> Vec<&'static str> {
     core::Flag::ALL.iter().map(|flag| flag.name()).collect()
 }

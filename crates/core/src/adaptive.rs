@@ -295,9 +295,4 @@ impl AdaptiveAxis {
             self.tip = self.slack.carried(tip, command);
         }
     }
-
-    /// In this direction there is no more slack than command minus output.
-    pub(crate) fn shrink(&mut self, upwards: bool, command: f64, measured: f64) {
-        self.slack.shrink(upwards, command, measured);
-    }
 }

@@ -119,14 +119,6 @@ impl Axis {
         }
     }
 
-    /// The tip outran the reference: in this direction there is no more slack than command minus output. Bumpless.
-    pub(crate) fn shrink(&mut self, upwards: bool, command: f64, measured: f64) {
-        match self {
-            Self::Article(axis) => axis.shrink(upwards, command - measured),
-            Self::Adaptive(axis) => axis.shrink(upwards, command, measured),
-        }
-    }
-
     pub(crate) const fn command(&self) -> f64 {
         match self {
             Self::Article(axis) => axis.compensation.command(),
@@ -164,12 +156,6 @@ impl ArticleAxis {
             triggers,
             is_limited,
         }
-    }
-
-    fn shrink(&mut self, upwards: bool, offset: f64) {
-        self.estimation.shrink(upwards, offset);
-        self.compensator
-            .retune(&mut self.compensation, self.estimation.play());
     }
 
     fn set_share(&mut self, share: f64) {

@@ -80,16 +80,6 @@ impl EstimatorState {
         exceeds
     }
 
-    /// Believe in no more slack in this direction than that, and in no less than none.
-    pub(crate) fn shrink(&mut self, upwards: bool, offset: f64) {
-        let (minus, plus) = (self.play.delta_minus(), self.play.delta_plus());
-        self.play = if upwards {
-            Play::from_ordered(minus, offset.min(plus).max(minus))
-        } else {
-            Play::from_ordered(offset.max(minus).min(plus), plus)
-        };
-    }
-
     /// The play operator estimated so far.
     pub const fn play(&self) -> Play {
         self.play

@@ -19,6 +19,14 @@ macro_rules! flags {
             pub const fn meaning(self) -> &'static str {
                 match self { $(Self::$flag => concat!($($doc),+).trim_ascii(),)+ }
             }
+
+            /// The flag of that name.
+            pub fn named(name: &str) -> Option<Self> {
+                match name {
+                    $($name => Some(Self::$flag),)+
+                    _ => None,
+                }
+            }
         }
     };
 }
@@ -68,13 +76,6 @@ flags! {
     Overcompensation = "overcompensation",
     /// Reference and tip that swing farther each time, one after the other.
     LimitCycle = "limit_cycle",
-}
-
-impl Flag {
-    /// The flag of that name.
-    pub fn named(name: &str) -> Option<Self> {
-        Self::ALL.iter().copied().find(|flag| flag.name() == name)
-    }
 }
 
 /// A set of flags.

@@ -256,7 +256,7 @@ impl HysteresisReduction {
 
     fn learn(&mut self, past: &Entry, seen: &Seen, raised: &mut Flags) -> PerDof<Triggers> {
         let mut triggers = [Triggers::default(); 3];
-        let (flags, over) = self.watch(past, seen);
+        let (flags, _) = self.watch(past, seen);
         *raised = raised.and(flags);
         let history = &self.history;
         let outputs = seen.output.iter().zip(seen.output_deviation);
@@ -271,17 +271,11 @@ impl HysteresisReduction {
             .iter_mut()
             .zip(&mut triggers)
             .zip(&mut self.corrected)
-            .zip(over)
             .enumerate();
-        for (
-            (dof, (((axis, triggers), corrected), over)),
-            ((observable, command), (output, deviation)),
-        ) in axes.zip(signals)
+        for ((dof, ((axis, triggers), corrected)), ((observable, command), (output, deviation))) in
+            axes.zip(signals)
         {
             if *observable {
-                if over != 0.0 {
-                    axis.shrink(over > 0.0, command, *output);
-                }
                 let since = history
                     .since(past.time)
                     .filter_map(|entry| entry.command.get(dof).copied());

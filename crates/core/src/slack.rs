@@ -6,15 +6,6 @@ use crate::limits::PlayLimit;
 use crate::offset_map::{OffsetMap, OffsetPrior, Side, TILTS};
 use crate::play::Play;
 
-/// The side that a motion comes into contact with, and its sign.
-const fn ahead(upwards: bool) -> (Side, f64) {
-    if upwards {
-        (Side::Plus, 1.0)
-    } else {
-        (Side::Minus, -1.0)
-    }
-}
-
 /// What was learnt of both contact offsets, and the most of it that is believed; in the unit of the DOF.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slack {
@@ -109,15 +100,6 @@ impl Slack {
         tip.max(plus.min(minus)).min(plus.max(minus))
     }
 
-    /// In this direction there is no more slack than command minus output.
-    pub fn shrink(&mut self, upwards: bool, command: f64, measured: f64) {
-        let (side, sign) = ahead(upwards);
-        let offset = command - measured;
-        if sign * (self.offset(side, measured) - offset) > 0.0 {
-            self.learnt.bound(side, measured, offset, 0.0);
-        }
-    }
-
     /// Learn from how a measurement with this variance belongs to the others of its stroke: in contact it is an
     /// offset; beyond the contact believed in, a bound of one.
     pub fn learn(
@@ -130,10 +112,10 @@ impl Slack {
         self.learnt.travel(motion.travel);
         let mut triggers = Triggers::default();
         let offset = command - measured;
-        let (side, sign) = ahead(motion.upwards);
-        let trigger = match side {
-            Side::Plus => &mut triggers.plus,
-            Side::Minus => &mut triggers.minus,
+        let (side, sign, trigger) = if motion.upwards {
+            (Side::Plus, 1.0, &mut triggers.plus)
+        } else {
+            (Side::Minus, -1.0, &mut triggers.minus)
         };
         if motion.together {
             self.learnt.measure(side, measured, offset, variance);
