@@ -33,7 +33,7 @@ def test_a_line_says_how_often_when_and_the_strongest_reaction() -> None:
 
 def test_what_comes_and_goes_between_images_is_told_too() -> None:
     (line,) = told([(Reaction.NONE, ())], ("reference_jump",))
-    assert line.startswith("reference_jump (a reference faster than")
+    assert line.startswith("reference_jump (a reference that gained more")
     assert line.endswith("between two images")
 
 
