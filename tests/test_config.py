@@ -80,6 +80,7 @@ def test_a_file_names_only_what_it_changes(tmp_path: Path) -> None:
         ("[twin]\nseed = -1", "twin.seed", -1),
         ("[experiment]\nperiods = 2", "experiment.periods", 2),
         ("[experiment.bending]\namplitude = 0.0", "experiment.bending.amplitude", 0.0),
+        ("[experiment.bending]\nperiod = 2.0", "experiment.bending.period", 2.0),
         ("[instrument]\nmarker_a = 14e-3", "instrument.marker_a", 14e-3),
         ("[instrument]\ntip_length = 16e-3", "instrument.marker_b", 16e-3),
         ("[control]\nperiod = 1e-4", "control.history", 2.0),

@@ -63,7 +63,8 @@ def test_a_tip_behind_slack_passes(dof: Dof, share: float) -> None:
 @dofs
 def test_a_quick_motor_seen_late_passes(dof: Dof) -> None:
     """The motor is compared with the tip of the same moment, not with where it has gone since."""
-    quick = CONFIG.replace(**{f"experiment.{dof.label}.period": 2.0})
+    faster = {"safety.reference_speed": [0.1, 10.0, 10.0]}
+    quick = CONFIG.replace(**faster, **{f"experiment.{dof.label}.period": 2.0})
     watch(dof, play(SLACK[dof]), config=quick, delay=5)
 
 

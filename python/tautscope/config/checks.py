@@ -134,6 +134,15 @@ def _check_safety(config: Config) -> None:
                 (least, largest),
                 "the lesser end, then the larger",
             )
+    for dof, speed in zip(Dof, safety.reference_speed, strict=True):
+        sine = config.experiment[dof]
+        least_period = 2 * math.pi * sine.amplitude / speed
+        if sine.period < least_period and "reference_jump" not in safety.off:
+            raise ConfigError(
+                f"experiment.{dof.label}.period",
+                sine.period,
+                f"at least {least_period:.3g}; a faster hand is stopped, safety.reference_speed",
+            )
     for dof, noise in zip(Dof, safety.state_noise, strict=True):
         tolerated = config[dof].contact_tolerance * config[dof].update_distance
         if not 0 <= 3 * noise < tolerated:
