@@ -1,4 +1,4 @@
-"""The table of reactions of crates/core/src/supervisor.rs, as docs/safety.md shows it."""
+"""The table of reactions of crates/core/src/reactions.rs, as docs/safety.md shows it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import re
 from doc_pages import ROOT, insert
 
 PAGE = ROOT / "docs" / "safety.md"
-SOURCE = ROOT / "crates" / "core" / "src" / "supervisor.rs"
+SOURCE = ROOT / "crates" / "core" / "src" / "reactions.rs"
 
 _LADDER = re.compile(r"const (\w+): &\[\(Reaction, Clear\)\] = &(\[.*?\]);")
 _RULE = re.compile(r"rule\(Flag::(\w+),\s*(\w+),\s*(&\[.*?\]|\w+),\s*(true|false)\s*\)", re.DOTALL)

@@ -10,7 +10,8 @@ use crate::limits::PlayLimit;
 use crate::monitor::{Monitor, MonitorSettings, Verdict};
 use crate::motion_watch::{MotionSettings, MotionWatch};
 use crate::play::Play;
-use crate::supervisor::{Event, Reaction, Source, Supervisor, SupervisorSettings};
+use crate::reactions::{Reaction, Source};
+use crate::supervisor::{Event, Supervisor, SupervisorSettings};
 
 /// What the guards are set to.
 #[derive(Debug, Clone, Copy, PartialEq)]
