@@ -176,6 +176,8 @@ class Recording:
 
 Row = tuple[object, ...]
 _UNKNOWN = (np.nan, np.nan, np.nan)
+_BLOCK = 500
+"""Rows packed at once: a millisecond."""
 _NO_FEATURES = (np.nan, np.nan, np.nan, np.nan)
 
 
@@ -208,6 +210,33 @@ def frame_row(now: float, frame: Frame, report: Report) -> Row:
     )
 
 
+class _Rows:
+    """Rows as they come, packed a few at a time: all at once would hold up every thread."""
+
+    def __init__(self, columns: np.dtype[np.void]) -> None:
+        self._columns = columns
+        self._packed: list[Table] = []
+        self._rows: list[Row] = []
+
+    def append(self, row: Row) -> None:
+        self._rows.append(row)
+        if len(self._rows) == _BLOCK:
+            self._pack()
+
+    def table(self) -> Table:
+        self._pack()
+        whole = np.empty(sum(map(len, self._packed)), self._columns)
+        end = 0
+        for block in self._packed:
+            start, end = end, end + len(block)
+            whole[start:end] = block
+        return whole
+
+    def _pack(self) -> None:
+        self._packed.append(np.array(self._rows, dtype=self._columns))
+        self._rows = []
+
+
 class Tables:
     """The rows of a `Recording`, collected in the order in which things happened.
 
@@ -216,8 +245,8 @@ class Tables:
     """
 
     def __init__(self, config: Config) -> None:
-        self._trace: list[Row] = []
-        self._frames: list[Row] = []
+        self._trace = _Rows(TRACE_COLUMNS)
+        self._frames = _Rows(FRAME_COLUMNS)
         self._estimate: Row = _UNKNOWN
         self._deltas: Row = (
             *(config[dof].delta_minus for dof in Dof),
@@ -251,8 +280,7 @@ class Tables:
 
     def tables(self) -> tuple[Table, Table]:
         """Trace and frames, with the true state at the time of capture."""
-        trace = np.array(self._trace, dtype=TRACE_COLUMNS)
-        frames = np.array(self._frames, dtype=FRAME_COLUMNS)
+        trace, frames = self._trace.table(), self._frames.table()
         if len(trace):
             for dof, truth in zip(Dof, per_dof(trace, "true").T, strict=True):
                 frames[f"true_{dof.label}"] = np.interp(
