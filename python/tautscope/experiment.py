@@ -11,10 +11,11 @@ import numpy as np
 from tautscope.config import Config
 from tautscope.errors import SignalError
 from tautscope.noticed import Noticed
-from tautscope.recording import Floats, Recording, Snapshot, Tables, frame_row
+from tautscope.recording import Floats, Recording, Snapshot
 from tautscope.reduction import HysteresisReduction, Report
 from tautscope.references import DatedReference, Reference
 from tautscope.rig import Frame, Rig, Sample
+from tautscope.rows import Tables, frame_row
 from tautscope.safety import Supervision, switched_off
 
 if TYPE_CHECKING:

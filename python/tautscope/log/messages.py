@@ -23,10 +23,11 @@ from tautscope.config import Config, dump_config, from_document
 from tautscope.dof import Dof
 from tautscope.errors import RecordError
 from tautscope.log.cdr import Message, decode, encode
-from tautscope.recording import FRAME_COLUMNS, Row, frame_row
+from tautscope.recording import FRAME_COLUMNS
 from tautscope.reduction import Report, Status
 from tautscope.references import Segment
 from tautscope.rig import Frame, Sample
+from tautscope.rows import Row, frame_row
 
 Floats = NDArray[np.float64]
 Messages = dict[str, bytes]

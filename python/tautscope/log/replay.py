@@ -19,10 +19,11 @@ from tautscope.errors import RecordError
 from tautscope.log import messages as msg
 from tautscope.log.cdr import decode
 from tautscope.log.reader import Log, Tick, Update
-from tautscope.recording import FEATURES, FRAME_COLUMNS, Recording, Tables, frame_row
+from tautscope.recording import FEATURES, FRAME_COLUMNS, Recording
 from tautscope.reduction import HysteresisReduction
 from tautscope.replay import read_motors
 from tautscope.rig import Frame, Sample
+from tautscope.rows import Tables, frame_row
 
 Floats = NDArray[np.float64]
 

@@ -1,0 +1,129 @@
+"""The rows of a run, collected while it goes on."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tautscope.config import Config
+from tautscope.dof import Dof
+from tautscope.recording import FRAME_COLUMNS, TRACE_COLUMNS, Floats, Table, per_dof
+
+if TYPE_CHECKING:
+    from tautscope.reduction import Report
+    from tautscope.rig import Frame, Sample
+
+Row = tuple[object, ...]
+_UNKNOWN = (np.nan, np.nan, np.nan)
+_BLOCK = 500
+"""Rows packed at once: a millisecond."""
+_NO_FEATURES = (np.nan, np.nan, np.nan, np.nan)
+
+
+def frame_row(now: float, frame: Frame, report: Report) -> Row:
+    """What became of a frame, in the order of `FRAME_COLUMNS`; the true state is filled in later.
+
+    Args:
+        now: When the frame arrived [s, the rig's clock].
+        frame: As it arrived.
+        report: What the loop made of it.
+    """
+    detection = report.detection
+    valid = detection is not None and bool(detection.valid)
+    features = detection.features if detection is not None and valid else _NO_FEATURES
+    truth = _NO_FEATURES if frame.true_features is None else frame.true_features
+    return (
+        frame.captured_at,
+        now,
+        frame.sequence,
+        str(report.status),
+        valid,
+        *report.state_estimate,
+        *report.predicted_state,
+        *_UNKNOWN,
+        *report.observable,
+        *features,
+        *report.predicted_features,
+        *report.innovation,
+        *truth,
+    )
+
+
+class _Rows:
+    """Rows as they come, packed a few at a time: all at once would hold up every thread."""
+
+    def __init__(self, columns: np.dtype[np.void]) -> None:
+        self._columns = columns
+        self._packed: list[Table] = []
+        self._rows: list[Row] = []
+
+    def append(self, row: Row) -> None:
+        self._rows.append(row)
+        if len(self._rows) == _BLOCK:
+            self._pack()
+
+    def table(self) -> Table:
+        self._pack()
+        whole = np.empty(sum(map(len, self._packed)), self._columns)
+        end = 0
+        for block in self._packed:
+            start, end = end, end + len(block)
+            whole[start:end] = block
+        return whole
+
+    def _pack(self) -> None:
+        self._packed.append(np.array(self._rows, dtype=self._columns))
+        self._rows = []
+
+
+class Tables:
+    """The rows of a `Recording`, collected in the order in which things happened.
+
+    Args:
+        config: Its contact offsets are those before the first frame.
+    """
+
+    def __init__(self, config: Config) -> None:
+        self._trace = _Rows(TRACE_COLUMNS)
+        self._frames = _Rows(FRAME_COLUMNS)
+        self._estimate: Row = _UNKNOWN
+        self._deltas: Row = (
+            *(config[dof].delta_minus for dof in Dof),
+            *(config[dof].delta_plus for dof in Dof),
+        )
+        self._status = "none"
+
+    def tick(self, sample: Sample, reference: Floats, command: Floats) -> None:
+        """One control tick: what the rig said, and what was asked of it then."""
+        truth = _UNKNOWN if sample.true_state is None else sample.true_state
+        self._trace.append(
+            (
+                sample.time,
+                *reference,
+                *command,
+                *sample.applied,
+                *self._estimate,
+                *truth,
+                *self._deltas,
+                self._status,
+            )
+        )
+
+    def frame(self, row: Row, delta_minus: Floats, delta_plus: Floats) -> None:
+        """One image: its `frame_row`, and the offsets (3,) after it."""
+        known = dict(zip(FRAME_COLUMNS.names or (), row, strict=True))
+        self._estimate = tuple(known[f"estimate_{dof.label}"] for dof in Dof)
+        self._deltas = (*delta_minus, *delta_plus)
+        self._status = str(known["status"])
+        self._frames.append(row)
+
+    def tables(self) -> tuple[Table, Table]:
+        """Trace and frames, with the true state at the time of capture."""
+        trace, frames = self._trace.table(), self._frames.table()
+        if len(trace):
+            for dof, truth in zip(Dof, per_dof(trace, "true").T, strict=True):
+                frames[f"true_{dof.label}"] = np.interp(
+                    frames["captured_at"], trace["time"], truth, left=np.nan, right=np.nan
+                )
+        return trace, frames
