@@ -62,3 +62,13 @@ def test_collections_pass_over_what_was_there_before() -> None:
     with realtime.little_collection():
         assert gc.get_freeze_count() > 1000
     assert gc.get_freeze_count() == 0
+
+
+def test_what_a_run_keeps_is_not_searched_while_it_lasts() -> None:
+    before = gc.get_threshold()
+    with realtime.little_collection():
+        count = gc.get_stats()[2]["collections"]
+        kept = [[index] for index in range(2_000_000)]
+        assert gc.get_stats()[2]["collections"] == count
+    assert len(kept) == 2_000_000
+    assert gc.get_threshold() == before
