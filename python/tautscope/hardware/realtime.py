@@ -78,7 +78,7 @@ def quick_switching() -> Iterator[None]:
 def little_collection() -> Iterator[None]:
     """Python's search for cycles of dead objects stops all threads: only the youngest are searched.
 
-    All there is after ten minutes of a run take 30 ms, three set-points.
+    A search of all takes the longer the more a run has kept.
     """
     gc.collect()
     gc.freeze()
