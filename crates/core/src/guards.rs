@@ -188,17 +188,16 @@ impl Guards {
         self.clutch.admitted()
     }
 
-    /// What an image says of hand and tip, and which DOFs are over-compensated, in which direction.
+    /// What an image says of hand and tip.
     pub(crate) fn look(
         &mut self,
         time: f64,
         reference: PerDof<f64>,
         measured: PerDof<f64>,
         play: PerDof<Play>,
-    ) -> (Flags, PerDof<f64>) {
-        let (flags, over) = self.motion.look(time, reference, measured, play);
-        let is_off = self.off.has(Flag::Overcompensation);
-        (self.watched(flags), if is_off { [0.0; 3] } else { over })
+    ) -> Flags {
+        let flags = self.motion.look(time, reference, measured, play);
+        self.watched(flags)
     }
 
     /// Whether images may teach.

@@ -115,33 +115,26 @@ impl MotionWatch {
     }
 
     /// An image of `time` in s: the reference then, the tip as measured, NaN where it was not, and the slack believed
-    /// in. What is wrong, and which DOFs the tip outruns, 0 or in the direction of their motion 1 or -1.
+    /// in.
     pub fn look(
         &mut self,
         time: f64,
         reference: PerDof<f64>,
         measured: PerDof<f64>,
         play: PerDof<Play>,
-    ) -> (Flags, PerDof<f64>) {
-        let mut over = [0.0; 3];
+    ) -> Flags {
         let (mut is_over, mut cycles) = (false, false);
         let signals = reference.into_iter().zip(measured).zip(play);
-        for ((axis, over), ((reference, measured), play)) in
-            self.axes.iter_mut().zip(&mut over).zip(signals)
-        {
+        for (axis, ((reference, measured), play)) in self.axes.iter_mut().zip(signals) {
             if reference.is_finite() && measured.is_finite() {
-                let shrunk;
-                (*over, shrunk) = axis.look(time, reference, measured, play, self.cycle_time);
-                is_over |= shrunk || *over != 0.0;
+                is_over |= axis.look(time, reference, measured, play, self.cycle_time);
                 cycles |= axis
                     .growing
                     .iter()
                     .all(|each| each.count >= self.cycle_swings);
             }
         }
-        let flags =
-            Flags::when(is_over, Flag::Overcompensation).and(Flags::when(cycles, Flag::LimitCycle));
-        (flags, over)
+        Flags::when(is_over, Flag::Overcompensation).and(Flags::when(cycles, Flag::LimitCycle))
     }
 }
 
@@ -184,15 +177,8 @@ impl Motion {
         }
     }
 
-    /// The direction of the reference if the tip has outrun it, else 0; and whether slack was unlearnt in this stroke.
-    fn look(
-        &mut self,
-        time: f64,
-        reference: f64,
-        measured: f64,
-        play: Play,
-        longest: f64,
-    ) -> (f64, bool) {
+    /// Whether the tip has outrun its reference, or slack was unlearnt in this stroke.
+    fn look(&mut self, time: f64, reference: f64, measured: f64, play: Play, longest: f64) -> bool {
         let [of_reference, of_tip] = &mut self.growing;
         if let Some(swing) = self.reference.follow(reference) {
             of_reference.turned(time, swing, longest);
@@ -219,8 +205,7 @@ impl Motion {
                 play.delta_minus() - then.delta_minus()
             }
         });
-        let outruns = if outrun { direction } else { 0.0 };
-        (outruns, unlearnt > UNLEARNT * self.ahead)
+        outrun || unlearnt > UNLEARNT * self.ahead
     }
 }
 

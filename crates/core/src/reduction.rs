@@ -256,7 +256,7 @@ impl HysteresisReduction {
 
     fn learn(&mut self, past: &Entry, seen: &Seen, raised: &mut Flags) -> PerDof<Triggers> {
         let mut triggers = [Triggers::default(); 3];
-        let (flags, _) = self.watch(past, seen);
+        let flags = self.watch(past, seen);
         *raised = raised.and(flags);
         let history = &self.history;
         let outputs = seen.output.iter().zip(seen.output_deviation);
@@ -291,13 +291,10 @@ impl HysteresisReduction {
     }
 
     /// What the image says of hand and tip.
-    fn watch(&mut self, past: &Entry, seen: &Seen) -> (Flags, PerDof<f64>) {
-        let mut measured = seen.output;
-        for (value, observable) in measured.iter_mut().zip(seen.estimate.observable) {
-            *value = if observable { *value } else { f64::NAN };
-        }
+    fn watch(&mut self, past: &Entry, seen: &Seen) -> Flags {
         let play = self.play();
-        self.guards.look(past.time, past.reference, measured, play)
+        self.guards
+            .look(past.time, past.reference, seen.image_state(), play)
     }
 
     /// The report on a frame that taught nothing.
