@@ -14,6 +14,10 @@ from tautscope.hardware.signals import exit_on_signals
 STEP = np.array([1e-4, 0.01, 0.01])
 
 
+class Panic(BaseException):
+    """As a panic in Rust comes to Python: no `Exception`, so that nobody takes it for an error."""
+
+
 def main() -> None:
     file, ending = sys.argv[1:]
     config = load_config(file).drives
@@ -29,6 +33,8 @@ def main() -> None:
                     return
                 if ending == "raise":
                     raise ZeroDivisionError
+                if ending == "panic":
+                    raise Panic
                 if ending == "exit":
                     sys.exit(3)
             time.sleep(drives.cycle / 2)

@@ -97,6 +97,7 @@ MASTER = str(Path(__file__).with_name("master.py"))
     [
         ("return", 0),
         ("raise", 1),
+        ("panic", 1),
         ("exit", 3),
         (signal.SIGINT, -signal.SIGINT),
         (signal.SIGTERM, 128 + signal.SIGTERM),
