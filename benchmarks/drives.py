@@ -39,11 +39,14 @@ AXES = {
         "travel": [-0.06, 0.06],
         "speed_limit": 0.15,
         "following_error": 2e-3,
+        "following_window": 1e-3,
     },
     "rotation": AXIS
-    | {"node": 2, "travel": [-4.0, 4.0], "speed_limit": 20.0, "following_error": 0.2},
+    | {"node": 2, "travel": [-4.0, 4.0], "speed_limit": 20.0}
+    | {"following_error": 0.2, "following_window": 0.1},
     "bending": AXIS
-    | {"node": 3, "travel": [-2.5, 2.5], "speed_limit": 10.0, "following_error": 0.1},
+    | {"node": 3, "travel": [-2.5, 2.5], "speed_limit": 10.0}
+    | {"following_error": 0.1, "following_window": 0.05},
 }
 FAULTS = {
     "heartbeat": ("heartbeat of a drive lost", 100.0),
