@@ -127,6 +127,9 @@ class Watch:
     def frame(self, now: float, frame: Frame, report: Report) -> None:
         """Nothing: `look` has seen it."""
 
+    def event(self, now: float, what: str) -> None:
+        """Nothing: the drives were told."""
+
     def read(self, now: float, supervision: Supervision) -> None:
         """What the supervisor says."""
         if supervision.flags != self._raised:
