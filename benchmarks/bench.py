@@ -65,7 +65,7 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "counts per degree, rotation": (
         {"drives.rotation.counts_per_unit": 1e4 * np.pi / 180},
-        "drives.rotation",
+        "rotation, node 2: it is at",
     ),
     "degrees for counts per rad, rotation": (
         {"drives.rotation.counts_per_unit": 1e4 * 180 / np.pi},

@@ -24,27 +24,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from tautscope.config import DrivesConfig, dump_config, from_document, load_config
+from doc_pages import ROOT
+from tautscope.config import DrivesConfig, dump_config, load_config
 from tautscope.errors import DriveError
 from tautscope.hardware.drives import Drives, open_drives
 
 SPEED = np.array([0.01, 1.5, 0.8])
 """Of the motors while something goes wrong [m/s, rad/s, rad/s]."""
-AXIS = {"sign": 1, "counts_per_unit": 1e4}
-AXES = {
-    "insertion": AXIS
-    | {
-        "node": 1,
-        "counts_per_unit": 1e6,
-        "travel": [-0.06, 0.06],
-        "speed_limit": 0.15,
-        "following_error": 2e-3,
-    },
-    "rotation": AXIS
-    | {"node": 2, "travel": [-4.0, 4.0], "speed_limit": 20.0, "following_error": 0.2},
-    "bending": AXIS
-    | {"node": 3, "travel": [-2.5, 2.5], "speed_limit": 10.0, "following_error": 0.1},
-}
 FAULTS = {
     "heartbeat": ("heartbeat of a drive lost", 100.0),
     "drop": ("a drive silent", 100.0),
@@ -59,8 +45,9 @@ FAULTS = {
 def rig(folder: Path) -> Iterator[tuple[Path, subprocess.Popen[str]]]:
     """Simulated drives; the file that names them, and their process."""
     socket, file = folder / "can", folder / "rig.toml"
-    drives = AXES | {"interface": "tautscope", "channel": str(socket)}
-    file.write_text(dump_config(from_document({"drives": drives})), encoding="utf-8")
+    bench = load_config(ROOT / "configs" / "bench.toml")
+    config = bench.replace(**{"drives.channel": str(socket)})
+    file.write_text(dump_config(config), encoding="utf-8")
     command = [sys.executable, "-m", "tautscope.bench.drives"]
     command += ["--config", str(file), "--socket", str(socket)]
     with subprocess.Popen(

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from doc_pages import ROOT
 from hysteresis_runs import FeatureCamera
 from numpy.typing import ArrayLike, NDArray
-from tautscope.config import Config
+from tautscope.config import Config, load_config
 from tautscope.dof import Dof
+from tautscope.hardware.following import Following
+from tautscope.hardware.rig import rig_drives
 from tautscope.reduction import HysteresisReduction, Report
 from tautscope.references import Segment
 from tautscope.rig import Frame, Sample
@@ -24,10 +26,8 @@ Floats = NDArray[np.float64]
 
 STILL = 1.0
 """How long a motion that was stopped is watched [s]."""
-FOLLOWING_ERROR = np.array([4e-3, 0.4, 0.3])
-"""Of the bench's drives, configs/bench.toml [m, rad, rad]."""
-FOLLOWING_TIME = 0.1
-"""Commands to which a drive's position is compared [s], as on hardware."""
+DRIVES = rig_drives(load_config(ROOT / "configs" / "bench.toml"))
+"""How they are watched: the bench's."""
 RANKS = {reaction: reaction.rank for reaction in Reaction}
 HOLD_ESTIMATE = RANKS[Reaction.HOLD_ESTIMATE]
 HOLD_MOTION = RANKS[Reaction.HOLD_MOTION]
@@ -127,6 +127,9 @@ class Watch:
     def frame(self, now: float, frame: Frame, report: Report) -> None:
         """Nothing: `look` has seen it."""
 
+    def event(self, now: float, what: str) -> None:
+        """Nothing: the drives were told."""
+
     def read(self, now: float, supervision: Supervision) -> None:
         """What the supervisor says."""
         if supervision.flags != self._raised:
@@ -198,7 +201,7 @@ class Driven:
     ) -> None:
         self.rig, self._watch, self._watching = rig, watch, watching
         self._at, self._then = at, then
-        self._recent: deque[Floats] = deque(maxlen=round(FOLLOWING_TIME / rig.control_period))
+        self._following = Following(DRIVES, rig.control_period)
         self._stopped = False
 
     @property
@@ -208,7 +211,9 @@ class Driven:
 
     def reset(self) -> Sample:
         """As the rig."""
-        return self.rig.reset()
+        sample = self.rig.reset()
+        self._following.begin(sample.applied)
+        return sample
 
     def step(self, command: ArrayLike) -> Sample:
         """As the rig, unless the drives were stopped."""
@@ -233,15 +238,11 @@ class Driven:
         self.rig.brake()
 
     def _check(self, said: Floats, applied: Floats) -> None:
-        self._recent.append(said)
+        strays = self._following.strays(said, applied).any()
         if "drive_fault" in self._watching and self.rig.drive_fault:
             self._give_up("drive_fault")
-        # The last command is one of the recent ones: who is near it needs no closer look.
-        elif "following_error" in self._watching and (abs(said - applied) > FOLLOWING_ERROR).any():
-            recent = np.stack(self._recent)
-            error = np.maximum(recent.min(axis=0) - applied, applied - recent.max(axis=0))
-            if (error > FOLLOWING_ERROR).any():
-                self._give_up("following_error")
+        elif "following_error" in self._watching and strays:
+            self._give_up("following_error")
 
     def _give_up(self, flag: str) -> None:
         now = self.rig.true_time

@@ -54,6 +54,7 @@ def simulated(folder: str) -> DrivesConfig:
             travel=(-1.0, 1.0),
             speed_limit=1.0,
             following_error=0.1,
+            following_window=0.05,
         )
         for dof in Dof
     }

@@ -46,7 +46,7 @@ def test_the_configurations_are_accepted(file: Path) -> None:
 
 def test_files_are_found_from_where_the_configuration_is(tmp_path: Path) -> None:
     axis = "{node = %d, counts_per_unit = 1e4, sign = 1, travel = [0, 1], speed_limit = 1, "
-    axis += "following_error = 0.1, eds = '%s'}"
+    axis += "following_error = 0.1, following_window = 0.05, eds = '%s'}"
     names = [(1, "drive.eds"), (2, "../other/drive.eds"), (3, "/opt/drive.eds")]
     axes = [axis % each for each in names]
     dofs = ("insertion", "rotation", "bending")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
 from typing import TYPE_CHECKING, Protocol
@@ -38,6 +39,10 @@ class Log(Protocol):
 
     def frame(self, now: float, frame: Frame, report: Report) -> None:
         """An image update, at a time of the rig's clock [s]."""
+        ...
+
+    def event(self, now: float, what: str) -> None:
+        """What the operator or the rig told the loop, `HysteresisReduction.on_event`, likewise."""
         ...
 
 
@@ -81,11 +86,14 @@ def run_experiment(
     reduction = HysteresisReduction(config, compensate=compensate)
     recorder = _Recorder(config, reference.duration / 2)
     eyes = _Ahead(look) if aside is None else _Aside(aside)
+    events = None if log is None else _Events(reduction, log)
     sample = rig.reset()
     start = sample.time
     while (elapsed := sample.time - start) < reference.duration:
         desired = reference(elapsed)
         made_at = start + reference.made_at if isinstance(reference, DatedReference) else None
+        if events is not None:
+            events.write(sample.time)
         command = reduction.step(desired, time=sample.time, made_at=made_at)
         recorder.tick(sample, desired, command)
         if log is not None:
@@ -93,7 +101,8 @@ def run_experiment(
         # After the command, which never waits for an image.
         for frame, report in eyes.see(reduction, sample.frame):
             recorder.seen(sample.time, frame, report, elapsed)
-            if log is not None:
+            if log is not None and events is not None:
+                events.write(sample.time, reduction.updates)
                 log.frame(sample.time, frame, report)
         if watch is not None:
             watch(reduction.supervision)
@@ -102,6 +111,8 @@ def run_experiment(
             raise SignalError("sample.time", sample.time, f"later than the last, {before.time}")
         if progress is not None and int(sample.time - start) > int(elapsed):
             progress(sample.time - start, reference.duration)
+    if events is not None:
+        events.write(sample.time)
     trace, frames = recorder.tables()
     segments = tuple(reference.segments)
     warnings = (*switched_off(config), *recorder.noticed.lines(reduction.supervision.latched))
@@ -138,6 +149,24 @@ class _Aside:
         if self._next is not None and self._asked is None:
             question = reduction.question(self._next)
             self._asked, self._next = (self._next, self._executor.submit(question)), None
+
+
+class _Events:
+    """What the loop is told beside references and images, for the log, in the order it was told."""
+
+    def __init__(self, loop: HysteresisReduction, log: Log) -> None:
+        self._loop, self._log = loop, log
+        self._waiting: list[tuple[int, str]] = []
+        loop.on_event = self._note
+
+    def write(self, now: float, update: float = math.inf) -> None:
+        """Those before an image update, or all."""
+        while self._waiting and self._waiting[0][0] < update:
+            self._log.event(now, self._waiting.pop(0)[1])
+
+    def _note(self, what: str) -> None:
+        # `look` may tell it something before and after its image: one is written with its report.
+        self._waiting.append((self._loop.updates, what))
 
 
 class _Recorder(Tables):

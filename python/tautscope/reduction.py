@@ -107,11 +107,17 @@ class HysteresisReduction:
     Args:
         config: Everything the loop depends on.
         compensate: Without it every gain is 1 (Table 1, "uncompensated"); the estimation goes on.
+
+    Attributes:
+        updates: Image updates up to now.
+        on_event: Told of every call of `engage`, `acknowledge`, `raise_flag`, with the call's name
+            (and the flag's): what a replay needs beside references and images.
     """
 
     def __init__(self, config: Config, compensate: bool = True) -> None:
         self._config = config
-        self._ticks = 0
+        self._ticks = self.updates = 0
+        self.on_event: Callable[[str], None] | None = None
         self._off = switched_off(config)
         self._loop = build_loop(config, compensate)
 
@@ -202,10 +208,12 @@ class HysteresisReduction:
         What is still wrong stops it again at once; what only a restart clears stays.
         """
         self._loop.engage()
+        self._told("engage")
 
     def acknowledge(self) -> None:
         """The operator has seen the warnings; faded compensation may come back, with motion."""
         self._loop.acknowledge()
+        self._told("acknowledge")
 
     def raise_flag(self, name: str) -> None:
         """Something only the rig can see: ``drive_fault``, ``following_error``.
@@ -214,6 +222,7 @@ class HysteresisReduction:
             ConfigError: It is none of `tautscope.safety.DETECTORS`.
         """
         self._loop.raise_flag(name)
+        self._told(f"raise_flag {name}")
 
     def expectation(self, captured_at: float) -> Expectation | None:
         """Where the instrument should be in a frame captured at this time, to the best knowledge.
@@ -251,6 +260,10 @@ class HysteresisReduction:
 
         return MarkerDetector(self._config)
 
+    def _told(self, what: str) -> None:
+        if self.on_event is not None:
+            self.on_event(what)
+
     def _report(
         self,
         features: NDArray[np.float64] | None,
@@ -260,6 +273,7 @@ class HysteresisReduction:
         picture: int | None = None,
     ) -> Report:
         facts = self._loop.on_features(features, captured_at, covariance, picture)
+        self.updates += 1
         now = self.supervision
         warnings = (*self._off, *now.flags)
         return Report(detection, captured_at, Status(facts[0]), *facts[1:], now.reaction, warnings)

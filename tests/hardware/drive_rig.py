@@ -14,6 +14,7 @@ AXES = {
         "travel": [-0.05, 0.06],
         "speed_limit": 0.15,
         "following_error": 0.004,
+        "following_window": 0.002,
     },
     "rotation": {
         "node": 2,
@@ -22,6 +23,7 @@ AXES = {
         "travel": [-3.0, 3.5],
         "speed_limit": 20.0,
         "following_error": 0.3,
+        "following_window": 0.15,
         "home": 0.25,
     },
     "bending": {
@@ -31,6 +33,7 @@ AXES = {
         "travel": [-2.5, 2.0],
         "speed_limit": 10.0,
         "following_error": 0.2,
+        "following_window": 0.1,
     },
 }
 

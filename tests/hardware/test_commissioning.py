@@ -128,3 +128,14 @@ def test_there_is_no_bus() -> None:
         open_drives(drives_config(interface="socketcan", channel="can7"))
     with pytest.raises(BusError, match="cannot be opened"):
         open_drives(drives_config(interface="no_such_interface"))
+
+
+def test_a_drive_stops_by_itself_only_where_we_would(hub: Hub, bench: Bench) -> None:
+    """It compares with its present set-point, so that the way of a lag comes on top."""
+    config = drives_config(channel=str(hub.path), lag=0.03, following_timeout=0.07)
+    bench(config)
+    with open_drives(config) as drives:
+        windows = [one.settings["0x6065:0 (Following error window)"] for one in drives.commissioned]
+        times = [one.settings["0x6066:0 (Following error time out)"] for one in drives.commissioned]
+    assert windows == [4000 + 4500, 3000 + 6000, 2000 + 3000]
+    assert times == [70, 70, 70]

@@ -9,13 +9,15 @@ import pytest
 from drawn import DrawnRig
 from numpy.typing import ArrayLike, NDArray
 from tautscope.config import Config
+from tautscope.errors import RecordError
 from tautscope.experiment import run_experiment
-from tautscope.log.reader import read_log
-from tautscope.log.replay import replay_same
+from tautscope.log.reader import Log, Told, read_log
+from tautscope.log.replay import _tell, listen_to_log, replay_same
 from tautscope.log.writer import LogWriter
 from tautscope.recording import Recording, per_dof
+from tautscope.reduction import HysteresisReduction, Report
 from tautscope.references import SineSequence
-from tautscope.rig import Sample
+from tautscope.rig import Frame, Sample
 
 SECONDS = 7.0
 SILENT_FROM = 6.6
@@ -57,6 +59,97 @@ class Jumping(SineSequence):
 def flags(run: Recording) -> set[str]:
     """The names at the beginning of what is told."""
     return {line.partition(" ")[0] for line in run.warnings}
+
+
+TOLD = {
+    0.5: ("before", "raise_flag following_error"),
+    0.9: ("before", "engage"),
+    1.2: ("step", "raise_flag start_check"),
+    1.5: ("step", "raise_flag drive_fault"),
+    1.6: ("step", "acknowledge"),
+    1.7: ("after", "engage"),
+    1.9: ("before", "raise_flag reference_jump"),
+    2.1: ("after", "engage"),
+    2.4: ("after", "raise_flag following_error"),
+}
+"""When [s] the loop is told what, by whom: before or after an image update, or by the rig."""
+
+
+class Telling(DrawnRig):
+    """Tells the loop while a command is under way."""
+
+    loop: HysteresisReduction | None = None
+
+    def __init__(self, config: Config) -> None:
+        super().__init__(config)
+        self.waiting = dict(TOLD)
+
+    def step(self, command: ArrayLike) -> Sample:
+        sample = super().step(command)
+        self.tell(sample.time, "step")
+        return sample
+
+    def look(self, loop: HysteresisReduction, frame: Frame) -> Report:
+        self.loop = loop
+        self.tell(frame.captured_at, "before")
+        report = loop.on_frame(frame)
+        self.tell(frame.captured_at, "after")
+        return report
+
+    def tell(self, now: float, place: str) -> None:
+        due = [at for at, (where, _) in self.waiting.items() if where == place and at <= now]
+        for at in due:
+            request, _, name = self.waiting.pop(at)[1].partition(" ")
+            assert self.loop is not None
+            getattr(self.loop, request)(*name.split())
+
+
+@pytest.mark.parametrize("profile", ["paper", "best"])
+def test_a_replay_is_told_what_the_loop_was_told(
+    tmp_path: Path, config: Config, profile: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = config.replace(profile=profile)
+    reference = SineSequence(config.experiment)
+    reference.duration = 3.0
+    path, rig = tmp_path / "run.mcap", Telling(config)
+    with LogWriter(path, config, wait=True) as log:
+        run = run_experiment(rig, reference, config, look=rig.look, log=log)
+    assert not rig.waiting
+    assert flags(run) >= {"following_error"}
+    found, again = replay_same(written := read_log(path))
+    assert found.first_difference == found.ended == ""
+    assert found.same_ticks == found.ticks == len(run.trace)
+    assert found.same_updates == found.updates == len(run.frames)
+    for name in run.trace.dtype.names or ():
+        np.testing.assert_array_equal(again.trace[name], run.trace[name], err_msg=name)
+    told = [event.what for event in written.events.values() if isinstance(event, Told)]
+    assert sorted(told) == sorted(what for _, what in TOLD.values())
+    effects = [untold(written, skip, monkeypatch) for skip in range(len(told))]
+    assert all(effects), list(zip(told, effects, strict=True))
+    listened = listen_to_log(written, config)
+    assert len(listened.recording.trace) == len(run.trace)
+
+
+def untold(log: Log, skip: int, monkeypatch: pytest.MonkeyPatch) -> str:
+    """The first difference where the loop is not told one thing of all."""
+    told: list[str] = []
+
+    def tell(loop: HysteresisReduction, what: str) -> None:
+        told.append(what)
+        if len(told) - 1 != skip:
+            _tell(loop, what)
+
+    with monkeypatch.context() as patch:
+        patch.setattr("tautscope.log.replay._tell", tell)
+        return replay_same(log)[0].first_difference
+
+
+def test_an_event_nobody_knows_is_refused(tmp_path: Path, config: Config) -> None:
+    with LogWriter(tmp_path / "run.mcap", config) as log:
+        log.tick(Sample(0.0, np.zeros(3)), np.zeros(3), np.zeros(3))
+        log.event(0.0, "__init__")
+    with pytest.raises(RecordError, match="__init__"):
+        replay_same(read_log(tmp_path / "run.mcap"))
 
 
 NOTICED = {"dropped", "late", "clock", "reference_jump", "late_tick", "reference_late"}

@@ -84,7 +84,7 @@ def test_a_hole_ends_the_comparison_and_is_said(recorded: Recorded) -> None:
     found, _ = replay_same(log)
     assert found.is_identical
     assert found.ticks + found.updates == 99
-    assert found.ended == f"tick or image update 100 of {max(log.events)} is not in the log"
+    assert found.ended == f"tick, image update or event 100 of {max(log.events)} is not in the log"
 
 
 def test_jpeg_is_not_identical_but_close(tmp_path: Path, config: Config) -> None:

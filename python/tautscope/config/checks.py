@@ -170,6 +170,12 @@ def _check_drives(drives: DrivesConfig) -> None:
                 axis.counts_per_unit,
                 f"less than 2^31 counts over the travel {axis.travel}",
             )
+        if axis.following_window > axis.following_error:
+            raise ConfigError(
+                f"{path}.following_window",
+                axis.following_window,
+                f"at most {path}.following_error = {axis.following_error}",
+            )
         step = axis.speed_limit * drives.cycle * axis.counts_per_unit
         if step < 1:
             raise ConfigError(
@@ -181,6 +187,7 @@ def _check_drives(drives: DrivesConfig) -> None:
         ("cycle", 0.255),
         ("heartbeat_period", 65.535),
         ("heartbeat_timeout", 65.535),
+        ("following_timeout", 65.535),
     ):
         value = getattr(drives, name)
         if not (0.001 <= value <= most and math.isclose(value * 1e3, round(value * 1e3))):

@@ -24,7 +24,9 @@ class AxisConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     speed_limit: Positive
     """[m/s or rad/s]; likewise."""
     following_error: Positive
-    """How far the motor may be from what was commanded within the last 0.1 s [m or rad]."""
+    """How far the motor may be from all that was commanded within the last `lag` [m or rad]."""
+    following_window: Positive
+    """Likewise for longer than `following_timeout` [m or rad]; at most `following_error`."""
     home: float = 0.0
     """Where the degree of freedom is when the drive reads 0 counts [m or rad]."""
     eds: str | None = None
@@ -68,6 +70,11 @@ class DrivesConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """For each state of the drive to be reached [s]."""
     request_timeout: Positive = 0.3
     """For each answer to a request [s]."""
+    lag: Positive = 0.02
+    """How long the motors may take to follow [s]: filter and servo of the drives, and a set-point
+    that came late for its cycle."""
+    following_timeout: Positive = 0.05
+    """How long a motor may be beyond its `following_window` [s], whole milliseconds."""
     command_timeout: Positive = 0.5
     """How long the motors are held where they are while the loop gives no command; then quick
     stop [s]."""

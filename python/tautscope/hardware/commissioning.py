@@ -23,8 +23,6 @@ WAIVABLE = ("6007", "605A", "607D")
 """What `drives.waive` may name."""
 CIA_402 = 402
 """Device profile number, the low half of 0x1000."""
-LAG = 0.1
-"""How long a drive may take to follow a command [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,9 +99,10 @@ class _Visit:
         self._set(objects.LEAST_POSITION, lower, needed=True)
         self._set(objects.LARGEST_POSITION, upper, needed=True)
         self._set(objects.PROFILE_SPEED_LIMIT, speed)
-        window = max(1, round(axis.following_error * axis.counts_per_unit))
-        self._set(objects.FOLLOWING_WINDOW, window)
-        self._set(objects.FOLLOWING_TIME, round(LAG * 1e3))
+        # A drive compares with its present set-point: it must grant the way of a lag on top.
+        window = axis.following_error + self._config.lag * axis.speed_limit
+        self._set(objects.FOLLOWING_WINDOW, max(1, round(window * axis.counts_per_unit)))
+        self._set(objects.FOLLOWING_TIME, round(self._config.following_timeout * 1e3))
         counts = self.read_or(objects.ENCODER_COUNTS, 0)
         turns = self.read_or(objects.ENCODER_TURNS, 0)
         if counts and turns:

@@ -254,6 +254,9 @@ class _Watched:
         if self._watch is not None:
             self._watch.frame(frame.captured_at, report)
 
+    def event(self, now: float, what: str) -> None:
+        self._log.event(now, what)
+
 
 def _make(folder: Path) -> None:
     try:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -14,7 +13,7 @@ from tautscope.dof import Dof
 from tautscope.errors import FollowingError, SilentDriveError, StateError
 from tautscope.hardware import cia402
 from tautscope.hardware.cia402 import Mode, Scale, State
-from tautscope.hardware.commissioning import LAG
+from tautscope.hardware.following import Following
 from tautscope.hardware.link import Feedback
 
 
@@ -64,9 +63,10 @@ class Watch:
         self._scales = [Scale(config[dof], dof.label) for dof in Dof]
         self._said: list[Feedback] = []
         self._answers = [0, 0, 0]
-        self._recent: deque[NDArray[np.float64]] = deque(
-            maxlen=max(1, round(LAG / config.cycle)) + config.lead_points
-        )
+        # An answer says where the motor was as the set-point came; those in a buffer wait longer.
+        buffered = Mode.INTERPOLATED_POSITION in modes.values()
+        pending = 1 + (config.lead_points if buffered else 0)
+        self._following = Following(config, config.cycle, pending)
         self.traffic = Traffic()
 
     def begin(self, said: list[Feedback]) -> NDArray[np.float64]:
@@ -75,7 +75,7 @@ class Watch:
         self._answers = [one.answers for one in said]
         self.traffic = Traffic()
         start = self.positions(said)
-        self._recent.extend([start] * (self._recent.maxlen or 1))
+        self._following.begin(start)
         return start
 
     def positions(self, said: Sequence[Feedback]) -> NDArray[np.float64]:
@@ -93,13 +93,13 @@ class Watch:
             StateError: A drive left operation enabled, its mode, or ignores set-points.
             FollowingError: A motor is not where it was told to be, or jumped.
         """
-        self._recent.append(command)
         self._count(said)
-        positions, commands = self.positions(said), np.stack(self._recent)
+        positions, fresh = self.positions(said), [one.age == 0 for one in said]
+        strays = self._following.strays(command, positions, fresh)
         for dof in Dof:
             self._check_state(dof, said[dof])
-            if said[dof].age == 0:
-                self._check_position(dof, said[dof], positions[dof], commands[:, dof])
+            if fresh[dof]:
+                self._check_position(dof, said[dof], positions[dof], strays=bool(strays[dof]))
         self._said = said
         return positions
 
@@ -181,22 +181,20 @@ class Watch:
                 "See its limits and inputs; it may be halted",
             )
 
-    def _check_position(
-        self, dof: Dof, said: Feedback, position: float, commands: NDArray[np.float64]
-    ) -> None:
+    def _check_position(self, dof: Dof, said: Feedback, position: float, *, strays: bool) -> None:
         axis, name, before = self._config[dof], self._names[dof], self._said[dof]
-        least, largest = float(commands.min()), float(commands.max())
-        error = max(least - position, position - largest)
         cyclic = self._modes[dof] is Mode.CYCLIC_SYNCHRONOUS_POSITION
         flagged = cyclic and bool(said.statusword & cia402.FOLLOWING_ERROR)
-        if error > axis.following_error or flagged:
+        if strays or flagged:
+            following = self._following
             own = " (the drive says so itself)" if flagged else ""
             raise FollowingError(
                 name,
-                f"it is at {position:.6g} and was told to be within {least:.6g} and "
-                f"{largest:.6g}{own}",
+                f"it is at {position:.6g} and was told to be within {following.least[dof]:.6g} and "
+                f"{following.largest[dof]:.6g}{own}",
                 "See whether something blocks the motor, then "
-                f"drives.{dof.label}.counts_per_unit and following_error",
+                f"drives.{dof.label}.counts_per_unit, following_error and following_window, and "
+                "drives.lag",
             )
         jump = abs(position - self._scales[dof].to_position(before.position))
         elapsed = (before.age + 2) * self._config.cycle

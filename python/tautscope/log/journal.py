@@ -35,11 +35,12 @@ class Journal:
         say: Told once of each trouble, by a thread.
 
     Attributes:
-        events: Index, time [s] and the arguments of `tick_messages` or `update_messages`.
+        events: Index, time [s] and the arguments of `tick_messages`, `update_messages` or
+            `event_messages`.
         images: Index, time, time of capture [s], pixels.
         texts: Time or None, and a warning.
         clock: From the loop's first call on.
-        dropped: Ticks and updates it could not take.
+        dropped: Ticks, updates and events it could not take.
         dropped_images: Images it could not take.
         failure: Why nothing is recorded any more; empty while it is.
         written: Topic -> number of messages.
@@ -130,7 +131,8 @@ class Journal:
             time.sleep(LOOK_PERIOD)
         if is_told:
             self._trouble(
-                f"{self.dropped} ticks and updates and {self.dropped_images} images were dropped"
+                f"{self.dropped} ticks, updates, events and {self.dropped_images} images were "
+                "dropped"
             )
             self._write_events(file)
         file.finish()
@@ -157,8 +159,7 @@ class Journal:
             index, now, facts = self.events.popleft()
             clock = self.clock
             assert clock is not None
-            kind = msg.tick_messages if isinstance(facts[0], Sample) else msg.update_messages
-            for topic, data in kind(clock, *facts).items():
+            for topic, data in _messages(clock, facts).items():
                 file.add(topic, data, index, clock.nanoseconds(now))
 
     def _write_images(self, file: McapFile) -> None:
@@ -193,6 +194,13 @@ class Journal:
                 is_told = True
             self.images.popleft()
         self._is_encoded.set()
+
+
+def _messages(clock: msg.Clock, facts: tuple[Any, ...]) -> msg.Messages:
+    if isinstance(facts[0], str):
+        return msg.event_messages(*facts)
+    kind = msg.tick_messages if isinstance(facts[0], Sample) else msg.update_messages
+    return kind(clock, *facts)
 
 
 def _open(path: Path) -> IO[bytes]:

@@ -49,6 +49,7 @@ DELTA = "/instrument/hysteresis/delta"
 MARKERS = "/endoscope/markers"
 STATUS = "/tautscope/status"
 UPDATE = "/tautscope/image_update"
+EVENT = "/tautscope/event"
 WARNING = "/tautscope/warning"
 
 TOPICS = {
@@ -68,6 +69,7 @@ TOPICS = {
     MARKERS: "std_msgs/msg/Float64MultiArray",
     STATUS: "diagnostic_msgs/msg/DiagnosticArray",
     UPDATE: "std_msgs/msg/Float64MultiArray",
+    EVENT: "std_msgs/msg/String",
     WARNING: "rcl_interfaces/msg/Log",
 }
 """Topic -> type."""
@@ -238,6 +240,11 @@ def image_message(clock: Clock, captured_at: float, picture: str, data: bytes) -
     """A compressed image: its format in image_transport's words, and its bytes."""
     header = _header(clock.nanoseconds(captured_at), "endoscope")
     return _encoded(IMAGE, {"header": header, "format": picture, "data": data})
+
+
+def event_messages(what: str) -> Messages:
+    """What the loop was told, as `HysteresisReduction.on_event`."""
+    return {EVENT: _encoded(EVENT, {"data": what})}
 
 
 def warning_message(stamp: int, text: str) -> bytes:

@@ -75,6 +75,14 @@ class Update:
     raw: msg.Messages
 
 
+@dataclass(frozen=True, slots=True)
+class Told:
+    """Something the operator or the rig told the loop, as `HysteresisReduction.on_event`."""
+
+    what: str
+    raw: msg.Messages
+
+
 @dataclass(frozen=True, eq=False)
 class Log:
     """A log in memory; images stay in the file until they are asked for.
@@ -85,8 +93,8 @@ class Log:
         compensated: As given to the loop.
         segments: Which DOF moved when.
         versions: Of the programs that wrote it.
-        events: Index -> tick or update, in the loop's order. Indices count from 1; one that is
-            missing was dropped when the log was written, or is lost.
+        events: Index -> tick, update or what else it was told, in the loop's order. Indices count
+            from 1; one that is missing was dropped when the log was written, or is lost.
         warnings: What was to be told a person.
         damage: What could not be read.
     """
@@ -96,7 +104,7 @@ class Log:
     compensated: bool
     segments: tuple[Segment, ...]
     versions: dict[str, str]
-    events: dict[int, Tick | Update]
+    events: dict[int, Tick | Update | Told]
     warnings: tuple[str, ...]
     damage: Damage
     _images: dict[int, tuple[int, int]] = field(repr=False)
@@ -104,7 +112,7 @@ class Log:
 
     @property
     def missing(self) -> int:
-        """Ticks and updates that are not there though later ones are."""
+        """How many of them are not there though later ones are."""
         return max(self.events, default=0) - len(self.events)
 
     def has_image(self, index: int) -> bool:
@@ -138,7 +146,7 @@ class Log:
         for event in self.events.values():
             if isinstance(event, Tick):
                 tables.tick(event.sample, event.reference, event.command)
-            else:
+            elif isinstance(event, Update):
                 tables.frame(event.row, event.delta_minus, event.delta_plus)
         return Recording(*tables.tables(), self.config, self.compensated, self.segments)
 
@@ -244,12 +252,15 @@ def read_log(path: str | PathLike[str]) -> Log:
         elif topic in msg.TOPICS:
             groups[record.sequence][topic] = record.data
     facts, versions = msg.read_head(groups.pop(0, {}))
-    events: dict[int, Tick | Update] = {}
+    events: dict[int, Tick | Update | Told] = {}
     for index, messages in sorted(groups.items()):
         if messages.keys() >= msg.OF_TICK:
             events[index] = Tick(*msg.read_tick(messages), messages)
         elif messages.keys() >= msg.OF_UPDATE:
             events[index] = Update(*msg.read_update(messages), messages)
+        elif msg.EVENT in messages:
+            what = decode(msg.TOPICS[msg.EVENT], messages[msg.EVENT])["data"]
+            events[index] = Told(what, messages)
     return Log(
         file,
         facts.config,

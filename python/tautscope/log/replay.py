@@ -18,12 +18,13 @@ from tautscope.config import Config
 from tautscope.errors import RecordError
 from tautscope.log import messages as msg
 from tautscope.log.cdr import decode
-from tautscope.log.reader import Log, Tick, Update
+from tautscope.log.reader import Log, Tick, Told, Update
 from tautscope.recording import FEATURES, FRAME_COLUMNS, Recording
 from tautscope.reduction import HysteresisReduction
 from tautscope.replay import read_motors
 from tautscope.rig import Frame, Sample
 from tautscope.rows import Tables, frame_row
+from tautscope.safety import DETECTORS
 
 Floats = NDArray[np.float64]
 
@@ -55,7 +56,7 @@ class Identity:
 
 
 def replay_same(log: Log) -> tuple[Identity, Recording]:
-    """Run the recorded references and images through the loop, in the recorded order.
+    """Run the recorded references, images and events through the loop, in the recorded order.
 
     Ends at a hole: what comes after a tick or an image that is not in the log depends on it.
 
@@ -63,7 +64,7 @@ def replay_same(log: Log) -> tuple[Identity, Recording]:
         What was the same, and the run as it came out now.
 
     Raises:
-        RecordError: The log has no tick.
+        RecordError: The log has no tick, or an event that this version does not know.
     """
     loop = HysteresisReduction(log.config, log.compensated)
     found, tables = Identity(), Tables(log.config)
@@ -77,6 +78,8 @@ def replay_same(log: Log) -> tuple[Identity, Recording]:
             again = msg.tick_messages(clock, *inputs, command, event.made_at)
             found.ticks += 1
             found.same_ticks += _is_same(found, event, again, f"tick at {event.sample.time:g} s")
+        elif isinstance(event, Told):
+            _tell(loop, event.what)
         elif event is not None and log.has_image(index):
             now, frame = _frame(log, index, event)
             report = loop.on_frame(frame)
@@ -85,10 +88,20 @@ def replay_same(log: Log) -> tuple[Identity, Recording]:
             found.updates += 1
             found.same_updates += _is_same(found, event, again, f"image {frame.sequence}")
         else:
-            what = "image" if event is not None else "tick or image update"
+            what = "image" if event is not None else "tick, image update or event"
             found.ended = f"{what} {index} of {max(log.events)} is not in the log"
             break
     return found, Recording(*tables.tables(), log.config, log.compensated, log.segments)
+
+
+def _tell(loop: HysteresisReduction, what: str) -> None:
+    call, _, name = what.partition(" ")
+    if what in ("engage", "acknowledge"):
+        getattr(loop, what)()
+    elif call == "raise_flag" and name in DETECTORS:
+        loop.raise_flag(name)
+    else:
+        raise RecordError("log", what, "engage, acknowledge, or raise_flag and a known name")
 
 
 def _is_same(found: Identity, event: Tick | Update, again: msg.Messages, where: str) -> bool:
@@ -192,6 +205,8 @@ def _of_log(log: Log, count: _Count) -> Iterator[_Motion | _Sight]:
     for index, event in log.events.items():
         if isinstance(event, Tick):
             yield _Motion(event.sample, event.reference, event.command)
+        elif isinstance(event, Told):
+            continue  # it listens: what held the motors then is in their commands
         elif log.has_image(index):
             yield _Sight(*_frame(log, index, event))
         else:

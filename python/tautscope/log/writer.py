@@ -34,7 +34,7 @@ class LogSummary:
         messages: Topic -> how many were written.
         ticks: Control ticks given to the log.
         updates: Image updates given to it.
-        dropped: Ticks and updates it could not take.
+        dropped: Ticks, updates and events it could not take.
         dropped_images: Images of other updates it could not take.
         failure: Why it ended before its time; empty if it did not.
     """
@@ -60,8 +60,8 @@ def _say(text: str) -> None:
 class LogWriter:
     """Writes an MCAP file; a context manager.
 
-    `tick` and `frame` are called by the loop, in the order of the loop's own calls; that order is
-    in the file as the messages' sequence number, one per tick or update, from 1 on.
+    `tick`, `frame` and `event` are called by the loop, in the order of the loop's own calls; that
+    order is in the file as the messages' sequence number, one per tick, update or event, from 1 on.
 
     Args:
         path: The file; there may be none yet.
@@ -87,7 +87,7 @@ class LogWriter:
     ) -> None:
         self._settings = config.recording
         self._wait = wait
-        self._ticks = self._updates = 0
+        self._ticks = self._updates = self._index = 0
         facts = msg.Facts(config, compensate, tuple(segments))
         self._journal = Journal(Path(path), facts, say)
 
@@ -126,8 +126,15 @@ class LogWriter:
         if not self._has_room(journal.images, self._settings.queue_images):
             journal.dropped_images += 1
             return
-        index = self._ticks + self._updates
-        journal.images.append((index, now, frame.captured_at, frame.image.copy()))
+        journal.images.append((self._index, now, frame.captured_at, frame.image.copy()))
+
+    def event(self, now: float, what: str) -> None:
+        """What the operator or the rig told the loop, at a time of the rig's clock [s].
+
+        In a loop of your own: ``loop.on_event = lambda what: log.event(sample.time, what)``.
+        """
+        self._begin(now)
+        self._put(now, (what,))
 
     def warn(self, text: str, now: float | None = None) -> None:
         """Something a person who reads the log should know, at a time of the rig's clock [s]."""
@@ -171,10 +178,11 @@ class LogWriter:
 
     def _put(self, now: float, facts: tuple[Any, ...]) -> bool:
         journal = self._journal
+        self._index += 1
         if not self._has_room(journal.events, self._settings.queue_events):
             journal.dropped += 1
             return False
-        journal.events.append((self._ticks + self._updates, now, facts))
+        journal.events.append((self._index, now, facts))
         return True
 
     def _has_room(self, queue: deque[Any], limit: int) -> bool:
