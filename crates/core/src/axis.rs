@@ -1,6 +1,7 @@
 //! One DOF of the loop: how its slack is compensated and learnt.
 
 use crate::adaptive::AdaptiveAxis;
+use crate::change_watch::Change;
 use crate::compensator::{Compensator, CompensatorState};
 use crate::estimator::{Estimator, EstimatorState, Triggers};
 use crate::limits::PlayLimit;
@@ -36,6 +37,8 @@ pub struct Lesson {
     pub triggers: Triggers,
     /// Whether it would have been more slack than may be.
     pub is_limited: bool,
+    /// What it changed; None in profile `paper`, where any one image may change all.
+    pub change: Option<Change>,
 }
 
 impl Axis {
@@ -112,10 +115,22 @@ impl Axis {
         }
         match self {
             Self::Article(axis) => axis.learn(command, measured),
-            Self::Adaptive(axis) => Lesson {
-                triggers: axis.learn(command, measured, deviation, since),
-                is_limited: axis.is_limited(),
-            },
+            Self::Adaptive(axis) => {
+                let (before, deviations) = (axis.play(), axis.deviation());
+                let triggers = axis.learn(command, measured, deviation, since);
+                let after = axis.play();
+                Lesson {
+                    triggers,
+                    is_limited: axis.is_limited(),
+                    change: Some(Change {
+                        offsets: [
+                            after.delta_minus() - before.delta_minus(),
+                            after.delta_plus() - before.delta_plus(),
+                        ],
+                        deviations: deviations.into(),
+                    }),
+                }
+            }
         }
     }
 
@@ -155,6 +170,7 @@ impl ArticleAxis {
         Lesson {
             triggers,
             is_limited,
+            change: None,
         }
     }
 

@@ -76,6 +76,8 @@ flags! {
     Overcompensation = "overcompensation",
     /// Reference and tip that swing farther each time, one after the other.
     LimitCycle = "limit_cycle",
+    /// Images that say another slack than was learnt: the instrument has changed, or they are wrong.
+    SlackChanged = "slack_changed",
 }
 
 /// A set of flags.
