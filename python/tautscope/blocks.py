@@ -147,7 +147,7 @@ def build_guards(config: Config) -> _core.Guards:
         ahead_limit=share(safety.ahead_limit),
         cycle_swings=safety.cycle_swings,
         cycle_time=safety.cycle_time,
-        change_limit=share(safety.change_limit),
+        change_limit=safety.change_limit,
         change_travel=share(safety.change_travel),
     )
     return _core.Guards(

@@ -1,7 +1,6 @@
 //! One DOF of the loop: how its slack is compensated and learnt.
 
 use crate::adaptive::AdaptiveAxis;
-use crate::change_watch::Change;
 use crate::compensator::{Compensator, CompensatorState};
 use crate::estimator::{Estimator, EstimatorState, Triggers};
 use crate::limits::PlayLimit;
@@ -37,8 +36,9 @@ pub struct Lesson {
     pub triggers: Triggers,
     /// Whether it would have been more slack than may be.
     pub is_limited: bool,
-    /// What it changed; None in profile `paper`, where any one image may change all.
-    pub change: Option<Change>,
+    /// What it changed of (`delta_minus`, `delta_plus`) where the DOF is; 0 in profile `paper`, where any one image
+    /// may change all.
+    pub change: [f64; 2],
 }
 
 impl Axis {
@@ -116,19 +116,16 @@ impl Axis {
         match self {
             Self::Article(axis) => axis.learn(command, measured),
             Self::Adaptive(axis) => {
-                let (before, deviations) = (axis.play(), axis.deviation());
+                let before = axis.play();
                 let triggers = axis.learn(command, measured, deviation, since);
                 let after = axis.play();
                 Lesson {
                     triggers,
                     is_limited: axis.is_limited(),
-                    change: Some(Change {
-                        offsets: [
-                            after.delta_minus() - before.delta_minus(),
-                            after.delta_plus() - before.delta_plus(),
-                        ],
-                        deviations: deviations.into(),
-                    }),
+                    change: [
+                        after.delta_minus() - before.delta_minus(),
+                        after.delta_plus() - before.delta_plus(),
+                    ],
                 }
             }
         }
@@ -170,7 +167,7 @@ impl ArticleAxis {
         Lesson {
             triggers,
             is_limited,
-            change: None,
+            change: [0.0; 2],
         }
     }
 

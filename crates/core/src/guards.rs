@@ -1,7 +1,7 @@
 //! All that watches the loop, in one place: what comes in, what goes out, what the images say.
 
 use crate::axis::Axis;
-use crate::change_watch::{Change, ChangeSettings, ChangeWatch};
+use crate::change_watch::{ChangeSettings, ChangeWatch};
 use crate::clutch::{Clutch, ClutchSettings};
 use crate::dof::PerDof;
 use crate::error::{ConfigError, require_positive};
@@ -205,8 +205,8 @@ impl Guards {
         self.watched(flags)
     }
 
-    /// What an image changed of the slack believed in, and how far the command had gone when it was captured.
-    pub(crate) fn taught(&mut self, changes: PerDof<Option<Change>>, travel: PerDof<f64>) -> Flags {
+    /// What an image changed of the contact offsets, and how far the command had gone when it was captured.
+    pub(crate) fn taught(&mut self, changes: PerDof<[f64; 2]>, travel: PerDof<f64>) -> Flags {
         let flags = self.changes.look(changes, travel);
         self.watched(flags)
     }

@@ -256,7 +256,7 @@ impl HysteresisReduction {
 
     fn learn(&mut self, past: &Entry, seen: &Seen, raised: &mut Flags) -> PerDof<Triggers> {
         let mut triggers = [Triggers::default(); 3];
-        let mut changes = [None; 3];
+        let mut changes = [[0.0; 2]; 3];
         let flags = self.watch(past, seen);
         *raised = raised.and(flags);
         let history = &self.history;
