@@ -72,7 +72,7 @@ class SafetyConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     operator in it builds up an oscillation."""
     cycle_time: Positive = 2.0
     """Longest swing of such an oscillation, one way [s]."""
-    change_limit: PerDof = (0.7e-3, 0.9, 0.08)
+    change_limit: PerDof = (0.8e-3, 0.9, 0.08)
     """Change of a contact offset that was learnt, and is worth saying; rotation's differs that much
     from place to place."""
     change_travel: Positive = 1.5
