@@ -70,6 +70,8 @@ flags! {
     WidthLimit = "width_limit",
     /// The monitor changed a command.
     Monitor = "monitor",
+    /// A command that would have changed faster than `command_speed`.
+    CommandJump = "command_jump",
     /// A hand that trembles: `tremor_rate` reversals in a second, each within the slack.
     Tremor = "tremor",
     /// A tip that came farther than its reference since the reference turned.

@@ -150,7 +150,11 @@ impl Guards {
             }
             let (permitted, verdict) = monitor.permit(reference, axis.command());
             if verdict != Verdict::Same {
-                event.raised = event.raised.and(Flags::of(Flag::Monitor));
+                let jumps = Flags::when(verdict == Verdict::Jump, Flag::CommandJump);
+                event.raised = event
+                    .raised
+                    .and(Flags::of(Flag::Monitor))
+                    .and(jumps.without(self.off));
                 if verdict == Verdict::Broken {
                     event.severe = event.severe.and(Flags::of(Flag::Monitor));
                 }
