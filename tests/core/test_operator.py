@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import deque
 
-import control
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -57,10 +56,8 @@ def operated(
 def test_an_operator_with_a_gain_margin_of_two_and_a_half_comes_to_rest(
     gain: float, delay: float, seed: int
 ) -> None:
-    frequencies = np.logspace(-1, 3, 4000)
-    late = gain * np.exp(-1j * frequencies * delay) / (1j * frequencies)
-    margin = control.stability_margins(control.frd(late, frequencies))[0] if delay else np.inf
-    assert margin > 2.5, "without any slack"
+    # gain exp(-i w delay) / (i w) is real and negative first at w = pi / (2 delay).
+    assert np.pi / 2 > 2.5 * gain * delay, "the margin without any slack"
     errors, raised, lead = operated(gain, delay, 5e-3, seed)
     last = errors[round(15 / PERIOD) :]
     assert np.ptp(last) < 0.5e-3, f"seed {seed}: {np.ptp(last)} m"
