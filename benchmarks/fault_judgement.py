@@ -71,8 +71,9 @@ class Outcome:
         seed: Of instrument, noise, motion, and when and how much fails.
         fault: What failed.
         excursion: How far the loop let the tip go (3,) [m, rad, rad]; this is what the goals limit.
-            Where motors, scope or tissue move the tip by themselves, how much farther than they
-            would have taken it under the commands of the run without the fault.
+            Where motors, scope, tissue or a hand that shakes or jumps move the tip by themselves,
+            how much farther than they would have taken it under the commands of the run without
+            the fault.
         tip: How far it went, whoever took it there (3,) [m, rad, rad].
         detected: Time from the fault to the first flag or refusal that is its own [s]; NaN if none.
         reaction: The highest.
@@ -117,8 +118,8 @@ def judged(
     """Whether the tip went farther than the goal, and how the run ended.
 
     ``stopped``, ``warned``, and of what was not noticed ``masked``: the tip was nowhere else;
-    ``unnoticed``: it was, but no farther than the goal allows, or than motors, scope or tissue took
-    it by themselves; ``SILENT``: beyond the goal.
+    ``unnoticed``: it was, but no farther than the goal allows, or than motors, scope, tissue or the
+    hand took it by themselves; ``SILENT``: beyond the goal.
     """
     beyond = bool((np.array(excursion) > goal).any())
     if stopped:
@@ -140,6 +141,7 @@ def outcome(
     usual: Said,
     *,
     band: Band | None = None,
+    asked: Band | None = None,
 ) -> Outcome:
     """What a run comes to.
 
@@ -150,6 +152,7 @@ def outcome(
         base: What its tip is compared with, if it came to move at all.
         usual: What is said without the fault.
         band: What the fault does by itself.
+        asked: Where the hand's device says, if that is what fails.
     """
     said = dict(found.said)
     stop, flags = said.pop("stop_tick"), said.pop("flags")
@@ -158,9 +161,9 @@ def outcome(
         tip = far = excursion(found.truth, base.truth, stop)
         if band is not None:
             far = excursion(found.truth, base.truth, stop, band)
-            if fault.row.target is Target.REFERENCE:
-                # Where the hand's device says, the tip is to go.
-                tip = far
+        if asked is not None:
+            # Where the hand's device says, the tip is to go.
+            tip = excursion(found.truth, base.truth, stop, asked)
     others = [usual["flags"], {} if base is None else base.said["flags"]]
     own = {name: own_from(each, usual["flags"].get(name, ())) for name, each in flags.items()}
     own = {name: at for name, at in own.items() if math.isfinite(at)}
@@ -241,6 +244,34 @@ def by_the_hand(kind: str, meant: Floats, told: Floats, reach: Floats) -> Band:
     return np.minimum(low, less), np.maximum(high, more)
 
 
+def as_told(commands: Floats, meant: Floats, told: Floats, stop: int | None) -> Floats:
+    """What motors would be told if the device's error went to them as it is (n, 3).
+
+    Args:
+        commands: Of the run without the fault.
+        meant: As `by_the_hand`.
+        told: As `by_the_hand`.
+        stop: The tick in which the loop stopped the motion; the error stays from there on.
+    """
+    # The first command was made before the fault.
+    error = np.vstack([np.zeros(3), told - meant])
+    ticks = min(len(commands), len(error))
+    error = error[:ticks]
+    if stop is not None:
+        error[stop:] = error[max(stop - 1, 0)]
+    return commands[:ticks] + error
+
+
+def wider(one: Band, other: Band) -> Band:
+    """What is within either; the shorter goes on as it ends."""
+    ticks = max(len(one[0]), len(other[0]))
+    (low, high), (less, more) = (
+        tuple(np.vstack([each, np.repeat(each[-1:], ticks - len(each), axis=0)]) for each in band)
+        for band in (one, other)
+    )
+    return np.minimum(low, less), np.maximum(high, more)
+
+
 def _so_far(error: Floats) -> Band:
     low = np.minimum.accumulate(np.minimum(error, 0.0), axis=0)
     return low, np.maximum.accumulate(np.maximum(error, 0.0), axis=0)
@@ -256,3 +287,5 @@ MOVED = {
     if kind.target is Target.PHYSICS or name.startswith("axis_") or name == "encoder_jump"
 }
 """Kinds in which motors, scope or tissue move the tip by themselves."""
+TAKEN = MOVED | {name for name, kind in KINDS.items() if kind.target is Target.REFERENCE} - HELD
+"""Those, and kinds in which the hand's device says something else than the hand means."""

@@ -36,10 +36,12 @@ from fault_judgement import (
     Floats,
     Outcome,
     Traces,
+    as_told,
     by_itself,
     by_the_hand,
     excursion,
     outcome,
+    wider,
 )
 from fault_watch import STILL, AllSeen, Device, Driven, FeatureTwin, Hand, Watch
 from tautscope.config import Config, Profile
@@ -161,17 +163,25 @@ class Instrument:
         nominal = yield lambda: None
         for kind in kinds:
             fault = drawn(kind, self._seed, self._since)
-            base, band = nominal, None
+            base, band, asked = nominal, None, None
             if kind in HELD:
                 base = yield partial(self._pause, fault)
             found = yield partial(self._fail, fault)
             far = excursion(found.truth, base.truth, found.said["stop_tick"])
             if kind in MOVED and (far > PASSING).any():
-                alone = yield partial(self._replay, fault, nominal.commands)
+                alone = yield partial(self._replay, fault, nominal.commands[: self._ticks(fault)])
                 band = by_itself(alone.truth, base.truth)
             elif fault.row.target is Target.REFERENCE and kind not in HELD:
-                band = by_the_hand(kind, found.meant, found.told, self._reach)
-            outcomes.append(outcome(self._seed, fault, found, base, nominal.said, band=band))
+                stop = found.said["stop_tick"]
+                band = asked = by_the_hand(kind, found.meant, found.told, self._reach)
+                if (excursion(found.truth, base.truth, stop, asked) > PASSING).any():
+                    bare = as_told(nominal.commands, found.meant, found.told, stop)
+                    alone = yield partial(self._replay, Fault("ok"), bare)
+                    swung = by_itself(alone.truth, base.truth)
+                    band = wider(asked, swung)
+            outcomes.append(
+                outcome(self._seed, fault, found, base, nominal.said, band=band, asked=asked)
+            )
 
     def _branch(self) -> None:
         """Every fork returns from here and goes on; we never do."""
@@ -219,10 +229,13 @@ class Instrument:
             self._hand.paused = [fault.dof]
         self._hand.end = self._since + watched(fault)
 
+    def _ticks(self, fault: Fault) -> int:
+        return round(watched(fault) / self._config.control.period)
+
     def _replay(self, fault: Fault, commands: Floats) -> None:
-        """The same physics, with the commands of the run without a fault."""
+        """The same physics, with these commands."""
         rig = FaultyRig(self._twin, (fault,), self._seed)
-        for command in commands[: round(watched(fault) / self._config.control.period)]:
+        for command in commands:
             rig.step(command)
         self._hand.end = 0.0
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from fault_draws import PLAY
-from fault_judgement import MOVED, PASSING, Outcome, judged, lasting
+from fault_judgement import PASSING, TAKEN, Outcome, judged, lasting
 from tautscope.twin.faults import KINDS
 
 Row = dict[str, Any]
@@ -88,7 +88,7 @@ def _cells(own: Sequence[Row]) -> str:
         len(own),
         sum(row["beyond"] for row in own),
         f"{1e3 * far[0]:.2f}, {far[1]:.3f}, {far[2]:.3f}",
-        f"{1e3 * max(row['tip'][0] for row in own):.2f}" if own[0]["kind"] in MOVED else "",
+        f"{1e3 * max(row['tip'][0] for row in own):.2f}" if own[0]["kind"] in TAKEN else "",
         noticed,
         len(known),
         *(ended[name] or "" for name in ENDINGS),

@@ -245,6 +245,31 @@ def test_where_the_hands_device_says_the_tip_is_to_go_at_the_speed_that_is_taken
     np.testing.assert_allclose(low[:, 0], [0, 0, -1, -2, -2])
 
 
+def test_a_tip_that_swings_by_what_the_hand_told_it_is_not_taken_back_but_what_is_added_counts():
+    meant, commands = np.zeros((4, 3)), np.full((5, 3), 2.0)
+    told = meant.copy()
+    told[:, 0] = [1.0, -1.0, 3.0, 0.0]
+    bare = judgement.as_told(commands, meant, told, None)
+    np.testing.assert_allclose(bare[:, 0], [2, 3, 1, 5, 2], err_msg="with gain 1, and no more")
+    np.testing.assert_allclose(bare[:, 1:], 2.0)
+    stopped = judgement.as_told(commands, meant, told, 3)
+    np.testing.assert_allclose(stopped[:, 0], [2, 3, 1, 1, 1], err_msg="nothing after a stop")
+
+    base = np.zeros((3, 3))
+    swung, found = base[:2].copy(), base.copy()
+    swung[1, 0], found[2, 0] = 2.0, 2.5
+    asked = judgement.by_the_hand("hand_tremor", meant[:2], told[:2] / 4, np.ones(3))
+    band = judgement.wider(asked, judgement.by_itself(swung, base))
+    np.testing.assert_allclose(band[1][:, 0], [0, 2, 2], err_msg="the shorter goes on")
+    np.testing.assert_allclose(band[0][:, 0], [0, 0, -0.25])
+    watch = Watch(lambda: 0.0, 0.0, 0.005)
+    ran, still = traces(watch, found), traces(watch, base)
+    fault, usual = Fault("hand_tremor"), {"flags": {}}
+    one = judgement.outcome(0, fault, ran, still, usual, band=band, asked=asked)
+    assert one.tip[0] == 2.25, "beyond where the device says"
+    assert one.excursion[0] == 0.5, "of which the loop did so much"
+
+
 @needs_fork
 def test_a_detector_that_is_silent_changes_nothing():
     kinds = ["ok", "duplicate", "band_b_lost"]

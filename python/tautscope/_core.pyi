@@ -273,6 +273,8 @@ class MotionWatch:
         ahead_limit: _Vector3,
         cycle_swings: int,
         cycle_time: float,
+        change_limit: _Vector3,
+        change_travel: _Vector3,
     ) -> MotionWatch: ...
 
 @final

@@ -134,16 +134,21 @@ def build_guards(config: Config) -> _core.Guards:
     def each(of: Callable[[DofConfig], float]) -> tuple[float, float, float]:
         return each_dof(lambda dof: of(config[dof]))
 
-    insertion, rotation, bending = (safety.ahead_limit * width for width in safety.width_limit)
+    def share(of: float) -> tuple[float, float, float]:
+        insertion, rotation, bending = safety.width_limit
+        return of * insertion, of * rotation, of * bending
+
     motion = _core.MotionWatch(
         period=config.control.period,
         tremor_swing=each(lambda dof: dof.update_distance * safety.tremor_swing),
         slack=safety.width_limit,
         tremor_rate=safety.tremor_rate,
         turn=each(lambda dof: dof.update_distance),
-        ahead_limit=(insertion, rotation, bending),
+        ahead_limit=share(safety.ahead_limit),
         cycle_swings=safety.cycle_swings,
         cycle_time=safety.cycle_time,
+        change_limit=safety.change_limit,
+        change_travel=share(safety.change_travel),
     )
     return _core.Guards(
         period=config.control.period,

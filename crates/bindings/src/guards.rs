@@ -77,6 +77,7 @@ impl Guards {
                 blind_growth,
             },
             motion: motion.0,
+            changes: motion.1,
             supervisor: core::SupervisorSettings {
                 hold_time,
                 hold_travel,
@@ -98,15 +99,16 @@ impl Guards {
     }
 }
 
-/// What of hand and tip is watched, to be given to `Guards`, which checks it.
+/// What of hand, tip and lessons is watched, to be given to `Guards`, which checks it.
 #[pyclass(name = "MotionWatch", module = "tautscope._core", frozen)]
-pub struct MotionWatch(core::MotionSettings);
+pub struct MotionWatch(core::MotionSettings, core::ChangeSettings);
 
 #[pymethods]
 impl MotionWatch {
     #[new]
     #[pyo3(signature = (
-        *, period, tremor_swing, slack, tremor_rate, turn, ahead_limit, cycle_swings, cycle_time
+        *, period, tremor_swing, slack, tremor_rate, turn, ahead_limit, cycle_swings, cycle_time,
+        change_limit, change_travel
     ))]
     // One argument per setting, by keyword only.
     #[allow(clippy::too_many_arguments)]
@@ -119,8 +121,10 @@ impl MotionWatch {
         ahead_limit: [f64; 3],
         cycle_swings: u32,
         cycle_time: f64,
+        change_limit: [f64; 3],
+        change_travel: [f64; 3],
     ) -> Self {
-        Self(core::MotionSettings {
+        let motion = core::MotionSettings {
             period,
             tremor_swing,
             slack,
@@ -129,7 +133,12 @@ impl MotionWatch {
             ahead: ahead_limit,
             cycle_swings,
             cycle_time,
-        })
+        };
+        let changes = core::ChangeSettings {
+            limit: change_limit,
+            travel: change_travel,
+        };
+        Self(motion, changes)
     }
 }
 

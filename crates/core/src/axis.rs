@@ -36,6 +36,9 @@ pub struct Lesson {
     pub triggers: Triggers,
     /// Whether it would have been more slack than may be.
     pub is_limited: bool,
+    /// What it changed of (`delta_minus`, `delta_plus`) where the DOF is; 0 in profile `paper`, where any one image
+    /// may change all.
+    pub change: [f64; 2],
 }
 
 impl Axis {
@@ -112,10 +115,19 @@ impl Axis {
         }
         match self {
             Self::Article(axis) => axis.learn(command, measured),
-            Self::Adaptive(axis) => Lesson {
-                triggers: axis.learn(command, measured, deviation, since),
-                is_limited: axis.is_limited(),
-            },
+            Self::Adaptive(axis) => {
+                let before = axis.play();
+                let triggers = axis.learn(command, measured, deviation, since);
+                let after = axis.play();
+                Lesson {
+                    triggers,
+                    is_limited: axis.is_limited(),
+                    change: [
+                        after.delta_minus() - before.delta_minus(),
+                        after.delta_plus() - before.delta_plus(),
+                    ],
+                }
+            }
         }
     }
 
@@ -155,6 +167,7 @@ impl ArticleAxis {
         Lesson {
             triggers,
             is_limited,
+            change: [0.0; 2],
         }
     }
 

@@ -70,12 +70,16 @@ flags! {
     WidthLimit = "width_limit",
     /// The monitor changed a command.
     Monitor = "monitor",
+    /// A command that would have changed faster than `command_speed`.
+    CommandJump = "command_jump",
     /// A hand that trembles: `tremor_rate` reversals in a second, each within the slack.
     Tremor = "tremor",
     /// A tip that came farther than its reference since the reference turned.
     Overcompensation = "overcompensation",
     /// Reference and tip that swing farther each time, one after the other.
     LimitCycle = "limit_cycle",
+    /// Images that say another slack than was learnt: the instrument has changed, or they are wrong.
+    SlackChanged = "slack_changed",
 }
 
 /// A set of flags.

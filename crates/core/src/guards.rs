@@ -1,6 +1,7 @@
 //! All that watches the loop, in one place: what comes in, what goes out, what the images say.
 
 use crate::axis::Axis;
+use crate::change_watch::{ChangeSettings, ChangeWatch};
 use crate::clutch::{Clutch, ClutchSettings};
 use crate::dof::PerDof;
 use crate::error::{ConfigError, require_positive};
@@ -24,6 +25,8 @@ pub struct GuardSettings {
     pub frames: FrameSettings,
     /// Of hand and tip.
     pub motion: MotionSettings,
+    /// Of what images teach.
+    pub changes: ChangeSettings,
     /// Of the reactions.
     pub supervisor: SupervisorSettings,
     /// Largest width of the slack [m, rad, rad]; the unit of travel for every reaction.
@@ -54,6 +57,7 @@ pub struct Guards {
     monitors: PerDof<Monitor>,
     pub(crate) frames: FrameWatch,
     motion: MotionWatch,
+    changes: ChangeWatch,
     supervisor: Supervisor,
     limits: PerDof<PlayLimit>,
     unit: PerDof<f64>,
@@ -80,6 +84,7 @@ impl Guards {
             monitors: [Monitor::new(m1)?, Monitor::new(m2)?, Monitor::new(m3)?],
             frames: FrameWatch::new(settings.frames)?,
             motion: MotionWatch::new(settings.motion)?,
+            changes: ChangeWatch::new(settings.changes)?,
             supervisor: Supervisor::new(settings.supervisor)?,
             limits: [
                 PlayLimit::new(w1, o1)?,
@@ -145,7 +150,11 @@ impl Guards {
             }
             let (permitted, verdict) = monitor.permit(reference, axis.command());
             if verdict != Verdict::Same {
-                event.raised = event.raised.and(Flags::of(Flag::Monitor));
+                let jumps = Flags::when(verdict == Verdict::Jump, Flag::CommandJump);
+                event.raised = event
+                    .raised
+                    .and(Flags::of(Flag::Monitor))
+                    .and(jumps.without(self.off));
                 if verdict == Verdict::Broken {
                     event.severe = event.severe.and(Flags::of(Flag::Monitor));
                 }
@@ -197,6 +206,12 @@ impl Guards {
         play: PerDof<Play>,
     ) -> Flags {
         let flags = self.motion.look(time, reference, measured, play);
+        self.watched(flags)
+    }
+
+    /// What an image changed of the contact offsets, and how far the command had gone when it was captured.
+    pub(crate) fn taught(&mut self, changes: PerDof<[f64; 2]>, travel: PerDof<f64>) -> Flags {
+        let flags = self.changes.look(changes, travel);
         self.watched(flags)
     }
 

@@ -46,6 +46,7 @@
 mod adaptive;
 mod axis;
 mod camera;
+mod change_watch;
 mod clutch;
 mod compensator;
 mod contact;
@@ -83,6 +84,7 @@ mod whereabouts;
 pub use adaptive::{AdaptiveAxis, AdaptiveSettings};
 pub use axis::{ArticleAxis, Axis, Lesson};
 pub use camera::{Camera, Pose, Projection};
+pub use change_watch::{ChangeSettings, ChangeWatch};
 pub use clutch::{Admission, Clutch, ClutchSettings};
 pub use compensator::{Compensator, CompensatorState};
 pub use contact::ContactTest;

@@ -22,8 +22,8 @@ pub struct MonitorSettings {
 /// least <= c <= largest,   |c - u| <= lead_limit
 /// ```
 ///
-/// A command outside of the last two, which another bound keeps it from entering at once, comes no farther
-/// out. What is permitted is what is sent, and what the law goes on from.
+/// A command that breaks the third is no hand's, whatever the clutch before the law made of it: it does not move. One
+/// outside of the last two, which another bound keeps it from entering at once, comes no farther out. What is permitted is what is sent, and what the law goes on from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Monitor {
     settings: MonitorSettings,
@@ -35,8 +35,10 @@ pub struct Monitor {
 pub enum Verdict {
     /// It was within all bounds and is what it was, bit for bit.
     Same,
-    /// A limit of speed, travel or lead changed it.
+    /// A limit of travel or lead changed it.
     Limited,
+    /// It would have changed faster than any hand asks for, and stays where it is.
+    Jump,
     /// It broke the law: the software is wrong.
     Broken,
 }
@@ -95,6 +97,16 @@ impl Monitor {
         } else {
             last
         };
+        if (lawful - last).abs() > step_limit {
+            if reference.is_finite() {
+                self.last = Some((reference, last));
+            }
+            let found = match verdict(command, lawful, last) {
+                Verdict::Broken => Verdict::Broken,
+                _ => Verdict::Jump,
+            };
+            return (last, found);
+        }
         // Never beyond the last command's own distance, so that a limit cannot move anything by itself.
         let ahead = (last - last_reference).max(lead_limit);
         let behind = (last - last_reference).min(-lead_limit);

@@ -84,7 +84,7 @@ const fn rule(
 /// A frame without markers teaches nothing by itself, so `lost` need not hold before it fades; two markers
 /// that leave a DOF undetermined hold it by themselves.
 #[rustfmt::skip]
-pub static TABLE: [Rule; 22] = [
+pub static TABLE: [Rule; 24] = [
     rule(Flag::Frozen,           Frame, HOLD_THEN_FADE,                          true),
     rule(Flag::Late,             Frame, HOLD_THEN_FADE,                          true),
     rule(Flag::Duplicate,        Frame, WARN,                                    false),
@@ -104,7 +104,9 @@ pub static TABLE: [Rule; 22] = [
     rule(Flag::StartCheck,       Rig,   &[(PassThrough, Engage)],                false),
     rule(Flag::WidthLimit,       Frame, WARN,                                    false),
     rule(Flag::Monitor,          Tick,  &[(Warn, Auto), (Disable, Restart)],     false),
+    rule(Flag::CommandJump,      Tick,  &[(HoldMotion, Engage)],                 false),
     rule(Flag::Tremor,           Tick,  WARN,                                    false),
     rule(Flag::Overcompensation, Frame, WARN,                                    false),
     rule(Flag::LimitCycle,       Frame, &[(Fade, Auto)],                         false),
+    rule(Flag::SlackChanged,     Frame, WARN,                                    false),
 ];

@@ -256,6 +256,7 @@ impl HysteresisReduction {
 
     fn learn(&mut self, past: &Entry, seen: &Seen, raised: &mut Flags) -> PerDof<Triggers> {
         let mut triggers = [Triggers::default(); 3];
+        let mut changes = [[0.0; 2]; 3];
         let flags = self.watch(past, seen);
         *raised = raised.and(flags);
         let history = &self.history;
@@ -269,11 +270,13 @@ impl HysteresisReduction {
         let axes = self
             .axes
             .iter_mut()
-            .zip(&mut triggers)
+            .zip(triggers.iter_mut().zip(&mut changes))
             .zip(&mut self.corrected)
             .enumerate();
-        for ((dof, ((axis, triggers), corrected)), ((observable, command), (output, deviation))) in
-            axes.zip(signals)
+        for (
+            (dof, ((axis, (triggers, change)), corrected)),
+            ((observable, command), (output, deviation)),
+        ) in axes.zip(signals)
         {
             if *observable {
                 let since = history
@@ -281,12 +284,13 @@ impl HysteresisReduction {
                     .filter_map(|entry| entry.command.get(dof).copied());
                 let before = axis.predicted_state();
                 let lesson = axis.learn(command, *output, deviation, since);
-                *triggers = lesson.triggers;
+                (*triggers, *change) = (lesson.triggers, lesson.change);
                 *raised = raised.and(Flags::when(lesson.is_limited, Flag::WidthLimit));
                 let moved = axis.predicted_state() - before;
                 *corrected += if moved.is_finite() { moved } else { 0.0 };
             }
         }
+        *raised = raised.and(self.guards.taught(changes, past.travel));
         triggers
     }
 

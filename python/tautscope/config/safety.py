@@ -33,8 +33,9 @@ class SafetyConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     re-engages: three times the fastest hand of docs/faults.md."""
     reference_time: Positive = 0.04
     """Over which a speed counts: a tremor of 1 mm passes, a jump of 2 mm does not [s]."""
-    command_speed: PerDof = (0.75, 50.0, 30.0)
-    """No command changes faster."""
+    command_speed: PerDof = (0.4, 27.0, 16.0)
+    """A command that would change faster does not move, and motion stops until the operator
+    re-engages: six times that of a hand at 12.6 mm/s, which crosses the slack K_b times as fast."""
     command_travel: tuple[Range, Range, Range] = ((-0.1, 0.3), (-12.6, 12.6), (-4.0, 4.0))
     """Least and largest command [m, rad, rad]."""
     reference_age: Positive = 0.05
@@ -72,6 +73,11 @@ class SafetyConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     operator in it builds up an oscillation."""
     cycle_time: Positive = 2.0
     """Longest swing of such an oscillation, one way [s]."""
+    change_limit: PerDof = (0.8e-3, 0.9, 0.08)
+    """Change of a contact offset that was learnt, and is worth saying; rotation's differs that much
+    from place to place."""
+    change_travel: Positive = 1.5
+    """Travel of the command over which changes count together [in width_limit]."""
     hold_time: NonNegative = 4.0
     """How long a reaction lasts before the next takes its place [s]."""
     hold_travel: NonNegative = 4.0

@@ -1,9 +1,9 @@
 //! The whole loop, guards included, under anything that may come.
 
 use tautscope_core::{
-    Axis, Camera, Clutch, Compensator, Estimator, FeatureModel, Flag, Flags, Guards, History,
-    HysteresisReduction, Instrument, PerDof, Play, Pose, Reaction, StateEstimation, StateEstimator,
-    Status, WeightedEstimator, WeightedSettings, Whereabouts, WhereaboutsSettings,
+    Axis, Camera, Clutch, Compensator, Estimator, FeatureModel, Flag, Flags, GuardSettings, Guards,
+    History, HysteresisReduction, Instrument, PerDof, Play, Pose, Reaction, StateEstimation,
+    StateEstimator, Status, WeightedEstimator, WeightedSettings, Whereabouts, WhereaboutsSettings,
 };
 
 use crate::support::{self, PERIOD, UNITS, guards};
@@ -44,6 +44,10 @@ fn adaptive() -> HysteresisReduction {
 }
 
 fn reduction(axes: PerDof<Axis>, estimation: StateEstimation) -> HysteresisReduction {
+    without(Flags::NONE, axes, estimation)
+}
+
+fn without(off: Flags, axes: PerDof<Axis>, estimation: StateEstimation) -> HysteresisReduction {
     HysteresisReduction::new(
         axes,
         model(),
@@ -55,7 +59,7 @@ fn reduction(axes: PerDof<Axis>, estimation: StateEstimation) -> HysteresisReduc
             settling_time: 0.15,
         })
         .unwrap(),
-        Guards::new(guards()).unwrap(),
+        Guards::new(GuardSettings { off, ..guards() }).unwrap(),
     )
 }
 
@@ -308,6 +312,47 @@ fn a_hand_is_followed_at_its_speed_limit_and_a_faster_one_no_farther_than_the_la
         let most = ratio * limit * PERIOD * ticks;
         assert!((gone - most).abs() <= 1e-9, "{ratio}: {gone} m, not {most}");
         assert!(ratio < 3.0 || gone <= 1.25 * steady, "{ratio}: {gone} m");
+    }
+}
+
+#[test]
+fn a_jump_that_nobody_saw_before_the_law_is_stopped_behind_it_and_moves_nothing() {
+    for jump in [6.0, -6.0, 40.0] {
+        let axes = UNITS.map(|unit| {
+            Axis::new(
+                Compensator::new(5.0, 5.0).unwrap(),
+                Estimator::new(unit, 0.4, 0.25).unwrap(),
+                Play::new(-5.0 * unit, 5.0 * unit).unwrap(),
+            )
+        });
+        let step = StateEstimation::Article(StateEstimator::new([1.0; 3]).unwrap());
+        let mut reduction = without(Flags::of(Flag::ReferenceJump), axes, step);
+        let mut time = 0.0;
+        let mut go = |reduction: &mut HysteresisReduction, at: f64| {
+            time += PERIOD;
+            reduction.step([at * UNITS[0], 0.0, 0.0], None, time)[0]
+        };
+        let before = (0..100)
+            .map(|tick| go(&mut reduction, 0.1 * f64::from(tick)))
+            .last()
+            .unwrap();
+        assert_eq!(reduction.guards().supervision().reaction, Reaction::None);
+        assert_eq!(go(&mut reduction, 9.9 + jump), before);
+        assert!(
+            reduction
+                .guards()
+                .supervision()
+                .flags
+                .has(Flag::CommandJump)
+        );
+        assert_eq!(go(&mut reduction, 10.0), before, "nor does the way back");
+        reduction.guards_mut().engage();
+        go(&mut reduction, 10.0);
+        let moved = go(&mut reduction, 10.1) - before;
+        assert!(
+            (0.0..=0.5 * UNITS[0] * (1.0 + 1e-9)).contains(&moved),
+            "{moved}"
+        );
     }
 }
 

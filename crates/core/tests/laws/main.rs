@@ -4,6 +4,7 @@
 #![allow(clippy::float_cmp)]
 
 mod adaptive;
+mod change_watch;
 mod compensator;
 mod estimator;
 mod expectation;

@@ -1,9 +1,9 @@
 //! Guards for the tests of the loop: lengths in units of 0.4 mm, 0.04 rad, 0.02 rad.
 
 use tautscope_core::{
-    AdaptiveAxis, AdaptiveSettings, ClutchSettings, ContactTest, Flags, FrameSettings,
-    GuardSettings, LeadLaw, MonitorSettings, MotionSettings, OffsetPrior, PerDof, Play,
-    SupervisorSettings,
+    AdaptiveAxis, AdaptiveSettings, ChangeSettings, ClutchSettings, ContactTest, Flags,
+    FrameSettings, GuardSettings, LeadLaw, MonitorSettings, MotionSettings, OffsetPrior, PerDof,
+    Play, SupervisorSettings,
 };
 
 pub const UNITS: PerDof<f64> = [0.4e-3, 0.04, 0.02];
@@ -62,6 +62,10 @@ pub fn guards() -> GuardSettings {
             ahead: UNITS.map(|unit| 3.0 * unit),
             cycle_swings: 4,
             cycle_time: 2.0,
+        },
+        changes: ChangeSettings {
+            limit: UNITS.map(|unit| 2.0 * unit),
+            travel: UNITS.map(|unit| 45.0 * unit),
         },
         supervisor: supervisor(),
         width_limit: UNITS.map(|unit| 30.0 * unit),
