@@ -249,6 +249,7 @@ class Guards:
         innovation_limit: float,
         start_deviation: _Vector3,
         innovation_floor: _Vector3,
+        jump: _Vector3,
         blind_growth: float,
         motion: MotionWatch,
         hold_time: float,

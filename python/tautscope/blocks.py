@@ -163,6 +163,7 @@ def build_guards(config: Config) -> _core.Guards:
         innovation_limit=safety.innovation_limit,
         start_deviation=each(lambda dof: dof.start_deviation),
         innovation_floor=each(lambda dof: dof.start_deviation * safety.innovation_floor),
+        jump=safety.jump,
         blind_growth=safety.blind_growth,
         motion=motion,
         hold_time=safety.hold_time,

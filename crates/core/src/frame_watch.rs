@@ -7,10 +7,13 @@ use crate::linear::square;
 use crate::posture::Belief;
 
 /// A frame out of order by more than this has a wrong clock, in s.
-const JUMP: f64 = 1.0;
+const BACK: f64 = 1.0;
 /// Share of the difference by which the spread follows a larger innovation, and a smaller one of a DOF in motion.
 const GROW: f64 = 0.3;
 const SHRINK: f64 = 0.05;
+
+/// So many of the image's own standard deviations are no jump.
+const JUMP_DEVIATIONS: f64 = 2.0;
 
 /// When a frame is refused.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,7 +30,9 @@ pub struct FrameSettings {
     pub start_deviation: PerDof<f64>,
     /// Least spread [m, rad, rad].
     pub least_deviation: PerDof<f64>,
-    /// What the spread grows by while nothing is seen, per travel of the command.
+    /// How far a tip may come beyond its command's travel between two images [m, rad, rad].
+    pub jump: PerDof<f64>,
+    /// What spread and jump grow by while nothing is seen, per travel of the command.
     pub blind_growth: f64,
 }
 
@@ -71,6 +76,8 @@ pub struct FrameWatch {
     arrived_at: Option<f64>,
     first: Option<(Picture, PerDof<f64>)>,
     spread: PerDof<f64>,
+    /// By how much a jump may be larger [m, rad, rad].
+    blind: PerDof<f64>,
     travel: PerDof<f64>,
 }
 
@@ -90,6 +97,9 @@ impl FrameWatch {
         for value in settings.start_deviation {
             require_positive("start_deviation", value)?;
         }
+        for value in settings.jump {
+            require_positive("jump", value)?;
+        }
         for value in settings.least_deviation {
             require_positive("innovation_floor", value)?;
         }
@@ -99,6 +109,7 @@ impl FrameWatch {
             arrived_at: None,
             first: None,
             spread: settings.start_deviation,
+            blind: settings.start_deviation,
             travel: [0.0; 3],
         })
     }
@@ -119,7 +130,7 @@ impl FrameWatch {
         }
         let since = self.captured_at.map(|last| captured_at - last);
         let is_ahead = captured_at > now && arrival.travel.is_none();
-        let has_jumped = since.is_some_and(|since| since < -JUMP);
+        let has_jumped = since.is_some_and(|since| since < -BACK);
         if !captured_at.is_finite() || is_ahead || has_jumped {
             // What comes next is compared with the new time.
             self.captured_at = Some(captured_at).filter(|_| has_jumped);
@@ -147,20 +158,33 @@ impl FrameWatch {
         }
     }
 
-    /// Whether an image says what can be believed: per DOF the state from it alone and its standard deviation,
-    /// NaN where it says nothing.
-    pub fn fits(&self, belief: &Belief, state: PerDof<f64>, deviation: PerDof<f64>) -> bool {
-        let axes = state
-            .iter()
-            .zip(belief.state)
-            .zip(deviation)
-            .zip(self.spread);
-        axes.into_iter()
-            .filter(|(((state, _), deviation), _)| state.is_finite() && deviation.is_finite())
-            .all(|(((state, expected), deviation), spread)| {
-                let limit = square(self.settings.innovation_limit);
-                square(state - expected) <= limit * (square(spread) + square(deviation))
-            })
+    /// What cannot be believed of an image: per DOF the state from it alone and its standard deviation,
+    /// NaN where it says nothing, and how far the command went since the last image.
+    pub fn doubts(
+        &self,
+        belief: &Belief,
+        moved: PerDof<f64>,
+        state: PerDof<f64>,
+        deviation: PerDof<f64>,
+    ) -> Flags {
+        let seen = state.iter().zip(belief.state).zip(deviation);
+        let reach = moved.iter().zip(self.settings.jump).zip(self.blind);
+        let mut doubts = Flags::NONE;
+        for ((((state, expected), deviation), spread), ((moved, jump), blind)) in
+            seen.zip(self.spread).zip(reach)
+        {
+            let surprise = (state - expected).abs();
+            if !(surprise.is_finite() && deviation.is_finite()) {
+                continue;
+            }
+            let limit = square(self.settings.innovation_limit);
+            let fits = square(surprise) <= limit * (square(spread) + square(deviation));
+            let reaches = surprise <= moved + jump + blind + JUMP_DEVIATIONS * deviation;
+            doubts = doubts
+                .and(Flags::when(!fits, Flag::Innovation))
+                .and(Flags::when(!reaches, Flag::Jump));
+        }
+        doubts
     }
 
     /// An image was believed.
@@ -181,16 +205,19 @@ impl FrameWatch {
                 *spread = libm::sqrt(square(*spread) + rate * change).max(least);
             }
         }
+        self.blind = [0.0; 3];
         self.travel = travel;
     }
 
     /// Nothing was seen.
     pub fn miss(&mut self, travel: PerDof<f64>) {
         let moved = travel.iter().zip(self.travel);
-        let axes = self.spread.iter_mut().zip(self.settings.start_deviation);
-        for ((spread, most), (now, then)) in axes.zip(moved) {
-            let grown = *spread + self.settings.blind_growth * (now - then).max(0.0);
-            *spread = grown.min(most).max(*spread);
+        let axes = self.spread.iter_mut().zip(&mut self.blind);
+        let axes = axes.zip(self.settings.start_deviation);
+        for (((spread, blind), most), (now, then)) in axes.zip(moved) {
+            let growth = self.settings.blind_growth * (now - then).max(0.0);
+            *spread = (*spread + growth).min(most).max(*spread);
+            *blind = (*blind + growth).min(most);
         }
         self.travel = travel;
     }
@@ -198,5 +225,6 @@ impl FrameWatch {
     /// What has been refused for so long may be the truth: believe the next images again.
     pub const fn forget(&mut self) {
         self.spread = self.settings.start_deviation;
+        self.blind = self.settings.start_deviation;
     }
 }

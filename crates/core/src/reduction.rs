@@ -190,22 +190,28 @@ impl HysteresisReduction {
             return self.unused(Status::Held, Some(past));
         };
         let belief = self.whereabouts.at(&past);
-        let fits = |seen: &Seen| {
-            self.guards
-                .frames
-                .fits(&belief, seen.image_state(), seen.output_deviation)
+        let moved = self.whereabouts.moved(&past);
+        let doubts = |seen: &Seen| {
+            let (state, deviation) = (seen.image_state(), seen.output_deviation);
+            self.guards.frames.doubts(&belief, moved, state, deviation)
         };
+        let doubt = doubts(&seen);
         let is_believed = seen.used != [false; 2];
         let expected = self.feature_model.predict(belief.state);
         let is_reversed = expected.is_some_and(|expected| reversed(expected.features, measured));
-        if is_reversed || !(is_believed && fits(&seen)) {
+        if is_reversed || !is_believed || !doubt.is_empty() {
             let [ua, va, ub, vb] = measured;
             let exchanged = self.look(&past, [ub, vb, ua, va], covariance);
             let swapped = is_reversed
-                || exchanged.is_some_and(|other| other.used == [true; 2] && fits(&other));
+                || exchanged.is_some_and(|other| other.used == [true; 2] && doubts(&other).is_empty());
             *raised = self.guards.watched(
-                Flags::when(swapped, Flag::Swapped)
-                    .and(Flags::when(!swapped && is_believed, Flag::Innovation)),
+                if swapped {
+                    Flags::of(Flag::Swapped)
+                } else if is_believed {
+                    doubt
+                } else {
+                    Flags::NONE
+                },
             );
             if !raised.is_empty() {
                 self.whereabouts.miss(&past);
@@ -225,10 +231,10 @@ impl HysteresisReduction {
         };
         // Two markers of which one is where it cannot be: the other may be as wrong.
         let is_doubtful = is_believed && seen.used != found(measured);
-        let doubt = self
+        let left_out = self
             .guards
             .watched(Flags::when(is_doubtful, Flag::Innovation));
-        let triggers = if doubt.is_empty() && self.guards.may_learn() {
+        let triggers = if left_out.is_empty() && self.guards.may_learn() {
             self.learn(&past, &seen, raised)
         } else {
             [Triggers::default(); 3]

@@ -51,6 +51,7 @@ pub fn guards() -> GuardSettings {
             innovation_limit: 5.0,
             start_deviation: [5e-3, 0.6, 0.5],
             least_deviation: UNITS,
+            jump: UNITS,
             blind_growth: 0.1,
         },
         motion: MotionSettings {
