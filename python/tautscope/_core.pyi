@@ -250,6 +250,8 @@ class Guards:
         start_deviation: _Vector3,
         innovation_floor: _Vector3,
         jump: _Vector3,
+        grip_distance: _Vector3,
+        slip: _Vector3,
         blind_growth: float,
         motion: MotionWatch,
         hold_time: float,

@@ -164,6 +164,8 @@ def build_guards(config: Config) -> _core.Guards:
         start_deviation=each(lambda dof: dof.start_deviation),
         innovation_floor=each(lambda dof: dof.start_deviation * safety.innovation_floor),
         jump=safety.jump,
+        grip_distance=each(lambda dof: dof.update_distance * safety.grip_distance),
+        slip=safety.slip,
         blind_growth=safety.blind_growth,
         motion=motion,
         hold_time=safety.hold_time,

@@ -3,6 +3,7 @@
 use crate::dof::PerDof;
 use crate::error::{ConfigError, require_non_negative, require_positive};
 use crate::flags::{Flag, Flags};
+use crate::grip::{Grip, GripSettings, Sighting};
 use crate::linear::square;
 use crate::posture::Belief;
 
@@ -32,6 +33,8 @@ pub struct FrameSettings {
     pub least_deviation: PerDof<f64>,
     /// How far a tip may come beyond its command's travel between two images [m, rad, rad].
     pub jump: PerDof<f64>,
+    /// When a tip is in contact, and has left it.
+    pub grips: PerDof<GripSettings>,
     /// What spread and jump grow by while nothing is seen, per travel of the command.
     pub blind_growth: f64,
 }
@@ -79,6 +82,7 @@ pub struct FrameWatch {
     /// By how much a jump may be larger [m, rad, rad].
     blind: PerDof<f64>,
     travel: PerDof<f64>,
+    grips: PerDof<Grip>,
 }
 
 impl FrameWatch {
@@ -100,6 +104,10 @@ impl FrameWatch {
         for value in settings.jump {
             require_positive("jump", value)?;
         }
+        for grip in settings.grips {
+            require_positive("grip_distance", grip.distance)?;
+            require_positive("slip", grip.slip)?;
+        }
         for value in settings.least_deviation {
             require_positive("innovation_floor", value)?;
         }
@@ -111,6 +119,7 @@ impl FrameWatch {
             spread: settings.start_deviation,
             blind: settings.start_deviation,
             travel: [0.0; 3],
+            grips: settings.grips.map(Grip::new),
         })
     }
 
@@ -158,22 +167,14 @@ impl FrameWatch {
         }
     }
 
-    /// What cannot be believed of an image: per DOF the state from it alone and its standard deviation,
-    /// NaN where it says nothing, and how far the command went since the last image.
-    pub fn doubts(
-        &self,
-        belief: &Belief,
-        moved: PerDof<f64>,
-        state: PerDof<f64>,
-        deviation: PerDof<f64>,
-    ) -> Flags {
-        let seen = state.iter().zip(belief.state).zip(deviation);
+    /// What cannot be believed of an image, of which each DOF says what is seen of it; how far the tip may have gone
+    /// since the last.
+    pub fn doubts(&self, belief: &Belief, moved: PerDof<f64>, seen: &PerDof<Sighting>) -> Flags {
         let reach = moved.iter().zip(self.settings.jump).zip(self.blind);
+        let axes = seen.iter().zip(belief.state).zip(self.spread).zip(reach);
         let mut doubts = Flags::NONE;
-        for ((((state, expected), deviation), spread), ((moved, jump), blind)) in
-            seen.zip(self.spread).zip(reach)
-        {
-            let surprise = (state - expected).abs();
+        for ((((seen, expected), spread), ((moved, jump), blind)), grip) in axes.zip(&self.grips) {
+            let (surprise, deviation) = ((seen.tip - expected).abs(), seen.deviation);
             if !(surprise.is_finite() && deviation.is_finite()) {
                 continue;
             }
@@ -182,31 +183,32 @@ impl FrameWatch {
             let reaches = surprise <= moved + jump + blind + JUMP_DEVIATIONS * deviation;
             doubts = doubts
                 .and(Flags::when(!fits, Flag::Innovation))
-                .and(Flags::when(!reaches, Flag::Jump));
+                .and(Flags::when(!reaches, Flag::Jump))
+                .and(Flags::when(grip.slips(seen), Flag::Slip));
         }
         doubts
     }
 
     /// An image was believed.
-    pub fn accept(&mut self, belief: &Belief, state: PerDof<f64>, travel: PerDof<f64>) {
-        let moved = travel.iter().zip(self.travel).map(|(now, then)| now - then);
-        let axes = state.iter().zip(belief.state).zip(&mut self.spread);
-        let axes = axes.zip(moved).zip(self.settings.least_deviation);
-        for ((((state, expected), spread), moved), least) in axes {
-            let surprise = square(state - expected);
+    pub fn accept(&mut self, belief: &Belief, seen: &PerDof<Sighting>) {
+        let axes = seen.iter().zip(belief.state).zip(&mut self.spread);
+        let axes = axes.zip(self.travel).zip(self.settings.least_deviation);
+        for (((((seen, expected), spread), then), least), grip) in axes.zip(&mut self.grips) {
+            let surprise = square(seen.tip - expected);
             if surprise.is_finite() {
                 let change = surprise - square(*spread);
                 let rate = if change > 0.0 {
                     GROW
                 } else {
                     // A DOF at rest shows nothing of how well its motion is foreseen.
-                    SHRINK * (moved / least).min(1.0)
+                    SHRINK * ((seen.travel - then) / least).min(1.0)
                 };
                 *spread = libm::sqrt(square(*spread) + rate * change).max(least);
             }
+            grip.follow(seen);
         }
         self.blind = [0.0; 3];
-        self.travel = travel;
+        self.travel = seen.map(|seen| seen.travel);
     }
 
     /// Nothing was seen.
@@ -226,5 +228,9 @@ impl FrameWatch {
     pub const fn forget(&mut self) {
         self.spread = self.settings.start_deviation;
         self.blind = self.settings.start_deviation;
+        let [first, second, third] = &mut self.grips;
+        first.release();
+        second.release();
+        third.release();
     }
 }

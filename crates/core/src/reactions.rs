@@ -84,7 +84,7 @@ const fn rule(
 /// A frame without markers teaches nothing by itself, so `lost` need not hold before it fades; two markers
 /// that leave a DOF undetermined hold it by themselves.
 #[rustfmt::skip]
-pub static TABLE: [Rule; 23] = [
+pub static TABLE: [Rule; 24] = [
     rule(Flag::Frozen,           Frame, HOLD_THEN_FADE,                          true),
     rule(Flag::Late,             Frame, HOLD_THEN_FADE,                          true),
     rule(Flag::Duplicate,        Frame, WARN,                                    false),
@@ -92,6 +92,7 @@ pub static TABLE: [Rule; 23] = [
     rule(Flag::Clock,            Frame, HOLD_THEN_FADE,                          true),
     rule(Flag::Innovation,       Frame, HOLD_THEN_FADE,                          true),
     rule(Flag::Jump,             Frame, HOLD_THEN_FADE,                          true),
+    rule(Flag::Slip,             Frame, HOLD_THEN_FADE,                          true),
     rule(Flag::Swapped,          Frame, HOLD_THEN_FADE,                          true),
     rule(Flag::Merged,           Frame, &[(Warn, Auto), (HoldEstimate, Auto), (Fade, Auto)], true),
     rule(Flag::Lost,             Frame, &[(Warn, Auto), (Fade, Auto)],           true),

@@ -191,9 +191,15 @@ impl HysteresisReduction {
         };
         let belief = self.whereabouts.at(&past);
         let moved = self.whereabouts.moved(&past);
+        // The article's estimate jumps by itself wherever a DOF begins or ceases to be held.
+        let unasked = match self.state_estimation {
+            StateEstimation::Article(_) => Flags::of(Flag::Jump).and(Flags::of(Flag::Slip)),
+            StateEstimation::Weighted(_) => Flags::NONE,
+        };
         let doubts = |seen: &Seen| {
-            let (state, deviation) = (seen.image_state(), seen.output_deviation);
-            self.guards.frames.doubts(&belief, moved, state, deviation)
+            let sightings = seen.sightings(&past);
+            let frames = &self.guards.frames;
+            frames.doubts(&belief, moved, &sightings).without(unasked)
         };
         let doubt = doubts(&seen);
         let is_believed = seen.used != [false; 2];
@@ -203,24 +209,21 @@ impl HysteresisReduction {
             let [ua, va, ub, vb] = measured;
             let exchanged = self.look(&past, [ub, vb, ua, va], covariance);
             let swapped = is_reversed
-                || exchanged.is_some_and(|other| other.used == [true; 2] && doubts(&other).is_empty());
-            *raised = self.guards.watched(
-                if swapped {
-                    Flags::of(Flag::Swapped)
-                } else if is_believed {
-                    doubt
-                } else {
-                    Flags::NONE
-                },
-            );
+                || exchanged
+                    .is_some_and(|other| other.used == [true; 2] && doubts(&other).is_empty());
+            *raised = self.guards.watched(if swapped {
+                Flags::of(Flag::Swapped)
+            } else if is_believed {
+                doubt
+            } else {
+                Flags::NONE
+            });
             if !raised.is_empty() {
                 self.whereabouts.miss(&past);
                 return self.unused(Status::Refused, Some(past));
             }
         }
-        self.guards
-            .frames
-            .accept(&belief, seen.image_state(), past.travel);
+        self.guards.frames.accept(&belief, &seen.sightings(&past));
         self.last_used = captured_at;
         self.settle(&past, &seen, measured);
         let estimate = seen.estimate;
