@@ -16,14 +16,16 @@ const REST: f64 = 0.007;
 /// What a command comes back by between two images before it has turned, as a share of `slip`.
 const TURN: f64 = 0.1;
 
-/// One DOF's contact, told from command c and measured tip m alone; neither model nor slack is believed in.
+/// One DOF's contact, told from command c and measured tip m.
 ///
 /// ```text
 /// slips   |(c - m) - (c0 - m0)| > slip + 0.15 |c - c0| + deviation
+/// or      c - m < least offset - slip - deviation,   c - m > largest offset + slip + deviation
 /// ```
 ///
 /// From a turn or rest of the command on, (c0, m0) is where it last slipped. Once it has not over `distance` the tip is held,
-/// (c0, m0) is where that was found, and until the command turns or rests it cannot slip.
+/// (c0, m0) is where that was found, and until the command turns or rests it cannot slip. Nor can slack grow by more than that between two turns: the
+/// offsets are those learnt at the last.
 ///
 /// Without effect where a tip goes less far than its command, or farther: it is never held. Wrong where something else
 /// moves the tip: that slips, too.
@@ -34,7 +36,12 @@ pub struct Grip {
     anchor: Option<(f64, f64)>,
     last: Last,
     is_held: bool,
+    /// What was allowed when the command turned or rested last.
+    offsets: (f64, f64),
 }
+
+/// Any offset.
+const ANY: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
 
 /// At the last image that was believed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,6 +64,8 @@ pub struct Sighting {
     pub tip: f64,
     /// Its standard deviation.
     pub deviation: f64,
+    /// Least and largest c - m that the slack as learnt allows.
+    pub offsets: (f64, f64),
 }
 
 impl Grip {
@@ -72,12 +81,21 @@ impl Grip {
                 direction: 0.0,
             },
             is_held: false,
+            offsets: ANY,
         }
     }
 
-    /// Whether a held tip would have slipped.
+    /// Whether a held tip would have slipped, or have been left farther behind than there is slack.
     pub fn slips(&self, seen: &Sighting) -> bool {
-        self.is_held && !self.turned(seen) && self.is_off(seen)
+        let (least, most) = if self.turned(seen) {
+            seen.offsets
+        } else {
+            self.offsets
+        };
+        let offset = seen.command - seen.tip;
+        let spare = self.settings.slip + seen.deviation;
+        let is_behind = offset < least - spare || offset > most + spare;
+        is_behind || self.is_held && !self.turned(seen) && self.is_off(seen)
     }
 
     /// An image was believed.
@@ -87,14 +105,17 @@ impl Grip {
         }
         if self.anchor.is_none() {
             self.anchor = Some((seen.command, seen.tip));
+            self.offsets = seen.offsets;
         } else if self.turned(seen) {
             self.anchor = Some((self.last.command, self.last.tip));
             self.is_held = false;
+            self.offsets = seen.offsets;
         }
         let moved = seen.command - self.last.command;
         if moved.abs() < REST * self.settings.distance {
             self.anchor = Some((seen.command, seen.tip));
             self.is_held = false;
+            self.offsets = seen.offsets;
         }
         self.last = Last {
             command: seen.command,
@@ -119,6 +140,7 @@ impl Grip {
     pub const fn release(&mut self) {
         self.anchor = None;
         self.is_held = false;
+        self.offsets = ANY;
     }
 
     /// Whether the command has gone back since the last image that was believed.

@@ -196,8 +196,9 @@ impl HysteresisReduction {
             StateEstimation::Article(_) => Flags::of(Flag::Jump).and(Flags::of(Flag::Slip)),
             StateEstimation::Weighted(_) => Flags::NONE,
         };
+        let offsets = self.axes.each_ref().map(Axis::offsets);
         let doubts = |seen: &Seen| {
-            let sightings = seen.sightings(&past);
+            let sightings = seen.sightings(&past, offsets);
             let frames = &self.guards.frames;
             frames.doubts(&belief, moved, &sightings).without(unasked)
         };
@@ -223,7 +224,9 @@ impl HysteresisReduction {
                 return self.unused(Status::Refused, Some(past));
             }
         }
-        self.guards.frames.accept(&belief, &seen.sightings(&past));
+        self.guards
+            .frames
+            .accept(&belief, &seen.sightings(&past, offsets));
         self.last_used = captured_at;
         self.settle(&past, &seen, measured);
         let estimate = seen.estimate;
