@@ -6,9 +6,6 @@ use crate::estimator::{Estimator, EstimatorState, Triggers};
 use crate::limits::PlayLimit;
 use crate::play::Play;
 
-/// So many standard deviations an offset is at most beyond what was learnt.
-const SURE: f64 = 4.0;
-
 /// One DOF of the loop, each scheme with its memory.
 #[derive(Debug, Clone, PartialEq)]
 // Without an allocator nothing can be boxed, and there are three of them.
@@ -140,13 +137,7 @@ impl Axis {
     pub(crate) fn offsets(&self) -> (f64, f64) {
         match self {
             Self::Article(_) => (f64::NEG_INFINITY, f64::INFINITY),
-            Self::Adaptive(axis) => {
-                let (play, (minus, plus)) = (axis.play(), axis.deviation());
-                (
-                    play.delta_minus() - SURE * minus,
-                    play.delta_plus() + SURE * plus,
-                )
-            }
+            Self::Adaptive(axis) => axis.offsets(),
         }
     }
 
