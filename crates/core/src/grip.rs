@@ -11,6 +11,8 @@ pub struct GripSettings {
 
 /// The same as a share of the command's travel.
 const SLIP_SHARE: f64 = 0.15;
+/// So often the command turns before slack counts as learnt: both contacts, and one once more.
+const LEARNT: u32 = 3;
 /// What a command moves by between two images that does not rest, as a share of `distance`: a tip at rest creeps.
 const REST: f64 = 0.007;
 /// What a command comes back by between two images before it has turned, as a share of `slip`.
@@ -25,7 +27,7 @@ const TURN: f64 = 0.1;
 ///
 /// From a turn or rest of the command on, (c0, m0) is where it last slipped. Once it has not over `distance` the tip is held,
 /// (c0, m0) is where that was found, and until the command turns or rests it cannot slip. Nor can slack grow by more than that between two turns: the
-/// offsets are those learnt at the last.
+/// offsets are those learnt at the last, once it has turned three times.
 ///
 /// Without effect where a tip goes less far than its command, or farther: it is never held. Wrong where something else
 /// moves the tip: that slips, too.
@@ -38,6 +40,8 @@ pub struct Grip {
     is_held: bool,
     /// What was allowed when the command turned or rested last.
     offsets: (f64, f64),
+    /// How often the command has turned.
+    turns: u32,
 }
 
 /// Any offset.
@@ -82,6 +86,7 @@ impl Grip {
             },
             is_held: false,
             offsets: ANY,
+            turns: 0,
         }
     }
 
@@ -94,7 +99,7 @@ impl Grip {
         };
         let offset = seen.command - seen.tip;
         let spare = self.settings.slip + seen.deviation;
-        let is_behind = offset < least - spare || offset > most + spare;
+        let is_behind = self.turns >= LEARNT && (offset < least - spare || offset > most + spare);
         is_behind || self.is_held && !self.turned(seen) && self.is_off(seen)
     }
 
@@ -110,6 +115,7 @@ impl Grip {
             self.anchor = Some((self.last.command, self.last.tip));
             self.is_held = false;
             self.offsets = seen.offsets;
+            self.turns = self.turns.saturating_add(1);
         }
         let moved = seen.command - self.last.command;
         if moved.abs() < REST * self.settings.distance {
@@ -141,6 +147,7 @@ impl Grip {
         self.anchor = None;
         self.is_held = false;
         self.offsets = ANY;
+        self.turns = 0;
     }
 
     /// Whether the command has gone back since the last image that was believed.

@@ -58,7 +58,7 @@ class SafetyConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     jump: PerDof = (0.2e-3, 0.1, 0.05)
     """How much farther than its command a tip may come from one image to the next, besides two of
     the image's own standard deviations [m, rad, rad]."""
-    slip: PerDof = (0.4e-3, 2.6, 0.03)
+    slip: PerDof = (0.4e-3, 2.6, 0.04)
     """How far a tip in contact may be off where its command should have taken it, besides 15 % of
     the way and the image's own standard deviation [m, rad, rad]. Rotation, whose shaft winds up
     while insertion moves, has no contact that lasts."""
