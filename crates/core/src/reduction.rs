@@ -212,13 +212,10 @@ impl HysteresisReduction {
             let swapped = is_reversed
                 || exchanged
                     .is_some_and(|other| other.used == [true; 2] && doubts(&other).is_empty());
-            *raised = self.guards.watched(if swapped {
-                Flags::of(Flag::Swapped)
-            } else if is_believed {
-                doubt
-            } else {
-                Flags::NONE
-            });
+            *raised = self.guards.watched(Flags::when(swapped, Flag::Swapped));
+            if raised.is_empty() && is_believed {
+                *raised = self.guards.watched(doubt);
+            }
             if !raised.is_empty() {
                 self.whereabouts.miss(&past);
                 return self.unused(Status::Refused, Some(past));
