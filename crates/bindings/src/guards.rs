@@ -16,7 +16,7 @@ impl Guards {
         *, period, gain_limit, reference_speed, reference_time, reference_age, late_tick, stall,
         command_speed, command_travel, width_limit, offset_limit,
         frame_age, frame_gap, frozen_travel, innovation_limit, start_deviation,
-        innovation_floor, blind_growth,
+        innovation_floor, jump, grip_distance, slip, blind_growth,
         motion,
         hold_time, hold_travel, fade_travel, restore_travel, good_frames, good_ticks, off
     ))]
@@ -41,6 +41,9 @@ impl Guards {
         innovation_limit: f64,
         start_deviation: [f64; 3],
         innovation_floor: [f64; 3],
+        jump: [f64; 3],
+        grip_distance: [f64; 3],
+        slip: [f64; 3],
         blind_growth: f64,
         motion: &MotionWatch,
         hold_time: f64,
@@ -74,6 +77,11 @@ impl Guards {
                 innovation_limit,
                 start_deviation,
                 least_deviation: innovation_floor,
+                jump,
+                grips: [0, 1, 2].map(|dof: usize| core::GripSettings {
+                    distance: grip_distance[dof],
+                    slip: slip[dof],
+                }),
                 blind_growth,
             },
             motion: motion.0,

@@ -10,6 +10,9 @@ use crate::play::Play;
 use crate::slack::Slack;
 use crate::smoother::Smoother;
 
+/// Standard deviation of an offset that was measured, in `cautious_deviation`.
+const KNOWN: f64 = 0.25;
+
 /// What an [`AdaptiveAxis`] is set to; lengths in the unit of the DOF.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AdaptiveSettings {
@@ -141,6 +144,23 @@ impl AdaptiveAxis {
         let at = self.reference.unwrap_or(0.0);
         let [minus, plus] = Side::BOTH.map(|side| libm::sqrt(self.slack.variance(side, at)));
         (minus, plus)
+    }
+
+    /// Least and largest offset where the reference is now, each a standard deviation beyond what was learnt; infinite
+    /// while it is hardly known.
+    pub(crate) fn offsets(&self) -> (f64, f64) {
+        let (play, (minus, plus)) = (self.play(), self.deviation());
+        let spare = |deviation: f64| {
+            if deviation < KNOWN * self.settings.cautious_deviation {
+                deviation
+            } else {
+                f64::INFINITY
+            }
+        };
+        (
+            play.delta_minus() - spare(minus),
+            play.delta_plus() + spare(plus),
+        )
     }
 
     /// Travel of the tip over the command's in contact: mean and standard deviation.

@@ -145,6 +145,14 @@ impl Axis {
         }
     }
 
+    /// Least and largest offset that the slack as learnt allows, where the DOF is now.
+    pub(crate) fn offsets(&self) -> (f64, f64) {
+        match self {
+            Self::Article(_) => (f64::NEG_INFINITY, f64::INFINITY),
+            Self::Adaptive(axis) => axis.offsets(),
+        }
+    }
+
     /// The play operator believed in, where the DOF is now.
     pub(crate) fn play(&self) -> Play {
         match self {

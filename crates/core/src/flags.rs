@@ -44,6 +44,10 @@ flags! {
     Clock = "clock",
     /// An image too far from what model and last images make one expect.
     Innovation = "innovation",
+    /// An image in which the tip went farther than its command.
+    Jump = "jump",
+    /// An image in which a tip in contact does not go with its command.
+    Slip = "slip",
     /// An image that would be as expected with the markers exchanged.
     Swapped = "swapped",
     /// One marker alone, or two of which one is where it cannot be.

@@ -3,14 +3,18 @@
 use crate::dof::PerDof;
 use crate::error::{ConfigError, require_non_negative, require_positive};
 use crate::flags::{Flag, Flags};
+use crate::grip::{Grip, GripSettings, Sighting};
 use crate::linear::square;
 use crate::posture::Belief;
 
 /// A frame out of order by more than this has a wrong clock, in s.
-const JUMP: f64 = 1.0;
+const BACK: f64 = 1.0;
 /// Share of the difference by which the spread follows a larger innovation, and a smaller one of a DOF in motion.
 const GROW: f64 = 0.3;
 const SHRINK: f64 = 0.05;
+
+/// So many of the image's own standard deviations are no jump.
+const JUMP_DEVIATIONS: f64 = 2.0;
 
 /// When a frame is refused.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,7 +31,11 @@ pub struct FrameSettings {
     pub start_deviation: PerDof<f64>,
     /// Least spread [m, rad, rad].
     pub least_deviation: PerDof<f64>,
-    /// What the spread grows by while nothing is seen, per travel of the command.
+    /// How far a tip may come beyond its command's travel between two images [m, rad, rad].
+    pub jump: PerDof<f64>,
+    /// When a tip is in contact, and has left it.
+    pub grips: PerDof<GripSettings>,
+    /// What spread and jump grow by while nothing is seen, per travel of the command.
     pub blind_growth: f64,
 }
 
@@ -71,7 +79,10 @@ pub struct FrameWatch {
     arrived_at: Option<f64>,
     first: Option<(Picture, PerDof<f64>)>,
     spread: PerDof<f64>,
+    /// By how much a jump may be larger [m, rad, rad].
+    blind: PerDof<f64>,
     travel: PerDof<f64>,
+    grips: PerDof<Grip>,
 }
 
 impl FrameWatch {
@@ -90,6 +101,13 @@ impl FrameWatch {
         for value in settings.start_deviation {
             require_positive("start_deviation", value)?;
         }
+        for value in settings.jump {
+            require_positive("jump", value)?;
+        }
+        for grip in settings.grips {
+            require_positive("grip_distance", grip.distance)?;
+            require_positive("slip", grip.slip)?;
+        }
         for value in settings.least_deviation {
             require_positive("innovation_floor", value)?;
         }
@@ -99,7 +117,9 @@ impl FrameWatch {
             arrived_at: None,
             first: None,
             spread: settings.start_deviation,
+            blind: settings.start_deviation,
             travel: [0.0; 3],
+            grips: settings.grips.map(Grip::new),
         })
     }
 
@@ -119,7 +139,7 @@ impl FrameWatch {
         }
         let since = self.captured_at.map(|last| captured_at - last);
         let is_ahead = captured_at > now && arrival.travel.is_none();
-        let has_jumped = since.is_some_and(|since| since < -JUMP);
+        let has_jumped = since.is_some_and(|since| since < -BACK);
         if !captured_at.is_finite() || is_ahead || has_jumped {
             // What comes next is compared with the new time.
             self.captured_at = Some(captured_at).filter(|_| has_jumped);
@@ -147,50 +167,59 @@ impl FrameWatch {
         }
     }
 
-    /// Whether an image says what can be believed: per DOF the state from it alone and its standard deviation,
-    /// NaN where it says nothing.
-    pub fn fits(&self, belief: &Belief, state: PerDof<f64>, deviation: PerDof<f64>) -> bool {
-        let axes = state
-            .iter()
-            .zip(belief.state)
-            .zip(deviation)
-            .zip(self.spread);
-        axes.into_iter()
-            .filter(|(((state, _), deviation), _)| state.is_finite() && deviation.is_finite())
-            .all(|(((state, expected), deviation), spread)| {
-                let limit = square(self.settings.innovation_limit);
-                square(state - expected) <= limit * (square(spread) + square(deviation))
-            })
+    /// What cannot be believed of an image, of which each DOF says what is seen of it; how far the tip may have gone
+    /// since the last.
+    pub fn doubts(&self, belief: &Belief, moved: PerDof<f64>, seen: &PerDof<Sighting>) -> Flags {
+        let reach = moved.iter().zip(self.settings.jump).zip(self.blind);
+        let axes = seen.iter().zip(belief.state).zip(self.spread).zip(reach);
+        let mut doubts = Flags::NONE;
+        for ((((seen, expected), spread), ((moved, jump), blind)), grip) in axes.zip(&self.grips) {
+            let (surprise, deviation) = ((seen.tip - expected).abs(), seen.deviation);
+            if !(surprise.is_finite() && deviation.is_finite()) {
+                continue;
+            }
+            let limit = square(self.settings.innovation_limit);
+            let fits = square(surprise) <= limit * (square(spread) + square(deviation));
+            let reaches = surprise <= moved + jump + blind + JUMP_DEVIATIONS * deviation;
+            doubts = doubts
+                .and(Flags::when(!fits, Flag::Innovation))
+                .and(Flags::when(!reaches, Flag::Jump))
+                .and(Flags::when(grip.slips(seen), Flag::Slip));
+        }
+        doubts
     }
 
     /// An image was believed.
-    pub fn accept(&mut self, belief: &Belief, state: PerDof<f64>, travel: PerDof<f64>) {
-        let moved = travel.iter().zip(self.travel).map(|(now, then)| now - then);
-        let axes = state.iter().zip(belief.state).zip(&mut self.spread);
-        let axes = axes.zip(moved).zip(self.settings.least_deviation);
-        for ((((state, expected), spread), moved), least) in axes {
-            let surprise = square(state - expected);
+    pub fn accept(&mut self, belief: &Belief, seen: &PerDof<Sighting>) {
+        let axes = seen.iter().zip(belief.state).zip(&mut self.spread);
+        let axes = axes.zip(self.travel).zip(self.settings.least_deviation);
+        for (((((seen, expected), spread), then), least), grip) in axes.zip(&mut self.grips) {
+            let surprise = square(seen.tip - expected);
             if surprise.is_finite() {
                 let change = surprise - square(*spread);
                 let rate = if change > 0.0 {
                     GROW
                 } else {
                     // A DOF at rest shows nothing of how well its motion is foreseen.
-                    SHRINK * (moved / least).min(1.0)
+                    SHRINK * ((seen.travel - then) / least).min(1.0)
                 };
                 *spread = libm::sqrt(square(*spread) + rate * change).max(least);
             }
+            grip.follow(seen);
         }
-        self.travel = travel;
+        self.blind = [0.0; 3];
+        self.travel = seen.map(|seen| seen.travel);
     }
 
     /// Nothing was seen.
     pub fn miss(&mut self, travel: PerDof<f64>) {
         let moved = travel.iter().zip(self.travel);
-        let axes = self.spread.iter_mut().zip(self.settings.start_deviation);
-        for ((spread, most), (now, then)) in axes.zip(moved) {
-            let grown = *spread + self.settings.blind_growth * (now - then).max(0.0);
-            *spread = grown.min(most).max(*spread);
+        let axes = self.spread.iter_mut().zip(&mut self.blind);
+        let axes = axes.zip(self.settings.start_deviation);
+        for (((spread, blind), most), (now, then)) in axes.zip(moved) {
+            let growth = self.settings.blind_growth * (now - then).max(0.0);
+            *spread = (*spread + growth).min(most).max(*spread);
+            *blind = (*blind + growth).min(most);
         }
         self.travel = travel;
     }
@@ -198,5 +227,10 @@ impl FrameWatch {
     /// What has been refused for so long may be the truth: believe the next images again.
     pub const fn forget(&mut self) {
         self.spread = self.settings.start_deviation;
+        self.blind = self.settings.start_deviation;
+        let [first, second, third] = &mut self.grips;
+        first.release();
+        second.release();
+        third.release();
     }
 }

@@ -84,13 +84,15 @@ const fn rule(
 /// A frame without markers teaches nothing by itself, so `lost` need not hold before it fades; two markers
 /// that leave a DOF undetermined hold it by themselves.
 #[rustfmt::skip]
-pub static TABLE: [Rule; 24] = [
+pub static TABLE: [Rule; 26] = [
     rule(Flag::Frozen,           Frame, HOLD_THEN_FADE,                          true),
     rule(Flag::Late,             Frame, HOLD_THEN_FADE,                          true),
     rule(Flag::Duplicate,        Frame, WARN,                                    false),
     rule(Flag::Dropped,          Frame, HOLD_THEN_FADE,                          true),
     rule(Flag::Clock,            Frame, HOLD_THEN_FADE,                          true),
     rule(Flag::Innovation,       Frame, HOLD_THEN_FADE,                          true),
+    rule(Flag::Jump,             Frame, HOLD_THEN_FADE,                          true),
+    rule(Flag::Slip,             Frame, HOLD_THEN_FADE,                          true),
     rule(Flag::Swapped,          Frame, HOLD_THEN_FADE,                          true),
     rule(Flag::Merged,           Frame, &[(Warn, Auto), (HoldEstimate, Auto), (Fade, Auto)], true),
     rule(Flag::Lost,             Frame, &[(Warn, Auto), (Fade, Auto)],           true),

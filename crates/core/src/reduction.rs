@@ -190,23 +190,32 @@ impl HysteresisReduction {
             return self.unused(Status::Held, Some(past));
         };
         let belief = self.whereabouts.at(&past);
-        let fits = |seen: &Seen| {
-            self.guards
-                .frames
-                .fits(&belief, seen.image_state(), seen.output_deviation)
+        let moved = self.whereabouts.moved(&past);
+        // The article's estimate jumps by itself wherever a DOF begins or ceases to be held.
+        let unasked = match self.state_estimation {
+            StateEstimation::Article(_) => Flags::of(Flag::Jump).and(Flags::of(Flag::Slip)),
+            StateEstimation::Weighted(_) => Flags::NONE,
         };
+        let offsets = self.axes.each_ref().map(Axis::offsets);
+        let doubts = |seen: &Seen| {
+            let sightings = seen.sightings(&past, offsets);
+            let frames = &self.guards.frames;
+            frames.doubts(&belief, moved, &sightings).without(unasked)
+        };
+        let doubt = doubts(&seen);
         let is_believed = seen.used != [false; 2];
         let expected = self.feature_model.predict(belief.state);
         let is_reversed = expected.is_some_and(|expected| reversed(expected.features, measured));
-        if is_reversed || !(is_believed && fits(&seen)) {
+        if is_reversed || !is_believed || !doubt.is_empty() {
             let [ua, va, ub, vb] = measured;
             let exchanged = self.look(&past, [ub, vb, ua, va], covariance);
             let swapped = is_reversed
-                || exchanged.is_some_and(|other| other.used == [true; 2] && fits(&other));
-            *raised = self.guards.watched(
-                Flags::when(swapped, Flag::Swapped)
-                    .and(Flags::when(!swapped && is_believed, Flag::Innovation)),
-            );
+                || exchanged
+                    .is_some_and(|other| other.used == [true; 2] && doubts(&other).is_empty());
+            *raised = self.guards.watched(Flags::when(swapped, Flag::Swapped));
+            if raised.is_empty() && is_believed {
+                *raised = self.guards.watched(doubt);
+            }
             if !raised.is_empty() {
                 self.whereabouts.miss(&past);
                 return self.unused(Status::Refused, Some(past));
@@ -214,7 +223,7 @@ impl HysteresisReduction {
         }
         self.guards
             .frames
-            .accept(&belief, seen.image_state(), past.travel);
+            .accept(&belief, &seen.sightings(&past, offsets));
         self.last_used = captured_at;
         self.settle(&past, &seen, measured);
         let estimate = seen.estimate;
@@ -225,10 +234,10 @@ impl HysteresisReduction {
         };
         // Two markers of which one is where it cannot be: the other may be as wrong.
         let is_doubtful = is_believed && seen.used != found(measured);
-        let doubt = self
+        let left_out = self
             .guards
             .watched(Flags::when(is_doubtful, Flag::Innovation));
-        let triggers = if doubt.is_empty() && self.guards.may_learn() {
+        let triggers = if left_out.is_empty() && self.guards.may_learn() {
             self.learn(&past, &seen, raised)
         } else {
             [Triggers::default(); 3]

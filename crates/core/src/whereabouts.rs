@@ -72,6 +72,11 @@ impl Last {
         };
         self.arrived + share * (travel - self.arrived)
     }
+
+    fn moved(&self, settling_time: f64, time: f64, travel: f64) -> f64 {
+        let arrived = self.arrived(settling_time, time, travel);
+        (travel - self.travel).max(arrived - self.arrived)
+    }
 }
 
 impl Whereabouts {
@@ -107,14 +112,22 @@ impl Whereabouts {
         let now = belief.state.iter_mut().zip(&mut belief.deviation);
         let grown = past.travel.iter().zip(settings.rest_deviation);
         for ((state, deviation), ((travel, rest), last)) in now.zip(grown.zip(self.last)) {
-            let arrived = last.arrived(settings.settling_time, past.time, *travel);
-            let moved = (travel - last.travel).max(arrived - last.arrived);
+            let moved = last.moved(settings.settling_time, past.time, *travel);
             *state += last.correction;
             let variance = square(last.deviation) + square(rest) + square(moved);
             *deviation = deviation.min(libm::sqrt(variance));
         }
         belief.state = turn(belief.state, half_turn(past.predicted_state, belief.state));
         belief
+    }
+
+    /// How far each DOF may have gone since the last image, `moved`.
+    pub(crate) fn moved(&self, past: &Entry) -> PerDof<f64> {
+        let mut moved = past.travel;
+        for (moved, last) in moved.iter_mut().zip(self.last) {
+            *moved = last.moved(self.settings.settling_time, past.time, *moved);
+        }
+        moved
     }
 
     /// Takes in what one linear step determined.

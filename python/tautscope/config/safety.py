@@ -56,8 +56,18 @@ class SafetyConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """An image further from what is expected is refused [in standard deviations]."""
     innovation_floor: Positive = 0.08
     """Least standard deviation of what is expected [in start_deviation]."""
+    jump: PerDof = (0.2e-3, 0.1, 0.05)
+    """How much farther than its command a tip may come from one image to the next, besides two of
+    the image's own standard deviations [m, rad, rad]."""
+    slip: PerDof = (0.4e-3, 2.6, 0.04)
+    """How far a tip in contact may be off where its command should have taken it, besides 15 % of
+    the way and the image's own standard deviation [m, rad, rad]. Rotation, whose shaft winds up
+    while insertion moves, has no contact that lasts."""
+    grip_distance: Positive = 15.0
+    """Travel of the command over which a tip that goes with it is in contact [in
+    update_distance]."""
     blind_growth: NonNegative = 0.1
-    """What it grows by, per travel of the command, while no marker is seen."""
+    """What both grow by, per travel of the command, while no marker is seen."""
     state_noise: Vector3 = (0.03e-3, 1.5e-3, 1.5e-3)
     """Standard deviation of the state estimate in a still scene [m, rad, rad], twin; three of it
     must be below contact_tolerance times update_distance, or noise passes for contact."""

@@ -2,6 +2,7 @@
 
 use super::{HysteresisReduction, StateEstimation};
 use crate::dof::{PerDof, all_finite};
+use crate::grip::Sighting;
 use crate::history::Entry;
 use crate::posture::{half_turn, turn};
 use crate::state::{StateEstimate, StateEstimator, found};
@@ -28,6 +29,27 @@ impl Seen {
             }
         }
         state
+    }
+
+    /// What is seen of each DOF.
+    pub(super) fn sightings(&self, past: &Entry, offsets: PerDof<(f64, f64)>) -> PerDof<Sighting> {
+        let [m1, m2, m3] = self.image_state();
+        let [d1, d2, d3] = self.output_deviation;
+        let [c1, c2, c3] = past.command;
+        let [t1, t2, t3] = past.travel;
+        let [o1, o2, o3] = offsets;
+        [
+            (c1, t1, m1, d1, o1),
+            (c2, t2, m2, d2, o2),
+            (c3, t3, m3, d3, o3),
+        ]
+        .map(|(command, travel, tip, deviation, offsets)| Sighting {
+            command,
+            travel,
+            tip,
+            deviation,
+            offsets,
+        })
     }
 }
 

@@ -8,6 +8,7 @@ mod change_watch;
 mod compensator;
 mod estimator;
 mod expectation;
+mod frame_watch;
 mod guarantees;
 mod guards;
 mod history;

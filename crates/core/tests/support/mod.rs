@@ -2,8 +2,8 @@
 
 use tautscope_core::{
     AdaptiveAxis, AdaptiveSettings, ChangeSettings, ClutchSettings, ContactTest, Flags,
-    FrameSettings, GuardSettings, LeadLaw, MonitorSettings, MotionSettings, OffsetPrior, PerDof,
-    Play, SupervisorSettings,
+    FrameSettings, GripSettings, GuardSettings, LeadLaw, MonitorSettings, MotionSettings,
+    OffsetPrior, PerDof, Play, SupervisorSettings,
 };
 
 pub const UNITS: PerDof<f64> = [0.4e-3, 0.04, 0.02];
@@ -51,6 +51,11 @@ pub fn guards() -> GuardSettings {
             innovation_limit: 5.0,
             start_deviation: [5e-3, 0.6, 0.5],
             least_deviation: UNITS,
+            jump: UNITS,
+            grips: UNITS.map(|unit| GripSettings {
+                distance: 10.0 * unit,
+                slip: unit,
+            }),
             blind_growth: 0.1,
         },
         motion: MotionSettings {
