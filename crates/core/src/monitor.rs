@@ -35,8 +35,11 @@ pub struct Monitor {
 pub enum Verdict {
     /// It was within all bounds and is what it was, bit for bit.
     Same,
-    /// A limit of speed, travel or lead changed it.
+    /// A limit of speed or travel changed it: that share of the reference's motion is to be thrown away, or the command
+    /// would make up for it later.
     Limited,
+    /// It led the reference too far and was kept at its side. That takes from the compensation and not from the motion.
+    Led,
     /// It broke the law: the software is wrong.
     Broken,
 }
@@ -73,6 +76,7 @@ impl Monitor {
     /// The command that may be sent for an admitted reference.
     ///
     /// One that is not finite becomes the last, or NaN before there is one.
+    #[allow(clippy::float_cmp)] // the verdict is told bit for bit
     pub fn permit(&mut self, reference: f64, command: f64) -> (f64, Verdict) {
         let MonitorSettings {
             gain_limit,
@@ -86,7 +90,12 @@ impl Monitor {
             }
             let permitted = command.max(least).min(largest);
             self.last = Some((reference, permitted));
-            return (permitted, verdict(command, command, permitted));
+            let verdict = if permitted == command {
+                Verdict::Same
+            } else {
+                Verdict::Limited
+            };
+            return (permitted, verdict);
         };
         let increment = reference - last_reference;
         let farthest = last + gain_limit * increment;
@@ -98,9 +107,8 @@ impl Monitor {
         // Never beyond the last command's own distance, so that a limit cannot move anything by itself.
         let ahead = (last - last_reference).max(lead_limit);
         let behind = (last - last_reference).min(-lead_limit);
-        let limited = lawful
-            .max(reference + behind)
-            .min(reference + ahead)
+        let led = lawful.max(reference + behind).min(reference + ahead);
+        let limited = led
             .max(least.min(last))
             .min(largest.max(last))
             .max(last - step_limit)
@@ -112,10 +120,19 @@ impl Monitor {
         } else {
             last
         };
+        let verdict = if lawful != command {
+            Verdict::Broken
+        } else if permitted == command {
+            Verdict::Same
+        } else if limited == led {
+            Verdict::Led
+        } else {
+            Verdict::Limited
+        };
         if reference.is_finite() {
             self.last = Some((reference, permitted));
         }
-        (permitted, verdict(command, lawful, permitted))
+        (permitted, verdict)
     }
 
     /// The reference is from now on counted from elsewhere.
@@ -123,16 +140,5 @@ impl Monitor {
         if let Some((reference, _)) = &mut self.last {
             *reference += shift;
         }
-    }
-}
-
-#[allow(clippy::float_cmp)] // bit for bit is what it says
-fn verdict(command: f64, lawful: f64, permitted: f64) -> Verdict {
-    if lawful != command {
-        Verdict::Broken
-    } else if permitted != command {
-        Verdict::Limited
-    } else {
-        Verdict::Same
     }
 }

@@ -1,63 +1,9 @@
 //! The whole loop, guards included, under anything that may come.
 
-use tautscope_core::{
-    Axis, Camera, Clutch, Compensator, Estimator, FeatureModel, Flag, Flags, Guards, History,
-    HysteresisReduction, Instrument, PerDof, Play, Pose, Reaction, StateEstimation, StateEstimator,
-    Status, WeightedEstimator, WeightedSettings, Whereabouts, WhereaboutsSettings,
-};
+use tautscope_core::{Clutch, Flag, Flags, HysteresisReduction, PerDof, Play, Reaction, Status};
 
-use crate::support::{self, PERIOD, UNITS, guards};
-
-pub fn model() -> FeatureModel {
-    let distortion = [-0.18, 0.05, 0.001, -0.001, -0.005, 0.0, 0.0, 0.0];
-    FeatureModel::new(
-        Instrument::new(18.5e-3, 5e-3, 15e-3, 1.75e-3, 4e-3).unwrap(),
-        Camera::new([424.0, 454.0], [349.6, 285.0], distortion).unwrap(),
-        Pose::new([9e-3, 7e-3, 8e-3], [0.29, -0.37, 0.0]).unwrap(),
-    )
-}
-
-fn article(play: impl Fn(f64) -> Play) -> HysteresisReduction {
-    let axes = UNITS.map(|unit| {
-        Axis::new(
-            Compensator::new(5.0, 5.0).unwrap(),
-            Estimator::new(unit, 0.4, 0.25).unwrap(),
-            play(unit),
-        )
-    });
-    let step = StateEstimation::Article(StateEstimator::new([1.0; 3]).unwrap());
-    reduction(axes, step)
-}
-
-fn adaptive() -> HysteresisReduction {
-    let axes = UNITS.map(|unit| Axis::Adaptive(support::axis(unit)));
-    let watch = StateEstimator::new([1.0; 3]).unwrap();
-    let weights = WeightedSettings {
-        marker_deviation: 0.3,
-        model_deviation: 0.3,
-        sideways_deviation: 0.3e-3,
-        outlier_distance: 4.0,
-        steps: 8,
-    };
-    let estimator = WeightedEstimator::new(watch, weights).unwrap();
-    reduction(axes, StateEstimation::Weighted(estimator))
-}
-
-fn reduction(axes: PerDof<Axis>, estimation: StateEstimation) -> HysteresisReduction {
-    HysteresisReduction::new(
-        axes,
-        model(),
-        estimation,
-        History::new(2.0, PERIOD).unwrap(),
-        Whereabouts::new(WhereaboutsSettings {
-            start_deviation: [5e-3, 0.6, 0.5],
-            rest_deviation: [2e-4, 0.02, 0.01],
-            settling_time: 0.15,
-        })
-        .unwrap(),
-        Guards::new(guards()).unwrap(),
-    )
-}
+use crate::support::looped::{adaptive, article, model};
+use crate::support::{self, PERIOD, UNITS};
 
 /// Xorshift.
 struct Chance(u64);

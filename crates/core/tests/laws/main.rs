@@ -20,6 +20,7 @@ mod state;
 mod supervisor;
 #[path = "../support/mod.rs"]
 mod support;
+mod thrown_away;
 mod weighted;
 
 use proptest::prelude::*;

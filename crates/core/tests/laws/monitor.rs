@@ -113,3 +113,19 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn a_lead_that_is_limited_is_no_lost_motion() {
+    let mut monitor = Monitor::new(support::monitor(1.0)).unwrap();
+    monitor.permit(0.0, 0.0);
+    for step in 1..=7 {
+        let reference = f64::from(step);
+        assert_eq!(
+            monitor.permit(reference, 5.0 * reference),
+            (5.0 * reference, Verdict::Same)
+        );
+    }
+    assert_eq!(monitor.permit(8.0, 40.0), (38.0, Verdict::Led));
+    assert_eq!(monitor.permit(9.0, 43.0), (39.0, Verdict::Led));
+    assert_eq!(monitor.permit(8.0, 34.0), (34.0, Verdict::Same));
+}
