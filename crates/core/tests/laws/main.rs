@@ -11,6 +11,7 @@ mod guarantees;
 mod guards;
 mod history;
 mod lead;
+mod learning;
 mod limits;
 mod monitor;
 mod motion_watch;

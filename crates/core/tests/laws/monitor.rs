@@ -115,17 +115,26 @@ proptest! {
 }
 
 #[test]
-fn a_lead_that_is_limited_is_no_lost_motion() {
-    let mut monitor = Monitor::new(support::monitor(1.0)).unwrap();
-    monitor.permit(0.0, 0.0);
-    for step in 1..=7 {
-        let reference = f64::from(step);
+fn a_lead_that_is_limited_is_no_lost_motion_either_way() {
+    for sign in [1.0, -1.0] {
+        let mut monitor = Monitor::new(support::monitor(1.0)).unwrap();
+        monitor.permit(0.0, 0.0);
+        for step in 1..=7 {
+            let reference = sign * f64::from(step);
+            let command = 5.0 * reference;
+            assert_eq!(monitor.permit(reference, command), (command, Verdict::Same));
+        }
         assert_eq!(
-            monitor.permit(reference, 5.0 * reference),
-            (5.0 * reference, Verdict::Same)
+            monitor.permit(sign * 8.0, sign * 40.0),
+            (sign * 38.0, Verdict::Led)
+        );
+        assert_eq!(
+            monitor.permit(sign * 9.0, sign * 43.0),
+            (sign * 39.0, Verdict::Led)
+        );
+        assert_eq!(
+            monitor.permit(sign * 8.0, sign * 34.0),
+            (sign * 34.0, Verdict::Same)
         );
     }
-    assert_eq!(monitor.permit(8.0, 40.0), (38.0, Verdict::Led));
-    assert_eq!(monitor.permit(9.0, 43.0), (39.0, Verdict::Led));
-    assert_eq!(monitor.permit(8.0, 34.0), (34.0, Verdict::Same));
 }

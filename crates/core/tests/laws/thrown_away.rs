@@ -55,7 +55,8 @@ fn strokes_against_the_end_of_the_travel_lose_what_was_beyond_it_and_no_more() {
     run.go(150.0);
     let (_, after) = run.go(100.0);
     let lost = before - after;
-    assert!((0.0..=50.0).contains(&lost), "{lost}");
+    // Pushing, the command leads by 0.8 * 15, so it is at the end when the hand is at 188.
+    assert!((lost - 42.0).abs() < 1e-6, "{lost}");
     for _ in 0..20 {
         run.go(150.0);
         run.go(100.0);
