@@ -86,7 +86,7 @@ class Size:
 
 
 SIZES = {
-    "steps": Size(1_000_000_000, 1_600),
+    "steps": Size(1_000_000_000, 350),
     "ticks": Size(1_000_000, 40),
     "hours": Size(1_000, 3_000),
     "loaded": Size(100_000, 100),

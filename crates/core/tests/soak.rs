@@ -16,6 +16,8 @@ const HAND: [(f64, f64, f64); 3] = [(0.025, 15e-3, 7.5), (0.0, 1.2, 11.3), (0.9,
 const WIDTH: f64 = 25.0;
 const TICKS_PER_FRAME: u64 = 8;
 const TENTHS: u8 = 10;
+/// When the slack is learnt, and nothing had time to drift [s]; what the last tenth is compared with.
+const EARLY: (f64, f64) = (60.0, 180.0);
 /// Of markers, one way [px].
 const NOISE: f64 = 0.2;
 
@@ -100,11 +102,14 @@ fn soak(law: &str, mut reduction: HysteresisReduction) -> String {
                 reduction.on_features(world.seen(), None, time, Some(tick));
             }
             worst = worst.max(reduction.guards().supervision().reaction);
-            error += (world.tip[0].output - hand[0]).abs() / real(ticks);
+            let off = (world.tip[0].output - hand[0]).abs();
+            error += off / real(ticks);
+            if (EARLY.0..EARLY.1).contains(&time) {
+                early += off * PERIOD / (EARLY.1 - EARLY.0);
+            }
         }
         if tenth == 1 {
             before = resources();
-            early = error;
         }
         late = error;
         eprintln!(
