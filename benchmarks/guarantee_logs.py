@@ -33,6 +33,8 @@ SLOW = 5.0
 """How long a disk takes to store what was written [s]."""
 SECONDS = 0.5
 """Of a run that is logged [s]."""
+CUT, CHUNK = 0.5, 0.02
+"""Of a run whose log is cut, on the twin's clock, and of a chunk of it, on the wall's [s]."""
 ALARM = 1.0
 """After a failed write, in which it is to be said [s]."""
 
@@ -164,9 +166,9 @@ def cuts(every: int) -> Figure:
 
 
 def _recorded(path: Path) -> bytes:
-    config = configured(18, "best", ())
+    config = configured(18, "best", ()).replace(**{"recording.flush_period": CHUNK})
     twin = Twin(config, images=False)
-    hand = Hand(config, dict.fromkeys(Dof, 3.0), lambda: twin.time, 2.0)
+    hand = Hand(config, dict.fromkeys(Dof, 3.0), lambda: twin.time, CUT)
     with LogWriter(path, config) as log:
         run_experiment(twin, hand, config, log=log)
     return path.read_bytes()

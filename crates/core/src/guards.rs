@@ -133,17 +133,27 @@ impl Guards {
             let motion = self.motion.tick(reference);
             event.raised = event.raised.and(self.watched(motion));
             self.tell(axes);
-            self.step(axes, reference, &mut event);
+            self.step(axes, reference, admission.moved, &mut event);
         }
         self.time = time;
         self.supervisor.update(&event);
     }
 
-    fn step(&mut self, axes: &mut PerDof<Axis>, reference: PerDof<f64>, event: &mut Event) {
+    /// Where a limit binds, the share of the reference's motion that the command could not follow is thrown away: never
+    /// more than the hand moved, which crossing the slack takes for more.
+    fn step(
+        &mut self,
+        axes: &mut PerDof<Axis>,
+        reference: PerDof<f64>,
+        moved: PerDof<f64>,
+        event: &mut Event,
+    ) {
         let mut shifts = [0.0; 3];
         let watched = axes.iter_mut().zip(&mut self.monitors).zip(&mut shifts);
-        for (((axis, monitor), shift), reference) in watched.zip(reference) {
-            let predicted_state = axis.predicted_state();
+        for (((axis, monitor), shift), (reference, moved)) in
+            watched.zip(reference.into_iter().zip(moved))
+        {
+            let (before, predicted_state) = (axis.command(), axis.predicted_state());
             axis.step(reference);
             if self.off.has(Flag::Monitor) {
                 continue;
@@ -158,9 +168,12 @@ impl Guards {
                 if verdict == Verdict::Broken {
                     event.severe = event.severe.and(Flags::of(Flag::Monitor));
                 }
-                *shift = permitted - axis.command();
-                if !shift.is_finite() {
-                    *shift = 0.0;
+                if verdict != Verdict::Led {
+                    let followed = (permitted - before) / (axis.command() - before);
+                    *shift = -moved * (1.0 - followed.clamp(0.0, 1.0));
+                    if !shift.is_finite() {
+                        *shift = -moved;
+                    }
                 }
                 axis.amend(*shift, permitted, predicted_state);
                 monitor.shift(*shift);

@@ -35,10 +35,13 @@ pub struct Monitor {
 pub enum Verdict {
     /// It was within all bounds and is what it was, bit for bit.
     Same,
-    /// A limit of travel or lead changed it.
+    /// A limit of travel changed it: that share of the reference's motion is to be thrown away, or the command would
+    /// make up for it later.
     Limited,
     /// It would have changed faster than any hand asks for, and stays where it is.
     Jump,
+    /// It led the reference too far and was kept at its side. That takes from the compensation and not from the motion.
+    Led,
     /// It broke the law: the software is wrong.
     Broken,
 }
@@ -75,6 +78,7 @@ impl Monitor {
     /// The command that may be sent for an admitted reference.
     ///
     /// One that is not finite becomes the last, or NaN before there is one.
+    #[allow(clippy::float_cmp)] // the verdict is told bit for bit
     pub fn permit(&mut self, reference: f64, command: f64) -> (f64, Verdict) {
         let MonitorSettings {
             gain_limit,
@@ -88,7 +92,12 @@ impl Monitor {
             }
             let permitted = command.max(least).min(largest);
             self.last = Some((reference, permitted));
-            return (permitted, verdict(command, command, permitted));
+            let verdict = if permitted == command {
+                Verdict::Same
+            } else {
+                Verdict::Limited
+            };
+            return (permitted, verdict);
         };
         let increment = reference - last_reference;
         let farthest = last + gain_limit * increment;
@@ -101,18 +110,18 @@ impl Monitor {
             if reference.is_finite() {
                 self.last = Some((reference, last));
             }
-            let found = match verdict(command, lawful, last) {
-                Verdict::Broken => Verdict::Broken,
-                _ => Verdict::Jump,
+            let verdict = if lawful == command {
+                Verdict::Jump
+            } else {
+                Verdict::Broken
             };
-            return (last, found);
+            return (last, verdict);
         }
         // Never beyond the last command's own distance, so that a limit cannot move anything by itself.
         let ahead = (last - last_reference).max(lead_limit);
         let behind = (last - last_reference).min(-lead_limit);
-        let limited = lawful
-            .max(reference + behind)
-            .min(reference + ahead)
+        let led = lawful.max(reference + behind).min(reference + ahead);
+        let limited = led
             .max(least.min(last))
             .min(largest.max(last))
             .max(last - step_limit)
@@ -124,10 +133,19 @@ impl Monitor {
         } else {
             last
         };
+        let verdict = if lawful != command {
+            Verdict::Broken
+        } else if permitted == command {
+            Verdict::Same
+        } else if limited == led {
+            Verdict::Led
+        } else {
+            Verdict::Limited
+        };
         if reference.is_finite() {
             self.last = Some((reference, permitted));
         }
-        (permitted, verdict(command, lawful, permitted))
+        (permitted, verdict)
     }
 
     /// The reference is from now on counted from elsewhere.
@@ -135,16 +153,5 @@ impl Monitor {
         if let Some((reference, _)) = &mut self.last {
             *reference += shift;
         }
-    }
-}
-
-#[allow(clippy::float_cmp)] // bit for bit is what it says
-fn verdict(command: f64, lawful: f64, permitted: f64) -> Verdict {
-    if lawful != command {
-        Verdict::Broken
-    } else if permitted != command {
-        Verdict::Limited
-    } else {
-        Verdict::Same
     }
 }

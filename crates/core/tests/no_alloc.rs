@@ -6,71 +6,19 @@
 mod support;
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
-use support::UNITS;
-use tautscope_core::{
-    Axis, Camera, Compensator, Estimator, FeatureModel, Flag, Guards, History, HysteresisReduction,
-    Instrument, PerDof, Play, Pose, Reaction, StateEstimation, StateEstimator, Status, Triggers,
-    WeightedEstimator, WeightedSettings, Whereabouts, WhereaboutsSettings,
-};
+use support::looped::{adaptive_with, article_with, model};
+use tautscope_core::{Flag, GuardSettings, HysteresisReduction, Play, Reaction, Status, Triggers};
 
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;
 
-fn article() -> PerDof<Axis> {
-    let axis = |update_distance| {
-        Axis::new(
-            Compensator::new(5.0, 5.0).unwrap(),
-            Estimator::new(update_distance, 0.4, 0.25).unwrap(),
-            Play::new(0.0, 0.0).unwrap(),
-        )
-    };
-    UNITS.map(axis)
-}
-
-fn adaptive() -> PerDof<Axis> {
-    UNITS.map(|unit| Axis::Adaptive(support::axis(unit)))
-}
-
-fn weighted(outlier_distance: f64) -> StateEstimation {
-    let watch = StateEstimator::new([1.0; 3]).unwrap();
-    let settings = WeightedSettings {
-        marker_deviation: 0.3,
-        model_deviation: 0.3,
-        sideways_deviation: 0.3e-3,
-        outlier_distance,
-        steps: 8,
-    };
-    StateEstimation::Weighted(WeightedEstimator::new(watch, settings).unwrap())
-}
-
-fn model() -> FeatureModel {
-    let distortion = [-0.18, 0.05, 0.001, -0.001, -0.005, 0.0, 0.0, 0.0];
-    FeatureModel::new(
-        Instrument::new(18.5e-3, 5e-3, 15e-3, 1.75e-3, 4e-3).unwrap(),
-        Camera::new([424.0, 454.0], [349.6, 285.0], distortion).unwrap(),
-        Pose::new([9e-3, 7e-3, 8e-3], [0.29, -0.37, 0.0]).unwrap(),
-    )
-}
-
-fn reduction(axes: PerDof<Axis>, estimation: StateEstimation) -> HysteresisReduction {
-    // The tip below is late by a third of a second, as none in contact is.
+/// The tip below is late by a third of a second, as none in contact is.
+fn patient() -> GuardSettings {
     let mut settings = support::guards();
     for grip in &mut settings.frames.grips {
         grip.slip = 1e3;
     }
-    HysteresisReduction::new(
-        axes,
-        model(),
-        estimation,
-        History::new(2.0, 0.005).unwrap(),
-        Whereabouts::new(WhereaboutsSettings {
-            start_deviation: [5e-3, 0.6, 0.5],
-            rest_deviation: [2e-4, 0.02, 0.01],
-            settling_time: 0.15,
-        })
-        .unwrap(),
-        Guards::new(settings).unwrap(),
-    )
+    settings
 }
 
 /// Over as many ticks as `TAUTSCOPE_TICKS` says, each loop at least once through every flag.
@@ -80,7 +28,7 @@ fn step_and_image_update_do_not_allocate() {
     let wanted: u64 = wanted.map_or(0, |text| text.parse().unwrap());
     let mut ticks = 0;
     loop {
-        ticks += run_article() + run_best(4.0) + run_best(f64::INFINITY);
+        ticks += run_article() + run_best() + run_best_without_doubt();
         if ticks >= wanted {
             break;
         }
@@ -90,16 +38,21 @@ fn step_and_image_update_do_not_allocate() {
 
 // Apart, so that the stack has one loop at a time.
 fn run_article() -> u64 {
-    let step = StateEstimation::Article(StateEstimator::new([1.0; 3]).unwrap());
-    run(reduction(article(), step))
+    run(article_with(&patient(), 0.0, |_| {
+        Play::new(0.0, 0.0).unwrap()
+    }))
 }
 
-fn run_best(outlier_distance: f64) -> u64 {
-    run(reduction(adaptive(), weighted(outlier_distance)))
+fn run_best() -> u64 {
+    run(adaptive_with(&patient(), 4.0))
+}
+
+fn run_best_without_doubt() -> u64 {
+    run(adaptive_with(&patient(), f64::INFINITY))
 }
 
 /// How many ticks there were.
-fn run(mut reduction: HysteresisReduction) -> u64 {
+fn run(mut reduction: Box<HysteresisReduction>) -> u64 {
     let mut ticks = 1;
     let (mut used, mut learnt, mut worst) = (0, 0, Reaction::None);
     let truth = model();

@@ -1,46 +1,64 @@
 //! Hours of work in one piece: nothing grows, nothing drifts. `TAUTSCOPE_HOURS` says how many; a few minutes without.
 //!
-//! Three degrees of freedom with play, a hand that never repeats itself, images every 40 ms.
+//! Three degrees of freedom with play, a hand that never repeats itself, images every 40 ms with 0.2 px of noise.
 
 // Three axes are more than the lint allows, and are moved once.
 #![allow(clippy::large_stack_arrays)]
 
 mod support;
 
+use support::looped::{adaptive, article, article_with, model};
 use support::{PERIOD, UNITS};
-use tautscope_core::{
-    Axis, Camera, Compensator, Estimator, FeatureModel, Guards, History, HysteresisReduction,
-    Instrument, PerDof, Play, PlayState, Pose, Reaction, StateEstimation, StateEstimator,
-    WeightedEstimator, WeightedSettings, Whereabouts, WhereaboutsSettings,
-};
+use tautscope_core::{FeatureModel, HysteresisReduction, PerDof, Play, PlayState, Reaction};
 
 const HAND: [(f64, f64, f64); 3] = [(0.025, 15e-3, 7.5), (0.0, 1.2, 11.3), (0.9, 0.5, 17.9)];
 /// Slack of the instrument, in [`UNITS`].
 const WIDTH: f64 = 25.0;
 const TICKS_PER_FRAME: u64 = 8;
+const TENTHS: u8 = 10;
+/// When the slack is learnt, and nothing had time to drift [s]; what the last tenth is compared with.
+const EARLY: (f64, f64) = (60.0, 180.0);
+/// Of markers, one way [px].
+const NOISE: f64 = 0.2;
 
-fn model() -> FeatureModel {
-    FeatureModel::new(
-        Instrument::new(18.5e-3, 5e-3, 15e-3, 1.75e-3, 4e-3).unwrap(),
-        Camera::new([424.0, 454.0], [349.6, 285.0], [0.0; 8]).unwrap(),
-        Pose::new([9e-3, 7e-3, 8e-3], [0.29, -0.37, 0.0]).unwrap(),
-    )
+struct World {
+    play: PerDof<Play>,
+    tip: PerDof<PlayState>,
+    model: FeatureModel,
+    chance: u64,
 }
 
-fn looped(axes: PerDof<Axis>, estimation: StateEstimation) -> HysteresisReduction {
-    HysteresisReduction::new(
-        axes,
-        model(),
-        estimation,
-        History::new(0.5, PERIOD).unwrap(),
-        Whereabouts::new(WhereaboutsSettings {
-            start_deviation: [5e-3, 0.6, 0.5],
-            rest_deviation: [2e-4, 0.02, 0.01],
-            settling_time: 0.15,
-        })
-        .unwrap(),
-        Guards::new(support::guards()).unwrap(),
-    )
+impl World {
+    fn new() -> Self {
+        Self {
+            play: UNITS.map(|unit| Play::new(-0.4 * WIDTH * unit, 0.6 * WIDTH * unit).unwrap()),
+            tip: HAND.map(|(output, _, _)| PlayState { output }),
+            model: model(),
+            chance: 2026,
+        }
+    }
+
+    fn follow(&mut self, command: PerDof<f64>) {
+        for ((play, tip), input) in self.play.iter().zip(&mut self.tip).zip(command) {
+            play.step(tip, input);
+        }
+    }
+
+    fn seen(&mut self) -> Option<[f64; 4]> {
+        let truth = self.model.predict(self.tip.map(|tip| tip.output))?;
+        Some(truth.features.map(|place| {
+            self.chance ^= self.chance << 13;
+            self.chance ^= self.chance >> 7;
+            self.chance ^= self.chance << 17;
+            let share = real(self.chance >> 11) / real(1 << 53);
+            place + 2.0 * NOISE * (share - 0.5)
+        }))
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "below 2^53")]
+fn real(count: u64) -> f64 {
+    count as f64
 }
 
 /// Resident memory in pages, and open files; none where the system does not say.
@@ -50,106 +68,85 @@ fn resources() -> Option<(u32, usize)> {
     Some((memory.split(' ').nth(1)?.parse().ok()?, files))
 }
 
-/// What grew or drifted, in words; nothing if nothing did.
-fn soak(law: &str, mut reduction: HysteresisReduction) -> String {
+/// Of each law.
+fn hours() -> f64 {
     let hours = std::env::var("TAUTSCOPE_HOURS");
-    let hours: f64 = hours.map_or(0.05, |text| text.parse().unwrap());
+    hours.map_or(0.05, |text| text.parse().unwrap())
+}
+
+/// What grew or drifted, in words; nothing if nothing did.
+fn soak(law: &str, mut reduction: Box<HysteresisReduction>) -> String {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "positive"
     )]
-    let ticks = (hours * 3600.0 / PERIOD) as u64;
-    let truth = model();
-    let play = UNITS.map(|unit| Play::new(-0.4 * WIDTH * unit, 0.6 * WIDTH * unit).unwrap());
-    let mut tip: PerDof<PlayState> = HAND.map(|(output, _, _)| PlayState { output });
-    let (mut noise, mut late_error, mut early_error) = (2026_u64, 0.0_f64, 0.0_f64);
+    let ticks = (hours() / f64::from(TENTHS) * 3600.0 / PERIOD) as u64;
+    let mut world = World::new();
+    let (mut early, mut late) = (0.0, 0.0);
     let (mut before, mut worst) = (None, Reaction::None);
-    for tick in 0..ticks {
-        #[expect(clippy::cast_precision_loss, reason = "below 2^52")]
-        let time = tick as f64 * PERIOD;
-        let hand = HAND.map(|(centre, reach, period)| {
-            centre + reach * (std::f64::consts::TAU * time / period).sin()
-        });
-        let command = reduction.step(hand, None, time);
-        for ((play, tip), input) in play.iter().zip(&mut tip).zip(command) {
-            play.step(tip, input);
-        }
-        if tick % TICKS_PER_FRAME == 0 {
-            let seen = truth.predict(tip.map(|tip| tip.output)).map(|seen| {
-                seen.features.map(|place| {
-                    noise ^= noise << 13;
-                    noise ^= noise >> 7;
-                    noise ^= noise << 17;
-                    #[expect(clippy::cast_precision_loss, reason = "53 bits")]
-                    let share = (noise >> 11) as f64 / (1_u64 << 53) as f64;
-                    place + 0.4 * (share - 0.5)
-                })
+    for tenth in 0..TENTHS {
+        let (start, mut error) = (u64::from(tenth) * ticks, 0.0);
+        for tick in start..start + ticks {
+            let time = real(tick) * PERIOD;
+            let hand = HAND.map(|(centre, reach, period)| {
+                centre + reach * (std::f64::consts::TAU * time / period).sin()
             });
-            reduction.on_features(seen, None, time, Some(tick));
+            let command = reduction.step(hand, None, time);
+            assert!(
+                command.iter().all(|value| value.is_finite()),
+                "{law} {tick}"
+            );
+            world.follow(command);
+            if tick.is_multiple_of(TICKS_PER_FRAME) {
+                reduction.on_features(world.seen(), None, time, Some(tick));
+            }
+            worst = worst.max(reduction.guards().supervision().reaction);
+            let off = (world.tip[0].output - hand[0]).abs();
+            error += off / real(ticks);
+            if (EARLY.0..EARLY.1).contains(&time) {
+                early += off * PERIOD / (EARLY.1 - EARLY.0);
+            }
         }
-        worst = worst.max(reduction.guards().supervision().reaction);
-        if tick == ticks / 10 {
+        if tenth == 1 {
             before = resources();
         }
-        let [input, ..] = command;
-        let error = (tip[0].output - hand[0]).abs();
-        assert!(
-            input.is_finite() && error < WIDTH * UNITS[0],
-            "{law} {tick}"
+        late = error;
+        eprintln!(
+            "{law}: {:.2} h, tip off by {:.3} mm",
+            hours() * f64::from(tenth + 1) / f64::from(TENTHS),
+            1e3 * error
         );
-        if tick > 9 * (ticks / 10) {
-            late_error += error;
-        } else if tick > ticks / 10 && tick <= 2 * (ticks / 10) {
-            early_error += error;
-        }
     }
     let grown = match (before, resources()) {
         (Some((memory, files)), Some((more, now))) => files != now || 100 * more > 101 * memory,
         _ => false,
     };
-    let drifted = late_error > 1.2 * early_error;
+    let drifted = late > 1.2 * early;
     let stopped = worst >= Reaction::HoldMotion;
     let broken = u64::from(grown) + u64::from(drifted) + u64::from(stopped);
-    println!("G15 {law} {ticks} {broken} {}", late_error / early_error);
+    println!(
+        "G15 {law} {} {broken} {}",
+        ticks * u64::from(TENTHS),
+        late / early
+    );
     if broken == 0 {
         return String::new();
     }
     format!(
-        "{law}: more memory or files: {grown}, tip off by {early_error} m in all, later {late_error} m, {worst:?}. "
+        "{law}: more memory or files: {grown}, tip off by {early} m, later {late} m, {worst:?}. "
     )
 }
 
-fn paper() -> HysteresisReduction {
-    let [insertion, rotation, bending] = UNITS;
-    let axis = |unit: f64| {
-        Axis::new(
-            Compensator::new(5.0, 5.0).unwrap(),
-            Estimator::new(3.0 * unit, 0.4, 0.25).unwrap(),
-            Play::new(0.0, 0.0).unwrap(),
-        )
-    };
-    let step = StateEstimation::Article(StateEstimator::new([1.0; 3]).unwrap());
-    looped([axis(insertion), axis(rotation), axis(bending)], step)
-}
-
-fn best() -> HysteresisReduction {
-    let settings = WeightedSettings {
-        marker_deviation: 0.3,
-        model_deviation: 0.3,
-        sideways_deviation: 0.3e-3,
-        outlier_distance: 4.0,
-        steps: 8,
-    };
-    let watch = StateEstimator::new([1.0; 3]).unwrap();
-    let estimation = StateEstimation::Weighted(WeightedEstimator::new(watch, settings).unwrap());
-    let axes = UNITS.map(|unit| Axis::Adaptive(support::axis(unit)));
-    looped(axes, estimation)
-}
-
 /// One after the other: files and memory are those of the process.
+///
+/// The article's law goes without recovery of its anchor as well, for which `broken` counts its drift and nothing is
+/// claimed: docs/safety.md.
 #[test]
 fn nothing_grows_and_nothing_drifts() {
-    let grown = soak("best", best()) + &soak("paper", paper());
+    let none = |_| Play::new(0.0, 0.0).unwrap();
+    let grown =
+        soak("best", adaptive()) + &soak("recovering", article_with(&support::guards(), 0.1, none));
+    soak("paper", article(none));
     assert!(grown.is_empty(), "{grown}");
 }

@@ -1,67 +1,11 @@
 //! The whole loop, guards included, under anything that may come.
 
 use tautscope_core::{
-    Axis, Camera, Clutch, Compensator, Estimator, FeatureModel, Flag, Flags, GuardSettings, Guards,
-    History, HysteresisReduction, Instrument, PerDof, Play, Pose, Reaction, StateEstimation,
-    StateEstimator, Status, WeightedEstimator, WeightedSettings, Whereabouts, WhereaboutsSettings,
+    Clutch, Flag, Flags, GuardSettings, HysteresisReduction, PerDof, Play, Reaction, Status,
 };
 
+use crate::support::looped::{adaptive, article, article_with, model};
 use crate::support::{self, PERIOD, UNITS, guards};
-
-pub fn model() -> FeatureModel {
-    let distortion = [-0.18, 0.05, 0.001, -0.001, -0.005, 0.0, 0.0, 0.0];
-    FeatureModel::new(
-        Instrument::new(18.5e-3, 5e-3, 15e-3, 1.75e-3, 4e-3).unwrap(),
-        Camera::new([424.0, 454.0], [349.6, 285.0], distortion).unwrap(),
-        Pose::new([9e-3, 7e-3, 8e-3], [0.29, -0.37, 0.0]).unwrap(),
-    )
-}
-
-fn article(play: impl Fn(f64) -> Play) -> HysteresisReduction {
-    let axes = UNITS.map(|unit| {
-        Axis::new(
-            Compensator::new(5.0, 5.0).unwrap(),
-            Estimator::new(unit, 0.4, 0.25).unwrap(),
-            play(unit),
-        )
-    });
-    let step = StateEstimation::Article(StateEstimator::new([1.0; 3]).unwrap());
-    reduction(axes, step)
-}
-
-fn adaptive() -> HysteresisReduction {
-    let axes = UNITS.map(|unit| Axis::Adaptive(support::axis(unit)));
-    let watch = StateEstimator::new([1.0; 3]).unwrap();
-    let weights = WeightedSettings {
-        marker_deviation: 0.3,
-        model_deviation: 0.3,
-        sideways_deviation: 0.3e-3,
-        outlier_distance: 4.0,
-        steps: 8,
-    };
-    let estimator = WeightedEstimator::new(watch, weights).unwrap();
-    reduction(axes, StateEstimation::Weighted(estimator))
-}
-
-fn reduction(axes: PerDof<Axis>, estimation: StateEstimation) -> HysteresisReduction {
-    without(Flags::NONE, axes, estimation)
-}
-
-fn without(off: Flags, axes: PerDof<Axis>, estimation: StateEstimation) -> HysteresisReduction {
-    HysteresisReduction::new(
-        axes,
-        model(),
-        estimation,
-        History::new(2.0, PERIOD).unwrap(),
-        Whereabouts::new(WhereaboutsSettings {
-            start_deviation: [5e-3, 0.6, 0.5],
-            rest_deviation: [2e-4, 0.02, 0.01],
-            settling_time: 0.15,
-        })
-        .unwrap(),
-        Guards::new(GuardSettings { off, ..guards() }).unwrap(),
-    )
-}
 
 /// Xorshift.
 struct Chance(u64);
@@ -93,7 +37,7 @@ fn steps() -> u64 {
 
 /// A hand that moves, rests, trembles and jumps, ticks that come late, images of every kind, an operator who goes on:
 /// every command keeps the law.
-fn torture(mut reduction: HysteresisReduction, seed: u64) {
+fn torture(mut reduction: Box<HysteresisReduction>, seed: u64) {
     let mut chance = Chance(seed);
     let truth = model();
     let (mut reference, mut speed, mut time) = ([0.025, 0.0, 0.9], [0.0; 3], 0.0);
@@ -251,7 +195,7 @@ fn a_stall_throws_its_motion_away_and_stops_until_re_engaged() {
 
 const START: PerDof<f64> = [0.025, 0.0, 0.9];
 
-fn begun() -> HysteresisReduction {
+fn begun() -> Box<HysteresisReduction> {
     let mut reduction = article(|_| Play::new(0.0, 0.0).unwrap());
     reduction.step(START, Some(0.0), 0.0);
     reduction
@@ -318,15 +262,13 @@ fn a_hand_is_followed_at_its_speed_limit_and_a_faster_one_no_farther_than_the_la
 #[test]
 fn a_jump_that_nobody_saw_before_the_law_is_stopped_behind_it_and_moves_nothing() {
     for jump in [6.0, -6.0, 40.0] {
-        let axes = UNITS.map(|unit| {
-            Axis::new(
-                Compensator::new(5.0, 5.0).unwrap(),
-                Estimator::new(unit, 0.4, 0.25).unwrap(),
-                Play::new(-5.0 * unit, 5.0 * unit).unwrap(),
-            )
+        let settings = GuardSettings {
+            off: Flags::of(Flag::ReferenceJump),
+            ..guards()
+        };
+        let mut reduction = article_with(&settings, 0.0, |unit| {
+            Play::new(-5.0 * unit, 5.0 * unit).unwrap()
         });
-        let step = StateEstimation::Article(StateEstimator::new([1.0; 3]).unwrap());
-        let mut reduction = without(Flags::of(Flag::ReferenceJump), axes, step);
         let mut time = 0.0;
         let mut go = |reduction: &mut HysteresisReduction, at: f64| {
             time += PERIOD;

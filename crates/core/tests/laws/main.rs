@@ -13,6 +13,7 @@ mod guarantees;
 mod guards;
 mod history;
 mod lead;
+mod learning;
 mod limits;
 mod monitor;
 mod motion_watch;
@@ -22,6 +23,7 @@ mod state;
 mod supervisor;
 #[path = "../support/mod.rs"]
 mod support;
+mod thrown_away;
 mod weighted;
 
 use proptest::prelude::*;

@@ -115,3 +115,28 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn a_lead_that_is_limited_is_no_lost_motion_either_way() {
+    for sign in [1.0, -1.0] {
+        let mut monitor = Monitor::new(support::monitor(1.0)).unwrap();
+        monitor.permit(0.0, 0.0);
+        for step in 1..=7 {
+            let reference = sign * f64::from(step);
+            let command = 5.0 * reference;
+            assert_eq!(monitor.permit(reference, command), (command, Verdict::Same));
+        }
+        assert_eq!(
+            monitor.permit(sign * 8.0, sign * 40.0),
+            (sign * 38.0, Verdict::Led)
+        );
+        assert_eq!(
+            monitor.permit(sign * 9.0, sign * 43.0),
+            (sign * 39.0, Verdict::Led)
+        );
+        assert_eq!(
+            monitor.permit(sign * 8.0, sign * 34.0),
+            (sign * 34.0, Verdict::Same)
+        );
+    }
+}
