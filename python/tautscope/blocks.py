@@ -193,6 +193,7 @@ def build_loop(config: Config, compensate: bool = True) -> _core.Reduction:
             start_deviation=start_deviation,
             rest_deviation=each_dof(lambda dof: config[dof].update_distance * rest),
             settling_time=config.state_estimation.settling_time,
+            friction_arm=config.instrument.diameter / 2 if config.adaptive.one_friction else None,
         )
     return _core.Reduction(
         each_dof(lambda dof: build_compensator(config[dof], compensate)),

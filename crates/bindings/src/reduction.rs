@@ -69,7 +69,7 @@ impl Reduction {
     /// The loop of profile `best`, from its three axes.
     #[staticmethod]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
-    #[pyo3(signature = (axes, model, state_estimator, guards, *, span, period, start_deviation, rest_deviation, settling_time))]
+    #[pyo3(signature = (axes, model, state_estimator, guards, *, span, period, start_deviation, rest_deviation, settling_time, friction_arm))]
     fn adaptive(
         py: Python<'_>,
         axes: [PyRef<'_, AdaptiveAxis>; 3],
@@ -81,6 +81,7 @@ impl Reduction {
         start_deviation: [f64; 3],
         rest_deviation: [f64; 3],
         settling_time: f64,
+        friction_arm: Option<f64>,
     ) -> PyResult<Self> {
         let axes = axes.map(|axis| core::Axis::Adaptive(axis.0.clone()));
         let estimation = core::StateEstimation::Weighted(state_estimator.0);
@@ -90,7 +91,11 @@ impl Reduction {
             settling_time,
         });
         let history = core::History::new(span, period);
-        Self::joined(py, axes, model, estimation, history, whereabouts, guards)
+        let Self(inner) = Self::joined(py, axes, model, estimation, history, whereabouts, guards)?;
+        let friction = friction_arm.map(core::Friction::new).transpose();
+        Ok(Self(
+            inner.with_friction(friction.map_err(errors::config(py))?),
+        ))
     }
 
     /// One control tick at `time` in s: reference (3,), made at `stamp` in s, in, command (3,) out.

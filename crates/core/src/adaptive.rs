@@ -265,6 +265,14 @@ impl AdaptiveAxis {
         self.share = share;
     }
 
+    /// Only so much of the slack is there now.
+    pub(crate) fn set_grip(&mut self, grip: f64) {
+        self.slack.set_grip(grip);
+        if self.tip.is_finite() {
+            self.tip = self.slack.carried(self.tip, self.command);
+        }
+    }
+
     /// Believe in no more slack than that.
     pub(crate) const fn limit(&mut self, limit: PlayLimit) {
         self.slack.set_limit(limit);

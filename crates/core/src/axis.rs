@@ -59,6 +59,13 @@ impl Axis {
         }
     }
 
+    /// Only so much of the slack is there now; the article's scheme does not know of it.
+    pub(crate) fn set_grip(&mut self, grip: f64) {
+        if let Self::Adaptive(axis) = self {
+            axis.set_grip(grip);
+        }
+    }
+
     /// Use a share of the free gain: all of it with 1, no compensation with 0. Bumpless.
     pub(crate) fn set_share(&mut self, share: f64) {
         match self {

@@ -11,6 +11,8 @@ use crate::play::Play;
 pub struct Slack {
     learnt: OffsetMap,
     limit: PlayLimit,
+    /// Share of the width that is there now.
+    grip: f64,
 }
 
 impl Slack {
@@ -19,6 +21,7 @@ impl Slack {
         Self {
             learnt: OffsetMap::new(prior, play.delta_minus(), play.delta_plus()),
             limit: PlayLimit::NONE,
+            grip: 1.0,
         }
     }
 
@@ -43,10 +46,17 @@ impl Slack {
         self.limit.exceeds(minus, plus)
     }
 
-    /// Both offsets at a position, within the limit.
+    /// So much of the width is there now, about the same middle.
+    pub const fn set_grip(&mut self, grip: f64) {
+        self.grip = grip;
+    }
+
+    /// Both offsets at a position, within the limit, with the grip there is.
     fn offsets(&self, position: f64) -> [f64; 2] {
         let [minus, plus] = Side::BOTH.map(|side| self.learnt.offset(side, position));
-        self.limit.clamp(minus, plus)
+        let [minus, plus] = self.limit.clamp(minus, plus);
+        let nearer = (1.0 - self.grip) / 2.0 * (plus - minus);
+        [minus + nearer, plus - nearer]
     }
 
     /// One of them.
@@ -118,9 +128,9 @@ impl Slack {
             (Side::Minus, -1.0, &mut triggers.minus)
         };
         if motion.together {
-            self.learnt.measure(side, measured, offset, variance);
+            self.learnt.measure(side, measured, self.grip, offset, variance);
             *trigger = Some(Trigger::Contact);
-        } else if sign * (offset - self.learnt.offset(side, measured)) > libm::sqrt(variance) {
+        } else if sign * (offset - self.offset(side, measured)) > libm::sqrt(variance) {
             self.learnt.bound(side, measured, offset, variance);
             *trigger = Some(Trigger::Violation);
         }

@@ -61,3 +61,6 @@ class AdaptiveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     state_correction: Annotated[float, Meta(ge=0, le=1)] = 1.0
     """Share of what an image says of the play state that is taken over; 0 leaves it to the
     model."""
+    one_friction: bool = True
+    """Whether insertion and rotation share the friction of a shaft that slides and turns in its channel:
+    what slides along it turns freely. False takes their slack to be independent."""
