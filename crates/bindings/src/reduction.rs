@@ -92,7 +92,7 @@ impl Reduction {
         });
         let history = core::History::new(span, period);
         let Self(inner) = Self::joined(py, axes, model, estimation, history, whereabouts, guards)?;
-        let friction = friction_arm.map(core::Friction::new).transpose();
+        let friction = friction_arm.map(|arm| core::Friction::new(arm, std::env::var("MEM").map_or(0.3e-3, |v| v.parse().unwrap_or(0.3e-3)))).transpose();
         Ok(Self(
             inner.with_friction(friction.map_err(errors::config(py))?),
         ))

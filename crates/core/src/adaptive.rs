@@ -196,9 +196,9 @@ impl AdaptiveAxis {
             self.cautious = deviation > settings.cautious_deviation;
         }
         let stretch = self.slack.stretch().min(settings.gain_limit);
-        let missing = sign * (self.slack.offset(side, reference) - self.lead);
+        let missing = sign * (self.slack.aimed(side, reference) - self.lead);
         let position = self.command - self.tip;
-        let gap = sign * (self.slack.offset(side, self.tip) - position);
+        let gap = sign * (self.slack.aimed(side, self.tip) - position);
         // Up to where the contact may already be.
         let sure = gap - deviation * deviation / settings.cautious_deviation;
         self.landed |= sure <= 0.0;
@@ -266,8 +266,8 @@ impl AdaptiveAxis {
     }
 
     /// Only so much of the slack is there now.
-    pub(crate) fn set_grip(&mut self, grip: f64) {
-        self.slack.set_grip(grip);
+    pub(crate) fn set_grip(&mut self, grip: f64, aim: f64) {
+        self.slack.set_grip(grip, aim);
         if self.tip.is_finite() {
             self.tip = self.slack.carried(self.tip, self.command);
         }

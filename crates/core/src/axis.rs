@@ -60,9 +60,9 @@ impl Axis {
     }
 
     /// Only so much of the slack is there now; the article's scheme does not know of it.
-    pub(crate) fn set_grip(&mut self, grip: f64) {
+    pub(crate) fn set_grip(&mut self, grip: f64, aim: f64) {
         if let Self::Adaptive(axis) = self {
-            axis.set_grip(grip);
+            axis.set_grip(grip, aim);
         }
     }
 

@@ -30,6 +30,10 @@ pub struct Friction {
     arm: f64,
     stretch: [f64; 2],
     command: [f64; 2],
+    memory: f64,
+    reference: [f64; 2],
+    /// Which way the surface is to slide, along and around.
+    way: [f64; 2],
 }
 
 impl Friction {
@@ -37,12 +41,15 @@ impl Friction {
     ///
     /// # Errors
     /// It is not a finite number above 0.
-    pub fn new(arm: f64) -> Result<Self, ConfigError> {
+    pub fn new(arm: f64, memory: f64) -> Result<Self, ConfigError> {
         require_positive("friction_arm", arm)?;
         Ok(Self {
             arm,
             stretch: [0.0; 2],
             command: [f64::NAN; 2],
+            memory,
+            reference: [f64::NAN; 2],
+            way: [0.0; 2],
         })
     }
 
@@ -61,6 +68,22 @@ impl Friction {
         self.slide(along / (self.arm * around));
         let [n1, n2] = self.stretch;
         [n2, n1].map(|other| libm::sqrt((1.0 - other * other).max(0.0)))
+    }
+
+    /// The references: the share that each will have of the friction when it slides as it is to.
+    pub fn aim(&mut self, reference: [f64; 2]) -> [f64; 2] {
+        let [u1, u2] = reference;
+        let [w1, w2] = core::mem::replace(&mut self.reference, reference);
+        let (along, around) = (u1 - w1, self.arm * (u2 - w2));
+        let travel = libm::hypot(along, around);
+        if travel > 0.0 {
+            let new = -libm::expm1(-travel / self.memory);
+            let [x, y] = self.way;
+            self.way = [x + new * (along / travel - x), y + new * (around / travel - y)];
+        }
+        let [x, y] = self.way;
+        let size = libm::hypot(x, y);
+        if size > 0.0 { [x.abs() / size, y.abs() / size] } else { [1.0; 2] }
     }
 
     /// Back to |n| = 1: n1 / (1 + l), n2 / (1 + l `ease`), by Newton from below.
@@ -82,14 +105,16 @@ impl Friction {
     }
 
     /// Tell both axes what is left for them.
-    pub(crate) fn couple(&mut self, axes: &mut PerDof<Axis>) {
+    pub(crate) fn couple(&mut self, reference: PerDof<f64>, axes: &mut PerDof<Axis>) {
         let [insertion, rotation, _] = axes;
+        let [u1, u2, _] = reference;
+        let [a1, a2] = self.aim([u1, u2]);
         let half = |axis: &Axis| axis.play().width() / 2.0;
         let [first, second] = self.step(
             [insertion.command(), rotation.command()],
             [half(insertion), half(rotation)],
         );
-        insertion.set_grip(first);
-        rotation.set_grip(second);
+        insertion.set_grip(first, a1);
+        rotation.set_grip(second, a2);
     }
 }

@@ -121,7 +121,7 @@ impl HysteresisReduction {
         let before = self.axes.each_ref().map(Axis::command);
         self.guards.tick(&mut self.axes, reference, stamp, time);
         if let Some(friction) = &mut self.friction {
-            friction.couple(&mut self.axes);
+            friction.couple(self.guards.admitted(), &mut self.axes);
         }
         let command = self.axes.each_ref().map(Axis::command);
         for ((travel, command), before) in self.travel.iter_mut().zip(command).zip(before) {

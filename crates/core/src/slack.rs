@@ -6,6 +6,9 @@ use crate::limits::PlayLimit;
 use crate::offset_map::{OffsetMap, OffsetPrior, Side, TILTS};
 use crate::play::Play;
 
+/// Of what is left of the friction: standard deviation.
+const DOUBT: f64 = 0.25;
+
 /// What was learnt of both contact offsets, and the most of it that is believed; in the unit of the DOF.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slack {
@@ -13,6 +16,7 @@ pub struct Slack {
     limit: PlayLimit,
     /// Share of the width that is there now.
     grip: f64,
+    aim: f64,
 }
 
 impl Slack {
@@ -22,6 +26,7 @@ impl Slack {
             learnt: OffsetMap::new(prior, play.delta_minus(), play.delta_plus()),
             limit: PlayLimit::NONE,
             grip: 1.0,
+            aim: 1.0,
         }
     }
 
@@ -47,8 +52,20 @@ impl Slack {
     }
 
     /// So much of the width is there now, about the same middle.
-    pub const fn set_grip(&mut self, grip: f64) {
+    pub const fn set_grip(&mut self, grip: f64, aim: f64) {
         self.grip = grip;
+        self.aim = aim;
+    }
+
+    /// An offset as it will be.
+    pub fn aimed(&self, side: Side, position: f64) -> f64 {
+        let [minus, plus] = Side::BOTH.map(|side| self.learnt.offset(side, position));
+        let [minus, plus] = self.limit.clamp(minus, plus);
+        let nearer = (1.0 - self.aim) / 2.0 * (plus - minus);
+        match side {
+            Side::Minus => minus + nearer,
+            Side::Plus => plus - nearer,
+        }
     }
 
     /// Both offsets at a position, within the limit, with the grip there is.
@@ -120,6 +137,9 @@ impl Slack {
         variance: f64,
     ) -> Triggers {
         self.learnt.travel(motion.travel);
+        let play = self.play(measured);
+        let doubt = DOUBT * play.width() / 2.0;
+        let variance = variance + doubt * doubt * (1.0 - self.grip * self.grip);
         let mut triggers = Triggers::default();
         let offset = command - measured;
         let (side, sign, trigger) = if motion.upwards {
