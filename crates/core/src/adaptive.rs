@@ -3,6 +3,7 @@
 use crate::contact::{ContactTest, Stroke};
 use crate::error::{ConfigError, require, require_non_negative, require_positive};
 use crate::estimator::Triggers;
+use crate::friction::Grip;
 use crate::lead::LeadLaw;
 use crate::limits::PlayLimit;
 use crate::offset_map::{OffsetPrior, Side};
@@ -265,9 +266,9 @@ impl AdaptiveAxis {
         self.share = share;
     }
 
-    /// Only so much of the slack is there now.
-    pub(crate) fn set_grip(&mut self, grip: f64, aim: f64) {
-        self.slack.set_grip(grip, aim);
+    /// So much of the slack is left for this DOF.
+    pub(crate) fn set_grip(&mut self, grip: Grip) {
+        self.slack.set_grip(grip);
         if self.tip.is_finite() {
             self.tip = self.slack.carried(self.tip, self.command);
         }

@@ -3,6 +3,7 @@
 use crate::adaptive::AdaptiveAxis;
 use crate::compensator::{Compensator, CompensatorState};
 use crate::estimator::{Estimator, EstimatorState, Triggers};
+use crate::friction::Grip;
 use crate::limits::PlayLimit;
 use crate::play::Play;
 
@@ -59,10 +60,10 @@ impl Axis {
         }
     }
 
-    /// Only so much of the slack is there now; the article's scheme does not know of it.
-    pub(crate) fn set_grip(&mut self, grip: f64, aim: f64) {
+    /// So much of its slack is left for it; the article's scheme does not know of that.
+    pub(crate) fn set_grip(&mut self, grip: Grip) {
         if let Self::Adaptive(axis) = self {
-            axis.set_grip(grip, aim);
+            axis.set_grip(grip);
         }
     }
 

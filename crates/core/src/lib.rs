@@ -94,7 +94,7 @@ pub use expectation::{Beliefs, Expected};
 pub use features::{FeatureModel, FeaturePrediction};
 pub use flags::{Flag, Flags};
 pub use frame_watch::{Arrival, FrameSettings, FrameWatch, Picture};
-pub use friction::Friction;
+pub use friction::{Friction, FrictionSettings, Grip};
 pub use guards::{GuardSettings, Guards, Supervision};
 pub use history::{Entry, History};
 pub use instrument::{Instrument, Marker};

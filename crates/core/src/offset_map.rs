@@ -92,6 +92,14 @@ impl Side {
             Self::Plus => Self::Minus,
         }
     }
+
+    /// Its own of two values.
+    pub(crate) const fn of(self, [minus, plus]: [f64; 2]) -> f64 {
+        match self {
+            Self::Minus => minus,
+            Self::Plus => plus,
+        }
+    }
 }
 
 /// Both contact offsets over position: the tilt, and what is left of them at nodes, linear between
@@ -191,11 +199,11 @@ impl OffsetMap {
         }
     }
 
-    /// An offset was measured at a position, with this variance, while the grip was this share of all:
-    /// by `(1 - grip) / 2` of the width nearer to the other contact.
-    pub fn measure(&mut self, side: Side, position: f64, grip: f64, offset: f64, variance: f64) {
+    /// An offset was measured at a position, with this variance, while a share of the width was there:
+    /// the offset lay `(1 - share) / 2` of the width nearer to the other one.
+    pub fn measure(&mut self, side: Side, position: f64, share: f64, offset: f64, variance: f64) {
         let nodes = [side, side.other()].map(|side| self.node(side, position));
-        let nearer = (1.0 - grip) / 2.0;
+        let nearer = (1.0 - share) / 2.0;
         let pick = |values: &[f64; SIZE]| {
             let [own, other] = nodes.each_ref().map(|node| node.pick(values));
             own + nearer * (other - own)

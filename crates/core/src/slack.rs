@@ -2,21 +2,17 @@
 
 use crate::contact::Motion;
 use crate::estimator::{Trigger, Triggers};
+use crate::friction::Grip;
 use crate::limits::PlayLimit;
 use crate::offset_map::{OffsetMap, OffsetPrior, Side, TILTS};
 use crate::play::Play;
-
-/// Of what is left of the friction: standard deviation.
-const DOUBT: f64 = 0.25;
 
 /// What was learnt of both contact offsets, and the most of it that is believed; in the unit of the DOF.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slack {
     learnt: OffsetMap,
     limit: PlayLimit,
-    /// Share of the width that is there now.
-    grip: f64,
-    aim: f64,
+    grip: Grip,
 }
 
 impl Slack {
@@ -25,8 +21,7 @@ impl Slack {
         Self {
             learnt: OffsetMap::new(prior, play.delta_minus(), play.delta_plus()),
             limit: PlayLimit::NONE,
-            grip: 1.0,
-            aim: 1.0,
+            grip: Grip::WHOLE,
         }
     }
 
@@ -51,38 +46,27 @@ impl Slack {
         self.limit.exceeds(minus, plus)
     }
 
-    /// So much of the width is there now, about the same middle.
-    pub const fn set_grip(&mut self, grip: f64, aim: f64) {
+    /// So much of it is left for this DOF.
+    pub const fn set_grip(&mut self, grip: Grip) {
         self.grip = grip;
-        self.aim = aim;
     }
 
-    /// An offset as it will be.
-    pub fn aimed(&self, side: Side, position: f64) -> f64 {
+    /// Both offsets at a position, within the limit, with a share of the width.
+    fn offsets(&self, position: f64, share: f64) -> [f64; 2] {
         let [minus, plus] = Side::BOTH.map(|side| self.learnt.offset(side, position));
         let [minus, plus] = self.limit.clamp(minus, plus);
-        let nearer = (1.0 - self.aim) / 2.0 * (plus - minus);
-        match side {
-            Side::Minus => minus + nearer,
-            Side::Plus => plus - nearer,
-        }
-    }
-
-    /// Both offsets at a position, within the limit, with the grip there is.
-    fn offsets(&self, position: f64) -> [f64; 2] {
-        let [minus, plus] = Side::BOTH.map(|side| self.learnt.offset(side, position));
-        let [minus, plus] = self.limit.clamp(minus, plus);
-        let nearer = (1.0 - self.grip) / 2.0 * (plus - minus);
+        let nearer = (1.0 - share) / 2.0 * (plus - minus);
         [minus + nearer, plus - nearer]
     }
 
-    /// One of them.
+    /// One of them, as it is now.
     pub fn offset(&self, side: Side, position: f64) -> f64 {
-        let [minus, plus] = self.offsets(position);
-        match side {
-            Side::Minus => minus,
-            Side::Plus => plus,
-        }
+        side.of(self.offsets(position, self.grip.now))
+    }
+
+    /// One of them, as it will be when the tip slides as it is to.
+    pub fn aimed(&self, side: Side, position: f64) -> f64 {
+        side.of(self.offsets(position, self.grip.aimed))
     }
 
     /// The variance of an offset at a position.
@@ -90,7 +74,7 @@ impl Slack {
         self.learnt.variance(side, position)
     }
 
-    /// The play operator at a position.
+    /// The play operator of this DOF by itself at a position.
     pub fn play(&self, position: f64) -> Play {
         let [minus, plus] = Side::BOTH.map(|side| self.learnt.offset(side, position));
         // Sides that have crossed are a width too, and limited as one.
@@ -137,9 +121,8 @@ impl Slack {
         variance: f64,
     ) -> Triggers {
         self.learnt.travel(motion.travel);
-        let play = self.play(measured);
-        let doubt = DOUBT * play.width() / 2.0;
-        let variance = variance + doubt * doubt * (1.0 - self.grip * self.grip);
+        let doubt = self.grip.deviation * self.play(measured).width() / 2.0;
+        let variance = variance + doubt * doubt;
         let mut triggers = Triggers::default();
         let offset = command - measured;
         let (side, sign, trigger) = if motion.upwards {
@@ -148,7 +131,8 @@ impl Slack {
             (Side::Minus, -1.0, &mut triggers.minus)
         };
         if motion.together {
-            self.learnt.measure(side, measured, self.grip, offset, variance);
+            self.learnt
+                .measure(side, measured, self.grip.now, offset, variance);
             *trigger = Some(Trigger::Contact);
         } else if sign * (offset - self.offset(side, measured)) > libm::sqrt(variance) {
             self.learnt.bound(side, measured, offset, variance);

@@ -7,6 +7,7 @@ mod adaptive;
 mod compensator;
 mod estimator;
 mod expectation;
+mod friction;
 mod guarantees;
 mod guards;
 mod history;
