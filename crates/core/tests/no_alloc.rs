@@ -66,6 +66,7 @@ fn reduction(axes: PerDof<Axis>, estimation: StateEstimation) -> HysteresisReduc
         .unwrap(),
         Guards::new(support::guards()).unwrap(),
     )
+    .with_friction(Some(support::friction()))
 }
 
 /// Over as many ticks as `TAUTSCOPE_TICKS` says, each loop at least once through every flag.

@@ -41,6 +41,7 @@ fn looped(axes: PerDof<Axis>, estimation: StateEstimation) -> HysteresisReductio
         .unwrap(),
         Guards::new(support::guards()).unwrap(),
     )
+    .with_friction(Some(support::friction()))
 }
 
 /// Resident memory in pages, and open files; none where the system does not say.

@@ -4,19 +4,11 @@ use proptest::prelude::*;
 use tautscope_core::{Friction, FrictionSettings, Grip};
 
 use crate::config;
+use crate::support::friction;
 
 /// Of a shaft of 3.5 mm with 10 mm and 1.8 rad of slack.
 const ARM: f64 = 1.75e-3;
 const HALF: [f64; 2] = [5e-3, 0.9];
-
-fn friction() -> Friction {
-    Friction::new(FrictionSettings {
-        arm: ARM,
-        memory: 0.2e-3,
-        deviation: 0.25,
-    })
-    .unwrap()
-}
 
 /// References and commands that move alike, by so much in every tick.
 fn slide(

@@ -57,6 +57,7 @@ fn reduction(axes: PerDof<Axis>, estimation: StateEstimation) -> HysteresisReduc
         .unwrap(),
         Guards::new(guards()).unwrap(),
     )
+    .with_friction(Some(support::friction()))
 }
 
 /// Xorshift.

@@ -1,9 +1,9 @@
 //! Guards for the tests of the loop: lengths in units of 0.4 mm, 0.04 rad, 0.02 rad.
 
 use tautscope_core::{
-    AdaptiveAxis, AdaptiveSettings, ClutchSettings, ContactTest, Flags, FrameSettings,
-    GuardSettings, LeadLaw, MonitorSettings, MotionSettings, OffsetPrior, PerDof, Play,
-    SupervisorSettings,
+    AdaptiveAxis, AdaptiveSettings, ClutchSettings, ContactTest, Flags, FrameSettings, Friction,
+    FrictionSettings, GuardSettings, LeadLaw, MonitorSettings, MotionSettings, OffsetPrior, PerDof,
+    Play, SupervisorSettings,
 };
 
 pub const UNITS: PerDof<f64> = [0.4e-3, 0.04, 0.02];
@@ -68,6 +68,16 @@ pub fn guards() -> GuardSettings {
         offset_limit: UNITS.map(|unit| 20.0 * unit),
         off: Flags::NONE,
     }
+}
+
+/// Of a shaft of 3.5 mm.
+pub fn friction() -> Friction {
+    Friction::new(FrictionSettings {
+        arm: 1.75e-3,
+        memory: 0.2e-3,
+        deviation: 0.25,
+    })
+    .unwrap()
 }
 
 /// A DOF of profile `best` with lengths in units of `unit`.
