@@ -7,12 +7,17 @@ use crate::limits::PlayLimit;
 use crate::offset_map::{OffsetMap, OffsetPrior, Side, TILTS};
 use crate::play::Play;
 
+/// How fast it is learnt how much of the friction is shared: share of the error, per image.
+const SHARING: f64 = 0.1;
+
 /// What was learnt of both contact offsets, and the most of it that is believed; in the unit of the DOF.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slack {
     learnt: OffsetMap,
     limit: PlayLimit,
     grip: Grip,
+    /// How much of the friction is shared, 0 to 1.
+    shared: f64,
 }
 
 impl Slack {
@@ -22,6 +27,7 @@ impl Slack {
             learnt: OffsetMap::new(prior, play.delta_minus(), play.delta_plus()),
             limit: PlayLimit::NONE,
             grip: Grip::WHOLE,
+            shared: 1.0,
         }
     }
 
@@ -51,8 +57,30 @@ impl Slack {
         self.grip = grip;
     }
 
-    /// Both offsets at a position, within the limit, with a share of the width.
-    fn offsets(&self, position: f64, share: f64) -> [f64; 2] {
+    /// The share of the width that a grip leaves.
+    fn left(&self, grip: f64) -> f64 {
+        1.0 - self.shared * (1.0 - grip)
+    }
+
+    /// Learn how much is shared from an offset in contact, by the steepest descent of
+    ///
+    /// ```text
+    /// ((offset - middle) / half width - (1 - shared (1 - grip)))^2
+    /// ```
+    fn share(&mut self, side: Side, position: f64, offset: f64) {
+        let lost = 1.0 - self.grip.now;
+        let whole = self.offsets(position, 1.0);
+        let [minus, plus] = whole;
+        if plus > minus && lost > 0.0 {
+            let missing = (side.of(whole) - offset) / (side.of(whole) - (minus + plus) / 2.0);
+            let error = missing.clamp(0.0, 1.0) - self.shared * lost;
+            self.shared = (self.shared + SHARING * lost * error).clamp(0.0, 1.0);
+        }
+    }
+
+    /// Both offsets at a position, within the limit, with so much of the grip.
+    fn offsets(&self, position: f64, grip: f64) -> [f64; 2] {
+        let share = self.left(grip);
         let [minus, plus] = Side::BOTH.map(|side| self.learnt.offset(side, position));
         let [minus, plus] = self.limit.clamp(minus, plus);
         let nearer = (1.0 - share) / 2.0 * (plus - minus);
@@ -121,7 +149,7 @@ impl Slack {
         variance: f64,
     ) -> Triggers {
         self.learnt.travel(motion.travel);
-        let doubt = self.grip.deviation * self.play(measured).width() / 2.0;
+        let doubt = self.shared * self.grip.deviation * self.play(measured).width() / 2.0;
         let variance = variance + doubt * doubt;
         let mut triggers = Triggers::default();
         let offset = command - measured;
@@ -131,8 +159,9 @@ impl Slack {
             (Side::Minus, -1.0, &mut triggers.minus)
         };
         if motion.together {
-            self.learnt
-                .measure(side, measured, self.grip.now, offset, variance);
+            let share = self.left(self.grip.now);
+            self.learnt.measure(side, measured, share, offset, variance);
+            self.share(side, measured, offset);
             *trigger = Some(Trigger::Contact);
         } else if sign * (offset - self.offset(side, measured)) > libm::sqrt(variance) {
             self.learnt.bound(side, measured, offset, variance);
