@@ -67,6 +67,8 @@ impl Slack {
     /// ```text
     /// ((offset - middle) / half width - (1 - shared (1 - grip)))^2
     /// ```
+    ///
+    /// as far as that is off by more than the grip's deviation.
     fn share(&mut self, side: Side, position: f64, offset: f64) {
         let lost = 1.0 - self.grip.now;
         let whole = self.offsets(position, 1.0);
@@ -74,7 +76,8 @@ impl Slack {
         if plus > minus && lost > 0.0 {
             let missing = (side.of(whole) - offset) / (side.of(whole) - (minus + plus) / 2.0);
             let error = missing.clamp(0.0, 1.0) - self.shared * lost;
-            self.shared = (self.shared + SHARING * lost * error).clamp(0.0, 1.0);
+            let beyond = error - error.clamp(-self.grip.deviation, self.grip.deviation);
+            self.shared = (self.shared + SHARING * lost * beyond).clamp(0.0, 1.0);
         }
     }
 
