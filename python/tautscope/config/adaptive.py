@@ -68,4 +68,5 @@ class AdaptiveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """Travel of the shaft's surface over which the way it is to slide is averaged [in
     update_distance of insertion]."""
     friction_deviation: NonNegative = 0.25
-    """Standard deviation of a slack of which the other motion leaves nothing [in half its width]."""
+    """Standard deviation of a slack of which the other motion leaves nothing [in half its
+    width]."""
