@@ -266,6 +266,11 @@ impl AdaptiveAxis {
         self.share = share;
     }
 
+    /// Half the width of the slack learnt where the reference is.
+    pub(crate) fn half_width(&self) -> f64 {
+        self.slack.half_width(self.reference.unwrap_or(0.0))
+    }
+
     /// So much of the slack is left for this DOF.
     pub(crate) fn set_grip(&mut self, grip: Grip) {
         self.slack.set_grip(grip);

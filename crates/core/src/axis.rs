@@ -60,6 +60,14 @@ impl Axis {
         }
     }
 
+    /// Half the width of the slack by itself; none in the article's scheme.
+    pub(crate) fn half_width(&self) -> f64 {
+        match self {
+            Self::Article(_) => 0.0,
+            Self::Adaptive(axis) => axis.half_width(),
+        }
+    }
+
     /// So much of its slack is left for it; the article's scheme does not know of that.
     pub(crate) fn set_grip(&mut self, grip: Grip) {
         if let Self::Adaptive(axis) = self {

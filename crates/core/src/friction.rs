@@ -158,9 +158,12 @@ impl Friction {
     /// Tells both axes what is left for them.
     pub(crate) fn couple(&mut self, reference: PerDof<f64>, axes: &mut PerDof<Axis>) {
         let ([insertion, rotation, _], [u1, u2, _]) = (axes, reference);
-        let half = |axis: &Axis| axis.play().width() / 2.0;
         let commands = [insertion.command(), rotation.command()];
-        let [first, second] = self.step([u1, u2], commands, [half(insertion), half(rotation)]);
+        let [first, second] = self.step(
+            [u1, u2],
+            commands,
+            [insertion.half_width(), rotation.half_width()],
+        );
         insertion.set_grip(first);
         rotation.set_grip(second);
     }

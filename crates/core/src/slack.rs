@@ -71,7 +71,7 @@ impl Slack {
     /// as far as that is off by more than the grip's deviation.
     fn share(&mut self, side: Side, position: f64, offset: f64) {
         let lost = 1.0 - self.grip.now;
-        let whole = self.offsets(position, 1.0);
+        let whole = Side::BOTH.map(|side| self.learnt.offset(side, position));
         let [minus, plus] = whole;
         if plus > minus && lost > 0.0 {
             let missing = (side.of(whole) - offset) / (side.of(whole) - (minus + plus) / 2.0);
@@ -113,6 +113,12 @@ impl Slack {
         Play::from_ordered(minus, plus)
     }
 
+    /// Half the width learnt at a position, whatever the limit: shares of it are shares all the same.
+    pub fn half_width(&self, position: f64) -> f64 {
+        let [minus, plus] = Side::BOTH.map(|side| self.learnt.offset(side, position));
+        (plus - minus).abs() / 2.0
+    }
+
     /// Travel of the command for a tip in contact to travel 1.
     pub fn stretch(&self) -> f64 {
         1.0 + self.learnt.tilt().0
@@ -152,7 +158,7 @@ impl Slack {
         variance: f64,
     ) -> Triggers {
         self.learnt.travel(motion.travel);
-        let doubt = self.shared * self.grip.deviation * self.play(measured).width() / 2.0;
+        let doubt = self.shared * self.grip.deviation * self.half_width(measured);
         let variance = variance + doubt * doubt;
         let mut triggers = Triggers::default();
         let offset = command - measured;
