@@ -74,7 +74,7 @@ impl Slack {
         let whole = Side::BOTH.map(|side| self.learnt.offset(side, position));
         let [minus, plus] = whole;
         if plus > minus && lost > 0.0 {
-            let missing = (side.of(whole) - offset) / (side.of(whole) - (minus + plus) / 2.0);
+            let missing = (side.of(whole) - offset) / (side.of(whole) - f64::midpoint(minus, plus));
             let error = missing.clamp(0.0, 1.0) - self.shared * lost;
             let beyond = error - error.clamp(-self.grip.deviation, self.grip.deviation);
             self.shared = (self.shared + SHARING * lost * beyond).clamp(0.0, 1.0);
