@@ -54,6 +54,15 @@ def campaign(folder, *arguments):
 
 
 @needs_fork
+@pytest.mark.parametrize("seed", [101, 107])
+def test_without_images_both_motions_of_the_shaft_go_on(seed):
+    """Insertion reverses meanwhile, and rotation has all of the friction for a moment."""
+    (found,) = runs.study(seed, ["camera_off"])
+    assert found.fault.duration > 1.4, f"seed {seed}"
+    assert (np.array(found.excursion) <= judgement.PASSING).all(), f"seed {seed}: {found}"
+
+
+@needs_fork
 def test_a_row_comes_out_again_alone(tmp_path):
     kinds = ["--kind", "swapped", "--kind", "ok", "--kind", "stall", "--kind", "start_negative"]
     several = campaign(tmp_path, *kinds, "--runs", "8", "--first-seed", "200")

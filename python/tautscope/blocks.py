@@ -183,6 +183,15 @@ def build_guards(config: Config) -> _core.Guards:
     )
 
 
+def build_friction(config: Config) -> tuple[float, float, float] | None:
+    """What insertion and rotation share: arm [m], memory [m] and deviation; None for nothing."""
+    settings = config.adaptive
+    if not settings.one_friction:
+        return None
+    memory = settings.friction_memory * config.insertion.update_distance
+    return config.instrument.diameter / 2, memory, settings.friction_deviation
+
+
 def build_loop(config: Config, compensate: bool = True) -> _core.Reduction:
     """The whole loop, Fig. 6, without checks of what goes in: `HysteresisReduction` has those."""
     model = build_feature_model(config)
@@ -201,6 +210,7 @@ def build_loop(config: Config, compensate: bool = True) -> _core.Reduction:
             start_deviation=start_deviation,
             rest_deviation=each_dof(lambda dof: config[dof].update_distance * rest),
             settling_time=config.state_estimation.settling_time,
+            friction=build_friction(config),
         )
     return _core.Reduction(
         each_dof(lambda dof: build_compensator(config[dof], compensate)),

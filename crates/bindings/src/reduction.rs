@@ -66,10 +66,11 @@ impl Reduction {
         Self::joined(py, axes, model, estimation, history, whereabouts, guards)
     }
 
-    /// The loop of profile `best`, from its three axes.
+    /// The loop of profile `best`, from its three axes; `friction` is arm, memory and deviation of a
+    /// `core::FrictionSettings`.
     #[staticmethod]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
-    #[pyo3(signature = (axes, model, state_estimator, guards, *, span, period, start_deviation, rest_deviation, settling_time))]
+    #[pyo3(signature = (axes, model, state_estimator, guards, *, span, period, start_deviation, rest_deviation, settling_time, friction))]
     fn adaptive(
         py: Python<'_>,
         axes: [PyRef<'_, AdaptiveAxis>; 3],
@@ -81,6 +82,7 @@ impl Reduction {
         start_deviation: [f64; 3],
         rest_deviation: [f64; 3],
         settling_time: f64,
+        friction: Option<(f64, f64, f64)>,
     ) -> PyResult<Self> {
         let axes = axes.map(|axis| core::Axis::Adaptive(axis.0.clone()));
         let estimation = core::StateEstimation::Weighted(state_estimator.0);
@@ -90,7 +92,18 @@ impl Reduction {
             settling_time,
         });
         let history = core::History::new(span, period);
-        Self::joined(py, axes, model, estimation, history, whereabouts, guards)
+        let Self(inner) = Self::joined(py, axes, model, estimation, history, whereabouts, guards)?;
+        let friction = friction.map(|(arm, memory, deviation)| {
+            core::Friction::new(core::FrictionSettings {
+                arm,
+                memory,
+                deviation,
+            })
+        });
+        let friction = friction.transpose();
+        Ok(Self(
+            inner.with_friction(friction.map_err(errors::config(py))?),
+        ))
     }
 
     /// One control tick at `time` in s: reference (3,), made at `stamp` in s, in, command (3,) out.

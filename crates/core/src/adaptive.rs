@@ -3,6 +3,7 @@
 use crate::contact::{ContactTest, Stroke};
 use crate::error::{ConfigError, require, require_non_negative, require_positive};
 use crate::estimator::Triggers;
+use crate::friction::SlackShare;
 use crate::lead::LeadLaw;
 use crate::limits::PlayLimit;
 use crate::offset_map::{OffsetPrior, Side};
@@ -216,9 +217,9 @@ impl AdaptiveAxis {
             self.cautious = deviation > settings.cautious_deviation;
         }
         let stretch = self.slack.stretch().min(settings.gain_limit);
-        let missing = sign * (self.slack.offset(side, reference) - self.lead);
+        let missing = sign * (self.slack.aimed(side, reference) - self.lead);
         let position = self.command - self.tip;
-        let gap = sign * (self.slack.offset(side, self.tip) - position);
+        let gap = sign * (self.slack.aimed(side, self.tip) - position);
         // Up to where the contact may already be.
         let sure = gap - deviation * deviation / settings.cautious_deviation;
         self.landed |= sure <= 0.0;
@@ -283,6 +284,19 @@ impl AdaptiveAxis {
     /// Use a share of the gains beyond 1: all of them with 1, no compensation with 0. Bumpless.
     pub(crate) const fn set_share(&mut self, share: f64) {
         self.share = share;
+    }
+
+    /// Half the width of the slack learnt where the reference is.
+    pub(crate) fn half_width(&self) -> f64 {
+        self.slack.half_width(self.reference.unwrap_or(0.0))
+    }
+
+    /// So much of the slack is left for this DOF.
+    pub(crate) fn set_slack_share(&mut self, part: SlackShare) {
+        self.slack.set_slack_share(part);
+        if self.tip.is_finite() {
+            self.tip = self.slack.carried(self.tip, self.command);
+        }
     }
 
     /// Believe in no more slack than that.

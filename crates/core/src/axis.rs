@@ -3,6 +3,7 @@
 use crate::adaptive::AdaptiveAxis;
 use crate::compensator::{Compensator, CompensatorState};
 use crate::estimator::{Estimator, EstimatorState, Triggers};
+use crate::friction::SlackShare;
 use crate::limits::PlayLimit;
 use crate::play::Play;
 
@@ -59,6 +60,21 @@ impl Axis {
         match self {
             Self::Article(axis) => axis.limit = limit,
             Self::Adaptive(axis) => axis.limit(limit),
+        }
+    }
+
+    /// Half the width of the slack by itself; none in the article's scheme.
+    pub(crate) fn half_width(&self) -> f64 {
+        match self {
+            Self::Article(_) => 0.0,
+            Self::Adaptive(axis) => axis.half_width(),
+        }
+    }
+
+    /// So much of its slack is left for it; the article's scheme does not know of that.
+    pub(crate) fn set_slack_share(&mut self, part: SlackShare) {
+        if let Self::Adaptive(axis) = self {
+            axis.set_slack_share(part);
         }
     }
 

@@ -85,6 +85,21 @@ pub enum Side {
 impl Side {
     /// Minus, then plus.
     pub(crate) const BOTH: [Self; 2] = [Self::Minus, Self::Plus];
+
+    const fn other(self) -> Self {
+        match self {
+            Self::Minus => Self::Plus,
+            Self::Plus => Self::Minus,
+        }
+    }
+
+    /// Its own of two values.
+    pub(crate) const fn of(self, [minus, plus]: [f64; 2]) -> f64 {
+        match self {
+            Self::Minus => minus,
+            Self::Plus => plus,
+        }
+    }
 }
 
 /// Both contact offsets over position: the tilt, and what is left of them at nodes, linear between
@@ -184,12 +199,21 @@ impl OffsetMap {
         }
     }
 
-    /// An offset was measured at a position, with this variance.
-    pub fn measure(&mut self, side: Side, position: f64, offset: f64, variance: f64) {
-        let node = self.node(side, position);
-        let column = self.column(&node);
-        let total = node.pick(&column) + variance;
-        self.shift(&column, (offset - node.pick(&self.mean)) / total);
+    /// An offset was measured at a position, with this variance, while a share of the width was there:
+    /// the offset lay `(1 - share) / 2` of the width nearer to the other one.
+    pub fn measure(&mut self, side: Side, position: f64, share: f64, offset: f64, variance: f64) {
+        let nodes = [side, side.other()].map(|side| self.node(side, position));
+        let nearer = (1.0 - share) / 2.0;
+        let pick = |values: &[f64; SIZE]| {
+            let [own, other] = nodes.each_ref().map(|node| node.pick(values));
+            own + nearer * (other - own)
+        };
+        let mut column = [0.0; SIZE];
+        for (value, row) in column.iter_mut().zip(&self.covariance) {
+            *value = pick(row);
+        }
+        let total = pick(&column) + variance;
+        self.shift(&column, (offset - pick(&self.mean)) / total);
         for (row, own) in self.covariance.iter_mut().zip(column) {
             for (value, other) in row.iter_mut().zip(column) {
                 *value -= own * other / total;

@@ -9,6 +9,7 @@ use crate::estimator::Triggers;
 use crate::features::FeatureModel;
 use crate::flags::{Flag, Flags};
 use crate::frame_watch::{Arrival, Picture};
+use crate::friction::Friction;
 use crate::guards::{Guards, Supervision};
 use crate::history::{Entry, History};
 use crate::play::Play;
@@ -70,6 +71,7 @@ pub struct Report {
 #[derive(Debug, Clone)]
 pub struct HysteresisReduction {
     axes: PerDof<Axis>,
+    friction: Option<Friction>,
     feature_model: FeatureModel,
     state_estimation: StateEstimation,
     history: History,
@@ -93,6 +95,7 @@ impl HysteresisReduction {
         guards.limit(&mut axes);
         Self {
             axes,
+            friction: None,
             feature_model,
             state_estimation,
             history,
@@ -104,6 +107,12 @@ impl HysteresisReduction {
         }
     }
 
+    /// The same, for a shaft whose insertion and rotation share one friction.
+    #[must_use]
+    pub const fn with_friction(self, friction: Option<Friction>) -> Self {
+        Self { friction, ..self }
+    }
+
     /// Control tick at `time` in s: reference (3,) in, command (3,) out [m, rad, rad].
     ///
     /// `stamp` in s is when the reference was made, if that is known. A reference that is not finite
@@ -111,6 +120,9 @@ impl HysteresisReduction {
     pub fn step(&mut self, reference: PerDof<f64>, stamp: Option<f64>, time: f64) -> PerDof<f64> {
         let before = self.axes.each_ref().map(Axis::command);
         self.guards.tick(&mut self.axes, reference, stamp, time);
+        if let Some(friction) = &mut self.friction {
+            friction.couple(self.guards.admitted(), &mut self.axes);
+        }
         let command = self.axes.each_ref().map(Axis::command);
         for ((travel, command), before) in self.travel.iter_mut().zip(command).zip(before) {
             let moved = (command - before).abs();

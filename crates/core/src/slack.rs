@@ -2,15 +2,22 @@
 
 use crate::contact::Motion;
 use crate::estimator::{Trigger, Triggers};
+use crate::friction::SlackShare;
 use crate::limits::PlayLimit;
 use crate::offset_map::{OffsetMap, OffsetPrior, Side, TILTS};
 use crate::play::Play;
+
+/// How fast it is learnt how much of the friction is shared: share of the error, per image.
+const SHARING: f64 = 0.1;
 
 /// What was learnt of both contact offsets, and the most of it that is believed; in the unit of the DOF.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slack {
     learnt: OffsetMap,
     limit: PlayLimit,
+    part: SlackShare,
+    /// How much of the friction is shared, 0 to 1.
+    shared: f64,
 }
 
 impl Slack {
@@ -19,6 +26,8 @@ impl Slack {
         Self {
             learnt: OffsetMap::new(prior, play.delta_minus(), play.delta_plus()),
             limit: PlayLimit::NONE,
+            part: SlackShare::WHOLE,
+            shared: 1.0,
         }
     }
 
@@ -43,19 +52,52 @@ impl Slack {
         self.limit.exceeds(minus, plus)
     }
 
-    /// Both offsets at a position, within the limit.
-    fn offsets(&self, position: f64) -> [f64; 2] {
-        let [minus, plus] = Side::BOTH.map(|side| self.learnt.offset(side, position));
-        self.limit.clamp(minus, plus)
+    /// So much of it is left for this DOF.
+    pub const fn set_slack_share(&mut self, part: SlackShare) {
+        self.part = part;
     }
 
-    /// One of them.
-    pub fn offset(&self, side: Side, position: f64) -> f64 {
-        let [minus, plus] = self.offsets(position);
-        match side {
-            Side::Minus => minus,
-            Side::Plus => plus,
+    /// The share of the width that is left.
+    fn left(&self, part: f64) -> f64 {
+        1.0 - self.shared * (1.0 - part)
+    }
+
+    /// Learn how much is shared from an offset in contact, by the steepest descent of
+    ///
+    /// ```text
+    /// ((offset - middle) / half width - (1 - shared (1 - part)))^2
+    /// ```
+    ///
+    /// as far as that is off by more than the share's deviation.
+    fn share(&mut self, side: Side, position: f64, offset: f64) {
+        let lost = 1.0 - self.part.now;
+        let whole = Side::BOTH.map(|side| self.learnt.offset(side, position));
+        let [minus, plus] = whole;
+        if plus > minus && lost > 0.0 {
+            let missing = (side.of(whole) - offset) / (side.of(whole) - f64::midpoint(minus, plus));
+            let error = missing.clamp(0.0, 1.0) - self.shared * lost;
+            let beyond = error - error.clamp(-self.part.deviation, self.part.deviation);
+            self.shared = (self.shared + SHARING * lost * beyond).clamp(0.0, 1.0);
         }
+    }
+
+    /// Both offsets at a position, within the limit, where that share of the width is left.
+    fn offsets(&self, position: f64, part: f64) -> [f64; 2] {
+        let share = self.left(part);
+        let [minus, plus] = Side::BOTH.map(|side| self.learnt.offset(side, position));
+        let [minus, plus] = self.limit.clamp(minus, plus);
+        let nearer = (1.0 - share) / 2.0 * (plus - minus);
+        [minus + nearer, plus - nearer]
+    }
+
+    /// One of them, as it is now.
+    pub fn offset(&self, side: Side, position: f64) -> f64 {
+        side.of(self.offsets(position, self.part.now))
+    }
+
+    /// One of them, as it will be when the tip slides as it is to.
+    pub fn aimed(&self, side: Side, position: f64) -> f64 {
+        side.of(self.offsets(position, self.part.aimed))
     }
 
     /// The variance of an offset at a position.
@@ -63,12 +105,18 @@ impl Slack {
         self.learnt.variance(side, position)
     }
 
-    /// The play operator at a position.
+    /// The play operator of this DOF by itself at a position.
     pub fn play(&self, position: f64) -> Play {
         let [minus, plus] = Side::BOTH.map(|side| self.learnt.offset(side, position));
         // Sides that have crossed are a width too, and limited as one.
         let [minus, plus] = self.limit.clamp(minus.min(plus), minus.max(plus));
         Play::from_ordered(minus, plus)
+    }
+
+    /// Half the width learnt at a position, whatever the limit: shares of it are shares all the same.
+    pub fn half_width(&self, position: f64) -> f64 {
+        let [minus, plus] = Side::BOTH.map(|side| self.learnt.offset(side, position));
+        (plus - minus).abs() / 2.0
     }
 
     /// Travel of the command for a tip in contact to travel 1.
@@ -110,6 +158,8 @@ impl Slack {
         variance: f64,
     ) -> Triggers {
         self.learnt.travel(motion.travel);
+        let doubt = self.shared * self.part.deviation * self.half_width(measured);
+        let variance = variance + doubt * doubt;
         let mut triggers = Triggers::default();
         let offset = command - measured;
         let (side, sign, trigger) = if motion.upwards {
@@ -118,9 +168,11 @@ impl Slack {
             (Side::Minus, -1.0, &mut triggers.minus)
         };
         if motion.together {
-            self.learnt.measure(side, measured, offset, variance);
+            let share = self.left(self.part.now);
+            self.learnt.measure(side, measured, share, offset, variance);
+            self.share(side, measured, offset);
             *trigger = Some(Trigger::Contact);
-        } else if sign * (offset - self.learnt.offset(side, measured)) > libm::sqrt(variance) {
+        } else if sign * (offset - self.offset(side, measured)) > libm::sqrt(variance) {
             self.learnt.bound(side, measured, offset, variance);
             *trigger = Some(Trigger::Violation);
         }

@@ -61,3 +61,12 @@ class AdaptiveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     state_correction: Annotated[float, Meta(ge=0, le=1)] = 1.0
     """Share of what an image says of the play state that is taken over; 0 leaves it to the
     model."""
+    one_friction: bool = True
+    """Whether insertion and rotation share the friction of a shaft that slides and turns in its
+    channel: what slides along it turns freely. False takes their slacks to be independent."""
+    friction_memory: Positive = 0.5
+    """Travel of the shaft's surface over which the way it is to slide is averaged [in
+    update_distance of insertion]."""
+    friction_deviation: NonNegative = 0.25
+    """Standard deviation of a slack of which the other motion leaves nothing [in half its
+    width]."""

@@ -37,7 +37,7 @@ proptest! {
     ) {
         let mut map = OffsetMap::new(prior(), 0.0, 0.0);
         let before = map.variance(Side::Plus, position);
-        map.measure(Side::Plus, position, offset, variance);
+        map.measure(Side::Plus, position, 1.0, offset, variance);
         prop_assert!(close(map.offset(Side::Plus, position), offset * before / (before + variance)));
         let after = before * variance / (before + variance);
         prop_assert!((map.variance(Side::Plus, position) - after).abs() < 1e-9);
@@ -60,7 +60,7 @@ proptest! {
                 prop_assert!(most >= before.min(1.0) * (1.0 - 0.02));
             }
             let before = map.variance(side(plus), probe);
-            map.measure(side(plus), position, offset, variance);
+            map.measure(side(plus), position, 1.0, offset, variance);
             prop_assert!(map.variance(side(plus), probe) <= before + 1e-9);
             map.travel(0.1);
         }
@@ -81,7 +81,7 @@ proptest! {
 #[test]
 fn friction_that_fell_at_one_contact_is_expected_to_have_fallen_at_the_other() {
     let mut map = OffsetMap::new(prior(), -1.0, 1.0);
-    map.measure(Side::Minus, 0.0, -0.5, 1e-3);
+    map.measure(Side::Minus, 0.0, 1.0, -0.5, 1e-3);
     assert!(map.offset(Side::Plus, 0.0) < 0.7);
 }
 
@@ -91,8 +91,8 @@ fn the_tilt_is_found_from_the_slope_of_the_offsets() {
     let mut map = OffsetMap::new(prior(), 0.0, 0.0);
     for step in -20..=20 {
         let position = 0.1 * f64::from(step);
-        map.measure(Side::Plus, position, 0.4 + 0.5 * position, 1e-4);
-        map.measure(Side::Minus, position, -0.4 + 0.5 * position, 1e-4);
+        map.measure(Side::Plus, position, 1.0, 0.4 + 0.5 * position, 1e-4);
+        map.measure(Side::Minus, position, 1.0, -0.4 + 0.5 * position, 1e-4);
     }
     let (tilt, deviation) = map.tilt();
     assert!((tilt - 0.5).abs() < 3.0 * deviation, "{tilt} {deviation}");

@@ -72,17 +72,20 @@ fn looped(
     axes: PerDof<Axis>,
     estimation: StateEstimation,
 ) -> Box<HysteresisReduction> {
-    Box::new(HysteresisReduction::new(
-        axes,
-        model(),
-        estimation,
-        History::new(2.0, PERIOD).unwrap(),
-        Whereabouts::new(WhereaboutsSettings {
-            start_deviation: [5e-3, 0.6, 0.5],
-            rest_deviation: [2e-4, 0.02, 0.01],
-            settling_time: 0.15,
-        })
-        .unwrap(),
-        Guards::new(*guards).unwrap(),
-    ))
+    Box::new(
+        HysteresisReduction::new(
+            axes,
+            model(),
+            estimation,
+            History::new(2.0, PERIOD).unwrap(),
+            Whereabouts::new(WhereaboutsSettings {
+                start_deviation: [5e-3, 0.6, 0.5],
+                rest_deviation: [2e-4, 0.02, 0.01],
+                settling_time: 0.15,
+            })
+            .unwrap(),
+            Guards::new(*guards).unwrap(),
+        )
+        .with_friction(Some(super::friction())),
+    )
 }

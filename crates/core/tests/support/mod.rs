@@ -4,8 +4,8 @@ pub mod looped;
 
 use tautscope_core::{
     AdaptiveAxis, AdaptiveSettings, ChangeSettings, ClutchSettings, ContactTest, Flags,
-    FrameSettings, GripSettings, GuardSettings, LeadLaw, MonitorSettings, MotionSettings,
-    OffsetPrior, PerDof, Play, SupervisorSettings,
+    FrameSettings, Friction, FrictionSettings, GripSettings, GuardSettings, LeadLaw,
+    MonitorSettings, MotionSettings, OffsetPrior, PerDof, Play, SupervisorSettings,
 };
 
 pub const UNITS: PerDof<f64> = [0.4e-3, 0.04, 0.02];
@@ -79,6 +79,16 @@ pub fn guards() -> GuardSettings {
         offset_limit: UNITS.map(|unit| 20.0 * unit),
         off: Flags::NONE,
     }
+}
+
+/// Of a shaft of 3.5 mm.
+pub fn friction() -> Friction {
+    Friction::new(FrictionSettings {
+        arm: 1.75e-3,
+        memory: 0.2e-3,
+        deviation: 0.25,
+    })
+    .unwrap()
 }
 
 /// A DOF of profile `best` with lengths in units of `unit`.
