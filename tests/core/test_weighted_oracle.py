@@ -265,10 +265,10 @@ def test_a_correction_is_not_added_twice() -> None:
 def test_a_wrong_belief_gives_way_in_the_end() -> None:
     """Both markers say the same, again and again, against a belief that was sure.
 
-    Without the guard, which would hold what was believed for ``safety.hold_time`` first.
+    Without the guards, which would hold what was believed for ``safety.hold_time`` first.
     """
     period = CONFIG.control.period
-    config = CONFIG.replace(**{"safety.off": ["innovation", "swapped"]})
+    config = CONFIG.replace(**{"safety.off": ["innovation", "jump", "swapped"]})
     loop, model = HysteresisReduction(config), build_feature_model(CONFIG)
     reference = np.array([0.025, 0.0, 0.9])
     tick = 0

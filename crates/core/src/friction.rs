@@ -43,7 +43,7 @@ impl SlackShare {
 ///
 /// Friction has one size and opposes the way the surface slides, along and around together. With
 /// e = c - q less the middle of the slack, h half the width of the slack that each DOF has by itself
-/// [m, rad], and the arm r [m]:
+/// [m, rad], and the arm r in m:
 ///
 /// ```text
 /// n = (e1 / h1, e2 / h2)              |n| <= 1; the shaft slides only where |n| = 1

@@ -18,7 +18,8 @@ pub struct Entry {
     pub predicted_state: PerDof<f64>,
     /// The part of it by which images have moved the model so far [m, rad, rad].
     pub corrected: PerDof<f64>,
-    /// How far the command has gone so far, forth and back [m, rad, rad].
+    /// How far the tip may have gone so far, forth and back [m, rad, rad]: as far as its command, or, where another DOF
+    /// takes the friction that held it, as the predicted state.
     pub travel: PerDof<f64>,
 }
 

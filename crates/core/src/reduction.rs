@@ -119,13 +119,19 @@ impl HysteresisReduction {
     /// holds the command, which before the first reference is NaN.
     pub fn step(&mut self, reference: PerDof<f64>, stamp: Option<f64>, time: f64) -> PerDof<f64> {
         let before = self.axes.each_ref().map(Axis::command);
+        let believed = self.predicted_state();
         self.guards.tick(&mut self.axes, reference, stamp, time);
+        let command = self.axes.each_ref().map(Axis::command);
+        let mut moved = distance(before, command);
         if let Some(friction) = &mut self.friction {
             friction.couple(self.guards.admitted(), &mut self.axes);
+            // What another DOF takes of the friction lets go of a tip whose command rests.
+            let released = distance(believed, self.predicted_state());
+            for (moved, released) in moved.iter_mut().zip(released) {
+                *moved = moved.max(released);
+            }
         }
-        let command = self.axes.each_ref().map(Axis::command);
-        for ((travel, command), before) in self.travel.iter_mut().zip(command).zip(before) {
-            let moved = (command - before).abs();
+        for (travel, moved) in self.travel.iter_mut().zip(moved) {
             *travel += if moved.is_finite() { moved } else { 0.0 };
         }
         let jumped_back = self.history.push(Entry {
@@ -381,4 +387,10 @@ impl HysteresisReduction {
     pub const fn guards_mut(&mut self) -> &mut Guards {
         &mut self.guards
     }
+}
+
+fn distance(from: PerDof<f64>, to: PerDof<f64>) -> PerDof<f64> {
+    let [a, b, c] = from;
+    let [d, e, f] = to;
+    [(d - a).abs(), (e - b).abs(), (f - c).abs()]
 }

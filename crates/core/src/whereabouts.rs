@@ -39,7 +39,7 @@ pub struct WhereaboutsSettings {
 /// arrived = arrived_last + (travel - arrived_last) elapsed / (settling_time + elapsed)
 /// ```
 ///
-/// with the travel of the command, forth and back: whatever the slack does, the tip moves no farther. But it does so
+/// with the travel of [`Entry`]: whatever the slack does, the tip moves no farther. But it does so
 /// later, and goes on when the command has come to rest; `arrived` is how far of the travel it has had the time to go.
 /// `deviation_last` has the
 /// image's own and, of the linear step of Eq. (16), a quarter of the correction. Every image without markers makes it
