@@ -25,6 +25,7 @@ from typing import Any
 import guarantee_logs as logs
 import guarantee_loop as loop
 import guarantee_rows as rows
+import guarantee_silence as silence
 from doc_pages import ROOT, insert
 from faults import read
 from guarantee_mutants import mutants
@@ -57,6 +58,8 @@ GOALS = (
     Goal("G9", "slack believed in, whatever fails", "at most 12 mm"),
     Goal("G10", "frozen picture noticed", "within 3 frames, 0.12 s"),
     Goal("G10b", "camera off noticed", "within 0.2 s"),
+    Goal("G10c", "hand's device silent: command at rest", "within 0.05 s and a tick"),
+    Goal("G10d", "heartbeat of a drive lost: all in quick stop", "within 0.1 s and a cycle"),
     Goal("G12", "allocation in the tick, through every flag and reaction", "none"),
     Goal("G13", "time of a tick under load", "p99.99 100 us, at most 1 ms"),
     Goal("G14", "command's step after a stall of 5 ms to 2 s", "at most v_max dt"),
@@ -91,6 +94,8 @@ SIZES = {
     "hours": Size(1_000, 3_000),
     "loaded": Size(100_000, 100),
     "stalls": Size(10_000, 5),
+    "silences": Size(1_000, 10),
+    "heartbeats": Size(100, 300),
     "replays": Size(256, 25),
     "kills": Size(1_000, 3_000),
     "cuts": Size(1, 200),
@@ -124,6 +129,8 @@ def arguments() -> argparse.Namespace:
     count("hours", "G15, in Rust: 1000", float)
     count("loaded", "G13: ticks under load, 100000")
     count("stalls", "G14: 10000")
+    count("silences", "G10c: of the hand, 1000")
+    count("heartbeats", "G10d: lost, on the simulated bus, 100")
     count("replays", "G19: 256")
     count("kills", "G16: 1000")
     count("cuts", "G18: every N-th byte, 1")
@@ -151,6 +158,8 @@ def measures() -> dict[str, Callable[[Any], dict[str, rows.Figure]]]:
         "ticks": lambda count: core("no_alloc", "allocate", TAUTSCOPE_TICKS=count),
         "hours": lambda hours: core("soak", "", TAUTSCOPE_HOURS=hours),
         "stalls": lambda count: {"G14": rows.stalls(count)},
+        "silences": lambda count: {"G10c": silence.hand_silent(count)},
+        "heartbeats": lambda count: {"G10d": silence.heartbeat_lost(count)},
         "replays": lambda count: {"G19": rows.replays(count)},
         "kills": lambda count: {"G16": kills(count)},
         "cuts": lambda every: {"G18": logs.cuts(every)},
