@@ -56,7 +56,7 @@ class SafetyConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """An image further from what is expected is refused [in standard deviations]."""
     innovation_floor: Positive = 0.08
     """Least standard deviation of what is expected [in start_deviation]."""
-    jump: PerDof = (0.2e-3, 0.1, 0.05)
+    jump: PerDof = (0.2e-3, 0.2, 0.05)
     """How much farther than its command a tip may come from one image to the next, besides two of
     the image's own standard deviations [m, rad, rad]."""
     slip: PerDof = (0.4e-3, 2.6, 0.04)
