@@ -15,7 +15,7 @@ const SLIP_SHARE: f64 = 0.15;
 const LEARNT: u32 = 3;
 /// What a command moves by between two images that does not rest, as a share of `distance`: a tip at rest creeps.
 const REST: f64 = 0.007;
-/// What a command comes back by between two images before it has turned, as a share of `slip`.
+/// What a command comes back by between two images, or another DOF lets go of, before it has turned, as a share of `slip`.
 const TURN: f64 = 0.1;
 
 /// One DOF's contact, told from command c and measured tip m.
@@ -25,9 +25,10 @@ const TURN: f64 = 0.1;
 /// or      c - m < least offset - slip - deviation,   c - m > largest offset + slip + deviation
 /// ```
 ///
-/// From a turn or rest of the command on, (c0, m0) is where it last slipped. Once it has not over `distance` the tip is held,
-/// (c0, m0) is where that was found, and until the command turns or rests it cannot slip. Nor can slack grow by more than that between two turns: the
-/// offsets are those learnt at the last, once it has turned three times.
+/// From a turn or rest of the command on, (c0, m0) is where it last slipped. Once it has not over `distance` the tip is
+/// held, (c0, m0) is where that was found, and until the command turns or rests it cannot slip. Nor can slack grow by
+/// more than that between two turns: the offsets are those learnt at the last, once it has turned three times. Friction
+/// that another DOF takes counts as a turn.
 ///
 /// Without effect where a tip goes less far than its command, or farther: it is never held. Wrong where something else
 /// moves the tip: that slips, too.
@@ -62,7 +63,7 @@ struct Last {
 pub struct Sighting {
     /// The command c.
     pub command: f64,
-    /// How far it had gone, forth and back.
+    /// How far the tip may have gone, as in [`crate::Entry`].
     pub travel: f64,
     /// The tip m as measured; NaN where it was not.
     pub tip: f64,
