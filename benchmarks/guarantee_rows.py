@@ -86,7 +86,10 @@ def campaign(rows: Sequence[Row]) -> dict[str, Figure]:
             if row["kind"] == kind and (row["fault"]["duration"] or np.inf) > limit
         ]
         times = [np.inf if row["detected"] is None else row["detected"] for row in own]
-        text = f"{max(times, default=np.inf):.3f} s at most"
+        noticed = [each for each in times if each < np.inf]
+        text = f"{max(noticed, default=np.inf):.3f} s at most"
+        if never := len(times) - len(noticed):
+            text += f", {never} never"
         found[name] = figure(text, own, sum(each > limit + 1e-9 for each in times))
     found["G23"] = _spurious(rows, seeds)
     return found
