@@ -1,7 +1,8 @@
 //! Frame to markers: Fig. 5 as a whole.
 
 use crate::blend::{Blend, Blended};
-use crate::judge::{Verdict, judge, judge_at};
+use crate::judge::{judge, judge_at};
+use crate::verdict::Verdict;
 use crate::{
     ColorDiscriminant, Demands, Error, Expect, Expectation, Frame, Labeller, Region, RunMap,
     Segmenter, Window,

@@ -1,26 +1,11 @@
 //! Which of what has the markers' colour is a band: by place, size, outline, and both together.
 
-use crate::evidence::{Demands, Evidence, weigh};
+use crate::evidence::{Demands, Evidence};
 use crate::fit::{COARSE, FINE, Fit, fit, settle};
 use crate::pairing::{Pair, TRIALS, likely, shift};
+use crate::verdict::{NOWHERE, Verdict};
 use crate::{Expect, Expectation, Region, Rejection, RunMap};
 
-/// How the two bands were recognised, or why not.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Verdict {
-    /// Centroids `[u_A, v_A, u_B, v_B]` (px); NaN for a band that is not found.
-    pub features: [f64; 4],
-    /// Their covariance (4, 4) (px^2); NaN likewise.
-    pub covariance: [[f64; 4]; 4],
-    /// What each band looks like; none of it counts for a band that nothing was compared with.
-    pub bands: [Evidence; 2],
-    /// Why a band is not found.
-    pub reasons: [Option<Rejection>; 2],
-    /// Which discriminant it rests on: 0 is the trained one, others are its alternatives.
-    pub discriminant: usize,
-}
-
-const NOWHERE: [f64; 4] = [f64::NAN; 4];
 /// Outlines are laid again at most so often, and until they stay within so much (px).
 const LAYS: usize = 6;
 const STILL: f64 = 0.1;
@@ -30,18 +15,14 @@ const SHIFTS: usize = 10;
 const SAME: f64 = 0.7;
 /// A lone band must be nearer to its place than to the other's by this squared Mahalanobis distance.
 const AMBIGUOUS: f64 = 9.0;
-/// Variance that a band has more of for its missing edges.
-const HIDDEN: f64 = 5.0;
-/// What a unit of that distance takes from a score that edges make.
-const DOUBT: f64 = 0.02;
 
 /// Recognises the bands among `regions` and `map`.
 pub fn judge(regions: &[Region], map: &RunMap, expect: &impl Expect, demands: &Demands) -> Verdict {
     let Some(blind) = expect.expect(NOWHERE, [f64::INFINITY; 4]) else {
-        return nothing(Rejection::Unseen);
+        return Verdict::nothing(Rejection::Unseen);
     };
     if regions.is_empty() {
-        return nothing(Rejection::NoRegion);
+        return Verdict::nothing(Rejection::NoRegion);
     }
     let mut best: Option<(f64, Verdict)> = None;
     let mut tried: [[f64; 4]; 2 * TRIALS] = [NOWHERE; 2 * TRIALS];
@@ -73,7 +54,7 @@ pub fn judge(regions: &[Region], map: &RunMap, expect: &impl Expect, demands: &D
         }
     }
     let Some((_, verdict)) = best else {
-        return nothing(Rejection::NoRegion);
+        return Verdict::nothing(Rejection::NoRegion);
     };
     match verdict.reasons {
         [None, Some(_)] => alone(verdict, 0, &blind, regions, map, expect, demands),
@@ -121,29 +102,6 @@ fn alone(
         verdict.conceal();
     }
     verdict
-}
-
-impl Verdict {
-    /// Each band found counts one and its edges; where they are surprising counts against it.
-    ///
-    /// So does a band of which too much is outside the image, if the rest is clear: else outlines that lie worse, but
-    /// farther inside, would win.
-    pub(crate) fn score(&self) -> f64 {
-        let bands = self.bands.iter().zip(&self.reasons);
-        let shown = |(band, reason): (&Evidence, &Option<Rejection>)| {
-            let located = match reason {
-                None => true,
-                Some(Rejection::Outside { .. }) => band.is_clear(),
-                Some(_) => false,
-            };
-            if located {
-                1.0 + band.edges - DOUBT * band.surprise
-            } else {
-                0.1 * band.edges
-            }
-        };
-        bands.map(shown).sum()
-    }
 }
 
 /// Where the bands are if these regions are they.
@@ -263,59 +221,4 @@ fn lay(
     }
     let found = fit(&laid, start, bands, rounds, map)?;
     Some((laid, found))
-}
-
-impl Verdict {
-    fn of(laid: &Expectation, found: &Fit, map: &RunMap, demands: &Demands) -> Self {
-        let (bands, reasons) = weigh(laid, found, map, demands);
-        let mut verdict = Self {
-            features: found.features,
-            covariance: doubted(&found.covariance, found.edges),
-            bands,
-            reasons,
-            discriminant: 0,
-        };
-        verdict.conceal();
-        verdict
-    }
-
-    /// Whether there is no need to look further.
-    pub(crate) fn is_clear(&self) -> bool {
-        let mut bands = self.bands.iter().zip(&self.reasons);
-        bands.all(|(band, reason)| reason.is_none() && band.is_clear())
-    }
-
-    /// What is not found has no features.
-    fn conceal(&mut self) {
-        for band in (0..2).filter(|band| self.reasons[*band].is_some()) {
-            for index in [2 * band, 2 * band + 1] {
-                self.features[index] = f64::NAN;
-                self.covariance[index] = NOWHERE;
-                for row in &mut self.covariance {
-                    row[index] = f64::NAN;
-                }
-            }
-        }
-    }
-}
-
-/// What hides a part of an outline may pass for another part of it: the less of it is there, the less sure it is.
-fn doubted(covariance: &[[f64; 4]; 4], edges: [f64; 2]) -> [[f64; 4]; 4] {
-    let factors = edges.map(|share| (1.0 + HIDDEN * (1.0 - share)).sqrt());
-    std::array::from_fn(|i| {
-        std::array::from_fn(|j| covariance[i][j] * factors[i / 2] * factors[j / 2])
-    })
-}
-
-fn nothing(reason: Rejection) -> Verdict {
-    Verdict {
-        features: NOWHERE,
-        covariance: [NOWHERE; 4],
-        bands: [Evidence {
-            centroid: [f64::NAN; 2],
-            ..Evidence::default()
-        }; 2],
-        reasons: [Some(reason); 2],
-        discriminant: 0,
-    }
 }

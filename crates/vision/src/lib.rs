@@ -13,6 +13,8 @@ pub mod blend;
 mod columns;
 pub mod detector;
 pub mod discriminant;
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+mod dot;
 pub mod error;
 pub mod evidence;
 pub mod expectation;
@@ -35,6 +37,7 @@ pub mod runs;
 mod samples;
 pub mod segment;
 mod triples;
+pub mod verdict;
 
 pub use detector::{Detector, Settings};
 pub use discriminant::ColorDiscriminant;
@@ -43,8 +46,8 @@ pub use evidence::{Demands, Evidence};
 pub use expectation::{Expect, Expectation, OUTLINE, Outline};
 pub use format::PixelFormat;
 pub use frame::{Frame, Image, Window};
-pub use judge::Verdict;
 pub use regions::{Labeller, Region};
 pub use rejection::Rejection;
 pub use runmap::RunMap;
 pub use segment::Segmenter;
+pub use verdict::Verdict;
