@@ -74,6 +74,7 @@ mod play;
 mod posture;
 mod reactions;
 mod reduction;
+mod sharing;
 mod sight;
 mod slack;
 mod smoother;
