@@ -113,6 +113,7 @@ pub use play::{ContactMode, Play, PlayState};
 pub use posture::Belief;
 pub use reactions::{Clear, Reaction, Rule, Source, TABLE};
 pub use reduction::{HysteresisReduction, Report, StateEstimation, Status};
+pub use sharing::Sharing;
 pub use smoother::Smoother;
 pub use state::{StateEstimate, StateEstimator};
 pub use supervisor::{Event, Supervisor, SupervisorSettings};
