@@ -170,3 +170,40 @@ impl Slack {
         triggers
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_shared_by_both_is_by_none() {
+        let prior = OffsetPrior {
+            spacing: 1.0,
+            level: 1.0,
+            tilt: 0.0,
+            local: 1.0,
+            correlation: 10.0,
+            level_drift: 0.0,
+            tilt_drift: 0.0,
+            local_drift: 0.0,
+            symmetry: 0.0,
+        };
+        let mut slack = Slack::new(prior, Play::from_ordered(-1.0, 3.0));
+        let part = SlackShare {
+            now: 0.0,
+            aimed: 0.5,
+            deviation: 0.0,
+        };
+        for (of_other, now, aimed) in [(0.0, 3.0, 3.0), (0.5, 2.0, 2.5), (1.0, 1.0, 2.0)] {
+            slack.set_slack_share(part, of_other);
+            assert!(
+                (slack.offset(Side::Plus, 0.0) - now).abs() < 1e-12,
+                "{of_other}"
+            );
+            assert!(
+                (slack.aimed(Side::Plus, 0.0) - aimed).abs() < 1e-12,
+                "{of_other}"
+            );
+        }
+    }
+}
