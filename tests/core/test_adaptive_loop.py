@@ -63,16 +63,14 @@ def run(
 
 @pytest.mark.parametrize("delay", [0, 16, 40])
 @pytest.mark.parametrize("seed", [0, 1])
-@pytest.mark.parametrize(("one_friction", "share"), [(False, 0.1), (True, 0.15)])
-def test_all_three_at_once_lose_their_slack(
-    delay: int, seed: int, one_friction: bool, share: float
-) -> None:
-    """Also, a little less of it, where a friction that they do not share is expected."""
+@pytest.mark.parametrize("one_friction", [False, True])
+def test_all_three_at_once_lose_their_slack(delay: int, seed: int, one_friction: bool) -> None:
+    """Also where a friction that they do not share is expected."""
     reference, _, tip = run(delay=delay, seed=seed, one_friction=one_friction)
     for dof in Dof:
         last = slice(TICKS - round(2 * PERIODS[dof] / CONFIG.control.period), TICKS)
         left = loop_width(reference[last, dof], tip[last, dof]).mean
-        assert abs(left) < share * (PLUS - MINUS)[dof], f"{dof.label}, seed {seed}: {left}"
+        assert abs(left) < 0.1 * (PLUS - MINUS)[dof], f"{dof.label}, seed {seed}: {left}"
 
 
 def test_start_values_half_too_wide_overshoot_little() -> None:

@@ -291,9 +291,14 @@ impl AdaptiveAxis {
         self.slack.half_width(self.reference.unwrap_or(0.0))
     }
 
-    /// So much of the slack is left for this DOF.
-    pub(crate) fn set_slack_share(&mut self, part: SlackShare) {
-        self.slack.set_slack_share(part);
+    /// How much of its friction is shared, 0 to 1.
+    pub(crate) const fn shared(&self) -> f64 {
+        self.slack.shared()
+    }
+
+    /// So much of the slack is left for this DOF if all friction is shared; the other DOF shares so much of its own.
+    pub(crate) fn set_slack_share(&mut self, part: SlackShare, of_other: f64) {
+        self.slack.set_slack_share(part, of_other);
         if self.tip.is_finite() {
             self.tip = self.slack.carried(self.tip, self.command);
         }

@@ -71,10 +71,18 @@ impl Axis {
         }
     }
 
-    /// So much of its slack is left for it; the article's scheme does not know of that.
-    pub(crate) fn set_slack_share(&mut self, part: SlackShare) {
+    /// How much of its friction is shared, 0 to 1; the article's scheme does not know of that.
+    pub(crate) fn shared(&self) -> f64 {
+        match self {
+            Self::Article(_) => 0.0,
+            Self::Adaptive(axis) => axis.shared(),
+        }
+    }
+
+    /// So much of its slack is left for it if all friction is shared; the other DOF shares so much of its own.
+    pub(crate) fn set_slack_share(&mut self, part: SlackShare, of_other: f64) {
         if let Self::Adaptive(axis) = self {
-            axis.set_slack_share(part);
+            axis.set_slack_share(part, of_other);
         }
     }
 

@@ -164,7 +164,8 @@ impl Friction {
             commands,
             [insertion.half_width(), rotation.half_width()],
         );
-        insertion.set_slack_share(first);
-        rotation.set_slack_share(second);
+        let shared = [insertion.shared(), rotation.shared()];
+        insertion.set_slack_share(first, shared[1]);
+        rotation.set_slack_share(second, shared[0]);
     }
 }

@@ -6,9 +6,7 @@ use crate::friction::SlackShare;
 use crate::limits::PlayLimit;
 use crate::offset_map::{OffsetMap, OffsetPrior, Side, TILTS};
 use crate::play::Play;
-
-/// How fast it is learnt how much of the friction is shared: share of the error, per image.
-const SHARING: f64 = 0.1;
+use crate::sharing::Sharing;
 
 /// What was learnt of both contact offsets, and the most of it that is believed; in the unit of the DOF.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,8 +14,9 @@ pub struct Slack {
     learnt: OffsetMap,
     limit: PlayLimit,
     part: SlackShare,
-    /// How much of the friction is shared, 0 to 1.
-    shared: f64,
+    sharing: Sharing,
+    /// How much of its friction the other DOF shares.
+    of_other: f64,
 }
 
 impl Slack {
@@ -27,7 +26,8 @@ impl Slack {
             learnt: OffsetMap::new(prior, play.delta_minus(), play.delta_plus()),
             limit: PlayLimit::NONE,
             part: SlackShare::WHOLE,
-            shared: 1.0,
+            sharing: Sharing::new(),
+            of_other: 1.0,
         }
     }
 
@@ -52,33 +52,24 @@ impl Slack {
         self.limit.exceeds(minus, plus)
     }
 
-    /// So much of it is left for this DOF.
-    pub const fn set_slack_share(&mut self, part: SlackShare) {
-        self.part = part;
+    /// So much of it is left for this DOF if all friction is shared; the other DOF shares so much of its own.
+    pub const fn set_slack_share(&mut self, part: SlackShare, of_other: f64) {
+        (self.part, self.of_other) = (part, of_other);
+    }
+
+    /// How much of its friction is shared, 0 to 1, as its offsets say.
+    pub const fn shared(&self) -> f64 {
+        self.sharing.shared()
+    }
+
+    /// The same as far as the other DOF shares its own: what is not shared by both is by none.
+    const fn common(&self) -> f64 {
+        self.shared().min(self.of_other)
     }
 
     /// The share of the width that is left.
     fn left(&self, part: f64) -> f64 {
-        1.0 - self.shared * (1.0 - part)
-    }
-
-    /// Learn how much is shared from an offset in contact, by the steepest descent of
-    ///
-    /// ```text
-    /// ((offset - middle) / half width - (1 - shared (1 - part)))^2
-    /// ```
-    ///
-    /// as far as that is off by more than the share's deviation.
-    fn share(&mut self, side: Side, position: f64, offset: f64) {
-        let lost = 1.0 - self.part.now;
-        let whole = Side::BOTH.map(|side| self.learnt.offset(side, position));
-        let [minus, plus] = whole;
-        if plus > minus && lost > 0.0 {
-            let missing = (side.of(whole) - offset) / (side.of(whole) - f64::midpoint(minus, plus));
-            let error = missing.clamp(0.0, 1.0) - self.shared * lost;
-            let beyond = error - error.clamp(-self.part.deviation, self.part.deviation);
-            self.shared = (self.shared + SHARING * lost * beyond).clamp(0.0, 1.0);
-        }
+        1.0 - self.common() * (1.0 - part)
     }
 
     /// Both offsets at a position, within the limit, where that share of the width is left.
@@ -158,8 +149,8 @@ impl Slack {
         variance: f64,
     ) -> Triggers {
         self.learnt.travel(motion.travel);
-        let doubt = self.shared * self.part.deviation * self.half_width(measured);
-        let variance = variance + doubt * doubt;
+        let doubt = self.common() * self.part.deviation * self.half_width(measured);
+        let (own, variance) = (variance, variance + doubt * doubt);
         let mut triggers = Triggers::default();
         let offset = command - measured;
         let (side, sign, trigger) = if motion.upwards {
@@ -170,12 +161,49 @@ impl Slack {
         if motion.together {
             let share = self.left(self.part.now);
             self.learnt.measure(side, measured, share, offset, variance);
-            self.share(side, measured, offset);
+            self.sharing.learn(side, 1.0 - self.part.now, offset, own);
             *trigger = Some(Trigger::Contact);
         } else if sign * (offset - self.offset(side, measured)) > libm::sqrt(variance) {
             self.learnt.bound(side, measured, offset, variance);
             *trigger = Some(Trigger::Violation);
         }
         triggers
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_shared_by_both_is_by_none() {
+        let prior = OffsetPrior {
+            spacing: 1.0,
+            level: 1.0,
+            tilt: 0.0,
+            local: 1.0,
+            correlation: 10.0,
+            level_drift: 0.0,
+            tilt_drift: 0.0,
+            local_drift: 0.0,
+            symmetry: 0.0,
+        };
+        let mut slack = Slack::new(prior, Play::from_ordered(-1.0, 3.0));
+        let part = SlackShare {
+            now: 0.0,
+            aimed: 0.5,
+            deviation: 0.0,
+        };
+        for (of_other, now, aimed) in [(0.0, 3.0, 3.0), (0.5, 2.0, 2.5), (1.0, 1.0, 2.0)] {
+            slack.set_slack_share(part, of_other);
+            assert!(
+                (slack.offset(Side::Plus, 0.0) - now).abs() < 1e-12,
+                "{of_other}"
+            );
+            assert!(
+                (slack.aimed(Side::Plus, 0.0) - aimed).abs() < 1e-12,
+                "{of_other}"
+            );
+        }
     }
 }

@@ -7,60 +7,15 @@
 
 mod support;
 
-use support::looped::{adaptive, article, article_with, model};
-use support::{PERIOD, UNITS};
-use tautscope_core::{FeatureModel, HysteresisReduction, PerDof, Play, PlayState, Reaction};
+use support::PERIOD;
+use support::looped::{adaptive, article, article_with};
+use support::stand_in::{World, hand, real};
+use tautscope_core::{HysteresisReduction, Play, Reaction};
 
-const HAND: [(f64, f64, f64); 3] = [(0.025, 15e-3, 7.5), (0.0, 1.2, 11.3), (0.9, 0.5, 17.9)];
-/// Slack of the instrument, in [`UNITS`].
-const WIDTH: f64 = 25.0;
 const TICKS_PER_FRAME: u64 = 8;
 const TENTHS: u8 = 10;
 /// When the slack is learnt, and nothing had time to drift [s]; what the last tenth is compared with.
 const EARLY: (f64, f64) = (60.0, 180.0);
-/// Of markers, one way [px].
-const NOISE: f64 = 0.2;
-
-struct World {
-    play: PerDof<Play>,
-    tip: PerDof<PlayState>,
-    model: FeatureModel,
-    chance: u64,
-}
-
-impl World {
-    fn new() -> Self {
-        Self {
-            play: UNITS.map(|unit| Play::new(-0.4 * WIDTH * unit, 0.6 * WIDTH * unit).unwrap()),
-            tip: HAND.map(|(output, _, _)| PlayState { output }),
-            model: model(),
-            chance: 2026,
-        }
-    }
-
-    fn follow(&mut self, command: PerDof<f64>) {
-        for ((play, tip), input) in self.play.iter().zip(&mut self.tip).zip(command) {
-            play.step(tip, input);
-        }
-    }
-
-    fn seen(&mut self) -> Option<[f64; 4]> {
-        let truth = self.model.predict(self.tip.map(|tip| tip.output))?;
-        Some(truth.features.map(|place| {
-            self.chance ^= self.chance << 13;
-            self.chance ^= self.chance >> 7;
-            self.chance ^= self.chance << 17;
-            let share = real(self.chance >> 11) / real(1 << 53);
-            place + 2.0 * NOISE * (share - 0.5)
-        }))
-    }
-}
-
-#[expect(clippy::cast_precision_loss, reason = "below 2^53")]
-fn real(count: u64) -> f64 {
-    count as f64
-}
-
 /// Resident memory in pages, and open files; none where the system does not say.
 fn resources() -> Option<(u32, usize)> {
     let memory = std::fs::read_to_string("/proc/self/statm").ok()?;
@@ -89,9 +44,7 @@ fn soak(law: &str, mut reduction: Box<HysteresisReduction>) -> String {
         let (start, mut error) = (u64::from(tenth) * ticks, 0.0);
         for tick in start..start + ticks {
             let time = real(tick) * PERIOD;
-            let hand = HAND.map(|(centre, reach, period)| {
-                centre + reach * (std::f64::consts::TAU * time / period).sin()
-            });
+            let hand = hand(time);
             let command = reduction.step(hand, None, time);
             assert!(
                 command.iter().all(|value| value.is_finite()),

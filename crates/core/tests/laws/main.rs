@@ -20,6 +20,7 @@ mod monitor;
 mod motion_watch;
 mod offset_map;
 mod play;
+mod sharing;
 mod state;
 mod supervisor;
 #[path = "../support/mod.rs"]

@@ -1,6 +1,7 @@
 //! Guards for the tests of the loop: lengths in units of 0.4 mm, 0.04 rad, 0.02 rad.
 
 pub mod looped;
+pub mod stand_in;
 
 use tautscope_core::{
     AdaptiveAxis, AdaptiveSettings, ChangeSettings, ClutchSettings, ContactTest, Flags,

@@ -1,0 +1,78 @@
+//! How much friction is shared: what offsets say of it, and what the loop makes of slacks that are apart.
+
+use proptest::prelude::*;
+use tautscope_core::{Sharing, Side, Status};
+
+use crate::config;
+use crate::support::looped::adaptive;
+use crate::support::stand_in::{WIDTH, World, hand};
+use crate::support::{PERIOD, UNITS};
+
+/// After offsets of a slack about `middle`, `half` wide each way, whose other DOF takes `shared` of what it can.
+fn told(middle: f64, half: f64, shared: f64, lost: &[f64]) -> f64 {
+    let mut sharing = Sharing::new();
+    for (index, lost) in lost.iter().enumerate() {
+        let (side, sign) = if index % 2 == 0 {
+            (Side::Plus, 1.0)
+        } else {
+            (Side::Minus, -1.0)
+        };
+        let offset = middle + sign * half * (1.0 - shared * lost);
+        sharing.learn(side, *lost, offset, 0.01 * half * half);
+    }
+    sharing.shared()
+}
+
+proptest! {
+    #![proptest_config(config())]
+
+    /// By least squares all is all, nothing nothing, and 3/4 is found where all is expected.
+    #[test]
+    fn offsets_tell_how_much_is_shared(
+        middle in -0.5..0.5, half in 1e-3..2.0, shared in 0.0..1.0, seed in prop::collection::vec(0.0..1.0, 40),
+    ) {
+        let lost: Vec<f64> = (0..800).map(|index| seed[index % 40]).collect();
+        let spread = seed.iter().fold(0.0_f64, |most, value| most.max((value - seed[0]).abs()));
+        prop_assume!(spread > 0.5);
+        let found = told(middle * half, half, shared, &lost);
+        let expected = (shared / 0.75).min(1.0);
+        prop_assert!((found - expected).abs() < 0.08, "{found}, {expected}");
+    }
+
+    /// What is hardly ever lost says nothing.
+    #[test]
+    fn without_a_difference_it_stays(half in 1e-3..2.0, lost in 0.0..0.005) {
+        prop_assert!(told(0.0, half, 0.0, &[lost; 500]) > 0.99);
+    }
+
+    /// Whatever comes in, it is a share, and it can be told anew.
+    #[test]
+    fn a_share_stays_a_share(
+        offsets in prop::collection::vec((any::<bool>(), 0.0..=1.0, -1e300..1e300, 1e-300..1e300), 1..50),
+    ) {
+        let mut sharing = Sharing::new();
+        for (upper, lost, offset, variance) in offsets {
+            let side = if upper { Side::Plus } else { Side::Minus };
+            sharing.learn(side, lost, offset, variance);
+            prop_assert!((0.0..=1.0).contains(&sharing.shared()), "{sharing:?}");
+        }
+    }
+}
+
+/// A loop that expects one friction finds three plays apart as wide as they are, and believes what it sees of them.
+#[test]
+fn slacks_apart_are_learnt_as_they_are() {
+    let (mut reduction, mut world) = (adaptive(), World::new());
+    for tick in 0..60_000_u32 {
+        let time = f64::from(tick) * PERIOD;
+        world.follow(reduction.step(hand(time), None, time));
+        if tick.is_multiple_of(8) {
+            let report = reduction.on_features(world.seen(), None, time, Some(u64::from(tick)));
+            assert_ne!(report.status, Status::Refused, "{time} s: {report:?}");
+            for (play, unit) in report.play.iter().zip(UNITS) {
+                let off = (play.width() / (WIDTH * unit) - 1.0).abs();
+                assert!(time < 60.0 || off < 0.1, "{time} s: {off}, {report:?}");
+            }
+        }
+    }
+}
