@@ -29,6 +29,7 @@ from fault_draws import (
     told,
     watched,
 )
+from fault_hand import AllSeen, Device, Hand
 from fault_judgement import (
     HELD,
     MOVED,
@@ -43,7 +44,7 @@ from fault_judgement import (
     outcome,
     wider,
 )
-from fault_watch import STILL, AllSeen, Device, Driven, FeatureTwin, Hand, Watch
+from fault_watch import STILL, Driven, FeatureTwin, Watch
 from tautscope.config import Config, Profile
 from tautscope.errors import ConfigError, TautscopeError
 from tautscope.experiment import run_experiment

@@ -22,7 +22,8 @@ import fault_draws as draws
 import fault_judgement as judgement
 import fault_runs as runs
 import fault_tables as tables
-from fault_watch import Hand, Watch
+from fault_hand import Hand
+from fault_watch import Watch
 
 ROOT = Path(__file__).resolve().parents[1]
 CONFIG = load_config()
