@@ -130,18 +130,33 @@ fn ticks_of_any_length_are_counted_as_long_as_they_were() {
 }
 
 #[test]
+fn a_clock_that_stands_still_or_is_none_counts_periods() {
+    for gap in [0.0, -1.0, f64::NAN] {
+        let mut watch = watch();
+        for _ in 0..100 {
+            assert_eq!(watch.tick([SPEED * PERIOD, 0.0, 0.0], gap), Flags::NONE);
+        }
+        for _ in 0..11 {
+            watch.tick([0.0; 3], gap);
+        }
+        let raised = watch.tick([1.3 * SPEED * PERIOD, 0.0, 0.0], gap);
+        assert_eq!(raised, Flags::of(Flag::ReferenceLate), "{gap}");
+    }
+}
+
+#[test]
 fn what_was_before_a_restart_is_forgotten() {
     let mut watch = watch();
     watch.tick([0.0; 3], 10.0);
     watch.restart();
-    assert_eq!(watch.tick([0.22e-3, 0.0, 0.0], PERIOD), Flags::NONE);
-    assert!(
-        watch
-            .tick([-0.22e-3, 0.0, 0.0], PERIOD)
-            .has(Flag::ReferenceJump)
+    let (slow, fast) = (0.22e-3, 0.3e-3);
+    assert_eq!(
+        watch.tick([fast, 0.0, 0.0], PERIOD),
+        Flags::of(Flag::ReferenceJump)
     );
+    assert_ne!(watch.tick([-slow, 0.0, 0.0], PERIOD), Flags::NONE);
     watch.restart();
-    assert_eq!(watch.tick([-0.22e-3, 0.0, 0.0], PERIOD), Flags::NONE);
+    assert_eq!(watch.tick([slow, 0.0, 0.0], PERIOD), Flags::NONE);
 }
 
 #[test]
