@@ -32,7 +32,9 @@ pub struct DeviceSettings {
 /// Minimum-jerk motion (Flash and Hogan 1985), x = d (10 s^3 - 15 s^4 + 6 s^5) over a time D, gains 5.8 d / D^2 at most:
 /// to 20 mm in 0.5 s it changes its increment by 12 um in 5 ms, and a tremor of 1 mm at 12 Hz by 0.14 mm.
 ///
-/// Wrong about a hand that moved by less than that in silence, and where a device counts more coarsely than `count`.
+/// Wrong about a hand that moved by less than that in silence, or whose device is late and never catches up; and where
+/// a device counts more coarsely than `count`, or tells less than some 30 values a second, so that a quick start of the
+/// hand passes for silence.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DeviceWatch {
     settings: DeviceSettings,
