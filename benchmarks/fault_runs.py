@@ -17,6 +17,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from fault_bands import Floats, as_late, as_told, by_itself, by_the_hand, wider
 from fault_draws import (
     PERIODS,
     STARTS,
@@ -29,21 +30,9 @@ from fault_draws import (
     told,
     watched,
 )
-from fault_judgement import (
-    HELD,
-    MOVED,
-    PASSING,
-    Floats,
-    Outcome,
-    Traces,
-    as_told,
-    by_itself,
-    by_the_hand,
-    excursion,
-    outcome,
-    wider,
-)
-from fault_watch import STILL, AllSeen, Device, Driven, FeatureTwin, Hand, Watch
+from fault_hand import AllSeen, Device, Hand
+from fault_judgement import HELD, MOVED, PASSING, Outcome, Traces, excursion, outcome
+from fault_watch import STILL, Driven, FeatureTwin, Watch
 from tautscope.config import Config, Profile
 from tautscope.errors import ConfigError, TautscopeError
 from tautscope.experiment import run_experiment
@@ -174,6 +163,9 @@ class Instrument:
             elif fault.row.target is Target.REFERENCE and kind not in HELD:
                 stop = found.said["stop_tick"]
                 band = asked = by_the_hand(kind, found.meant, found.told, self._reach)
+                if kind == "hand_late":
+                    late = as_late(fault, base.truth, self._config.control.period)
+                    band = asked = wider(asked, late)
                 if (excursion(found.truth, base.truth, stop, asked) > PASSING).any():
                     bare = as_told(nominal.commands, found.meant, found.told, stop)
                     alone = yield partial(self._replay, Fault("ok"), bare)

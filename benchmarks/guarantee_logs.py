@@ -16,7 +16,7 @@ from unittest.mock import patch
 
 import numpy as np
 from fault_draws import configured
-from fault_watch import Hand
+from fault_hand import Hand
 from guarantee_rows import Figure
 from tautscope import HysteresisReduction, Twin
 from tautscope.dof import Dof

@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 from fault_draws import WATCHED, WATCHED_FOR_GOOD, configured
+from fault_hand import Hand
 from fault_judgement import PASSING
 from fault_tables import seeds as seeds_of
-from fault_watch import FeatureTwin, Hand, look
+from fault_watch import FeatureTwin, look
 from tautscope import HysteresisReduction, load_config
 from tautscope.dof import Dof
 from tautscope.experiment import run_experiment

@@ -18,11 +18,13 @@ from tautscope.twin.faults import KINDS, Fault
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
 
+import fault_bands as bands
 import fault_draws as draws
 import fault_judgement as judgement
 import fault_runs as runs
 import fault_tables as tables
-from fault_watch import Hand, Watch
+from fault_hand import Hand
+from fault_watch import Watch
 
 ROOT = Path(__file__).resolve().parents[1]
 CONFIG = load_config()
@@ -225,7 +227,7 @@ def test_what_motors_or_tissue_do_by_themselves_is_taken_off():
     alone, found = base.copy(), base.copy()
     alone[1:3, 0] = 4.0
     found[:, 0] = [0.0, 3.0, 4.5, 4.0, 0.0, -1.0]
-    band = judgement.by_itself(alone, base)
+    band = bands.by_itself(alone, base)
     assert judgement.excursion(found, base, None, band)[0] == 1.0, "to the other side"
     found[5] = 0
     assert judgement.excursion(found, base, None, band)[0] == 0.5, "so far, and not only now"
@@ -238,37 +240,48 @@ def test_where_the_hands_device_says_the_tip_is_to_go_at_the_speed_that_is_taken
     meant = np.zeros((4, 3))
     told = meant.copy()
     told[1:3, 0] = 5.0
-    low, high = judgement.by_the_hand("hand_step", meant, told, np.ones(3))
+    low, high = bands.by_the_hand("hand_step", meant, told, np.ones(3))
     # 5 at once, of which 1 is taken and 4 are thrown away; then back.
     np.testing.assert_allclose(high[:, 0], [0, 0, 5, 5, 5])
     np.testing.assert_allclose(low[:, 0], [0, 0, 0, 0, 0])
-    low, _ = judgement.by_the_hand("hand_late", meant, -told, np.ones(3))
+    low, _ = bands.by_the_hand("hand_late", meant, -told, np.ones(3))
     np.testing.assert_allclose(low[:, 0], [0, 0, -5, -5, -5])
     ramp = np.arange(1.0, 5.0)[:, None] * [1.0, 0.0, 0.0]
     behind = np.repeat(ramp[:1], 4, axis=0)
     behind[3] = ramp[3]
-    low, high = judgement.by_the_hand("hand_slow", ramp, behind, np.full(3, 0.5))
+    low, high = bands.by_the_hand("hand_slow", ramp, behind, np.full(3, 0.5))
     np.testing.assert_allclose(low[:, 0], [0, 0, -1, -2, -2.5], err_msg="2.5 of 3 thrown away")
     np.testing.assert_allclose(high[:, 0], 0)
-    low, _ = judgement.by_the_hand("hand_noisy", ramp, behind, np.full(3, 0.5))
+    low, _ = bands.by_the_hand("hand_noisy", ramp, behind, np.full(3, 0.5))
     np.testing.assert_allclose(low[:, 0], [0, 0, -1, -2, -2])
+
+
+def test_a_tip_whose_hand_is_late_belongs_where_it_was_then():
+    base = np.cumsum(np.arange(8.0))[:, None] * np.ones(3)
+    fault = Fault("hand_late", duration=1.0, severity=0.2)
+    late = base[np.maximum(np.arange(8) - 2, 0)]
+    band = bands.as_late(fault, base, 0.1)
+    assert judgement.excursion(late, base, None)[0] > 10
+    np.testing.assert_array_equal(judgement.excursion(late, base, None, band), 0)
+    np.testing.assert_array_equal(judgement.excursion(late - 1, base, None, band), 1)
+    np.testing.assert_array_equal(judgement.excursion(base + 1, base, None, band), 1)
 
 
 def test_a_tip_that_swings_by_what_the_hand_told_it_is_not_taken_back_but_what_is_added_counts():
     meant, commands = np.zeros((4, 3)), np.full((5, 3), 2.0)
     told = meant.copy()
     told[:, 0] = [1.0, -1.0, 3.0, 0.0]
-    bare = judgement.as_told(commands, meant, told, None)
+    bare = bands.as_told(commands, meant, told, None)
     np.testing.assert_allclose(bare[:, 0], [2, 3, 1, 5, 2], err_msg="with gain 1, and no more")
     np.testing.assert_allclose(bare[:, 1:], 2.0)
-    stopped = judgement.as_told(commands, meant, told, 3)
+    stopped = bands.as_told(commands, meant, told, 3)
     np.testing.assert_allclose(stopped[:, 0], [2, 3, 1, 1, 1], err_msg="nothing after a stop")
 
     base = np.zeros((3, 3))
     swung, found = base[:2].copy(), base.copy()
     swung[1, 0], found[2, 0] = 2.0, 2.5
-    asked = judgement.by_the_hand("hand_tremor", meant[:2], told[:2] / 4, np.ones(3))
-    band = judgement.wider(asked, judgement.by_itself(swung, base))
+    asked = bands.by_the_hand("hand_tremor", meant[:2], told[:2] / 4, np.ones(3))
+    band = bands.wider(asked, bands.by_itself(swung, base))
     np.testing.assert_allclose(band[1][:, 0], [0, 2, 2], err_msg="the shorter goes on")
     np.testing.assert_allclose(band[0][:, 0], [0, 0, -0.25])
     watch = Watch(lambda: 0.0, 0.0, 0.005)

@@ -33,6 +33,7 @@ NOTICED = {
     "C3": (("not_finite", "hand_nan"), {"features", "reference", "reference_invalid"}),
     "C5": (("hand_displaced",), {"reference_jump"}),
     "C7": (("stall",), {"late_tick"}),
+    "C8": (("hand_slow",), {"reference_late"}),
     "C9": (("hand_step", "hand_fast"), {"reference_jump"}),
     "D1": (("axis_off",), {"drive_fault"}),
     "D5": (("axis_reversed",), {"following_error", "innovation"}),

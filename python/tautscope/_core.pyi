@@ -236,6 +236,7 @@ class Guards:
         gain_limit: _Vector3,
         reference_speed: _Vector3,
         reference_time: float,
+        reference_count: _Vector3,
         reference_age: float,
         late_tick: float,
         stall: float,

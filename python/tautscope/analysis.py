@@ -122,11 +122,13 @@ def write_analysis(analysis: Analysis, folder: str | PathLike[str]) -> None:
     Raises:
         OutputError: The folder holds something already, or cannot be written.
     """
-    from tautscope import figures  # noqa: PLC0415  matplotlib takes half a second
+    # matplotlib takes half a second
+    from tautscope.analysis_figure import analysis_figure  # noqa: PLC0415
+    from tautscope.figures import style  # noqa: PLC0415
 
     columns = _columns(analysis)
-    figure = figures.analysis_figure(analysis)
-    with new_folder(folder) as place, figures.style():
+    figure = analysis_figure(analysis)
+    with new_folder(folder) as place, style():
         np.savetxt(
             place / "analysis.csv",
             np.column_stack(list(columns.values())),

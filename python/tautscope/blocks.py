@@ -155,6 +155,7 @@ def build_guards(config: Config) -> _core.Guards:
         gain_limit=each(lambda dof: dof.gain_limit),
         reference_speed=safety.reference_speed,
         reference_time=safety.reference_time,
+        reference_count=safety.reference_count,
         reference_age=safety.reference_age,
         late_tick=safety.late_tick,
         stall=safety.stall,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
@@ -14,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from tautscope.blocks import build_loop
 from tautscope.config import Config
-from tautscope.errors import SignalError
 from tautscope.rig import Frame
 from tautscope.safety import Reaction, Supervision, checksum, switched_off
+from tautscope.signal_checks import features_of, finite, seconds
 
 if TYPE_CHECKING:
     from tautscope.vision import Detection, MarkerDetector
@@ -140,10 +139,10 @@ class HysteresisReduction:
             SignalError: The reference is not three finite numbers, or the time is not finite;
                 the loop is left as it was.
         """
-        values = _finite("reference", reference, (3,))
-        at = self._ticks * self._config.control.period if time is None else _time("time", time)
+        values = finite("reference", reference, (3,))
+        at = self._ticks * self._config.control.period if time is None else seconds("time", time)
         self._ticks += 1
-        return self._loop.step(values, at, None if made_at is None else _time("made_at", made_at))
+        return self._loop.step(values, at, None if made_at is None else seconds("made_at", made_at))
 
     def on_frame(self, frame: Frame) -> Report:
         """Image update: find the markers, estimate the state, learn the slack, Eqs. (4)-(16).
@@ -163,7 +162,7 @@ class HysteresisReduction:
         Raises:
             SignalError: The capture time is not finite.
         """
-        captured_at = _time("captured_at", frame.captured_at)
+        captured_at = seconds("captured_at", frame.captured_at)
         predicted, expected = (
             self._loop.predicted_features(captured_at),
             self.expectation(captured_at),
@@ -173,7 +172,7 @@ class HysteresisReduction:
 
     def on_detection(self, frame: Frame, detection: Detection) -> Report:
         """The rest of `on_frame`, with the answer to `question`."""
-        captured_at = _time("captured_at", frame.captured_at)
+        captured_at = seconds("captured_at", frame.captured_at)
         picture = checksum(frame.image)
         if not any(detection.found):
             return self._report(None, captured_at, detection, None, picture)
@@ -193,8 +192,8 @@ class HysteresisReduction:
             SignalError: The features are not four numbers, finite for each band but for one that
                 was not found, or the time is not finite.
         """
-        values = None if features is None else _features(features)
-        return self._report(values, _time("captured_at", captured_at), None)
+        values = None if features is None else features_of(features)
+        return self._report(values, seconds("captured_at", captured_at), None)
 
     @property
     def supervision(self) -> Supervision:
@@ -277,30 +276,3 @@ class HysteresisReduction:
         now = self.supervision
         warnings = (*self._off, *now.flags)
         return Report(detection, captured_at, Status(facts[0]), *facts[1:], now.reaction, warnings)
-
-
-def _features(values: ArrayLike) -> NDArray[np.float64]:
-    """Four numbers, both of a band NaN or both finite, and not all NaN."""
-    features = np.asarray(values, dtype=np.float64) if np.shape(values) == (4,) else np.empty(0)
-    lost = np.isnan(features).reshape(-1, 2).all(axis=1).repeat(2)
-    if features.shape != (4,) or lost.all():
-        return _finite("features", values, (4,))
-    _finite("features", np.where(lost, 0.0, features), (4,))
-    return features
-
-
-def _finite(field: str, values: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    allowed = f"{shape[0]} finite numbers"
-    try:
-        array = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise SignalError(field, values, allowed) from None
-    if array.shape != shape or not np.isfinite(array).all():
-        raise SignalError(field, array.tolist(), allowed)
-    return array
-
-
-def _time(field: str, value: float) -> float:
-    if not isinstance(value, float | int | np.floating) or not math.isfinite(value):
-        raise SignalError(field, value, "a finite number of seconds")
-    return float(value)

@@ -8,7 +8,7 @@ import pytest
 from drawn import SLACK
 from recorded import record
 from tautscope.config import Config
-from tautscope.log.reader import Update, read_log
+from tautscope.log.reader import Log, Update, read_log
 from tautscope.log.replay import listen_to_log, listen_to_video, replay_same
 from tautscope.log.writer import LogSummary
 from tautscope.recording import Recording, per_dof
@@ -101,15 +101,19 @@ def test_jpeg_is_not_identical_but_close(tmp_path: Path, config: Config) -> None
     assert np.abs(difference).max(axis=0) == pytest.approx(0, abs=0.2)
 
 
-def test_video_and_motors_are_a_run_too(recorded: Recorded, tmp_path: Path) -> None:
-    """The same frames, and the commands as a table: the same estimates."""
-    path, recording, _ = recorded
-    log = read_log(path)
-    frames = [
+def frames_of(log: Log) -> list[Frame]:
+    return [
         Frame(log.image(index), float(event.row[0]), int(event.row[2]))
         for index, event in log.events.items()
         if isinstance(event, Update)
     ]
+
+
+def test_video_and_motors_are_a_run_too(recorded: Recorded, tmp_path: Path) -> None:
+    """The same frames, and the commands as a table: the same estimates."""
+    path, recording, _ = recorded
+    log = read_log(path)
+    frames = frames_of(log)
     table = tmp_path / "motors.csv"
     lines = ["bending,time, insertion,rotation"]
     for time, (insertion, rotation, bending) in zip(
@@ -124,3 +128,19 @@ def test_video_and_motors_are_a_run_too(recorded: Recorded, tmp_path: Path) -> N
     )
     assert len(heard.frames) >= len(frames) - 1
     assert len(heard.trace) == len(recording.trace)
+
+
+def test_motors_that_were_written_down_ten_times_a_second_are_no_silent_hand(
+    recorded: Recorded, tmp_path: Path
+) -> None:
+    path, recording, _ = recorded
+    log, commands = read_log(path), per_dof(recording.trace, "command")
+    held = commands[np.arange(len(commands)) // 10 * 10]
+    names = "time,insertion,rotation,bending"
+    rows = np.column_stack([recording.trace["time"], held])
+    table = tmp_path / "motors.csv"
+    np.savetxt(table, rows, "%.17g", delimiter=",", header=names, comments="")
+    heard = listen_to_video(frames_of(log), table, log.config).recording
+    there = per_dof(heard.frames, "predicted")
+    away = np.abs(there - per_dof(recording.frames, "predicted")[: len(there)])
+    assert (away.max(axis=0) <= 1.5 * np.abs(held - commands).max(axis=0) + 1e-9).all()

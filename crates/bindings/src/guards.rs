@@ -13,7 +13,8 @@ pub struct Guards(pub core::Guards);
 impl Guards {
     #[new]
     #[pyo3(signature = (
-        *, period, gain_limit, reference_speed, reference_time, reference_age, late_tick, stall,
+        *, period, gain_limit, reference_speed, reference_time, reference_count, reference_age,
+        late_tick, stall,
         command_speed, command_travel, width_limit, offset_limit,
         frame_age, frame_gap, frozen_travel, innovation_limit, start_deviation,
         innovation_floor, jump, grip_distance, slip, blind_growth,
@@ -28,6 +29,7 @@ impl Guards {
         gain_limit: [f64; 3],
         reference_speed: [f64; 3],
         reference_time: f64,
+        reference_count: [f64; 3],
         reference_age: f64,
         late_tick: f64,
         stall: f64,
@@ -65,6 +67,7 @@ impl Guards {
                 period,
                 reference_speed,
                 reference_time,
+                reference_count,
                 reference_age,
                 late_tick,
                 stall,

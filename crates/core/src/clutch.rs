@@ -1,5 +1,6 @@
 //! Between the hand and the law: only fresh, finite increments of the reference, taken in time, move anything.
 
+use crate::device_watch::{DeviceSettings, DeviceWatch};
 use crate::dof::{PerDof, all_finite};
 use crate::error::{ConfigError, require, require_positive};
 use crate::flags::{Flag, Flags};
@@ -13,7 +14,9 @@ pub struct ClutchSettings {
     pub reference_speed: PerDof<f64>,
     /// Over which a speed counts, in s.
     pub reference_time: f64,
-    /// Oldest reference that moves anything, in s.
+    /// What its device counts in [m, rad, rad].
+    pub reference_count: PerDof<f64>,
+    /// Oldest reference that moves anything, and longest silence of its device, in s.
     pub reference_age: f64,
     /// Periods from one tick to the next beyond which an increment is thrown away.
     pub late_tick: f64,
@@ -39,13 +42,14 @@ pub struct ClutchSettings {
 ///
 /// which a steady `reference_speed` just reaches. An increment that would break it is no hand's: it is thrown away,
 /// and motion stops. A tremor comes back before it has gained much; a hand that runs away slower than
-/// `reference_speed` is followed.
+/// `reference_speed` is followed. Nor is what [`DeviceWatch`] says of a hand whose device was silent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clutch {
     settings: ClutchSettings,
     /// k.
     kept: f64,
     gained: PerDof<f64>,
+    device: DeviceWatch,
     offset: PerDof<f64>,
     raw: PerDof<f64>,
     admitted: Option<PerDof<f64>>,
@@ -74,11 +78,7 @@ impl Clutch {
     /// A value is not a finite number above 0, or `late_tick` not above 1.
     pub fn new(settings: ClutchSettings) -> Result<Self, ConfigError> {
         require_positive("period", settings.period)?;
-        for speed in settings.reference_speed {
-            require_positive("reference_speed", speed)?;
-        }
         require_positive("reference_time", settings.reference_time)?;
-        require_positive("reference_age", settings.reference_age)?;
         let late = settings.late_tick.is_finite() && settings.late_tick > 1.0;
         require(late, "late_tick", settings.late_tick, "finite, above 1")?;
         require_positive("stall", settings.stall)?;
@@ -86,6 +86,12 @@ impl Clutch {
             settings,
             kept: libm::exp(-settings.period / settings.reference_time),
             gained: [0.0; 3],
+            device: DeviceWatch::new(DeviceSettings {
+                period: settings.period,
+                speed: settings.reference_speed,
+                count: settings.reference_count,
+                silence: settings.reference_age,
+            })?,
             offset: [0.0; 3],
             raw: [f64::NAN; 3],
             admitted: None,
@@ -105,7 +111,8 @@ impl Clutch {
         held: bool,
         off: Flags,
     ) -> Admission {
-        let (late, severe) = self.punctuality(time, stamp);
+        let gap = self.gap(time);
+        let (late, severe) = self.punctuality(gap, time, stamp);
         let invalid = Flags::when(!all_finite(reference), Flag::ReferenceInvalid);
         let (wrong, severe) = (late.without(off), severe.without(off));
         let mut stopped = held || self.fresh || !wrong.and(severe).is_empty();
@@ -123,17 +130,22 @@ impl Clutch {
                 self.admitted = Some(reference);
                 admission.reference = self.admitted;
             }
+            self.raw = reference;
             return admission;
         };
         let wanted = self.wanted(reference, last);
+        if !stopped {
+            let unlike = self
+                .unlike_a_hand(reference, wanted, last, gap)
+                .without(off);
+            admission.raised = admission.raised.and(unlike);
+            stopped = !unlike.is_empty();
+        }
         self.raw = reference;
         self.fresh = false;
-        if !stopped && self.outruns(wanted, last) && !off.has(Flag::ReferenceJump) {
-            admission.raised = admission.raised.and(Flags::of(Flag::ReferenceJump));
-            stopped = true;
-        }
         if stopped {
             self.gained = [0.0; 3];
+            self.device.restart();
             for ((offset, last), raw) in self.offset.iter_mut().zip(last).zip(reference) {
                 *offset = last - raw;
             }
@@ -158,6 +170,22 @@ impl Clutch {
             }
         }
         wanted
+    }
+
+    /// What no hand does, of this increment and those before it.
+    fn unlike_a_hand(
+        &mut self,
+        reference: PerDof<f64>,
+        wanted: PerDof<f64>,
+        last: PerDof<f64>,
+        gap: f64,
+    ) -> Flags {
+        let mut moved = reference;
+        for (moved, before) in moved.iter_mut().zip(self.raw) {
+            *moved -= before;
+        }
+        let outruns = Flags::when(self.outruns(wanted, last), Flag::ReferenceJump);
+        self.device.tick(moved, gap).and(outruns)
     }
 
     /// Whether a DOF would gain more than a hand can, counting this increment.
@@ -197,12 +225,17 @@ impl Clutch {
         self.fresh = true;
     }
 
-    fn punctuality(&mut self, time: f64, stamp: Option<f64>) -> (Flags, Flags) {
-        let settings = &self.settings;
-        let gap = self.time.map_or(settings.period, |last| time - last);
+    /// Time since the last tick, in s.
+    fn gap(&mut self, time: f64) -> f64 {
+        let gap = self.time.map_or(self.settings.period, |last| time - last);
         if time.is_finite() {
             self.time = Some(time);
         }
+        gap
+    }
+
+    fn punctuality(&self, gap: f64, time: f64, stamp: Option<f64>) -> (Flags, Flags) {
+        let settings = &self.settings;
         // Clocks that count ticks differ in the last digits.
         let late = gap > settings.late_tick * settings.period * (1.0 + 1e-6);
         let jumped = !time.is_finite() || gap < 0.0;

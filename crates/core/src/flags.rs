@@ -58,9 +58,9 @@ flags! {
     Unobservable = "unobservable",
     /// A drive is not where it was told to be; the rig says so.
     FollowingError = "following_error",
-    /// A reference that gained more in `reference_time` than `reference_speed` allows.
+    /// A reference that gained more in `reference_time` than `reference_speed` allows, or all at once.
     ReferenceJump = "reference_jump",
-    /// A reference older than `reference_age`.
+    /// A reference older than `reference_age`, or one that moves on as no hand does after it was silent for so long.
     ReferenceLate = "reference_late",
     /// A reference that is no number.
     ReferenceInvalid = "reference_invalid",

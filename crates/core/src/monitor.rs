@@ -78,7 +78,6 @@ impl Monitor {
     /// The command that may be sent for an admitted reference.
     ///
     /// One that is not finite becomes the last, or NaN before there is one.
-    #[allow(clippy::float_cmp)] // the verdict is told bit for bit
     pub fn permit(&mut self, reference: f64, command: f64) -> (f64, Verdict) {
         let MonitorSettings {
             gain_limit,
@@ -92,11 +91,7 @@ impl Monitor {
             }
             let permitted = command.max(least).min(largest);
             self.last = Some((reference, permitted));
-            let verdict = if permitted == command {
-                Verdict::Same
-            } else {
-                Verdict::Limited
-            };
+            let verdict = told(permitted, command, Verdict::Same, Verdict::Limited);
             return (permitted, verdict);
         };
         let increment = reference - last_reference;
@@ -110,12 +105,7 @@ impl Monitor {
             if reference.is_finite() {
                 self.last = Some((reference, last));
             }
-            let verdict = if lawful == command {
-                Verdict::Jump
-            } else {
-                Verdict::Broken
-            };
-            return (last, verdict);
+            return (last, told(lawful, command, Verdict::Jump, Verdict::Broken));
         }
         // Never beyond the last command's own distance, so that a limit cannot move anything by itself.
         let ahead = (last - last_reference).max(lead_limit);
@@ -133,15 +123,9 @@ impl Monitor {
         } else {
             last
         };
-        let verdict = if lawful != command {
-            Verdict::Broken
-        } else if permitted == command {
-            Verdict::Same
-        } else if limited == led {
-            Verdict::Led
-        } else {
-            Verdict::Limited
-        };
+        let bound = told(limited, led, Verdict::Led, Verdict::Limited);
+        let lawfully = told(permitted, command, Verdict::Same, bound);
+        let verdict = told(lawful, command, lawfully, Verdict::Broken);
         if reference.is_finite() {
             self.last = Some((reference, permitted));
         }
@@ -154,4 +138,10 @@ impl Monitor {
             *reference += shift;
         }
     }
+}
+
+/// A verdict is told bit for bit: one if a bound has left a command what it was, the other if not.
+#[allow(clippy::float_cmp)]
+fn told(bounded: f64, command: f64, left: Verdict, changed: Verdict) -> Verdict {
+    if bounded == command { left } else { changed }
 }

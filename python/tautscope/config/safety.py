@@ -38,8 +38,13 @@ class SafetyConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     re-engages: six times that of a hand at 12.6 mm/s, which crosses the slack K_b times as fast."""
     command_travel: tuple[Range, Range, Range] = ((-0.1, 0.3), (-12.6, 12.6), (-4.0, 4.0))
     """Least and largest command [m, rad, rad]."""
+    reference_count: PerDof = (50e-6, 5e-3, 2.5e-3)
+    """What the hand's device counts in, or its largest step of rest: so much more than
+    `reference_speed` allows may its value change from one to the next, beyond the speed it had
+    before [m, rad, rad]."""
     reference_age: Positive = 0.05
-    """A reference made longer ago moves nothing, where that is known [s]."""
+    """A reference made longer ago moves nothing, where that is known [s]. A device that repeats its
+    value to the bit for longer is at rest, or silent: it may go on only as a hand at rest does."""
     late_tick: Annotated[float, Meta(gt=1)] = 3.0
     """Control periods from one tick to the next beyond which that motion is thrown away."""
     stall: Positive = 0.1

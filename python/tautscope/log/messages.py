@@ -23,6 +23,7 @@ from tautscope.config import Config, dump_config, from_document
 from tautscope.dof import Dof
 from tautscope.errors import RecordError
 from tautscope.log.cdr import Message, decode, encode
+from tautscope.log.fields import header_of, joint_state, multi_array, stamp_of
 from tautscope.recording import FRAME_COLUMNS
 from tautscope.reduction import Report, Status
 from tautscope.references import Segment
@@ -78,7 +79,6 @@ OF_TICK = {REFERENCE, COMMAND, APPLIED, TICK}
 OF_UPDATE = {ESTIMATE, DELTA, MARKERS, STATUS, UPDATE}
 """What makes a tick, and an image update, whole."""
 
-_NAMES = [dof.label for dof in Dof]
 _COLUMNS = FRAME_COLUMNS.names or ()
 _NUMBERS = [name for name in _COLUMNS if FRAME_COLUMNS[name].kind != "U"]
 _WARN_LEVEL = 30  # of rcl_interfaces/msg/Log
@@ -134,7 +134,7 @@ def head_messages(facts: Facts, stamp: int) -> Messages:
     messages[CAMERA_INFO] = _encoded(
         CAMERA_INFO,
         {
-            "header": _header(stamp, "endoscope"),
+            "header": header_of(stamp, "endoscope"),
             "height": camera.height,
             "width": camera.width,
             "distortion_model": "rational_polynomial",
@@ -183,13 +183,15 @@ def tick_messages(
     made_at: float | None = None,
 ) -> Messages:
     """One control tick; when its reference was made [s, the rig's clock], if that is known."""
-    header = _header(clock.nanoseconds(sample.time), "")
+    header = header_of(clock.nanoseconds(sample.time), "")
     joints = {REFERENCE: reference, COMMAND: command, APPLIED: sample.applied}
     if sample.true_state is not None:
         joints[TRUTH] = sample.true_state
     # The date first: where a torn log has the rest of a tick, it has its date.
     messages = {} if made_at is None else {MADE_AT: _encoded(MADE_AT, {"data": made_at})}
-    messages |= {topic: _joints(topic, header, values) for topic, values in joints.items()}
+    messages |= {
+        topic: _encoded(topic, joint_state(header, values)) for topic, values in joints.items()
+    }
     messages[TICK] = _encoded(TICK, {"data": sample.time})
     return messages
 
@@ -209,17 +211,19 @@ def read_tick(messages: Mapping[str, bytes]) -> tuple[Sample, Floats, Floats, fl
 
 def update_messages(clock: Clock, now: float, frame: Frame, report: Report) -> Messages:
     """What the loop made of an image; the image itself is `image_message`."""
-    captured = _header(clock.nanoseconds(report.captured_at), "endoscope")
+    captured = header_of(clock.nanoseconds(report.captured_at), "endoscope")
     row = dict(zip(_COLUMNS, frame_row(now, frame, report), strict=True))
     numbers = [float(row[name]) for name in _NUMBERS]  # type: ignore[arg-type]
     features = [row[f"features_{name}"] for name in ("a_x", "a_y", "b_x", "b_y")]
     deltas = np.stack([report.delta_minus, report.delta_plus], axis=1).ravel()
     return {
-        ESTIMATE: _joints(ESTIMATE, captured, report.state_estimate),
-        DELTA: _array(DELTA, {"insertion,rotation,bending": 3, "minus,plus": 2}, deltas),
-        MARKERS: _array(MARKERS, {"a,b": 2, "u,v": 2}, features),
+        ESTIMATE: _encoded(ESTIMATE, joint_state(captured, report.state_estimate)),
+        DELTA: _encoded(
+            DELTA, multi_array({"insertion,rotation,bending": 3, "minus,plus": 2}, deltas)
+        ),
+        MARKERS: _encoded(MARKERS, multi_array({"a,b": 2, "u,v": 2}, features)),
         STATUS: _status(captured, report),
-        UPDATE: _array(UPDATE, {",".join(_NUMBERS): len(_NUMBERS)}, numbers),
+        UPDATE: _encoded(UPDATE, multi_array({",".join(_NUMBERS): len(_NUMBERS)}, numbers)),
     }
 
 
@@ -238,7 +242,7 @@ def read_update(messages: Mapping[str, bytes]) -> tuple[Row, Floats, Floats]:
 
 def image_message(clock: Clock, captured_at: float, picture: str, data: bytes) -> bytes:
     """A compressed image: its format in image_transport's words, and its bytes."""
-    header = _header(clock.nanoseconds(captured_at), "endoscope")
+    header = header_of(clock.nanoseconds(captured_at), "endoscope")
     return _encoded(IMAGE, {"header": header, "format": picture, "data": data})
 
 
@@ -249,7 +253,7 @@ def event_messages(what: str) -> Messages:
 
 def warning_message(stamp: int, text: str) -> bytes:
     """A line for the log panel of a viewer."""
-    fields: dict[str, Any] = {"stamp": _stamp(stamp), "level": _WARN_LEVEL, "msg": text}
+    fields: dict[str, Any] = {"stamp": stamp_of(stamp), "level": _WARN_LEVEL, "msg": text}
     return _encoded(WARNING, fields | {"name": "tautscope", "file": "", "function": "", "line": 0})
 
 
@@ -275,31 +279,5 @@ def _status(header: Message, report: Report) -> bytes:
     return _encoded(STATUS, {"header": header, "status": [status]})
 
 
-def _joints(topic: str, header: Message, values: Iterable[float]) -> bytes:
-    position = [float(value) for value in values]
-    return _encoded(
-        topic,
-        {"header": header, "name": _NAMES, "position": position, "velocity": (), "effort": ()},
-    )
-
-
-def _array(topic: str, axes: Mapping[str, int], data: Iterable[Any]) -> bytes:
-    sizes = list(axes.values())
-    dim = [
-        {"label": label, "size": size, "stride": int(np.prod(sizes[place:]))}
-        for place, (label, size) in enumerate(axes.items())
-    ]
-    values = [float(value) for value in data]
-    return _encoded(topic, {"layout": {"dim": dim, "data_offset": 0}, "data": values})
-
-
 def _encoded(topic: str, message: Message) -> bytes:
     return encode(TOPICS[topic], message)
-
-
-def _header(nanoseconds: int, frame: str) -> dict[str, Any]:
-    return {"stamp": _stamp(nanoseconds), "frame_id": frame}
-
-
-def _stamp(nanoseconds: int) -> dict[str, int]:
-    return {"sec": nanoseconds // 10**9, "nanosec": nanoseconds % 10**9}

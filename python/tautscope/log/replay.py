@@ -233,7 +233,7 @@ def _listen(inputs: Iterable[_Motion | _Sight], config: Config, compensated: boo
     # Without compensation a command is passed on as it is, and the estimators only listen. What
     # moved the motors then is not to be refused now, commands are faster than a hand, and a codec
     # repeats pictures.
-    deaf = ("reference_jump", "late_tick", "monitor", "frozen")
+    deaf = ("reference_jump", "reference_late", "late_tick", "monitor", "frozen")
     moved = {"safety.off": [*config.safety.off, *deaf]}
     loop = HysteresisReduction(config.replace(**moved), compensate=False)
     tables = Tables(config)

@@ -226,14 +226,20 @@ fn a_reference_that_is_too_fast_stops_motion() {
     assert!((moved - 1e-4).abs() < 1e-12, "nothing catches up: {moved}");
 }
 
-/// How far a hand at this speed in m/s comes before it is stopped, in m; None if it never is.
-fn followed(speed: f64) -> Option<f64> {
+/// The increments of a hand that gains `gain` in m/s with every tick, up to a speed in m/s.
+fn runs_up(speed: f64, gain: f64) -> impl Iterator<Item = f64> {
+    (1..2000).map(move |tick| speed.min(gain * f64::from(tick)) * PERIOD)
+}
+
+/// How far it comes before it is stopped, in m; None if it never is.
+fn followed(speed: f64, gain: f64) -> Option<f64> {
     let mut clutch = Clutch::new(support::clutch()).unwrap();
-    let mut gone = 0.0;
-    for tick in 0..2000 {
-        let time = f64::from(tick) * PERIOD;
-        let reference = [speed * time, 0.0, 0.0];
-        let admission = clutch.admit(reference, time, None, false, Flags::NONE);
+    let (mut time, mut hand, mut gone) = (0.0, 0.0, 0.0);
+    clutch.admit([hand; 3], time, None, false, Flags::NONE);
+    for increment in runs_up(speed, gain) {
+        time += PERIOD;
+        hand += increment;
+        let admission = clutch.admit([hand, 0.0, 0.0], time, None, false, Flags::NONE);
         gone += admission.moved[0];
         if admission.raised.has(Flag::ReferenceJump) {
             assert_eq!(admission.moved, [0.0; 3]);
@@ -247,15 +253,72 @@ fn followed(speed: f64) -> Option<f64> {
 fn a_hand_is_followed_at_its_speed_limit_and_a_faster_one_no_farther_than_the_law_says() {
     let settings = support::clutch();
     let (limit, over) = (settings.reference_speed[0], settings.reference_time);
-    assert_eq!(followed(limit * (1.0 - 1e-9)), None);
+    assert_eq!(followed(limit * (1.0 - 1e-9), limit), None);
     let steady = limit * PERIOD / -libm::expm1(-PERIOD / over);
     for ratio in [1.1, 1.5, 3.0, 10.0, 100.0] {
-        let gone = followed(-ratio * limit).unwrap().abs();
-        // gained = v dt (1 - k^n) / (1 - k) within its limit
-        let ticks = (-over / PERIOD * (1.0_f64 - 1.0 / ratio).ln()).floor();
-        let most = ratio * limit * PERIOD * ticks;
+        let gone = followed(ratio * limit, limit).unwrap();
+        let increments: Vec<f64> = runs_up(ratio * limit, limit).collect();
+        let gained = |ticks: usize| -> f64 {
+            let ages = (0_u32..).map(|ago| PERIOD / over * f64::from(ago));
+            let last = increments[..=ticks].iter().rev().zip(ages);
+            last.map(|(du, age)| du * (-age).exp()).sum()
+        };
+        let first = (0..increments.len())
+            .find(|&ticks| gained(ticks) > steady)
+            .unwrap();
+        let most: f64 = increments[..first].iter().sum();
         assert!((gone - most).abs() <= 1e-9, "{ratio}: {gone} m, not {most}");
         assert!(ratio < 3.0 || gone <= 1.25 * steady, "{ratio}: {gone} m");
+    }
+}
+
+#[test]
+fn a_hand_that_is_faster_all_at_once_moves_nothing() {
+    let settings = support::clutch();
+    let limit = settings.reference_speed[0] + settings.reference_count[0] / PERIOD;
+    assert_eq!(followed(1.001 * limit, f64::INFINITY), Some(0.0));
+}
+
+#[test]
+fn a_device_that_was_silent_moves_nothing_until_re_engaged() {
+    let settings = support::clutch();
+    let speed = 0.5 * settings.reference_speed[0];
+    for off in [Flags::NONE, Flags::of(Flag::ReferenceLate)] {
+        let mut clutch = Clutch::new(settings).unwrap();
+        let mut held = false;
+        let mut thrown = 0.0;
+        for tick in 0..200 {
+            let time = f64::from(tick) * PERIOD;
+            // Longer than `reference_age`, and less than `reference_jump` would see.
+            let said = if (100..115).contains(&tick) { 99 } else { tick };
+            let hand = [speed * PERIOD * f64::from(said), 0.0, 0.0];
+            let admission = clutch.admit(hand, time, None, held, off);
+            if tick == 115 {
+                assert_eq!(
+                    admission.raised,
+                    Flags::of(Flag::ReferenceLate).without(off)
+                );
+                held = !admission.raised.is_empty();
+                thrown = if held {
+                    8.0 * settings.reference_speed[0] * PERIOD
+                } else {
+                    0.0
+                };
+            } else {
+                assert_eq!(admission.raised, Flags::NONE, "tick {tick}");
+            }
+            if tick == 150 && held {
+                held = false;
+                clutch.engage();
+                thrown += speed * PERIOD * 36.0;
+            }
+        }
+        let gone = clutch.admitted()[0];
+        let hand = speed * PERIOD * 199.0;
+        assert!(
+            (hand - gone - thrown).abs() < 1e-12,
+            "{hand} {gone} {thrown}"
+        );
     }
 }
 
@@ -303,7 +366,7 @@ fn a_trembling_hand_is_no_fast_one() {
     let mut clutch = Clutch::new(support::clutch()).unwrap();
     for tick in 0..4000 {
         let time = f64::from(tick) * PERIOD;
-        let shake = 3e-3 * (60.0 * time).sin();
+        let shake = 3e-3 * time.min(1.0) * (60.0 * time).sin();
         let admission = clutch.admit([shake, 0.0, 0.0], time, None, false, Flags::NONE);
         assert_eq!(admission.raised, Flags::NONE, "tick {tick}");
         assert_eq!(admission.reference, Some([shake, 0.0, 0.0]));

@@ -6,6 +6,7 @@
 mod adaptive;
 mod change_watch;
 mod compensator;
+mod device_watch;
 mod estimator;
 mod expectation;
 mod frame_watch;

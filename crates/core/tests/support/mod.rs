@@ -26,6 +26,7 @@ pub fn clutch() -> ClutchSettings {
         period: PERIOD,
         reference_speed: UNITS.map(|unit| unit / PERIOD),
         reference_time: 0.05,
+        reference_count: UNITS.map(|unit| 0.125 * unit),
         reference_age: 0.05,
         late_tick: 3.0,
         stall: 0.1,

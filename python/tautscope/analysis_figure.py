@@ -1,0 +1,62 @@
+"""The figure of an analysis: every model's error and loop, one below the other."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from tautscope.figures import BLUE, GREY, PAGE, style
+from tautscope.models.registry import NO_MODEL
+
+if TYPE_CHECKING:
+    from tautscope.analysis import Analysis
+
+
+def analysis_figure(found: Analysis) -> Figure:
+    """A row per model: its error over the record, and its loop over the measured one.
+
+    The horizontal axis is the record's time if it was read, and counts samples if not. Loops are
+    of the second half. Errors have one scale, wide enough for all but the largest hundredth; "no
+    model", usually far larger, has its own.
+    """
+    record = found.record
+    at = np.arange(len(record.rows)) if record.time is None else record.time
+    tip = np.isfinite(record.measured)
+    errors = [entry.prediction.tip - record.measured for entry in found.entries]
+    reach = [1.1 * float(np.quantile(np.abs(error[found.scored]), 0.99)) for error in errors]
+    plain = [entry.model is NO_MODEL for entry in found.entries]
+    common = max((size for size, own in zip(reach, plain, strict=True) if not own), default=0.0)
+    with style():
+        count = len(found.entries)
+        figure = Figure(figsize=(PAGE, 1.15 * count + 0.5), layout="constrained")
+        axes = figure.subplots(count, 2, sharex="col", squeeze=False, width_ratios=(3.2, 1))
+        for row, entry in enumerate(found.entries):
+            strip, loop = axes[row]
+            strip.axvspan(at[0], at[found.half], color="#f0f0f0", linewidth=0)
+            strip.axhline(0, color=GREY, linewidth=0.5)
+            strip.plot(at[tip], errors[row][tip], color=BLUE, linewidth=0.7)
+            if not np.isfinite(errors[row][: found.half]).any():
+                middle = (at[0] + at[found.half]) / 2
+                strip.text(middle, 0, "learning: no prediction", ha="center", va="bottom")
+            strip.set_title(f"{entry.model.title}: {entry.rmse:.3g}")
+            strip.set_ylabel("error")
+            limit = reach[row] if plain[row] else common
+            if limit > 0:
+                strip.set_ylim(-limit, limit)
+            command = record.command[found.scored]
+            for values, colour, width in (
+                (record.measured, GREY, 1.6),
+                (entry.prediction.tip, BLUE, 0.7),
+            ):
+                loop.plot(command, values[found.scored], color=colour, linewidth=width)
+            loop.set_ylabel("tip")
+            loop.locator_params(axis="x", nbins=3)
+        axes[0, 0].set_xlim(at[0], at[-1])
+        axes[-1, 0].set_xlabel("sample" if record.time is None else "time [s]")
+        axes[-1, 1].set_xlabel("command")
+        axes[0, 0].set_title("RMS over the second half (white)", loc="right", fontweight="normal")
+        axes[0, 1].set_title("measured", color=GREY, loc="left")
+        axes[0, 1].set_title("model", color=BLUE, loc="right", fontweight="bold")
+    return figure

@@ -1,0 +1,39 @@
+"""Fields that messages of several topics have, as their ROS types want them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from tautscope.dof import Dof
+from tautscope.log.cdr import Message
+
+_NAMES = [dof.label for dof in Dof]
+
+
+def header_of(nanoseconds: int, frame: str) -> dict[str, Any]:
+    """std_msgs/msg/Header, of a time of the wall clock [ns]."""
+    return {"stamp": stamp_of(nanoseconds), "frame_id": frame}
+
+
+def stamp_of(nanoseconds: int) -> dict[str, int]:
+    """builtin_interfaces/msg/Time, likewise."""
+    return {"sec": nanoseconds // 10**9, "nanosec": nanoseconds % 10**9}
+
+
+def joint_state(header: Message, values: Iterable[float]) -> dict[str, Any]:
+    """sensor_msgs/msg/JointState: positions (3,) [m, rad, rad]."""
+    position = [float(value) for value in values]
+    return {"header": header, "name": _NAMES, "position": position, "velocity": (), "effort": ()}
+
+
+def multi_array(axes: Mapping[str, int], data: Iterable[Any]) -> dict[str, Any]:
+    """std_msgs/msg/Float64MultiArray, with the label of each axis and its length."""
+    sizes = list(axes.values())
+    dim = [
+        {"label": label, "size": size, "stride": int(np.prod(sizes[place:]))}
+        for place, (label, size) in enumerate(axes.items())
+    ]
+    return {"layout": {"dim": dim, "data_offset": 0}, "data": [float(value) for value in data]}
