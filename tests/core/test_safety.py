@@ -63,8 +63,10 @@ def run(
     seed: int = 0,
     until: float = 30.0,
     delay: Callable[[float], float | None] = lambda time: 0.0,
+    *,
+    begin: float = BEGIN,
 ) -> Run:
-    """The same hand, the same noise; between BEGIN and END the fault sees to the images."""
+    """The same hand, the same noise; from `begin` to END the fault sees to the images."""
     loop, model = HysteresisReduction(settings), build_feature_model(settings)
     noise, chance = np.random.default_rng(seed), np.random.default_rng(seed + 1)
     tip, tips, commands, reports = REST.copy(), [], [], []
@@ -82,7 +84,7 @@ def run(
         assert prediction is not None
         seen: Floats | None = prediction[0] + noise.normal(0.0, NOISE, 4)
         at = captured * PERIOD
-        if BEGIN <= at < END:
+        if begin <= at < END:
             assert seen is not None
             frozen = seen if frozen is None else frozen
             shift = delay(at)
@@ -168,6 +170,18 @@ def test_a_fault_of_two_seconds_moves_the_tip_by_less_than_a_millimetre(
     assert flags & set(bad.loop.supervision.latched), "a warning stays until it is seen"
     bad.loop.acknowledge()
     assert bad.loop.supervision.latched == ()
+
+
+@pytest.mark.parametrize("profile", ["paper", "best"])
+@pytest.mark.parametrize("late", [-0.08, -0.04, -0.02, 0.0, 0.02])
+def test_a_frozen_picture_is_noticed_in_three_frames_where_the_hand_turns(
+    profile: str, late: float
+) -> None:
+    begin = 0.5 * np.pi / (12.6 / 15) + late
+    found = run(config(profile), frozen, until=begin + 0.25, begin=begin)
+    reports = [report for report in found.reports if report.captured_at >= begin]
+    assert any("frozen" in report.warnings for report in reports[:3])
+    assert reports[0].warnings == (), "the first is well"
 
 
 # Of the goal of 3 mm [m]. The width that wild markers teach has one bound.
