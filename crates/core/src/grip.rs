@@ -28,10 +28,9 @@ const TURN: f64 = 0.1;
 /// ```
 ///
 /// From a turn or rest of the command on, (c0, m0) is where it last slipped. Once it has not over `distance` and eight
-/// images the tip is held, and until the command turns or rests it cannot slip: neither from (c0, m0) where that was
-/// found nor from where it was lately, each a fading mean over eight images. The first tells what slips slowly, the second what
-/// slips late in a stroke. Nor can slack grow by more than that between two turns: the offsets are those learnt at the
-/// last, once it has turned three times. Friction that another DOF takes counts as a turn.
+/// images the tip is held, (c0, m0) is a fading mean over the last eight, and until the command turns or rests it cannot
+/// slip. Nor can slack grow by more than that between two turns: the offsets are those learnt at the last, once it has
+/// turned three times. Friction that another DOF takes counts as a turn.
 ///
 /// Without effect where a tip goes less far than its command, or farther: it is never held. Wrong where something else
 /// moves the tip: that slips, too.
@@ -40,7 +39,7 @@ pub struct Grip {
     settings: GripSettings,
     /// Command and tip it is compared with.
     anchor: Option<(f64, f64)>,
-    /// The same over the last images since the command turned, rested, or the tip slipped, and of how many.
+    /// Their mean over the last images since the command turned, rested, or the tip slipped, and of how many.
     lately: (f64, f64),
     looks: u32,
     last: Last,
@@ -109,8 +108,7 @@ impl Grip {
         let offset = seen.command - seen.tip;
         let spare = self.settings.slip + seen.deviation;
         let is_behind = self.turns >= LEARNT && (offset < least - spare || offset > most + spare);
-        let lets_go = || self.is_off(seen) || self.is_off_from(self.lately, seen);
-        is_behind || self.is_held && !self.turned(seen) && lets_go()
+        is_behind || self.is_held && !self.turned(seen) && self.is_off(seen)
     }
 
     /// An image was believed.
@@ -180,13 +178,10 @@ impl Grip {
     }
 
     fn is_off(&self, seen: &Sighting) -> bool {
-        self.anchor.is_some_and(|from| self.is_off_from(from, seen))
-    }
-
-    /// Whether the tip is elsewhere than its command has taken it from a place.
-    fn is_off_from(&self, (command, tip): (f64, f64), seen: &Sighting) -> bool {
-        let travel = seen.command - command;
-        let off = (seen.tip - tip) - travel;
-        off.abs() > self.settings.slip + SLIP_SHARE * travel.abs() + seen.deviation
+        self.anchor.is_some_and(|(command, tip)| {
+            let travel = seen.command - command;
+            let off = (seen.tip - tip) - travel;
+            off.abs() > self.settings.slip + SLIP_SHARE * travel.abs() + seen.deviation
+        })
     }
 }

@@ -110,22 +110,6 @@ proptest! {
     }
 
     #[test]
-    fn a_held_tip_that_stops_slips_as_soon_late_in_a_stroke_as_early(
-        length in 12_u32..400, by in 0.15..0.5,
-    ) {
-        let mut motion = Motion::new(0.0);
-        for _ in 0..length.max(24) {
-            motion.step(by);
-            let seen = motion.seen(motion.tip, ANY);
-            prop_assert!(!motion.grip.slips(&seen));
-            motion.grip.follow(&seen);
-        }
-        prop_assume!(f64::from(length.max(24)) * by > SETTINGS.distance + by);
-        let came = motion.stuck(by, ANY);
-        prop_assert!(came <= 3.0 * (SETTINGS.slip + DEVIATION) + by, "{came} after {length} by {by}");
-    }
-
-    #[test]
     fn a_picture_repeats_itself_once_the_command_went_so_far(
         dof in 0_usize..3, went in 0.0..3.0, sum in any::<u64>(), other in any::<u64>(),
     ) {
