@@ -98,6 +98,18 @@ def test_a_fault_of_two_seconds_moves_the_tip_by_less_than_a_millimetre(
     assert bad.loop.supervision.latched == ()
 
 
+@pytest.mark.parametrize("profile", ["paper", "best"])
+@pytest.mark.parametrize("late", [-0.08, -0.04, -0.02, 0.0, 0.02])
+def test_a_frozen_picture_is_noticed_in_three_frames_where_the_hand_turns(
+    profile: str, late: float
+) -> None:
+    begin = 0.5 * np.pi / (12.6 / 15) + late
+    found = run(config(profile), frozen, until=begin + 0.25, begin=begin)
+    reports = [report for report in found.reports if report.captured_at >= begin]
+    assert any("frozen" in report.warnings for report in reports[:3])
+    assert reports[0].warnings == (), "the first is well"
+
+
 # Of the goal of 3 mm [m]. The width that wild markers teach has one bound.
 SECOND_BARRIER_MISSES = {("paper", "wild", "width_limit"): 8.5e-3}
 

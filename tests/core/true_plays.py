@@ -55,6 +55,8 @@ def run(
     seed: int = 0,
     until: float = 30.0,
     delay: Callable[[float], float | None] = lambda time: 0.0,
+    *,
+    begin: float = BEGIN,
 ) -> Run:
     """The same hand, the same noise; between BEGIN and END the fault sees to the images."""
     loop, model = HysteresisReduction(settings), build_feature_model(settings)
@@ -74,7 +76,7 @@ def run(
         assert prediction is not None
         seen: Floats | None = prediction[0] + noise.normal(0.0, NOISE, 4)
         at = captured * PERIOD
-        if BEGIN <= at < END:
+        if begin <= at < END:
             assert seen is not None
             frozen = seen if frozen is None else frozen
             shift = delay(at)

@@ -15,6 +15,8 @@ const SLIP_SHARE: f64 = 0.15;
 const LEARNT: u32 = 3;
 /// What a command moves by between two images that does not rest, as a share of `distance`: a tip at rest creeps.
 const REST: f64 = 0.007;
+/// Over so many images it is averaged where a tip in contact is: one alone is off by its own noise from then on.
+const LOOKS: u32 = 8;
 /// What a command comes back by between two images, or another DOF lets go of, before it has turned, as a share of `slip`.
 const TURN: f64 = 0.1;
 
@@ -25,10 +27,10 @@ const TURN: f64 = 0.1;
 /// or      c - m < least offset - slip - deviation,   c - m > largest offset + slip + deviation
 /// ```
 ///
-/// From a turn or rest of the command on, (c0, m0) is where it last slipped. Once it has not over `distance` the tip is
-/// held, (c0, m0) is where that was found, and until the command turns or rests it cannot slip. Nor can slack grow by
-/// more than that between two turns: the offsets are those learnt at the last, once it has turned three times. Friction
-/// that another DOF takes counts as a turn.
+/// From a turn or rest of the command on, (c0, m0) is where it last slipped. Once it has not over `distance` and eight
+/// images the tip is held, (c0, m0) is a fading mean over the last eight, and until the command turns or rests it cannot
+/// slip. Nor can slack grow by more than that between two turns: the offsets are those learnt at the last, once it has
+/// turned three times. Friction that another DOF takes counts as a turn.
 ///
 /// Without effect where a tip goes less far than its command, or farther: it is never held. Wrong where something else
 /// moves the tip: that slips, too.
@@ -37,6 +39,9 @@ pub struct Grip {
     settings: GripSettings,
     /// Command and tip it is compared with.
     anchor: Option<(f64, f64)>,
+    /// Their mean over the last images since the command turned, rested, or the tip slipped, and of how many.
+    lately: (f64, f64),
+    looks: u32,
     last: Last,
     is_held: bool,
     /// What was allowed when the command turned or rested last.
@@ -79,6 +84,8 @@ impl Grip {
         Self {
             settings,
             anchor: None,
+            lately: (0.0, 0.0),
+            looks: 0,
             last: Last {
                 command: 0.0,
                 tip: 0.0,
@@ -114,14 +121,14 @@ impl Grip {
             self.offsets = seen.offsets;
         } else if self.turned(seen) {
             self.anchor = Some((self.last.command, self.last.tip));
-            self.is_held = false;
+            (self.is_held, self.looks) = (false, 0);
             self.offsets = seen.offsets;
             self.turns = self.turns.saturating_add(1);
         }
         let moved = seen.command - self.last.command;
         if moved.abs() < REST * self.settings.distance {
             self.anchor = Some((seen.command, seen.tip));
-            self.is_held = false;
+            (self.is_held, self.looks) = (false, 0);
             self.offsets = seen.offsets;
         }
         self.last = Last {
@@ -134,19 +141,31 @@ impl Grip {
                 moved.signum()
             },
         };
-        let is_off = self.is_off(seen);
-        let start = self.anchor.map_or(f64::NAN, |(command, _)| command);
-        let is_found = !self.is_held && (seen.command - start).abs() >= self.settings.distance;
-        if is_off || is_found {
+        if self.is_off(seen) {
             self.anchor = Some((seen.command, seen.tip));
-            self.is_held = is_found && !is_off;
+            (self.is_held, self.looks) = (false, 0);
         }
+        self.look(seen);
+        let start = self.anchor.map_or(f64::NAN, |(command, _)| command);
+        let is_far = (seen.command - start).abs() >= self.settings.distance;
+        if is_far && self.looks == LOOKS && !self.is_held {
+            self.anchor = Some(self.lately);
+            self.is_held = true;
+        }
+    }
+
+    fn look(&mut self, seen: &Sighting) {
+        self.looks = (self.looks + 1).min(LOOKS);
+        let (command, tip) = &mut self.lately;
+        let share = 1.0 / f64::from(self.looks);
+        *command += share * (seen.command - *command);
+        *tip += share * (seen.tip - *tip);
     }
 
     /// What was held may be so no longer.
     pub const fn release(&mut self) {
         self.anchor = None;
-        self.is_held = false;
+        (self.is_held, self.looks) = (false, 0);
         self.offsets = ANY;
         self.turns = 0;
     }

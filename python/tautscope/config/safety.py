@@ -54,9 +54,10 @@ class SafetyConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """An older frame is refused when it comes [s]."""
     frame_gap: Positive = 0.18
     """So long without a frame, and the camera counts as lost [s]."""
-    frozen_travel: Positive = 1.0
-    """Travel of the command after which no picture repeats itself [in update_distance]. Sensor
-    noise makes every picture different; a source without noise needs more than the slack."""
+    frozen_travel: Positive = 0.01
+    """Travel of the command after which no picture repeats itself [in update_distance]: any, even
+    where a hand turns. Sensor noise makes every picture different, of a tip at rest too; a source
+    without noise needs more than the slack."""
     innovation_limit: Positive = 8.0
     """An image further from what is expected is refused [in standard deviations]."""
     innovation_floor: Positive = 0.08
