@@ -58,7 +58,7 @@ def run(
     *,
     begin: float = BEGIN,
 ) -> Run:
-    """The same hand, the same noise; between BEGIN and END the fault sees to the images."""
+    """The same hand, the same noise; from `begin` to END the fault sees to the images."""
     loop, model = HysteresisReduction(settings), build_feature_model(settings)
     noise, chance = np.random.default_rng(seed), np.random.default_rng(seed + 1)
     tip, tips, commands, reports = REST.copy(), [], [], []
