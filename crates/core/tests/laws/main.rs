@@ -9,6 +9,7 @@ mod compensator;
 mod estimator;
 mod expectation;
 mod frame_watch;
+mod frames;
 mod friction;
 mod guarantees;
 mod guards;
