@@ -5,6 +5,7 @@
 
 mod adaptive;
 mod change_watch;
+mod clutch;
 mod compensator;
 mod estimator;
 mod expectation;
