@@ -25,6 +25,7 @@ mod motion_watch;
 mod offset_map;
 mod play;
 mod state;
+mod strokes;
 mod supervisor;
 #[path = "../support/mod.rs"]
 mod support;
