@@ -23,8 +23,8 @@ BASELINE_FAILED = 4
 KEPT = ROOT / "target" / "guarantees"
 CONFIG = ROOT / ".cargo" / "mutants.toml"
 LIST = ("cargo", "mutants", "-p", "tautscope-core")
-EQUIVALENT = re.compile(r"^- `(?P<mutant>crates/.+)`", re.MULTILINE)
-"""Mutants that docs/mutants.md gives a reason for."""
+EQUIVALENT = re.compile(r"^- `(?P<mutant>crates/.+?)`,\s+`(?P<line>.+?)`:", re.MULTILINE)
+"""Mutants that docs/mutants.md gives a reason for, and the line each breaks, wherever that stands."""
 
 
 def mutants(minutes: float) -> Figure:
@@ -54,13 +54,14 @@ def mutants(minutes: float) -> Figure:
 def figure(everyone: list[str], now: dict[str, str], earlier: dict[str, str]) -> Figure:
     """What became of those that were tried, in this state or else in an earlier one."""
     page = (ROOT / "docs" / "mutants.md").read_text(encoding="utf-8")
-    reasons = {found["mutant"] for found in EQUIVALENT.finditer(page)}
+    reasons = {(found["mutant"], found["line"]) for found in EQUIVALENT.finditer(page)}
     both = earlier | now
     known = {name: both[name] for name in everyone if name in both}
-    missed = [name for name, kind in known.items() if kind == "missed" and name not in reasons]
+    survived = [name for name, kind in known.items() if kind == "missed"]
+    missed = [name for name in survived if _place(name) not in reasons]
     counts = Counter(known.values())
     text = ", ".join(f"{counts[kind]} {kind}" for kind in KINDS)
-    if excused := counts["missed"] - len(missed):
+    if excused := len(survived) - len(missed):
         text += f", {excused} of the missed with a reason"
     if old := sum(name not in now for name in known):
         text += f"; {old} of them tried before other files changed"
@@ -125,6 +126,13 @@ def _earlier(folder: Path, files: dict[str, str]) -> dict[str, str]:
             if then.get(_file(name)) == files.get(_file(name)):
                 found[name] = kind
     return found
+
+
+def _place(mutant: str) -> tuple[str, str]:
+    """A mutant without where it stands, and the line that it breaks."""
+    file, line, _, what = mutant.split(":", 3)
+    text = (ROOT / file).read_text("utf-8").splitlines()[int(line) - 1]
+    return f"{file}:{what}", text.strip()
 
 
 def _file(mutant: str) -> str:

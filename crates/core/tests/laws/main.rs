@@ -31,6 +31,7 @@ mod supervisor;
 mod support;
 mod thrown_away;
 mod weighted;
+mod whole;
 
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
