@@ -24,7 +24,7 @@ KEPT = ROOT / "target" / "guarantees"
 CONFIG = ROOT / ".cargo" / "mutants.toml"
 LIST = ("cargo", "mutants", "-p", "tautscope-core")
 EQUIVALENT = re.compile(r"^- `(?P<mutant>crates/.+?)`,\s+`(?P<line>.+?)`:", re.MULTILINE)
-"""Mutants that docs/mutants.md gives a reason for, and the line each breaks, wherever that stands."""
+"""Mutants that docs/mutants.md gives a reason for, and the line each breaks, wherever it stands."""
 
 
 def mutants(minutes: float) -> Figure:
@@ -122,9 +122,8 @@ def _earlier(folder: Path, files: dict[str, str]) -> dict[str, str]:
     found: dict[str, str] = {}
     for state in sorted(states, key=lambda state: (state / "files.json").stat().st_mtime):
         then = json.loads((state / "files.json").read_text("utf-8"))
-        for name, kind in _known(state).items():
-            if then.get(_file(name)) == files.get(_file(name)):
-                found[name] = kind
+        same = {name for name, text in files.items() if then.get(name) == text}
+        found |= {name: kind for name, kind in _known(state).items() if _file(name) in same}
     return found
 
 

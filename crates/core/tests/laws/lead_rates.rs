@@ -88,6 +88,7 @@ proptest! {
 
 #[test]
 fn settings_out_of_range_are_named() {
+    type Change = fn(&mut LeadLaw);
     let sound = LeadLaw {
         free_gain: 1.0,
         contact_gain: 1.0,
@@ -95,7 +96,6 @@ fn settings_out_of_range_are_named() {
         settling: 0.1,
     };
     assert_eq!(sound.checked().unwrap(), sound);
-    type Change = fn(&mut LeadLaw);
     let changes: [(&str, Change); 7] = [
         ("free_gain", |law| law.free_gain = 0.9),
         ("free_gain", |law| law.free_gain = f64::NAN),

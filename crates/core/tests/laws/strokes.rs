@@ -146,7 +146,7 @@ proptest! {
                     prop_assert_eq!(swings.follow(at - side * 0.9 * band), None);
                 }
             }
-            let expected = if count == 0 { 0 } else { 1 };
+            let expected = usize::from(count > 0);
             prop_assert_eq!(found.len(), expected, "leg {}", count);
             prop_assert!(found.iter().all(|swing| (swing - ways[count - 1]).abs() < 1e-9));
             prop_assert_eq!(swings.direction(), side);
