@@ -100,6 +100,30 @@ fn the_first_lesson_is_no_surprise_and_the_next_is_once_it_has_been_quiet() {
     assert_eq!(bench.image(-1.1, 0.0), Flags::NONE);
 }
 
+/// Within half the limit for two travels, and neither counts if it is just reached.
+#[test]
+fn learnt_is_what_has_stayed_as_it_was() {
+    let said = Flags::of(Flag::SlackChanged);
+    for (stays, learnt) in [(0.4, true), (0.6, false), (-0.6, false)] {
+        let mut bench = Bench::new(2, 1);
+        bench.image(stays, 0.0);
+        for _ in 0..100 {
+            // As much again as fades.
+            let fades = -stays * libm::expm1(-0.1);
+            assert_eq!(bench.image(fades, 0.1), Flags::NONE);
+        }
+        let more = if stays > 0.0 { 1.0 } else { -1.0 };
+        assert_eq!(bench.image(more, 0.0) == said, learnt, "{stays}");
+    }
+    let mut bench = Bench::new(0, 0);
+    assert_eq!(bench.image(0.5, 2.0), Flags::NONE);
+    assert_eq!(bench.image(0.5, 0.0), Flags::NONE, "the limit itself");
+    assert_eq!(bench.image(0.1, 0.0), said);
+    let mut bench = Bench::new(0, 0);
+    assert_eq!(bench.image(0.0, 1.9), Flags::NONE);
+    assert_eq!(bench.image(1.1, 0.0), Flags::NONE, "not yet learnt");
+}
+
 #[test]
 fn what_is_no_number_changes_nothing() {
     let mut bench = Bench::calm(0, 0);

@@ -274,3 +274,26 @@ fn recovery_never_makes_a_jump_at_the_contact() {
     }
     assert!(was_in_contact);
 }
+
+/// Of 5 it is 1 + 4 of that share; all else stays as it is.
+#[test]
+fn a_share_of_the_gain_is_that_of_what_is_beyond_one() {
+    let whole = Compensator::new(5.0, 6.0)
+        .and_then(|law| law.with_recovery(0.1))
+        .unwrap();
+    for (share, gain) in [(1.0, 5.0), (0.5, 3.0), (0.25, 2.0), (0.0, 1.0)] {
+        assert_eq!(
+            whole.with_share(share),
+            whole.with_gain(gain, 6.0).unwrap(),
+            "{share}"
+        );
+    }
+    let (mut state, none) = (
+        CompensatorState::new(Play::new(-1.0, 1.0).unwrap()),
+        whole.with_share(0.0),
+    );
+    for tick in 0..100 {
+        let reference = 3.0 * (0.1 * f64::from(tick)).sin();
+        assert!(close(none.step(&mut state, reference), reference));
+    }
+}

@@ -57,6 +57,10 @@ fn torture(mut reduction: Box<HysteresisReduction>, seed: u64) {
             // Never out of the world.
             *next = next.clamp(-90.0 * unit, 190.0 * unit);
         }
+        if tick == 10_000 {
+            // However few steps there are, this comes.
+            reduction.guards_mut().raise(Flag::FollowingError);
+        }
         match chance.bits() % 20_000 {
             0 => next[0] += 0.01 * chance.share(),
             1 => next[1] = f64::NAN,

@@ -139,3 +139,48 @@ fn at_the_top_of_its_ladder_a_flag_stays() {
         }
     }
 }
+
+#[test]
+fn slack_that_was_learnt_and_changes_is_said() {
+    let mut run = Run::new(adaptive(), -6.0, 9.0);
+    run.swing(4);
+    let latched = run.reduction.guards().supervision().latched;
+    assert!(!latched.has(Flag::SlackChanged), "{latched:?}");
+    for tick in 0..3200 {
+        // Some new place of the contact at every image, as if the shaft were bent.
+        let more = 10.0 * (f64::from(tick) / 3200.0);
+        run.slack = Play::new((-6.0 - more) * UNITS[0], 9.0 * UNITS[0]).unwrap();
+        run.tick();
+    }
+    let latched = run.reduction.guards().supervision().latched;
+    assert!(latched.has(Flag::SlackChanged), "{latched:?}");
+}
+
+/// What images have said for as long as a hold lasts is believed in the end.
+#[test]
+fn a_tip_that_has_jumped_is_not_believed_until_it_has_stayed() {
+    let mut run = Run::new(adaptive(), -3.0, 3.0);
+    run.swing(3);
+    assert_eq!(
+        run.reduction.guards().supervision().reaction,
+        Reaction::None
+    );
+    run.slack = Play::new(9.0 * UNITS[0], 15.0 * UNITS[0]).unwrap();
+    let (mut worst, mut believed) = (Reaction::None, false);
+    for tick in 0..4800 {
+        run.tick();
+        let supervision = run.reduction.guards().supervision();
+        worst = worst.max(supervision.reaction);
+        believed |= worst == Reaction::Fade && supervision.reaction < Reaction::HoldEstimate;
+        if tick == 40 {
+            assert!(
+                supervision.latched.has(Flag::Jump),
+                "{:?}",
+                supervision.latched
+            );
+            assert_eq!(supervision.reaction, Reaction::HoldEstimate);
+        }
+    }
+    assert_eq!(worst, Reaction::Fade);
+    assert!(believed, "in the end");
+}

@@ -5,16 +5,20 @@
 
 mod adaptive;
 mod change_watch;
+mod clutch;
 mod compensator;
 mod device_watch;
 mod estimator;
 mod expectation;
 mod frame_watch;
+mod frames;
 mod friction;
+mod friction_step;
 mod guarantees;
 mod guards;
 mod history;
 mod lead;
+mod lead_rates;
 mod learning;
 mod limits;
 mod monitor;
@@ -23,11 +27,13 @@ mod offset_map;
 mod play;
 mod sharing;
 mod state;
+mod strokes;
 mod supervisor;
 #[path = "../support/mod.rs"]
 mod support;
 mod thrown_away;
 mod weighted;
+mod whole;
 
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;

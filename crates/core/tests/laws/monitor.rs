@@ -140,3 +140,52 @@ fn a_lead_that_is_limited_is_no_lost_motion_either_way() {
         );
     }
 }
+
+#[test]
+fn the_first_command_is_where_it_may_be_and_a_number() {
+    let new = || Monitor::new(support::monitor(1.0)).unwrap();
+    for (reference, command) in [(f64::NAN, 0.0), (0.0, f64::NAN), (f64::INFINITY, 0.0)] {
+        let (permitted, verdict) = new().permit(reference, command);
+        assert!(permitted.is_nan());
+        assert_eq!(verdict, Verdict::Broken);
+    }
+    assert_eq!(new().permit(190.0, 190.0), (190.0, Verdict::Same));
+    assert_eq!(new().permit(190.0, 210.0), (200.0, Verdict::Limited));
+    assert_eq!(new().permit(-90.0, -110.0), (-100.0, Verdict::Limited));
+}
+
+#[test]
+fn what_the_reference_is_shifted_by_is_no_motion_of_it() {
+    for shift in [0.7, -0.7] {
+        let mut monitor = Monitor::new(support::monitor(1.0)).unwrap();
+        monitor.permit(2.0, 3.0);
+        monitor.shift(shift);
+        assert_eq!(monitor.permit(2.0 + shift, 3.1), (3.0, Verdict::Broken));
+        assert_eq!(monitor.permit(2.1 + shift, 3.1), (3.1, Verdict::Same));
+    }
+}
+
+/// At the end of the lead the command has to go with the reference, but no faster than a command may.
+#[test]
+fn a_lead_that_is_limited_moves_nothing_faster_than_it_may() {
+    for sign in [1.0, -1.0] {
+        let mut monitor = Monitor::new(support::monitor(1.0)).unwrap();
+        monitor.permit(0.0, sign * 30.0);
+        let found = monitor.permit(-10.0 * sign, sign * 29.0);
+        assert_eq!(found, (sign * 25.0, Verdict::Limited));
+    }
+}
+
+/// A command that is out already comes back as it likes, and no farther out.
+#[test]
+fn from_beyond_a_limit_it_only_comes_back() {
+    for sign in [1.0, -1.0] {
+        let mut monitor = Monitor::new(support::monitor(1.0)).unwrap();
+        monitor.permit(0.0, sign * 40.0);
+        let at = |reference: f64| sign * reference;
+        // The lead of 40 is more than may be: it grows no farther, and shrinks.
+        assert_eq!(monitor.permit(at(1.0), at(43.0)), (at(41.0), Verdict::Led));
+        assert_eq!(monitor.permit(at(2.0), at(41.5)), (at(41.5), Verdict::Same));
+        assert_eq!(monitor.permit(at(1.0), at(40.5)), (at(40.5), Verdict::Same));
+    }
+}
