@@ -59,6 +59,7 @@ mod flags;
 mod frame_watch;
 mod friction;
 mod grip;
+
 mod guards;
 mod history;
 mod instrument;
@@ -82,6 +83,7 @@ mod supervisor;
 mod swings;
 mod weighted;
 mod whereabouts;
+mod withheld;
 
 pub use adaptive::{AdaptiveAxis, AdaptiveSettings};
 pub use axis::{ArticleAxis, Axis, Lesson};
@@ -99,6 +101,7 @@ pub use flags::{Flag, Flags};
 pub use frame_watch::{Arrival, FrameSettings, FrameWatch, Picture};
 pub use friction::{Friction, FrictionSettings, SlackShare};
 pub use grip::{Grip, GripSettings, Sighting};
+
 pub use guards::{GuardSettings, Guards, Supervision};
 pub use history::{Entry, History};
 pub use instrument::{Instrument, Marker};
@@ -118,3 +121,4 @@ pub use supervisor::{Event, Supervisor, SupervisorSettings};
 pub use swings::Swings;
 pub use weighted::{WeightedEstimate, WeightedEstimator, WeightedSettings};
 pub use whereabouts::{Whereabouts, WhereaboutsSettings};
+pub use withheld::{ChangeLimit, Withheld};

@@ -6,6 +6,7 @@ use crate::friction::SlackShare;
 use crate::limits::PlayLimit;
 use crate::offset_map::{OffsetMap, OffsetPrior, Side, TILTS};
 use crate::play::Play;
+use crate::withheld::{ChangeLimit, Withheld};
 
 /// How fast it is learnt how much of the friction is shared: share of the error, per image.
 const SHARING: f64 = 0.1;
@@ -14,6 +15,7 @@ const SHARING: f64 = 0.1;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slack {
     learnt: OffsetMap,
+    withheld: Withheld,
     limit: PlayLimit,
     part: SlackShare,
     /// How much of the friction is shared, 0 to 1.
@@ -22,9 +24,10 @@ pub struct Slack {
 
 impl Slack {
     /// The offsets of `play` everywhere, trusted as far as the prior says, without limit.
-    pub fn new(prior: OffsetPrior, play: Play) -> Self {
+    pub fn new(prior: OffsetPrior, limit: ChangeLimit, play: Play) -> Self {
         Self {
             learnt: OffsetMap::new(prior, play.delta_minus(), play.delta_plus()),
+            withheld: Withheld::new(limit),
             limit: PlayLimit::NONE,
             part: SlackShare::WHOLE,
             shared: 1.0,
@@ -48,7 +51,7 @@ impl Slack {
 
     /// Whether more slack than may be was learnt at a position.
     pub fn is_limited(&self, position: f64) -> bool {
-        let [minus, plus] = Side::BOTH.map(|side| self.learnt.offset(side, position));
+        let [minus, plus] = self.learnt(position);
         self.limit.exceeds(minus, plus)
     }
 
@@ -71,7 +74,7 @@ impl Slack {
     /// as far as that is off by more than the share's deviation.
     fn share(&mut self, side: Side, position: f64, offset: f64) {
         let lost = 1.0 - self.part.now;
-        let whole = Side::BOTH.map(|side| self.learnt.offset(side, position));
+        let whole = self.learnt(position);
         let [minus, plus] = whole;
         if plus > minus && lost > 0.0 {
             let missing = (side.of(whole) - offset) / (side.of(whole) - f64::midpoint(minus, plus));
@@ -84,10 +87,20 @@ impl Slack {
     /// Both offsets at a position, within the limit, where that share of the width is left.
     fn offsets(&self, position: f64, part: f64) -> [f64; 2] {
         let share = self.left(part);
-        let [minus, plus] = Side::BOTH.map(|side| self.learnt.offset(side, position));
+        let [minus, plus] = self.withheld.trusted(self.learnt(position));
         let [minus, plus] = self.limit.clamp(minus, plus);
         let nearer = (1.0 - share) / 2.0 * (plus - minus);
         [minus + nearer, plus - nearer]
+    }
+
+    /// The reference moved for so long, in s.
+    pub fn pass(&mut self, time: f64) {
+        self.withheld.pass(time);
+    }
+
+    /// Both, as they were learnt.
+    fn learnt(&self, position: f64) -> [f64; 2] {
+        Side::BOTH.map(|side| self.learnt.offset(side, position))
     }
 
     /// One of them, as it is now.
@@ -107,7 +120,7 @@ impl Slack {
 
     /// The play operator of this DOF by itself at a position.
     pub fn play(&self, position: f64) -> Play {
-        let [minus, plus] = Side::BOTH.map(|side| self.learnt.offset(side, position));
+        let [minus, plus] = self.learnt(position);
         // Sides that have crossed are a width too, and limited as one.
         let [minus, plus] = self.limit.clamp(minus.min(plus), minus.max(plus));
         Play::from_ordered(minus, plus)
@@ -115,7 +128,7 @@ impl Slack {
 
     /// Half the width learnt at a position, whatever the limit: shares of it are shares all the same.
     pub fn half_width(&self, position: f64) -> f64 {
-        let [minus, plus] = Side::BOTH.map(|side| self.learnt.offset(side, position));
+        let [minus, plus] = self.learnt(position);
         (plus - minus).abs() / 2.0
     }
 
@@ -157,6 +170,7 @@ impl Slack {
         measured: f64,
         variance: f64,
     ) -> Triggers {
+        let before = self.learnt(measured);
         self.learnt.travel(motion.travel);
         let doubt = self.shared * self.part.deviation * self.half_width(measured);
         let variance = variance + doubt * doubt;
@@ -176,6 +190,8 @@ impl Slack {
             self.learnt.bound(side, measured, offset, variance);
             *trigger = Some(Trigger::Violation);
         }
+        let after = self.learnt(measured);
+        self.withheld.learn(before, after, triggers, motion.travel);
         triggers
     }
 }

@@ -26,6 +26,7 @@ mod supervisor;
 mod support;
 mod thrown_away;
 mod weighted;
+mod withheld;
 
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
