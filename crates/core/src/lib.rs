@@ -59,7 +59,6 @@ mod flags;
 mod frame_watch;
 mod friction;
 mod grip;
-
 mod guards;
 mod history;
 mod instrument;
@@ -101,7 +100,6 @@ pub use flags::{Flag, Flags};
 pub use frame_watch::{Arrival, FrameSettings, FrameWatch, Picture};
 pub use friction::{Friction, FrictionSettings, SlackShare};
 pub use grip::{Grip, GripSettings, Sighting};
-
 pub use guards::{GuardSettings, Guards, Supervision};
 pub use history::{Entry, History};
 pub use instrument::{Instrument, Marker};

@@ -25,6 +25,13 @@ pub struct Slack {
 impl Slack {
     /// The offsets of `play` everywhere, trusted as far as the prior says, without limit.
     pub fn new(prior: OffsetPrior, limit: ChangeLimit, play: Play) -> Self {
+        // With a gain to be learnt a change here is another one elsewhere: no offset is ever known.
+        let known = if prior.tilt > 0.0 {
+            f64::INFINITY
+        } else {
+            limit.known
+        };
+        let limit = ChangeLimit { known, ..limit };
         Self {
             learnt: OffsetMap::new(prior, play.delta_minus(), play.delta_plus()),
             withheld: Withheld::new(limit),
