@@ -43,7 +43,7 @@ impl ChangeLimit {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Withheld {
     limit: ChangeLimit,
-    withheld: [f64; 2],
+    amounts: [f64; 2],
     /// Travel over which each contact was measured.
     seen: [f64; 2],
     /// Since the last image that taught, in s.
@@ -55,7 +55,7 @@ impl Withheld {
     pub const fn new(limit: ChangeLimit) -> Self {
         Self {
             limit,
-            withheld: [0.0; 2],
+            amounts: [0.0; 2],
             seen: [0.0; 2],
             moving: 0.0,
         }
@@ -64,7 +64,7 @@ impl Withheld {
     /// Both offsets as they may be acted on, of those learnt.
     pub fn trusted(&self, [minus, plus]: [f64; 2]) -> [f64; 2] {
         let spare = self.limit.spare;
-        let [a, b] = self.withheld.map(|much| much - much.clamp(-spare, spare));
+        let [a, b] = self.amounts.map(|much| much - much.clamp(-spare, spare));
         [minus - a, plus - b]
     }
 
@@ -86,7 +86,7 @@ impl Withheld {
         if self.seen.iter().any(|seen| *seen < self.limit.known) {
             return;
         }
-        for (side, withheld) in Side::BOTH.into_iter().zip(&mut self.withheld) {
+        for (side, withheld) in Side::BOTH.into_iter().zip(&mut self.amounts) {
             *withheld += side.of(after) - side.of(before);
             *withheld -= withheld.clamp(-allowed, allowed);
         }
