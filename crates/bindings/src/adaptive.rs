@@ -20,9 +20,9 @@ impl AdaptiveAxis {
     #[pyo3(signature = (
         *, free_gain, contact_gain, cautious_gain, cautious_deviation, gain_limit,
         taper, settling, node_spacing, level_deviation, gain_deviation, local_deviation, correlation,
-        level_drift, gain_drift, local_drift, symmetry, contact_distance, contact_moved,
-        slope_tolerance, model_deviation, state_correction, tremor_time, period,
-        delta_minus, delta_plus
+        level_drift, gain_drift, local_drift, symmetry, change_rate, change_spare,
+        known_travel, contact_distance, contact_moved, slope_tolerance, model_deviation,
+        state_correction, tremor_time, period, delta_minus, delta_plus
     ))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
     fn new(
@@ -43,6 +43,9 @@ impl AdaptiveAxis {
         gain_drift: f64,
         local_drift: f64,
         symmetry: f64,
+        change_rate: f64,
+        change_spare: f64,
+        known_travel: f64,
         contact_distance: f64,
         contact_moved: f64,
         slope_tolerance: f64,
@@ -72,6 +75,11 @@ impl AdaptiveAxis {
                 tilt_drift: gain_drift,
                 local_drift,
                 symmetry,
+            },
+            change: core::ChangeLimit {
+                rate: change_rate,
+                spare: change_spare,
+                known: known_travel,
             },
             contact: core::ContactTest {
                 distance: contact_distance,

@@ -10,6 +10,7 @@ use crate::offset_map::{OffsetPrior, Side};
 use crate::play::Play;
 use crate::slack::Slack;
 use crate::smoother::Smoother;
+use crate::withheld::ChangeLimit;
 
 /// Standard deviation of an offset that was measured, in `cautious_deviation`.
 const KNOWN: f64 = 0.25;
@@ -27,6 +28,8 @@ pub struct AdaptiveSettings {
     pub cautious_deviation: f64,
     /// What is known beforehand of the offsets.
     pub prior: OffsetPrior,
+    /// How fast they may change.
+    pub change: ChangeLimit,
     /// When tip and command move together.
     pub contact: ContactTest,
     /// Deviation of a measured offset beyond that of the output.
@@ -46,6 +49,7 @@ impl AdaptiveSettings {
     fn checked(self) -> Result<Self, ConfigError> {
         let law = self.law.checked()?;
         self.prior.checked()?;
+        self.change.checked()?;
         let limit = self.gain_limit.is_finite() && self.gain_limit >= law.free_gain;
         require(
             limit,
@@ -110,7 +114,7 @@ impl AdaptiveAxis {
         let settings = settings.checked()?;
         Ok(Self {
             settings,
-            slack: Slack::new(settings.prior, play),
+            slack: Slack::new(settings.prior, settings.change, play),
             smoother: Smoother::new(settings.tremor_time, settings.period),
             stroke: Stroke::new(),
             reference: None,
@@ -188,6 +192,7 @@ impl AdaptiveAxis {
         if increment == 0.0 {
             return self.command;
         }
+        self.slack.pass(self.settings.period);
         let intention = smooth - self.intended;
         self.intended = smooth;
         if intention != 0.0 {

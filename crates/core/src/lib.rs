@@ -84,6 +84,7 @@ mod supervisor;
 mod swings;
 mod weighted;
 mod whereabouts;
+mod withheld;
 
 pub use adaptive::{AdaptiveAxis, AdaptiveSettings};
 pub use axis::{ArticleAxis, Axis, Lesson};
@@ -122,3 +123,4 @@ pub use supervisor::{Event, Supervisor, SupervisorSettings};
 pub use swings::Swings;
 pub use weighted::{WeightedEstimate, WeightedEstimator, WeightedSettings};
 pub use whereabouts::{Whereabouts, WhereaboutsSettings};
+pub use withheld::{ChangeLimit, Withheld};

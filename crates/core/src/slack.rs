@@ -7,11 +7,13 @@ use crate::limits::PlayLimit;
 use crate::offset_map::{OffsetMap, OffsetPrior, Side, TILTS};
 use crate::play::Play;
 use crate::sharing::Sharing;
+use crate::withheld::{ChangeLimit, Withheld};
 
 /// What was learnt of both contact offsets, and the most of it that is believed; in the unit of the DOF.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slack {
     learnt: OffsetMap,
+    withheld: Withheld,
     limit: PlayLimit,
     part: SlackShare,
     sharing: Sharing,
@@ -21,9 +23,17 @@ pub struct Slack {
 
 impl Slack {
     /// The offsets of `play` everywhere, trusted as far as the prior says, without limit.
-    pub fn new(prior: OffsetPrior, play: Play) -> Self {
+    pub fn new(prior: OffsetPrior, limit: ChangeLimit, play: Play) -> Self {
+        // With a gain to be learnt a change here is another one elsewhere: no offset is ever known.
+        let known = if prior.tilt > 0.0 {
+            f64::INFINITY
+        } else {
+            limit.known
+        };
+        let limit = ChangeLimit { known, ..limit };
         Self {
             learnt: OffsetMap::new(prior, play.delta_minus(), play.delta_plus()),
+            withheld: Withheld::new(limit),
             limit: PlayLimit::NONE,
             part: SlackShare::WHOLE,
             sharing: Sharing::new(),
@@ -48,7 +58,7 @@ impl Slack {
 
     /// Whether more slack than may be was learnt at a position.
     pub fn is_limited(&self, position: f64) -> bool {
-        let [minus, plus] = Side::BOTH.map(|side| self.learnt.offset(side, position));
+        let [minus, plus] = self.learnt(position);
         self.limit.exceeds(minus, plus)
     }
 
@@ -75,10 +85,20 @@ impl Slack {
     /// Both offsets at a position, within the limit, where that share of the width is left.
     fn offsets(&self, position: f64, part: f64) -> [f64; 2] {
         let share = self.left(part);
-        let [minus, plus] = Side::BOTH.map(|side| self.learnt.offset(side, position));
+        let [minus, plus] = self.withheld.trusted(self.learnt(position));
         let [minus, plus] = self.limit.clamp(minus, plus);
         let nearer = (1.0 - share) / 2.0 * (plus - minus);
         [minus + nearer, plus - nearer]
+    }
+
+    /// The reference moved for so long, in s.
+    pub fn pass(&mut self, time: f64) {
+        self.withheld.pass(time);
+    }
+
+    /// Both, as they were learnt.
+    fn learnt(&self, position: f64) -> [f64; 2] {
+        Side::BOTH.map(|side| self.learnt.offset(side, position))
     }
 
     /// One of them, as it is now.
@@ -98,7 +118,7 @@ impl Slack {
 
     /// The play operator of this DOF by itself at a position.
     pub fn play(&self, position: f64) -> Play {
-        let [minus, plus] = Side::BOTH.map(|side| self.learnt.offset(side, position));
+        let [minus, plus] = self.learnt(position);
         // Sides that have crossed are a width too, and limited as one.
         let [minus, plus] = self.limit.clamp(minus.min(plus), minus.max(plus));
         Play::from_ordered(minus, plus)
@@ -106,7 +126,7 @@ impl Slack {
 
     /// Half the width learnt at a position, whatever the limit: shares of it are shares all the same.
     pub fn half_width(&self, position: f64) -> f64 {
-        let [minus, plus] = Side::BOTH.map(|side| self.learnt.offset(side, position));
+        let [minus, plus] = self.learnt(position);
         (plus - minus).abs() / 2.0
     }
 
@@ -148,6 +168,7 @@ impl Slack {
         measured: f64,
         variance: f64,
     ) -> Triggers {
+        let before = self.learnt(measured);
         self.learnt.travel(motion.travel);
         let doubt = self.common() * self.part.deviation * self.half_width(measured);
         let (own, variance) = (variance, variance + doubt * doubt);
@@ -167,6 +188,8 @@ impl Slack {
             self.learnt.bound(side, measured, offset, variance);
             *trigger = Some(Trigger::Violation);
         }
+        let after = self.learnt(measured);
+        self.withheld.learn(before, after, triggers, motion.travel);
         triggers
     }
 }
@@ -174,6 +197,12 @@ impl Slack {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const LIMIT: ChangeLimit = ChangeLimit {
+        rate: 1.0,
+        spare: 1.0,
+        known: 1.0,
+    };
 
     #[test]
     fn what_is_not_shared_by_both_is_by_none() {
@@ -188,7 +217,7 @@ mod tests {
             local_drift: 0.0,
             symmetry: 0.0,
         };
-        let mut slack = Slack::new(prior, Play::from_ordered(-1.0, 3.0));
+        let mut slack = Slack::new(prior, LIMIT, Play::from_ordered(-1.0, 3.0));
         let part = SlackShare {
             now: 0.0,
             aimed: 0.5,

@@ -50,6 +50,12 @@ class AdaptiveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """The same of its variation with position."""
     symmetry: Annotated[float, Meta(ge=0, lt=1)] = 0.8
     """Minus the correlation of the two offsets: friction moves both contacts outwards alike."""
+    change_rate: NonNegative = 1.4
+    """Most that a known contact offset changes in a second of motion, as it is acted on."""
+    change_spare: NonNegative = 0.6
+    """What it changes by at once all the same: noise, and what it differs from place to place."""
+    known_travel: NonNegative = 50.0
+    """Travel of the command in contact, on either side, after which the offsets are known."""
     contact_distance: Positive = 3.0
     """Travel of the command over which it is seen whether the tip follows."""
     contact_moved: NonNegative = 3.0

@@ -1,7 +1,9 @@
 //! Profile `best`, one DOF: what holds whatever it has learnt, and what it achieves on a true play.
 
 use proptest::prelude::*;
-use tautscope_core::{AdaptiveAxis, AdaptiveSettings, ContactTest, LeadLaw, Play, PlayState};
+use tautscope_core::{
+    AdaptiveAxis, AdaptiveSettings, ChangeLimit, ContactTest, LeadLaw, Play, PlayState,
+};
 
 use crate::offset_map::prior;
 use crate::{config, plays};
@@ -19,6 +21,11 @@ pub(crate) fn settings(tremor_time: f64, period: f64) -> AdaptiveSettings {
         cautious_gain: 1.5,
         cautious_deviation: 0.1,
         prior: prior(),
+        change: ChangeLimit {
+            rate: 0.03,
+            spare: 0.05,
+            known: 1.0,
+        },
         contact: ContactTest {
             distance: 0.1,
             moved: 0.1,

@@ -108,7 +108,11 @@ fn admit(clutch: &mut Clutch, hand: f64, time: f64, stamp: Option<f64>) -> Admis
 
 /// A hand that has been at rest at 0 at time 0.
 fn begun() -> Clutch {
-    let mut clutch = Clutch::new(support::clutch()).unwrap();
+    begun_with(support::clutch())
+}
+
+fn begun_with(settings: ClutchSettings) -> Clutch {
+    let mut clutch = Clutch::new(settings).unwrap();
     assert!(clutch.admitted().iter().all(|value| value.is_nan()));
     assert_eq!(admit(&mut clutch, 0.0, 0.0, None).raised, Flags::NONE);
     clutch
@@ -195,18 +199,24 @@ fn what_is_off_stops_nothing() {
 /// Any one DOF may, and the least farther is too far.
 #[test]
 fn a_hand_may_gain_what_its_speed_limit_does_in_the_time_and_no_more() {
+    // A step from rest is what the watch over the device looks at.
+    let settings = ClutchSettings {
+        reference_count: [1e3; 3],
+        ..support::clutch()
+    };
     let ClutchSettings {
         period,
         reference_speed,
         reference_time,
         ..
-    } = support::clutch();
+    } = settings;
     let steady = period / (1.0 - libm::exp(-period / reference_time));
     for dof in 0..3 {
         for (share, raised) in [(1.0, false), (1.0 + 1e-9, true), (-1.0 - 1e-9, true)] {
             let mut reference = [0.0; 3];
             reference[dof] = reference_speed[dof] * steady * share;
-            let found = begun().admit(reference, PERIOD, None, false, Flags::NONE);
+            let mut clutch = begun_with(settings);
+            let found = clutch.admit(reference, PERIOD, None, false, Flags::NONE);
             assert_eq!(
                 found.raised,
                 Flags::when(raised, Flag::ReferenceJump),

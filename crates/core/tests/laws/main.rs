@@ -34,6 +34,7 @@ mod support;
 mod thrown_away;
 mod weighted;
 mod whole;
+mod withheld;
 
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;

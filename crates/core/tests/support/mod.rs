@@ -4,8 +4,8 @@ pub mod looped;
 pub mod stand_in;
 
 use tautscope_core::{
-    AdaptiveAxis, AdaptiveSettings, ChangeSettings, ClutchSettings, ContactTest, Flags,
-    FrameSettings, Friction, FrictionSettings, GripSettings, GuardSettings, LeadLaw,
+    AdaptiveAxis, AdaptiveSettings, ChangeLimit, ChangeSettings, ClutchSettings, ContactTest,
+    Flags, FrameSettings, Friction, FrictionSettings, GripSettings, GuardSettings, LeadLaw,
     MonitorSettings, MotionSettings, OffsetPrior, PerDof, Play, SupervisorSettings,
 };
 
@@ -114,6 +114,11 @@ pub fn axis(unit: f64) -> AdaptiveAxis {
             tilt_drift: 0.1,
             local_drift: unit,
             symmetry: 0.8,
+        },
+        change: ChangeLimit {
+            rate: 0.03,
+            spare: unit,
+            known: 50.0 * unit,
         },
         contact: ContactTest {
             distance: 3.0 * unit,
