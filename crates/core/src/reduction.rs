@@ -1,8 +1,11 @@
 //! The whole loop, Fig. 6.
 
+mod lesson;
 mod look;
+mod report;
 
 use self::look::{Seen, reversed, usable};
+pub use self::report::{Report, Status};
 use crate::axis::Axis;
 use crate::dof::PerDof;
 use crate::estimator::Triggers;
@@ -10,32 +13,13 @@ use crate::features::FeatureModel;
 use crate::flags::{Flag, Flags};
 use crate::frame_watch::{Arrival, Picture};
 use crate::friction::Friction;
-use crate::guards::{Guards, Supervision};
+use crate::guards::Guards;
 use crate::history::{Entry, History};
 use crate::play::Play;
 use crate::posture::Belief;
-use crate::state::{StateEstimate, StateEstimator, found};
+use crate::state::{StateEstimator, found};
 use crate::weighted::WeightedEstimator;
 use crate::whereabouts::Whereabouts;
-
-/// What became of a frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Status {
-    /// Every DOF was measured.
-    Ok,
-    /// Some DOF could not be observed and was held.
-    Held,
-    /// Only one marker was found, or could be believed; what it does not determine was held.
-    Partial,
-    /// The markers were not found.
-    NoMarkers,
-    /// Captured at a time the history does not reach.
-    Stale,
-    /// Captured no later than a frame already used.
-    Duplicate,
-    /// A guard did not believe it: it taught nothing.
-    Refused,
-}
 
 /// How an image becomes a state.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,27 +28,6 @@ pub enum StateEstimation {
     Article(StateEstimator),
     /// From what the last images said; profile `best`.
     Weighted(WeightedEstimator),
-}
-
-/// What the loop made of a frame; NaN is what is not known.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Report {
-    /// What became of the frame.
-    pub status: Status,
-    /// q at the capture time [m, rad, rad].
-    pub predicted_state: PerDof<f64>,
-    /// h of the state the estimate started from in px: q, or what the last images said.
-    pub predicted_features: [f64; 4],
-    /// `q_hat`, innovation and what could be observed.
-    pub estimate: StateEstimate,
-    /// Standard deviation of each DOF of `q_hat` [m, rad, rad].
-    pub state_deviation: PerDof<f64>,
-    /// Which offsets were updated, and why.
-    pub triggers: PerDof<Triggers>,
-    /// The offsets from now on [m, rad, rad].
-    pub play: PerDof<Play>,
-    /// What is in force from now on, and why.
-    pub supervision: Supervision,
 }
 
 /// Image-based hysteresis reduction, Fig. 6: reference in, command out; images teach it the slack.
@@ -276,75 +239,6 @@ impl HysteresisReduction {
             triggers,
             estimate,
             state_deviation: seen.state_deviation,
-            play: self.play(),
-            supervision: self.guards.supervision(),
-        }
-    }
-
-    fn learn(&mut self, past: &Entry, seen: &Seen, raised: &mut Flags) -> PerDof<Triggers> {
-        let mut triggers = [Triggers::default(); 3];
-        let mut changes = [[0.0; 2]; 3];
-        let flags = self.watch(past, seen);
-        *raised = raised.and(flags);
-        let history = &self.history;
-        let outputs = seen.output.iter().zip(seen.output_deviation);
-        let signals = seen
-            .estimate
-            .observable
-            .iter()
-            .zip(past.command)
-            .zip(outputs);
-        let axes = self
-            .axes
-            .iter_mut()
-            .zip(triggers.iter_mut().zip(&mut changes))
-            .zip(&mut self.corrected)
-            .enumerate();
-        for (
-            (dof, ((axis, (triggers, change)), corrected)),
-            ((observable, command), (output, deviation)),
-        ) in axes.zip(signals)
-        {
-            if *observable {
-                let since = history
-                    .since(past.time)
-                    .filter_map(|entry| entry.command.get(dof).copied());
-                let before = axis.predicted_state();
-                let lesson = axis.learn(command, *output, deviation, since);
-                (*triggers, *change) = (lesson.triggers, lesson.change);
-                *raised = raised.and(Flags::when(lesson.is_limited, Flag::WidthLimit));
-                let moved = axis.predicted_state() - before;
-                *corrected += if moved.is_finite() { moved } else { 0.0 };
-            }
-        }
-        *raised = raised.and(self.guards.taught(changes, past.travel));
-        triggers
-    }
-
-    /// What the image says of hand and tip.
-    fn watch(&mut self, past: &Entry, seen: &Seen) -> Flags {
-        let play = self.play();
-        self.guards
-            .look(past.time, past.reference, seen.image_state(), play)
-    }
-
-    /// The report on a frame that taught nothing.
-    fn unused(&self, status: Status, past: Option<Entry>) -> Report {
-        let predicted_state = past.map_or([f64::NAN; 3], |past| past.predicted_state);
-        let prediction = self.feature_model.predict(predicted_state);
-        Report {
-            status,
-            predicted_state,
-            predicted_features: prediction.map_or([f64::NAN; 4], |prediction| prediction.features),
-            estimate: StateEstimate {
-                state: predicted_state,
-                observable: [false; 3],
-                deviation: [f64::NAN; 3],
-                innovation: [f64::NAN; 4],
-                inverse: [[0.0; 4]; 3],
-            },
-            state_deviation: [f64::NAN; 3],
-            triggers: [Triggers::default(); 3],
             play: self.play(),
             supervision: self.guards.supervision(),
         }
