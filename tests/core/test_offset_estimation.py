@@ -21,7 +21,6 @@ Contacts = Callable[[float, float], tuple[float, float]]
 """From tip and time to the command's offsets (minus, plus) at the two contacts."""
 
 CONFIG = load_config(profile="best")
-UNIT = CONFIG.insertion.update_distance
 TICK = CONFIG.control.period
 AMPLITUDE, PERIOD = 40.0, 10.0
 """Of the reference [update distances, s]."""
@@ -39,29 +38,31 @@ class Trial:
         seed: int = 0,
         periods: int = 5,
         compensate: bool = True,
+        dof: Dof = Dof.INSERTION,
         **settings: float,
     ) -> None:
+        unit = CONFIG[dof].update_distance
         changes = {f"adaptive.{name}": value for name, value in settings.items()}
         changes |= {
-            "insertion.delta_minus": start[0] * UNIT,
-            "insertion.delta_plus": start[1] * UNIT,
+            f"{dof.label}.delta_minus": start[0] * unit,
+            f"{dof.label}.delta_plus": start[1] * unit,
         }
         config = CONFIG.replace(**changes)
-        axis = build_adaptive_axis(config, Dof.INSERTION, compensate)
+        axis = build_adaptive_axis(config, dof, compensate)
         noise, seen = np.random.default_rng(seed), deque[tuple[int, float]]()
         tip, commands, rows = 0.0, [], []
         for tick in range(round(periods * PERIOD / TICK)):
             reference = AMPLITUDE * np.sin(2 * np.pi * tick * TICK / PERIOD)
-            commands.append(axis.step(reference * UNIT))
+            commands.append(axis.step(reference * unit))
             if seen and seen[0][0] + 16 <= tick:
                 at, measured = seen.popleft()
-                axis.learn(commands[at], measured * UNIT, 0.0, np.array(commands[at + 1 :]))
+                axis.learn(commands[at], measured * unit, 0.0, np.array(commands[at + 1 :]))
             minus, plus = contacts(tip, tick * TICK)
-            command = commands[-1] / UNIT
+            command = commands[-1] / unit
             tip = gain * np.clip(tip / gain, command - plus, command - minus)
             if tick % 8 == 0:
                 seen.append((tick, tip + 0.2 * noise.standard_normal()))
-            rows.append((reference, tip, axis.delta_minus / UNIT, axis.delta_plus / UNIT))
+            rows.append((reference, tip, axis.delta_minus / unit, axis.delta_plus / unit))
         self.reference, self.tip, self.minus, self.plus = np.array(rows).T
         self.gain, self.gain_deviation = axis.gain
 
@@ -128,7 +129,7 @@ def test_one_cable_hands_over_to_the_other_in_mid_stroke(slack: float, seed: int
         share = np.clip(tip / 0.5, 0.0, 1.0)
         return -10 + slack * share, 10 + slack * share
 
-    trial = Trial(contacts, seed=seed)
+    trial = Trial(contacts, seed=seed, dof=Dof.BENDING)
     assert abs(trial.width(3, 5)) < 1.0, f"seed {seed}: {trial.width(3, 5)}"
     assert trial.error(3, 5) < 0.75 * slack + 0.5, f"seed {seed}: {trial.error(3, 5)}"
 

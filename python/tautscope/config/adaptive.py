@@ -6,7 +6,7 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
-from tautscope.config.fields import Fraction, Gain, NonNegative, Positive
+from tautscope.config.fields import Fraction, Gain, NonNegative, PerDof, Positive
 
 
 class AdaptiveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -50,8 +50,10 @@ class AdaptiveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """The same of its variation with position."""
     symmetry: Annotated[float, Meta(ge=0, lt=1)] = 0.8
     """Minus the correlation of the two offsets: friction moves both contacts outwards alike."""
-    change_rate: NonNegative = 1.4
-    """Most that a known contact offset changes in a second of motion, as it is acted on."""
+    change_rate: PerDof = (1.4, 1.4, 1000.0)
+    """Most that a known contact offset changes in a second of motion, as it is acted on, of each
+    DOF. Of bending it bounds nothing: where one of its cables hands over to the other, offsets
+    change within a stroke by more than any scope changes them."""
     change_spare: NonNegative = 0.6
     """What it changes by at once all the same: noise, and what it differs from place to place."""
     known_travel: NonNegative = 50.0

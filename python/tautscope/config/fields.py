@@ -9,3 +9,5 @@ NonNegative = Annotated[float, Meta(ge=0)]
 Fraction = Annotated[float, Meta(gt=0, lt=1)]
 Gain = Annotated[float, Meta(ge=1)]
 Vector3 = tuple[float, float, float]
+PerDof = tuple[Positive, Positive, Positive]
+"""Of insertion, rotation and bending."""

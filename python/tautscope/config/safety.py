@@ -6,9 +6,8 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
-from tautscope.config.fields import NonNegative, Positive, Vector3
+from tautscope.config.fields import NonNegative, PerDof, Positive, Vector3
 
-PerDof = tuple[Positive, Positive, Positive]
 Range = tuple[float, float]
 Count = Annotated[int, Meta(ge=1, le=1_000_000)]
 
