@@ -14,6 +14,7 @@ mod frame_watch;
 mod frames;
 mod friction;
 mod friction_step;
+mod grip;
 mod guarantees;
 mod guards;
 mod history;
