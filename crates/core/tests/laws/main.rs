@@ -10,6 +10,7 @@ mod compensator;
 mod device_watch;
 mod estimator;
 mod expectation;
+mod fading;
 mod frame_watch;
 mod frames;
 mod friction;
