@@ -24,6 +24,7 @@ mod lead_rates;
 mod learning;
 mod limits;
 mod monitor;
+mod motion_bounds;
 mod motion_watch;
 mod offset_map;
 mod play;
