@@ -1,6 +1,6 @@
 //! The bounds of hand and tip, which numbers of few bits meet exactly: what is on one is within.
 
-use tautscope_core::{Flag, Flags, MotionSettings, MotionWatch, PerDof, Play};
+use tautscope_core::{Flag, Flags, MotionSettings, MotionWatch, PerDof, Play, Swings};
 
 /// A little more of a length, and a little less.
 const MORE: f64 = 1.0 + 1e-12;
@@ -115,4 +115,19 @@ fn a_swing_grows_from_its_bound_on_and_in_no_more_than_its_time() {
     assert_eq!(said(11.0, 2.0), cycle);
     assert_eq!(said(11.0 * LESS, 2.0), Flags::NONE);
     assert_eq!(said(11.0, 2.0 * MORE), Flags::NONE);
+}
+
+#[test]
+fn a_signal_turns_beyond_the_band_and_not_on_it() {
+    for sign in [1.0, -1.0] {
+        let begun = || {
+            let mut swings = Swings::new(0.5);
+            for value in [0.0, sign * 4.0] {
+                assert_eq!(swings.follow(value), None);
+            }
+            swings
+        };
+        assert_eq!(begun().follow(sign * 3.5), None);
+        assert_eq!(begun().follow(sign * 3.5 * LESS), Some(4.0));
+    }
 }
