@@ -191,3 +191,34 @@ fn what_is_no_limit_is_refused() {
         }
     }
 }
+
+/// |du - v T| <= speed T + count where T <= silence: both to the last bit, in numbers of few bits.
+#[test]
+fn what_is_on_a_bound_is_within() {
+    let (period, speed, count) = (1.0 / 256.0, 1.0 / 32.0, 1.0 / 16384.0);
+    let ticks = 16;
+    let new = || {
+        DeviceWatch::new(DeviceSettings {
+            period,
+            speed: [speed; 3],
+            count: [count; 3],
+            silence: f64::from(ticks) * period,
+        })
+        .unwrap()
+    };
+    for waited in [1, ticks / 2, ticks] {
+        let bound = speed * f64::from(waited) * period + count;
+        for (moved, expected) in [
+            (bound, Flags::NONE),
+            (-bound, Flags::NONE),
+            (bound * (1.0 + 1e-12), Flags::of(Flag::ReferenceJump)),
+        ] {
+            let mut watch = new();
+            for _ in 1..waited {
+                watch.tick([0.0; 3], period);
+            }
+            let raised = watch.tick([0.0, moved, 0.0], period);
+            assert_eq!(raised, expected, "{moved} after {waited} ticks");
+        }
+    }
+}

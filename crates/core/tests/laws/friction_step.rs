@@ -6,7 +6,7 @@ use tautscope_core::{Friction, FrictionSettings};
 use crate::config;
 
 /// n after a pull from n: where it is, or n1 / (1 + l), n2 / (1 + ease l) with the l that makes |n| = 1.
-fn slid(n: [f64; 2], ease: f64) -> [f64; 2] {
+pub fn slid(n: [f64; 2], ease: f64) -> [f64; 2] {
     let at = |way: f64| [n[0] / (1.0 + way), n[1] / (1.0 + ease * way)];
     let size = |[a, b]: [f64; 2]| a.hypot(b);
     if size(n) <= 1.0 {

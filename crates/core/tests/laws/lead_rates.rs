@@ -72,6 +72,16 @@ proptest! {
         prop_assert!((found - expected).abs() < 1e-4, "{found}, by small steps {expected}");
     }
 
+    /// A lead that is there need not be brought about: what of the free zone is left does not matter.
+    #[test]
+    fn where_nothing_is_missing_the_gap_is_of_no_account(
+        travel in 0.0..3.0, stretch in 0.3..3.0, gap in 0.0..5.0, missing in prop_oneof![Just(0.0), -3.0..0.0],
+    ) {
+        let law = LeadLaw { free_gain: 5.0, contact_gain: 2.0, taper: 0.5, settling: 0.5 };
+        let found = law.gain(travel, stretch, gap, missing);
+        prop_assert_eq!(found, law.gain(travel, stretch, 0.0, missing));
+    }
+
     /// Nothing is asked of a tip of a scale that the gain cannot give.
     #[test]
     fn a_stretch_beyond_the_gain_counts_as_the_gain(
@@ -110,4 +120,18 @@ fn settings_out_of_range_are_named() {
         change(&mut wrong);
         assert_eq!(wrong.checked().unwrap_err().field, field);
     }
+}
+
+/// One that arrives in the free zone stays until the tick ends, also where it arrives with the contact; in numbers of
+/// few bits.
+#[test]
+fn a_lead_that_arrives_with_the_contact_waits() {
+    let law = LeadLaw {
+        free_gain: 4.0,
+        contact_gain: 2.0,
+        taper: 1.0,
+        settling: 0.5,
+    };
+    // A gap of 9 at K = 4, which is s contact_gain.
+    assert_eq!(law.gain(3.0, 2.0, 9.0, 6.75), 6.75);
 }

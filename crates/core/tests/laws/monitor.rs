@@ -66,6 +66,8 @@ fn each_limit_binds_and_a_broken_law_is_told_from_a_limit() {
     assert_eq!(start().permit(1.0, -0.1), (0.0, Verdict::Broken));
     assert_eq!(start().permit(0.0, 1e-300), (0.0, Verdict::Broken));
     assert_eq!(start().permit(1.0, f64::NAN), (0.0, Verdict::Broken));
+    assert_eq!(start().permit(-1.0, f64::NAN), (0.0, Verdict::Broken));
+    assert_eq!(start().permit(f64::NAN, 1.0), (0.0, Verdict::Broken));
     assert_eq!(start().permit(2.0, 5.1), (0.0, Verdict::Jump));
     assert_eq!(start().permit(-2.0, -9.0), (0.0, Verdict::Jump));
     assert_eq!(start().permit(2.0, 10.1), (0.0, Verdict::Broken));

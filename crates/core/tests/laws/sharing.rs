@@ -1,10 +1,11 @@
 //! How much friction is shared: what offsets say of it, and what the loop makes of slacks that are apart.
 
 use proptest::prelude::*;
-use tautscope_core::{Sharing, Side, Status};
+use tautscope_core::{HysteresisReduction, PerDof, Play, PlayState, Sharing, Side, Status};
 
 use crate::config;
-use crate::support::looped::adaptive;
+use crate::friction_step::slid;
+use crate::support::looped::{adaptive, model};
 use crate::support::stand_in::{WIDTH, World, hand};
 use crate::support::{PERIOD, UNITS};
 
@@ -74,5 +75,74 @@ fn slacks_apart_are_learnt_as_they_are() {
                 assert!(time < 60.0 || off < 0.1, "{time} s: {off}, {report:?}");
             }
         }
+    }
+}
+
+/// An instrument whose insertion and rotation share one friction, and whose bending has its own.
+struct Shaft {
+    half: PerDof<f64>,
+    n: [f64; 2],
+    command: PerDof<f64>,
+    bending: PlayState,
+}
+
+impl Shaft {
+    fn new(command: PerDof<f64>) -> Self {
+        Self {
+            half: UNITS.map(|unit| 0.5 * WIDTH * unit),
+            n: [0.0; 2],
+            command,
+            bending: PlayState { output: command[2] },
+        }
+    }
+
+    fn follow(&mut self, command: PerDof<f64>) -> PerDof<f64> {
+        let [h1, h2, h3] = self.half;
+        let [along, around, bent] = command;
+        let [n1, n2] = self.n;
+        let pulled = [
+            n1 + (along - self.command[0]) / h1,
+            n2 + (around - self.command[1]) / h2,
+        ];
+        // The arm of the support's friction.
+        self.n = slid(pulled, h1 / (1.75e-3 * h2));
+        self.command = command;
+        Play::new(-h3, h3).unwrap().step(&mut self.bending, bent);
+        [
+            along - self.n[0] * h1,
+            around - self.n[1] * h2,
+            self.bending.output,
+        ]
+    }
+}
+
+/// What the prediction of a loop that has learnt such an instrument is off without images, root mean square in [`UNITS`].
+fn blindly_off(mut reduction: Box<HysteresisReduction>) -> [f64; 2] {
+    let mut shaft = Shaft::new(hand(0.0));
+    let (mut sums, mut count) = ([0.0; 2], 0.0);
+    for tick in 0..20_000_u32 {
+        let time = f64::from(tick) * PERIOD;
+        let tip = shaft.follow(reduction.step(hand(time), None, time));
+        if tick >= 15_000 {
+            count += 1.0;
+            let predicted = reduction.predicted_state();
+            for (dof, sum) in sums.iter_mut().enumerate() {
+                *sum += ((predicted[dof] - tip[dof]) / UNITS[dof]).powi(2);
+            }
+        } else if tick.is_multiple_of(8) {
+            let features = model().predict(tip).map(|seen| seen.features);
+            reduction.on_features(features, None, time, Some(u64::from(tick)));
+        }
+    }
+    sums.map(|sum: f64| (sum / count).sqrt())
+}
+
+/// A loop that knows of one friction foresees the tip where there is one.
+#[test]
+fn one_friction_is_foreseen_by_who_expects_one() {
+    let expects = blindly_off(adaptive());
+    let without = blindly_off(Box::new(adaptive().with_friction(None)));
+    for (expects, without) in expects.iter().zip(without) {
+        assert!(2.0 * expects < without, "{expects} {without}");
     }
 }

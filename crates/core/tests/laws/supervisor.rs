@@ -189,6 +189,24 @@ fn hold_ends_by_time_or_by_travel_then_motion_fades_and_comes_back_once_seen() {
     assert!((supervisor.lead() - 1.0).abs() < 1e-12);
 }
 
+/// The longest time and travel there may be: with either the hold is over.
+#[test]
+fn a_hold_ends_on_its_bound() {
+    let frozen = Flags::of(Flag::Frozen);
+    let settings = support::supervisor();
+    for (time, travel, expected) in [
+        (settings.hold_time, 0.0, Reaction::Fade),
+        (0.0, settings.hold_travel, Reaction::Fade),
+        (0.999 * settings.hold_time, 0.0, Reaction::HoldEstimate),
+        (0.0, 0.999 * settings.hold_travel, Reaction::HoldEstimate),
+    ] {
+        let mut supervisor = supervisor();
+        supervisor.update(&event(Source::Frame, 0.0, 0.0, frozen));
+        supervisor.update(&event(Source::Frame, time, travel, frozen));
+        assert_eq!(supervisor.reaction(), expected, "{time} s, {travel}");
+    }
+}
+
 #[test]
 fn settings_out_of_range_are_named() {
     let good = support::supervisor();
