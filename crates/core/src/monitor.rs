@@ -77,7 +77,7 @@ impl Monitor {
 
     /// The command that may be sent for an admitted reference.
     ///
-    /// One that is not finite becomes the last, or NaN before there is one.
+    /// One that is not finite, or of a reference that is not, becomes the last, or NaN before there is one.
     pub fn permit(&mut self, reference: f64, command: f64) -> (f64, Verdict) {
         let MonitorSettings {
             gain_limit,
@@ -94,6 +94,9 @@ impl Monitor {
             let verdict = told(permitted, command, Verdict::Same, Verdict::Limited);
             return (permitted, verdict);
         };
+        if !reference.is_finite() {
+            return (last, Verdict::Broken);
+        }
         let increment = reference - last_reference;
         let farthest = last + gain_limit * increment;
         let lawful = if command.is_finite() && farthest.is_finite() {
@@ -102,9 +105,7 @@ impl Monitor {
             last
         };
         if (lawful - last).abs() > step_limit {
-            if reference.is_finite() {
-                self.last = Some((reference, last));
-            }
+            self.last = Some((reference, last));
             return (last, told(lawful, command, Verdict::Jump, Verdict::Broken));
         }
         // Never beyond the last command's own distance, so that a limit cannot move anything by itself.
@@ -126,9 +127,7 @@ impl Monitor {
         let bound = told(limited, led, Verdict::Led, Verdict::Limited);
         let lawfully = told(permitted, command, Verdict::Same, bound);
         let verdict = told(lawful, command, lawfully, Verdict::Broken);
-        if reference.is_finite() {
-            self.last = Some((reference, permitted));
-        }
+        self.last = Some((reference, permitted));
         (permitted, verdict)
     }
 

@@ -67,7 +67,14 @@ fn each_limit_binds_and_a_broken_law_is_told_from_a_limit() {
     assert_eq!(start().permit(0.0, 1e-300), (0.0, Verdict::Broken));
     assert_eq!(start().permit(1.0, f64::NAN), (0.0, Verdict::Broken));
     assert_eq!(start().permit(-1.0, f64::NAN), (0.0, Verdict::Broken));
-    assert_eq!(start().permit(f64::NAN, 1.0), (0.0, Verdict::Broken));
+    for reference in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        for command in [0.0, 1.0, f64::NAN] {
+            let mut monitor = start();
+            assert_eq!(monitor.permit(reference, command), (0.0, Verdict::Broken));
+            // And counts from the last that was one.
+            assert_eq!(monitor.permit(1.0, 1.0), (1.0, Verdict::Same));
+        }
+    }
     assert_eq!(start().permit(2.0, 5.1), (0.0, Verdict::Jump));
     assert_eq!(start().permit(-2.0, -9.0), (0.0, Verdict::Jump));
     assert_eq!(start().permit(2.0, 10.1), (0.0, Verdict::Broken));
