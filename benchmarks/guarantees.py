@@ -281,7 +281,8 @@ def line(goal: Goal, found: dict[str, rows.Figure], old: dict[str, str]) -> str:
         cells = before.split("|")[4:-1] if before else [" not measured ", *[" "] * 4]
         return start + "|".join(cells) + "|"
     today = datetime.now(UTC).date().isoformat()
-    return f"{start} {figure.text} | {figure.runs} | {figure.failures} | {figure.seeds} | {today} |"
+    k = f"{figure.failures}, missed" if figure.failures else "0"
+    return f"{start} {figure.text} | {figure.runs} | {k} | {figure.seeds} | {today} |"
 
 
 if __name__ == "__main__":
