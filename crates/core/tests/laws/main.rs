@@ -35,6 +35,7 @@ mod supervisor;
 #[path = "../support/mod.rs"]
 mod support;
 mod thrown_away;
+mod torture;
 mod weighted;
 mod whole;
 mod withheld;
