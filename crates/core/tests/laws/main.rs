@@ -19,6 +19,7 @@ mod grip;
 mod guarantees;
 mod guards;
 mod history;
+mod innovations;
 mod lead;
 mod lead_rates;
 mod learning;
