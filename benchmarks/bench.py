@@ -25,18 +25,18 @@ import bench_tables
 import numpy as np
 from bench_processes import PATIENCE, bench_config, rig, run
 from numpy.typing import ArrayLike
-from tautscope import tables
 from tautscope.bench.truth import read_truth
 from tautscope.config import dump_config
 from tautscope.dof import Dof
-from tautscope.experiment import run_experiment
 from tautscope.hardware.timing import read_sent
 from tautscope.log.reader import read_log
 from tautscope.log.replay import replay_same
-from tautscope.recording import Recording
-from tautscope.references import SineSequence
-from tautscope.results import Results, evaluate
-from tautscope.rig import Sample
+from tautscope.loop.references import SineSequence
+from tautscope.loop.rig import Sample
+from tautscope.report import tables
+from tautscope.report.results import Results, evaluate
+from tautscope.runs.experiment import run_experiment
+from tautscope.runs.recording import Recording
 from tautscope.twin import Twin
 
 WITHIN = 0.03

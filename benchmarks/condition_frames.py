@@ -11,11 +11,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from tautscope.blocks import build_feature_model
 from tautscope.config import Config
-from tautscope.reduction import Expectation
+from tautscope.loop.construction import build_feature_model
+from tautscope.loop.reduction import Expectation
+from tautscope.loop.vision import MarkerDetector
 from tautscope.twin.camera import FRAMES_PER_BACKGROUND, Picture, TwinCamera
-from tautscope.vision import MarkerDetector
 
 Floats = NDArray[np.float64]
 

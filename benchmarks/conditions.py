@@ -34,7 +34,7 @@ from condition_frames import (
     judge,
     shots,
 )
-from tautscope.progress import progress_bar
+from tautscope.commands.progress import progress_bar
 
 ROOT = Path(__file__).resolve().parents[1]
 

@@ -11,7 +11,7 @@ from fault_watch import STILL, Watch
 from numpy.typing import NDArray
 from tautscope.config import Config
 from tautscope.dof import Dof
-from tautscope.references import Segment
+from tautscope.loop.references import Segment
 from tautscope.twin.faults import FaultyHand
 
 Floats = NDArray[np.float64]

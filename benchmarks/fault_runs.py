@@ -35,8 +35,8 @@ from fault_judgement import HELD, MOVED, PASSING, Outcome, Traces, excursion, ou
 from fault_watch import STILL, Driven, FeatureTwin, Watch
 from tautscope.config import Config, Profile
 from tautscope.errors import ConfigError, TautscopeError
-from tautscope.experiment import run_experiment
-from tautscope.safety import DETECTORS, Reaction
+from tautscope.loop.safety import DETECTORS, Reaction
+from tautscope.runs.experiment import run_experiment
 from tautscope.twin.faults import Fault, FaultyHand, FaultyRig, Target
 
 

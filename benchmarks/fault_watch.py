@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 from tautscope.config import Config, load_config
 from tautscope.hardware.following import Following
 from tautscope.hardware.rig import rig_drives
-from tautscope.reduction import HysteresisReduction, Report
-from tautscope.rig import Frame, Sample
-from tautscope.safety import Reaction, Supervision
+from tautscope.loop.reduction import HysteresisReduction, Report
+from tautscope.loop.rig import Frame, Sample
+from tautscope.loop.safety import Reaction, Supervision
 from tautscope.twin import Twin
 from tautscope.twin.faults import FaultyRig, FeatureFrame
 
@@ -72,7 +72,7 @@ def look(loop: HysteresisReduction, frame: Frame) -> Report:
 
 @dataclass
 class Watch:
-    """Sees what the loop says of itself, tick by tick; a `tautscope.experiment.Log`.
+    """Sees what the loop says of itself, tick by tick; a `tautscope.runs.experiment.Log`.
 
     Attributes:
         clock: The twin's own [s].

@@ -21,9 +21,9 @@ import fault_tables as tables
 from doc_pages import ROOT, insert
 from fault_runs import each_off, study
 from hysteresis_runs import one_thread
+from tautscope.commands.progress import progress_bar
 from tautscope.config import Profile
-from tautscope.progress import progress_bar
-from tautscope.safety import DETECTORS
+from tautscope.loop.safety import DETECTORS
 from tautscope.twin.faults import KINDS
 
 PAGE = ROOT / "docs" / "faults.md"

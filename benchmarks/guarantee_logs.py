@@ -21,11 +21,11 @@ from guarantee_rows import Figure
 from tautscope import HysteresisReduction, Twin
 from tautscope.dof import Dof
 from tautscope.errors import RecordError
-from tautscope.experiment import run_experiment
 from tautscope.log import journal
 from tautscope.log.reader import read_log
 from tautscope.log.writer import LogWriter
-from tautscope.rig import Sample
+from tautscope.loop.rig import Sample
+from tautscope.runs.experiment import run_experiment
 
 FLIPS = 1_000
 """Bits flipped, beside the cuts."""

@@ -19,11 +19,11 @@ from hysteresis_rows import insertion, stroke_widths, true_width
 from hysteresis_runs import Simulation, uncompensated
 from numpy.typing import NDArray
 from tautscope import HysteresisReduction
-from tautscope.blocks import build_feature_model
 from tautscope.config import Config, Profile
 from tautscope.hardware.realtime import LOOP, realtime
-from tautscope.metrics import until_within
-from tautscope.results import evaluate
+from tautscope.loop.construction import build_feature_model
+from tautscope.report.metrics import until_within
+from tautscope.report.results import evaluate
 
 TICK_P9999, TICK_MAX = 100e-6, 1e-3
 """Goals of a tick [s]."""

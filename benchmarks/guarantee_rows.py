@@ -15,7 +15,7 @@ from fault_tables import seeds as seeds_of
 from fault_watch import FeatureTwin, look
 from tautscope import HysteresisReduction, load_config
 from tautscope.dof import Dof
-from tautscope.experiment import run_experiment
+from tautscope.runs.experiment import run_experiment
 
 Row = dict[str, Any]
 

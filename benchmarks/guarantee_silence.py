@@ -16,7 +16,7 @@ from tautscope.config import DrivesConfig, load_config
 from tautscope.dof import Dof
 from tautscope.errors import DriveError, HeartbeatError
 from tautscope.hardware.drives import open_drives
-from tautscope.safety import Reaction
+from tautscope.loop.safety import Reaction
 
 HAND, DRIVE = 0.05, 0.1
 """Goals [s]."""

@@ -20,9 +20,9 @@ import hysteresis_table as tables
 from hysteresis_goals import GOALS
 from hysteresis_rows import SCENARIOS, Plan
 from hysteresis_runs import Recordings, Store
+from tautscope.commands.progress import progress_bar
 from tautscope.config import Config, Profile, load_config
 from tautscope.dof import Dof
-from tautscope.progress import progress_bar
 
 PROFILES: tuple[Profile, ...] = ("paper", "best")
 SEEDS = range(5)

@@ -20,10 +20,10 @@ from hysteresis_rows import (
 from hysteresis_runs import Floats, Recordings
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from tautscope import metrics
 from tautscope.dof import Dof
-from tautscope.figures import BLACK, BLUE, GREEN, GREY, ORANGE, PAGE, style
-from tautscope.results import evaluate, true_loop
+from tautscope.report import metrics
+from tautscope.report.figures import BLACK, BLUE, GREEN, GREY, ORANGE, PAGE, style
+from tautscope.report.results import evaluate, true_loop
 
 PLAIN = "without"
 COLOURS = {PLAIN: GREY, "paper": ORANGE, "best": BLUE}

@@ -13,12 +13,12 @@ from itertools import pairwise
 import numpy as np
 from hysteresis_goals import CONDITIONS, LATENCIES
 from hysteresis_runs import Floats, Recordings, Simulation, Sines, uncompensated
-from tautscope import metrics
 from tautscope.config import Config
 from tautscope.dof import Dof
-from tautscope.recording import Recording, Table
-from tautscope.references import Segment
-from tautscope.results import evaluate
+from tautscope.loop.references import Segment
+from tautscope.report import metrics
+from tautscope.report.results import evaluate
+from tautscope.runs.recording import Recording, Table
 
 Plan = dict[str, Simulation]
 Found = list[tuple[str, Dof, float]]

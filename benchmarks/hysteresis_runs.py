@@ -15,14 +15,14 @@ import msgspec
 import numpy as np
 import tautscope
 from numpy.typing import ArrayLike, NDArray
-from tautscope.blocks import build_feature_model
 from tautscope.config import Config, ExperimentConfig
 from tautscope.dof import Dof
-from tautscope.experiment import run_experiment
-from tautscope.recording import Recording
-from tautscope.reduction import HysteresisReduction, Report
-from tautscope.references import Segment, SineSequence
-from tautscope.rig import Frame, Sample
+from tautscope.loop.construction import build_feature_model
+from tautscope.loop.reduction import HysteresisReduction, Report
+from tautscope.loop.references import Segment, SineSequence
+from tautscope.loop.rig import Frame, Sample
+from tautscope.runs.experiment import run_experiment
+from tautscope.runs.recording import Recording
 from tautscope.twin.fault_frames import FeatureFrame
 
 Floats = NDArray[np.float64]

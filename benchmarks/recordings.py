@@ -34,11 +34,11 @@ from tautscope import (
     load_config,
 )
 from tautscope.dof import Dof
-from tautscope.experiment import run_experiment
 from tautscope.log.export import recover
 from tautscope.log.reader import Tick, Update, read_log
 from tautscope.log.replay import replay_same
 from tautscope.log.writer import LogWriter
+from tautscope.runs.experiment import run_experiment
 
 PERIOD = 0.01
 """Of the killed process's ticks [s]."""
@@ -135,7 +135,8 @@ def kill_one(folder: Path, lifetime: float, scene: Scene) -> Loss:
     sent_file.write_bytes(bytes(_SENT.size))
     # A server that has all modules loaded: a process each would spend its time on imports.
     context = get_context("forkserver")
-    context.set_forkserver_preload(["tautscope.twin", "tautscope.log.writer", "tautscope.vision"])
+    modules = ["tautscope.twin", "tautscope.log.writer", "tautscope.loop.vision"]
+    context.set_forkserver_preload(modules)
     child = context.Process(target=write_for_ever, args=(log_file, sent_file, scene))
     child.start()
     try:

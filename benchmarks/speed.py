@@ -15,13 +15,13 @@ from time import perf_counter_ns
 from typing import Any
 
 import numpy as np
-from tautscope.blocks import (
+from tautscope.config import Config
+from tautscope.loop.construction import (
     build_feature_model,
     build_loop,
     build_state_estimator,
     build_weighted_estimator,
 )
-from tautscope.config import Config
 
 REPEATS = 60
 

@@ -21,12 +21,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from tautscope import _core
-from tautscope.blocks import build_feature_model, build_state_estimator, build_weighted_estimator
 from tautscope.config import Config, load_config
 from tautscope.dof import Dof
-from tautscope.experiment import run_experiment
-from tautscope.recording import per_dof
-from tautscope.references import SineSequence
+from tautscope.loop.construction import (
+    build_feature_model,
+    build_state_estimator,
+    build_weighted_estimator,
+)
+from tautscope.loop.references import SineSequence
+from tautscope.runs.experiment import run_experiment
+from tautscope.runs.recording import per_dof
 from tautscope.twin.camera import TwinCamera
 from tautscope.twin.plant import Plant
 from tautscope.twin.rig import Twin

@@ -15,7 +15,7 @@ os.environ["OMP_NUM_THREADS"] = "1"
 
 import cv2
 from tautscope import HysteresisReduction, Twin, load_config
-from tautscope.references import SineSequence
+from tautscope.loop.references import SineSequence
 
 
 def seconds_per_second(*, images: bool, simulated: float) -> float:

@@ -30,8 +30,8 @@ import numpy as np
 from numpy.typing import NDArray
 from tautscope import Twin, load_config
 from tautscope.config import Config
-from tautscope.reduction import Expectation
-from tautscope.vision import MarkerDetector, Region
+from tautscope.loop.reduction import Expectation
+from tautscope.loop.vision import MarkerDetector, Region
 from vision_peers import (
     HAS_SCIKIT_IMAGE,
     Visp,

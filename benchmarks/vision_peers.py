@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 from tautscope.config import Config
-from tautscope.vision import Region
+from tautscope.loop.vision import Region
 
 try:
     from skimage import filters, measure

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from own_rig import DrawnRig, short_experiment
 from tautscope import Frame, HysteresisReduction, Report, run_experiment
 from tautscope.references import SineSequence
-from tautscope.results import evaluate
+from tautscope.report.results import evaluate
 
 LEAST_AREA = 20
 """Smaller regions are noise [px^2]."""

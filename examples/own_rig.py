@@ -10,10 +10,10 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from tautscope import Config, Frame, Sample, run_experiment
-from tautscope.blocks import build_feature_model
 from tautscope.config import ControlConfig, ExperimentConfig, SafetyConfig, Sine
+from tautscope.loop.construction import build_feature_model
 from tautscope.references import SineSequence
-from tautscope.results import evaluate
+from tautscope.report.results import evaluate
 
 SLACK = np.array([10e-3, 1.0, 0.5])
 """Width of each DOF's play [m, rad, rad]."""

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 from drawn import DrawnRig, short_experiment
-from tautscope.experiment import run_experiment
-from tautscope.recording import Recording
-from tautscope.references import SineSequence
+from tautscope.loop.references import SineSequence
+from tautscope.runs.experiment import run_experiment
+from tautscope.runs.recording import Recording
 
 
 def shared_data(*parts: str) -> Path:

@@ -4,10 +4,10 @@ from pathlib import Path
 
 from drawn import DrawnRig
 from tautscope.config import Config
-from tautscope.experiment import run_experiment
 from tautscope.log.writer import LogSummary, LogWriter
-from tautscope.recording import Recording
-from tautscope.references import SineSequence
+from tautscope.loop.references import SineSequence
+from tautscope.runs.experiment import run_experiment
+from tautscope.runs.recording import Recording
 
 
 def record(path: Path, config: Config, seconds: float = 36.0) -> tuple[Recording, LogSummary]:

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from drawn import BadFrameRig, DrawnRig, short_experiment
 from refused import failed
-from tautscope import demo
 from tautscope.cli import main
 from tautscope.config import dump_config, load_config
-from tautscope.recording import Recording
-from tautscope.tables import ROWS
+from tautscope.report import demo
+from tautscope.report.tables import ROWS
+from tautscope.runs.recording import Recording
 
 SUMMARY = [
     "unit",

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from play_model import play
 from refused import failed
+from tautscope.analysis.models.registry import MODELS
 from tautscope.cli import main
-from tautscope.models.registry import MODELS
 
 
 def write_record(file: Path) -> None:

@@ -16,7 +16,7 @@ from drawn import SLACK, DrawnRig, short_experiment
 from tautscope.cli import _parser
 from tautscope.config import dump_config
 from tautscope.dof import Dof
-from tautscope.references import SineSequence
+from tautscope.loop.references import SineSequence
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])

@@ -13,12 +13,12 @@ from tautscope.errors import (
     FrameError,
     SignalError,
 )
-from tautscope.experiment import run_experiment
-from tautscope.recording import Recording, per_dof, per_feature
-from tautscope.reduction import HysteresisReduction, Report
-from tautscope.references import SineSequence
-from tautscope.results import evaluate
-from tautscope.rig import Frame, Rig, Sample
+from tautscope.loop.reduction import HysteresisReduction, Report
+from tautscope.loop.references import SineSequence
+from tautscope.loop.rig import Frame, Rig, Sample
+from tautscope.report.results import evaluate
+from tautscope.runs.experiment import run_experiment
+from tautscope.runs.recording import Recording, per_dof, per_feature
 
 CONFIG = short_experiment()
 REFERENCE = SineSequence(CONFIG.experiment)

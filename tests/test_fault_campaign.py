@@ -13,7 +13,7 @@ import pytest
 from tautscope.config import load_config
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError
-from tautscope.safety import Reaction, Supervision
+from tautscope.loop.safety import Reaction, Supervision
 from tautscope.twin.faults import KINDS, Fault
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike, NDArray
 from play_model import play
-from tautscope import metrics
 from tautscope.errors import SignalError
+from tautscope.report import metrics
 
 TWO_PERIODS = np.linspace(0, 4 * np.pi, 4001)
 

@@ -10,16 +10,16 @@ from drawn import EXAMPLES
 from numpy.typing import NDArray
 from play_model import play
 from scipy.integrate import solve_ivp
-from tautscope.analysis import analyze
+from tautscope.analysis.models import bouc_wen, constant_play, prandtl_ishlinskii
+from tautscope.analysis.models.bouc_wen import BoucWen, hysteretic_variable
+from tautscope.analysis.models.prandtl_ishlinskii import PrandtlIshlinskii
+from tautscope.analysis.models.registry import MODELS, Model
+from tautscope.analysis.models.task import Task
+from tautscope.analysis.records import analyze
 from tautscope.config import load_config
 from tautscope.dof import Dof
-from tautscope.metrics import rms
-from tautscope.models import bouc_wen, constant_play, prandtl_ishlinskii
-from tautscope.models.bouc_wen import BoucWen, hysteretic_variable
-from tautscope.models.prandtl_ishlinskii import PrandtlIshlinskii
-from tautscope.models.registry import MODELS, Model
-from tautscope.models.task import Task
-from tautscope.replay import Cleaning, Record
+from tautscope.report.metrics import rms
+from tautscope.runs.replay import Cleaning, Record
 
 Floats = NDArray[np.float64]
 

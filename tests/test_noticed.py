@@ -4,11 +4,11 @@ from types import SimpleNamespace
 
 import pytest
 from drawn import DrawnRig, short_experiment
-from tautscope.experiment import run_experiment
-from tautscope.noticed import Noticed
-from tautscope.recording import Recording
-from tautscope.references import SineSequence
-from tautscope.safety import DETECTORS, MEANINGS, Reaction
+from tautscope.loop.references import SineSequence
+from tautscope.loop.safety import DETECTORS, MEANINGS, Reaction
+from tautscope.runs.experiment import run_experiment
+from tautscope.runs.flag_summary import Noticed
+from tautscope.runs.recording import Recording
 
 
 def told(seen: list[tuple[Reaction, tuple[str, ...]]], latched: tuple[str, ...]) -> list[str]:

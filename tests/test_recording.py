@@ -11,9 +11,9 @@ from tautscope.errors import (
     OutputError,
     RecordError,
 )
-from tautscope.recording import Recording, Table
-from tautscope.references import SineSequence
-from tautscope.trials import Trial, run_trials
+from tautscope.loop.references import SineSequence
+from tautscope.runs.recording import Recording, Table
+from tautscope.runs.trials import Trial, run_trials
 
 CONFIG = short_experiment()
 
@@ -59,7 +59,7 @@ def test_a_failed_save_leaves_nothing(
     def full(*_: object) -> str:
         raise OSError("disk full")
 
-    monkeypatch.setattr("tautscope.recording.dump_config", full)
+    monkeypatch.setattr("tautscope.runs.recording.dump_config", full)
     with pytest.raises(OSError, match="disk full"):
         compensated.save(tmp_path / "run")
     assert list(tmp_path.iterdir()) == []

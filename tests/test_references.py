@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from tautscope.config import Config
 from tautscope.dof import Dof
-from tautscope.references import Segment, SineSequence
+from tautscope.loop.references import Segment, SineSequence
 
 EXPERIMENT = Config().experiment
 REFERENCE = SineSequence(EXPERIMENT)

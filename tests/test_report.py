@@ -9,13 +9,13 @@ import matplotlib
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from tautscope import figures, tables
-from tautscope.demo import Demo
 from tautscope.dof import Dof
-from tautscope.recording import Recording
-from tautscope.report import Picture, demo_report, run_report
-from tautscope.results import DofResult, evaluate
-from tautscope.tables import ROWS, article_cell, cell
+from tautscope.report import figures, tables
+from tautscope.report.demo import Demo
+from tautscope.report.report import Picture, demo_report, run_report
+from tautscope.report.results import DofResult, evaluate
+from tautscope.report.tables import ROWS, article_cell, cell
+from tautscope.runs.recording import Recording
 
 VOID = {"meta", "img", "br"}
 

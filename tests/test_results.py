@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from play_model import play
-from tautscope import metrics
 from tautscope.config import Config
 from tautscope.dof import Dof
-from tautscope.recording import FRAME_COLUMNS, TRACE_COLUMNS, Recording
-from tautscope.references import Segment
-from tautscope.results import DofResult, combine, evaluate
+from tautscope.loop.references import Segment
+from tautscope.report import metrics
+from tautscope.report.results import DofResult, combine, evaluate
+from tautscope.runs.recording import FRAME_COLUMNS, TRACE_COLUMNS, Recording
 
 START = 100.0  # the rig's clock need not begin at 0
 TIME = np.arange(7000) * 1e-3  # the segment: 1 s to 6 s

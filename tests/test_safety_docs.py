@@ -8,7 +8,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
 
 import guarantees
 import reactions
-from tautscope.safety import DETECTORS, Reaction
+from tautscope.loop.safety import DETECTORS, Reaction
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs" / "safety.md").read_text(encoding="utf-8")

@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 from tautscope import Frame, HysteresisReduction, Report, Twin, load_config
-from tautscope.figures import style
 from tautscope.references import SineSequence
+from tautscope.report.figures import style
 
 Floats = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from tautscope import Compensator, Play
-from tautscope.figures import BLACK, BLUE, GREY, ORANGE, style
+from tautscope.report.figures import BLACK, BLUE, GREY, ORANGE, style
 
 Floats = NDArray[np.float64]
 

@@ -12,38 +12,39 @@ from typing import TYPE_CHECKING, Any
 from tautscope._core import __version__
 
 if TYPE_CHECKING:
-    from tautscope import metrics, replay
     from tautscope._core import Camera, Compensator, Estimator, Instrument, Play
     from tautscope.config import Config, load_config
     from tautscope.dof import Dof
     from tautscope.errors import TautscopeError
-    from tautscope.experiment import run_experiment
-    from tautscope.recording import Recording
-    from tautscope.reduction import HysteresisReduction, Report
-    from tautscope.rig import Frame, Rig, Sample
+    from tautscope.loop.reduction import HysteresisReduction, Report
+    from tautscope.loop.rig import Frame, Rig, Sample
+    from tautscope.loop.vision import Detection, MarkerDetector
+    from tautscope.report import metrics
+    from tautscope.runs import replay
+    from tautscope.runs.experiment import run_experiment
+    from tautscope.runs.recording import Recording
     from tautscope.twin import Twin
-    from tautscope.vision import Detection, MarkerDetector
 
 _HOMES = {
     "Camera": "_core",
     "Compensator": "_core",
     "Config": "config",
-    "Detection": "vision",
+    "Detection": "loop.vision",
     "Dof": "dof",
     "Estimator": "_core",
-    "Frame": "rig",
-    "HysteresisReduction": "reduction",
+    "Frame": "loop.rig",
+    "HysteresisReduction": "loop.reduction",
     "Instrument": "_core",
-    "MarkerDetector": "vision",
+    "MarkerDetector": "loop.vision",
     "Play": "_core",
-    "Recording": "recording",
-    "Report": "reduction",
-    "Rig": "rig",
-    "Sample": "rig",
+    "Recording": "runs.recording",
+    "Report": "loop.reduction",
+    "Rig": "loop.rig",
+    "Sample": "loop.rig",
     "TautscopeError": "errors",
     "Twin": "twin",
     "load_config": "config",
-    "run_experiment": "experiment",
+    "run_experiment": "runs.experiment",
 }
 _MODULES = ("metrics", "replay")
 

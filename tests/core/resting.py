@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from tautscope.config import Config
-from tautscope.reduction import HysteresisReduction
+from tautscope.loop.reduction import HysteresisReduction
 
 Floats = NDArray[np.float64]
 

@@ -7,12 +7,12 @@ from collections import deque
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tautscope.blocks import build_feature_model
 from tautscope.config import load_config
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError
-from tautscope.metrics import loop_width
-from tautscope.reduction import HysteresisReduction
+from tautscope.loop.construction import build_feature_model
+from tautscope.loop.reduction import HysteresisReduction
+from tautscope.report.metrics import loop_width
 
 Floats = NDArray[np.float64]
 CONFIG = load_config(profile="best").replace(**{"adaptive.one_friction": False})

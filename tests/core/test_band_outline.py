@@ -3,8 +3,8 @@
 import cv2
 import numpy as np
 import pytest
-from tautscope.blocks import build_feature_model
 from tautscope.config import Config
+from tautscope.loop.construction import build_feature_model
 
 MODEL = build_feature_model(Config())
 

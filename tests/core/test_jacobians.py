@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tautscope.blocks import build_camera, build_feature_model, build_instrument
 from tautscope.config import Config
+from tautscope.loop.construction import build_camera, build_feature_model, build_instrument
 
 Floats = NDArray[np.float64]
 

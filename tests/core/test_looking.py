@@ -9,12 +9,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from resting import CONFIG, REST, Floats, started
-from tautscope.blocks import build_feature_model
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import SignalError
-from tautscope.reduction import HysteresisReduction, Status
-from tautscope.rig import Frame
+from tautscope.loop.construction import build_feature_model
+from tautscope.loop.reduction import HysteresisReduction, Status
+from tautscope.loop.rig import Frame
 
 
 class FakeDetector:
@@ -35,7 +35,7 @@ class FakeDetector:
 
 def test_a_frame_is_looked_at_where_it_was_captured(monkeypatch: pytest.MonkeyPatch) -> None:
     vision = SimpleNamespace(MarkerDetector=FakeDetector)
-    monkeypatch.setitem(sys.modules, "tautscope.vision", vision)
+    monkeypatch.setitem(sys.modules, "tautscope.loop.vision", vision)
     loop = started()
     predicted = loop.predicted_features(0.2)
     assert predicted is not None

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from resting import CONFIG, REST, Floats, started
 from tautscope import _core
-from tautscope.blocks import build_feature_model
 from tautscope.errors import ConfigError, SignalError
-from tautscope.reduction import HysteresisReduction, Report, Status
+from tautscope.loop.construction import build_feature_model
+from tautscope.loop.reduction import HysteresisReduction, Report, Status
 
 WIDTHS = np.array([10e-3, 1.8, 1.1])
 AMPLITUDES = np.array([15e-3, 2.0, 1.1])
@@ -211,7 +211,7 @@ def test_the_blocks_name_what_is_wrong_with_their_settings() -> None:
 
 
 def test_batch_run_is_step_by_step() -> None:
-    from tautscope.blocks import build_loop
+    from tautscope.loop.construction import build_loop
 
     references = REST + 0.1 * np.sin(np.arange(300.0))[:, None] * AMPLITUDES
     times = np.arange(300) * PERIOD

@@ -11,10 +11,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tautscope.blocks import build_adaptive_axis
 from tautscope.config import load_config
 from tautscope.dof import Dof
-from tautscope.metrics import loop_width
+from tautscope.loop.construction import build_adaptive_axis
+from tautscope.report.metrics import loop_width
 
 Floats = NDArray[np.float64]
 Contacts = Callable[[float, float], tuple[float, float]]

@@ -7,10 +7,10 @@ from collections import deque
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tautscope.blocks import build_feature_model
 from tautscope.config import load_config
 from tautscope.dof import Dof
-from tautscope.reduction import HysteresisReduction
+from tautscope.loop.construction import build_feature_model
+from tautscope.loop.reduction import HysteresisReduction
 
 PERIOD = 0.005
 HALF = np.array([5e-3, 0.9, 0.55])

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from tautscope.errors import ConfigError
-from tautscope.reduction import HysteresisReduction, Report, Status
-from tautscope.safety import DETECTORS, Reaction, checksum
+from tautscope.loop.reduction import HysteresisReduction, Report, Status
+from tautscope.loop.safety import DETECTORS, Reaction, checksum
 from true_plays import (
     BEGIN,
     END,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from tautscope import _core
-from tautscope.blocks import build_feature_model, build_state_estimator
 from tautscope.config import Config
+from tautscope.loop.construction import build_feature_model, build_state_estimator
 
 EVERYTHING = (1e9, 1e9, 1e9)
 

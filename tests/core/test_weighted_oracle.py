@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 from tautscope import _core
-from tautscope.blocks import (
+from tautscope.config import Config, load_config
+from tautscope.loop.construction import (
     build_camera,
     build_feature_model,
     build_instrument,
     build_weighted_estimator,
 )
-from tautscope.config import Config, load_config
-from tautscope.reduction import HysteresisReduction
+from tautscope.loop.reduction import HysteresisReduction
 
 Floats = NDArray[np.float64]
 CONFIG = load_config(profile="best")

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from tautscope.blocks import build_feature_model
 from tautscope.config import Config, load_config
-from tautscope.reduction import HysteresisReduction, Report
+from tautscope.loop.construction import build_feature_model
+from tautscope.loop.reduction import HysteresisReduction, Report
 
 Floats = NDArray[np.float64]
 WIDTHS = np.array([10e-3, 1.8, 1.1])

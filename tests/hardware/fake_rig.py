@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from tautscope.config import Config, from_document
 from tautscope.hardware.cameras import CameraState, Capture
 from tautscope.hardware.rig import HardwareRig
-from tautscope.rig import Frame
+from tautscope.loop.rig import Frame
 
 HOME = np.array([0.01, 0.5, 0.2])
 CYCLE = 0.01

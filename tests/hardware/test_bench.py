@@ -23,7 +23,7 @@ from tautscope.hardware.cameras import Camera, Capture
 from tautscope.hardware.experiment import run_on_hardware, write_run_folder
 from tautscope.hardware.timing import read_sent
 from tautscope.log.reader import read_log
-from tautscope.recording import Recording, per_dof
+from tautscope.runs.recording import Recording, per_dof
 from test_processes import Lines, process
 
 CYCLE, PATIENCE = 0.02, 60.0

@@ -26,8 +26,8 @@ from tautscope.errors import (
 from tautscope.hardware.experiment import run_on_hardware
 from tautscope.hardware.rig import HardwareRig
 from tautscope.hardware.timing import Timing, read_sent
-from tautscope.reduction import HysteresisReduction
-from tautscope.rig import Rig
+from tautscope.loop.reduction import HysteresisReduction
+from tautscope.loop.rig import Rig
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from tautscope.config import SourceConfig
 from tautscope.errors import CameraError
 from tautscope.hardware.cameras import Capture, check_captures
 from tautscope.hardware.stream_clock import StreamClock
-from tautscope.rig import Frame
+from tautscope.loop.rig import Frame
 
 
 def captures(stamps: list[float], lag: float = 0.05) -> list[Capture]:

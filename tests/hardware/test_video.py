@@ -51,7 +51,7 @@ def test_video_in_the_wrong_size_is_named(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["bgr", "rgb", "bgra", "yuyv", "uyvy", "nv12", "i420"])
 def test_every_pixel_format_has_the_same_colours(name: str) -> None:
-    """Green, as BT.601 with limited range has it, in the layout of `tautscope.pixels`."""
+    """Green, as BT.601 with limited range has it."""
     config = camera("color=0x30c040:size=64x48:rate=25,format=yuv420p", pixel_format=name)
     with opened(config.source.url, "lavfi") as container:
         image = next(iter(Decoder(container, config, live=True))).image

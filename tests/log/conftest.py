@@ -7,7 +7,7 @@ from drawn import short_experiment
 from recorded import record
 from tautscope.config import Config
 from tautscope.log.writer import LogSummary
-from tautscope.recording import Recording
+from tautscope.runs.recording import Recording
 
 
 @pytest.fixture(scope="session")

@@ -14,7 +14,7 @@ from tautscope.cli import main
 from tautscope.config import Config, dump_config
 from tautscope.log.reader import Update, read_log
 from tautscope.log.writer import LogSummary
-from tautscope.recording import Recording, per_dof
+from tautscope.runs.recording import Recording, per_dof
 
 Recorded = tuple[Path, Recording, LogSummary]
 Capture = pytest.CaptureFixture[str]

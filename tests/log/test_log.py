@@ -17,8 +17,8 @@ from tautscope.log.export import export_csv, export_rosbag
 from tautscope.log.images import ImageCodec
 from tautscope.log.reader import Update, read_log
 from tautscope.log.writer import LogSummary
-from tautscope.pixels import FrameLayout
-from tautscope.recording import Recording, Table, per_dof
+from tautscope.loop.frame_layout import FrameLayout
+from tautscope.runs.recording import Recording, Table, per_dof
 
 Recorded = tuple[Path, Recording, LogSummary]
 
@@ -148,7 +148,7 @@ def test_every_pixel_format_comes_back_to_the_byte(name: str) -> None:
 
 def test_importing_the_package_loads_no_log_and_no_camera() -> None:
     code = (
-        "import sys, tautscope, tautscope.experiment, tautscope.cli;"
+        "import sys, tautscope, tautscope.runs.experiment, tautscope.cli;"
         "assert not {'mcap', 'av', 'zstandard'} & sys.modules.keys()"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -10,14 +10,14 @@ from drawn import DrawnRig
 from numpy.typing import ArrayLike, NDArray
 from tautscope.config import Config
 from tautscope.errors import RecordError
-from tautscope.experiment import run_experiment
 from tautscope.log.reader import Log, Told, read_log
 from tautscope.log.replay import _tell, listen_to_log, replay_same
 from tautscope.log.writer import LogWriter
-from tautscope.recording import Recording, per_dof
-from tautscope.reduction import HysteresisReduction, Report
-from tautscope.references import SineSequence
-from tautscope.rig import Frame, Sample
+from tautscope.loop.reduction import HysteresisReduction, Report
+from tautscope.loop.references import SineSequence
+from tautscope.loop.rig import Frame, Sample
+from tautscope.runs.experiment import run_experiment
+from tautscope.runs.recording import Recording, per_dof
 
 SECONDS = 7.0
 SILENT_FROM = 6.6

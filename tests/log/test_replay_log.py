@@ -11,8 +11,8 @@ from tautscope.config import Config
 from tautscope.log.reader import Log, Update, read_log
 from tautscope.log.replay import listen_to_log, listen_to_video, replay_same
 from tautscope.log.writer import LogSummary
-from tautscope.recording import Recording, per_dof
-from tautscope.rig import Frame
+from tautscope.loop.rig import Frame
+from tautscope.runs.recording import Recording, per_dof
 
 Recorded = tuple[Path, Recording, LogSummary]
 

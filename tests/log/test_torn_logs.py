@@ -9,7 +9,7 @@ from tautscope.errors import MissingPathError, OutputError, RecordError
 from tautscope.log.export import recover
 from tautscope.log.reader import Tick, read_log
 from tautscope.log.writer import LogSummary
-from tautscope.recording import Recording, per_dof
+from tautscope.runs.recording import Recording, per_dof
 
 Recorded = tuple[Path, Recording, LogSummary]
 

@@ -12,8 +12,8 @@ from tautscope.config import Config
 from tautscope.errors import OutputError, RecordError
 from tautscope.log.reader import Tick, Update, read_log
 from tautscope.log.writer import LogWriter
-from tautscope.reduction import HysteresisReduction
-from tautscope.rig import Sample
+from tautscope.loop.reduction import HysteresisReduction
+from tautscope.loop.rig import Sample
 
 
 def test_a_log_in_the_way_is_left_alone(tmp_path: Path, config: Config) -> None:

@@ -6,10 +6,10 @@ import sys
 from pathlib import Path
 
 import pytest
-from tautscope import demo
 from tautscope.cli import main
 from tautscope.config import DISTURBANCES, Config, dump_config, load_config
 from tautscope.errors import ConfigError
+from tautscope.report import demo
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 

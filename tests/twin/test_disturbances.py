@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from tautscope.config import DISTURBANCES, Config
-from tautscope.rig import Frame
+from tautscope.loop.rig import Frame
 from tautscope.twin import Twin, obstacles, optics
 from tautscope.twin.camera import Picture, TwinCamera
 from tautscope.twin.disturbances import EMPTY, TABLE

@@ -21,8 +21,8 @@ from failing import (
     run,
 )
 from tautscope import Twin
-from tautscope.blocks import build_feature_model
 from tautscope.errors import FieldError
+from tautscope.loop.construction import build_feature_model
 from tautscope.twin.fault_frames import IMAGES
 from tautscope.twin.faults import FaultyRig
 

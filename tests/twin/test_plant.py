@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from tautscope.config import Config, load_config
 from tautscope.dof import Dof
-from tautscope.metrics import loop_width
+from tautscope.report.metrics import loop_width
 from tautscope.twin.plant import Plant
 
 ROOT = Path(__file__).parents[2]

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from tautscope.blocks import build_feature_model
 from tautscope.config import Config
-from tautscope.reduction import Expectation
+from tautscope.loop.construction import build_feature_model
+from tautscope.loop.reduction import Expectation
 from tautscope.twin.camera import TwinCamera
 
 CONFIG = Config()

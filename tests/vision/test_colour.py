@@ -7,7 +7,7 @@ from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
 from tautscope.calibration.colour import ColorDiscriminant, fit_discriminant
 from tautscope.config import Config
 from tautscope.errors import FieldError
-from tautscope.vision import MarkerDetector
+from tautscope.loop.vision import MarkerDetector
 
 
 def two_kinds(seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

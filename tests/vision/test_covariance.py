@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scenes import CONFIG, scenes
-from tautscope.vision import MarkerDetector
+from tautscope.loop.vision import MarkerDetector
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scenes import scenes
 from tautscope.config import Config
 from tautscope.errors import ConfigError, FieldError, FrameError
-from tautscope.vision import MarkerDetector
+from tautscope.loop.vision import MarkerDetector
 
 Image = NDArray[np.uint8]
 

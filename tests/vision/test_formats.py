@@ -6,7 +6,7 @@ import pytest
 from numpy.typing import NDArray
 from tautscope.config import Config
 from tautscope.errors import ConfigError, FrameError
-from tautscope.vision import MarkerDetector
+from tautscope.loop.vision import MarkerDetector
 
 Image = NDArray[np.uint8]
 SIZE = (96, 208)

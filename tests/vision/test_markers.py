@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scenes import CONFIG, DEVIATION, MODEL, Scene, cut_scenes, scenes
-from tautscope.reduction import Expectation
-from tautscope.vision import Detection, MarkerDetector
+from tautscope.loop.reduction import Expectation
+from tautscope.loop.vision import Detection, MarkerDetector
 
 Image = NDArray[np.uint8]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scenes import CONFIG, scenes
-from tautscope.vision import MarkerDetector
+from tautscope.loop.vision import MarkerDetector
 
 Frames = dict[str, tuple[NDArray[np.uint8], NDArray[np.bool_]]]
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from tautscope.config import Config
-from tautscope.vision import MarkerDetector
+from tautscope.loop.vision import MarkerDetector
 
 Frames = dict[str, tuple[NDArray[np.uint8], NDArray[np.bool_]]]
 

@@ -1,4 +1,4 @@
-//! `Reduction`: the loop, wrapped by `tautscope.reduction.HysteresisReduction`.
+//! `Reduction`: the loop, wrapped by `tautscope.loop.reduction.HysteresisReduction`.
 
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
@@ -32,7 +32,7 @@ type Report<'py> = (
     Floats<'py>,
 );
 
-/// The loop of Fig. 6; `tautscope.reduction.HysteresisReduction` is its public face.
+/// The loop of Fig. 6; `tautscope.loop.reduction.HysteresisReduction` is its public face.
 #[pyclass(name = "Reduction", module = "tautscope._core")]
 pub struct Reduction(core::HysteresisReduction);
 
@@ -138,7 +138,7 @@ impl Reduction {
     }
 
     /// Image update: features (4,) in px, NaN for a band that was not found, and their covariance (4, 4) in
-    /// px^2, and a checksum of the image. Returns the fields of `tautscope.reduction.Report` from `status`
+    /// px^2, and a checksum of the image. Returns the fields of `tautscope.loop.reduction.Report` from `status`
     /// to `delta_plus`.
     #[pyo3(signature = (features, captured_at, covariance=None, checksum=None))]
     fn on_features<'py>(

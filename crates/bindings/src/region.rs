@@ -1,4 +1,4 @@
-//! Regions as plain tuples, from which `tautscope.vision.Region` is made.
+//! Regions as plain tuples, from which `tautscope.loop.vision.Region` is made.
 
 use tautscope_vision::Region;
 

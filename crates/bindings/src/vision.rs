@@ -28,7 +28,7 @@ use crate::features::FeatureModel;
 use crate::frame::ArrayFrame;
 use crate::region::{Described, described};
 
-/// The markers in frames; `tautscope.vision.MarkerDetector` is its public face.
+/// The markers in frames; `tautscope.loop.vision.MarkerDetector` is its public face.
 #[pyclass(frozen, module = "tautscope._core")]
 pub struct MarkerDetector {
     format: PixelFormat,

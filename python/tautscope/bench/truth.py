@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tautscope.dof import Dof
 from tautscope.errors import OutputError
 from tautscope.hardware.realtime import OTHERS, step_back
-from tautscope.recording import per_dof
+from tautscope.runs.recording import per_dof
 
 TRUTH = np.dtype([("time", "f8")] + [(f"true_{dof.label}", "f8") for dof in Dof])
 """A line of the truth: the tip (3,) [m, rad, rad] at an instant of the monotonic clock [s]."""

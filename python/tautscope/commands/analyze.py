@@ -12,7 +12,7 @@ from tautscope.commands.printing import console, print_json
 from tautscope.config import load_config
 
 if TYPE_CHECKING:
-    from tautscope.analysis import Analysis
+    from tautscope.analysis.records import Analysis
 
 
 def add_parser(verbs: arguments.Verbs) -> None:
@@ -50,9 +50,9 @@ def add_parser(verbs: arguments.Verbs) -> None:
 
 
 def _run(options: argparse.Namespace) -> None:
-    from tautscope import analysis  # noqa: PLC0415
-    from tautscope.output import check_free, default_folder  # noqa: PLC0415
-    from tautscope.replay import read_record  # noqa: PLC0415
+    from tautscope.analysis import records as analysis  # noqa: PLC0415
+    from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
+    from tautscope.runs.replay import read_record  # noqa: PLC0415
 
     config = load_config(options.config)
     folder = check_free(options.out or default_folder("analyze"))

@@ -26,7 +26,7 @@ def add_profile(parser: argparse.ArgumentParser, what: str, default: str | None 
 
 
 def add_out(parser: argparse.ArgumentParser, verb: str) -> None:
-    """``--out``, by default `tautscope.output.default_folder` of the verb."""
+    """``--out``, by default `tautscope.runs.output_folder.default_folder` of the verb."""
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help=f"folder, new or empty [runs/<date-time>-{verb}]"
     )

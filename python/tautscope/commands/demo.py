@@ -12,7 +12,7 @@ from tautscope.config import DISTURBANCES, Config, load_config
 from tautscope.errors import MissingPathError
 
 if TYPE_CHECKING:
-    from tautscope.demo import Demo
+    from tautscope.report.demo import Demo
 
 
 def add_parser(verbs: arguments.Verbs) -> None:
@@ -56,9 +56,9 @@ def add_parser(verbs: arguments.Verbs) -> None:
 
 
 def _run(options: argparse.Namespace) -> None:
-    from tautscope import demo, tables  # noqa: PLC0415
-    from tautscope.output import check_free, default_folder  # noqa: PLC0415
-    from tautscope.progress import progress_bar  # noqa: PLC0415
+    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
+    from tautscope.report import demo, tables  # noqa: PLC0415
+    from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
 
     config = _configured(options)
     folder = check_free(options.out or default_folder("demo"))
@@ -102,7 +102,7 @@ def _configured(options: argparse.Namespace) -> Config:
 def _print_table1(demo: Demo, folder: Path) -> None:
     from rich.table import Table  # noqa: PLC0415
 
-    from tautscope import tables  # noqa: PLC0415
+    from tautscope.report import tables  # noqa: PLC0415
 
     profiles = demo.by_profile
     several = len(demo.seeds) > 1

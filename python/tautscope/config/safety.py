@@ -20,8 +20,8 @@ class SafetyConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """
 
     off: tuple[str, ...] = ()
-    """Guards that do not look, by the names of `tautscope.safety.DETECTORS`; every one named here
-    is said in every report."""
+    """Detectors that are switched off, by the names of `tautscope.loop.safety.DETECTORS`; every
+    report names them."""
     width_limit: PerDof = (12e-3, 2.6, 1.5)
     """Largest width of the slack that is believed; the article's are 10 mm, 1.8 rad, 1.1 rad. Also
     how far a command may lead its reference, and the unit of the travels below."""

@@ -14,7 +14,7 @@ from tautscope.config import CameraConfig
 from tautscope.errors import CameraError, CameraMismatchError
 from tautscope.hardware.stream_clock import JUMP, StreamClock
 from tautscope.hardware.video import Decoder, Image, Picture, opened
-from tautscope.rig import Frame
+from tautscope.loop.rig import Frame
 
 TEST_FRAMES = 8
 """How many frames the self-test looks at."""

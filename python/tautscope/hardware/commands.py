@@ -18,7 +18,7 @@ from tautscope.dof import Dof
 from tautscope.errors import ConfigError
 
 if TYPE_CHECKING:
-    from tautscope.results import DofResult
+    from tautscope.report.results import DofResult
 
 BENCH = "configs/bench.toml"
 
@@ -87,12 +87,12 @@ def _fault(text: str) -> tuple[float, str]:
 
 
 def _run(options: argparse.Namespace) -> int:
+    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
     from tautscope.hardware.experiment import (  # noqa: PLC0415
         run_on_hardware,
         write_run_folder,
     )
-    from tautscope.output import default_folder  # noqa: PLC0415
-    from tautscope.progress import progress_bar  # noqa: PLC0415
+    from tautscope.runs.output_folder import default_folder  # noqa: PLC0415
 
     config = load_config(options.config, options.profile)
     folder = options.out or default_folder("run")

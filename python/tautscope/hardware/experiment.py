@@ -14,7 +14,6 @@ from typing import Any
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import DriveError, OutputError, TautscopeError
-from tautscope.experiment import run_experiment
 from tautscope.hardware.plausibility import Plausibility
 from tautscope.hardware.realtime import (
     OTHERS,
@@ -28,14 +27,15 @@ from tautscope.hardware.rig import HardwareRig
 from tautscope.hardware.signals import exit_on_signals
 from tautscope.hardware.timing import Timing
 from tautscope.log.writer import LogSummary, LogWriter
-from tautscope.output import check_free
-from tautscope.recording import Floats, Recording, Table
-from tautscope.reduction import Report
-from tautscope.references import SineSequence
-from tautscope.results import Results, evaluate
-from tautscope.rig import Frame, Sample
-from tautscope.safety import Reaction, Supervision
-from tautscope.tables import finite_or_none
+from tautscope.loop.reduction import Report
+from tautscope.loop.references import SineSequence
+from tautscope.loop.rig import Frame, Sample
+from tautscope.loop.safety import Reaction, Supervision
+from tautscope.report.results import Results, evaluate
+from tautscope.report.tables import finite_or_none
+from tautscope.runs.experiment import run_experiment
+from tautscope.runs.output_folder import check_free
+from tautscope.runs.recording import Floats, Recording, Table
 
 RigMaker = Callable[[Config], HardwareRig]
 
@@ -139,7 +139,7 @@ def run_on_hardware(
 
 def write_run_folder(run: HardwareRun, folder: Path) -> None:
     """Tables, timing, figures and report, beside the logs that are there."""
-    from tautscope import figures, report, tables  # noqa: PLC0415  matplotlib takes half a second
+    from tautscope.report import figures, report, tables  # noqa: PLC0415  matplotlib takes half a second
 
     first, results = run.compensated, run.results
     first.recording.write(folder)

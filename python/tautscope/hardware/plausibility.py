@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError
-from tautscope.reduction import Report
+from tautscope.loop.reduction import Report
 
 UNSEEN = 8.0
 """Travel of a motor after which its tip must have been seen [in start deviations]."""

@@ -21,7 +21,7 @@ from tautscope.hardware.drives import open_drives
 from tautscope.hardware.realtime import LOOP, quick_switching, realtime
 from tautscope.hardware.setpoints import Motors, Setpoints
 from tautscope.hardware.timing import Timing
-from tautscope.rig import Frame, Sample
+from tautscope.loop.rig import Frame, Sample
 
 
 class Eye(AbstractContextManager["Eye"], Protocol):
@@ -42,7 +42,7 @@ def _say(text: str) -> None:
 
 
 class HardwareRig:
-    """Motors on a bus and a live camera; implements `tautscope.rig.Rig`.
+    """Motors on a bus and a live camera; implements `tautscope.loop.rig.Rig`.
 
     The rig's clock counts set-points: tick k is at k times the cycle, from the instant its
     set-point is sent. In a cycle that finds no new command the motors are held and the clock

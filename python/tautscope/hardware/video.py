@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from tautscope.config import CameraConfig
 from tautscope.errors import CameraError, CameraMismatchError, MissingPathError
-from tautscope.pixels import FrameLayout
-from tautscope.rig import Frame
+from tautscope.loop.frame_layout import FrameLayout
+from tautscope.loop.rig import Frame
 
 if TYPE_CHECKING:
     import av

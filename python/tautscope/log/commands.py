@@ -15,7 +15,7 @@ from tautscope.errors import FieldError
 if TYPE_CHECKING:
     from tautscope.log.comparison import Estimation
     from tautscope.log.reader import Damage, Log
-    from tautscope.recording import Recording
+    from tautscope.runs.recording import Recording
 
 
 def add_parsers(verbs: arguments.Verbs) -> None:
@@ -132,7 +132,7 @@ def _replay(options: argparse.Namespace) -> int:
 def _replay_same(options: argparse.Namespace, log: Log) -> int:
     from tautscope.log.comparison import write_replay  # noqa: PLC0415
     from tautscope.log.replay import replay_same  # noqa: PLC0415
-    from tautscope.output import check_free  # noqa: PLC0415
+    from tautscope.runs.output_folder import check_free  # noqa: PLC0415
 
     if options.out is not None:
         check_free(options.out)
@@ -202,7 +202,7 @@ def _replay_video(options: argparse.Namespace) -> int:
 
 
 def _folder(options: argparse.Namespace) -> Path:
-    from tautscope.output import check_free, default_folder  # noqa: PLC0415
+    from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
 
     return check_free(options.out or default_folder("replay"))
 
@@ -265,7 +265,7 @@ def _cell(value: float, name: str, scale: float) -> str:
 
 
 def _finite(figures: Estimation) -> dict[str, float | None]:
-    from tautscope.tables import finite_or_none  # noqa: PLC0415
+    from tautscope.report.tables import finite_or_none  # noqa: PLC0415
 
     names = ("width", "seen", "state_rms", "change_rms")
     return {name: finite_or_none(getattr(figures, name)) for name in names}

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tautscope import metrics
 from tautscope.dof import Dof
-from tautscope.output import new_folder
-from tautscope.recording import Recording, Table
+from tautscope.report import metrics
+from tautscope.runs.output_folder import new_folder
+from tautscope.runs.recording import Recording, Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -77,7 +77,7 @@ def replay_figure(replayed: Recording, recorded: Recording | None = None) -> Fig
     """A row per DOF: where the tip was estimated to be, and the slack learnt, over time."""
     from matplotlib.figure import Figure  # noqa: PLC0415  it takes half a second
 
-    from tautscope.figures import BLUE, GREY, ORANGE, PAGE, style  # noqa: PLC0415
+    from tautscope.report.figures import BLUE, GREY, ORANGE, PAGE, style  # noqa: PLC0415
 
     runs = [(replayed, "replayed", BLUE, 0.9)]
     if recorded is not None:
@@ -120,7 +120,7 @@ def write_replay(
     Raises:
         OutputError: The folder holds something already, or cannot be written.
     """
-    from tautscope.figures import style  # noqa: PLC0415
+    from tautscope.report.figures import style  # noqa: PLC0415
 
     figure = replay_figure(replayed, recorded)
     with new_folder(folder) as place, style():

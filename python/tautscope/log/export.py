@@ -10,7 +10,7 @@ from tautscope.errors import OutputError
 from tautscope.log import messages as msg
 from tautscope.log.mcap_file import McapFile
 from tautscope.log.reader import Damage, messages_in, read_log
-from tautscope.output import new_folder
+from tautscope.runs.output_folder import new_folder
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tautscope.config import CameraConfig, RecordingConfig
 from tautscope.errors import RecordError
-from tautscope.pixels import FrameLayout
+from tautscope.loop.frame_layout import FrameLayout
 
 Image = NDArray[np.uint8]
 

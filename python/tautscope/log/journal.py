@@ -18,7 +18,7 @@ from tautscope.errors import OutputError
 from tautscope.log import messages as msg
 from tautscope.log.images import ImageCodec
 from tautscope.log.mcap_file import McapFile
-from tautscope.rig import Sample
+from tautscope.loop.rig import Sample
 
 LOOK_PERIOD = 0.01
 """How often the threads look for news [s]: far below the `flush_period`."""

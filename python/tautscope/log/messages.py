@@ -24,11 +24,11 @@ from tautscope.dof import Dof
 from tautscope.errors import RecordError
 from tautscope.log.cdr import Message, decode, encode
 from tautscope.log.fields import header_of, joint_state, multi_array, stamp_of
-from tautscope.recording import FRAME_COLUMNS
-from tautscope.reduction import Report, Status
-from tautscope.references import Segment
-from tautscope.rig import Frame, Sample
-from tautscope.rows import Row, frame_row
+from tautscope.loop.reduction import Report, Status
+from tautscope.loop.references import Segment
+from tautscope.loop.rig import Frame, Sample
+from tautscope.runs.recording import FRAME_COLUMNS
+from tautscope.runs.run_recorder import Row, frame_row
 
 Floats = NDArray[np.float64]
 Messages = dict[str, bytes]

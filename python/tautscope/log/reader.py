@@ -24,10 +24,10 @@ from tautscope.errors import MissingPathError, RecordError
 from tautscope.log import messages as msg
 from tautscope.log.cdr import decode
 from tautscope.log.images import ImageCodec
-from tautscope.recording import Recording
-from tautscope.references import Segment
-from tautscope.rig import Sample
-from tautscope.rows import Row, Tables
+from tautscope.loop.references import Segment
+from tautscope.loop.rig import Sample
+from tautscope.runs.recording import Recording
+from tautscope.runs.run_recorder import Row, Tables
 
 _LARGEST_CHUNK = 2**30
 """What a chunk may say it unpacks to [bytes]; ours are a few MB, and a hostile one would fill the
@@ -67,7 +67,7 @@ class Tick:
 
 @dataclass(frozen=True, slots=True)
 class Update:
-    """One image update as recorded: a `tautscope.rows.frame_row`, and the offsets after."""
+    """One image update as recorded: its `frame_row`, and the offsets after it."""
 
     row: Row
     delta_minus: msg.Floats

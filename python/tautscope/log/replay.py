@@ -19,12 +19,12 @@ from tautscope.errors import RecordError
 from tautscope.log import messages as msg
 from tautscope.log.cdr import decode
 from tautscope.log.reader import Log, Tick, Told, Update
-from tautscope.recording import FEATURES, FRAME_COLUMNS, Recording
-from tautscope.reduction import HysteresisReduction
-from tautscope.replay import read_motors
-from tautscope.rig import Frame, Sample
-from tautscope.rows import Tables, frame_row
-from tautscope.safety import DETECTORS
+from tautscope.loop.reduction import HysteresisReduction
+from tautscope.loop.rig import Frame, Sample
+from tautscope.loop.safety import DETECTORS
+from tautscope.runs.recording import FEATURES, FRAME_COLUMNS, Recording
+from tautscope.runs.replay import read_motors
+from tautscope.runs.run_recorder import Tables, frame_row
 
 Floats = NDArray[np.float64]
 
@@ -186,7 +186,7 @@ def listen_to_video(frames: Iterable[Frame], motors: str | PathLike[str], config
 
     Args:
         frames: In order, captured on the clock of the table.
-        motors: CSV file, see `tautscope.replay.read_motors`.
+        motors: CSV file, see `tautscope.runs.replay.read_motors`.
         config: Of instrument, camera and loop.
 
     Raises:

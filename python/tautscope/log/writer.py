@@ -20,9 +20,9 @@ import numpy as np
 from tautscope.config import Config
 from tautscope.log import messages as msg
 from tautscope.log.journal import LOOK_PERIOD, Journal
-from tautscope.reduction import Report
-from tautscope.references import Segment
-from tautscope.rig import Frame, Sample
+from tautscope.loop.reduction import Report
+from tautscope.loop.references import Segment
+from tautscope.loop.rig import Frame, Sample
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope.rig import Frame
+from tautscope.loop.rig import Frame
 from tautscope.twin.fault_kinds import Fault
 
 Floats = NDArray[np.float64]

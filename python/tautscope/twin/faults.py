@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from tautscope.config import Config
 from tautscope.errors import FieldError
-from tautscope.references import Reference, Segment
-from tautscope.rig import Frame, Sample
+from tautscope.loop.references import Reference, Segment
+from tautscope.loop.rig import Frame, Sample
 from tautscope.twin.fault_frames import FEATURES, FRAMES, IMAGES, Arrivals, FeatureFrame, Moment
 from tautscope.twin.fault_kinds import KINDS, PER_MM, Fault, Kind, Mode, Target
 from tautscope.twin.fault_motion import DRIVES, ENCODERS, HANDS, PHYSICS, RATE, Act

@@ -1,4 +1,4 @@
-"""The twin as a rig: plant and camera behind the seam of `tautscope.rig`."""
+"""The twin as a rig: plant and camera behind the seam of `tautscope.loop.rig`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from tautscope.config import Config
 from tautscope.errors import SignalError
-from tautscope.rig import Frame, Sample
+from tautscope.loop.rig import Frame, Sample
 from tautscope.twin.camera import TwinCamera
 from tautscope.twin.plant import Plant
 

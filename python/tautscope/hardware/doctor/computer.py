@@ -14,7 +14,7 @@ from tautscope._core import __version__
 from tautscope.config import Config
 from tautscope.hardware.doctor.finding import Finding
 from tautscope.hardware.realtime import REMEDY, SETPOINTS, memory_kept, realtime
-from tautscope.pixels import FrameLayout
+from tautscope.loop.frame_layout import FrameLayout
 
 PACKED = {"png": 0.55, "jpeg": 0.12}
 """Size of an image in a log, as a share of its pixels' (decision 0020)."""

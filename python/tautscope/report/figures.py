@@ -17,10 +17,10 @@ from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from tautscope.config import Config
-from tautscope.recording import Recording, Snapshot
-from tautscope.references import Segment
-from tautscope.results import estimated_loop, used_frames
-from tautscope.vision import MarkerDetector
+from tautscope.loop.references import Segment
+from tautscope.loop.vision import MarkerDetector
+from tautscope.report.results import estimated_loop, used_frames
+from tautscope.runs.recording import Recording, Snapshot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

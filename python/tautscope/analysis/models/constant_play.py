@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from tautscope._core import Play
-from tautscope.models.task import SWEEP, Floats, Prediction, Task, fitted, line
+from tautscope.analysis.models.task import SWEEP, Floats, Prediction, Task, fitted, line
 
 _LARGEST = SWEEP / 2
 """Largest radius tried, as a share of the command's range; at 0.5 the play never moves."""

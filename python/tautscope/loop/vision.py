@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tautscope import _core
-from tautscope.blocks import build_feature_model
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import FieldError
-from tautscope.pixels import FrameLayout
-from tautscope.reduction import Expectation
+from tautscope.loop.construction import build_feature_model
+from tautscope.loop.frame_layout import FrameLayout
+from tautscope.loop.reduction import Expectation
 
 
 class Region(NamedTuple):
@@ -181,8 +181,8 @@ class MarkerDetector:
 
         Args:
             image: uint8, as ``camera.pixel_format`` says: (height, width, 3) B, G, R by default;
-                `tautscope.pixels` has the shapes. A cropped view of a larger array is read in
-                place.
+                `tautscope.loop.frame_layout` has the shapes. A cropped view of a larger array is
+                read in place.
             predicted_features: (4,) [px] where the bands should be, u_A, v_A, u_B, v_B. Features
                 that are not finite (the model looks behind the camera, say) are no prediction.
             expectation: Where the instrument is believed to be and how sure that is; with it the

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope import metrics
 from tautscope.dof import Dof
-from tautscope.recording import Recording, Table, per_feature
-from tautscope.references import Segment
+from tautscope.loop.references import Segment
+from tautscope.report import metrics
+from tautscope.runs.recording import Recording, Table, per_feature
 
 LAST_PERIODS = 2
 """Loop widths are read over this many periods at the end of a segment."""

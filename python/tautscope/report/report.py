@@ -12,15 +12,15 @@ from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING
 
-from tautscope import tables
 from tautscope._core import __version__
 from tautscope.config import Config, dump_config
-from tautscope.results import Results
+from tautscope.report import tables
+from tautscope.report.results import Results
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from tautscope.demo import Demo
+    from tautscope.report.demo import Demo
 
 _STYLE = """
 :root { color-scheme: light; }

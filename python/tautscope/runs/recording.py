@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from tautscope.config import Config, dump_config, load_config
 from tautscope.dof import Dof
 from tautscope.errors import MissingPathError, RecordError
-from tautscope.output import new_folder
-from tautscope.references import Segment
-from tautscope.table_files import read_csv, write_csv
+from tautscope.loop.references import Segment
+from tautscope.runs.csv_files import read_csv, write_csv
+from tautscope.runs.output_folder import new_folder
 
 Floats = NDArray[np.float64]
 Table = NDArray[np.void]
@@ -89,7 +89,7 @@ class Recording:
         compensated: Whether the compensator was on.
         segments: Which DOF moved when.
         snapshot: One frame from about the middle; not saved.
-        warnings: A line for each guard that noticed something, `tautscope.noticed`, and for each
+        warnings: A line for each flag raised, `tautscope.runs.flag_summary`, and for each detector
             that is off; not saved.
     """
 

@@ -7,12 +7,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from os import PathLike
 
-from tautscope import tables
 from tautscope.config import Config
-from tautscope.output import new_folder
-from tautscope.recording import Recording
-from tautscope.results import Results, evaluate
-from tautscope.trials import RigMaker, Trial, make_twin, run_trials
+from tautscope.report import tables
+from tautscope.report.results import Results, evaluate
+from tautscope.runs.output_folder import new_folder
+from tautscope.runs.recording import Recording
+from tautscope.runs.trials import RigMaker, Trial, make_twin, run_trials
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def write_run_folder(demo: Demo, folder: str | PathLike[str]) -> None:
     Raises:
         OutputError: The folder holds something already, or cannot be written.
     """
-    from tautscope import figures, report  # noqa: PLC0415  matplotlib takes half a second
+    from tautscope.report import figures, report  # noqa: PLC0415  matplotlib takes half a second
 
     figure9 = figures.figure9(demo.uncompensated, demo.compensated)
     pictures = [

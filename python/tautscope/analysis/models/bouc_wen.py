@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from tautscope.models.task import Floats, Prediction, Task, fitted, seen
+from tautscope.analysis.models.task import Floats, Prediction, Task, fitted, seen
 
 _REACH = 18.0
 """atanh of the largest |w| told from 1 in double precision."""

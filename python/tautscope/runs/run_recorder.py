@@ -8,11 +8,11 @@ import numpy as np
 
 from tautscope.config import Config
 from tautscope.dof import Dof
-from tautscope.recording import FRAME_COLUMNS, TRACE_COLUMNS, Floats, Table, per_dof
+from tautscope.runs.recording import FRAME_COLUMNS, TRACE_COLUMNS, Floats, Table, per_dof
 
 if TYPE_CHECKING:
-    from tautscope.reduction import Report
-    from tautscope.rig import Frame, Sample
+    from tautscope.loop.reduction import Report
+    from tautscope.loop.rig import Frame, Sample
 
 Row = tuple[object, ...]
 _UNKNOWN = (np.nan, np.nan, np.nan)

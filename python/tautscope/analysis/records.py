@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope import metrics
+from tautscope.analysis.models.registry import MODELS, NO_MODEL, Model
+from tautscope.analysis.models.task import Floats, Prediction, Task
 from tautscope.config import Config
 from tautscope.errors import RecordError
-from tautscope.models.registry import MODELS, NO_MODEL, Model
-from tautscope.models.task import Floats, Prediction, Task
-from tautscope.output import new_folder
-from tautscope.replay import Record
-from tautscope.tables import finite_or_none
+from tautscope.report import metrics
+from tautscope.report.tables import finite_or_none
+from tautscope.runs.output_folder import new_folder
+from tautscope.runs.replay import Record
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,8 +123,8 @@ def write_analysis(analysis: Analysis, folder: str | PathLike[str]) -> None:
         OutputError: The folder holds something already, or cannot be written.
     """
     # matplotlib takes half a second
-    from tautscope.analysis_figure import analysis_figure  # noqa: PLC0415
-    from tautscope.figures import style  # noqa: PLC0415
+    from tautscope.analysis.figure import analysis_figure  # noqa: PLC0415
+    from tautscope.report.figures import style  # noqa: PLC0415
 
     columns = _columns(analysis)
     figure = analysis_figure(analysis)

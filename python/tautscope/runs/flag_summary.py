@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tautscope.reduction import Report
-from tautscope.safety import MEANINGS, Reaction
+from tautscope.loop.reduction import Report
+from tautscope.loop.safety import MEANINGS, Reaction
 
 _DONE = {
     Reaction.NONE: "the loop went on",
@@ -44,7 +44,7 @@ class Noticed:
                 count.reaction = max(count.reaction, report.reaction, key=lambda each: each.rank)
 
     def lines(self, latched: Sequence[str]) -> tuple[str, ...]:
-        """A line for each flag of a run, by the names of `tautscope.safety.DETECTORS`.
+        """A line for each flag of a run, by the names of `tautscope.loop.safety.DETECTORS`.
 
         One that no image met came and went between two of them.
         """

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from tautscope.dof import Dof
-from tautscope.results import DofResult, Results, combine
+from tautscope.report.results import DofResult, Results, combine
 
 Worst = Literal["min", "max"]
 

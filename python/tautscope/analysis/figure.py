@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from tautscope.figures import BLUE, GREY, PAGE, style
-from tautscope.models.registry import NO_MODEL
+from tautscope.analysis.models.registry import NO_MODEL
+from tautscope.report.figures import BLUE, GREY, PAGE, style
 
 if TYPE_CHECKING:
-    from tautscope.analysis import Analysis
+    from tautscope.analysis.records import Analysis
 
 
 def analysis_figure(found: Analysis) -> Figure:

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tautscope.blocks import build_loop
 from tautscope.config import Config
-from tautscope.rig import Frame
-from tautscope.safety import Reaction, Supervision, checksum, switched_off
-from tautscope.signal_checks import features_of, finite, seconds
+from tautscope.loop.construction import build_loop
+from tautscope.loop.rig import Frame
+from tautscope.loop.safety import Reaction, Supervision, checksum, switched_off
+from tautscope.loop.signal_checks import features_of, finite, seconds
 
 if TYPE_CHECKING:
-    from tautscope.vision import Detection, MarkerDetector
+    from tautscope.loop.vision import Detection, MarkerDetector
 
 Triggers = tuple[str | None, str | None]
 
@@ -79,7 +79,7 @@ class Report:
         delta_minus: (3,) contact offsets after this frame, input minus output.
         delta_plus: (3,) contact offsets after this frame, input minus output.
         reaction: What is in force after this frame.
-        warnings: Why, by the names of `tautscope.safety.DETECTORS`; and a line for every guard
+        warnings: Why, by the names of `tautscope.loop.safety.DETECTORS`; and a line for every guard
             that ``safety.off`` names.
     """
 
@@ -218,7 +218,7 @@ class HysteresisReduction:
         """Something only the rig can see: ``drive_fault``, ``following_error``.
 
         Raises:
-            ConfigError: It is none of `tautscope.safety.DETECTORS`.
+            ConfigError: It is none of `tautscope.loop.safety.DETECTORS`.
         """
         self._loop.raise_flag(name)
         self._told(f"raise_flag {name}")
@@ -255,7 +255,7 @@ class HysteresisReduction:
     @cached_property
     def _detector(self) -> MarkerDetector:
         # Not every user of the loop has this package look at the images.
-        from tautscope.vision import MarkerDetector  # noqa: PLC0415
+        from tautscope.loop.vision import MarkerDetector  # noqa: PLC0415
 
         return MarkerDetector(self._config)
 

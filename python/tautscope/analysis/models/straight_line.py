@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 
-from tautscope.models.task import Floats, Prediction, Task, line, seen
+from tautscope.analysis.models.task import Floats, Prediction, Task, line, seen
 
 
 @dataclass(frozen=True)

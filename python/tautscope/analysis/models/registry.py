@@ -7,8 +7,14 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Literal
 
-from tautscope.models import bouc_wen, constant_play, online, prandtl_ishlinskii, straight_line
-from tautscope.models.task import Prediction, Task
+from tautscope.analysis.models import (
+    bouc_wen,
+    constant_play,
+    online,
+    prandtl_ishlinskii,
+    straight_line,
+)
+from tautscope.analysis.models.task import Prediction, Task
 
 
 @dataclass(frozen=True)

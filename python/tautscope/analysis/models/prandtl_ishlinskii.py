@@ -6,8 +6,8 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from tautscope.models.constant_play import operator
-from tautscope.models.task import Floats, Prediction, Task, fitted
+from tautscope.analysis.models.constant_play import operator
+from tautscope.analysis.models.task import Floats, Prediction, Task, fitted
 
 OPERATORS = 32
 """Plays superposed; radii evenly from 0 to just below half the command's range."""

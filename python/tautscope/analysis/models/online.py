@@ -9,11 +9,11 @@ from typing import Protocol
 import numpy as np
 
 from tautscope._core import AdaptiveAxis, Estimator
-from tautscope.blocks import build_adaptive_axis
+from tautscope.analysis.models import constant_play
+from tautscope.analysis.models.task import Floats, Prediction, Task, seen
 from tautscope.config import Config
 from tautscope.dof import Dof
-from tautscope.models import constant_play
-from tautscope.models.task import Floats, Prediction, Task, seen
+from tautscope.loop.construction import build_adaptive_axis
 
 UPDATE_SHARE = 0.01
 """Update distance, as a share of the command's range in the first half, if none is given."""

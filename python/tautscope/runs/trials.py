@@ -11,10 +11,10 @@ from multiprocessing import get_context
 from typing import Any
 
 from tautscope.config import Config
-from tautscope.experiment import run_experiment
-from tautscope.recording import Recording
-from tautscope.references import SineSequence
-from tautscope.rig import Rig
+from tautscope.loop.references import SineSequence
+from tautscope.loop.rig import Rig
+from tautscope.runs.experiment import run_experiment
+from tautscope.runs.recording import Recording
 
 RigMaker = Callable[[Config], Rig]
 

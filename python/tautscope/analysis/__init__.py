@@ -1,0 +1,1 @@
+"""Models of hysteresis compared on records of an actuator and its tip."""

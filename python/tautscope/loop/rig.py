@@ -1,0 +1,71 @@
+"""The seam between the loop and whatever moves and sees: a twin, hardware, a recording, your own.
+
+A rig takes commands and gives samples; nothing else is known about it. It owns the clock.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One camera image.
+
+    Attributes:
+        image: Pixels, uint8 (height, width, 3), BGR.
+        captured_at: When it was taken [s, the rig's clock], not when it arrived.
+        sequence: Counts the camera's frames; a gap is a dropped frame.
+        true_features: (4,) [px] what an ideal segmentation would measure were each band wholly
+            visible, twin only; the loop never reads it.
+        true_visible: (2,) visible share of bands A and B, 0 to 1, twin only; likewise.
+    """
+
+    image: NDArray[np.uint8]
+    captured_at: float
+    sequence: int
+    true_features: NDArray[np.float64] | None = None
+    true_visible: NDArray[np.float64] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """What a rig reports after one control period.
+
+    Attributes:
+        time: [s, the rig's clock].
+        applied: (3,) [m, rad, rad] what the drives report.
+        frame: The newest image that arrived in this period, if any.
+        true_state: (3,) [m, rad, rad] where the tip is, twin only; the loop never reads it.
+    """
+
+    time: float
+    applied: NDArray[np.float64]
+    frame: Frame | None = None
+    true_state: NDArray[np.float64] | None = None
+
+
+@runtime_checkable
+class Rig(Protocol):
+    """Anything that can be commanded and looked at."""
+
+    @property
+    def control_period(self) -> float:
+        """Time from one command to the next [s]."""
+        ...
+
+    def reset(self) -> Sample:
+        """Go to the start, with the clock at the time the returned sample names."""
+        ...
+
+    def step(self, command: ArrayLike) -> Sample:
+        """Send command (3,) [m, rad, rad] and let one control period pass."""
+        ...
+
+    def close(self) -> None:
+        """Release what the rig holds; motors come to rest. May be called twice."""
+        ...

@@ -1,0 +1,1 @@
+"""Figures of merit, tables, figures and reports of recorded runs."""

@@ -1,0 +1,284 @@
+"""How good a run is: loop width, reduction, start, overshoot, tracking, state and marker errors.
+
+The one implementation of the project's definitions. Plain arrays in, plain numbers out; nothing
+here draws or knows a file. A figure that its data do not carry is NaN, never a guess.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tautscope.errors import SignalError
+
+LEVELS = 41
+"""Levels of y at which a loop's width is read."""
+CENTRAL = 0.8
+"""Share of y's range the levels span, about its middle."""
+DEADBAND = 0.05
+"""Share of y's range that y must go beyond a level for a crossing to count as a passage."""
+COVERAGE = 0.5
+"""Share of the levels that must be passed both ways for a loop to have a width."""
+SETTLED = 1.2
+"""A period is settled when its width is at most this times the final one."""
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class LoopWidth:
+    """Width of a hysteresis loop, in the unit of x. ``float(width)`` is the mean width.
+
+    Attributes:
+        mean: Mean over the levels that y passes both ways.
+        max: Largest over these levels.
+        levels: (41,) values of y at which the width was read.
+        widths: (41,) width at each level; NaN where y does not pass both ways.
+    """
+
+    mean: float
+    max: float
+    levels: Floats
+    widths: Floats
+
+    def __float__(self) -> float:
+        return self.mean
+
+
+def loop_width(
+    x: ArrayLike, y: ArrayLike, *, levels: int = LEVELS, central: float = CENTRAL
+) -> LoopWidth:
+    """Horizontal width of the loop that output y draws over input x.
+
+    At each level: x where y passes it rising, minus x where y passes it falling, each averaged
+    over all passages and interpolated between samples. Of a play, Eq. (1), this is exactly
+    ``delta_plus - delta_minus``, and its sign says the same: positive when the output lags.
+
+    Noise makes y cross a level several times in one passage. A passage therefore ends only when y
+    is more than 5 % of its range beyond the level, and stands at the mean of its crossings.
+
+    Args:
+        x: (n,) input in order of time; pairs with a number that is not finite are left out.
+        y: (n,) output, same length.
+        levels: How many levels.
+        central: Share of y's range they span.
+
+    Returns:
+        Mean and largest width; both NaN if y passes fewer than half of the levels both ways.
+
+    Raises:
+        SignalError: x and y are not one-dimensional and equally long.
+    """
+    x, y = _pair("x", x, "y", y)
+    finite = np.isfinite(x) & np.isfinite(y)
+    x, y = x[finite], y[finite]
+    if len(y) < 2 or np.ptp(y) == 0:
+        nothing = np.full(levels, np.nan)
+        return LoopWidth(np.nan, np.nan, nothing, nothing)
+    middle, half = (y.max() + y.min()) / 2, np.ptp(y) / 2
+    at = np.linspace(middle - central * half, middle + central * half, levels)
+    widths = np.array([_width_at(x, y - level, 2 * half * DEADBAND) for level in at])
+    passed = widths[np.isfinite(widths)]
+    if len(passed) < COVERAGE * levels:
+        return LoopWidth(np.nan, np.nan, at, widths)
+    return LoopWidth(float(passed.mean()), float(passed.max()), at, widths)
+
+
+def _width_at(x: Floats, height: Floats, deadband: float) -> float:
+    """Mean x of the rising less that of the falling passages of height through zero."""
+    above = height >= 0
+    before = np.flatnonzero(above[1:] != above[:-1])
+    if len(before) < 2:
+        return np.nan
+    share = height[before] / (height[before] - height[before + 1])
+    crossings = x[before] + share * (x[before + 1] - x[before])
+    excursions = np.maximum.reduceat(np.abs(height), before + 1)
+    excursions[-1] = np.inf  # what follows the last crossing is not seen: it counts
+    passages: dict[bool, list[float]] = {True: [], False: []}
+    side, first = bool(above[0]), 0
+    for index in np.flatnonzero(excursions > deadband):
+        arrived = bool(above[before[index] + 1])
+        if arrived is not side:
+            passages[arrived].append(float(crossings[first : index + 1].mean()))
+        side, first = arrived, int(index) + 1
+    if not (passages[True] and passages[False]):
+        return np.nan
+    return float(np.mean(passages[True]) - np.mean(passages[False]))
+
+
+def reduction(uncompensated: float | LoopWidth, compensated: float | LoopWidth) -> float:
+    """Share of the hysteresis that is gone: 1 - compensated / uncompensated.
+
+    Mean widths, or any two widths of one kind. The ideal of Eq. (2) is 1 - 1 / free_gain. NaN if
+    the uncompensated width is not positive: there was nothing to reduce.
+    """
+    before, after = float(uncompensated), float(compensated)
+    return 1.0 - after / before if before > 0 else np.nan
+
+
+def start_periods(widths: ArrayLike) -> float:
+    """Number of periods until the mean width stays within 1.2 times its final value.
+
+    Args:
+        widths: (periods,) mean width of each whole period, see `period_widths`; of one that runs
+            the other way the size counts.
+
+    Returns:
+        How many periods come before the settled ones: 0 if the first is settled already; NaN if
+        the final width is not known.
+    """
+    values = np.asarray(widths, dtype=np.float64)
+    if values.size == 0 or not np.isfinite(values[-1]):
+        return np.nan
+    unsettled = ~(np.abs(values) <= SETTLED * abs(values[-1]))
+    return float(np.flatnonzero(unsettled)[-1] + 1) if unsettled.any() else 0.0
+
+
+def period_widths(
+    time: ArrayLike, x: ArrayLike, y: ArrayLike, *, start: float, period: float, periods: int
+) -> Floats:
+    """(periods,) mean loop width of each whole period of y over x from time `start`."""
+    time = np.asarray(time, dtype=np.float64)
+    x, y = _pair("x", x, "y", y)
+    edges = np.searchsorted(time, start + period * np.arange(periods + 1))
+    # One sample more than the period: the loop closes.
+    windows = (slice(first, last + 1) for first, last in pairwise(edges))
+    return np.array([loop_width(x[window], y[window]).mean for window in windows])
+
+
+def rms(errors: ArrayLike) -> float:
+    """Root of the mean square of those errors that are finite; NaN if there is none."""
+    values = np.asarray(errors, dtype=np.float64)
+    values = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(values**2))) if values.size else np.nan
+
+
+def tracking_rms(reference: ArrayLike, tip: ArrayLike) -> float:
+    """RMS of (tip - reference), in their unit; over whatever samples are passed."""
+    return rms(np.subtract(*_pair("reference", reference, "tip", tip)))
+
+
+def state_rms(estimate: ArrayLike, truth: ArrayLike) -> float:
+    """RMS of (state_estimate - true_state at the capture time), one DOF, in its unit."""
+    return rms(np.subtract(*_pair("estimate", estimate, "truth", truth)))
+
+
+def tip_overspeed(time: ArrayLike, reference: ArrayLike, tip: ArrayLike) -> float:
+    """99.9th percentile of |tip speed| over the peak of |reference speed|; 1 is faithful."""
+    reference, tip = _pair("reference", reference, "tip", tip)
+    steps = np.diff(np.asarray(time, dtype=np.float64))
+    if len(steps) == 0 or not np.all(steps > 0):
+        return np.nan
+    peak = np.max(np.abs(np.diff(reference)) / steps)
+    speed = np.abs(np.diff(tip)) / steps
+    speed = speed[np.isfinite(speed)]
+    return float(np.percentile(speed, 99.9) / peak) if len(speed) and peak > 0 else np.nan
+
+
+def actuator_gain(reference: ArrayLike, command: ArrayLike) -> float:
+    """Largest |change of command| over |change of reference| in one tick.
+
+    Infinite if the command moves in a tick in which the reference stands still. Ticks whose
+    reference moves less than 1e-9 of its largest step are left out: they are rounding.
+    """
+    reference, command = _pair("reference", reference, "command", command)
+    asked, given = np.abs(np.diff(reference)), np.abs(np.diff(command))
+    if np.any((asked == 0) & (given > 0)):
+        return np.inf
+    moving = asked > 1e-9 * asked.max(initial=0.0)
+    return float(np.max(given[moving] / asked[moving])) if moving.any() else np.nan
+
+
+def overshoot(reference: ArrayLike, tip: ArrayLike) -> float:
+    """How far the tip runs ahead of the reference by its own motion, in their unit; 0 if never.
+
+    A stroke lasts from one reversal of the reference to the next. In it, with the direction
+    s = +-1 of the reference and the tip's place y0 at its start,
+
+        overshoot = max over the stroke of min(s (y - u), s (y - y0))
+
+    so a tip that still lags from the stroke before, and is therefore ahead as soon as the
+    reference turns, does not count until it moves on in the new direction.
+
+    Args:
+        reference: u (n,); where it stands still the stroke goes on.
+        tip: y (n,).
+
+    Returns:
+        The largest over all strokes; NaN if nothing moves or something is not known.
+    """
+    reference, tip = _pair("reference", reference, "tip", tip)
+    largest = np.nan
+    for first, last in pairwise(_reversals(reference)):
+        sign = np.sign(reference[last] - reference[first])
+        stroke = slice(first, last + 1)
+        ahead, moved = sign * (tip[stroke] - reference[stroke]), sign * (tip[stroke] - tip[first])
+        largest = np.maximum(np.nan_to_num(largest), np.minimum(ahead, moved).max())
+    return float(largest)
+
+
+def _reversals(signal: Floats) -> list[int]:
+    """Where a signal turns, with its two ends; empty if it never moves."""
+    moving = np.flatnonzero(np.diff(signal))
+    if len(moving) == 0:
+        return []
+    direction = np.sign(np.diff(signal)[moving])
+    turns = moving[1:][direction[1:] != direction[:-1]]
+    return [0, *turns.tolist(), len(signal) - 1]
+
+
+def until_within(values: ArrayLike, target: float, tolerance: float) -> float:
+    """Number of values, one per stroke or period, before they stay near a target.
+
+    Args:
+        values: (n,).
+        target: What they should be.
+        tolerance: |value - target| that is near, in their unit.
+
+    Returns:
+        0 if all are near; NaN if the last is not, since then it is not known.
+    """
+    errors = np.abs(np.asarray(values, dtype=np.float64) - target)
+    wrong = np.flatnonzero(~(errors <= tolerance))
+    if errors.size == 0 or errors.size - 1 in wrong:
+        return np.nan
+    return float(wrong[-1] + 1) if wrong.size else 0.0
+
+
+def peak_to_peak(signal: ArrayLike) -> float:
+    """Largest less smallest value; NaN if one is not known or there is none."""
+    values = np.asarray(signal, dtype=np.float64)
+    return float(np.ptp(values)) if values.size else np.nan
+
+
+def marker_errors(measured: ArrayLike, truth: ArrayLike) -> Floats:
+    """(n, 2) distance between measured and true feature of markers A and B [px].
+
+    Args:
+        measured: (n, 4) measured features, x and y of A, then of B [px].
+        truth: (n, 4) true features.
+    """
+    difference = np.asarray(measured, np.float64) - np.asarray(truth, np.float64)
+    return np.asarray(np.hypot(difference[:, 0::2], difference[:, 1::2]))
+
+
+def marker_rms(measured: ArrayLike, truth: ArrayLike) -> float:
+    """RMS over frames and both markers of the distance from measured to true feature [px].
+
+    Frames whose features or truth are not known (NaN) are left out.
+    """
+    errors = marker_errors(measured, truth)
+    return rms(errors[np.isfinite(errors).all(axis=1)].ravel())
+
+
+def _pair(name_a: str, a: ArrayLike, name_b: str, b: ArrayLike) -> tuple[Floats, Floats]:
+    first, second = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
+    for name, signal in ((name_a, first), (name_b, second)):
+        if signal.ndim != 1:
+            raise SignalError(name, f"an array of shape {signal.shape}", "a signal of shape (n,)")
+    if len(first) != len(second):
+        raise SignalError(name_b, f"{len(second)} samples", f"as many as {name_a}: {len(first)}")
+    return first, second

@@ -1,0 +1,1 @@
+"""Runs of the loop: experiments, what they record, and their replay."""
