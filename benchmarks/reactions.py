@@ -1,4 +1,4 @@
-"""The table of reactions of crates/core/src/reactions.rs, as docs/safety.md shows it."""
+"""The table of reactions of crates/core/src/supervision/reactions.rs, as docs/safety.md shows it."""
 
 from __future__ import annotations
 

@@ -227,7 +227,7 @@ class HysteresisReduction:
         """Where the instrument should be in a frame captured at this time, to the best knowledge.
 
         The model's state with the correction of the last images, and how sure that is
-        (crates/core/src/whereabouts.rs). It says where to look, never what to learn. None if not
+        (crates/core/src/estimation/whereabouts.rs). It says where to look, never what to learn. None if not
         known.
         """
         belief = self._loop.expectation(captured_at)

@@ -1,12 +1,12 @@
 //! Settings of one DOF of profile `best`.
 
-use crate::contact::ContactTest;
+use crate::adaptive::contact::ContactTest;
+use crate::adaptive::lead::LeadLaw;
+use crate::adaptive::offset_map::OffsetPrior;
+use crate::adaptive::withheld::ChangeLimit;
 use crate::error::{ConfigError, require, require_non_negative, require_positive};
-use crate::lead::LeadLaw;
-use crate::offset_map::OffsetPrior;
-use crate::withheld::ChangeLimit;
 
-/// What an [`AdaptiveAxis`](super::AdaptiveAxis) is set to; lengths in the unit of the DOF.
+/// What an [`AdaptiveAxis`](crate::AdaptiveAxis) is set to; lengths in the unit of the DOF.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AdaptiveSettings {
     /// How the lead is brought about.

@@ -1,0 +1,217 @@
+//! The limited-gain inverse of the hysteresis, Eqs. (2)-(3), Fig. 2.
+
+use crate::article::play::{Play, PlayState};
+use crate::error::{ConfigError, require};
+
+/// Turns a reference into a command that crosses the slack faster, Eqs. (2)-(3), Fig. 2.
+///
+/// ```text
+/// dc = K du,   0 <= K <= gain_limit;   K = 1 in contact,   K = free_gain in the free zone
+/// ```
+///
+/// with reference u, command c, predicted state q (the play model driven by c) and position
+/// p = c - q, all in the unit of the DOF. A tick that ends the free zone is split exactly at the
+/// contact: the closed form below has no increments, so nothing accumulates.
+///
+/// ```text
+/// c = u + anchor + (1 - 1 / free_gain) clamp(free_gain (u + anchor - q), delta_minus, delta_plus)
+/// ```
+///
+/// c - u - (1 - 1 / `free_gain`) p is the anchor: zero, and constant however many reversals come.
+/// New offsets may move p but never c, so the anchor takes up the difference.
+///
+/// As in the article, it keeps it. The noise of the offsets then adds up in it, because each
+/// inwards step in contact pushes p and no outwards step pulls it back. With a `recovery` above
+/// zero (ours) the anchor returns to zero by at most that share of the reference's further travel;
+/// the gain in contact is then within `recovery` of 1 until it has.
+///
+/// What remains of a slack of width w is w / `free_gain`.
+///
+/// Wrong when the width is over-estimated: the tip overshoots by
+/// max(0, estimated width (1 - 1 / `free_gain`) - true width).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Compensator {
+    free_gain: f64,
+    gain_limit: f64,
+    recovery: f64,
+}
+
+/// The memory of a [`Compensator`]: the play it believes in and where it stands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CompensatorState {
+    play: Play,
+    tip: PlayState,
+    reference: Option<f64>,
+    command: f64,
+    anchor: f64,
+}
+
+impl CompensatorState {
+    /// Before the first reference, which will find the position nearest to zero.
+    pub const fn new(play: Play) -> Self {
+        Self {
+            play,
+            tip: PlayState { output: f64::NAN },
+            reference: None,
+            command: f64::NAN,
+            anchor: 0.0,
+        }
+    }
+
+    /// The play operator believed in.
+    pub const fn play(&self) -> Play {
+        self.play
+    }
+
+    /// p = c - q, the position between the contacts; NaN before the first reference.
+    pub fn position(&self) -> f64 {
+        self.command - self.tip.output
+    }
+
+    /// The command c; NaN before the first reference.
+    pub const fn command(&self) -> f64 {
+        self.command
+    }
+
+    /// The predicted state q; NaN before the first reference.
+    pub const fn predicted_state(&self) -> f64 {
+        self.tip.output
+    }
+
+    /// What the command leads the reference by beyond the law: 0 until `retune` pushes p.
+    pub const fn anchor(&self) -> f64 {
+        self.anchor
+    }
+}
+
+impl Compensator {
+    /// A compensator with `free_gain` (`K_b` in the article) in the free zone; 1 compensates nothing.
+    ///
+    /// # Errors
+    /// A gain is not finite, `free_gain` is below 1, or above `gain_limit`.
+    pub fn new(free_gain: f64, gain_limit: f64) -> Result<Self, ConfigError> {
+        let limit = gain_limit.is_finite() && gain_limit >= 1.0;
+        require(
+            limit,
+            "gain_limit",
+            gain_limit,
+            "a finite number, 1 or above",
+        )?;
+        let gain = free_gain >= 1.0 && free_gain <= gain_limit;
+        require(
+            gain,
+            "free_gain",
+            free_gain,
+            "at least 1, at most gain_limit",
+        )?;
+        Ok(Self {
+            free_gain,
+            gain_limit,
+            recovery: 0.0,
+        })
+    }
+
+    /// The same with other gains.
+    ///
+    /// # Errors
+    /// As [`Compensator::new`].
+    pub fn with_gain(self, free_gain: f64, gain_limit: f64) -> Result<Self, ConfigError> {
+        Self::new(free_gain, gain_limit)?.with_recovery(self.recovery)
+    }
+
+    /// The same with the anchor's return to zero, as a share of the reference's travel.
+    ///
+    /// # Errors
+    /// The share is not at least 0 and below 1.
+    pub fn with_recovery(self, recovery: f64) -> Result<Self, ConfigError> {
+        let share = (0.0..1.0).contains(&recovery);
+        require(share, "recovery", recovery, "at least 0, below 1")?;
+        Ok(Self { recovery, ..self })
+    }
+
+    /// The same with a share of the free gain beyond 1: all of it with 1, no compensation with 0.
+    #[must_use]
+    pub const fn with_share(self, share: f64) -> Self {
+        let free_gain = 1.0 + share * (self.free_gain - 1.0);
+        Self { free_gain, ..self }
+    }
+
+    /// The command for the next reference.
+    ///
+    /// The first reference is passed through. A reference that has not changed, or is not
+    /// finite, gives the same command again, bit for bit.
+    pub fn step(&self, state: &mut CompensatorState, reference: f64) -> f64 {
+        if !reference.is_finite() {
+            return state.command;
+        }
+        let Some(last) = state.reference.replace(reference) else {
+            state.command = reference;
+            state.tip.output = reference - state.play.clamp(0.0);
+            self.hold(state, reference);
+            return state.command;
+        };
+        let increment = reference - last;
+        if increment == 0.0 {
+            return state.command;
+        }
+        let recovery = self.recovery * increment.abs();
+        state.anchor -= state.anchor.max(-recovery).min(recovery);
+        let origin = reference + state.anchor;
+        let position = self.free_gain * (origin - state.tip.output);
+        let command = origin + self.surplus() * state.play.clamp(position);
+
+        // Rounding, and recovery on top of the gain, stay within Eq. (2) to the last bit.
+        let farthest = state.command + self.gain_limit * increment;
+        let allowed = command
+            .max(state.command.min(farthest))
+            .min(state.command.max(farthest));
+        state.command = allowed;
+        state.play.step(&mut state.tip, allowed);
+        if (allowed - command).abs() > 0.0 {
+            self.hold(state, reference);
+        }
+        state.command
+    }
+
+    /// Go on from here with other offsets, or with this compensator after another: bumpless.
+    ///
+    /// The command does not move. The position moves only as far as the new contacts push it.
+    pub fn retune(&self, state: &mut CompensatorState, play: Play) {
+        state.play = play;
+        if let Some(reference) = state.reference {
+            play.step(&mut state.tip, state.command);
+            self.hold(state, reference);
+        }
+    }
+
+    /// Go on from another command than that of the last step, with the reference counted from elsewhere by `shift`, and
+    /// the predicted state from before that step.
+    pub(crate) fn amend(
+        &self,
+        state: &mut CompensatorState,
+        shift: f64,
+        command: f64,
+        predicted_state: f64,
+    ) {
+        if let Some(reference) = state.reference {
+            state.reference = Some(reference + shift);
+            state.command = command;
+            state.tip.output = if predicted_state.is_finite() {
+                predicted_state
+            } else {
+                command - state.play.clamp(0.0)
+            };
+            self.retune(state, state.play);
+        }
+    }
+
+    /// Anchor the law where the command is.
+    fn hold(&self, state: &mut CompensatorState, reference: f64) {
+        state.anchor = state.command - reference - self.surplus() * state.position();
+    }
+
+    /// 1 - 1 / `free_gain`: the share of the position by which the command leads the reference.
+    fn surplus(&self) -> f64 {
+        1.0 - 1.0 / self.free_gain
+    }
+}

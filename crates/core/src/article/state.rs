@@ -1,0 +1,261 @@
+//! The state estimate from one image, Eqs. (13)-(16), and which DOF the image says nothing about.
+
+use crate::dof::{PerDof, all_finite};
+use crate::error::{ConfigError, require_positive};
+use crate::model::features::FeaturePrediction;
+
+type Column = [f64; 4];
+
+/// One linear step from prediction to measurement, Eqs. (13)-(16), with its rank watched.
+///
+/// ```text
+/// q_hat = q + pinv(L) (s_measured - s_predicted)
+/// deviation_j = sqrt(((L' L)^-1)_jj)       standard deviation of DOF j per px of marker noise
+/// ```
+///
+/// with the interaction matrix L (4, 3). While a DOF's deviation exceeds its
+/// `observable_deviation`, one of these is held at its prediction, the one without which the rest
+/// is best determined (by the worst ratio of the two, so that m and rad compare), and the rest is solved
+/// for again: rotation, for example, near zero bend.
+///
+/// A band that was not found has no say: its two rows of L are left out, so that at least one DOF
+/// is held.
+///
+/// Wrong far from the prediction: the step is linear and there is one of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StateEstimator {
+    observable_deviation: PerDof<f64>,
+}
+
+/// What one image says about the state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StateEstimate {
+    /// `q_hat` [m, rad, rad]; a DOF that is not observable has its prediction here.
+    pub state: PerDof<f64>,
+    /// Which DOFs the image determined.
+    pub observable: PerDof<bool>,
+    /// Standard deviation per px of marker noise [m/px, rad/px]; for a held DOF that for which it
+    /// was held.
+    pub deviation: PerDof<f64>,
+    /// `s_measured - s_predicted` in px; NaN for a band that was not found.
+    pub innovation: [f64; 4],
+    /// pinv(L) as it was used, one row per DOF [m/px, rad/px]; zeros for a DOF that was held.
+    pub inverse: PerDof<[f64; 4]>,
+}
+
+impl StateEstimate {
+    /// Standard deviations (3,) [m, rad, rad] of what was estimated from features of this covariance
+    /// (4, 4) in px^2: `sqrt((pinv(L) covariance pinv(L)')_jj)`. NaN for a DOF that was held.
+    ///
+    /// The step is not weighted with the covariance, Eq. (16): this is how sure it is, not how
+    /// sure it could be. What a held DOF is off by is not in it.
+    pub fn state_deviation(&self, covariance: &[[f64; 4]; 4]) -> PerDof<f64> {
+        let mut deviations = [f64::NAN; 3];
+        let rows = self.inverse.iter().zip(self.observable);
+        for (deviation, (row, observable)) in deviations.iter_mut().zip(rows) {
+            if observable {
+                let each = covariance.iter().zip(row).filter(|(_, own)| **own != 0.0);
+                let variance: f64 = each
+                    .map(|(line, own)| {
+                        let used = line.iter().zip(row).filter(|(_, other)| **other != 0.0);
+                        own * used.map(|(entry, other)| entry * other).sum::<f64>()
+                    })
+                    .sum();
+                *deviation = libm::sqrt(variance);
+            }
+        }
+        deviations
+    }
+}
+
+impl StateEstimator {
+    /// An estimator that holds a DOF beyond `observable_deviation` (3,) [m/px, rad/px].
+    ///
+    /// # Errors
+    /// A value is not a finite number above 0.
+    pub fn new(observable_deviation: PerDof<f64>) -> Result<Self, ConfigError> {
+        for value in observable_deviation {
+            require_positive("observable_deviation", value)?;
+        }
+        Ok(Self {
+            observable_deviation,
+        })
+    }
+
+    /// The state estimate for measured features (4,) in px, from the predicted state and what the
+    /// model predicts for it. Two NaN for a band say that it was not found. With anything else not
+    /// finite, no DOF is observable.
+    pub fn estimate(
+        &self,
+        predicted_state: PerDof<f64>,
+        prediction: &FeaturePrediction,
+        measured_features: [f64; 4],
+    ) -> StateEstimate {
+        let innovation = subtract(measured_features, prediction.features);
+        let found = found(measured_features);
+        let seen = |column: Column| only(found, column);
+        let [insertion, rotation, bending] = prediction.columns.map(seen);
+        let [insertion_unit, rotation_unit, bending_unit] = self.observable_deviation;
+        let step = seen(innovation);
+        let finite = all_finite(step)
+            && all_finite(predicted_state)
+            && prediction.columns.iter().all(|column| all_finite(*column));
+
+        // In units of the largest deviation allowed, "observable" is "at most one".
+        let mut axes = [
+            Unknown::new(insertion, insertion_unit, finite),
+            Unknown::new(rotation, rotation_unit, finite),
+            Unknown::new(bending, bending_unit, finite),
+        ];
+        while finite && solve_and_hold_one(&mut axes, step) {}
+
+        let [insertion, rotation, bending] = axes;
+        let [q1, q2, q3] = predicted_state;
+        StateEstimate {
+            state: [
+                q1 + insertion.correction(),
+                q2 + rotation.correction(),
+                q3 + bending.correction(),
+            ],
+            observable: [insertion.active, rotation.active, bending.active],
+            deviation: [
+                insertion.ratio * insertion_unit,
+                rotation.ratio * rotation_unit,
+                bending.ratio * bending_unit,
+            ],
+            innovation,
+            inverse: [insertion.row(), rotation.row(), bending.row()],
+        }
+    }
+}
+
+/// Which bands were found: not those with two NaN.
+pub fn found([ua, va, ub, vb]: [f64; 4]) -> [bool; 2] {
+    [!(ua.is_nan() && va.is_nan()), !(ub.is_nan() && vb.is_nan())]
+}
+
+/// Zeros for a band that was not found.
+fn only([a, b]: [bool; 2], [ua, va, ub, vb]: Column) -> Column {
+    let part = |found: bool, u: f64, v: f64| if found { (u, v) } else { (0.0, 0.0) };
+    let ((ua, va), (ub, vb)) = (part(a, ua, va), part(b, ub, vb));
+    [ua, va, ub, vb]
+}
+
+/// A DOF being solved for.
+#[derive(Clone, Copy)]
+struct Unknown {
+    column: Column,
+    unit: f64,
+    active: bool,
+    /// Deviation over `observable_deviation`.
+    ratio: f64,
+    /// In `unit`.
+    solution: f64,
+    /// Its row of the pseudo-inverse, in `unit`.
+    inverse: Column,
+}
+
+impl Unknown {
+    fn new(column: Column, unit: f64, active: bool) -> Self {
+        Self {
+            column: column.map(|value| value * unit),
+            unit,
+            active,
+            ratio: f64::INFINITY,
+            solution: 0.0,
+            inverse: [0.0; 4],
+        }
+    }
+
+    fn correction(&self) -> f64 {
+        if self.active {
+            self.solution * self.unit
+        } else {
+            0.0
+        }
+    }
+
+    fn row(&self) -> Column {
+        if self.active {
+            self.inverse.map(|value| value * self.unit)
+        } else {
+            [0.0; 4]
+        }
+    }
+
+    /// Least squares for this DOF: with r the part of its column that no other column explains,
+    /// the solution is r e / r r and the deviation 1 / |r|.
+    fn solve(&mut self, others: [&Self; 2], innovation: Column) {
+        let [first, second] =
+            others.map(|other| if other.active { other.column } else { [0.0; 4] });
+        let second = without(second, first);
+        // Twice: what rounding left of the other columns goes with the second pass.
+        let own = without(without(self.column, first), second);
+        let own = without(without(own, first), second);
+        let square = dot(own, own);
+        self.solution = dot(own, innovation) / square;
+        self.inverse = own.map(|value| value / square);
+        self.ratio = if square.is_finite() && self.solution.is_finite() {
+            1.0 / libm::sqrt(square)
+        } else {
+            f64::INFINITY
+        };
+    }
+}
+
+/// Solve for the active DOFs; hold one that is not observable and say so if there is one.
+fn solve_and_hold_one(axes: &mut [Unknown; 3], innovation: Column) -> bool {
+    solve(axes, innovation);
+    let mut best: Option<(f64, [Unknown; 3])> = None;
+    for index in 0..axes.len() {
+        let mut trial = *axes;
+        let Some(axis) = trial
+            .get_mut(index)
+            .filter(|axis| axis.active && axis.ratio > 1.0)
+        else {
+            continue;
+        };
+        axis.active = false;
+        solve(&mut trial, innovation);
+        let active = trial.iter().filter(|axis| axis.active);
+        let worst = active.map(|axis| axis.ratio).fold(0.0, f64::max);
+        if best.is_none_or(|(least, _)| worst < least) {
+            best = Some((worst, trial));
+        }
+    }
+    best.is_some_and(|(_, held)| {
+        *axes = held;
+        true
+    })
+}
+
+fn solve(axes: &mut [Unknown; 3], innovation: Column) {
+    let [first, second, third] = axes;
+    if first.active {
+        first.solve([second, third], innovation);
+    }
+    if second.active {
+        second.solve([third, first], innovation);
+    }
+    if third.active {
+        third.solve([first, second], innovation);
+    }
+}
+
+fn dot([a0, a1, a2, a3]: Column, [b0, b1, b2, b3]: Column) -> f64 {
+    a0 * b0 + a1 * b1 + a2 * b2 + a3 * b3
+}
+
+fn subtract([a0, a1, a2, a3]: Column, [b0, b1, b2, b3]: Column) -> Column {
+    [a0 - b0, a1 - b1, a2 - b2, a3 - b3]
+}
+
+/// `vector` without its part along `direction`.
+fn without(vector: Column, direction: Column) -> Column {
+    let square = dot(direction, direction);
+    if square == 0.0 {
+        return vector;
+    }
+    let share = dot(vector, direction) / square;
+    subtract(vector, direction.map(|value| share * value))
+}

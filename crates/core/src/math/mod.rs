@@ -1,0 +1,3 @@
+//! Vectors and small linear systems.
+
+pub(crate) mod linear;

@@ -1,0 +1,113 @@
+//! Kinematics of the instrument, Eq. (7), Fig. 4.
+
+use crate::dof::PerDof;
+use crate::error::{ConfigError, require_non_negative, require_positive};
+use crate::math::linear::{Vector, sinc, sinc_slope};
+
+/// Geometry of the instrument in m, Fig. 4.
+///
+/// Guide frame: origin where the instrument leaves the guide, z along the channel outwards.
+/// Insertion q1 is the length of straight shaft outside the guide; then comes a section of
+/// constant curvature that bends by the total angle q3 towards (cos q2, sin q2, 0); then a
+/// straight tip with two marker bands.
+///
+/// Wrong when the section sags or is pressed against tissue: its curvature is then not constant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Instrument {
+    bending_length: f64,
+    markers: [f64; 2],
+    radius: f64,
+    band_length: f64,
+}
+
+/// The centre of a marker band on the instrument's axis, and how it moves with the state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Marker {
+    /// The centre, (3,) in m.
+    pub position: Vector,
+    /// Unit vector along the tip, outwards.
+    pub axis: Vector,
+    /// `d position / d q`, one vector per DOF [1, m/rad, m/rad].
+    pub position_by_dof: PerDof<Vector>,
+    /// `d axis / d q`, one vector per DOF [1/m, 1/rad, 1/rad].
+    pub axis_by_dof: PerDof<Vector>,
+}
+
+impl Instrument {
+    /// An instrument from the length of its bending section, the distances of the bands' centres A
+    /// and B from that section's distal end, the radius of the tip and the bands' length in m.
+    ///
+    /// With radius and band length 0 a band is a point on the axis.
+    ///
+    /// # Errors
+    /// A value is not finite, `bending_length` is not above 0, or another is below 0.
+    pub fn new(
+        bending_length: f64,
+        marker_a: f64,
+        marker_b: f64,
+        radius: f64,
+        band_length: f64,
+    ) -> Result<Self, ConfigError> {
+        require_positive("bending_length", bending_length)?;
+        require_non_negative("marker_a", marker_a)?;
+        require_non_negative("marker_b", marker_b)?;
+        require_non_negative("radius", radius)?;
+        require_non_negative("band_length", band_length)?;
+        Ok(Self {
+            bending_length,
+            markers: [marker_a, marker_b],
+            radius,
+            band_length,
+        })
+    }
+
+    /// Radius of the tip in m.
+    pub const fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    /// Length of a band along the axis in m.
+    pub const fn band_length(&self) -> f64 {
+        self.band_length
+    }
+
+    /// f(q), Eq. (7): bands A and B in the guide frame for the state q (3,) [m, rad, rad].
+    ///
+    /// ```text
+    /// f = (r cos q2, r sin q2, q1 + z)
+    /// r = bending_length (1 - cos q3) / q3 + d sin q3
+    /// z = bending_length sin q3 / q3 + d cos q3
+    /// ```
+    ///
+    /// with the band's distance d from the section's end; exact and smooth at q3 = 0.
+    pub fn markers(&self, [insertion, rotation, bending]: PerDof<f64>) -> [Marker; 2] {
+        let (sin_turn, cos_turn) = libm::sincos(rotation);
+        let (sin_bend, cos_bend) = libm::sincos(bending);
+        let half = bending / 2.0;
+        let (sin_half, cos_half) = libm::sincos(half);
+        let (sinc_half, sinc_half_slope) = (sinc(half), sinc_slope(half));
+        // (1 - cos x) / x written without a difference.
+        let across = sin_half * sinc_half;
+        let across_slope = 0.5 * (cos_half * sinc_half + sin_half * sinc_half_slope);
+        let in_plane = |radial: f64, axial: f64| [radial * cos_turn, radial * sin_turn, axial];
+        let turned = |radial: f64| [-radial * sin_turn, radial * cos_turn, 0.0];
+
+        self.markers.map(|distance| {
+            let length = self.bending_length;
+            let radial = length * across + distance * sin_bend;
+            let axial = insertion + length * sinc(bending) + distance * cos_bend;
+            let radial_slope = length * across_slope + distance * cos_bend;
+            let axial_slope = length * sinc_slope(bending) - distance * sin_bend;
+            Marker {
+                position: in_plane(radial, axial),
+                axis: in_plane(sin_bend, cos_bend),
+                position_by_dof: [
+                    [0.0, 0.0, 1.0],
+                    turned(radial),
+                    in_plane(radial_slope, axial_slope),
+                ],
+                axis_by_dof: [[0.0; 3], turned(sin_bend), in_plane(cos_bend, -sin_bend)],
+            }
+        })
+    }
+}

@@ -1,0 +1,14 @@
+//! What is checked before and after the law, and what is done about it.
+
+pub(crate) mod change_watch;
+pub(crate) mod command_limiter;
+pub(crate) mod flags;
+pub(crate) mod frame_gate;
+pub(crate) mod grip;
+pub(crate) mod guards;
+pub(crate) mod input_device;
+pub(crate) mod motion_monitor;
+pub(crate) mod reactions;
+pub(crate) mod reference_gate;
+pub(crate) mod supervisor;
+pub(crate) mod turning_points;
