@@ -154,9 +154,9 @@ def measures() -> dict[str, Callable[[Any], dict[str, rows.Figure]]]:
     """What an option has measured, given its value."""
     return {
         "loaded": lambda count: {"G13": loop.ticks_under_load(count)},
-        "steps": lambda count: core("laws", "guarantees", TAUTSCOPE_STEPS=count),
-        "ticks": lambda count: core("no_alloc", "allocate", TAUTSCOPE_TICKS=count),
-        "hours": lambda hours: core("soak", "", TAUTSCOPE_HOURS=hours),
+        "steps": lambda count: core("--lib", "properties::guarantees", TAUTSCOPE_STEPS=count),
+        "ticks": lambda count: core("--test no_alloc", "allocate", TAUTSCOPE_TICKS=count),
+        "hours": lambda hours: core("--test soak", "", TAUTSCOPE_HOURS=hours),
         "stalls": lambda count: {"G14": rows.stalls(count)},
         "silences": lambda count: {"G10c": silence.hand_silent(count)},
         "heartbeats": lambda count: {"G10d": silence.heartbeat_lost(count)},
@@ -201,7 +201,7 @@ def whole(files: Iterable[Path]) -> list[rows.Row]:
 
 def core(test: str, only: str, **wanted: float) -> dict[str, rows.Figure]:
     """What a test of the core prints; it counts allocations only with its assertions on."""
-    command = ["cargo", "test", "--profile", "proof", "-p", "tautscope-core", "--test", test, only]
+    command = ["cargo", "test", "--profile", "proof", "-p", "tautscope-core", *test.split(), only]
     done = subprocess.run(
         [*command, "--", "--nocapture", "--test-threads", "1"],
         cwd=ROOT,

@@ -12,10 +12,10 @@ __all__ = [
     "Compensator",
     "Estimator",
     "FeatureModel",
-    "Guards",
+    "Monitors",
     "Instrument",
     "MarkerDetector",
-    "MotionWatch",
+    "MotionMonitor",
     "Play",
     "Reduction",
     "Renderer",
@@ -231,7 +231,7 @@ class AdaptiveAxis:
     def deviation(self) -> tuple[float, float]: ...
 
 @final
-class Guards:
+class Monitors:
     def __new__(
         cls,
         *,
@@ -257,7 +257,7 @@ class Guards:
         grip_distance: _Vector3,
         slip: _Vector3,
         blind_growth: float,
-        motion: MotionWatch,
+        motion: MotionMonitor,
         hold_time: float,
         hold_travel: float,
         fade_travel: float,
@@ -265,10 +265,10 @@ class Guards:
         good_frames: int,
         good_ticks: int,
         off: Sequence[str],
-    ) -> Guards: ...
+    ) -> Monitors: ...
 
 @final
-class MotionWatch:
+class MotionMonitor:
     def __new__(
         cls,
         *,
@@ -282,7 +282,7 @@ class MotionWatch:
         cycle_time: float,
         change_limit: _Vector3,
         change_travel: _Vector3,
-    ) -> MotionWatch: ...
+    ) -> MotionMonitor: ...
 
 @final
 class Reduction:
@@ -292,7 +292,7 @@ class Reduction:
         estimators: Sequence[Estimator],
         model: FeatureModel,
         state_estimator: StateEstimator,
-        guards: Guards,
+        monitors: Monitors,
         *,
         span: float,
         period: float,
@@ -303,7 +303,7 @@ class Reduction:
         axes: Sequence[AdaptiveAxis],
         model: FeatureModel,
         state_estimator: WeightedEstimator,
-        guards: Guards,
+        monitors: Monitors,
         *,
         span: float,
         period: float,

@@ -11,8 +11,8 @@ mod errors;
 mod estimator;
 mod features;
 mod frame;
-mod guards;
 mod instrument;
+mod monitors;
 mod play;
 mod reduction;
 mod region;
@@ -39,9 +39,9 @@ mod _core {
     #[pymodule_export]
     use super::features::FeatureModel;
     #[pymodule_export]
-    use super::guards::{Guards, MotionWatch};
-    #[pymodule_export]
     use super::instrument::Instrument;
+    #[pymodule_export]
+    use super::monitors::{Monitors, MotionMonitor};
     #[pymodule_export]
     use super::play::Play;
     #[pymodule_export]
@@ -59,11 +59,11 @@ mod _core {
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add(
             "DETECTORS",
-            PyTuple::new(module.py(), super::guards::names())?,
+            PyTuple::new(module.py(), super::monitors::names())?,
         )?;
         module.add(
             "MEANINGS",
-            PyTuple::new(module.py(), super::guards::meanings())?,
+            PyTuple::new(module.py(), super::monitors::meanings())?,
         )?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }

@@ -10,7 +10,7 @@ use crate::compensator::Compensator;
 use crate::errors;
 use crate::estimator::{Estimator, TriggerNames, trigger_names};
 use crate::features::FeatureModel;
-use crate::guards::{self, Guards};
+use crate::monitors::{self, Monitors};
 use crate::state::StateEstimator;
 use crate::weighted::WeightedEstimator;
 
@@ -40,14 +40,14 @@ pub struct Reduction(core::HysteresisReduction);
 impl Reduction {
     #[new]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
-    #[pyo3(signature = (compensators, estimators, model, state_estimator, guards, *, span, period, start_deviation))]
+    #[pyo3(signature = (compensators, estimators, model, state_estimator, monitors, *, span, period, start_deviation))]
     fn new(
         py: Python<'_>,
         compensators: [PyRef<'_, Compensator>; 3],
         estimators: [PyRef<'_, Estimator>; 3],
         model: &FeatureModel,
         state_estimator: &StateEstimator,
-        guards: &Guards,
+        monitors: &Monitors,
         span: f64,
         period: f64,
         start_deviation: [f64; 3],
@@ -63,20 +63,20 @@ impl Reduction {
             settling_time: 0.0,
         });
         let history = core::History::new(span, period);
-        Self::joined(py, axes, model, estimation, history, whereabouts, guards)
+        Self::joined(py, axes, model, estimation, history, whereabouts, monitors)
     }
 
     /// The loop of profile `best`, from its three axes; `friction` is arm, memory and deviation of a
     /// `core::FrictionSettings`.
     #[staticmethod]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
-    #[pyo3(signature = (axes, model, state_estimator, guards, *, span, period, start_deviation, rest_deviation, settling_time, friction))]
+    #[pyo3(signature = (axes, model, state_estimator, monitors, *, span, period, start_deviation, rest_deviation, settling_time, friction))]
     fn adaptive(
         py: Python<'_>,
         axes: [PyRef<'_, AdaptiveAxis>; 3],
         model: &FeatureModel,
         state_estimator: &WeightedEstimator,
-        guards: &Guards,
+        monitors: &Monitors,
         span: f64,
         period: f64,
         start_deviation: [f64; 3],
@@ -92,7 +92,8 @@ impl Reduction {
             settling_time,
         });
         let history = core::History::new(span, period);
-        let Self(inner) = Self::joined(py, axes, model, estimation, history, whereabouts, guards)?;
+        let Self(inner) =
+            Self::joined(py, axes, model, estimation, history, whereabouts, monitors)?;
         let friction = friction.map(|(arm, memory, deviation)| {
             core::Friction::new(core::FrictionSettings {
                 arm,
@@ -177,28 +178,30 @@ impl Reduction {
     /// gain in use.
     #[getter]
     fn supervision(&self) -> (&'static str, Vec<&'static str>, Vec<&'static str>, f64) {
-        let now = self.0.guards().supervision();
+        let now = self.0.monitors().supervision();
         (
-            guards::reaction_name(now.reaction),
-            guards::set(now.flags),
-            guards::set(now.latched),
+            monitors::reaction_name(now.reaction),
+            monitors::set(now.flags),
+            monitors::set(now.latched),
             now.lead,
         )
     }
 
     /// The operator goes on: the first increment of the reference is zero.
     fn engage(&mut self) {
-        self.0.guards_mut().engage();
+        self.0.monitors_mut().engage();
     }
 
     /// The operator has seen the warnings.
     fn acknowledge(&mut self) {
-        self.0.guards_mut().acknowledge();
+        self.0.monitors_mut().acknowledge();
     }
 
     /// Something only the rig can see, by its name.
     fn raise_flag(&mut self, py: Python<'_>, name: &str) -> PyResult<()> {
-        self.0.guards_mut().raise(guards::flag(py, "flag", name)?);
+        self.0
+            .monitors_mut()
+            .raise(monitors::flag(py, "flag", name)?);
         Ok(())
     }
 
@@ -247,7 +250,7 @@ impl Reduction {
         estimation: core::StateEstimation,
         history: Result<core::History, core::ConfigError>,
         whereabouts: Result<core::Whereabouts, core::ConfigError>,
-        guards: &Guards,
+        monitors: &Monitors,
     ) -> PyResult<Self> {
         Ok(Self(core::HysteresisReduction::new(
             axes,
@@ -255,7 +258,7 @@ impl Reduction {
             estimation,
             history.map_err(errors::config(py))?,
             whereabouts.map_err(errors::config(py))?,
-            guards.0,
+            monitors.0,
         )))
     }
 }

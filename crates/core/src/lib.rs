@@ -31,7 +31,7 @@
 //! # Ok(())
 //! # }
 //! ```
-#![no_std]
+#![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 #![cfg_attr(
     not(test),
@@ -42,6 +42,13 @@
         clippy::indexing_slicing
     )
 )]
+
+#[cfg(test)]
+extern crate self as tautscope_core;
+
+#[cfg(test)]
+#[path = "../tests/properties/mod.rs"]
+mod properties;
 
 mod adaptive;
 mod article;
@@ -81,14 +88,14 @@ pub use model::features::{FeatureModel, FeaturePrediction};
 pub use model::instrument::{Instrument, Marker};
 pub use model::outline::{BandImage, OUTLINE};
 pub use supervision::change_watch::{ChangeSettings, ChangeWatch};
-pub use supervision::command_limiter::{Monitor, MonitorSettings, Verdict};
+pub use supervision::command_limiter::{CommandLimiter, CommandLimits, LimiterResult};
 pub use supervision::flags::{Flag, Flags};
-pub use supervision::frame_gate::{Arrival, FrameSettings, FrameWatch, Picture};
+pub use supervision::frame_gate::{FrameArrival, FrameGate, FrameGateSettings, ImageIdentity};
 pub use supervision::grip::{Grip, GripSettings, Sighting};
-pub use supervision::guards::{GuardSettings, Guards, Supervision};
-pub use supervision::input_device::{DeviceSettings, DeviceWatch};
-pub use supervision::motion_monitor::{MotionSettings, MotionWatch};
+pub use supervision::input_device::{InputDeviceMonitor, InputDeviceSettings};
+pub use supervision::monitors::{Monitors, MonitorsSettings, Supervision};
+pub use supervision::motion_monitor::{MotionMonitor, MotionMonitorSettings};
 pub use supervision::reactions::{Clear, Reaction, Rule, Source, TABLE};
-pub use supervision::reference_gate::{Admission, Clutch, ClutchSettings};
+pub use supervision::reference_gate::{GatedReference, ReferenceGate, ReferenceGateSettings};
 pub use supervision::supervisor::{Event, Supervisor, SupervisorSettings};
-pub use supervision::turning_points::Swings;
+pub use supervision::turning_points::TurningPoints;

@@ -7,14 +7,16 @@ mod support;
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use support::looped::{adaptive_with, article_with, model};
-use tautscope_core::{Flag, GuardSettings, HysteresisReduction, Play, Reaction, Status, Triggers};
+use tautscope_core::{
+    Flag, HysteresisReduction, MonitorsSettings, Play, Reaction, Status, Triggers,
+};
 
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;
 
 /// The tip below is late by a third of a second, as none in contact is.
-fn patient() -> GuardSettings {
-    let mut settings = support::guards();
+fn patient() -> MonitorsSettings {
+    let mut settings = support::monitors();
     for grip in &mut settings.frames.grips {
         grip.slip = 1e3;
     }
@@ -82,19 +84,19 @@ fn run(mut reduction: Box<HysteresisReduction>) -> u64 {
         reduction.on_features(None, None, 20.0, None);
         // Every flag, long enough for every rung of its ladder.
         for (flag, minute) in Flag::ALL.iter().zip(1_u32..) {
-            reduction.guards_mut().engage();
+            reduction.monitors_mut().engage();
             for tick in 0..2000_u32 {
                 let time = 60.0 * f64::from(minute) + f64::from(tick) * 0.005;
-                reduction.guards_mut().raise(*flag);
+                reduction.monitors_mut().raise(*flag);
                 reduction.step(posture(time), Some(time), time);
                 ticks += 1;
                 if tick % 8 == 0 {
                     let seen = truth.predict(posture(time)).map(|seen| seen.features);
                     reduction.on_features(seen, None, time, Some(u64::from(tick)));
                 }
-                worst = worst.max(reduction.guards().supervision().reaction);
+                worst = worst.max(reduction.monitors().supervision().reaction);
             }
-            reduction.guards_mut().acknowledge();
+            reduction.monitors_mut().acknowledge();
         }
     });
     assert_eq!(worst, Reaction::Disable);

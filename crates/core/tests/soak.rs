@@ -54,7 +54,7 @@ fn soak(law: &str, mut reduction: Box<HysteresisReduction>) -> String {
             if tick.is_multiple_of(TICKS_PER_FRAME) {
                 reduction.on_features(world.seen(), None, time, Some(tick));
             }
-            worst = worst.max(reduction.guards().supervision().reaction);
+            worst = worst.max(reduction.monitors().supervision().reaction);
             let off = (world.tip[0].output - hand[0]).abs();
             error += off / real(ticks);
             if (EARLY.0..EARLY.1).contains(&time) {
@@ -98,8 +98,8 @@ fn soak(law: &str, mut reduction: Box<HysteresisReduction>) -> String {
 #[test]
 fn nothing_grows_and_nothing_drifts() {
     let none = |_| Play::new(0.0, 0.0).unwrap();
-    let grown =
-        soak("best", adaptive()) + &soak("recovering", article_with(&support::guards(), 0.1, none));
+    let grown = soak("best", adaptive())
+        + &soak("recovering", article_with(&support::monitors(), 0.1, none));
     soak("paper", article(none));
     assert!(grown.is_empty(), "{grown}");
 }

@@ -130,7 +130,7 @@ def build_weighted_estimator(config: Config) -> _core.WeightedEstimator:
     )
 
 
-def build_guards(config: Config) -> _core.Guards:
+def build_guards(config: Config) -> _core.Monitors:
     """What watches the loop: reference, command, frames, and the reactions to them."""
     safety = config.safety
 
@@ -141,7 +141,7 @@ def build_guards(config: Config) -> _core.Guards:
         insertion, rotation, bending = safety.width_limit
         return of * insertion, of * rotation, of * bending
 
-    motion = _core.MotionWatch(
+    motion = _core.MotionMonitor(
         period=config.control.period,
         tremor_swing=each(lambda dof: dof.update_distance * safety.tremor_swing),
         slack=safety.width_limit,
@@ -153,7 +153,7 @@ def build_guards(config: Config) -> _core.Guards:
         change_limit=safety.change_limit,
         change_travel=share(safety.change_travel),
     )
-    return _core.Guards(
+    return _core.Monitors(
         period=config.control.period,
         gain_limit=each(lambda dof: dof.gain_limit),
         reference_speed=safety.reference_speed,

@@ -18,8 +18,8 @@ use crate::r#loop::axis::Axis;
 use crate::r#loop::history::{Entry, History};
 use crate::model::features::FeatureModel;
 use crate::supervision::flags::{Flag, Flags};
-use crate::supervision::frame_gate::{Arrival, Picture};
-use crate::supervision::guards::Guards;
+use crate::supervision::frame_gate::{FrameArrival, ImageIdentity};
+use crate::supervision::monitors::Monitors;
 
 /// How an image becomes a state.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,7 +39,7 @@ pub struct HysteresisReduction {
     state_estimation: StateEstimation,
     history: History,
     whereabouts: Whereabouts,
-    guards: Guards,
+    monitors: Monitors,
     travel: PerDof<f64>,
     corrected: PerDof<f64>,
     last_used: f64,
@@ -53,9 +53,9 @@ impl HysteresisReduction {
         state_estimation: StateEstimation,
         history: History,
         whereabouts: Whereabouts,
-        guards: Guards,
+        monitors: Monitors,
     ) -> Self {
-        guards.limit(&mut axes);
+        monitors.limit(&mut axes);
         Self {
             axes,
             friction: None,
@@ -63,7 +63,7 @@ impl HysteresisReduction {
             state_estimation,
             history,
             whereabouts,
-            guards,
+            monitors,
             travel: [0.0; 3],
             corrected: [0.0; 3],
             last_used: f64::NEG_INFINITY,
@@ -83,11 +83,11 @@ impl HysteresisReduction {
     pub fn step(&mut self, reference: PerDof<f64>, stamp: Option<f64>, time: f64) -> PerDof<f64> {
         let before = self.axes.each_ref().map(Axis::command);
         let believed = self.predicted_state();
-        self.guards.tick(&mut self.axes, reference, stamp, time);
+        self.monitors.tick(&mut self.axes, reference, stamp, time);
         let command = self.axes.each_ref().map(Axis::command);
         let mut moved = distance(before, command);
         if let Some(friction) = &mut self.friction {
-            friction.couple(self.guards.admitted(), &mut self.axes);
+            friction.couple(self.monitors.admitted(), &mut self.axes);
             // What another DOF takes of the friction lets go of a tip whose command rests.
             let released = distance(believed, self.predicted_state());
             for (moved, released) in moved.iter_mut().zip(released) {
@@ -99,7 +99,7 @@ impl HysteresisReduction {
         }
         let jumped_back = self.history.push(Entry {
             time,
-            reference: self.guards.admitted(),
+            reference: self.monitors.admitted(),
             command,
             predicted_state: self.predicted_state(),
             corrected: self.corrected,
@@ -127,22 +127,22 @@ impl HysteresisReduction {
         checksum: Option<u64>,
     ) -> Report {
         let past = self.history.at(captured_at);
-        let mut raised = self.guards.arrive(&Arrival {
+        let mut raised = self.monitors.arrive(&FrameArrival {
             captured_at,
             now: self.history.newest_time(),
             picture: checksum.map_or_else(
-                || measured.map(|features| Picture::Features(features.map(f64::to_bits))),
-                |sum| Some(Picture::Checksum(sum)),
+                || measured.map(|features| ImageIdentity::Features(features.map(f64::to_bits))),
+                |sum| Some(ImageIdentity::Checksum(sum)),
             ),
             travel: past.map(|past| past.travel),
         });
         let mut report = self.image_update(measured, covariance, captured_at, past, &mut raised);
-        self.guards.judged(raised);
-        report.supervision = self.guards.supervision();
+        self.monitors.judged(raised);
+        report.supervision = self.monitors.supervision();
         report
     }
 
-    /// The image update of a frame of which guards have said what is wrong so far.
+    /// The image update of a frame of which monitors have said what is wrong so far.
     fn image_update(
         &mut self,
         measured: Option<[f64; 4]>,
@@ -152,7 +152,9 @@ impl HysteresisReduction {
         raised: &mut Flags,
     ) -> Report {
         if captured_at <= self.last_used {
-            *raised = self.guards.watched(raised.and(Flags::of(Flag::Duplicate)));
+            *raised = self
+                .monitors
+                .watched(raised.and(Flags::of(Flag::Duplicate)));
             return self.unused(Status::Duplicate, None);
         }
         let Some(past) = past else {
@@ -163,8 +165,8 @@ impl HysteresisReduction {
         }
         let Some(measured) = measured.filter(|features| usable(*features)) else {
             self.whereabouts.miss(&past);
-            self.guards.frames.miss(past.travel);
-            *raised = self.guards.watched(Flags::of(Flag::Lost));
+            self.monitors.frames.miss(past.travel);
+            *raised = self.monitors.watched(Flags::of(Flag::Lost));
             return self.unused(Status::NoMarkers, Some(past));
         };
         let Some(seen) = self.look(&past, measured, covariance) else {
@@ -180,7 +182,7 @@ impl HysteresisReduction {
         let offsets = self.axes.each_ref().map(Axis::offsets);
         let doubts = |seen: &Seen| {
             let sightings = seen.sightings(&past, offsets);
-            let frames = &self.guards.frames;
+            let frames = &self.monitors.frames;
             frames.doubts(&belief, moved, &sightings).without(unasked)
         };
         let doubt = doubts(&seen);
@@ -193,16 +195,16 @@ impl HysteresisReduction {
             let swapped = is_reversed
                 || exchanged
                     .is_some_and(|other| other.used == [true; 2] && doubts(&other).is_empty());
-            *raised = self.guards.watched(Flags::when(swapped, Flag::Swapped));
+            *raised = self.monitors.watched(Flags::when(swapped, Flag::Swapped));
             if raised.is_empty() && is_believed {
-                *raised = self.guards.watched(doubt);
+                *raised = self.monitors.watched(doubt);
             }
             if !raised.is_empty() {
                 self.whereabouts.miss(&past);
                 return self.unused(Status::Refused, Some(past));
             }
         }
-        self.guards
+        self.monitors
             .frames
             .accept(&belief, &seen.sightings(&past, offsets));
         self.last_used = captured_at;
@@ -216,14 +218,14 @@ impl HysteresisReduction {
         // Two markers of which one is where it cannot be: the other may be as wrong.
         let is_doubtful = is_believed && seen.used != found(measured);
         let left_out = self
-            .guards
+            .monitors
             .watched(Flags::when(is_doubtful, Flag::Innovation));
-        let triggers = if left_out.is_empty() && self.guards.may_learn() {
+        let triggers = if left_out.is_empty() && self.monitors.may_learn() {
             self.learn(&past, &seen, raised)
         } else {
             [Triggers::default(); 3]
         };
-        *raised = self.guards.watched(
+        *raised = self.monitors.watched(
             raised
                 .and(Flags::when(status == Status::Partial, Flag::Merged))
                 .and(Flags::when(!is_believed, Flag::Lost))
@@ -240,7 +242,7 @@ impl HysteresisReduction {
             estimate,
             state_deviation: seen.state_deviation,
             play: self.play(),
-            supervision: self.guards.supervision(),
+            supervision: self.monitors.supervision(),
         }
     }
 
@@ -273,13 +275,13 @@ impl HysteresisReduction {
     }
 
     /// What watches the loop.
-    pub const fn guards(&self) -> &Guards {
-        &self.guards
+    pub const fn monitors(&self) -> &Monitors {
+        &self.monitors
     }
 
     /// What watches the loop, to re-engage, to acknowledge, and to raise what only the rig can see.
-    pub const fn guards_mut(&mut self) -> &mut Guards {
-        &mut self.guards
+    pub const fn monitors_mut(&mut self) -> &mut Monitors {
+        &mut self.monitors
     }
 }
 

@@ -4,7 +4,7 @@ use crate::error::{ConfigError, require, require_positive};
 
 /// What no command may do; one DOF, in its unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MonitorSettings {
+pub struct CommandLimits {
     /// Largest dc / du.
     pub gain_limit: f64,
     /// Largest |dc| in a tick.
@@ -25,14 +25,14 @@ pub struct MonitorSettings {
 /// A command that breaks the third is no hand's, whatever the clutch before the law made of it: it does not move. One
 /// outside of the last two, which another bound keeps it from entering at once, comes no farther out. What is permitted is what is sent, and what the law goes on from.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Monitor {
-    settings: MonitorSettings,
+pub struct CommandLimiter {
+    settings: CommandLimits,
     last: Option<(f64, f64)>,
 }
 
 /// What became of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Verdict {
+pub enum LimiterResult {
     /// It was within all bounds and is what it was, bit for bit.
     Same,
     /// A limit of travel changed it: that share of the reference's motion is to be thrown away, or the command would
@@ -46,12 +46,12 @@ pub enum Verdict {
     Broken,
 }
 
-impl Monitor {
+impl CommandLimiter {
     /// Before the first command.
     ///
     /// # Errors
     /// A limit is not above 0, the gain's below 1, or the travel's ends are not in order.
-    pub fn new(settings: MonitorSettings) -> Result<Self, ConfigError> {
+    pub fn new(settings: CommandLimits) -> Result<Self, ConfigError> {
         let gain = settings.gain_limit.is_finite() && settings.gain_limit >= 1.0;
         require(
             gain,
@@ -78,8 +78,8 @@ impl Monitor {
     /// The command that may be sent for an admitted reference.
     ///
     /// One that is not finite, or of a reference that is not, becomes the last, or NaN before there is one.
-    pub fn permit(&mut self, reference: f64, command: f64) -> (f64, Verdict) {
-        let MonitorSettings {
+    pub fn permit(&mut self, reference: f64, command: f64) -> (f64, LimiterResult) {
+        let CommandLimits {
             gain_limit,
             step_limit,
             travel: (least, largest),
@@ -87,15 +87,20 @@ impl Monitor {
         } = self.settings;
         let Some((last_reference, last)) = self.last else {
             if !(reference.is_finite() && command.is_finite()) {
-                return (f64::NAN, Verdict::Broken);
+                return (f64::NAN, LimiterResult::Broken);
             }
             let permitted = command.max(least).min(largest);
             self.last = Some((reference, permitted));
-            let verdict = told(permitted, command, Verdict::Same, Verdict::Limited);
+            let verdict = told(
+                permitted,
+                command,
+                LimiterResult::Same,
+                LimiterResult::Limited,
+            );
             return (permitted, verdict);
         };
         if !reference.is_finite() {
-            return (last, Verdict::Broken);
+            return (last, LimiterResult::Broken);
         }
         let increment = reference - last_reference;
         let farthest = last + gain_limit * increment;
@@ -106,7 +111,10 @@ impl Monitor {
         };
         if (lawful - last).abs() > step_limit {
             self.last = Some((reference, last));
-            return (last, told(lawful, command, Verdict::Jump, Verdict::Broken));
+            return (
+                last,
+                told(lawful, command, LimiterResult::Jump, LimiterResult::Broken),
+            );
         }
         // Never beyond the last command's own distance, so that a limit cannot move anything by itself.
         let ahead = (last - last_reference).max(lead_limit);
@@ -124,9 +132,9 @@ impl Monitor {
         } else {
             last
         };
-        let bound = told(limited, led, Verdict::Led, Verdict::Limited);
-        let lawfully = told(permitted, command, Verdict::Same, bound);
-        let verdict = told(lawful, command, lawfully, Verdict::Broken);
+        let bound = told(limited, led, LimiterResult::Led, LimiterResult::Limited);
+        let lawfully = told(permitted, command, LimiterResult::Same, bound);
+        let verdict = told(lawful, command, lawfully, LimiterResult::Broken);
         self.last = Some((reference, permitted));
         (permitted, verdict)
     }
@@ -141,6 +149,6 @@ impl Monitor {
 
 /// A verdict is told bit for bit: one if a bound has left a command what it was, the other if not.
 #[allow(clippy::float_cmp)]
-fn told(bounded: f64, command: f64, left: Verdict, changed: Verdict) -> Verdict {
+fn told(bounded: f64, command: f64, left: LimiterResult, changed: LimiterResult) -> LimiterResult {
     if bounded == command { left } else { changed }
 }

@@ -18,7 +18,7 @@ const JUMP_DEVIATIONS: f64 = 2.0;
 
 /// When a frame is refused.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FrameSettings {
+pub struct FrameGateSettings {
     /// Oldest frame that is used, in s.
     pub frame_age: f64,
     /// Longest time without a frame, in s.
@@ -41,7 +41,7 @@ pub struct FrameSettings {
 
 /// A picture as far as it can be told from another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Picture {
+pub enum ImageIdentity {
     /// A checksum of its pixels.
     Checksum(u64),
     /// The bits of the features in it.
@@ -50,13 +50,13 @@ pub enum Picture {
 
 /// A frame as it comes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Arrival {
+pub struct FrameArrival {
     /// In s.
     pub captured_at: f64,
     /// Of the newest control tick, in s.
     pub now: f64,
     /// None if neither pixels nor features are known.
-    pub picture: Option<Picture>,
+    pub picture: Option<ImageIdentity>,
     /// How far the command had gone at capture, forth and back [m, rad, rad]; None beyond the history.
     pub travel: Option<PerDof<f64>>,
 }
@@ -73,11 +73,11 @@ pub struct Arrival {
 /// with the image's own standard deviation from the markers' covariance, and a spread that follows the root mean square
 /// of the innovations accepted: quickly when they grow, slowly and with motion when they shrink. A refused innovation teaches it nothing.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FrameWatch {
-    settings: FrameSettings,
+pub struct FrameGate {
+    settings: FrameGateSettings,
     captured_at: Option<f64>,
     arrived_at: Option<f64>,
-    first: Option<(Picture, PerDof<f64>)>,
+    first: Option<(ImageIdentity, PerDof<f64>)>,
     spread: PerDof<f64>,
     /// By how much a jump may be larger [m, rad, rad].
     blind: PerDof<f64>,
@@ -85,12 +85,12 @@ pub struct FrameWatch {
     grips: PerDof<Grip>,
 }
 
-impl FrameWatch {
+impl FrameGate {
     /// Before the first frame.
     ///
     /// # Errors
     /// A value is not a finite number above 0; the growth may be 0.
-    pub fn new(settings: FrameSettings) -> Result<Self, ConfigError> {
+    pub fn new(settings: FrameGateSettings) -> Result<Self, ConfigError> {
         require_positive("frame_age", settings.frame_age)?;
         require_positive("frame_gap", settings.frame_gap)?;
         require_positive("innovation_limit", settings.innovation_limit)?;
@@ -130,8 +130,8 @@ impl FrameWatch {
     }
 
     /// What is wrong with a frame before anyone looks at the features.
-    pub fn arrive(&mut self, arrival: &Arrival) -> Flags {
-        let Arrival {
+    pub fn arrive(&mut self, arrival: &FrameArrival) -> Flags {
+        let FrameArrival {
             captured_at, now, ..
         } = *arrival;
         if now.is_finite() {
@@ -150,7 +150,7 @@ impl FrameWatch {
             .and(Flags::when(self.repeats(arrival), Flag::Frozen))
     }
 
-    fn repeats(&mut self, arrival: &Arrival) -> bool {
+    fn repeats(&mut self, arrival: &FrameArrival) -> bool {
         let (Some(picture), Some(travel)) = (arrival.picture, arrival.travel) else {
             return false;
         };

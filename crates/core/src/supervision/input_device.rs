@@ -6,7 +6,7 @@ use crate::supervision::flags::{Flag, Flags};
 
 /// What a hand and its device can do.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct DeviceSettings {
+pub struct InputDeviceSettings {
     /// Control period, in s.
     pub period: f64,
     /// Speed that a hand gains or loses at most while its device says nothing new [m/s, rad/s, rad/s].
@@ -36,20 +36,20 @@ pub struct DeviceSettings {
 /// a device counts more coarsely than `count`, or tells less than some 30 values a second, so that a quick start of the
 /// hand passes for silence.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct DeviceWatch {
-    settings: DeviceSettings,
+pub struct InputDeviceMonitor {
+    settings: InputDeviceSettings,
     /// v.
     speeds: PerDof<f64>,
     /// T.
     repeated: PerDof<f64>,
 }
 
-impl DeviceWatch {
+impl InputDeviceMonitor {
     /// Of a hand at rest.
     ///
     /// # Errors
     /// A value is not a finite number above 0.
-    pub fn new(settings: DeviceSettings) -> Result<Self, ConfigError> {
+    pub fn new(settings: InputDeviceSettings) -> Result<Self, ConfigError> {
         require_positive("period", settings.period)?;
         for (field, values) in [
             ("reference_speed", settings.speed),

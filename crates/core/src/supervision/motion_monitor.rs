@@ -4,7 +4,7 @@ use crate::article::play::Play;
 use crate::dof::PerDof;
 use crate::error::{ConfigError, require, require_positive};
 use crate::supervision::flags::{Flag, Flags};
-use crate::supervision::turning_points::Swings;
+use crate::supervision::turning_points::TurningPoints;
 
 /// Over which reversals are counted, in s.
 const COUNTED: f64 = 1.0;
@@ -17,7 +17,7 @@ const UNLEARNT: f64 = 2.0;
 
 /// When a motion is wrong.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MotionSettings {
+pub struct MotionMonitorSettings {
     /// Control period, in s.
     pub period: f64,
     /// Least swing of a tremor [m, rad, rad].
@@ -51,7 +51,7 @@ pub struct MotionSettings {
 ///
 /// Wrong about over-compensation where images tell a wrong time, for the tip is then seen too late.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MotionWatch {
+pub struct MotionMonitor {
     axes: PerDof<Motion>,
     kept: f64,
     tremor_rate: f64,
@@ -59,12 +59,12 @@ pub struct MotionWatch {
     cycle_time: f64,
 }
 
-impl MotionWatch {
+impl MotionMonitor {
     /// Before the first motion.
     ///
     /// # Errors
     /// A value is not a finite number above 0, or `cycle_swings` is 0.
-    pub fn new(settings: MotionSettings) -> Result<Self, ConfigError> {
+    pub fn new(settings: MotionMonitorSettings) -> Result<Self, ConfigError> {
         require_positive("period", settings.period)?;
         for (field, lengths) in [
             ("tremor_swing", settings.tremor_swing),
@@ -143,10 +143,10 @@ impl MotionWatch {
 struct Motion {
     slack: f64,
     ahead: f64,
-    hand: Swings,
+    hand: TurningPoints,
     reversals: f64,
-    reference: Swings,
-    tip: Swings,
+    reference: TurningPoints,
+    tip: TurningPoints,
     /// Reference and tip where the reference came farthest, and where it turned last.
     farthest: (f64, f64),
     start: Option<(f64, f64)>,
@@ -166,10 +166,10 @@ impl Motion {
         Self {
             slack,
             ahead,
-            hand: Swings::new(tremor_swing),
+            hand: TurningPoints::new(tremor_swing),
             reversals: 0.0,
-            reference: Swings::new(turn),
-            tip: Swings::new(turn),
+            reference: TurningPoints::new(turn),
+            tip: TurningPoints::new(turn),
             farthest: (f64::NAN, f64::NAN),
             start: None,
             play: None,

@@ -3,11 +3,11 @@
 use crate::dof::{PerDof, all_finite};
 use crate::error::{ConfigError, require, require_positive};
 use crate::supervision::flags::{Flag, Flags};
-use crate::supervision::input_device::{DeviceSettings, DeviceWatch};
+use crate::supervision::input_device::{InputDeviceMonitor, InputDeviceSettings};
 
 /// Which increments of the reference are taken.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ClutchSettings {
+pub struct ReferenceGateSettings {
     /// Control period, in s.
     pub period: f64,
     /// Largest speed of the reference over `reference_time` [m/s, rad/s, rad/s].
@@ -42,14 +42,14 @@ pub struct ClutchSettings {
 ///
 /// which a steady `reference_speed` just reaches. An increment that would break it is no hand's: it is thrown away,
 /// and motion stops. A tremor comes back before it has gained much; a hand that runs away slower than
-/// `reference_speed` is followed. Nor is what [`DeviceWatch`] says of a hand whose device was silent.
+/// `reference_speed` is followed. Nor is what [`InputDeviceMonitor`] says of a hand whose device was silent.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Clutch {
-    settings: ClutchSettings,
+pub struct ReferenceGate {
+    settings: ReferenceGateSettings,
     /// k.
     kept: f64,
     gained: PerDof<f64>,
-    device: DeviceWatch,
+    device: InputDeviceMonitor,
     offset: PerDof<f64>,
     raw: PerDof<f64>,
     admitted: Option<PerDof<f64>>,
@@ -60,7 +60,7 @@ pub struct Clutch {
 
 /// What became of a reference.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Admission {
+pub struct GatedReference {
     /// What the law is to follow (3,) [m, rad, rad]; None before the first that is finite.
     pub reference: Option<PerDof<f64>>,
     /// Its increments, 0 for the first.
@@ -71,12 +71,12 @@ pub struct Admission {
     pub severe: Flags,
 }
 
-impl Clutch {
+impl ReferenceGate {
     /// Before the first reference.
     ///
     /// # Errors
     /// A value is not a finite number above 0, or `late_tick` not above 1.
-    pub fn new(settings: ClutchSettings) -> Result<Self, ConfigError> {
+    pub fn new(settings: ReferenceGateSettings) -> Result<Self, ConfigError> {
         require_positive("period", settings.period)?;
         require_positive("reference_time", settings.reference_time)?;
         let late = settings.late_tick.is_finite() && settings.late_tick > 1.0;
@@ -86,7 +86,7 @@ impl Clutch {
             settings,
             kept: libm::exp(-settings.period / settings.reference_time),
             gained: [0.0; 3],
-            device: DeviceWatch::new(DeviceSettings {
+            device: InputDeviceMonitor::new(InputDeviceSettings {
                 period: settings.period,
                 speed: settings.reference_speed,
                 count: settings.reference_count,
@@ -110,13 +110,13 @@ impl Clutch {
         stamp: Option<f64>,
         held: bool,
         off: Flags,
-    ) -> Admission {
+    ) -> GatedReference {
         let gap = self.gap(time);
         let (late, severe) = self.punctuality(gap, time, stamp);
         let invalid = Flags::when(!all_finite(reference), Flag::ReferenceInvalid);
         let (wrong, severe) = (late.without(off), severe.without(off));
         let mut stopped = held || self.fresh || !wrong.and(severe).is_empty();
-        let mut admission = Admission {
+        let mut admission = GatedReference {
             reference: self.admitted,
             moved: [0.0; 3],
             raised: wrong.and(invalid.without(off)),

@@ -2,7 +2,7 @@
 
 /// Follows a signal and tells where it turned, once it has come back by more than `band`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Swings {
+pub struct TurningPoints {
     band: f64,
     /// 1 upwards, -1 downwards, 0 before either is clear.
     direction: f64,
@@ -12,7 +12,7 @@ pub struct Swings {
     turn: f64,
 }
 
-impl Swings {
+impl TurningPoints {
     /// Before the first value; `band` in the unit of the signal.
     pub const fn new(band: f64) -> Self {
         Self {
@@ -64,7 +64,7 @@ mod tests {
 
     #[test]
     fn a_sine_turns_twice_a_period_and_noise_within_the_band_never() {
-        let mut swings = Swings::new(0.1);
+        let mut swings = TurningPoints::new(0.1);
         let mut found = [0.0; 8];
         let mut count = 0;
         for tick in 0..4000 {
@@ -85,7 +85,7 @@ mod tests {
 
     #[test]
     fn what_is_no_number_is_no_turn() {
-        let mut swings = Swings::new(0.1);
+        let mut swings = TurningPoints::new(0.1);
         assert_eq!(swings.follow(f64::NAN), None);
         for value in [0.0, 1.0, f64::NAN, 2.0] {
             assert_eq!(swings.follow(value), None);

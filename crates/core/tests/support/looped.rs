@@ -4,12 +4,12 @@
 #![allow(dead_code)]
 
 use tautscope_core::{
-    Axis, Camera, Compensator, Estimator, FeatureModel, GuardSettings, Guards, History,
-    HysteresisReduction, Instrument, PerDof, Play, Pose, StateEstimation, StateEstimator,
+    Axis, Camera, Compensator, Estimator, FeatureModel, History, HysteresisReduction, Instrument,
+    Monitors, MonitorsSettings, PerDof, Play, Pose, StateEstimation, StateEstimator,
     WeightedEstimator, WeightedSettings, Whereabouts, WhereaboutsSettings,
 };
 
-use super::{PERIOD, UNITS, guards};
+use super::{PERIOD, UNITS, monitors};
 
 /// What the loop believes of instrument and camera, and what tests take for the truth.
 pub fn model() -> FeatureModel {
@@ -23,12 +23,12 @@ pub fn model() -> FeatureModel {
 
 /// The article's scheme, from the slack that `play` gives for a unit.
 pub fn article(play: impl Fn(f64) -> Play) -> Box<HysteresisReduction> {
-    article_with(&guards(), 0.0, play)
+    article_with(&monitors(), 0.0, play)
 }
 
-/// The same with other guards and the anchor's return.
+/// The same with other monitors and the anchor's return.
 pub fn article_with(
-    guards: &GuardSettings,
+    monitors: &MonitorsSettings,
     recovery: f64,
     play: impl Fn(f64) -> Play,
 ) -> Box<HysteresisReduction> {
@@ -41,16 +41,19 @@ pub fn article_with(
             play(unit),
         )
     });
-    looped(guards, axes, StateEstimation::Article(watch()))
+    looped(monitors, axes, StateEstimation::Article(watch()))
 }
 
 /// Profile `best`.
 pub fn adaptive() -> Box<HysteresisReduction> {
-    adaptive_with(&guards(), 4.0)
+    adaptive_with(&monitors(), 4.0)
 }
 
-/// The same with other guards, and other ideas of what one marker may say.
-pub fn adaptive_with(guards: &GuardSettings, outlier_distance: f64) -> Box<HysteresisReduction> {
+/// The same with other monitors, and other ideas of what one marker may say.
+pub fn adaptive_with(
+    monitors: &MonitorsSettings,
+    outlier_distance: f64,
+) -> Box<HysteresisReduction> {
     let axes = UNITS.map(|unit| Axis::Adaptive(super::axis(unit)));
     let settings = WeightedSettings {
         marker_deviation: 0.3,
@@ -60,7 +63,7 @@ pub fn adaptive_with(guards: &GuardSettings, outlier_distance: f64) -> Box<Hyste
         steps: 8,
     };
     let estimator = WeightedEstimator::new(watch(), settings).unwrap();
-    looped(guards, axes, StateEstimation::Weighted(estimator))
+    looped(monitors, axes, StateEstimation::Weighted(estimator))
 }
 
 fn watch() -> StateEstimator {
@@ -68,7 +71,7 @@ fn watch() -> StateEstimator {
 }
 
 fn looped(
-    guards: &GuardSettings,
+    monitors: &MonitorsSettings,
     axes: PerDof<Axis>,
     estimation: StateEstimation,
 ) -> Box<HysteresisReduction> {
@@ -84,7 +87,7 @@ fn looped(
                 settling_time: 0.15,
             })
             .unwrap(),
-            Guards::new(*guards).unwrap(),
+            Monitors::new(*monitors).unwrap(),
         )
         .with_friction(Some(super::friction())),
     )

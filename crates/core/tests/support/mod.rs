@@ -1,19 +1,19 @@
-//! Guards for the tests of the loop: lengths in units of 0.4 mm, 0.04 rad, 0.02 rad.
+//! Monitors for the tests of the loop: lengths in units of 0.4 mm, 0.04 rad, 0.02 rad.
 
 pub mod looped;
 pub mod stand_in;
 
 use tautscope_core::{
-    AdaptiveAxis, AdaptiveSettings, ChangeLimit, ChangeSettings, ClutchSettings, ContactTest,
-    Flags, FrameSettings, Friction, FrictionSettings, GripSettings, GuardSettings, LeadLaw,
-    MonitorSettings, MotionSettings, OffsetPrior, PerDof, Play, SupervisorSettings,
+    AdaptiveAxis, AdaptiveSettings, ChangeLimit, ChangeSettings, CommandLimits, ContactTest, Flags,
+    FrameGateSettings, Friction, FrictionSettings, GripSettings, LeadLaw, MonitorsSettings,
+    MotionMonitorSettings, OffsetPrior, PerDof, Play, ReferenceGateSettings, SupervisorSettings,
 };
 
 pub const UNITS: PerDof<f64> = [0.4e-3, 0.04, 0.02];
 pub const PERIOD: f64 = 0.005;
 
-pub fn monitor(unit: f64) -> MonitorSettings {
-    MonitorSettings {
+pub fn monitor(unit: f64) -> CommandLimits {
+    CommandLimits {
         gain_limit: 5.0,
         step_limit: 5.0 * unit,
         travel: (-100.0 * unit, 200.0 * unit),
@@ -21,8 +21,8 @@ pub fn monitor(unit: f64) -> MonitorSettings {
     }
 }
 
-pub fn clutch() -> ClutchSettings {
-    ClutchSettings {
+pub fn clutch() -> ReferenceGateSettings {
+    ReferenceGateSettings {
         period: PERIOD,
         reference_speed: UNITS.map(|unit| unit / PERIOD),
         reference_time: 0.05,
@@ -44,11 +44,11 @@ pub fn supervisor() -> SupervisorSettings {
     }
 }
 
-pub fn guards() -> GuardSettings {
-    GuardSettings {
+pub fn monitors() -> MonitorsSettings {
+    MonitorsSettings {
         clutch: clutch(),
-        monitors: UNITS.map(monitor),
-        frames: FrameSettings {
+        limits: UNITS.map(monitor),
+        frames: FrameGateSettings {
             frame_age: 0.3,
             frame_gap: 0.18,
             frozen_travel: UNITS,
@@ -62,7 +62,7 @@ pub fn guards() -> GuardSettings {
             }),
             blind_growth: 0.1,
         },
-        motion: MotionSettings {
+        motion: MotionMonitorSettings {
             period: PERIOD,
             tremor_swing: UNITS.map(|unit| 0.5 * unit),
             slack: UNITS.map(|unit| 30.0 * unit),

@@ -50,14 +50,14 @@ impl HysteresisReduction {
                 *corrected += if moved.is_finite() { moved } else { 0.0 };
             }
         }
-        *raised = raised.and(self.guards.taught(changes, past.travel));
+        *raised = raised.and(self.monitors.taught(changes, past.travel));
         triggers
     }
 
     /// What the image says of hand and tip.
     fn watch(&mut self, past: &Entry, seen: &Seen) -> Flags {
         let play = self.play();
-        self.guards
+        self.monitors
             .look(past.time, past.reference, seen.image_state(), play)
     }
 }

@@ -6,7 +6,7 @@ use crate::article::play::Play;
 use crate::article::state::StateEstimate;
 use crate::dof::PerDof;
 use crate::r#loop::history::Entry;
-use crate::supervision::guards::Supervision;
+use crate::supervision::monitors::Supervision;
 
 /// What became of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -67,7 +67,7 @@ impl HysteresisReduction {
             state_deviation: [f64::NAN; 3],
             triggers: [Triggers::default(); 3],
             play: self.play(),
-            supervision: self.guards.supervision(),
+            supervision: self.monitors.supervision(),
         }
     }
 }

@@ -1,0 +1,159 @@
+//! Eqs. (4)-(6).
+
+use crate::article::estimator::{Estimator, EstimatorState, Trigger};
+use crate::article::play::{Play, PlayState};
+use proptest::prelude::*;
+
+use super::{close, config, path, plays, turning_points};
+
+const DISTANCE: f64 = 0.05;
+
+fn estimator() -> Estimator {
+    Estimator::new(DISTANCE, 0.4, 0.25).unwrap()
+}
+
+fn unknown() -> EstimatorState {
+    EstimatorState::new(Play::new(0.0, 0.0).unwrap())
+}
+
+fn close_plays(a: Play, b: Play, tolerance: f64) -> bool {
+    (a.delta_minus() - b.delta_minus()).abs() <= tolerance
+        && (a.delta_plus() - b.delta_plus()).abs() <= tolerance
+}
+
+proptest! {
+    #![proptest_config(config())]
+
+    #[test]
+    fn offsets_keep_their_order_and_stay_among_what_was_seen(
+        first in plays(), signals in prop::collection::vec((-5.0..5.0, -5.0..5.0), 1..100)
+    ) {
+        let mut state = EstimatorState::new(first);
+        let (mut least, mut most) = (first.delta_minus(), first.delta_plus());
+        for (command, measured) in signals {
+            estimator().update(&mut state, command, measured);
+            let offset: f64 = command - measured;
+            least = least.min(offset);
+            most = most.max(offset);
+            let play = state.play();
+            prop_assert!(least <= play.delta_minus());
+            prop_assert!(play.delta_minus() <= play.delta_plus());
+            prop_assert!(play.delta_plus() <= most);
+        }
+    }
+
+    #[test]
+    fn the_true_offsets_are_a_fixed_point(truth in plays(), commands in turning_points()) {
+        let mut state = EstimatorState::new(truth);
+        let mut tip = PlayState { output: commands[0] - truth.delta_plus() };
+        for command in path(&commands, 400) {
+            estimator().update(&mut state, command, truth.step(&mut tip, command));
+            prop_assert!(close_plays(state.play(), truth, 1e-12), "{:?}", state.play());
+        }
+    }
+
+    #[test]
+    fn it_converges_on_a_play_that_is_fully_crossed(truth in plays()) {
+        let (mut state, mut tip) = (unknown(), PlayState { output: 0.0 });
+        let commands: Vec<f64> = (0..6).map(|turn| if turn % 2 == 0 { -6.0 } else { 6.0 }).collect();
+        for command in path(&commands, 600) {
+            estimator().update(&mut state, command, truth.step(&mut tip, command));
+        }
+        prop_assert!(close_plays(state.play(), truth, 1e-6), "{:?} {truth:?}", state.play());
+    }
+
+    /// Steady contact, looked at more or less often: what counts is the distance travelled.
+    #[test]
+    fn the_sample_rate_does_not_matter(offset in 0.5..2.0, every in 1_u32..20) {
+        let learn = |stride: f64, updates: u32| {
+            let mut state = unknown();
+            for update in 0..=updates {
+                let command = f64::from(update) * stride;
+                estimator().update(&mut state, command, command - offset);
+            }
+            state.play().delta_plus()
+        };
+        let often = learn(1.000_001 * DISTANCE, 20 * every);
+        let seldom = learn(f64::from(every) * 1.000_001 * DISTANCE, 20);
+        prop_assert!((often - seldom).abs() <= 1e-9, "{} {}", often, seldom);
+    }
+
+    #[test]
+    fn what_is_not_finite_is_ignored(
+        command in prop_oneof![Just(f64::NAN), Just(f64::INFINITY), Just(1.0)],
+        measured in prop_oneof![Just(f64::NAN), Just(f64::NEG_INFINITY)]
+    ) {
+        let mut state = unknown();
+        estimator().update(&mut state, 0.0, 0.0);
+        let before = state;
+        prop_assert!(!estimator().update(&mut state, command, measured).any());
+        prop_assert_eq!(state, before);
+    }
+}
+
+#[test]
+fn one_distance_counts_the_articles_factor() {
+    let mut state = unknown();
+    estimator().update(&mut state, 0.0, -1.0);
+    estimator().update(&mut state, DISTANCE, DISTANCE - 1.0);
+    assert!(close(state.play().delta_plus(), 0.25), "{state:?}");
+}
+
+#[test]
+fn triggers_say_which_condition_and_contact_first() {
+    let mut state = unknown();
+    let rule = estimator();
+    assert!(
+        !rule.update(&mut state, 0.0, 0.0).any(),
+        "the first pair is remembered"
+    );
+    assert!(
+        !rule.update(&mut state, 0.9 * DISTANCE, 0.0).any(),
+        "too near"
+    );
+    let stuck = rule.update(&mut state, 1.0, 0.0);
+    assert_eq!((stuck.minus, stuck.plus), (None, Some(Trigger::Violation)));
+    let follows = rule.update(&mut state, 2.0, 1.0);
+    assert_eq!(
+        (follows.minus, follows.plus),
+        (None, Some(Trigger::Contact))
+    );
+    let back = rule.update(&mut state, 0.0, 1.0);
+    assert_eq!((back.minus, back.plus), (Some(Trigger::Violation), None));
+    let follows = rule.update(&mut state, -1.0, 0.0);
+    assert_eq!(
+        (follows.minus, follows.plus),
+        (Some(Trigger::Contact), None)
+    );
+}
+
+#[test]
+fn the_reference_point_moves_on_though_no_condition_holds() {
+    let mut state = EstimatorState::new(Play::new(-1.0, 1.0).unwrap());
+    let rule = estimator();
+    rule.update(&mut state, 0.0, 0.0);
+    assert!(!rule.update(&mut state, 0.3, 0.0).any(), "free");
+    assert!(
+        rule.update(&mut state, 0.4, 0.1).plus.is_some(),
+        "followed since"
+    );
+}
+
+#[test]
+fn bad_settings_are_named() {
+    let field = |a, b, c| Estimator::new(a, b, c).unwrap_err().field;
+    assert_eq!(field(0.0, 0.4, 0.25), "update_distance");
+    assert_eq!(field(f64::NAN, 0.4, 0.25), "update_distance");
+    assert_eq!(field(0.1, 1.0, 0.25), "contact_tolerance");
+    assert_eq!(field(0.1, 0.4, 0.0), "smoothing_factor");
+}
+
+#[test]
+fn together_means_within_the_tolerance_of_the_commands_travel() {
+    for (followed, expected) in [(0.61, Some(Trigger::Contact)), (0.59, None)] {
+        let mut state = EstimatorState::new(Play::new(-2.0, 2.0).unwrap());
+        estimator().update(&mut state, 0.0, 0.0);
+        let triggers = estimator().update(&mut state, 1.0, followed);
+        assert_eq!((triggers.minus, triggers.plus), (None, expected));
+    }
+}

@@ -1,0 +1,110 @@
+//! The command in force when a frame was captured.
+
+use crate::r#loop::history::{Entry, History};
+use proptest::prelude::*;
+
+use super::{close, config};
+
+const PERIOD: f64 = 0.005;
+
+fn entry(time: f64) -> Entry {
+    Entry {
+        time,
+        reference: [-2.0 * time; 3],
+        command: [time, 2.0 * time, -time],
+        predicted_state: [3.0 * time, time, 0.5],
+        corrected: [0.5 * time; 3],
+        travel: [time; 3],
+    }
+}
+
+fn filled(span: f64, ticks: u32) -> History {
+    let mut history = History::new(span, PERIOD).unwrap();
+    for tick in 0..ticks {
+        assert!(!history.push(entry(f64::from(tick) * PERIOD)));
+    }
+    history
+}
+
+proptest! {
+    #![proptest_config(config())]
+
+    #[test]
+    fn between_ticks_it_interpolates(ticks in 2_u32..3000, share in 0.0..1.0) {
+        let history = filled(100.0, ticks);
+        let newest = f64::from(ticks - 1) * PERIOD;
+        let kept = f64::from(ticks.min(1024) - 1) * PERIOD;
+        let time = newest - share * (kept - 1e-9);
+        let found = history.at(time).unwrap();
+        let expected = entry(time);
+        for (found, expected) in [
+            (found.command, expected.command),
+            (found.predicted_state, expected.predicted_state),
+        ] {
+            prop_assert!(found.iter().zip(expected).all(|(a, b)| close(*a, b)));
+        }
+    }
+}
+
+#[test]
+fn beyond_either_end_there_is_nothing() {
+    let history = filled(1.0, 500);
+    let newest = 499.0 * PERIOD;
+    assert!(history.at(newest - 1.0 + 1e-9).is_some());
+    assert!(
+        history.at(newest - 1.0 - 1e-9).is_none(),
+        "older than the span"
+    );
+    assert!(
+        filled(100.0, 3000)
+            .at(2999.0 * PERIOD - 1023.5 * PERIOD)
+            .is_none(),
+        "overwritten"
+    );
+    assert!(filled(100.0, 3).at(-1e-9).is_none(), "before the first");
+    assert_eq!(
+        history.at(newest + 0.9 * PERIOD).unwrap().command,
+        entry(newest).command
+    );
+    assert!(
+        history.at(newest + 1.1 * PERIOD).is_none(),
+        "later than a period"
+    );
+    assert!(history.at(f64::NAN).is_none());
+    assert!(
+        History::new(1.0, PERIOD).unwrap().at(0.0).is_none(),
+        "empty"
+    );
+}
+
+#[test]
+fn a_time_that_jumps_back_starts_afresh() {
+    let mut history = filled(2.0, 100);
+    assert!(history.push(entry(0.1)));
+    assert!(history.at(0.2).is_none());
+    assert!(history.at(0.1).is_some() && history.at(0.09).is_none());
+}
+
+#[test]
+fn the_same_time_again_replaces_and_what_is_not_finite_is_left_out() {
+    let mut history = filled(2.0, 3);
+    let again = Entry {
+        command: [7.0; 3],
+        ..entry(2.0 * PERIOD)
+    };
+    assert!(!history.push(again));
+    assert_eq!(history.at(2.0 * PERIOD).unwrap().command, [7.0; 3]);
+    assert!(close(history.at(PERIOD).unwrap().command[0], PERIOD));
+    assert!(!history.push(Entry {
+        command: [f64::NAN; 3],
+        ..entry(1.0)
+    }));
+    assert!(!history.push(entry(f64::NAN)));
+    assert_eq!(history.at(2.0 * PERIOD).unwrap().command, [7.0; 3]);
+}
+
+#[test]
+fn bad_spans_are_named() {
+    assert_eq!(History::new(0.0, 0.1).unwrap_err().field, "span");
+    assert_eq!(History::new(1.0, f64::NAN).unwrap_err().field, "period");
+}

@@ -1,0 +1,190 @@
+//! What images teach the whole loop, and when they do not.
+
+use crate::article::play::{Play, PlayState};
+use crate::dof::PerDof;
+use crate::r#loop::reduction::HysteresisReduction;
+use crate::supervision::flags::Flag;
+use crate::supervision::reactions::Reaction;
+
+use super::support::looped::{adaptive, article, model};
+use super::support::{PERIOD, UNITS};
+
+const CENTRES: PerDof<f64> = [0.025, 0.0, 0.9];
+/// Once forth and back [s].
+const SWING: f64 = 8.0;
+
+/// A loop and an instrument whose insertion has slack; exact images.
+struct Run {
+    reduction: Box<HysteresisReduction>,
+    slack: Play,
+    tip: PlayState,
+    tick: u32,
+}
+
+impl Run {
+    fn new(reduction: Box<HysteresisReduction>, minus: f64, plus: f64) -> Self {
+        Self {
+            reduction,
+            slack: Play::new(minus * UNITS[0], plus * UNITS[0]).unwrap(),
+            tip: PlayState { output: CENTRES[0] },
+            tick: 0,
+        }
+    }
+
+    fn tick(&mut self) {
+        let time = f64::from(self.tick) * PERIOD;
+        let mut reference = CENTRES;
+        reference[0] += 16e-3 * (std::f64::consts::TAU * time / SWING).sin();
+        let [insertion, rotation, bending] = self.reduction.step(reference, None, time);
+        self.slack.step(&mut self.tip, insertion);
+        if self.tick.is_multiple_of(8) {
+            let seen = model().predict([self.tip.output, rotation, bending]);
+            let features = seen.map(|seen| seen.features);
+            self.reduction
+                .on_features(features, None, time, Some(u64::from(self.tick)));
+        }
+        self.tick += 1;
+    }
+
+    fn swing(&mut self, count: u32) {
+        for _ in 0..count * 1600 {
+            self.tick();
+        }
+    }
+
+    /// Of the insertion, in its unit.
+    fn believed(&self) -> (f64, f64) {
+        let [play, ..] = self.reduction.play();
+        (play.delta_minus() / UNITS[0], play.delta_plus() / UNITS[0])
+    }
+}
+
+fn learns_and_is_held(reduction: Box<HysteresisReduction>) {
+    let mut run = Run::new(reduction, -6.0, 9.0);
+    run.swing(4);
+    let (minus, plus) = run.believed();
+    assert!(
+        (minus + 6.0).abs() < 1.0 && (plus - 9.0).abs() < 1.0,
+        "{minus} {plus}"
+    );
+    let before = run.believed();
+    run.slack = Play::new(-3.0 * UNITS[0], 3.0 * UNITS[0]).unwrap();
+    for _ in 0..400 {
+        run.reduction.monitors_mut().raise(Flag::Frozen);
+        run.tick();
+        let reaction = run.reduction.monitors().supervision().reaction;
+        assert_eq!(reaction, Reaction::HoldEstimate);
+    }
+    let after = run.believed();
+    let moved = (after.0 - before.0).abs().max((after.1 - before.1).abs());
+    assert!(moved < 0.5, "{before:?} {after:?}");
+}
+
+#[test]
+fn images_teach_the_articles_slack_and_nothing_while_the_estimate_is_held() {
+    learns_and_is_held(article(|_| Play::new(0.0, 0.0).unwrap()));
+}
+
+#[test]
+fn images_teach_the_best_profile_and_nothing_while_the_estimate_is_held() {
+    learns_and_is_held(adaptive());
+}
+
+#[test]
+fn no_more_slack_is_believed_than_may_be() {
+    // 36 wide, and 30 may be.
+    let start = article(|unit| Play::new(-13.0 * unit, 13.0 * unit).unwrap());
+    let mut run = Run::new(start, -18.0, 18.0);
+    let mut widest = 0.0_f64;
+    for _ in 0..6 * 1600 {
+        run.tick();
+        let (minus, plus) = run.believed();
+        widest = widest.max(plus - minus);
+    }
+    assert!((28.0..=30.0 + 1e-9).contains(&widest), "{widest}");
+    let latched = run.reduction.monitors().supervision().latched;
+    assert!(latched.has(Flag::WidthLimit));
+}
+
+#[test]
+fn a_hold_ends_by_the_hands_travel_counted_in_widths() {
+    let mut reduction = article(|_| Play::new(0.0, 0.0).unwrap());
+    let mut hand = CENTRES;
+    reduction.step(hand, None, 0.0);
+    // Four widths of 12 mm end it, and 2 s do not.
+    for tick in 1..=400_u32 {
+        let gone = f64::from(tick) * 0.15e-3 / 12e-3;
+        hand[0] += if (tick / 100).is_multiple_of(2) {
+            0.15e-3
+        } else {
+            -0.15e-3
+        };
+        reduction.monitors_mut().raise(Flag::Frozen);
+        reduction.step(hand, None, f64::from(tick) * PERIOD);
+        let reaction = reduction.monitors().supervision().reaction;
+        if gone < 3.9 {
+            assert_eq!(reaction, Reaction::HoldEstimate, "after {gone} widths");
+        } else if gone > 4.1 {
+            assert_eq!(reaction, Reaction::Fade, "after {gone} widths");
+        }
+    }
+}
+
+#[test]
+fn at_the_top_of_its_ladder_a_flag_stays() {
+    let mut reduction = article(|_| Play::new(0.0, 0.0).unwrap());
+    reduction.step(CENTRES, None, 0.0);
+    for tick in 1..=10_000_u32 {
+        reduction.monitors_mut().raise(Flag::Frozen);
+        reduction.step(CENTRES, None, f64::from(tick) * PERIOD);
+        if tick > 1000 {
+            let reaction = reduction.monitors().supervision().reaction;
+            assert_eq!(reaction, Reaction::Fade, "tick {tick}");
+        }
+    }
+}
+
+#[test]
+fn slack_that_was_learnt_and_changes_is_said() {
+    let mut run = Run::new(adaptive(), -6.0, 9.0);
+    run.swing(4);
+    let latched = run.reduction.monitors().supervision().latched;
+    assert!(!latched.has(Flag::SlackChanged), "{latched:?}");
+    for tick in 0..3200 {
+        // Some new place of the contact at every image, as if the shaft were bent.
+        let more = 10.0 * (f64::from(tick) / 3200.0);
+        run.slack = Play::new((-6.0 - more) * UNITS[0], 9.0 * UNITS[0]).unwrap();
+        run.tick();
+    }
+    let latched = run.reduction.monitors().supervision().latched;
+    assert!(latched.has(Flag::SlackChanged), "{latched:?}");
+}
+
+/// What images have said for as long as a hold lasts is believed in the end.
+#[test]
+fn a_tip_that_has_jumped_is_not_believed_until_it_has_stayed() {
+    let mut run = Run::new(adaptive(), -3.0, 3.0);
+    run.swing(3);
+    assert_eq!(
+        run.reduction.monitors().supervision().reaction,
+        Reaction::None
+    );
+    run.slack = Play::new(9.0 * UNITS[0], 15.0 * UNITS[0]).unwrap();
+    let (mut worst, mut believed) = (Reaction::None, false);
+    for tick in 0..4800 {
+        run.tick();
+        let supervision = run.reduction.monitors().supervision();
+        worst = worst.max(supervision.reaction);
+        believed |= worst == Reaction::Fade && supervision.reaction < Reaction::HoldEstimate;
+        if tick == 40 {
+            assert!(
+                supervision.latched.has(Flag::Jump),
+                "{:?}",
+                supervision.latched
+            );
+            assert_eq!(supervision.reaction, Reaction::HoldEstimate);
+        }
+    }
+    assert_eq!(worst, Reaction::Fade);
+    assert!(believed, "in the end");
+}

@@ -1,0 +1,82 @@
+//! Properties of the blocks, checked on generated input; the generator's seed is fixed.
+
+// Where these compare floats for equality, equality to the last bit is what they claim.
+#![allow(clippy::float_cmp)]
+
+mod adaptive;
+mod change_watch;
+mod command_limiter;
+mod compensator;
+mod estimator;
+mod expectation;
+mod fading;
+mod frame_gate;
+mod frames;
+mod friction;
+mod friction_step;
+mod grip;
+mod guarantees;
+mod history;
+mod innovations;
+mod input_device;
+mod lead;
+mod lead_rates;
+mod learning;
+mod limits;
+mod monitors;
+mod motion_bounds;
+mod motion_monitor;
+mod offset_map;
+mod play;
+mod reference_gate;
+mod sharing;
+mod state;
+mod stress;
+mod strokes;
+mod supervisor;
+#[path = "../support/mod.rs"]
+mod support;
+mod thrown_away;
+mod weighted;
+mod whole;
+mod withheld;
+
+use crate::article::play::Play;
+use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
+
+fn config() -> ProptestConfig {
+    ProptestConfig {
+        cases: 256,
+        rng_seed: RngSeed::Fixed(2013),
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    }
+}
+
+/// Contact offsets of any sign, with a width from 0 up.
+fn plays() -> impl Strategy<Value = Play> {
+    (-2.0..2.0, prop_oneof![Just(0.0), 0.0..3.0])
+        .prop_map(|(minus, width)| Play::new(minus, minus + width).unwrap())
+}
+
+/// Where a signal turns round.
+fn turning_points() -> impl Strategy<Value = Vec<f64>> {
+    prop::collection::vec(-5.0..5.0, 2..20)
+}
+
+/// The path through the turning points, `steps` samples from each to the next.
+fn path(turning_points: &[f64], steps: u32) -> Vec<f64> {
+    let mut samples = vec![turning_points[0]];
+    for pair in turning_points.windows(2) {
+        samples.extend((1..=steps).map(|step| {
+            let share = f64::from(step) / f64::from(steps);
+            pair[0] + share * (pair[1] - pair[0])
+        }));
+    }
+    samples
+}
+
+fn close(a: f64, b: f64) -> bool {
+    (a - b).abs() <= 1e-12
+}

@@ -1,0 +1,128 @@
+//! Eqs. (13)-(16), and the rank watch. The comparison with numpy's pinv is among Python's tests.
+
+use crate::article::state::StateEstimator;
+use crate::model::features::FeaturePrediction;
+use proptest::prelude::*;
+
+use super::config;
+
+fn prediction(columns: [[f64; 4]; 3]) -> FeaturePrediction {
+    FeaturePrediction {
+        features: [0.0; 4],
+        columns,
+    }
+}
+
+fn columns() -> impl Strategy<Value = [[f64; 4]; 3]> {
+    prop::array::uniform3(prop::array::uniform4(-100.0..100.0))
+}
+
+fn image(columns: [[f64; 4]; 3], state: [f64; 3]) -> [f64; 4] {
+    [0, 1, 2, 3].map(|row| (0..3).map(|dof| columns[dof][row] * state[dof]).sum())
+}
+
+proptest! {
+    #![proptest_config(config())]
+
+    #[test]
+    fn a_consistent_innovation_gives_the_state_back(
+        columns in columns(), state in prop::array::uniform3(-1.0..1.0)
+    ) {
+        let all = StateEstimator::new([1e9; 3]).unwrap();
+        let found = all.estimate([0.0; 3], &prediction(columns), image(columns, state));
+        let worst = found.deviation.iter().copied().fold(0.0, f64::max);
+        for (found, state) in found.state.iter().zip(state) {
+            prop_assert!((found - state).abs() <= 1e-12 * (1.0 + worst * 100.0), "{} {}", found, state);
+        }
+    }
+
+    #[test]
+    fn a_held_dof_stays_and_the_rest_is_solved_without_it(
+        columns in columns(), innovation in prop::array::uniform4(-10.0..10.0), held in 0_usize..3
+    ) {
+        let mut limits = [1e9; 3];
+        limits[held] = 1e-9;
+        let watch = StateEstimator::new(limits).unwrap();
+        let found = watch.estimate([0.5; 3], &prediction(columns), innovation);
+        prop_assert_eq!(found.state[held], 0.5);
+        for dof in 0..3 {
+            prop_assert_eq!(found.observable[dof], dof != held);
+        }
+        // Least squares: what is left is across every column that was used.
+        let mut step = found.state.map(|value| value - 0.5);
+        step[held] = 0.0;
+        let explained = image(columns, step);
+        for dof in (0..3).filter(|dof| *dof != held) {
+            let left: f64 = (0..4)
+                .map(|row| columns[dof][row] * (innovation[row] - explained[row]))
+                .sum();
+            prop_assert!(left.abs() <= 1e-8, "{}", left);
+        }
+    }
+
+    #[test]
+    fn units_do_not_matter(columns in columns(), scale in 1e-6..1e6_f64) {
+        let plain = StateEstimator::new([0.02; 3]).unwrap();
+        let other = StateEstimator::new([0.02 * scale, 0.02, 0.02]).unwrap();
+        let mut scaled = columns;
+        scaled[0] = scaled[0].map(|value| value / scale);
+        let innovation = [1.0, -2.0, 3.0, 0.5];
+        let a = plain.estimate([0.0; 3], &prediction(columns), innovation);
+        let b = other.estimate([0.0; 3], &prediction(scaled), innovation);
+        prop_assert_eq!(a.observable, b.observable);
+        prop_assert!((a.state[0] * scale - b.state[0]).abs() <= 1e-9 * scale);
+    }
+}
+
+#[test]
+fn a_column_of_nothing_or_twice_the_same_is_held() {
+    let watch = StateEstimator::new([1.0; 3]).unwrap();
+    let (x, y) = ([1e3, 0.0, 0.0, 0.0], [0.0, 1e3, 0.0, 0.0]);
+    let none = watch.estimate([0.0; 3], &prediction([x, [0.0; 4], y]), [1.0; 4]);
+    assert_eq!(none.observable, [true, false, true]);
+    assert_eq!(none.deviation[1], f64::INFINITY);
+    let twice = watch.estimate([0.0; 3], &prediction([x, x, y]), [1.0; 4]);
+    assert_eq!(twice.observable.iter().filter(|seen| **seen).count(), 2);
+    assert!(twice.observable[2]);
+}
+
+#[test]
+fn with_anything_not_finite_nothing_is_observable() {
+    let watch = StateEstimator::new([1.0; 3]).unwrap();
+    let good = [
+        [1e3, 0.0, 0.0, 0.0],
+        [0.0, 1e3, 0.0, 0.0],
+        [0.0, 0.0, 1e3, 0.0],
+    ];
+    let mut bad = good;
+    bad[2][3] = f64::INFINITY;
+    let huge = good.map(|column| column.map(|value| value * 1e200));
+    let cases = [
+        watch.estimate([0.5; 3], &prediction(good), [1.0, f64::NAN, 1.0, 1.0]),
+        watch.estimate([0.5; 3], &prediction(bad), [1.0; 4]),
+        watch.estimate([0.5; 3], &prediction(huge), [1.0; 4]),
+    ];
+    for found in cases {
+        assert_eq!((found.state, found.observable), ([0.5; 3], [false; 3]));
+    }
+    assert_eq!(StateEstimator::new([1.0, 0.0, 1.0]).unwrap_err().value, 0.0);
+}
+
+#[test]
+fn the_worst_for_its_limit_goes_first_and_that_may_save_the_other() {
+    let nearly_the_same = [[1e3, 0.0, 0.0, 0.0], [1e3, 1.0, 0.0, 0.0]];
+    let [a, b] = nearly_the_same;
+    let c = [0.0, 0.0, 1e3, 0.0];
+    let watch = StateEstimator::new([0.1, 0.5, 0.5]).unwrap();
+    let found = watch.estimate([0.0; 3], &prediction([a, b, c]), [1.0; 4]);
+    assert_eq!(found.observable, [false, true, true]);
+    let watch = StateEstimator::new([0.5, 0.1, 0.5]).unwrap();
+    let found = watch.estimate([0.0; 3], &prediction([a, b, c]), [1.0; 4]);
+    assert_eq!(found.observable, [true, false, true]);
+    // The limit itself: alone, c is known to 1e-3 per px.
+    for (limit, observable) in [(1.01e-3, true), (0.99e-3, false)] {
+        let watch = StateEstimator::new([1.0, 1.0, limit]).unwrap();
+        let found = watch.estimate([0.0; 3], &prediction([a, [0.0; 4], c]), [1.0; 4]);
+        assert_eq!(found.observable[2], observable);
+    }
+}

@@ -1,0 +1,106 @@
+//! The monitors in the loop: that they change nothing, and that each is asked.
+
+use crate::article::compensator::{Compensator, CompensatorState};
+use crate::article::play::Play;
+use crate::supervision::flags::{Flag, Flags};
+use crate::supervision::monitors::MonitorsSettings;
+use crate::supervision::reactions::Reaction;
+
+use super::support::looped::{article, article_with};
+use super::support::{PERIOD, UNITS, monitors};
+
+/// While nothing is wrong, what the loop commands is what the law does by itself.
+#[test]
+fn a_nominal_run_is_the_laws_to_the_bit() {
+    let play = |unit: f64| Play::new(-7.0 * unit, 11.0 * unit).unwrap();
+    let mut reduction = article(play);
+    let law = Compensator::new(5.0, 5.0).unwrap();
+    let mut states = UNITS.map(|unit| CompensatorState::new(play(unit)));
+    for tick in 0..20_000_u32 {
+        let time = f64::from(tick) * PERIOD;
+        let mut reference = UNITS;
+        for (dof, value) in (0_u8..).zip(&mut reference) {
+            let phase = time * (0.7 + 0.3 * f64::from(dof));
+            *value *= 20.0 * phase.sin() + 9.0 * (2.3 * phase).cos();
+        }
+        let command = reduction.step(reference, None, time);
+        for ((command, state), value) in command.iter().zip(&mut states).zip(reference) {
+            assert_eq!(*command, law.step(state, value), "tick {tick}");
+        }
+    }
+    assert_eq!(reduction.monitors().supervision().latched, Flags::NONE);
+}
+
+/// A first reference beyond the end of the travel is taken at the end, and no motion is lost but what was beyond.
+#[test]
+fn a_start_beyond_the_end_is_at_the_end() {
+    for (minus, plus) in [(2.0, 6.0), (-6.0, -2.0), (-3.0, 3.0)] {
+        let mut reduction = article(|unit| Play::new(minus * unit, plus * unit).unwrap());
+        let unit = UNITS[0];
+        let [command, ..] = reduction.step([210.0 * unit, 0.0, 0.0], None, 0.0);
+        assert!((command / unit - 200.0).abs() < 1e-9);
+        let [tip, ..] = reduction.predicted_state();
+        let position = (command - tip) / unit;
+        let nearest = 0.0_f64.clamp(minus, plus);
+        assert!((position - nearest).abs() < 1e-9, "{position}");
+        let mut last = command;
+        for tick in 1..=400_u32 {
+            let time = f64::from(tick) * PERIOD;
+            let hand = 210.0 - 0.1 * f64::from(tick);
+            let [command, ..] = reduction.step([hand * unit, 0.0, 0.0], None, time);
+            assert!(command < last, "tick {tick}: {command} after {last}");
+            last = command;
+        }
+        assert_eq!(
+            reduction.monitors().supervision().flags,
+            Flags::NONE,
+            "it is over"
+        );
+    }
+}
+
+/// The end of the travel is no jump of a command, and no fault of the law.
+#[test]
+fn the_end_of_the_travel_stops_nothing_else() {
+    let mut reduction = article(|_| Play::new(0.0, 0.0).unwrap());
+    for tick in 0..3000_u32 {
+        let time = f64::from(tick) * PERIOD;
+        let hand = 230.0 * (0.4 * time).sin().max(0.0) * UNITS[0];
+        reduction.step([hand, 0.0, 0.0], None, time);
+        let supervision = reduction.monitors().supervision();
+        assert!(supervision.reaction < Reaction::HoldMotion, "tick {tick}");
+    }
+    let latched = reduction.monitors().supervision().latched;
+    assert_eq!(latched, Flags::of(Flag::Monitor));
+}
+
+#[test]
+fn a_hand_that_trembles_is_said_unless_it_is_not_looked_for() {
+    for off in [Flags::NONE, Flags::of(Flag::Tremor)] {
+        let settings = MonitorsSettings { off, ..monitors() };
+        let mut reduction = article_with(&settings, 0.0, |_| Play::new(0.0, 0.0).unwrap());
+        for tick in 0..1000_u32 {
+            let time = f64::from(tick) * PERIOD;
+            let hand = UNITS[0] * (40.0 * time).sin();
+            reduction.step([hand, 0.0, 0.0], None, time);
+        }
+        let latched = reduction.monitors().supervision().latched;
+        assert_eq!(latched, Flags::of(Flag::Tremor).without(off));
+    }
+}
+
+#[test]
+fn what_the_rig_says_counts_unless_it_is_not_looked_for() {
+    for off in [Flags::NONE, Flags::of(Flag::FollowingError)] {
+        let settings = MonitorsSettings { off, ..monitors() };
+        let mut reduction = article_with(&settings, 0.0, |_| Play::new(0.0, 0.0).unwrap());
+        reduction.step([0.0; 3], None, 0.0);
+        reduction.monitors_mut().raise(Flag::FollowingError);
+        let supervision = reduction.monitors().supervision();
+        assert_eq!(
+            supervision.flags,
+            Flags::of(Flag::FollowingError).without(off)
+        );
+        assert_eq!(supervision.reaction == Reaction::None, !off.is_empty());
+    }
+}
