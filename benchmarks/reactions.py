@@ -1,4 +1,4 @@
-"""The table of reactions of crates/core/src/supervision/reactions.rs, as docs/safety.md shows it."""
+"""Write the table of reactions of supervision/reactions.rs into docs/safety.md."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ Count = Annotated[int, Meta(ge=1, le=1_000_000)]
 
 
 class SafetyConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Guards of the loop; crates/core/src/supervision/reactions.rs has the table of reactions. All [ours].
+    """Supervision of the loop; its reactions are in crates/core/src/supervision/reactions.rs. [ours]
 
     Per degree of freedom: [m, rad, rad], or those per second. Nothing of it changes a run in which
     nothing goes wrong.

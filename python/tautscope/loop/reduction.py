@@ -226,9 +226,9 @@ class HysteresisReduction:
     def expectation(self, captured_at: float) -> Expectation | None:
         """Where the instrument should be in a frame captured at this time, to the best knowledge.
 
-        The model's state with the correction of the last images, and how sure that is
-        (crates/core/src/estimation/whereabouts.rs). It says where to look, never what to learn. None if not
-        known.
+        The model's state with the correction of the last images and its standard deviation
+        (crates/core/src/estimation/whereabouts.rs). It says where to look, never what to learn.
+        None if not known.
         """
         belief = self._loop.expectation(captured_at)
         return None if belief is None else Expectation(*belief)

@@ -13,7 +13,7 @@ from tautscope import _core
 from tautscope.config import Config
 
 DETECTORS: tuple[str, ...] = _core.DETECTORS
-"""The names of all flags, as crates/core/src/supervision/flags.rs has them; `safety.off` may name any."""
+"""Names of all flags, from crates/core/src/supervision/flags.rs; `safety.off` may name any."""
 
 MEANINGS: dict[str, str] = dict(zip(DETECTORS, _core.MEANINGS, strict=True))
 """What each of them says, in a sentence."""
