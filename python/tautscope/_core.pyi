@@ -1,5 +1,5 @@
-from collections.abc import Sequence
-from typing import Self, final
+from collections.abc import Mapping, Sequence
+from typing import Any, Self, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,8 +14,6 @@ __all__ = [
     "FeatureModel",
     "Instrument",
     "MarkerDetector",
-    "Monitors",
-    "MotionMonitor",
     "Play",
     "Reduction",
     "Renderer",
@@ -151,16 +149,7 @@ class StateEstimator:
 
 @final
 class WeightedEstimator:
-    def __new__(
-        cls,
-        watch: StateEstimator,
-        *,
-        marker_deviation: float,
-        model_deviation: float,
-        sideways_deviation: float,
-        outlier_distance: float,
-        steps: int,
-    ) -> WeightedEstimator: ...
+    def __new__(cls, settings: Mapping[str, Any]) -> WeightedEstimator: ...
     def estimate(
         self,
         model: FeatureModel,
@@ -180,38 +169,7 @@ class WeightedEstimator:
 
 @final
 class AdaptiveAxis:
-    def __new__(
-        cls,
-        *,
-        free_gain: float,
-        contact_gain: float,
-        cautious_gain: float,
-        cautious_deviation: float,
-        gain_limit: float,
-        taper: float,
-        settling: float,
-        node_spacing: float,
-        level_deviation: float,
-        gain_deviation: float,
-        local_deviation: float,
-        correlation: float,
-        level_drift: float,
-        gain_drift: float,
-        local_drift: float,
-        symmetry: float,
-        change_rate: float,
-        change_spare: float,
-        known_travel: float,
-        contact_distance: float,
-        contact_moved: float,
-        slope_tolerance: float,
-        model_deviation: float,
-        state_correction: float,
-        tremor_time: float,
-        period: float,
-        delta_minus: float,
-        delta_plus: float,
-    ) -> AdaptiveAxis: ...
+    def __new__(cls, settings: Mapping[str, Any], dof: int) -> AdaptiveAxis: ...
     def step(self, reference: float) -> float: ...
     def run(self, references: ArrayLike) -> _Floats: ...
     @property
@@ -231,87 +189,8 @@ class AdaptiveAxis:
     def deviation(self) -> tuple[float, float]: ...
 
 @final
-class Monitors:
-    def __new__(
-        cls,
-        *,
-        period: float,
-        gain_limit: _Vector3,
-        reference_speed: _Vector3,
-        reference_time: float,
-        reference_count: _Vector3,
-        reference_age: float,
-        late_tick: float,
-        stall: float,
-        command_speed: _Vector3,
-        command_travel: Sequence[tuple[float, float]],
-        width_limit: _Vector3,
-        offset_limit: _Vector3,
-        frame_age: float,
-        frame_gap: float,
-        frozen_travel: _Vector3,
-        innovation_limit: float,
-        start_deviation: _Vector3,
-        innovation_floor: _Vector3,
-        jump: _Vector3,
-        grip_distance: _Vector3,
-        slip: _Vector3,
-        blind_growth: float,
-        motion: MotionMonitor,
-        hold_time: float,
-        hold_travel: float,
-        fade_travel: float,
-        restore_travel: float,
-        good_frames: int,
-        good_ticks: int,
-        off: Sequence[str],
-    ) -> Monitors: ...
-
-@final
-class MotionMonitor:
-    def __new__(
-        cls,
-        *,
-        period: float,
-        tremor_swing: _Vector3,
-        slack: _Vector3,
-        tremor_rate: float,
-        turn: _Vector3,
-        ahead_limit: _Vector3,
-        cycle_swings: int,
-        cycle_time: float,
-        change_limit: _Vector3,
-        change_travel: _Vector3,
-    ) -> MotionMonitor: ...
-
-@final
 class Reduction:
-    def __new__(
-        cls,
-        compensators: Sequence[Compensator],
-        estimators: Sequence[Estimator],
-        model: FeatureModel,
-        state_estimator: StateEstimator,
-        monitors: Monitors,
-        *,
-        span: float,
-        period: float,
-        start_deviation: _Vector3,
-    ) -> Reduction: ...
-    @staticmethod
-    def adaptive(
-        axes: Sequence[AdaptiveAxis],
-        model: FeatureModel,
-        state_estimator: WeightedEstimator,
-        monitors: Monitors,
-        *,
-        span: float,
-        period: float,
-        start_deviation: _Vector3,
-        rest_deviation: _Vector3,
-        settling_time: float,
-        friction: tuple[float, float, float] | None,
-    ) -> Reduction: ...
+    def __new__(cls, settings: Mapping[str, Any], profile: str) -> Reduction: ...
     def step(self, reference: ArrayLike, time: float, stamp: float | None = None) -> _Floats: ...
     def run(self, references: ArrayLike, times: ArrayLike) -> _Floats: ...
     def on_features(

@@ -7,6 +7,7 @@ use tautscope_core as core;
 use crate::arrays::Vector;
 use crate::errors;
 use crate::estimator::{TriggerNames, trigger_names};
+use crate::settings::from_mapping;
 
 /// One DOF of profile `best`: the lead law and the offsets it learns.
 ///
@@ -16,84 +17,12 @@ pub struct AdaptiveAxis(pub core::AdaptiveAxis);
 
 #[pymethods]
 impl AdaptiveAxis {
+    /// DOF number `dof`, 0 to 2, from the settings of the loop.
     #[new]
-    #[pyo3(signature = (
-        *, free_gain, contact_gain, cautious_gain, cautious_deviation, gain_limit,
-        taper, settling, node_spacing, level_deviation, gain_deviation, local_deviation, correlation,
-        level_drift, gain_drift, local_drift, symmetry, change_rate, change_spare,
-        known_travel, contact_distance, contact_moved, slope_tolerance, model_deviation,
-        state_correction, tremor_time, period, delta_minus, delta_plus
-    ))]
-    #[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
-    fn new(
-        py: Python<'_>,
-        free_gain: f64,
-        contact_gain: f64,
-        cautious_gain: f64,
-        cautious_deviation: f64,
-        gain_limit: f64,
-        taper: f64,
-        settling: f64,
-        node_spacing: f64,
-        level_deviation: f64,
-        gain_deviation: f64,
-        local_deviation: f64,
-        correlation: f64,
-        level_drift: f64,
-        gain_drift: f64,
-        local_drift: f64,
-        symmetry: f64,
-        change_rate: f64,
-        change_spare: f64,
-        known_travel: f64,
-        contact_distance: f64,
-        contact_moved: f64,
-        slope_tolerance: f64,
-        model_deviation: f64,
-        state_correction: f64,
-        tremor_time: f64,
-        period: f64,
-        delta_minus: f64,
-        delta_plus: f64,
-    ) -> PyResult<Self> {
-        let settings = core::AdaptiveSettings {
-            law: core::LeadLaw {
-                free_gain,
-                contact_gain,
-                taper,
-                settling,
-            },
-            cautious_gain,
-            cautious_deviation,
-            prior: core::OffsetPrior {
-                spacing: node_spacing,
-                level: level_deviation,
-                tilt: gain_deviation,
-                local: local_deviation,
-                correlation,
-                level_drift,
-                tilt_drift: gain_drift,
-                local_drift,
-                symmetry,
-            },
-            change: core::ChangeLimit {
-                rate: change_rate,
-                spare: change_spare,
-                known: known_travel,
-            },
-            contact: core::ContactTest {
-                distance: contact_distance,
-                moved: contact_moved,
-                tolerance: slope_tolerance,
-            },
-            model_deviation,
-            correction: state_correction,
-            gain_limit,
-            tremor_time,
-            period,
-        };
-        core::Play::new(delta_minus, delta_plus)
-            .and_then(|play| core::AdaptiveAxis::new(settings, play))
+    fn new(settings: Bound<'_, PyAny>, dof: usize) -> PyResult<Self> {
+        let py = settings.py();
+        let settings: core::Settings = from_mapping("config", settings)?;
+        core::AdaptiveAxis::from_settings(&settings, dof)
             .map(Self)
             .map_err(errors::config(py))
     }

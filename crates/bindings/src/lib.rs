@@ -10,13 +10,14 @@ mod compensator;
 mod errors;
 mod estimator;
 mod features;
+mod flags;
 mod frame;
 mod instrument;
-mod monitors;
 mod play;
 mod reduction;
 mod region;
 mod render;
+mod settings;
 mod state;
 mod vision;
 mod weighted;
@@ -41,8 +42,6 @@ mod _core {
     #[pymodule_export]
     use super::instrument::Instrument;
     #[pymodule_export]
-    use super::monitors::{Monitors, MotionMonitor};
-    #[pymodule_export]
     use super::play::Play;
     #[pymodule_export]
     use super::reduction::Reduction;
@@ -59,11 +58,11 @@ mod _core {
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add(
             "DETECTORS",
-            PyTuple::new(module.py(), super::monitors::names())?,
+            PyTuple::new(module.py(), super::flags::names())?,
         )?;
         module.add(
             "MEANINGS",
-            PyTuple::new(module.py(), super::monitors::meanings())?,
+            PyTuple::new(module.py(), super::flags::meanings())?,
         )?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }

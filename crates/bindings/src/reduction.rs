@@ -4,15 +4,11 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use tautscope_core as core;
 
-use crate::adaptive::AdaptiveAxis;
 use crate::arrays::{Table, Vector, covariance as known, fixed, rows, same_length, table};
-use crate::compensator::Compensator;
 use crate::errors;
-use crate::estimator::{Estimator, TriggerNames, trigger_names};
-use crate::features::FeatureModel;
-use crate::monitors::{self, Monitors};
-use crate::state::StateEstimator;
-use crate::weighted::WeightedEstimator;
+use crate::estimator::{TriggerNames, trigger_names};
+use crate::flags;
+use crate::settings::from_mapping;
 
 type Floats<'py> = Bound<'py, PyArray1<f64>>;
 
@@ -32,79 +28,42 @@ type Report<'py> = (
     Floats<'py>,
 );
 
-/// The loop of Fig. 6; `tautscope.loop.reduction.HysteresisReduction` is its public face.
+/// The loop with storage for its history on the heap.
+type Loop<P> = Box<core::HysteresisReduction<P, Vec<core::Entry>>>;
+
+enum Profile {
+    Paper(Loop<core::Paper>),
+    Best(Loop<core::Best>),
+}
+
+/// The loop of either profile.
+macro_rules! on_loop {
+    ($reduction:expr, $name:ident => $body:expr) => {
+        match $reduction {
+            Profile::Paper($name) => $body,
+            Profile::Best($name) => $body,
+        }
+    };
+}
+
+/// The loop of Fig. 6; `tautscope.loop.reduction.HysteresisReduction` is its public face. Raises `ConfigError`.
 #[pyclass(name = "Reduction", module = "tautscope._core")]
-pub struct Reduction(core::HysteresisReduction);
+pub struct Reduction(Profile);
 
 #[pymethods]
 impl Reduction {
+    /// From the settings of the loop, for profile "paper" or "best".
     #[new]
-    #[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
-    #[pyo3(signature = (compensators, estimators, model, state_estimator, monitors, *, span, period, start_deviation))]
-    fn new(
-        py: Python<'_>,
-        compensators: [PyRef<'_, Compensator>; 3],
-        estimators: [PyRef<'_, Estimator>; 3],
-        model: &FeatureModel,
-        state_estimator: &StateEstimator,
-        monitors: &Monitors,
-        span: f64,
-        period: f64,
-        start_deviation: [f64; 3],
-    ) -> PyResult<Self> {
-        let axes = [0, 1, 2].map(|dof| {
-            let (compensator, estimator) = (&compensators[dof], &estimators[dof]);
-            core::Axis::new(compensator.inner, estimator.inner, estimator.state.play())
-        });
-        let estimation = core::StateEstimation::Article(state_estimator.0);
-        let whereabouts = core::Whereabouts::new(core::WhereaboutsSettings {
-            start_deviation,
-            rest_deviation: [0.0; 3],
-            settling_time: 0.0,
-        });
-        let history = core::History::new(span, period);
-        Self::joined(py, axes, model, estimation, history, whereabouts, monitors)
-    }
-
-    /// The loop of profile `best`, from its three axes; `friction` is arm, memory and deviation of a
-    /// `core::FrictionSettings`.
-    #[staticmethod]
-    #[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
-    #[pyo3(signature = (axes, model, state_estimator, monitors, *, span, period, start_deviation, rest_deviation, settling_time, friction))]
-    fn adaptive(
-        py: Python<'_>,
-        axes: [PyRef<'_, AdaptiveAxis>; 3],
-        model: &FeatureModel,
-        state_estimator: &WeightedEstimator,
-        monitors: &Monitors,
-        span: f64,
-        period: f64,
-        start_deviation: [f64; 3],
-        rest_deviation: [f64; 3],
-        settling_time: f64,
-        friction: Option<(f64, f64, f64)>,
-    ) -> PyResult<Self> {
-        let axes = axes.map(|axis| core::Axis::Adaptive(axis.0.clone()));
-        let estimation = core::StateEstimation::Weighted(state_estimator.0);
-        let whereabouts = core::Whereabouts::new(core::WhereaboutsSettings {
-            start_deviation,
-            rest_deviation,
-            settling_time,
-        });
-        let history = core::History::new(span, period);
-        let Self(inner) =
-            Self::joined(py, axes, model, estimation, history, whereabouts, monitors)?;
-        let friction = friction.map(|(arm, memory, deviation)| {
-            core::Friction::new(core::FrictionSettings {
-                arm,
-                memory,
-                deviation,
-            })
-        });
-        let friction = friction.transpose();
-        Ok(Self(
-            inner.with_friction(friction.map_err(errors::config(py))?),
-        ))
+    fn new(settings: Bound<'_, PyAny>, profile: &str) -> PyResult<Self> {
+        let py = settings.py();
+        let settings: core::Settings = from_mapping("config", settings)?;
+        match profile {
+            "paper" => build(&settings).map(Profile::Paper),
+            "best" => build(&settings).map(Profile::Best),
+            _ => return Err(errors::choice(py, "profile", profile, "paper or best")),
+        }
+        .map(Self)
+        .map_err(errors::config(py))
     }
 
     /// One control tick at `time` in s: reference (3,), made at `stamp` in s, in, command (3,) out.
@@ -116,7 +75,7 @@ impl Reduction {
         time: f64,
         stamp: Option<f64>,
     ) -> PyResult<Floats<'py>> {
-        let command = self.0.step(fixed("reference", &reference)?, stamp, time);
+        let command = on_loop!(&mut self.0, inner => inner.step(fixed("reference", &reference)?, stamp, time));
         Ok(PyArray1::from_slice(py, &command))
     }
 
@@ -133,7 +92,7 @@ impl Reduction {
         let commands: Vec<[f64; 3]> = references
             .into_iter()
             .zip(times)
-            .map(|(reference, time)| self.0.step(reference, None, *time))
+            .map(|(reference, time)| on_loop!(&mut self.0, inner => inner.step(reference, None, *time)))
             .collect();
         table(py, &commands)
     }
@@ -154,9 +113,7 @@ impl Reduction {
             .map(|features| fixed("features", &features))
             .transpose()?;
         let covariance = known(covariance)?;
-        let report = self
-            .0
-            .on_features(features, covariance.as_ref(), captured_at, checksum);
+        let report = on_loop!(&mut self.0, inner => inner.on_features(features, covariance.as_ref(), captured_at, checksum));
         let estimate = &report.estimate;
         let [insertion, rotation, bending] = report.triggers.map(trigger_names);
         Ok((
@@ -178,36 +135,35 @@ impl Reduction {
     /// gain in use.
     #[getter]
     fn supervision(&self) -> (&'static str, Vec<&'static str>, Vec<&'static str>, f64) {
-        let now = self.0.monitors().supervision();
+        let now = on_loop!(&self.0, inner => inner.monitors().supervision());
         (
-            monitors::reaction_name(now.reaction),
-            monitors::set(now.flags),
-            monitors::set(now.latched),
+            flags::reaction_name(now.reaction),
+            flags::set(now.flags),
+            flags::set(now.latched),
             now.lead,
         )
     }
 
     /// The operator goes on: the first increment of the reference is zero.
     fn engage(&mut self) {
-        self.0.monitors_mut().engage();
+        on_loop!(&mut self.0, inner => inner.monitors_mut().engage());
     }
 
     /// The operator has seen the warnings.
     fn acknowledge(&mut self) {
-        self.0.monitors_mut().acknowledge();
+        on_loop!(&mut self.0, inner => inner.monitors_mut().acknowledge());
     }
 
     /// Something only the rig can see, by its name.
     fn raise_flag(&mut self, py: Python<'_>, name: &str) -> PyResult<()> {
-        self.0
-            .monitors_mut()
-            .raise(monitors::flag(py, "flag", name)?);
+        let flag = flags::flag(py, "flag", name)?;
+        on_loop!(&mut self.0, inner => inner.monitors_mut().raise(flag));
         Ok(())
     }
 
     /// Features (4,) in px to expect at a capture time; None if not known.
     fn predicted_features<'py>(&self, py: Python<'py>, captured_at: f64) -> Option<Floats<'py>> {
-        let features = self.0.predicted_features(captured_at)?;
+        let features = on_loop!(&self.0, inner => inner.predicted_features(captured_at))?;
         Some(PyArray1::from_slice(py, &features))
     }
 
@@ -218,7 +174,7 @@ impl Reduction {
         py: Python<'py>,
         captured_at: f64,
     ) -> Option<(Floats<'py>, Floats<'py>)> {
-        let belief = self.0.expectation(captured_at)?;
+        let belief = on_loop!(&self.0, inner => inner.expectation(captured_at))?;
         let array = |values| PyArray1::from_slice(py, values);
         Some((array(&belief.state), array(&belief.deviation)))
     }
@@ -226,41 +182,33 @@ impl Reduction {
     /// The predicted state (3,) now.
     #[getter]
     fn predicted_state<'py>(&self, py: Python<'py>) -> Floats<'py> {
-        PyArray1::from_slice(py, &self.0.predicted_state())
+        PyArray1::from_slice(py, &on_loop!(&self.0, inner => inner.predicted_state()))
     }
 
     /// The estimated offsets (3,), input minus output.
     #[getter]
     fn delta_minus<'py>(&self, py: Python<'py>) -> Floats<'py> {
-        PyArray1::from_slice(py, &self.0.play().map(|play| play.delta_minus()))
+        PyArray1::from_slice(
+            py,
+            &on_loop!(&self.0, inner => inner.play()).map(|play| play.delta_minus()),
+        )
     }
 
     /// The estimated offsets (3,), input minus output.
     #[getter]
     fn delta_plus<'py>(&self, py: Python<'py>) -> Floats<'py> {
-        PyArray1::from_slice(py, &self.0.play().map(|play| play.delta_plus()))
+        PyArray1::from_slice(
+            py,
+            &on_loop!(&self.0, inner => inner.play()).map(|play| play.delta_plus()),
+        )
     }
 }
 
-impl Reduction {
-    fn joined(
-        py: Python<'_>,
-        axes: [core::Axis; 3],
-        model: &FeatureModel,
-        estimation: core::StateEstimation,
-        history: Result<core::History, core::ConfigError>,
-        whereabouts: Result<core::Whereabouts, core::ConfigError>,
-        monitors: &Monitors,
-    ) -> PyResult<Self> {
-        Ok(Self(core::HysteresisReduction::new(
-            axes,
-            model.0,
-            estimation,
-            history.map_err(errors::config(py))?,
-            whereabouts.map_err(errors::config(py))?,
-            monitors.0,
-        )))
-    }
+fn build<P: core::Profile>(settings: &core::Settings) -> Result<Loop<P>, core::ConfigError> {
+    let control = &settings.control;
+    let ticks = core::ticks(control.history, control.period);
+    let storage = vec![core::Entry::BLANK; ticks];
+    core::HysteresisReduction::new(settings, storage).map(Box::new)
 }
 
 fn status_name(status: core::Status) -> &'static str {

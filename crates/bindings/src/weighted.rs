@@ -7,7 +7,7 @@ use tautscope_core as core;
 use crate::arrays::{Table, Vector, covariance as known, fixed, rows, same_length, table};
 use crate::errors;
 use crate::features::FeatureModel;
-use crate::state::StateEstimator;
+use crate::settings::from_mapping;
 
 type Estimate<'py> = (
     Bound<'py, PyArray1<f64>>,
@@ -24,33 +24,18 @@ type Estimates<'py> = (
     Bound<'py, PyArray2<bool>>,
 );
 
-/// The state estimate of profile `best`: weighted, iterated, outliers left out; decision 0018.
-///
-/// `marker_deviation` and `model_deviation` in px, `sideways_deviation` in m. Raises `ConfigError`.
+/// The state estimate of profile `best`: weighted, iterated, outliers left out; decision 0018. Raises `ConfigError`.
 #[pyclass(name = "WeightedEstimator", module = "tautscope._core", frozen)]
 pub struct WeightedEstimator(pub core::WeightedEstimator);
 
 #[pymethods]
 impl WeightedEstimator {
+    /// From the settings of the loop.
     #[new]
-    #[pyo3(signature = (watch, *, marker_deviation, model_deviation, sideways_deviation, outlier_distance, steps))]
-    fn new(
-        py: Python<'_>,
-        watch: &StateEstimator,
-        marker_deviation: f64,
-        model_deviation: f64,
-        sideways_deviation: f64,
-        outlier_distance: f64,
-        steps: u32,
-    ) -> PyResult<Self> {
-        let settings = core::WeightedSettings {
-            marker_deviation,
-            model_deviation,
-            sideways_deviation,
-            outlier_distance,
-            steps,
-        };
-        core::WeightedEstimator::new(watch.0, settings)
+    fn new(settings: Bound<'_, PyAny>) -> PyResult<Self> {
+        let py = settings.py();
+        let settings: core::Settings = from_mapping("config", settings)?;
+        core::WeightedEstimator::from_settings(&settings)
             .map(Self)
             .map_err(errors::config(py))
     }

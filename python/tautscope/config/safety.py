@@ -13,7 +13,7 @@ Count = Annotated[int, Meta(ge=1, le=1_000_000)]
 
 
 class SafetyConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Supervision of the loop; its reactions are in crates/core/src/supervision/reactions.rs. [ours]
+    """Supervision of the loop; reactions: crates/core/src/supervision/reactions.rs. All [ours].
 
     Per degree of freedom: [m, rad, rad], or those per second. Nothing of it changes a run in which
     nothing goes wrong.
@@ -105,3 +105,9 @@ class SafetyConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """Frames in a row with nothing wrong after which learning goes on."""
     good_ticks: Count = 200
     """The same for what is seen at the control tick."""
+    clock_jump: Positive = 1.0
+    innovation_growth: Positive = 0.3
+    innovation_decay: Positive = 0.05
+    ahead_ratio: Positive = 1.5
+    offset_decrease: Positive = 2.0
+    cycle_growth: Positive = 1.1

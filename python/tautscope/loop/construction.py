@@ -1,10 +1,11 @@
-"""The blocks of the core, built from a configuration: every argument by name, units converted."""
+"""Blocks of the core from a configuration."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, TypeVar
+
+import msgspec
 
 from tautscope import _core
 from tautscope.config import Config, DofConfig
@@ -29,43 +30,18 @@ def build_compensator(dof: DofConfig, compensate: bool = True) -> _core.Compensa
     )
 
 
+def core_settings(config: Config, compensate: bool = True) -> dict[str, Any]:
+    """The table of settings that the core reads; without compensation every gain is 1."""
+    document: dict[str, Any] = msgspec.to_builtins(config)
+    if not compensate:
+        for dof in Dof:
+            document[dof.label]["free_gain"] = 1.0
+    return document
+
+
 def build_adaptive_axis(config: Config, dof: Dof, compensate: bool = True) -> _core.AdaptiveAxis:
     """One DOF of profile ``best``; without compensation its gains are 1."""
-    own, shared = config[dof], config.adaptive
-    unit = own.update_distance
-    free = own.free_gain if compensate else 1.0
-    contact = min(shared.contact_gain, free)
-    return _core.AdaptiveAxis(
-        free_gain=free,
-        contact_gain=contact,
-        cautious_gain=min(shared.cautious_gain, contact),
-        cautious_deviation=unit * shared.cautious_deviation,
-        gain_limit=own.gain_limit,
-        taper=unit * shared.taper,
-        settling=unit * shared.settling,
-        node_spacing=unit * shared.node_spacing,
-        level_deviation=unit * shared.level_deviation,
-        gain_deviation=shared.gain_deviation,
-        local_deviation=unit * shared.local_deviation,
-        correlation=unit * shared.correlation,
-        # A deviation per square root of travel.
-        level_drift=math.sqrt(unit) * shared.level_drift,
-        gain_drift=shared.gain_drift / math.sqrt(unit),
-        local_drift=math.sqrt(unit) * shared.local_drift,
-        symmetry=shared.symmetry,
-        change_rate=unit * shared.change_rate[dof],
-        change_spare=unit * shared.change_spare,
-        known_travel=unit * shared.known_travel,
-        contact_distance=unit * shared.contact_distance,
-        contact_moved=unit * shared.contact_moved,
-        slope_tolerance=shared.slope_tolerance,
-        model_deviation=unit * shared.model_deviation,
-        state_correction=shared.state_correction,
-        tremor_time=shared.tremor_time,
-        period=config.control.period,
-        delta_minus=own.delta_minus,
-        delta_plus=own.delta_plus,
-    )
+    return _core.AdaptiveAxis(core_settings(config, compensate), list(Dof).index(dof))
 
 
 def build_estimator(dof: DofConfig) -> _core.Estimator:
@@ -119,110 +95,9 @@ def build_state_estimator(config: Config) -> _core.StateEstimator:
 
 def build_weighted_estimator(config: Config) -> _core.WeightedEstimator:
     """The state estimation of profile ``best``, decision 0018."""
-    settings = config.state_estimation
-    return _core.WeightedEstimator(
-        build_state_estimator(config),
-        marker_deviation=settings.marker_deviation,
-        model_deviation=settings.model_deviation,
-        sideways_deviation=settings.sideways_deviation,
-        outlier_distance=settings.outlier_distance,
-        steps=settings.steps,
-    )
-
-
-def build_guards(config: Config) -> _core.Monitors:
-    """What watches the loop: reference, command, frames, and the reactions to them."""
-    safety = config.safety
-
-    def each(of: Callable[[DofConfig], float]) -> tuple[float, float, float]:
-        return each_dof(lambda dof: of(config[dof]))
-
-    def share(of: float) -> tuple[float, float, float]:
-        insertion, rotation, bending = safety.width_limit
-        return of * insertion, of * rotation, of * bending
-
-    motion = _core.MotionMonitor(
-        period=config.control.period,
-        tremor_swing=each(lambda dof: dof.update_distance * safety.tremor_swing),
-        slack=safety.width_limit,
-        tremor_rate=safety.tremor_rate,
-        turn=each(lambda dof: dof.update_distance),
-        ahead_limit=share(safety.ahead_limit),
-        cycle_swings=safety.cycle_swings,
-        cycle_time=safety.cycle_time,
-        change_limit=safety.change_limit,
-        change_travel=share(safety.change_travel),
-    )
-    return _core.Monitors(
-        period=config.control.period,
-        gain_limit=each(lambda dof: dof.gain_limit),
-        reference_speed=safety.reference_speed,
-        reference_time=safety.reference_time,
-        reference_count=safety.reference_count,
-        reference_age=safety.reference_age,
-        late_tick=safety.late_tick,
-        stall=safety.stall,
-        command_speed=safety.command_speed,
-        command_travel=safety.command_travel,
-        width_limit=safety.width_limit,
-        offset_limit=safety.offset_limit,
-        frame_age=safety.frame_age,
-        frame_gap=safety.frame_gap,
-        frozen_travel=each(lambda dof: dof.update_distance * safety.frozen_travel),
-        innovation_limit=safety.innovation_limit,
-        start_deviation=each(lambda dof: dof.start_deviation),
-        innovation_floor=each(lambda dof: dof.start_deviation * safety.innovation_floor),
-        jump=safety.jump,
-        grip_distance=each(lambda dof: dof.update_distance * safety.grip_distance),
-        slip=safety.slip,
-        blind_growth=safety.blind_growth,
-        motion=motion,
-        hold_time=safety.hold_time,
-        hold_travel=safety.hold_travel,
-        fade_travel=safety.fade_travel,
-        restore_travel=safety.restore_travel,
-        good_frames=safety.good_frames,
-        good_ticks=safety.good_ticks,
-        off=safety.off,
-    )
-
-
-def build_friction(config: Config) -> tuple[float, float, float] | None:
-    """What insertion and rotation share: arm [m], memory [m] and deviation; None for nothing."""
-    settings = config.adaptive
-    if not settings.one_friction:
-        return None
-    memory = settings.friction_memory * config.insertion.update_distance
-    return config.instrument.diameter / 2, memory, settings.friction_deviation
+    return _core.WeightedEstimator(core_settings(config))
 
 
 def build_loop(config: Config, compensate: bool = True) -> _core.Reduction:
     """The whole loop, Fig. 6, without checks of what goes in: `HysteresisReduction` has those."""
-    model = build_feature_model(config)
-    guards = build_guards(config)
-    span, period = config.control.history, config.control.period
-    start_deviation = each_dof(lambda dof: config[dof].start_deviation)
-    if config.profile == "best":
-        rest = config.state_estimation.rest_deviation
-        return _core.Reduction.adaptive(
-            each_dof(lambda dof: build_adaptive_axis(config, dof, compensate)),
-            model,
-            build_weighted_estimator(config),
-            guards,
-            span=span,
-            period=period,
-            start_deviation=start_deviation,
-            rest_deviation=each_dof(lambda dof: config[dof].update_distance * rest),
-            settling_time=config.state_estimation.settling_time,
-            friction=build_friction(config),
-        )
-    return _core.Reduction(
-        each_dof(lambda dof: build_compensator(config[dof], compensate)),
-        each_dof(lambda dof: build_estimator(config[dof])),
-        model,
-        build_state_estimator(config),
-        guards,
-        span=span,
-        period=period,
-        start_deviation=start_deviation,
-    )
+    return _core.Reduction(core_settings(config, compensate), config.profile)

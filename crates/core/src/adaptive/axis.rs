@@ -3,7 +3,7 @@
 use crate::adaptive::contact::Stroke;
 use crate::adaptive::friction::SlackShare;
 use crate::adaptive::offset_map::Side;
-use crate::adaptive::settings::AdaptiveSettings;
+use crate::adaptive::parameters::AxisParameters;
 use crate::adaptive::slack::Slack;
 use crate::adaptive::smoother::Smoother;
 use crate::article::estimator::Triggers;
@@ -21,7 +21,7 @@ const KNOWN: f64 = 0.25;
 /// `0 <= dc / du <= gain_limit` last of all.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AdaptiveAxis {
-    settings: AdaptiveSettings,
+    settings: AxisParameters,
     slack: Slack,
     smoother: Smoother,
     stroke: Stroke,
@@ -42,7 +42,7 @@ impl AdaptiveAxis {
     ///
     /// # Errors
     /// A setting is out of range.
-    pub fn new(settings: AdaptiveSettings, play: Play) -> Result<Self, ConfigError> {
+    pub fn new(settings: AxisParameters, play: Play) -> Result<Self, ConfigError> {
         let settings = settings.checked()?;
         Ok(Self {
             settings,
@@ -110,19 +110,37 @@ impl AdaptiveAxis {
     /// The first reference is passed through. A reference that has not changed, or is not finite,
     /// gives the same command again, bit for bit.
     pub fn step(&mut self, reference: f64) -> f64 {
+        self.step_within(reference, |command| command)
+    }
+
+    /// [`AdaptiveAxis::step`] whose command `limit` may change before the axis goes on from it.
+    ///
+    /// `limit` is called exactly once, with the command of the law.
+    pub(crate) fn step_within(&mut self, reference: f64, limit: impl FnOnce(f64) -> f64) -> f64 {
+        let lawful = self.propose(reference);
+        let command = limit(lawful.unwrap_or(self.command));
+        if lawful.is_some() || (command - self.command).abs() > 0.0 {
+            self.command = command;
+            let tip = if self.tip.is_nan() { command } else { self.tip };
+            self.tip = self.slack.carried(tip, command);
+        }
+        self.command
+    }
+
+    /// The command of the law for the next reference; None where nothing moves.
+    fn propose(&mut self, reference: f64) -> Option<f64> {
         if !reference.is_finite() {
-            return self.command;
+            return None;
         }
         let smooth = self.smoother.step(reference);
         let Some(last) = self.reference.replace(reference) else {
             self.slack.centre(reference);
-            (self.intended, self.command) = (smooth, reference);
-            self.tip = self.slack.carried(reference, reference);
-            return self.command;
+            self.intended = smooth;
+            return Some(reference);
         };
         let increment = reference - last;
         if increment == 0.0 {
-            return self.command;
+            return None;
         }
         self.slack.pass(self.settings.period);
         let intention = smooth - self.intended;
@@ -132,11 +150,10 @@ impl AdaptiveAxis {
         }
         // Eq. (2), to the last bit.
         let farthest = self.command + self.settings.gain_limit * increment;
-        self.command = (reference + self.lead)
+        let command = (reference + self.lead)
             .max(self.command.min(farthest))
             .min(self.command.max(farthest));
-        self.tip = self.slack.carried(self.tip, self.command);
-        self.command
+        Some(command)
     }
 
     fn move_lead(&mut self, reference: f64, intention: f64) {
@@ -255,20 +272,12 @@ impl AdaptiveAxis {
         self.slack.is_limited(self.reference.unwrap_or(0.0))
     }
 
-    /// Go on from another command than that of the last step, with the reference counted from elsewhere by `shift`, and
-    /// the predicted state from before that step.
-    pub(crate) fn amend(&mut self, shift: f64, command: f64, predicted_state: f64) {
-        if let Some(reference) = self.reference {
-            self.reference = Some(reference + shift);
+    /// Count the reference from elsewhere by `shift`: the command stays.
+    pub(crate) fn shift_reference(&mut self, shift: f64) {
+        if let Some(reference) = &mut self.reference {
+            *reference += shift;
             self.intended += shift;
             self.smoother.shift(shift);
-            self.command = command;
-            let tip = if predicted_state.is_finite() {
-                predicted_state
-            } else {
-                command
-            };
-            self.tip = self.slack.carried(tip, command);
         }
     }
 }

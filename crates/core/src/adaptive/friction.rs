@@ -1,8 +1,6 @@
 //! One friction for insertion and rotation: what slides along the channel turns freely in it.
 
-use crate::dof::PerDof;
 use crate::error::{ConfigError, require_non_negative, require_positive};
-use crate::r#loop::axis::Axis;
 
 const STEPS: usize = 12;
 /// By so much |n|^2 may be above 1 at rest.
@@ -153,19 +151,5 @@ impl Friction {
         let [a, b] = at(slid);
         let size = libm::hypot(a, b);
         self.stretch = [a / size, b / size];
-    }
-
-    /// Tells both axes what is left for them.
-    pub(crate) fn couple(&mut self, reference: PerDof<f64>, axes: &mut PerDof<Axis>) {
-        let ([insertion, rotation, _], [u1, u2, _]) = (axes, reference);
-        let commands = [insertion.command(), rotation.command()];
-        let [first, second] = self.step(
-            [u1, u2],
-            commands,
-            [insertion.half_width(), rotation.half_width()],
-        );
-        let shared = [insertion.shared(), rotation.shared()];
-        insertion.set_slack_share(first, shared[1]);
-        rotation.set_slack_share(second, shared[0]);
     }
 }

@@ -141,18 +141,44 @@ impl Compensator {
     /// The first reference is passed through. A reference that has not changed, or is not
     /// finite, gives the same command again, bit for bit.
     pub fn step(&self, state: &mut CompensatorState, reference: f64) -> f64 {
+        self.step_within(state, reference, |command| command)
+    }
+
+    /// [`Compensator::step`] whose command `limit` may change before the state goes on from it.
+    ///
+    /// `limit` is called exactly once, with the command of the law.
+    pub(crate) fn step_within(
+        &self,
+        state: &mut CompensatorState,
+        reference: f64,
+        limit: impl FnOnce(f64) -> f64,
+    ) -> f64 {
+        let (lawful, is_anchored) = self
+            .propose(state, reference)
+            .unwrap_or((state.command, true));
+        let command = limit(lawful);
+        state.command = command;
+        if state.tip.output.is_nan() {
+            state.tip.output = command - state.play.clamp(0.0);
+        }
+        state.play.step(&mut state.tip, command);
+        if !is_anchored || (command - lawful).abs() > 0.0 {
+            self.hold(state);
+        }
+        command
+    }
+
+    /// The command of the law for the next reference, and whether it is on the anchored law; None where nothing moves.
+    fn propose(&self, state: &mut CompensatorState, reference: f64) -> Option<(f64, bool)> {
         if !reference.is_finite() {
-            return state.command;
+            return None;
         }
         let Some(last) = state.reference.replace(reference) else {
-            state.command = reference;
-            state.tip.output = reference - state.play.clamp(0.0);
-            self.hold(state, reference);
-            return state.command;
+            return Some((reference, false));
         };
         let increment = reference - last;
         if increment == 0.0 {
-            return state.command;
+            return None;
         }
         let recovery = self.recovery * increment.abs();
         state.anchor -= state.anchor.max(-recovery).min(recovery);
@@ -165,12 +191,7 @@ impl Compensator {
         let allowed = command
             .max(state.command.min(farthest))
             .min(state.command.max(farthest));
-        state.command = allowed;
-        state.play.step(&mut state.tip, allowed);
-        if (allowed - command).abs() > 0.0 {
-            self.hold(state, reference);
-        }
-        state.command
+        Some((allowed, (allowed - command).abs() == 0.0))
     }
 
     /// Go on from here with other offsets, or with this compensator after another: bumpless.
@@ -178,36 +199,25 @@ impl Compensator {
     /// The command does not move. The position moves only as far as the new contacts push it.
     pub fn retune(&self, state: &mut CompensatorState, play: Play) {
         state.play = play;
-        if let Some(reference) = state.reference {
+        if state.reference.is_some() {
             play.step(&mut state.tip, state.command);
-            self.hold(state, reference);
+            self.hold(state);
         }
     }
 
-    /// Go on from another command than that of the last step, with the reference counted from elsewhere by `shift`, and
-    /// the predicted state from before that step.
-    pub(crate) fn amend(
-        &self,
-        state: &mut CompensatorState,
-        shift: f64,
-        command: f64,
-        predicted_state: f64,
-    ) {
-        if let Some(reference) = state.reference {
-            state.reference = Some(reference + shift);
-            state.command = command;
-            state.tip.output = if predicted_state.is_finite() {
-                predicted_state
-            } else {
-                command - state.play.clamp(0.0)
-            };
-            self.retune(state, state.play);
+    /// Count the reference from elsewhere by `shift`: the command stays.
+    pub(crate) fn shift_reference(&self, state: &mut CompensatorState, shift: f64) {
+        if let Some(reference) = &mut state.reference {
+            *reference += shift;
+            self.hold(state);
         }
     }
 
     /// Anchor the law where the command is.
-    fn hold(&self, state: &mut CompensatorState, reference: f64) {
-        state.anchor = state.command - reference - self.surplus() * state.position();
+    fn hold(&self, state: &mut CompensatorState) {
+        if let Some(reference) = state.reference {
+            state.anchor = state.command - reference - self.surplus() * state.position();
+        }
     }
 
     /// 1 - 1 / `free_gain`: the share of the position by which the command leads the reference.

@@ -5,6 +5,7 @@ use crate::dof::PerDof;
 use crate::error::{ConfigError, require, require_non_negative, require_positive};
 use crate::estimation::normal_equations::NormalEquations;
 use crate::estimation::posture::Belief;
+use crate::estimation::settings::StateEstimationSettings;
 use crate::estimation::sight::{Sights, both, only, sights};
 use crate::math::linear::{add, diagonal_of_inverse, dot, rotate, square, times};
 use crate::model::features::FeatureModel;
@@ -31,23 +32,6 @@ const LEFT: f64 = 0.5;
 /// Share that is left of the deviation of a DOF that is held.
 const HELD: f64 = 1e-3;
 
-/// What a [`WeightedEstimator`] is set to.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WeightedSettings {
-    /// Of a marker that comes without a covariance: standard deviation in px.
-    pub marker_deviation: f64,
-    /// What the model of the features is off by beyond the markers' covariance: standard deviation
-    /// in px.
-    pub model_deviation: f64,
-    /// How far the tip is displaced across the bend because the section does not bend evenly:
-    /// standard deviation in m.
-    pub sideways_deviation: f64,
-    /// Mahalanobis distance beyond which a marker is an outlier; infinite: never.
-    pub outlier_distance: f64,
-    /// Gauss-Newton steps, at most.
-    pub steps: u32,
-}
-
 /// The most probable state, given a belief and an image.
 ///
 /// ```text
@@ -72,7 +56,7 @@ pub struct WeightedSettings {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WeightedEstimator {
     watch: StateEstimator,
-    settings: WeightedSettings,
+    settings: StateEstimationSettings,
 }
 
 /// What a belief and an image say together, and what the image says alone.
@@ -98,7 +82,10 @@ impl WeightedEstimator {
     ///
     /// # Errors
     /// A setting is out of range.
-    pub fn new(watch: StateEstimator, settings: WeightedSettings) -> Result<Self, ConfigError> {
+    pub fn new(
+        watch: StateEstimator,
+        settings: StateEstimationSettings,
+    ) -> Result<Self, ConfigError> {
         require_positive("marker_deviation", settings.marker_deviation)?;
         require_non_negative("model_deviation", settings.model_deviation)?;
         require_non_negative("sideways_deviation", settings.sideways_deviation)?;

@@ -1,9 +1,7 @@
-//! What was commanded when: a frame speaks of the moment it was captured, not of its arrival.
+//! The latest control ticks: a frame is compared with the state at its capture, not at its arrival.
 
 use crate::dof::{PerDof, all_finite};
-use crate::error::{ConfigError, require_positive};
-
-const CAPACITY: usize = 1024;
+use crate::error::{ConfigError, require, require_positive};
 
 /// One control tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,10 +21,22 @@ pub struct Entry {
     pub travel: PerDof<f64>,
 }
 
-/// The latest control ticks, at most 1024; it never allocates.
+impl Entry {
+    /// A place in the storage of a [`History`].
+    pub const BLANK: Self = Self {
+        time: 0.0,
+        reference: [0.0; 3],
+        command: [0.0; 3],
+        predicted_state: [0.0; 3],
+        corrected: [0.0; 3],
+        travel: [0.0; 3],
+    };
+}
+
+/// The latest control ticks, as many as its storage `S` holds: an array, a vector, or a borrowed slice.
 #[derive(Debug, Clone)]
-pub struct History {
-    ring: [Entry; CAPACITY],
+pub struct History<S> {
+    ring: S,
     /// Where the next entry goes.
     next: usize,
     len: usize,
@@ -34,24 +44,22 @@ pub struct History {
     period: f64,
 }
 
-impl History {
+impl<S: AsRef<[Entry]> + AsMut<[Entry]>> History<S> {
     /// A history of `span` in s for a control tick every `period` in s.
     ///
     /// # Errors
-    /// A value is not a finite number above 0.
-    pub fn new(span: f64, period: f64) -> Result<Self, ConfigError> {
+    /// A value is not a finite number above 0, or the storage holds fewer than [`ticks`] entries.
+    pub fn new(span: f64, period: f64, storage: S) -> Result<Self, ConfigError> {
         require_positive("span", span)?;
         require_positive("period", period)?;
-        let blank = Entry {
-            time: 0.0,
-            reference: [0.0; 3],
-            command: [0.0; 3],
-            predicted_state: [0.0; 3],
-            corrected: [0.0; 3],
-            travel: [0.0; 3],
-        };
+        require(
+            ticks(span, period) <= storage.as_ref().len(),
+            "history",
+            span,
+            "a span that the storage holds: two entries and one per control period",
+        )?;
         Ok(Self {
-            ring: core::array::from_fn(|_| blank),
+            ring: storage,
             next: 0,
             len: 0,
             span,
@@ -73,14 +81,14 @@ impl History {
         if jumped {
             self.len = 0;
         } else if newest == Some(entry.time) {
-            self.next = (self.next + CAPACITY - 1) % CAPACITY;
+            self.next = (self.next + self.capacity() - 1) % self.capacity();
             self.len -= 1;
         }
-        if let Some(slot) = self.ring.get_mut(self.next) {
+        if let Some(slot) = self.ring.as_mut().get_mut(self.next) {
             *slot = entry;
         }
-        self.next = (self.next + 1) % CAPACITY;
-        self.len = (self.len + 1).min(CAPACITY);
+        self.next = (self.next + 1) % self.capacity();
+        self.len = (self.len + 1).min(self.capacity());
         jumped
     }
 
@@ -141,9 +149,24 @@ impl History {
     }
 
     fn aged(&self, age: usize) -> Option<&Entry> {
-        let place = (self.next + CAPACITY - 1 - age) % CAPACITY;
-        self.ring.get(place).filter(|_| age < self.len)
+        let place = (self.next + self.capacity() - 1).checked_sub(age)? % self.capacity();
+        self.ring.as_ref().get(place).filter(|_| age < self.len)
     }
+
+    fn capacity(&self) -> usize {
+        self.ring.as_ref().len()
+    }
+}
+
+/// Entries that a history of `span` in s needs for a control tick every `period` in s: from the last tick before the
+/// span to the newest.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a cast from f64 saturates"
+)]
+pub fn ticks(span: f64, period: f64) -> usize {
+    libm::ceil(span / period) as usize + 2
 }
 
 fn between([a0, a1, a2]: PerDof<f64>, [b0, b1, b2]: PerDof<f64>, share: f64) -> PerDof<f64> {

@@ -1,5 +1,12 @@
 //! The whole loop, Fig. 6.
 
 pub(crate) mod axis;
+pub(crate) mod best;
 pub(crate) mod history;
+pub(crate) mod image_update;
+pub(crate) mod measurement;
+pub(crate) mod paper;
+pub(crate) mod profile;
 pub(crate) mod reduction;
+pub(crate) mod report;
+pub(crate) mod settings;

@@ -3,9 +3,11 @@
 use core::f64::consts::PI;
 
 use crate::dof::{PerDof, all_finite};
+use crate::error::ConfigError;
 use crate::math::linear::{Vector, add, dot, scale};
 use crate::model::camera::{Camera, Pose};
 use crate::model::instrument::{Instrument, Marker};
+use crate::model::settings::{CameraSettings, InstrumentSettings};
 
 /// h = g after f, Eqs. (9)-(11): from the state to the centroids of the two marker bands.
 ///
@@ -56,6 +58,32 @@ impl FeatureModel {
             camera,
             camera_from_guide,
         }
+    }
+
+    /// The model of a configured instrument and camera.
+    ///
+    /// # Errors
+    /// As [`Instrument::new`], [`Camera::new`] and [`Pose::new`].
+    pub(crate) fn from_settings(
+        instrument: &InstrumentSettings,
+        camera: &CameraSettings,
+    ) -> Result<Self, ConfigError> {
+        let pose = &camera.camera_from_guide;
+        Ok(Self::new(
+            Instrument::new(
+                instrument.bending_length,
+                instrument.marker_a,
+                instrument.marker_b,
+                instrument.diameter / 2.0,
+                instrument.band_length,
+            )?,
+            Camera::new(
+                [camera.fx, camera.fy],
+                [camera.cx, camera.cy],
+                camera.distortion,
+            )?,
+            Pose::new(pose.translation, pose.rotation)?,
+        ))
     }
 
     /// h(q) and its interaction matrix for the state q (3,) [m, rad, rad].

@@ -4,3 +4,4 @@ pub(crate) mod camera;
 pub(crate) mod features;
 pub(crate) mod instrument;
 pub(crate) mod outline;
+pub(crate) mod settings;

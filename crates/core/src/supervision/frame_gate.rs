@@ -4,8 +4,10 @@ use crate::dof::PerDof;
 use crate::error::{ConfigError, require_non_negative, require_positive};
 use crate::estimation::posture::Belief;
 use crate::math::linear::square;
+use crate::settings::DofSettings;
 use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::grip::{Grip, GripSettings, Sighting};
+use crate::supervision::settings::SafetySettings;
 
 /// A frame out of order by more than this has a wrong clock, in s.
 const BACK: f64 = 1.0;
@@ -90,7 +92,35 @@ impl FrameGate {
     ///
     /// # Errors
     /// A value is not a finite number above 0; the growth may be 0.
-    pub fn new(settings: FrameGateSettings) -> Result<Self, ConfigError> {
+    pub fn new(safety: &SafetySettings, dofs: &PerDof<DofSettings>) -> Result<Self, ConfigError> {
+        let [i, r, b] = dofs;
+        let each = |of: &dyn Fn(&DofSettings) -> f64| [of(i), of(r), of(b)];
+        let [s1, s2, s3] = safety.slip;
+        let [g1, g2, g3] = each(&|dof| dof.update_distance * safety.grip_distance);
+        let settings = FrameGateSettings {
+            frame_age: safety.frame_age,
+            frame_gap: safety.frame_gap,
+            frozen_travel: each(&|dof| dof.update_distance * safety.frozen_travel),
+            innovation_limit: safety.innovation_limit,
+            start_deviation: each(&|dof| dof.start_deviation),
+            least_deviation: each(&|dof| dof.start_deviation * safety.innovation_floor),
+            jump: safety.jump,
+            grips: [
+                GripSettings {
+                    distance: g1,
+                    slip: s1,
+                },
+                GripSettings {
+                    distance: g2,
+                    slip: s2,
+                },
+                GripSettings {
+                    distance: g3,
+                    slip: s3,
+                },
+            ],
+            blind_growth: safety.blind_growth,
+        };
         require_positive("frame_age", settings.frame_age)?;
         require_positive("frame_gap", settings.frame_gap)?;
         require_positive("innovation_limit", settings.innovation_limit)?;
@@ -147,7 +177,7 @@ impl FrameGate {
         }
         self.captured_at = Some(captured_at);
         Flags::when(now - captured_at > self.settings.frame_age, Flag::Late)
-            .and(Flags::when(self.repeats(arrival), Flag::Frozen))
+            .union(Flags::when(self.repeats(arrival), Flag::Frozen))
     }
 
     fn repeats(&mut self, arrival: &FrameArrival) -> bool {
@@ -182,9 +212,9 @@ impl FrameGate {
             let fits = square(surprise) <= limit * (square(spread) + square(deviation));
             let reaches = surprise <= moved + jump + blind + JUMP_DEVIATIONS * deviation;
             doubts = doubts
-                .and(Flags::when(!fits, Flag::Innovation))
-                .and(Flags::when(!reaches, Flag::Jump))
-                .and(Flags::when(grip.slips(seen), Flag::Slip));
+                .union(Flags::when(!fits, Flag::Innovation))
+                .union(Flags::when(!reaches, Flag::Jump))
+                .union(Flags::when(grip.slips(seen), Flag::Slip));
         }
         doubts
     }

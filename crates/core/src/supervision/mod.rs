@@ -10,5 +10,6 @@ pub(crate) mod monitors;
 pub(crate) mod motion_monitor;
 pub(crate) mod reactions;
 pub(crate) mod reference_gate;
+pub(crate) mod settings;
 pub(crate) mod supervisor;
 pub(crate) mod turning_points;

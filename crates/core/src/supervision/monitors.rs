@@ -1,41 +1,19 @@
-//! All that watches the loop, in one place: what comes in, what goes out, what the images say.
+//! Supervision as a wrapper of the laws: what goes in is gated, what comes out is limited.
 
 use crate::article::play::Play;
 use crate::article::play_limit::PlayLimit;
 use crate::dof::PerDof;
-use crate::error::{ConfigError, require_positive};
-use crate::r#loop::axis::Axis;
+use crate::error::ConfigError;
+use crate::settings::DofSettings;
 use crate::supervision::change_watch::{ChangeSettings, ChangeWatch};
-use crate::supervision::command_limiter::{CommandLimiter, CommandLimits, LimiterResult};
+use crate::supervision::command_limiter::{CommandLimiter, LimiterResult};
 use crate::supervision::flags::{Flag, Flags};
-use crate::supervision::frame_gate::{FrameArrival, FrameGate, FrameGateSettings};
-use crate::supervision::motion_monitor::{MotionMonitor, MotionMonitorSettings};
+use crate::supervision::frame_gate::{FrameArrival, FrameGate};
+use crate::supervision::motion_monitor::MotionMonitor;
 use crate::supervision::reactions::{Reaction, Source};
-use crate::supervision::reference_gate::{ReferenceGate, ReferenceGateSettings};
-use crate::supervision::supervisor::{Event, Supervisor, SupervisorSettings};
-
-/// What the monitors are set to.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MonitorsSettings {
-    /// Of the reference.
-    pub clutch: ReferenceGateSettings,
-    /// Of the command.
-    pub limits: PerDof<CommandLimits>,
-    /// Of the frames.
-    pub frames: FrameGateSettings,
-    /// Of hand and tip.
-    pub motion: MotionMonitorSettings,
-    /// Of what images teach.
-    pub changes: ChangeSettings,
-    /// Of the reactions.
-    pub supervisor: SupervisorSettings,
-    /// Largest width of the slack [m, rad, rad]; the unit of travel for every reaction.
-    pub width_limit: PerDof<f64>,
-    /// Largest offset of it either way [m, rad, rad].
-    pub offset_limit: PerDof<f64>,
-    /// What is not looked at.
-    pub off: Flags,
-}
+use crate::supervision::reference_gate::ReferenceGate;
+use crate::supervision::settings::SafetySettings;
+use crate::supervision::supervisor::{Event, Supervisor};
 
 /// How the loop stands.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,148 +28,181 @@ pub struct Supervision {
     pub lead: f64,
 }
 
-/// The monitors of the loop. While nothing is wrong, they change no bit of it.
+/// The law of one DOF, as far as supervision wraps it.
+pub trait Law {
+    /// The command c; NaN before the first reference.
+    fn command(&self) -> f64;
+
+    /// Control tick: follow the next reference. `limit` is called exactly once, with the command of the law; the law
+    /// continues from what it returns.
+    fn step_within(&mut self, reference: f64, limit: impl FnOnce(f64) -> f64);
+
+    /// Count the reference from elsewhere by `shift`; the command stays.
+    fn shift_reference(&mut self, shift: f64);
+
+    /// Use this share of the compensation: all with 1, none with 0. Bumpless.
+    fn set_share(&mut self, share: f64);
+}
+
+/// Supervision of the loop: gate(reference) -> law -> limiter(command), and the monitors of frames and motion.
+///
+/// While no flag is raised, it changes no bit of the loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Monitors {
-    clutch: ReferenceGate,
+    gate: ReferenceGate,
     limiters: PerDof<CommandLimiter>,
     pub(crate) frames: FrameGate,
     motion: MotionMonitor,
     changes: ChangeWatch,
     supervisor: Supervisor,
-    limits: PerDof<PlayLimit>,
+    play_limits: PerDof<PlayLimit>,
     unit: PerDof<f64>,
     off: Flags,
     time: f64,
-    /// The share of the gain that the axes have been told.
-    told: f64,
+    /// The share of the compensation that the laws use.
+    share: f64,
 }
 
 impl Monitors {
-    /// From their settings.
+    /// Supervision of three DOFs with a control period in s.
     ///
     /// # Errors
-    /// One is out of range.
-    pub fn new(settings: MonitorsSettings) -> Result<Self, ConfigError> {
-        let [m1, m2, m3] = settings.limits;
-        let [w1, w2, w3] = settings.width_limit;
-        let [o1, o2, o3] = settings.offset_limit;
-        for width in settings.width_limit {
-            require_positive("width_limit", width)?;
-        }
+    /// A setting is out of range.
+    pub fn new(
+        safety: &SafetySettings,
+        dofs: &PerDof<DofSettings>,
+        period: f64,
+    ) -> Result<Self, ConfigError> {
+        let [first, second, third] = dofs;
+        let [w1, w2, w3] = safety.width_limit;
+        let [o1, o2, o3] = safety.offset_limit;
         Ok(Self {
-            clutch: ReferenceGate::new(settings.clutch)?,
+            gate: ReferenceGate::new(safety, period)?,
             limiters: [
-                CommandLimiter::new(m1)?,
-                CommandLimiter::new(m2)?,
-                CommandLimiter::new(m3)?,
+                CommandLimiter::new(safety, first, 0, period)?,
+                CommandLimiter::new(safety, second, 1, period)?,
+                CommandLimiter::new(safety, third, 2, period)?,
             ],
-            frames: FrameGate::new(settings.frames)?,
-            motion: MotionMonitor::new(settings.motion)?,
-            changes: ChangeWatch::new(settings.changes)?,
-            supervisor: Supervisor::new(settings.supervisor)?,
-            limits: [
-                PlayLimit::new(w1, o1)?,
-                PlayLimit::new(w2, o2)?,
-                PlayLimit::new(w3, o3)?,
-            ],
-            unit: settings.width_limit,
-            off: settings.off,
+            frames: FrameGate::new(safety, dofs)?,
+            motion: MotionMonitor::new(safety, dofs, period)?,
+            changes: ChangeWatch::new(ChangeSettings {
+                limit: safety.change_limit,
+                travel: safety.width_limit.map(|width| safety.change_travel * width),
+            })?,
+            supervisor: Supervisor::new(safety)?,
+            play_limits: if safety.off.contains(Flag::WidthLimit) {
+                [PlayLimit::NONE; 3]
+            } else {
+                [
+                    PlayLimit::new(w1, o1)?,
+                    PlayLimit::new(w2, o2)?,
+                    PlayLimit::new(w3, o3)?,
+                ]
+            },
+            unit: safety.width_limit,
+            off: safety.off,
             time: f64::NAN,
-            told: 1.0,
+            share: 1.0,
         })
     }
 
-    /// Bounds what the axes may believe.
-    pub(crate) fn limit(&self, axes: &mut PerDof<Axis>) {
-        if !self.off.has(Flag::WidthLimit) {
-            for (axis, limit) in axes.iter_mut().zip(self.limits) {
-                axis.limit(limit);
-            }
-        }
+    /// Limits of the estimated offsets.
+    pub(crate) const fn play_limits(&self) -> PerDof<PlayLimit> {
+        self.play_limits
     }
 
-    /// A control tick: the axes take what is admitted of the reference and command what is permitted.
-    pub(crate) fn tick(
+    /// A control tick: gate, law, limiter.
+    pub(crate) fn step<L: Law>(
         &mut self,
-        axes: &mut PerDof<Axis>,
+        laws: &mut PerDof<L>,
         reference: PerDof<f64>,
         stamp: Option<f64>,
         time: f64,
     ) {
-        let held = self.supervisor.reaction() >= Reaction::HoldMotion;
-        let admission = self.clutch.admit(reference, time, stamp, held, self.off);
+        let is_held = self.supervisor.reaction() >= Reaction::HoldMotion;
+        let gated = self.gate.step(reference, time, stamp, is_held, self.off);
         let mut event = Event {
             source: Source::Tick,
             time,
             travel: 0.0,
-            raised: admission
+            raised: gated
                 .raised
-                .and(self.frames.tick(time).without(self.off)),
-            severe: admission.severe,
+                .union(self.frames.tick(time).difference(self.off)),
+            severe: gated.severe,
         };
-        for (moved, unit) in admission.moved.iter().zip(self.unit) {
-            event.travel += moved.abs() / unit;
+        for (increment, unit) in gated.increments.iter().zip(self.unit) {
+            event.travel += increment.abs() / unit;
         }
-        if let Some(reference) = admission.reference {
+        if let Some(reference) = gated.reference {
             let motion = self.motion.tick(reference);
-            event.raised = event.raised.and(self.watched(motion));
-            self.tell(axes);
-            self.step(axes, reference, admission.moved, &mut event);
+            event.raised = event.raised.union(self.watched(motion));
+            self.set_share(laws);
+            self.step_laws(laws, reference, gated.increments, &mut event);
         }
         self.time = time;
         self.supervisor.update(&event);
     }
 
-    /// Where a limit binds, the share of the reference's motion that the command could not follow is thrown away: never
-    /// more than the hand moved, which crossing the slack takes for more.
-    fn step(
+    /// Step each law within its limiter.
+    ///
+    /// Where a limit binds, the share of the reference's motion that the command could not follow is discarded: never
+    /// more than the reference moved, which crossing the slack takes for more.
+    fn step_laws<L: Law>(
         &mut self,
-        axes: &mut PerDof<Axis>,
+        laws: &mut PerDof<L>,
         reference: PerDof<f64>,
-        moved: PerDof<f64>,
+        increments: PerDof<f64>,
         event: &mut Event,
     ) {
         let mut shifts = [0.0; 3];
-        let watched = axes.iter_mut().zip(&mut self.limiters).zip(&mut shifts);
-        for (((axis, monitor), shift), (reference, moved)) in
-            watched.zip(reference.into_iter().zip(moved))
-        {
-            let (before, predicted_state) = (axis.command(), axis.predicted_state());
-            axis.step(reference);
-            if self.off.has(Flag::Monitor) {
+        let dofs = laws.iter_mut().zip(&mut self.limiters).zip(&mut shifts);
+        let inputs = reference.into_iter().zip(increments);
+        for (((law, limiter), shift), (reference, increment)) in dofs.zip(inputs) {
+            if self.off.contains(Flag::Monitor) {
+                law.step_within(reference, |command| command);
                 continue;
             }
-            let (permitted, verdict) = monitor.permit(reference, axis.command());
-            if verdict != LimiterResult::Same {
-                let jumps = Flags::when(verdict == LimiterResult::Jump, Flag::CommandJump);
-                event.raised = event
-                    .raised
-                    .and(Flags::of(Flag::Monitor))
-                    .and(jumps.without(self.off));
-                if verdict == LimiterResult::Broken {
-                    event.severe = event.severe.and(Flags::of(Flag::Monitor));
+            let before = law.command();
+            let mut result = LimiterResult::Unchanged;
+            law.step_within(reference, |command| {
+                let limited;
+                (limited, result) = limiter.limit(reference, command);
+                let followed = (limited - before) / (command - before);
+                *shift = -increment * (1.0 - followed.clamp(0.0, 1.0));
+                limited
+            });
+            match result {
+                LimiterResult::Unchanged => {
+                    *shift = 0.0;
+                    continue;
                 }
-                if verdict != LimiterResult::Led {
-                    let followed = (permitted - before) / (axis.command() - before);
-                    *shift = -moved * (1.0 - followed.clamp(0.0, 1.0));
+                LimiterResult::LeadLimited => *shift = 0.0,
+                LimiterResult::Limited | LimiterResult::Jump | LimiterResult::Violation => {
                     if !shift.is_finite() {
-                        *shift = -moved;
+                        *shift = -increment;
                     }
                 }
-                axis.amend(*shift, permitted, predicted_state);
-                monitor.shift(*shift);
+            }
+            law.shift_reference(*shift);
+            limiter.shift_reference(*shift);
+            let jump = Flags::when(result == LimiterResult::Jump, Flag::CommandJump);
+            event.raised = event
+                .raised
+                .union(Flags::of(Flag::Monitor))
+                .union(jump.difference(self.off));
+            if result == LimiterResult::Violation {
+                event.severe = event.severe.union(Flags::of(Flag::Monitor));
             }
         }
-        self.clutch.shift(shifts);
+        self.gate.shift(shifts);
     }
 
-    fn tell(&mut self, axes: &mut PerDof<Axis>) {
-        let lead = self.supervisor.lead();
-        if (lead - self.told).abs() > 0.0 {
-            self.told = lead;
-            for axis in axes {
-                axis.set_share(lead);
+    fn set_share<L: Law>(&mut self, laws: &mut PerDof<L>) {
+        let share = self.supervisor.lead();
+        if (share - self.share).abs() > 0.0 {
+            self.share = share;
+            for law in laws {
+                law.set_share(share);
             }
         }
     }
@@ -201,17 +212,17 @@ impl Monitors {
         if self.supervisor.reaction() == Reaction::Fade {
             self.frames.forget();
         }
-        self.frames.arrive(arrival).without(self.off)
+        self.frames.arrive(arrival).difference(self.off)
     }
 
     /// What is in the set and looked for.
     pub(crate) const fn watched(&self, flags: Flags) -> Flags {
-        flags.without(self.off)
+        flags.difference(self.off)
     }
 
     /// The reference as far as it was admitted [m, rad, rad].
     pub(crate) fn admitted(&self) -> PerDof<f64> {
-        self.clutch.admitted()
+        self.gate.reference()
     }
 
     /// What an image says of hand and tip.
@@ -254,7 +265,7 @@ impl Monitors {
             source: Source::Rig,
             time: self.time,
             travel: 0.0,
-            raised: Flags::of(flag).without(self.off),
+            raised: Flags::of(flag).difference(self.off),
             severe: Flags::NONE,
         });
     }
@@ -262,7 +273,7 @@ impl Monitors {
     /// The operator goes on: the first increment of the reference is zero.
     pub fn engage(&mut self) {
         self.supervisor.engage();
-        self.clutch.engage();
+        self.gate.engage();
     }
 
     /// The operator has seen the warnings.

@@ -3,7 +3,9 @@
 use crate::article::play::Play;
 use crate::dof::PerDof;
 use crate::error::{ConfigError, require, require_positive};
+use crate::settings::DofSettings;
 use crate::supervision::flags::{Flag, Flags};
+use crate::supervision::settings::SafetySettings;
 use crate::supervision::turning_points::TurningPoints;
 
 /// Over which reversals are counted, in s.
@@ -64,7 +66,21 @@ impl MotionMonitor {
     ///
     /// # Errors
     /// A value is not a finite number above 0, or `cycle_swings` is 0.
-    pub fn new(settings: MotionMonitorSettings) -> Result<Self, ConfigError> {
+    pub fn new(
+        safety: &SafetySettings,
+        dofs: &PerDof<DofSettings>,
+        period: f64,
+    ) -> Result<Self, ConfigError> {
+        let settings = MotionMonitorSettings {
+            period,
+            tremor_swing: dofs.map(|dof| dof.update_distance * safety.tremor_swing),
+            slack: safety.width_limit,
+            tremor_rate: safety.tremor_rate,
+            turn: dofs.map(|dof| dof.update_distance),
+            ahead: safety.width_limit.map(|width| safety.ahead_limit * width),
+            cycle_swings: safety.cycle_swings,
+            cycle_time: safety.cycle_time,
+        };
         require_positive("period", settings.period)?;
         for (field, lengths) in [
             ("tremor_swing", settings.tremor_swing),
@@ -134,7 +150,7 @@ impl MotionMonitor {
                     .all(|each| each.count >= self.cycle_swings);
             }
         }
-        Flags::when(is_over, Flag::Overcompensation).and(Flags::when(cycles, Flag::LimitCycle))
+        Flags::when(is_over, Flag::Overcompensation).union(Flags::when(cycles, Flag::LimitCycle))
     }
 }
 

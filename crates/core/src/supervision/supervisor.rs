@@ -3,6 +3,7 @@
 use crate::error::{ConfigError, require, require_non_negative, require_positive};
 use crate::supervision::flags::Flags;
 use crate::supervision::reactions::{Clear, Reaction, Rule, Source, TABLE};
+use crate::supervision::settings::SafetySettings;
 
 /// The bounds of the table's reactions.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -74,7 +75,15 @@ impl Supervisor {
     ///
     /// # Errors
     /// A travel is not above 0, a time or the travel of a hold negative, a count 0, or one not finite.
-    pub fn new(settings: SupervisorSettings) -> Result<Self, ConfigError> {
+    pub fn new(safety: &SafetySettings) -> Result<Self, ConfigError> {
+        let settings = SupervisorSettings {
+            hold_time: safety.hold_time,
+            hold_travel: safety.hold_travel,
+            fade_travel: safety.fade_travel,
+            restore_travel: safety.restore_travel,
+            good_frames: safety.good_frames,
+            good_ticks: safety.good_ticks,
+        };
         require_non_negative("hold_time", settings.hold_time)?;
         require_non_negative("hold_travel", settings.hold_travel)?;
         require_positive("fade_travel", settings.fade_travel)?;
@@ -112,7 +121,7 @@ impl Supervisor {
         for (rule, standing) in TABLE.iter().zip(&mut self.standing) {
             let now = (self.time, self.travel);
             if take(standing, rule, &self.settings, event, now) {
-                self.latched = self.latched.and(Flags::of(rule.flag));
+                self.latched = self.latched.union(Flags::of(rule.flag));
             }
         }
         self.sum_up();
@@ -150,7 +159,7 @@ impl Supervisor {
         (self.reaction, self.flags) = (Reaction::None, Flags::NONE);
         for (rule, standing) in TABLE.iter().zip(&self.standing) {
             if let Some(standing) = standing {
-                self.flags = self.flags.and(Flags::of(rule.flag));
+                self.flags = self.flags.union(Flags::of(rule.flag));
                 if let Some((reaction, _)) = rule.ladder.get(standing.rung) {
                     self.reaction = self.reaction.max(*reaction);
                 }
@@ -194,8 +203,8 @@ fn take(
     event: &Event,
     (time, travel): (f64, f64),
 ) -> bool {
-    let severe = event.severe.has(rule.flag);
-    if severe || event.raised.has(rule.flag) {
+    let severe = event.severe.contains(rule.flag);
+    if severe || event.raised.contains(rule.flag) {
         let start = if severe { rule.ladder.len() - 1 } else { 0 };
         let rung = standing.map_or(start, |now| {
             now.next(rule, settings, time, travel).max(start)
