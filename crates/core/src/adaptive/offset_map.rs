@@ -5,10 +5,13 @@ mod prior;
 use core::ops::Range;
 
 pub use self::prior::OffsetPrior;
+use crate::math::symmetric::Symmetric;
 
 const NODES: usize = 33;
 const TILT: usize = 2 * NODES;
 const SIZE: usize = TILT + 1;
+/// Entries of the covariance.
+const ENTRIES: usize = SIZE * (SIZE + 1) / 2;
 const MIDDLE: f64 = 16.0;
 
 /// The tilt is kept between these, gains of 2 to 0.25, whatever was measured: with 1 + tilt at or below 0 no
@@ -53,7 +56,7 @@ pub struct OffsetMap {
     origin: f64,
     /// Of the nodes of `delta_minus`, then of `delta_plus`, then of the tilt.
     mean: [f64; SIZE],
-    covariance: [[f64; SIZE]; SIZE],
+    covariance: Symmetric<ENTRIES>,
     /// By distance in nodes, of the local part: exp(-distance / correlation).
     alike: [f64; NODES],
 }
@@ -80,7 +83,7 @@ impl OffsetMap {
             prior,
             origin: 0.0,
             mean,
-            covariance: [[0.0; SIZE]; SIZE],
+            covariance: Symmetric::zero(),
             alike,
         };
         map.add(1.0, [prior.level, prior.tilt, prior.local]);
@@ -94,23 +97,19 @@ impl OffsetMap {
 
     /// An offset at a position.
     pub fn offset(&self, side: Side, position: f64) -> f64 {
-        self.node(side, position).pick(&self.mean)
+        self.node(side, position).pick(|index| self.at(index))
     }
 
     /// The tilt: mean, from -0.5 to 3, and standard deviation.
     pub fn tilt(&self) -> (f64, f64) {
-        let variance = self.covariance.get(TILT).and_then(|row| row.get(TILT));
-        let mean = self.mean.get(TILT).unwrap_or(&f64::NAN);
-        (*mean, libm::sqrt(variance.unwrap_or(&f64::NAN).max(0.0)))
+        let variance = self.covariance.entry(TILT, TILT);
+        (self.at(TILT), libm::sqrt(variance.max(0.0)))
     }
 
     /// The variance of an offset at a position.
     pub fn variance(&self, side: Side, position: f64) -> f64 {
         let node = self.node(side, position);
-        let with = |index: usize| {
-            let row = self.covariance.get(index);
-            row.map_or(f64::NAN, |row| node.pick(row))
-        };
+        let with = |index: usize| node.pick(|other| self.covariance.entry(index, other));
         let [first, second] = [node.below, node.below + 1].map(with);
         (first + node.share * (second - first) + node.away * with(TILT)).max(0.0)
     }
@@ -120,9 +119,8 @@ impl OffsetMap {
         let prior = self.prior;
         let drift = [prior.level_drift, prior.tilt_drift, prior.local_drift];
         self.add(distance.abs(), drift);
-        let diagonal = |(index, row): (usize, &[f64; SIZE])| row.get(index).copied();
-        let rows = self.covariance.iter().take(TILT).enumerate();
-        let largest = libm::sqrt(rows.filter_map(diagonal).fold(0.0, f64::max));
+        let variances = (0..TILT).map(|index| self.covariance.entry(index, index));
+        let largest = libm::sqrt(variances.fold(0.0, f64::max));
         let most = libm::sqrt(prior.level * prior.level + prior.local * prior.local);
         self.shrink(0..TILT, most / largest);
         self.shrink(TILT..SIZE, prior.tilt / self.tilt().1);
@@ -131,13 +129,9 @@ impl OffsetMap {
     /// Make some of what is estimated more certain by a factor, if below 1.
     fn shrink(&mut self, which: Range<usize>, factor: f64) {
         if factor < 1.0 {
-            for (i, row) in self.covariance.iter_mut().enumerate() {
-                for (j, value) in row.iter_mut().enumerate() {
-                    for index in [i, j] {
-                        *value *= if which.contains(&index) { factor } else { 1.0 };
-                    }
-                }
-            }
+            let own = |index| if which.contains(&index) { factor } else { 1.0 };
+            self.covariance
+                .update(|i, j, value| value * own(i) * own(j));
         }
     }
 
@@ -146,21 +140,18 @@ impl OffsetMap {
     pub fn measure(&mut self, side: Side, position: f64, share: f64, offset: f64, variance: f64) {
         let nodes = [side, side.other()].map(|side| self.node(side, position));
         let nearer = (1.0 - share) / 2.0;
-        let pick = |values: &[f64; SIZE]| {
+        let pick = |values: &dyn Fn(usize) -> f64| {
             let [own, other] = nodes.each_ref().map(|node| node.pick(values));
             own + nearer * (other - own)
         };
-        let mut column = [0.0; SIZE];
-        for (value, row) in column.iter_mut().zip(&self.covariance) {
-            *value = pick(row);
-        }
-        let total = pick(&column) + variance;
-        self.shift(&column, (offset - pick(&self.mean)) / total);
-        for (row, own) in self.covariance.iter_mut().zip(column) {
-            for (value, other) in row.iter_mut().zip(column) {
-                *value -= own * other / total;
-            }
-        }
+        let column: [f64; SIZE] =
+            core::array::from_fn(|row| pick(&|index| self.covariance.entry(row, index)));
+        let of = |index: usize| column.get(index).copied().unwrap_or(f64::NAN);
+        let total = pick(&of) + variance;
+        let surprise = offset - pick(&|index| self.at(index));
+        self.shift(&column, surprise / total);
+        self.covariance
+            .update(|i, j, value| value - of(i) * of(j) / total);
     }
 
     /// An offset is at least so far out: the mean follows, and is as uncertain as before.
@@ -168,16 +159,17 @@ impl OffsetMap {
     /// It says nothing about the other contact, nor about the tilt that both share.
     pub fn bound(&mut self, side: Side, position: f64, offset: f64, variance: f64) {
         let node = self.node(side, position);
-        let surprise = offset - node.pick(&self.mean);
+        let surprise = offset - node.pick(|index| self.at(index));
         // As if the tilt were known.
         let node = Node { away: 0.0, ..node };
-        let mut column = self.column(&node);
+        let mut column: [f64; SIZE] =
+            core::array::from_fn(|row| node.pick(|index| self.covariance.entry(row, index)));
         for (index, value) in column.iter_mut().enumerate() {
             if index == TILT || (index < NODES) != (side == Side::Minus) {
                 *value = 0.0;
             }
         }
-        let total = node.pick(&column) + variance;
+        let total = node.pick(|index| column.get(index).copied().unwrap_or(f64::NAN)) + variance;
         self.shift(&column, surprise / total);
     }
 
@@ -190,30 +182,31 @@ impl OffsetMap {
         }
     }
 
-    /// Covariance of every node with the offset at a place.
-    fn column(&self, node: &Node) -> [f64; SIZE] {
-        let mut column = [0.0; SIZE];
-        for (value, row) in column.iter_mut().zip(&self.covariance) {
-            *value = node.pick(row);
-        }
-        column
+    /// A mean; NaN beyond the last.
+    fn at(&self, index: usize) -> f64 {
+        self.mean.get(index).copied().unwrap_or(f64::NAN)
     }
 
     /// Add `share` of the variances of level, tilt and local part with these deviations.
     fn add(&mut self, share: f64, deviations: [f64; 3]) {
         let [level, tilt, local] = deviations.map(|deviation| share * deviation * deviation);
-        for (i, row) in self.covariance.iter_mut().enumerate() {
-            for (j, value) in row.iter_mut().enumerate() {
-                *value += match (i == TILT, j == TILT) {
+        let Self {
+            prior,
+            covariance,
+            alike,
+            ..
+        } = self;
+        covariance.update(|i, j, value| {
+            value
+                + match (i == TILT, j == TILT) {
                     (true, true) => tilt,
                     (false, false) if (i < NODES) == (j < NODES) => {
-                        level + local * self.alike.get(i.abs_diff(j)).unwrap_or(&0.0)
+                        level + local * alike.get(i.abs_diff(j)).unwrap_or(&0.0)
                     }
-                    (false, false) => -self.prior.symmetry * level,
+                    (false, false) => -prior.symmetry * level,
                     _ => 0.0,
-                };
-            }
-        }
+                }
+        });
     }
 
     fn node(&self, side: Side, position: f64) -> Node {
@@ -241,10 +234,8 @@ struct Node {
 }
 
 impl Node {
-    fn pick(&self, values: &[f64; SIZE]) -> f64 {
-        match values.get(self.below..self.below + 2) {
-            Some([a, b]) => a + self.share * (b - a) + self.away * values[TILT],
-            _ => f64::NAN,
-        }
+    fn pick(&self, values: impl Fn(usize) -> f64) -> f64 {
+        let (a, b) = (values(self.below), values(self.below + 1));
+        a + self.share * (b - a) + self.away * values(TILT)
     }
 }

@@ -2,17 +2,6 @@
 
 use crate::error::{ConfigError, require, require_finite};
 
-/// Where a play operator stands between its two contacts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ContactMode {
-    /// The output follows a decreasing input.
-    Negative,
-    /// The input moves, the output does not.
-    Free,
-    /// The output follows an increasing input.
-    Positive,
-}
-
 /// The play operator, Eq. (1): the output lags the input by an offset between two contacts.
 ///
 /// ```text
@@ -85,17 +74,6 @@ impl Play {
                 .min(input - self.delta_minus);
         }
         state.output
-    }
-
-    /// Which contact this pair of input and output is in; without width, the positive one.
-    pub fn contact(&self, input: f64, output: f64) -> ContactMode {
-        if output <= input - self.delta_plus {
-            ContactMode::Positive
-        } else if output >= input - self.delta_minus {
-            ContactMode::Negative
-        } else {
-            ContactMode::Free
-        }
     }
 
     /// The nearest position p = v - y that the contacts allow.

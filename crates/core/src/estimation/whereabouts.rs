@@ -3,8 +3,8 @@
 use crate::article::state::StateEstimate;
 use crate::dof::PerDof;
 use crate::error::{ConfigError, require_non_negative, require_positive};
+use crate::estimation::history::Entry;
 use crate::estimation::posture::{Belief, half_turn, turn};
-use crate::r#loop::history::Entry;
 use crate::math::linear::{add, square};
 
 /// One linear step from far away misses by a part of itself.

@@ -3,8 +3,8 @@
 use crate::article::estimator::Triggers;
 use crate::article::state::{StateEstimate, found};
 use crate::dof::PerDof;
+use crate::estimation::history::Entry;
 use crate::r#loop::axis::Axis;
-use crate::r#loop::history::Entry;
 use crate::r#loop::measurement::{Measurement, reversed, usable};
 use crate::r#loop::profile::Profile;
 use crate::r#loop::reduction::HysteresisReduction;

@@ -2,7 +2,7 @@
 
 use crate::article::state::{StateEstimate, found};
 use crate::dof::{PerDof, all_finite};
-use crate::r#loop::history::Entry;
+use crate::estimation::history::Entry;
 use crate::supervision::grip::Sighting;
 
 /// The state estimate from one image.

@@ -2,7 +2,6 @@
 
 pub(crate) mod axis;
 pub(crate) mod best;
-pub(crate) mod history;
 pub(crate) mod image_update;
 pub(crate) mod measurement;
 pub(crate) mod paper;

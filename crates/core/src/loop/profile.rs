@@ -2,9 +2,9 @@
 
 use crate::dof::PerDof;
 use crate::error::ConfigError;
+use crate::estimation::history::Entry;
 use crate::estimation::whereabouts::Whereabouts;
 use crate::r#loop::axis::Axis;
-use crate::r#loop::history::Entry;
 use crate::r#loop::measurement::Measurement;
 use crate::r#loop::settings::Settings;
 use crate::model::features::FeatureModel;

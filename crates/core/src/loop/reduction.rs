@@ -3,10 +3,10 @@
 use crate::article::play::Play;
 use crate::dof::PerDof;
 use crate::error::ConfigError;
+use crate::estimation::history::{Entry, History};
 use crate::estimation::posture::Belief;
 use crate::estimation::whereabouts::Whereabouts;
 use crate::r#loop::axis::Axis;
-use crate::r#loop::history::{Entry, History};
 use crate::r#loop::profile::Profile;
 use crate::r#loop::settings::Settings;
 use crate::model::features::FeatureModel;

@@ -1,3 +1,4 @@
 //! Vectors and small linear systems.
 
 pub(crate) mod linear;
+pub(crate) mod symmetric;

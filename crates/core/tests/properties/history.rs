@@ -1,6 +1,6 @@
 //! The command in force when a frame was captured.
 
-use crate::r#loop::history::{Entry, History};
+use crate::estimation::history::{Entry, History};
 use proptest::prelude::*;
 
 use super::{close, config};
