@@ -206,7 +206,7 @@ impl Reduction {
 
 fn build<P: core::Profile>(settings: &core::Settings) -> Result<Loop<P>, core::ConfigError> {
     let control = &settings.control;
-    let ticks = core::ticks(control.history, control.period);
+    let ticks = core::history_entries(control.history, control.period);
     let storage = vec![core::Entry::BLANK; ticks];
     core::HysteresisReduction::new(settings, storage).map(Box::new)
 }

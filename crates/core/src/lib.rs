@@ -8,7 +8,7 @@
 //! Constructors check their arguments and say which is wrong ([`ConfigError`]); what runs in the
 //! loop cannot fail, does not allocate, reads no clock and does no I/O. Units are m, rad, s, px.
 //!
-//! One DOF in the article's way; `tests/no_alloc.rs` puts a whole loop together.
+//! One DOF in the article's way; `examples/whole_loop.rs` is the whole loop, with settings from a TOML file.
 //!
 //! ```
 //! use tautscope_core::{Compensator, CompensatorState, Estimator, EstimatorState, Play, PlayState};
@@ -70,7 +70,7 @@ pub use article::state::{StateEstimate, StateEstimator};
 pub use dof::PerDof;
 pub use error::ConfigError;
 pub use estimation::expectation::{Beliefs, Expected};
-pub use estimation::history::{Entry, ticks};
+pub use estimation::history::{Entry, history_entries};
 pub use estimation::posture::Belief;
 pub use estimation::settings::StateEstimationSettings;
 pub use estimation::weighted::{WeightedEstimate, WeightedEstimator};

@@ -48,12 +48,12 @@ impl<S: AsRef<[Entry]> + AsMut<[Entry]>> History<S> {
     /// A history of `span` in s for a control tick every `period` in s.
     ///
     /// # Errors
-    /// A value is not a finite number above 0, or the storage holds fewer than [`ticks`] entries.
+    /// A value is not a finite number above 0, or the storage holds fewer than [`history_entries`] entries.
     pub fn new(span: f64, period: f64, storage: S) -> Result<Self, ConfigError> {
         require_positive("span", span)?;
         require_positive("period", period)?;
         require(
-            ticks(span, period) <= storage.as_ref().len(),
+            history_entries(span, period) <= storage.as_ref().len(),
             "history",
             span,
             "a span that the storage holds: two entries and one per control period",
@@ -165,7 +165,7 @@ impl<S: AsRef<[Entry]> + AsMut<[Entry]>> History<S> {
     clippy::cast_sign_loss,
     reason = "a cast from f64 saturates"
 )]
-pub fn ticks(span: f64, period: f64) -> usize {
+pub fn history_entries(span: f64, period: f64) -> usize {
     libm::ceil(span / period) as usize + 2
 }
 

@@ -1,0 +1,102 @@
+//! The whole loop of Fig. 6 on a simulated instrument: three plays, seen by an ideal camera 80 ms later.
+//!
+//! ```sh
+//! uv run tautscope config > rig.toml
+//! cargo run -p tautscope-core --features serde --example whole_loop -- rig.toml
+//! ```
+//!
+//! It prints the RMS distance of the tip from the reference, without and with compensation.
+
+use std::error::Error;
+use std::f64::consts::TAU;
+
+use tautscope_core::{
+    Entry, HysteresisReduction, Paper, PerDof, Play, PlayState, Settings, history_entries,
+};
+
+/// Widths of the plays: Table 1 of the article [m, rad, rad].
+const WIDTHS: PerDof<f64> = [10e-3, 1.8, 1.1];
+/// Centre, amplitude and period in s of the reference of each DOF.
+const REFERENCE: PerDof<(f64, f64, f64)> =
+    [(25e-3, 15e-3, 20.0), (0.0, 1.5, 23.0), (0.9, 0.6, 17.0)];
+const DURATION: f64 = 120.0;
+/// The first part of the run, in which the offsets are estimated, is not counted [s].
+const COUNTED_FROM: f64 = 60.0;
+const TICKS_PER_FRAME: u32 = 8;
+const LATENCY: f64 = 0.08;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let path = std::env::args()
+        .nth(1)
+        .ok_or("name a TOML file, for example one written by `uv run tautscope config`")?;
+    let settings: Settings = toml::from_str(&std::fs::read_to_string(path)?)?;
+    let mut bare = settings;
+    for dof in [&mut bare.insertion, &mut bare.rotation, &mut bare.bending] {
+        dof.free_gain = 1.0;
+    }
+    let [without, with] = [tracking_error(&bare)?, tracking_error(&settings)?];
+    let units = [
+        ("insertion", "mm", 1e3),
+        ("rotation", "rad", 1.0),
+        ("bending", "rad", 1.0),
+    ];
+    for ((name, unit, scale), (without, with)) in units.iter().zip(without.into_iter().zip(with)) {
+        println!(
+            "{name}: {:.3} {unit} without, {:.3} {unit} with",
+            scale * without,
+            scale * with
+        );
+    }
+    Ok(())
+}
+
+/// RMS distance (3,) of the tip from the reference [m, rad, rad].
+fn tracking_error(settings: &Settings) -> Result<PerDof<f64>, Box<dyn Error>> {
+    let control = settings.control;
+    let storage = vec![Entry::BLANK; history_entries(control.history, control.period)];
+    let mut reduction = HysteresisReduction::<Paper, _>::new(settings, storage)?;
+    let model = settings.feature_model()?;
+    let mut plays = Vec::new();
+    for width in WIDTHS {
+        plays.push((
+            Play::new(-width / 2.0, width / 2.0)?,
+            PlayState { output: 0.0 },
+        ));
+    }
+    let (mut squares, mut counted) = ([0.0; 3], 0.0);
+    let mut seen = Vec::new();
+    for tick in 0_u32.. {
+        let time = f64::from(tick) * control.period;
+        if time >= DURATION {
+            break;
+        }
+        let reference = REFERENCE
+            .map(|(centre, amplitude, period)| centre + amplitude * (TAU * time / period).sin());
+        let command = reduction.step(reference, None, time);
+        let mut tip = [0.0; 3];
+        for ((play, state), (tip, command)) in plays.iter_mut().zip(tip.iter_mut().zip(command)) {
+            *tip = play.step(state, command);
+        }
+        if tick % TICKS_PER_FRAME == 0 {
+            seen.push((
+                time,
+                model.predict(tip).map(|prediction| prediction.features),
+            ));
+        }
+        // A frame arrives when its latency is over.
+        while let Some(&(captured_at, features)) = seen.first()
+            && time - captured_at >= LATENCY
+        {
+            reduction.on_features(features, None, captured_at, None);
+            seen.remove(0);
+        }
+        if time >= COUNTED_FROM {
+            counted += 1.0;
+            for (square, (tip, reference)) in squares.iter_mut().zip(tip.into_iter().zip(reference))
+            {
+                *square += (tip - reference) * (tip - reference);
+            }
+        }
+    }
+    Ok(squares.map(|square| (square / counted).sqrt()))
+}
