@@ -1,4 +1,4 @@
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Self, final
 
 import numpy as np
@@ -354,15 +354,8 @@ class MarkerDetector:
     def __new__(
         cls,
         model: FeatureModel,
-        *,
         pixel_format: str,
-        weights: Sequence[float],
-        threshold: float,
-        smoothing: int,
-        minimum_area: int,
-        model_deviation: float,
-        demands: tuple[float, float, float, float, float, float, float],
-        alternatives: Sequence[tuple[_Vector3, float]],
+        settings: Mapping[str, object],
     ) -> Self: ...
     def detect(
         self, image: NDArray[np.uint8], states: NDArray[np.float64], deviation: NDArray[np.float64]
@@ -374,7 +367,7 @@ class MarkerDetector:
 
 def label_regions(mask: NDArray[np.bool_]) -> NDArray[np.float64]: ...
 
-# The pictures of the twin: crates/render.
+# Images of the twin: crates/render.
 
 @final
 class Renderer:

@@ -1,0 +1,256 @@
+//! Search for the outlines of both bands among the marker pixels.
+
+use super::fit::{COARSE, FINE, Fit, fit};
+use super::outcome::{Recognition, UNKNOWN};
+use super::pairing::{Pair, TRIALS, likely_pairs};
+use super::prediction::{BandPrediction, BandPredictor};
+use super::rejection::Rejection;
+use crate::scan::{Region, RunMap};
+use crate::settings::Settings;
+
+/// Outlines are fitted again at most this often, until they move by less than [`STILL`] (px), half of the accuracy.
+const REPEATS: usize = 6;
+const STILL: f64 = 0.1;
+/// A band that the border cuts is moved at most this often to match the centroid of its visible part.
+const SHIFTS: usize = 10;
+/// Fits nearer than this to each other are the same (px): no pair of bands is so close.
+const SAME: f64 = 0.7;
+/// Standard deviation of the centroid of a region as a feature (px): part of the band may be hidden.
+const REGION_DEVIATION: [f64; 4] = [4.0; 4];
+/// A band found alone must be nearer to its predicted position than to the other's by this squared Mahalanobis distance:
+/// 3 standard deviations.
+const AMBIGUITY: f64 = 9.0;
+
+/// What a search is based on.
+#[derive(Clone, Copy)]
+struct Search<'a, P> {
+    map: &'a RunMap,
+    predictor: &'a P,
+    settings: &'a Settings,
+}
+
+/// Recognises the bands among the regions and the marker pixels.
+pub fn recognise(
+    regions: &[Region],
+    map: &RunMap,
+    predictor: &impl BandPredictor,
+    settings: &Settings,
+) -> Recognition {
+    let Some(prior) = predictor.predict(UNKNOWN, [f64::INFINITY; 4]) else {
+        return Recognition::none(Rejection::NotPredicted);
+    };
+    if regions.is_empty() {
+        return Recognition::none(Rejection::NoRegion);
+    }
+    let search = Search {
+        map,
+        predictor,
+        settings,
+    };
+    let mut best: Option<(f64, Recognition)> = None;
+    let mut tried = [UNKNOWN; 2 * TRIALS];
+    let pairs = likely_pairs(regions, &prior);
+    let starts = pairs.into_iter().flatten().flat_map(|pair| {
+        let seen = centroids(pair, &prior, regions);
+        [Some(seen), uncut_centroids(seen, &prior, map)]
+    });
+    for (index, seen) in starts.flatten().enumerate() {
+        let Some((_, first)) = search.fit(seen, REGION_DEVIATION, [true; 2], COARSE) else {
+            continue;
+        };
+        // Many pairs lead to the same fit.
+        let is_same =
+            |before: &[f64; 4]| (0..4).all(|i| (before[i] - first.features[i]).abs() < SAME);
+        if tried.iter().any(is_same) {
+            continue;
+        }
+        tried[index] = first.features;
+        let Some(found) = search.refine(first) else {
+            continue;
+        };
+        let quality = found.quality(settings);
+        if best.is_none_or(|(most, _)| quality > most) {
+            best = Some((quality, found));
+        }
+        if found.is_clear(settings) {
+            break;
+        }
+    }
+    let Some((_, found)) = best else {
+        return Recognition::none(Rejection::NoRegion);
+    };
+    match found.rejections {
+        [None, Some(_)] => search.check_single(found, 0, &prior, regions),
+        [Some(_), None] => search.check_single(found, 1, &prior, regions),
+        _ => found,
+    }
+}
+
+/// Recognises the bands near features `seen` (4,) (px) with standard deviations `deviation` (4,) (px).
+pub fn recognise_at(
+    seen: [f64; 4],
+    deviation: [f64; 4],
+    map: &RunMap,
+    predictor: &impl BandPredictor,
+    settings: &Settings,
+) -> Option<Recognition> {
+    let search = Search {
+        map,
+        predictor,
+        settings,
+    };
+    search.recognise_at(seen, deviation)
+}
+
+impl<P: BandPredictor> Search<'_, P> {
+    fn recognise_at(&self, seen: [f64; 4], deviation: [f64; 4]) -> Option<Recognition> {
+        let (_, first) = self.fit(seen, deviation, [true; 2], COARSE)?;
+        self.refine(first)
+    }
+
+    /// Rejects a band found alone if it is not complete enough, or if the same pixels fit the other band as well.
+    fn check_single(
+        &self,
+        mut found: Recognition,
+        band: usize,
+        prior: &BandPrediction,
+        regions: &[Region],
+    ) -> Recognition {
+        let score = found.scores[band];
+        let least = self.settings.least_edges_alone;
+        if score.edges < least || score.coverage < 0.75 * least {
+            found.rejections[band] = Some(Rejection::MissingEdges { share: score.edges });
+            found.erase_rejected();
+            return found;
+        }
+        let [u, v] = score.centroid;
+        let distance = |region: &Region| {
+            let [ru, rv] = region.centroid();
+            (ru - u).hypot(rv - v)
+        };
+        let nearest = (0..regions.len())
+            .min_by(|a, b| distance(&regions[*a]).total_cmp(&distance(&regions[*b])));
+        let mut pair = [None; 2];
+        pair[1 - band] = nearest;
+        let mut here = UNKNOWN;
+        [here[2 - 2 * band], here[3 - 2 * band]] = [u, v];
+        let starts = [here, centroids(pair, prior, regions)];
+        let is_ambiguous = starts.iter().any(|seen| {
+            self.recognise_at(*seen, REGION_DEVIATION)
+                .is_some_and(|other| {
+                    other.rejections[1 - band].is_none()
+                        && other.scores[1 - band].mahalanobis_squared
+                            < score.mahalanobis_squared + AMBIGUITY
+                })
+        });
+        if is_ambiguous {
+            found.rejections[band] = Some(Rejection::Ambiguous);
+            found.erase_rejected();
+        }
+        found
+    }
+
+    /// Repeats a fit with the outlines of the posture that it implies, until it converges.
+    fn refine(&self, mut found: Fit) -> Option<Recognition> {
+        let mut last = None;
+        for _ in 0..REPEATS {
+            let before = found.features;
+            let Some((prediction, next)) = self.fit(before, fit_deviation(&found), [true; 2], FINE)
+            else {
+                break;
+            };
+            found = next;
+            last = Some(prediction);
+            let moved = before.iter().zip(found.features);
+            if moved.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) < STILL {
+                break;
+            }
+        }
+        let result = Recognition::of(&last?, &found, self.map, self.settings);
+        let rejections = result.rejections;
+        let is_used = rejections.map(|rejection| rejection.is_none());
+        if is_used[0] == is_used[1] {
+            return Some(result);
+        }
+        // A rejected band must not influence the position of the other.
+        let mut seen = found.features;
+        for band in (0..2).filter(|band| !is_used[*band]) {
+            seen[2 * band..2 * band + 2].fill(f64::NAN);
+        }
+        let (prediction, found) = self.fit(seen, fit_deviation(&found), is_used, FINE)?;
+        let mut single = Recognition::of(&prediction, &found, self.map, self.settings);
+        for band in (0..2).filter(|band| !is_used[*band]) {
+            single.rejections[band] = rejections[band];
+            single.scores[band] = result.scores[band];
+        }
+        single.erase_rejected();
+        Some(single)
+    }
+
+    /// Fits the outlines of the posture that explains the features `seen`, starting there.
+    fn fit(
+        &self,
+        seen: [f64; 4],
+        deviation: [f64; 4],
+        is_used: [bool; 2],
+        tolerances: [f64; 3],
+    ) -> Option<(BandPrediction, Fit)> {
+        let prediction = self.predictor.predict(seen, deviation)?;
+        let [[ua, va], [ub, vb]] = prediction.outlines.map(|outline| outline.centroid);
+        let mut start = [ua, va, ub, vb];
+        for (start, seen) in start.iter_mut().zip(seen) {
+            if seen.is_finite() {
+                *start = seen;
+            }
+        }
+        let settings = &self.settings.fit;
+        let found = fit(&prediction, start, is_used, tolerances, self.map, settings)?;
+        Some((prediction, found))
+    }
+}
+
+/// Centroids of the bands if these regions are the bands.
+fn centroids(pair: Pair, prior: &BandPrediction, regions: &[Region]) -> [f64; 4] {
+    let mut seen = UNKNOWN;
+    for (band, region) in pair.into_iter().enumerate() {
+        if let Some(region) = region.and_then(|index| regions.get(index)) {
+            [seen[2 * band], seen[2 * band + 1]] = region.centroid();
+        }
+    }
+    if let [Some(one), Some(other)] = pair
+        && one == other
+    {
+        let [u, v] = prior.shift_to(regions[one].centroid());
+        let [ua, va, ub, vb] = prior.features;
+        seen = [ua + u, va + v, ub + u, vb + v];
+    }
+    seen
+}
+
+/// Centroids of the whole bands from those of their parts inside the image; None if the border cuts neither.
+fn uncut_centroids(mut seen: [f64; 4], prior: &BandPrediction, map: &RunMap) -> Option<[f64; 4]> {
+    let mut is_cut = false;
+    for (outline, centroid) in prior.outlines.iter().zip(seen.chunks_exact_mut(2)) {
+        let part = [centroid[0], centroid[1]];
+        let mut outline = outline.moved_to(part);
+        for _ in 0..SHIFTS {
+            let Some([u, v]) = outline.centroid_within(map) else {
+                break;
+            };
+            let [du, dv] = [part[0] - u, part[1] - v];
+            if du.hypot(dv) < SAME {
+                break;
+            }
+            is_cut = true;
+            outline = outline.moved([du, dv]);
+        }
+        centroid.copy_from_slice(&outline.centroid);
+    }
+    is_cut.then_some(seen)
+}
+
+/// Standard deviations of a fit's features for the next fit: twice its own plus 0.3 px, because the outlines were those of
+/// a posture that was not yet right.
+fn fit_deviation(found: &Fit) -> [f64; 4] {
+    [0, 1, 2, 3].map(|index: usize| 0.3 + 2.0 * found.covariance[index][index].max(0.0).sqrt())
+}
