@@ -4,10 +4,6 @@
     clippy::needless_pass_by_value,
     reason = "PyO3 hands arguments over by value"
 )]
-#![expect(
-    clippy::cast_precision_loss,
-    reason = "counts of pixels stay far below 2^53"
-)]
 
 use std::sync::{Mutex, PoisonError};
 
@@ -20,7 +16,7 @@ use serde::de::DeserializeOwned;
 use tautscope_core as core;
 use tautscope_vision::{
     BandPrediction, BandPredictor, ColorDiscriminant, Detector, Error, Frame, Labeller, MAX_SIDE,
-    Outline, PixelFormat, Region, Segmenter, Settings, Window, each_run,
+    Outline, PixelFormat, Segmenter, Settings, Window, each_run,
 };
 
 use crate::arrays::table;
@@ -198,18 +194,18 @@ impl BandPredictor for Predictor<'_> {
     }
 }
 
-/// Labels the 8-connected regions of a mask (h, w): (n, 7), in the order of their last rows.
+/// The 8-connected regions of a mask (h, w), in the order of their last rows.
 #[pyfunction]
 pub fn label_regions<'py>(
     py: Python<'py>,
     mask: PyReadonlyArray2<'py, bool>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
+) -> PyResult<Vec<Described>> {
     let mask = mask.as_array();
     let (height, width) = mask.dim();
     if height > MAX_SIDE || width > MAX_SIDE {
         return Err(PyValueError::new_err("mask: expected sides up to 65536"));
     }
-    let regions = py.detach(|| {
+    Ok(py.detach(|| {
         let mut labeller = Labeller::default();
         let mut regions = Vec::new();
         labeller.start(width);
@@ -223,23 +219,8 @@ pub fn label_regions<'py>(
             labeller.end_row(|region| regions.push(region));
         }
         labeller.end_row(|region| regions.push(region));
-        rows(regions.into_iter())
-    });
-    Ok(regions.into_pyarray(py))
-}
-
-/// One row per region: area, centroid u, v, then left, top, width, height of its box [px].
-fn rows(regions: impl Iterator<Item = Region>) -> Array2<f64> {
-    let rows: Vec<[f64; 7]> = regions
-        .map(|region| {
-            let [u, v] = region.centroid();
-            let sides = [region.right - region.left, region.bottom - region.top];
-            let [left, top, width, height] =
-                [region.left, region.top, sides[0], sides[1]].map(|side| side as f64);
-            [region.area as f64, u, v, left, top, width, height]
-        })
-        .collect();
-    Array2::from(rows)
+        described(&regions)
+    }))
 }
 
 /// Converts the mapping of a section of the configuration.

@@ -1,7 +1,7 @@
 //! The marker detector: Fig. 5 as a whole.
 
 use crate::blur::{BlurFit, BlurFitter};
-use crate::recognition::{BandPrediction, BandPredictor, Recognition, recognise, recognise_at};
+use crate::recognition::{BandPrediction, BandPredictor, OutlineSearch, Recognition};
 use crate::scan::{ColorDiscriminant, Frame, Region, Scanner, Window};
 use crate::{Error, Settings};
 
@@ -151,14 +151,8 @@ impl<F: Frame, P: BandPredictor> Search<'_, F, P> {
     }
 
     fn by_discriminant(&mut self, window: Window, index: usize) -> Recognition {
-        let scanner = &mut self.memory.scanner;
-        scanner.find(self.frame, window, index);
-        recognise(
-            &scanner.regions,
-            &scanner.map,
-            self.predictor,
-            self.settings,
-        )
+        self.memory.scanner.find(self.frame, window, index);
+        self.outlines().recognise(&self.memory.scanner.regions)
     }
 
     /// An accepted fit of the intensity, from the outlines found so far or else from the prediction.
@@ -181,16 +175,9 @@ impl<F: Frame, P: BandPredictor> Search<'_, F, P> {
     /// The best of a result that is not clear, the edges near the intensity fit, and that fit itself.
     fn best_of(&mut self, window: Window, found: &Recognition, fit: &BlurFit) -> Recognition {
         self.swap_regions();
-        let scanner = &mut self.memory.scanner;
-        scanner.find(self.frame, window, 0);
-        let near = recognise_at(
-            fit.features,
-            // The fit is accepted with about this standard deviation (px).
-            [1.0; 4],
-            &scanner.map,
-            self.predictor,
-            self.settings,
-        );
+        self.memory.scanner.find(self.frame, window, 0);
+        // The fit is accepted with about this standard deviation (px).
+        let near = self.outlines().recognise_at(fit.features, [1.0; 4]);
         let edges = match near {
             Some(near) if self.is_better(&near, found) => near,
             _ => {
@@ -204,6 +191,14 @@ impl<F: Frame, P: BandPredictor> Search<'_, F, P> {
             fit.recognition()
         } else {
             edges
+        }
+    }
+
+    fn outlines(&self) -> OutlineSearch<'_, P> {
+        OutlineSearch {
+            map: &self.memory.scanner.map,
+            predictor: self.predictor,
+            settings: self.settings,
         }
     }
 

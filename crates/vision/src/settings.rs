@@ -2,8 +2,11 @@
 
 /// Settings of a [`Detector`](crate::Detector), `[vision]` in a configuration file.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Deserialize),
+    serde(deny_unknown_fields)
+)]
 pub struct Settings {
     /// Weights of blue, green, red in Fisher's discriminant, Eq. (12).
     pub weights: [f64; 3],
@@ -50,8 +53,11 @@ pub struct Settings {
 
 /// Settings of the outline fit, `[vision.fit]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Deserialize),
+    serde(deny_unknown_fields)
+)]
 pub struct FitSettings {
     /// Standard deviation of an edge point (px), neighbours taken as independent.
     pub edge_deviation: f64,
@@ -73,8 +79,11 @@ pub struct FitSettings {
 
 /// Scores at which a result is clear and nothing else is tried, `[vision.clear]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Deserialize),
+    serde(deny_unknown_fields)
+)]
 pub struct ClearSettings {
     /// Least edge share of each band; below it, the largest Mahalanobis distance shrinks too.
     pub least_edges: f64,
@@ -86,8 +95,11 @@ pub struct ClearSettings {
 
 /// Least scores where the posture is not known, `[vision.unlocated]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Deserialize),
+    serde(deny_unknown_fields)
+)]
 pub struct UnlocatedSettings {
     /// See [`Settings::least_inside`].
     pub least_inside: f64,
@@ -101,8 +113,11 @@ pub struct UnlocatedSettings {
 
 /// Settings of the intensity fit of blurred bands, `[vision.blur]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Deserialize),
+    serde(deny_unknown_fields)
+)]
 pub struct BlurSettings {
     /// Expected standard deviation of the blur kernel (px).
     pub sigma: f64,

@@ -93,21 +93,18 @@ impl Patch {
 
     /// How much redder than green a sample is (grey levels).
     pub fn redness(&self, index: usize) -> f64 {
-        let red = self
-            .differences
-            .get(index)
-            .map_or(0.0, |[red, _]| f64::from(*red));
-        (-red).max(0.0)
+        (-self.green_minus_red(index)).max(0.0)
+    }
+
+    fn green_minus_red(&self, index: usize) -> f64 {
+        let difference = self.differences.get(index);
+        difference.map_or(0.0, |[red, _]| f64::from(*red))
     }
 
     /// Derivatives of a sample's green by changes in the tissue's colour: in the whole patch, along u, along v, and with
     /// its brightness. Scaled to about 1 for typical samples, so that the normal equations are well conditioned.
     pub fn tissue(&self, index: usize) -> [f64; 4] {
-        let red = self
-            .differences
-            .get(index)
-            .map_or(0.0, |[red, _]| f64::from(*red))
-            / 100.0;
+        let red = self.green_minus_red(index) / 100.0;
         let [u, v] = self.place(index);
         let [u, v] = [u - self.origin[0], v - self.origin[1]].map(|offset| offset / 30.0 - 1.0);
         [red, red * u, red * v, red * red]

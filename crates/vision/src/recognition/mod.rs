@@ -15,4 +15,4 @@ pub use outline::{OUTLINE_CORNERS, Outline};
 pub use prediction::{BandPrediction, BandPredictor};
 pub use rejection::Rejection;
 pub use score::BandScore;
-pub(crate) use search::{recognise, recognise_at};
+pub(crate) use search::OutlineSearch;

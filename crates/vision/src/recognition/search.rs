@@ -21,89 +21,66 @@ const REGION_DEVIATION: [f64; 4] = [4.0; 4];
 /// 3 standard deviations.
 const AMBIGUITY: f64 = 9.0;
 
-/// What a search is based on.
-#[derive(Clone, Copy)]
-struct Search<'a, P> {
-    map: &'a RunMap,
-    predictor: &'a P,
-    settings: &'a Settings,
+/// Search for both bands near their prediction.
+pub struct OutlineSearch<'a, P> {
+    /// The marker pixels.
+    pub map: &'a RunMap,
+    /// The prediction.
+    pub predictor: &'a P,
+    /// Thresholds and the settings of the fit.
+    pub settings: &'a Settings,
 }
 
-/// Recognises the bands among the regions and the marker pixels.
-pub fn recognise(
-    regions: &[Region],
-    map: &RunMap,
-    predictor: &impl BandPredictor,
-    settings: &Settings,
-) -> Recognition {
-    let Some(prior) = predictor.predict(UNKNOWN, [f64::INFINITY; 4]) else {
-        return Recognition::none(Rejection::NotPredicted);
-    };
-    if regions.is_empty() {
-        return Recognition::none(Rejection::NoRegion);
-    }
-    let search = Search {
-        map,
-        predictor,
-        settings,
-    };
-    let mut best: Option<(f64, Recognition)> = None;
-    let mut tried = [UNKNOWN; 2 * TRIALS];
-    let pairs = likely_pairs(regions, &prior);
-    let starts = pairs.into_iter().flatten().flat_map(|pair| {
-        let seen = centroids(pair, &prior, regions);
-        [Some(seen), uncut_centroids(seen, &prior, map)]
-    });
-    for (index, seen) in starts.flatten().enumerate() {
-        let Some((_, first)) = search.fit(seen, REGION_DEVIATION, [true; 2], COARSE) else {
-            continue;
+impl<P: BandPredictor> OutlineSearch<'_, P> {
+    /// Recognises the bands among the regions.
+    pub fn recognise(&self, regions: &[Region]) -> Recognition {
+        let Some(prior) = self.predictor.predict(UNKNOWN, [f64::INFINITY; 4]) else {
+            return Recognition::none(Rejection::NotPredicted);
         };
-        // Many pairs lead to the same fit.
-        let is_same =
-            |before: &[f64; 4]| (0..4).all(|i| (before[i] - first.features[i]).abs() < SAME);
-        if tried.iter().any(is_same) {
-            continue;
+        if regions.is_empty() {
+            return Recognition::none(Rejection::NoRegion);
         }
-        tried[index] = first.features;
-        let Some(found) = search.refine(first) else {
-            continue;
+        let mut best: Option<(f64, Recognition)> = None;
+        let mut tried = [UNKNOWN; 2 * TRIALS];
+        let pairs = likely_pairs(regions, &prior);
+        let starts = pairs.into_iter().flatten().flat_map(|pair| {
+            let seen = centroids(pair, &prior, regions);
+            [Some(seen), uncut_centroids(seen, &prior, self.map)]
+        });
+        for (index, seen) in starts.flatten().enumerate() {
+            let Some((_, first)) = self.fit(seen, REGION_DEVIATION, [true; 2], COARSE) else {
+                continue;
+            };
+            // Many pairs lead to the same fit.
+            let is_same =
+                |before: &[f64; 4]| (0..4).all(|i| (before[i] - first.features[i]).abs() < SAME);
+            if tried.iter().any(is_same) {
+                continue;
+            }
+            tried[index] = first.features;
+            let Some(found) = self.refine(first) else {
+                continue;
+            };
+            let quality = found.quality(self.settings);
+            if best.is_none_or(|(most, _)| quality > most) {
+                best = Some((quality, found));
+            }
+            if found.is_clear(self.settings) {
+                break;
+            }
+        }
+        let Some((_, found)) = best else {
+            return Recognition::none(Rejection::NoRegion);
         };
-        let quality = found.quality(settings);
-        if best.is_none_or(|(most, _)| quality > most) {
-            best = Some((quality, found));
-        }
-        if found.is_clear(settings) {
-            break;
+        match found.rejections {
+            [None, Some(_)] => self.check_single(found, 0, &prior, regions),
+            [Some(_), None] => self.check_single(found, 1, &prior, regions),
+            _ => found,
         }
     }
-    let Some((_, found)) = best else {
-        return Recognition::none(Rejection::NoRegion);
-    };
-    match found.rejections {
-        [None, Some(_)] => search.check_single(found, 0, &prior, regions),
-        [Some(_), None] => search.check_single(found, 1, &prior, regions),
-        _ => found,
-    }
-}
 
-/// Recognises the bands near features `seen` (4,) (px) with standard deviations `deviation` (4,) (px).
-pub fn recognise_at(
-    seen: [f64; 4],
-    deviation: [f64; 4],
-    map: &RunMap,
-    predictor: &impl BandPredictor,
-    settings: &Settings,
-) -> Option<Recognition> {
-    let search = Search {
-        map,
-        predictor,
-        settings,
-    };
-    search.recognise_at(seen, deviation)
-}
-
-impl<P: BandPredictor> Search<'_, P> {
-    fn recognise_at(&self, seen: [f64; 4], deviation: [f64; 4]) -> Option<Recognition> {
+    /// Recognises the bands near features `seen` (4,) (px) with standard deviations `deviation` (4,) (px).
+    pub fn recognise_at(&self, seen: [f64; 4], deviation: [f64; 4]) -> Option<Recognition> {
         let (_, first) = self.fit(seen, deviation, [true; 2], COARSE)?;
         self.refine(first)
     }

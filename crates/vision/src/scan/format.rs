@@ -39,17 +39,11 @@ impl PixelFormat {
         Self::I420,
     ];
 
-    /// `bgr`, `rgb`, `bgra`, `yuyv`, `uyvy`, `nv12` or `i420`.
+    const NAMES: [&str; 7] = ["bgr", "rgb", "bgra", "yuyv", "uyvy", "nv12", "i420"];
+
+    /// Name in the configuration: that of the variant in lower case.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Bgr => "bgr",
-            Self::Rgb => "rgb",
-            Self::Bgra => "bgra",
-            Self::Yuyv => "yuyv",
-            Self::Uyvy => "uyvy",
-            Self::Nv12 => "nv12",
-            Self::I420 => "i420",
-        }
+        Self::NAMES[self as usize]
     }
 
     /// The format with this [`name`](Self::name).

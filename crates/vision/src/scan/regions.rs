@@ -9,9 +9,9 @@ pub struct Region {
     /// Number of pixels (px).
     pub area: u64,
     /// Sum of the columns of its pixels (px).
-    pub sum_u: u64,
+    sum_u: u64,
     /// Sum of the rows of its pixels (px).
-    pub sum_v: u64,
+    sum_v: u64,
     /// First column of the bounding box (px).
     pub left: usize,
     /// First row of the bounding box (px).

@@ -7,29 +7,17 @@ use super::active_blocks::BLOCK;
 /// The marker pixels of one row of a window.
 #[derive(Clone, Copy, Debug)]
 pub struct Runs<'a> {
-    marker: &'a [u64],
-    active: &'a [u64],
-    origin: usize,
-    window: [usize; 2],
+    /// Marker bits of the blocks.
+    pub(super) marker: &'a [u64],
+    /// Bits of the blocks that are valid.
+    pub(super) active: &'a [u64],
+    /// Column of the first marker bit.
+    pub(super) origin: usize,
+    /// First column of the window and the one after its last.
+    pub(super) window: [usize; 2],
 }
 
-impl<'a> Runs<'a> {
-    /// From the marker bits of the blocks whose bit in `active` is set. `origin` is the frame's column of the
-    /// first bit; `window` has the window's first column and the one after its last.
-    pub(crate) fn new(
-        marker: &'a [u64],
-        active: &'a [u64],
-        origin: usize,
-        window: [usize; 2],
-    ) -> Self {
-        Self {
-            marker,
-            active,
-            origin,
-            window,
-        }
-    }
-
+impl Runs<'_> {
     /// Calls `found(start, end)` for each run of marker pixels; `end` is the pixel after its last.
     #[inline(always)]
     pub fn each(self, mut found: impl FnMut(usize, usize)) {

@@ -150,8 +150,13 @@ fn sweep<S: Simd>(
             };
             if (window.top..window.bottom).contains(&v) && active.is_active(step - first) {
                 let (marker, active) = (rows.marker(step - first), active.active(step - first));
-                let window = [window.left, window.right];
-                visit(v, Runs::new(marker, active, columns.start, window));
+                let runs = Runs {
+                    marker,
+                    active,
+                    origin: columns.start,
+                    window: [window.left, window.right],
+                };
+                visit(v, runs);
             }
         }
     }
