@@ -2,6 +2,7 @@
 
 mod active_blocks;
 mod discriminant;
+mod filter;
 mod format;
 mod frame;
 mod lowpass;
