@@ -25,7 +25,7 @@ struct Input<'a> {
     smoothing: u8,
     minimum_area: u8,
     predicted: [f32; 4],
-    deviation: f32,
+    std: f32,
     radii: [f32; 2],
     thresholds: [u8; 7],
     is_located: bool,
@@ -34,7 +34,7 @@ struct Input<'a> {
 }
 
 impl BandPredictor for Input<'_> {
-    fn predict(&self, _seen: [f64; 4], _deviation: [f64; 4]) -> Option<BandPrediction> {
+    fn predict(&self, _observed: [f64; 4], _std: [f64; 4]) -> Option<BandPrediction> {
         let features = self.predicted.map(f64::from);
         let [ua, va, ub, vb] = features;
         let [radius_a, radius_b] = self.radii.map(f64::from);
@@ -48,7 +48,7 @@ impl BandPredictor for Input<'_> {
         };
         let mut covariance = [[0.0; 4]; 4];
         for (index, row) in covariance.iter_mut().enumerate() {
-            row[index] = f64::from(self.deviation).powi(2);
+            row[index] = f64::from(self.std).powi(2);
         }
         Some(BandPrediction {
             features,

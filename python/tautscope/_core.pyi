@@ -358,7 +358,7 @@ class MarkerDetector:
         settings: Mapping[str, object],
     ) -> Self: ...
     def detect(
-        self, image: NDArray[np.uint8], states: NDArray[np.float64], deviation: NDArray[np.float64]
+        self, image: NDArray[np.uint8], states: NDArray[np.float64], std: NDArray[np.float64]
     ) -> tuple[_Floats, _Floats, _Floats, tuple[str, str], list[_Region], int]: ...
     def regions_in(
         self, image: NDArray[np.uint8], windows: Sequence[tuple[int, int, int, int]]

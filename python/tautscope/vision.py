@@ -188,9 +188,9 @@ class MarkerDetector:
             FieldError: The prediction is not four numbers.
         """
         predicted = _checked_prediction(predicted_features)
-        states, deviation = self._prior(predicted, expectation)
+        states, std = self._prior(predicted, expectation)
         features, covariance, scores, reasons, regions, discriminant = self._core.detect(
-            self._layout.checked(image), states, deviation
+            self._layout.checked(image), states, std
         )
         a, b = (_band_score(row) for row in scores.tolist())
         found = tuple(map(Region._make, regions))

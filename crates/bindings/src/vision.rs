@@ -64,20 +64,20 @@ impl MarkerDetector {
 
     /// Features (4,), covariance (4, 4), scores (2, 9), a reason per marker, regions, index of the discriminant.
     ///
-    /// `states` (n, 3): where the instrument may be, each with the standard deviations `deviation` (3,).
+    /// `states` (n, 3): where the instrument may be, each with the standard deviations `std` (3,).
     fn detect<'py>(
         &self,
         py: Python<'py>,
         image: PyReadonlyArrayDyn<'py, u8>,
         states: Vec<[f64; 3]>,
-        deviation: [f64; 3],
+        std: [f64; 3],
     ) -> PyResult<Detected<'py>> {
         let frame = ArrayFrame::new(&image, self.format)?;
         let predictor = Predictor {
             model: &self.model,
             beliefs: core::Beliefs {
                 states: &states,
-                deviation,
+                deviation: std,
                 model_deviation: self.model_deviation,
             },
         };
@@ -176,8 +176,8 @@ struct Predictor<'a> {
 }
 
 impl BandPredictor for Predictor<'_> {
-    fn predict(&self, seen: [f64; 4], deviation: [f64; 4]) -> Option<BandPrediction> {
-        let expected = self.model.expect(&self.beliefs, seen, deviation)?;
+    fn predict(&self, observed: [f64; 4], std: [f64; 4]) -> Option<BandPrediction> {
+        let expected = self.model.expect(&self.beliefs, observed, std)?;
         Some(BandPrediction {
             features: expected.features,
             covariance: expected.covariance,

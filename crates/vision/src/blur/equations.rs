@@ -37,7 +37,7 @@ pub struct Residuals {
     /// Share of the variance that is explained, sensor noise excluded.
     pub explained: f64,
     /// Standard deviation (grey levels).
-    pub deviation: f64,
+    pub std: f64,
     /// Standard deviation of the tissue's colour that they imply, relative to its redness.
     pub tissue_unevenness: f64,
 }
@@ -127,7 +127,7 @@ pub fn residuals(
     let variance = square - sum * sum / f64::max(count, 1.0) - count * sensor_variance;
     Residuals {
         explained: 1.0 - f64::max(left - count * sensor_variance, 0.0) / f64::max(variance, 1.0),
-        deviation: (left / f64::max(count, 1.0)).sqrt(),
+        std: (left / f64::max(count, 1.0)).sqrt(),
         tissue_unevenness: (tissue_square / f64::max(fourth, 1.0)).max(0.0).sqrt(),
     }
 }

@@ -13,10 +13,10 @@ use crate::settings::BlurSettings;
 
 /// Gauss-Newton steps; the outlines are drawn anew in each, the frame is read again after half of them.
 const STEPS: usize = 16;
-/// After [`TRIAL_STEPS`] a fit that explains less than this share of the variance has not converged later either.
+/// A fit that explains less than this share of the variance after the trial steps is given up: it bounds the time.
 const TRIAL_STEPS: usize = 4;
 const LEAST_TRIAL_EXPLAINED: f64 = 0.3;
-/// The fit has converged if no position moves by more than this (px), a fifth of its least standard deviation.
+/// The fit has converged if no position moves by more than this (px), a fifth of its least standard deviation by default.
 const CONVERGED: f64 = 0.05;
 /// Largest step of a position (px) and of the blur (px): the linearisation holds for about one sigma.
 const LARGEST_STEP: f64 = 2.5;
@@ -27,9 +27,9 @@ const SIGMA_BOUNDS: [f64; 2] = [0.6, 8.0];
 const TISSUE_UNEVENNESS: f64 = 0.05;
 /// Standard deviation of the positions that the outlines are drawn from (px): at the start, after half of the steps, and
 /// else.
-const START_DEVIATION: f64 = 3.0;
-const HALFWAY_DEVIATION: f64 = 1.0;
-const STEP_DEVIATION: f64 = 2.0;
+const START_STD: f64 = 3.0;
+const HALFWAY_STD: f64 = 1.0;
+const STEP_STD: f64 = 2.0;
 /// Bounds of a band's brightness: the largest, and the least that its ratio to the other's is computed from (grey levels).
 const LARGEST_BRIGHTNESS: f64 = 400.0;
 const LEAST_BRIGHTNESS: f64 = 5.0;
@@ -75,24 +75,24 @@ impl BlurFitter {
         settings: &BlurSettings,
     ) -> Option<BlurFit> {
         let prior = inverse(prediction.covariance)?;
-        let draw = |position: [f64; 4], deviation: f64| {
-            let drawn = predictor.predict(position, [deviation; 4])?;
+        let draw = |position: [f64; 4], std: f64| {
+            let drawn = predictor.predict(position, [std; 4])?;
             let [a, b] = &drawn.outlines;
             let [ua, va, ub, vb] = position;
             Some([a.moved_to([ua, va]), b.moved_to([ub, vb])])
         };
         let mut position = start;
-        let mut outlines = draw(position, START_DEVIATION)?;
+        let mut outlines = draw(position, START_STD)?;
         let mut sensor_variance = self.read(frame, &outlines, settings.margin)?;
         let (mut brightness, mut sigma) = ([0.0; 2], settings.sigma);
         let mut tissue_unevenness = TISSUE_UNEVENNESS;
         let mut result = None;
         for step in 0..STEPS {
             if step == STEPS / 2 {
-                outlines = draw(position, HALFWAY_DEVIATION)?;
+                outlines = draw(position, HALFWAY_STD)?;
                 sensor_variance = self.read(frame, &outlines, settings.margin)?;
             } else if step > 0 {
-                outlines = draw(position, STEP_DEVIATION)?;
+                outlines = draw(position, STEP_STD)?;
             }
             let scaled_sigma = sigma / self.patch.step;
             for (mask, outline) in self.masks.iter_mut().zip(&outlines) {
@@ -159,7 +159,7 @@ impl BlurFitter {
                 }),
                 brightness,
                 explained: left.explained,
-                residual: left.deviation,
+                residual: left.std,
                 sigma,
                 mahalanobis_squared: quadratic(&prior, offset),
                 outlines,

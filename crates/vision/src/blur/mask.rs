@@ -72,13 +72,13 @@ impl Mask {
         {
             for (u, value) in row.iter().enumerate().filter(|(_, value)| **value > 0.0) {
                 for (index, weight) in kernel.iter().enumerate().take(reach + 1) {
-                    if let Some(place) = blurred.get_mut(u + index) {
-                        *place += weight * value;
+                    if let Some(target) = blurred.get_mut(u + index) {
+                        *target += weight * value;
                     }
                     if index > 0
-                        && let Some(place) = u.checked_sub(index).and_then(|u| blurred.get_mut(u))
+                        && let Some(target) = u.checked_sub(index).and_then(|u| blurred.get_mut(u))
                     {
-                        *place += weight * value;
+                        *target += weight * value;
                     }
                 }
             }
@@ -89,8 +89,8 @@ impl Mask {
             for to in v.saturating_sub(reach)..(v + reach + 1).min(rows) {
                 let weight = kernel[v.abs_diff(to)];
                 let into = self.coverage.iter_mut().skip(to * columns);
-                for (place, value) in into.zip(row) {
-                    *place += weight * value;
+                for (target, value) in into.zip(row) {
+                    *target += weight * value;
                 }
             }
         }

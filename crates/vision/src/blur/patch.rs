@@ -12,7 +12,8 @@ pub const SIDE: usize = 64;
 /// Weights of B, G, R for green minus red and green minus blue, which are 0 for grey of any brightness.
 const DIFFERENCES: [[f64; 3]; 2] = [[0.0, 1.0, -1.0], [-1.0, 1.0, 0.0]];
 
-/// Histogram of second differences: bins, and width of a bin (grey levels), enough for noise of 10 grey levels.
+/// Histogram of second differences: bins, and width of a bin (grey levels); the median is inside for sensor noise of up
+/// to 38 grey levels.
 const BINS: usize = 128;
 const BIN: f64 = 0.5;
 
@@ -79,7 +80,7 @@ impl Patch {
     pub fn remove_tissue_colour(&mut self, outlines: &[Outline; 2]) {
         let (mut square, mut product) = (0.0, 0.0);
         for (index, [red, blue]) in self.differences.iter().enumerate() {
-            let at = self.place(index);
+            let at = self.coordinates(index);
             if *red < 0.0 && !outlines.iter().any(|outline| outline.contains(at)) {
                 square += f64::from(red * red);
                 product += f64::from(red * blue);
@@ -105,7 +106,7 @@ impl Patch {
     /// its brightness. Scaled to about 1 for typical samples, so that the normal equations are well conditioned.
     pub fn tissue(&self, index: usize) -> [f64; 4] {
         let red = self.green_minus_red(index) / 100.0;
-        let [u, v] = self.place(index);
+        let [u, v] = self.coordinates(index);
         let [u, v] = [u - self.origin[0], v - self.origin[1]].map(|offset| offset / 30.0 - 1.0);
         [red, red * u, red * v, red * red]
     }
@@ -135,7 +136,7 @@ impl Patch {
     }
 
     /// Coordinates of a sample (px).
-    pub fn place(&self, index: usize) -> [f64; 2] {
+    pub fn coordinates(&self, index: usize) -> [f64; 2] {
         let columns = self.columns.max(1);
         let [u, v] = [index % columns, index / columns].map(real);
         [
@@ -213,8 +214,8 @@ mod tests {
         patch.remove_tissue_colour(&[outline; 2]);
         let at = |u: f64| {
             let index = (0..patch.green.len()).find(|index| {
-                let [place, _] = patch.place(*index);
-                place >= u
+                let [column, _] = patch.coordinates(*index);
+                column >= u
             });
             patch.green[index.unwrap()]
         };

@@ -70,9 +70,9 @@ fn positions_and_blur_are_those_of_the_image() {
         assert!(found.is_blurred(&SETTINGS.blur));
         assert!((found.sigma - sigma).abs() < 0.2, "{sigma}: {found:?}");
         for (index, (value, position)) in found.features.iter().zip(positions).enumerate() {
-            let deviation = found.covariance[index][index].sqrt();
+            let std = found.covariance[index][index].sqrt();
             assert!((value - position).abs() < 0.25, "{sigma}: {found:?}");
-            assert!((value - position).abs() < 4.0 * deviation);
+            assert!((value - position).abs() < 4.0 * std);
         }
     }
 }

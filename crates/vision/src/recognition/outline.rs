@@ -3,7 +3,7 @@
 use crate::scan::RunMap;
 
 /// Least share of an outline inside the image for which its centroid there is computed: that of a smaller piece depends
-/// on the pixel raster more than on the outline's place.
+/// more on the pixel raster than on the position.
 const LEAST_PIECE: f64 = 0.15;
 
 /// Corners of an outline: 13 on each of its two arcs, the rims; one side joins their ends, one their starts.

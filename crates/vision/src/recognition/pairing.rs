@@ -4,7 +4,7 @@ use super::prediction::BandPrediction;
 use crate::math::{inverse, quadratic, real_sum};
 use crate::scan::Region;
 
-/// Number of pairs that are tried: it bounds the time, and the right one is rarely beyond the third.
+/// Number of pairs that are tried: it bounds the time.
 pub const TRIALS: usize = 6;
 
 /// A region for A and one for B; None: it has no region; one region for both: the bands touch.

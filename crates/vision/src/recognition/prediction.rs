@@ -58,11 +58,11 @@ impl BandPrediction {
 
 /// Predicts the bands from the instrument model and the prior of its posture.
 pub trait BandPredictor {
-    /// The prediction, with outlines in the posture that best explains the features `seen` (4,) (px) with
-    /// standard deviations `deviation` (4,) (px; infinite: not seen).
+    /// The prediction, with outlines in the posture that best explains the features `observed` (4,) (px)
+    /// with standard deviations `std` (4,) (px; infinite: not observed).
     ///
     /// None if the bands are not visible.
-    fn predict(&self, seen: [f64; 4], deviation: [f64; 4]) -> Option<BandPrediction>;
+    fn predict(&self, observed: [f64; 4], std: [f64; 4]) -> Option<BandPrediction>;
 
     /// Whether the prior is of one posture, and not of several that cover the whole workspace.
     fn is_located(&self) -> bool {

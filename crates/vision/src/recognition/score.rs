@@ -40,16 +40,12 @@ impl BandScore {
     fn rejection(&self, settings: &Settings) -> Option<Rejection> {
         // A band with few edges must be near its predicted position: the bound falls with the square of their share.
         let shortage = (self.edges / settings.clear.least_edges).min(1.0).powi(2);
-        let exclusive = f64::max(
-            // A quarter of the least coverage may be shared: where outlines touch they overlap by growth.
-            0.75 * settings.least_coverage,
-            settings.least_exclusive * self.coverage,
-        );
+        let least_exclusive = settings.least_exclusive * self.coverage;
         if self.inside < settings.least_inside {
             Some(Rejection::Outside {
                 share: 1.0 - self.inside,
             })
-        } else if self.coverage < settings.least_coverage || self.exclusive < exclusive {
+        } else if self.coverage < settings.least_coverage || self.exclusive < least_exclusive {
             Some(Rejection::Hidden {
                 share: self.exclusive,
             })

@@ -8,15 +8,15 @@ use super::rejection::Rejection;
 use crate::scan::{Region, RunMap};
 use crate::settings::Settings;
 
-/// Outlines are fitted again at most this often, until they move by less than [`STILL`] (px), half of the accuracy.
+/// Outlines are fitted again at most this often, until they move by less than half of the accuracy of 0.2 px.
 const REPEATS: usize = 6;
-const STILL: f64 = 0.1;
+const CONVERGED: f64 = 0.1;
 /// A band that the border cuts is moved at most this often to match the centroid of its visible part.
 const SHIFTS: usize = 10;
-/// Fits nearer than this to each other are the same (px): no pair of bands is so close.
+/// Positions nearer than this to each other lead to the same fit (px): it is within the tolerance of the edges.
 const SAME: f64 = 0.7;
 /// Standard deviation of the centroid of a region as a feature (px): part of the band may be hidden.
-const REGION_DEVIATION: [f64; 4] = [4.0; 4];
+const REGION_STD: [f64; 4] = [4.0; 4];
 /// A band found alone must be nearer to its predicted position than to the other's by this squared Mahalanobis distance:
 /// 3 standard deviations.
 const AMBIGUITY: f64 = 9.0;
@@ -44,11 +44,11 @@ impl<P: BandPredictor> OutlineSearch<'_, P> {
         let mut tried = [UNKNOWN; 2 * TRIALS];
         let pairs = likely_pairs(regions, &prior);
         let starts = pairs.into_iter().flatten().flat_map(|pair| {
-            let seen = centroids(pair, &prior, regions);
-            [Some(seen), uncut_centroids(seen, &prior, self.map)]
+            let observed = centroids(pair, &prior, regions);
+            [Some(observed), uncut_centroids(observed, &prior, self.map)]
         });
-        for (index, seen) in starts.flatten().enumerate() {
-            let Some((_, first)) = self.fit(seen, REGION_DEVIATION, [true; 2], COARSE) else {
+        for (index, observed) in starts.flatten().enumerate() {
+            let Some((_, first)) = self.fit(observed, REGION_STD, [true; 2], COARSE) else {
                 continue;
             };
             // Many pairs lead to the same fit.
@@ -79,9 +79,9 @@ impl<P: BandPredictor> OutlineSearch<'_, P> {
         }
     }
 
-    /// Recognises the bands near features `seen` (4,) (px) with standard deviations `deviation` (4,) (px).
-    pub fn recognise_at(&self, seen: [f64; 4], deviation: [f64; 4]) -> Option<Recognition> {
-        let (_, first) = self.fit(seen, deviation, [true; 2], COARSE)?;
+    /// Recognises the bands near features `observed` (4,) (px) with standard deviations `std` (4,) (px).
+    pub fn recognise_at(&self, observed: [f64; 4], std: [f64; 4]) -> Option<Recognition> {
+        let (_, first) = self.fit(observed, std, [true; 2], COARSE)?;
         self.refine(first)
     }
 
@@ -112,8 +112,8 @@ impl<P: BandPredictor> OutlineSearch<'_, P> {
         let mut here = UNKNOWN;
         [here[2 - 2 * band], here[3 - 2 * band]] = [u, v];
         let starts = [here, centroids(pair, prior, regions)];
-        let is_ambiguous = starts.iter().any(|seen| {
-            self.recognise_at(*seen, REGION_DEVIATION)
+        let is_ambiguous = starts.iter().any(|observed| {
+            self.recognise_at(*observed, REGION_STD)
                 .is_some_and(|other| {
                     other.rejections[1 - band].is_none()
                         && other.scores[1 - band].mahalanobis_squared
@@ -132,14 +132,14 @@ impl<P: BandPredictor> OutlineSearch<'_, P> {
         let mut last = None;
         for _ in 0..REPEATS {
             let before = found.features;
-            let Some((prediction, next)) = self.fit(before, fit_deviation(&found), [true; 2], FINE)
+            let Some((prediction, next)) = self.fit(before, fit_std(&found), [true; 2], FINE)
             else {
                 break;
             };
             found = next;
             last = Some(prediction);
             let moved = before.iter().zip(found.features);
-            if moved.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) < STILL {
+            if moved.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) < CONVERGED {
                 break;
             }
         }
@@ -150,11 +150,11 @@ impl<P: BandPredictor> OutlineSearch<'_, P> {
             return Some(result);
         }
         // A rejected band must not influence the position of the other.
-        let mut seen = found.features;
+        let mut observed = found.features;
         for band in (0..2).filter(|band| !is_used[*band]) {
-            seen[2 * band..2 * band + 2].fill(f64::NAN);
+            observed[2 * band..2 * band + 2].fill(f64::NAN);
         }
-        let (prediction, found) = self.fit(seen, fit_deviation(&found), is_used, FINE)?;
+        let (prediction, found) = self.fit(observed, fit_std(&found), is_used, FINE)?;
         let mut single = Recognition::of(&prediction, &found, self.map, self.settings);
         for band in (0..2).filter(|band| !is_used[*band]) {
             single.rejections[band] = rejections[band];
@@ -164,20 +164,20 @@ impl<P: BandPredictor> OutlineSearch<'_, P> {
         Some(single)
     }
 
-    /// Fits the outlines of the posture that explains the features `seen`, starting there.
+    /// Fits the outlines of the posture that explains the features `observed`, starting there.
     fn fit(
         &self,
-        seen: [f64; 4],
-        deviation: [f64; 4],
+        observed: [f64; 4],
+        std: [f64; 4],
         is_used: [bool; 2],
         tolerances: [f64; 3],
     ) -> Option<(BandPrediction, Fit)> {
-        let prediction = self.predictor.predict(seen, deviation)?;
+        let prediction = self.predictor.predict(observed, std)?;
         let [[ua, va], [ub, vb]] = prediction.outlines.map(|outline| outline.centroid);
         let mut start = [ua, va, ub, vb];
-        for (start, seen) in start.iter_mut().zip(seen) {
-            if seen.is_finite() {
-                *start = seen;
+        for (start, observed) in start.iter_mut().zip(observed) {
+            if observed.is_finite() {
+                *start = observed;
             }
         }
         let settings = &self.settings.fit;
@@ -188,10 +188,10 @@ impl<P: BandPredictor> OutlineSearch<'_, P> {
 
 /// Centroids of the bands if these regions are the bands.
 fn centroids(pair: Pair, prior: &BandPrediction, regions: &[Region]) -> [f64; 4] {
-    let mut seen = UNKNOWN;
+    let mut observed = UNKNOWN;
     for (band, region) in pair.into_iter().enumerate() {
         if let Some(region) = region.and_then(|index| regions.get(index)) {
-            [seen[2 * band], seen[2 * band + 1]] = region.centroid();
+            [observed[2 * band], observed[2 * band + 1]] = region.centroid();
         }
     }
     if let [Some(one), Some(other)] = pair
@@ -199,15 +199,19 @@ fn centroids(pair: Pair, prior: &BandPrediction, regions: &[Region]) -> [f64; 4]
     {
         let [u, v] = prior.shift_to(regions[one].centroid());
         let [ua, va, ub, vb] = prior.features;
-        seen = [ua + u, va + v, ub + u, vb + v];
+        observed = [ua + u, va + v, ub + u, vb + v];
     }
-    seen
+    observed
 }
 
 /// Centroids of the whole bands from those of their parts inside the image; None if the border cuts neither.
-fn uncut_centroids(mut seen: [f64; 4], prior: &BandPrediction, map: &RunMap) -> Option<[f64; 4]> {
+fn uncut_centroids(
+    mut observed: [f64; 4],
+    prior: &BandPrediction,
+    map: &RunMap,
+) -> Option<[f64; 4]> {
     let mut is_cut = false;
-    for (outline, centroid) in prior.outlines.iter().zip(seen.chunks_exact_mut(2)) {
+    for (outline, centroid) in prior.outlines.iter().zip(observed.chunks_exact_mut(2)) {
         let part = [centroid[0], centroid[1]];
         let mut outline = outline.moved_to(part);
         for _ in 0..SHIFTS {
@@ -223,11 +227,11 @@ fn uncut_centroids(mut seen: [f64; 4], prior: &BandPrediction, map: &RunMap) -> 
         }
         centroid.copy_from_slice(&outline.centroid);
     }
-    is_cut.then_some(seen)
+    is_cut.then_some(observed)
 }
 
 /// Standard deviations of a fit's features for the next fit: twice its own plus 0.3 px, because the outlines were those of
 /// a posture that was not yet right.
-fn fit_deviation(found: &Fit) -> [f64; 4] {
+fn fit_std(found: &Fit) -> [f64; 4] {
     [0, 1, 2, 3].map(|index: usize| 0.3 + 2.0 * found.covariance[index][index].max(0.0).sqrt())
 }

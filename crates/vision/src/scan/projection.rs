@@ -10,7 +10,7 @@ use super::row::{Consumer, Group, Row};
 use super::simd_dot::{self, SimdDot};
 use super::simd_gather;
 
-/// Pixels that are scanned together where the compiler vectorises: 4 blocks were the fastest.
+/// Pixels that are scanned together where the compiler vectorises: long enough for its loop, in whole blocks.
 const CHUNK: usize = 4 * BLOCK;
 
 /// Largest magnitude of a projected pixel: the low-pass sums four of them in an `i16`, rounding included.

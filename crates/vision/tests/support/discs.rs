@@ -16,7 +16,7 @@ impl Discs {
 }
 
 impl BandPredictor for Discs {
-    fn predict(&self, _seen: [f64; 4], _deviation: [f64; 4]) -> Option<BandPrediction> {
+    fn predict(&self, _observed: [f64; 4], _std: [f64; 4]) -> Option<BandPrediction> {
         let [ua, va, ub, vb] = self.0;
         let disc = |[u, v]: [f64; 2]| Outline {
             corners: std::array::from_fn(|index| {
