@@ -26,7 +26,7 @@ import numpy as np
 from bench_processes import PATIENCE, bench_config, rig, run
 from numpy.typing import ArrayLike
 from tautscope import tables
-from tautscope.bench.truth import read_truth
+from tautscope.bench.ground_truth import read_ground_truth
 from tautscope.config import dump_config
 from tautscope.dof import Dof
 from tautscope.experiment import run_experiment
@@ -110,7 +110,7 @@ def with_truth(folder: Path, suffix: str, truth: Path) -> Recording:
     """A run with the true tip at its ticks and captures, as the in-process twin would have it."""
     recording = Recording.load(folder, suffix)
     sent = read_sent(folder / f"timing_cycles{suffix}.csv")
-    instants, states = read_truth(truth)
+    instants, states = read_ground_truth(truth)
     trace, frames = recording.trace.copy(), recording.frames.copy()
     count = min(len(sent), len(trace))
     trace = trace[:count]

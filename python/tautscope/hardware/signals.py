@@ -1,4 +1,4 @@
-"""Signals and motors: a process that is told to end stops its motors first."""
+"""POSIX signals: a process that is asked to end stops its motors first."""
 
 from __future__ import annotations
 
@@ -16,21 +16,20 @@ DEFERRED = (signal.SIGINT, *TERMINATING)
 
 @contextmanager
 def exit_on_signals() -> Iterator[None]:
-    """SIGTERM and SIGHUP raise SystemExit in the main thread, so that every ``with`` is left.
+    """Make SIGTERM and SIGHUP raise SystemExit in the main thread, so that every ``with`` is left.
 
-    They would end the process at once, and only the drives' own watchdogs would stop the motors.
-    SIGINT raises KeyboardInterrupt, also in a process in the background, whose shell had it
-    ignored. In another thread than the main one this does nothing. What was there before comes
-    back at the end.
+    By default they end the process at once, and only the drives' watchdogs stop the motors. SIGINT
+    raises KeyboardInterrupt, also in a background process whose shell ignores it. The handlers are
+    restored at the end. Outside the main thread this does nothing.
     """
 
-    def leave(number: int, frame: FrameType | None) -> None:
+    def exit_process(number: int, frame: FrameType | None) -> None:
         raise SystemExit(128 + number)
 
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = {number: signal.signal(number, leave) for number in TERMINATING}
+    before = {number: signal.signal(number, exit_process) for number in TERMINATING}
     before[signal.SIGINT] = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         yield
@@ -40,25 +39,24 @@ def exit_on_signals() -> Iterator[None]:
 
 
 @contextmanager
-def signals_deferred() -> Iterator[None]:
-    """Let signals that end the process wait until the block is done; then they act.
+def defer_signals() -> Iterator[None]:
+    """Defer signals that end the process until the end of the block.
 
-    A second Ctrl-C cannot interrupt a quick stop. In another thread than the main one this does
-    nothing: signals do not interrupt it.
+    A second Ctrl-C cannot interrupt a quick stop. Outside the main thread this does nothing.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    came: list[int] = []
+    received: list[int] = []
 
-    def note(number: int, frame: FrameType | None) -> None:
-        came.append(number)
+    def record(number: int, frame: FrameType | None) -> None:
+        received.append(number)
 
-    before = {number: signal.signal(number, note) for number in DEFERRED}
+    before = {number: signal.signal(number, record) for number in DEFERRED}
     try:
         yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-        for number in dict.fromkeys(came):
+        for number in dict.fromkeys(received):
             signal.raise_signal(number)

@@ -1,4 +1,4 @@
-"""Sources of pictures for tests: FFmpeg's own, and DV as the article's rig gave it."""
+"""Video sources for tests: FFmpeg's test sources, and DV as in the article's rig."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from tautscope.config import CameraConfig, SourceConfig
 
 SIZE = {"width": 64, "height": 48}
-PATIENCE = 60.0  # s; a loaded machine is slow, and no test waits for all of it
+PATIENCE = 60.0  # s; long, for a busy computer
 
 
 def camera(url: str, format_name: str | None = "lavfi", **changes: Any) -> CameraConfig:
@@ -37,7 +37,7 @@ def until(condition: Callable[[], bool]) -> None:
 
 
 def write_dv(path: Path, frames: int, pixel_format: str = "yuv420p") -> None:
-    """A bright bar that moves 10 px per field. DV's second lines come first in time."""
+    """A bright bar that moves 10 px per field. In DV the lower field comes first."""
     with av.open(str(path), "w") as container:
         stream = container.add_stream("dvvideo", rate=25)
         stream.width, stream.height, stream.pix_fmt = 720, 576, pixel_format
