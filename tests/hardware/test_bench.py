@@ -7,7 +7,7 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -25,8 +25,9 @@ from tautscope.hardware.timing import read_sent
 from tautscope.log.reader import read_log
 from tautscope.recording import Recording, per_dof
 from test_processes import Lines, process
+from waiting import TIMEOUT, until
 
-CYCLE, PATIENCE = 0.02, 60.0
+CYCLE = 0.02
 RUN = "from tautscope.cli import main; raise SystemExit(main())"
 
 
@@ -39,14 +40,14 @@ def bench_config(folder: Path, **changes: Any) -> Config:
                 "url": f"unix:{folder / 'video'}",
                 "format": "nut",
                 "clock": "device",
-                "timeout": PATIENCE,
-                "start_timeout": PATIENCE,
-                "lost_timeout": PATIENCE,
+                "timeout": TIMEOUT,
+                "start_timeout": TIMEOUT,
+                "lost_timeout": TIMEOUT,
                 "reconnect_period": 0.05,
             }
         },
         "drives": drives_document(
-            channel=str(folder / "can"), cycle=CYCLE, command_timeout=PATIENCE, start_speed=0.5
+            channel=str(folder / "can"), cycle=CYCLE, command_timeout=TIMEOUT, start_speed=0.5
         ),
         "experiment": {
             "periods": 3,
@@ -61,18 +62,11 @@ def bench_config(folder: Path, **changes: Any) -> Config:
 
 
 def next_capture(camera: Camera) -> Capture:
-    end = time.monotonic() + PATIENCE
+    end = time.monotonic() + TIMEOUT
     while (capture := camera.newest()) is None:
         assert time.monotonic() < end, camera.state
         time.sleep(0.005)
     return capture
-
-
-def until(condition: Callable[[], bool]) -> None:
-    end = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.005)
 
 
 def test_camera_stream_and_its_faults(tmp_path: Path) -> None:
@@ -200,10 +194,10 @@ def test_protocol_runs_over_bus_and_stream(rig: tuple[Config, Path, Lines], tmp_
     instants, states = read_ground_truth(tmp_path / "truth.csv")
     assert len(sent) == len(trace)
     truth = np.interp(sent, instants, states[:, Dof.INSERTION])
-    seen = frames[frames["observable_insertion"] & (frames["captured_at"] > 0)]
-    if len(seen) > 5:  # a busy computer may deliver too few frames
-        tip = np.interp(seen["captured_at"], trace["time"], truth)
-        assert np.median(np.abs(seen["estimate_insertion"] - tip)) < 2e-3
+    measured = frames[frames["observable_insertion"] & (frames["captured_at"] > 0)]
+    if len(measured) > 5:  # a busy computer may deliver too few frames
+        tip = np.interp(measured["captured_at"], trace["time"], truth)
+        assert np.median(np.abs(measured["estimate_insertion"] - tip)) < 2e-3
 
     facts = json.loads((out / "run.json").read_text(encoding="utf-8"))
     assert facts["runs"]["compensated"]["ticks"] == len(trace)
@@ -223,7 +217,7 @@ def test_sigterm_stops_the_motors_and_keeps_the_log(
         until(lambda: log.is_file() and log.stat().st_size > 10_000)
         running.send_signal(signal.SIGTERM)
         lines.until("quick stop active", 3)
-        assert running.wait(PATIENCE) == 128 + signal.SIGTERM
+        assert running.wait(TIMEOUT) == 128 + signal.SIGTERM
     assert len(read_log(log).recording().trace) > 0
 
 
@@ -235,7 +229,7 @@ def test_error_names_a_wrong_node_before_any_motion(
     text = file.read_text(encoding="utf-8").replace("node = 2", "node = 9")
     wrong.write_text(text.replace("request_timeout = 5.0", "request_timeout = 0.5"))
     with process("-c", RUN, "run", str(wrong), "--out", str(tmp_path / "run")) as (running, _):
-        assert running.wait(PATIENCE) == 2
+        assert running.wait(TIMEOUT) == 2
         assert running.stderr is not None
         errors = running.stderr.read()
     assert "error: rotation, node 9: no answer to an SDO request" in errors

@@ -10,31 +10,32 @@ import pytest
 from tautscope.config import CameraConfig, SourceConfig
 from tautscope.errors import CameraError
 from tautscope.hardware.cameras import Camera, Capture
-from video_sources import PATIENCE, camera, pattern, until, write_dv
+from video_sources import camera, pattern, write_dv
+from waiting import TIMEOUT, until
 
 
 def test_each_newest_frame_is_returned_once() -> None:
     with Camera(camera(pattern())) as live:
-        seen: list[Capture] = []
+        captures: list[Capture] = []
 
         def take() -> bool:
             capture = live.newest()
             if capture is not None:
-                seen.append(capture)
-            return len(seen) >= 5
+                captures.append(capture)
+            return len(captures) >= 5
 
         until(take)
-        until(lambda: live.state.received >= seen[-1].frame.sequence + 4)
+        until(lambda: live.state.received >= captures[-1].frame.sequence + 4)
         state = live.state
-    sequences = [capture.frame.sequence for capture in seen]
+    sequences = [capture.frame.sequence for capture in captures]
     assert sequences == sorted(set(sequences))
     assert state.skipped > 0
     assert state.is_interlaced is False
     assert state.trouble == ""
-    for capture in seen:
+    for capture in captures:
         assert capture.frame.captured_at <= capture.arrived_at
         assert capture.frame.image.shape == (48, 64, 3)
-    spacing = np.diff([capture.frame.captured_at for capture in seen]) / np.diff(sequences)
+    spacing = np.diff([capture.frame.captured_at for capture in captures]) / np.diff(sequences)
     assert np.median(spacing) == pytest.approx(0.02, rel=0.5)
 
 
@@ -52,7 +53,7 @@ def test_camera_connected_later_is_found(tmp_path: Path) -> None:
     path = tmp_path / "late.avi"
     config = CameraConfig(
         source=SourceConfig(
-            url=str(path), format=None, reconnect_period=0.01, start_timeout=PATIENCE
+            url=str(path), format=None, reconnect_period=0.01, start_timeout=TIMEOUT
         )
     )
     live = Camera(config)
@@ -126,7 +127,7 @@ def test_dv_from_a_stalled_pipe_recovers(tmp_path: Path) -> None:
         url=str(pipe),
         format="dv",
         timeout=0.3,
-        start_timeout=PATIENCE,
+        start_timeout=TIMEOUT,
         options={"probesize": "500000"},
     )
     go_on = threading.Event()

@@ -12,8 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tautscope.bench.can_bus import Hub, LocalBus
-
-PATIENCE = 30.0
+from waiting import TIMEOUT
 
 frames = st.builds(
     lambda extended, identifier, data: can.Message(
@@ -38,7 +37,7 @@ def test_all_other_stations_receive_all_frames_in_order(station: Callable[[], Lo
             one.send(message)
         for other in (two, three):
             for message in messages:
-                received = other.recv(PATIENCE)
+                received = other.recv(TIMEOUT)
                 assert received is not None
                 assert received.equals(message, timestamp_delta=None, check_channel=False)
         assert one.recv(0.0) is None
@@ -53,7 +52,7 @@ def settle(*stations: LocalBus) -> None:
             if other is sender:
                 continue
             received = None
-            deadline = time.monotonic() + PATIENCE
+            deadline = time.monotonic() + TIMEOUT
             while received is None or received.arbitration_id != number:
                 assert time.monotonic() < deadline
                 sender.send(can.Message(arbitration_id=number, is_extended_id=False))
@@ -63,7 +62,7 @@ def settle(*stations: LocalBus) -> None:
     for number, station in enumerate(stations):
         ends = {0x7FF, 0x7FE} - {0x7FF - number}
         while ends:
-            received = station.recv(PATIENCE)
+            received = station.recv(TIMEOUT)
             assert received is not None
             ends.discard(received.arbitration_id)
 
@@ -83,7 +82,7 @@ def test_closed_hub_disconnects_its_stations(hub: Hub, station: Callable[[], Loc
     bus = station()
     hub.close()
     with pytest.raises(can.CanOperationError, match="the bus is closed"):
-        bus.recv(PATIENCE)
+        bus.recv(TIMEOUT)
     assert not hub.path.exists()
 
 
@@ -108,5 +107,5 @@ def test_station_that_does_not_read_is_disconnected(
     listener = station()
     with pytest.raises(can.CanOperationError):
         while True:
-            sleeper.recv(PATIENCE)
+            sleeper.recv(TIMEOUT)
     settle(talker, listener)

@@ -20,7 +20,7 @@ from tautscope.errors import (
 )
 from tautscope.hardware.cia402 import State
 from tautscope.hardware.drives import open_drives
-from test_drive_faults import wait_for
+from waiting import until
 
 Bench = Callable[..., SimulatedDrives]
 
@@ -33,7 +33,7 @@ def test_mode_refused_by_the_drive(hub: Hub, bench: Bench) -> None:
     config = drives_config(channel=str(hub.path), state_timeout=0.2)
     rig = bench(config, modes=(7,))
     rig.inject("refuse", Dof.BENDING)
-    wait_for(lambda: any(event.what == "fault: refuse" for event in rig.events))
+    until(lambda: any(event.what == "fault: refuse" for event in rig.events))
     with pytest.raises(ModeRefusedError, match=r"bending, node 3: it did not enter mode 7.*is 0"):
         open_drives(config)
 

@@ -20,7 +20,8 @@ from tautscope.hardware.cia402 import State
 from tautscope.hardware.doctor.check_result import CheckResult
 from tautscope.hardware.doctor.computer import check_disk
 from tautscope.hardware.doctor.drives import check_drives
-from test_cameras import PATIENCE, until, write_dv
+from video_sources import write_dv
+from waiting import TIMEOUT, until
 
 Bench = Callable[..., SimulatedDrives]
 CAMERA = {
@@ -29,8 +30,8 @@ CAMERA = {
     "source": {
         "url": "testsrc2=size=64x48:rate=50,realtime",
         "format": "lavfi",
-        "start_timeout": PATIENCE,
-        "timeout": PATIENCE,
+        "start_timeout": TIMEOUT,
+        "timeout": TIMEOUT,
     },
 }
 
@@ -183,7 +184,7 @@ def missing(findings: list[CheckResult]) -> dict[str, CheckResult]:
 
 
 @pytest.mark.parametrize(
-    ("options", "changes", "where", "says"),
+    ("options", "changes", "where", "message"),
     [
         ({"modes": (1, 3)}, {}, "rotation, node 2", "stream of positions"),
         ({"absent": (0x6007,)}, {}, "rotation, node 2: settings", "add 6007 to drives.waive"),
@@ -199,12 +200,12 @@ def test_wrong_drive_is_named_and_the_others_are_checked(
     options: dict[str, Any],
     changes: dict[str, Any],
     where: str,
-    says: str,
+    message: str,
 ) -> None:
     drives = bench(drives_of(document(hub.path)), **options)
     wrong = {"rotation": {**AXES["rotation"], **changes}, "request_timeout": 1.0}
     found = check_drives(drives_of(document(hub.path, **wrong)))
-    assert says in missing(found)[where].todo, missing(found)
+    assert message in missing(found)[where].todo, missing(found)
     assert any(one.what == "bending, node 3" for one in found)
     assert was_never_enabled(drives)
 

@@ -25,7 +25,7 @@ def rotation(**changes: Any) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize(
-    ("changes", "field", "says"),
+    ("changes", "field", "message"),
     [
         (rotation(node=0), "drives.rotation.node", ">= 1"),
         (rotation(node=128), "drives.rotation.node", "<= 127"),
@@ -52,11 +52,11 @@ def rotation(**changes: Any) -> dict[str, Any]:
         ({"waive": ["6040"]}, "drives.waive[0]", "enum"),
     ],
 )
-def test_error_names_the_invalid_field(changes: dict[str, Any], field: str, says: str) -> None:
+def test_error_names_the_invalid_field(changes: dict[str, Any], field: str, message: str) -> None:
     with pytest.raises(ConfigError) as found:
         from_document({"drives": drives_document(**changes)})
     assert found.value.field == field
-    assert says in found.value.allowed
+    assert message in found.value.allowed
 
 
 def test_drives_section_is_optional_and_survives_a_round_trip(tmp_path: Path) -> None:

@@ -147,11 +147,11 @@ def test_capture_times_follow_the_set_point_in_force(setup: Callable[..., Setup]
 def test_repeated_image_is_not_a_new_frame(setup: Callable[..., Setup]) -> None:
     one = setup()
     start = one.rig.reset().applied
-    seen = []
+    is_new = []
     for value in (1, 2, 2, 2, 3):
         one.camera.provide(time.monotonic(), value)
-        seen.append(one.rig.step(start).frame is not None)
-    assert seen == [True, True, False, False, True]
+        is_new.append(one.rig.step(start).frame is not None)
+    assert is_new == [True, True, False, False, True]
 
 
 @pytest.mark.parametrize("how", ["nothing", "frozen"])
@@ -247,8 +247,8 @@ def test_supervisor_reaction_reaches_the_drives_in_the_same_tick(
         return step(loop, *values, **more)
 
     monkeypatch.setattr(HysteresisReduction, "step", step_with_fault)
-    says = r"loop: disable \(drive_fault\).*without power" if disabled else r"loop: quick_stop"
-    with pytest.raises(DriveError, match=says):
+    message = r"loop: disable \(drive_fault\).*without power" if disabled else r"loop: quick_stop"
+    with pytest.raises(DriveError, match=message):
         run_on_hardware(config, tmp_path / "run", lambda share: None, make_rig=lambda _: one.rig)
     assert (one.motors.stopped, one.motors.disabled, one.camera.closed) == (1, disabled, 1)
     assert next(ticks) == 21  # no further tick

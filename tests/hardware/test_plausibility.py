@@ -25,7 +25,7 @@ def run_sine(
     dof: Dof,
     tip_of: Callable[[float, float], float],
     *,
-    seen: bool = True,
+    is_measured: bool = True,
     noise: float = 0.0,
     config: Config = CONFIG,
     delay: int = 0,
@@ -44,7 +44,7 @@ def run_sine(
         tip = tip_of(tip, motor[dof])
         estimate = START.copy()
         estimate[dof] = tip + noise * random.standard_normal()
-        report: Any = SimpleNamespace(state_estimate=estimate, observable=np.full(3, seen))
+        report: Any = SimpleNamespace(state_estimate=estimate, observable=np.full(3, is_measured))
         pending.append((float(time), report))
         if len(pending) > delay:
             monitor.check_frame(*pending.popleft())
@@ -55,9 +55,9 @@ def play(width: float) -> Callable[[float, float], float]:
 
 
 @dofs
-@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
-def test_tip_behind_slack_passes(dof: Dof, share: float) -> None:
-    run_sine(dof, play(share * SLACK[dof]), noise=0.05 * CONFIG[dof].update_distance)
+@pytest.mark.parametrize("fraction", [0.0, 0.5, 1.0])
+def test_tip_behind_slack_passes(dof: Dof, fraction: float) -> None:
+    run_sine(dof, play(fraction * SLACK[dof]), noise=0.05 * CONFIG[dof].update_distance)
 
 
 @dofs
@@ -100,4 +100,4 @@ def test_tip_that_does_not_move(dof: Dof) -> None:
 @dofs
 def test_tip_that_is_never_measured(dof: Dof) -> None:
     with pytest.raises(ConfigError, match=f"drives.{dof.label}: .*no frame measured it"):
-        run_sine(dof, play(0.0), seen=False)
+        run_sine(dof, play(0.0), is_measured=False)

@@ -16,8 +16,8 @@ from typing import Any
 import pytest
 from drive_settings import drives_document
 from tautscope.config import dump_config, from_document
+from waiting import TIMEOUT
 
-PATIENCE = 60.0
 DOFS = {"insertion", "rotation", "bending"}
 
 
@@ -40,13 +40,13 @@ class Lines:
         lines: list[dict[str, Any]] = []
         while sum(line.get("what") == what for line in lines) < times:
             try:
-                lines.append(json.loads(self._queue.get(timeout=PATIENCE)))
+                lines.append(json.loads(self._queue.get(timeout=TIMEOUT)))
             except Empty:
                 pytest.fail(f"no {what!r} after {lines}")
         return lines
 
     def join(self) -> None:
-        self._thread.join(PATIENCE)
+        self._thread.join(TIMEOUT)
         assert self._stream is not None
         self._stream.close()
 
@@ -68,7 +68,7 @@ def process(*arguments: str) -> Iterator[tuple[subprocess.Popen[str], Lines]]:
         assert running.stderr is not None
         running.stdin.close()
         try:
-            running.wait(PATIENCE)
+            running.wait(TIMEOUT)
         finally:
             running.kill()
             running.wait()
@@ -90,6 +90,14 @@ def rig(tmp_path: Path) -> Iterator[tuple[Path, subprocess.Popen[str], Lines]]:
 
 
 MASTER = str(Path(__file__).with_name("master.py"))
+
+
+@contextmanager
+def running_master(file: Path, lines: Lines) -> Iterator[subprocess.Popen[str]]:
+    with process(MASTER, str(file), "signal") as (master, output):
+        lines.until("operation enabled", 3)
+        output._queue.get(timeout=TIMEOUT)
+        yield master
 
 
 @pytest.mark.parametrize(
@@ -114,11 +122,11 @@ def test_motors_stop_however_the_master_ends(
     with process(MASTER, str(file), how) as (master, output):
         lines.until("operation enabled", 3)
         if isinstance(ending, signal.Signals):
-            output._queue.get(timeout=PATIENCE)
+            output._queue.get(timeout=TIMEOUT)
             master.send_signal(ending)
         stopped = lines.until("quick stop active", 3)
         assert {line["dof"] for line in stopped if line["what"] == "quick stop active"} == DOFS
-        assert master.wait(PATIENCE) == status
+        assert master.wait(TIMEOUT) == status
     assert not any(line["what"] == "fault" for line in stopped)
 
 
@@ -126,11 +134,9 @@ def test_master_reports_lost_drives(
     rig: tuple[Path, subprocess.Popen[str], Lines],
 ) -> None:
     file, bench, lines = rig
-    with process(MASTER, str(file), "signal") as (master, output):
-        lines.until("operation enabled", 3)
-        output._queue.get(timeout=PATIENCE)
+    with running_master(file, lines) as master:
         bench.kill()
-        assert master.wait(PATIENCE) == 1
+        assert master.wait(TIMEOUT) == 1
         assert master.stderr is not None
         text = master.stderr.read()
     assert "BusError: CAN bus: the connection is lost" in text
@@ -141,13 +147,11 @@ def test_fault_injected_through_standard_input(
     rig: tuple[Path, subprocess.Popen[str], Lines],
 ) -> None:
     file, bench, lines = rig
-    with process(MASTER, str(file), "signal") as (master, output):
-        lines.until("operation enabled", 3)
-        output._queue.get(timeout=PATIENCE)
+    with running_master(file, lines) as master:
         assert bench.stdin is not None
         bench.stdin.write("fault bending\n")
         bench.stdin.flush()
         lines.until("quick stop active", 2)
-        assert master.wait(PATIENCE) == 1
+        assert master.wait(TIMEOUT) == 1
         assert master.stderr is not None
         assert "EmergencyError: bending, node 3: emergency 0x4310" in master.stderr.read()

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import av
 import numpy as np
 from tautscope.config import CameraConfig, SourceConfig
+from waiting import TIMEOUT
 
 SIZE = {"width": 64, "height": 48}
-PATIENCE = 60.0  # s; long, for a busy computer
 
 
 def camera(url: str, format_name: str | None = "lavfi", **changes: Any) -> CameraConfig:
-    source = {"reconnect_period": 0.01, "start_timeout": PATIENCE, "timeout": PATIENCE}
+    source = {"reconnect_period": 0.01, "start_timeout": TIMEOUT, "timeout": TIMEOUT}
     layout = SIZE | {
         key: changes.pop(key) for key in ("width", "height", "pixel_format") if key in changes
     }
@@ -27,13 +25,6 @@ def camera(url: str, format_name: str | None = "lavfi", **changes: Any) -> Camer
 
 def pattern(more: str = "", size: str = "64x48") -> str:
     return f"testsrc2=size={size}:rate=50{more},realtime"
-
-
-def until(condition: Callable[[], bool]) -> None:
-    end = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.005)
 
 
 def write_dv(path: Path, frames: int, pixel_format: str = "yuv420p") -> None:

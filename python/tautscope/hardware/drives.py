@@ -74,8 +74,8 @@ class Drives:
         self.config = config
         self._bus = bus
         self._scales = [Scale(config[dof], dof.label) for dof in Dof]
-        self._running = False
-        self._closed = False
+        self._is_running = False
+        self._is_closed = False
         self._previous: NDArray[np.float64] = np.zeros(3)
         try:
             self.commissioned = tuple(commission(bus, config, dof) for dof in Dof)
@@ -93,9 +93,9 @@ class Drives:
         return self.config.cycle
 
     @property
-    def running(self) -> bool:
+    def is_running(self) -> bool:
         """Whether the motors are enabled and follow commands."""
-        return self._running
+        return self._is_running
 
     @property
     def statistics(self) -> BusStatistics:
@@ -121,7 +121,7 @@ class Drives:
             FollowingError: A motor is outside its travel.
             DriveError: As `exchange`.
         """
-        if self._running or self._closed:
+        if self._is_running or self._is_closed:
             raise StateError(
                 "drives", "start() was called while running or closed", "Open them again"
             )
@@ -131,7 +131,7 @@ class Drives:
             self._stop_after(error)
             raise
         self._previous = self._monitor.reset(feedback)
-        self._running = True
+        self._is_running = True
         return self._previous.copy()
 
     def exchange(self, command: ArrayLike) -> NDArray[np.float64]:
@@ -157,7 +157,7 @@ class Drives:
 
         All motors are quick-stopped before any of these is raised.
         """
-        if not self._running:
+        if not self._is_running:
             raise StateError(
                 "drives", "a command before start() or after stop()", "Call start() first"
             )
@@ -194,7 +194,7 @@ class Drives:
             StateError: A drive does not confirm; use the emergency stop.
         """
         with defer_signals():
-            self._running = False
+            self._is_running = False
             unconfirmed = self._machine.disable()
         if unconfirmed:
             raise _unconfirmed(unconfirmed, "disabling")
@@ -206,9 +206,9 @@ class Drives:
             StateError: As `stop`.
         """
         with defer_signals():
-            if self._closed:
+            if self._is_closed:
                 return
-            self._closed = True
+            self._is_closed = True
             try:
                 unconfirmed = self._quick_stop()
             finally:
@@ -237,7 +237,7 @@ class Drives:
 
     def _quick_stop(self) -> list[str]:
         """Quick-stop all drives; names of those that do not confirm it."""
-        self._running = False
+        self._is_running = False
         return self._machine.quick_stop()
 
 
