@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import can
 from drive_settings import AXES, drives_config
@@ -40,7 +41,10 @@ class Transcript(can.BusABC):
 QUICK = {"heartbeat_period": 0.001, "cycle": 0.001, "reply_timeout": 5e-4}
 
 
-def open_transcript(answers: dict[str, str], node: int = 1) -> tuple[CanopenFieldbus, Transcript]:
+@contextmanager
+def open_transcript(
+    answers: dict[str, str], node: int = 1
+) -> Iterator[tuple[CanopenFieldbus, Transcript]]:
     """Open a fieldbus whose insertion drive has this node id."""
     bus = Transcript(lambda sent: [answers[sent]] if sent in answers else [])
     others = [other for other in range(1, 5) if other != node]
@@ -48,4 +52,9 @@ def open_transcript(answers: dict[str, str], node: int = 1) -> tuple[CanopenFiel
         dof.label: AXES[dof.label] | {"node": number}
         for dof, number in zip(Dof, [node, *others], strict=False)
     }
-    return CanopenFieldbus(drives_config(**QUICK, **axes), bus), bus
+    fieldbus = CanopenFieldbus(drives_config(**QUICK, **axes), bus)
+    try:
+        yield fieldbus, bus
+    finally:
+        fieldbus.stop_communication([])  # no SDO transfers when it is closed
+        fieldbus.close()

@@ -50,12 +50,9 @@ from tautscope.hardware.object_dictionary import Entry
     ],
 )
 def test_sdo_upload(node: int, asked: str, answered: str, entry: Entry, value: int) -> None:
-    fieldbus, bus = open_transcript({asked: answered}, node)
-    try:
+    with open_transcript({asked: answered}, node) as (fieldbus, bus):
         assert fieldbus.read(Dof.INSERTION, entry) == value
         assert bus.sent == [asked]
-    finally:
-        fieldbus.close()
 
 
 @pytest.mark.parametrize(
@@ -73,13 +70,10 @@ def test_sdo_download(
     index, subindex, size = entry
     if (index, subindex) == (0x1800, 9):
         subindex = 2  # the manual writes four bytes, against the type of CiA 301
-    fieldbus, bus = open_transcript({sent: answered}, node)
-    fieldbus._sdo[Dof.INSERTION].od.indices.pop(index, None)
-    try:
+    with open_transcript({sent: answered}, node) as (fieldbus, bus):
+        fieldbus._sdo[Dof.INSERTION].od.indices.pop(index, None)
         fieldbus.write(Dof.INSERTION, Entry(index, subindex, "object", size), value)  # type: ignore[arg-type]
         assert bus.sent == [sent]
-    finally:
-        fieldbus.close()
 
 
 @pytest.mark.parametrize(
@@ -93,17 +87,14 @@ def test_sdo_download(
 )
 def test_sdo_abort_codes(code: str, error: type[DriveError]) -> None:
     """Elmo1: 0x80, index, sub-index, abort code as Unsigned32."""
-    fieldbus, _ = open_transcript({"601#2F60600007000000": f"581#80606000{code}"})
-    number = int.from_bytes(bytes.fromhex(code), "little")
-    try:
+    with open_transcript({"601#2F60600007000000": f"581#80606000{code}"}) as (fieldbus, _):
+        number = int.from_bytes(bytes.fromhex(code), "little")
         with pytest.raises(error) as found:
             fieldbus.write(Dof.INSERTION, objects.MODES_OF_OPERATION, 7)
         assert type(found.value) is error
         assert "insertion, node 1" in str(found.value)
         if error is SettingRefusedError:
             assert f"0x{number:08X}" in str(found.value)
-    finally:
-        fieldbus.close()
 
 
 def test_enabling_follows_a_recorded_trace() -> None:
@@ -112,11 +103,8 @@ def test_enabling_follows_a_recorded_trace() -> None:
     for statusword, controlword in trace:
         word = cia402.next_controlword(cia402.state_of(statusword))
         assert word is not None
-        fieldbus, bus = open_transcript({}, node=2)
-        try:
+        with open_transcript({}, node=2) as (fieldbus, bus):
             fieldbus.exchange([word] * 3, [0] * 3)
-        finally:
-            fieldbus.close()
         assert f"202#{controlword}" in bus.sent
         assert bus.sent[-1] == "080#"  # S300: SYNC
     assert cia402.state_of(0x0737) is State.OPERATION_ENABLED
@@ -127,8 +115,7 @@ def test_quick_stop_and_disable_voltage_controlwords() -> None:
 
     They are repeated, also after the emergency object of S300.
     """
-    fieldbus, bus = open_transcript({})
-    try:
+    with open_transcript({}) as (fieldbus, bus):
         bus.waiting.append("081#1043080100000000")
         for word, data in ((cia402.QUICK_STOP, "0200"), (cia402.DISABLE_VOLTAGE, "0000")):
             for _ in range(2):
@@ -138,35 +125,26 @@ def test_quick_stop_and_disable_voltage_controlwords() -> None:
                     one for one in bus.sent if one.startswith("20")
                 ]
                 assert bus.sent[-1] == "080#"
-    finally:
-        fieldbus.close()
 
 
 def test_interpolated_position_frames() -> None:
     """Elmo2: 0x60C2:1 in milliseconds; bit 4 of the controlword enables interpolation."""
-    fieldbus, bus = open_transcript({"601#2FC260010A000000": "581#60C2600100000000"})
-    try:
+    with open_transcript({"601#2FC260010A000000": "581#60C2600100000000"}) as (fieldbus, bus):
         fieldbus.write(Dof.INSERTION, objects.INTERPOLATION_TIME, 10)
         fieldbus.exchange([cia402.ENABLE_INTERPOLATION] * 3, [0x12345678, -2, 0])
         assert "201#1F00" in bus.sent
         assert "301#78563412" in bus.sent
         assert "302#FEFFFFFF" in bus.sent
-    finally:
-        fieldbus.close()
 
 
 def test_network_management_and_heartbeat() -> None:
     """EAO: 70b#00, 70b#7F, 000#010b, 70b#05."""
-    fieldbus, bus = open_transcript({}, node=0x0B)
-    try:
+    with open_transcript({}, node=0x0B) as (fieldbus, bus):
         fieldbus.start()
         assert "000#010B" in bus.sent
         bus.waiting += ["70B#7F", "70B#05"]
         fieldbus.exchange([0] * 3, [0] * 3)
         assert "77F#05" in bus.sent  # the master's node id is 0x7F
-        fieldbus.stop_communication([])
-    finally:
-        fieldbus.close()
 
     sent: list[str] = []
     node = CanopenNode(0x0B, lambda identifier, data: sent.append(frame(identifier, data)))
@@ -181,36 +159,27 @@ def test_network_management_and_heartbeat() -> None:
 def test_consumer_heartbeat_encodes_node_and_time() -> None:
     """Vect: bits 23-16 node id, bits 15-0 time in ms."""
     written = "601#2316100150007F00"
-    fieldbus, bus = open_transcript({written: "581#6016100100000000"})
-    try:
+    with open_transcript({written: "581#6016100100000000"}) as (fieldbus, bus):
         fieldbus.write(Dof.INSERTION, objects.CONSUMER_HEARTBEAT, 127 << 16 | 80)
         assert bus.sent == [written]
-    finally:
-        fieldbus.close()
 
 
 def test_emergency_object_raises() -> None:
     """S300: 081 10 43 08 01 is the motor temperature; 081 00 00 resets it."""
-    fieldbus, bus = open_transcript({})
-    try:
+    with open_transcript({}) as (fieldbus, bus):
         bus.waiting.append("081#0000080000000000")
         fieldbus.exchange([0] * 3, [0] * 3)
         bus.waiting.append("081#1043080100000000")
         with pytest.raises(EmergencyError, match=r"insertion, node 1: emergency 0x4310.*0x08"):
             fieldbus.exchange([0] * 3, [0] * 3)
-    finally:
-        fieldbus.close()
 
 
 @pytest.mark.parametrize("foreign", ["080#", "202#0F00", "000#8100", "77F#05"])
 def test_second_master_raises(foreign: str) -> None:
-    fieldbus, bus = open_transcript({})
-    try:
+    with open_transcript({}) as (fieldbus, bus):
         bus.waiting.append(foreign)
         with pytest.raises(SecondMasterError, match=foreign):
             fieldbus.exchange([0] * 3, [0] * 3)
-    finally:
-        fieldbus.close()
 
 
 def test_simulated_drive_answers_as_published() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -39,14 +40,11 @@ def test_eds_file_determines_object_lengths(tmp_path: Path) -> None:
     sent = "601#2B7F6000E8030000"
     bus = Transcript(lambda frame: ["581#607F600000000000"] if frame == sent else [])
     axis = AXES["insertion"] | {"eds": str(file)}
-    fieldbus = CanopenFieldbus(drives_config(**QUICK, insertion=axis), bus)
-    try:
+    with closing(CanopenFieldbus(drives_config(**QUICK, insertion=axis), bus)) as fieldbus:
         fieldbus.write(Dof.INSERTION, objects.MAX_PROFILE_VELOCITY, 0x03E8)
         assert bus.sent == [sent]
         with pytest.raises(SettingRefusedError, match=r"cannot hold 65536.*EDS"):
             fieldbus.write(Dof.INSERTION, objects.MAX_PROFILE_VELOCITY, 65536)
-    finally:
-        fieldbus.close()
 
 
 def test_eds_file_of_another_drive_is_refused(

@@ -28,7 +28,6 @@ requests = st.tuples(  # SDO requests
 
 def test_malformed_frames_crash_neither_master_nor_drive() -> None:
     """The drive answers or ignores a frame; the master raises only `DriveError`."""
-    fieldbus, bus = open_transcript({})
     drive = SimulatedDrive(
         Dof.ROTATION,
         drives_config(),
@@ -50,8 +49,5 @@ def test_malformed_frames_crash_neither_master_nor_drive() -> None:
         with suppress(DriveError):
             fieldbus.exchange([0] * 3, [0] * 3)
 
-    try:
+    with open_transcript({}) as (fieldbus, bus):
         check()
-    finally:
-        fieldbus.stop_communication([])
-        fieldbus.close()

@@ -167,39 +167,27 @@ class Camera:
                 return
             arrived_at = self._clock()
             captured_at = stream_clock.captured_at(decoded.stamp, arrived_at)
-            self._deliver(
-                decoded, captured_at, arrived_at, _lost_frames(last, decoded, decoder), decoder
-            )
-            last = decoded.stamp
-
-    def _deliver(
-        self,
-        decoded: DecodedFrame,
-        captured_at: float,
-        arrived_at: float,
-        lost: int,
-        decoder: Decoder,
-    ) -> None:
-        self._sequence += lost
-        frame = Frame(decoded.image, captured_at, self._sequence)
-        self._sequence += 1
-        capture = Capture(frame, arrived_at)
-        with self._lock:
-            state = self._state
-            self._state = replace(
-                state,
-                received=state.received + 1,
-                lost=state.lost + lost,
-                skipped=state.skipped + (self._newest is not None),
-                is_interlaced=decoder.is_interlaced,
-                trouble="",
-            )
-            self._newest = capture
-            self._arrived_at = arrived_at
-        if not self._is_tested.is_set():
-            self._test_captures.append(capture)
-            if len(self._test_captures) == TEST_FRAMES:
-                self._is_tested.set()
+            lost, last = _lost_frames(last, decoded, decoder), decoded.stamp
+            self._sequence += lost
+            frame = Frame(decoded.image, captured_at, self._sequence)
+            self._sequence += 1
+            capture = Capture(frame, arrived_at)
+            with self._lock:
+                state = self._state
+                self._state = replace(
+                    state,
+                    received=state.received + 1,
+                    lost=state.lost + lost,
+                    skipped=state.skipped + (self._newest is not None),
+                    is_interlaced=decoder.is_interlaced,
+                    trouble="",
+                )
+                self._newest = capture
+                self._arrived_at = arrived_at
+            if not self._is_tested.is_set():
+                self._test_captures.append(capture)
+                if len(self._test_captures) == TEST_FRAMES:
+                    self._is_tested.set()
 
 
 def _lost_frames(last: float | None, decoded: DecodedFrame, decoder: Decoder) -> int:

@@ -22,12 +22,7 @@ from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from tautscope.config import DrivesConfig
 from tautscope.dof import Dof
-from tautscope.errors import (
-    ConfigError,
-    DriveError,
-    SettingRefusedError,
-    SilentDriveError,
-)
+from tautscope.errors import ConfigError, DriveError, SettingRefusedError, SilentDriveError
 from tautscope.hardware import object_dictionary as objects
 from tautscope.hardware.canopen_master import (
     PRE_OPERATIONAL,

@@ -24,13 +24,7 @@ import can
 
 from tautscope.config import DrivesConfig
 from tautscope.dof import Dof
-from tautscope.errors import (
-    BusError,
-    EmergencyError,
-    HeartbeatError,
-    SecondMasterError,
-    StateError,
-)
+from tautscope.errors import BusError, EmergencyError, HeartbeatError, SecondMasterError, StateError
 from tautscope.hardware.fieldbus import EMPTY_TX_PDO, TX_PDO_SIZE, Feedback, TxPdo
 
 NMT, SYNC, EMERGENCY = 0x000, 0x080, 0x080

@@ -40,10 +40,7 @@ def add_parser(verbs: arguments.Verbs) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from tautscope.hardware.experiment import (  # noqa: PLC0415
-        run_on_hardware,
-        write_run_folder,
-    )
+    from tautscope.hardware.experiment import run_on_hardware, write_run_folder  # noqa: PLC0415
     from tautscope.output import default_folder  # noqa: PLC0415
     from tautscope.progress import progress_bar  # noqa: PLC0415
 

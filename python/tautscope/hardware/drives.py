@@ -243,12 +243,12 @@ class Drives:
 
 def _as_vector(command: ArrayLike) -> NDArray[np.float64]:
     try:
-        wanted = np.array(command, dtype=np.float64)
+        vector = np.array(command, dtype=np.float64)
     except (TypeError, ValueError):
-        raise SignalError("command", command, "three finite numbers [m, rad, rad]") from None
-    if wanted.shape != (3,):
+        vector = np.empty(0)
+    if vector.shape != (3,):
         raise SignalError("command", command, "three finite numbers [m, rad, rad]")
-    return wanted
+    return vector
 
 
 def _unconfirmed(names: list[str], what: str = "quick stop") -> StateError:

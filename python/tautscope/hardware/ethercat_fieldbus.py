@@ -88,8 +88,7 @@ class EthercatFieldbus:
             )
         self._slaves = {
             dof: _Slave(
-                f"{dof.label}, device {config[dof].node}",
-                self._master.slaves[config[dof].node - 1],
+                f"{dof.label}, device {config[dof].node}", self._master.slaves[config[dof].node - 1]
             )
             for dof in Dof
         }

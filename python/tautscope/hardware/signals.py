@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+Handler = Callable[[int, FrameType | None], object]
 TERMINATING = tuple(
     getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)
 )
@@ -26,16 +27,9 @@ def exit_on_signals() -> Iterator[None]:
     def exit_process(number: int, frame: FrameType | None) -> None:
         raise SystemExit(128 + number)
 
-    if threading.current_thread() is not threading.main_thread():
+    handlers: dict[int, Handler] = dict.fromkeys(TERMINATING, exit_process)
+    with _installed(handlers | {signal.SIGINT: signal.default_int_handler}):
         yield
-        return
-    before = {number: signal.signal(number, exit_process) for number in TERMINATING}
-    before[signal.SIGINT] = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 @contextmanager
@@ -44,19 +38,24 @@ def defer_signals() -> Iterator[None]:
 
     A second Ctrl-C cannot interrupt a quick stop. Outside the main thread this does nothing.
     """
+    received: list[int] = []
+    try:
+        with _installed(dict.fromkeys(DEFERRED, lambda number, frame: received.append(number))):
+            yield
+    finally:
+        for number in dict.fromkeys(received):
+            signal.raise_signal(number)
+
+
+@contextmanager
+def _installed(handlers: dict[int, Handler]) -> Iterator[None]:
+    """Install signal handlers for the block, if this is the main thread."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    received: list[int] = []
-
-    def record(number: int, frame: FrameType | None) -> None:
-        received.append(number)
-
-    before = {number: signal.signal(number, record) for number in DEFERRED}
+    before = {number: signal.signal(number, handler) for number, handler in handlers.items()}
     try:
         yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-        for number in dict.fromkeys(received):
-            signal.raise_signal(number)
