@@ -1,4 +1,4 @@
-"""Where the tip of the bench's instrument truly is, in a file; for evaluation alone."""
+"""A file of the true tip state of the bench's instrument, for evaluation only."""
 
 from __future__ import annotations
 
@@ -12,61 +12,61 @@ from numpy.typing import NDArray
 
 from tautscope.dof import Dof
 from tautscope.errors import OutputError
-from tautscope.hardware.realtime import OTHERS, step_back
+from tautscope.hardware.realtime import OTHERS, lower_realtime_priority
 from tautscope.runs.recording import per_dof
 
 TRUTH = np.dtype([("time", "f8")] + [(f"true_{dof.label}", "f8") for dof in Dof])
-"""A line of the truth: the tip (3,) [m, rad, rad] at an instant of the monotonic clock [s]."""
+"""Columns: time of the monotonic clock [s] and true tip state (3,) [m, rad, rad]."""
 _WRITE_PERIOD = 0.1
-"""How often lines are written [s]."""
+"""Time from one write to the next [s]."""
 
 
-class TruthFile:
-    """Writes a CSV in a thread of its own: a disk that is busy must not hold the drives up.
+class GroundTruthWriter:
+    """Writes a CSV in a thread, so that a busy disk cannot delay the drives.
 
     Args:
-        path: It is replaced.
+        path: The file; it is overwritten.
 
     Raises:
-        OutputError: It cannot be written.
+        OutputError: The file cannot be written.
     """
 
     def __init__(self, path: Path) -> None:
         try:
             self._file = path.open("w", encoding="utf-8")
         except OSError as error:
-            place = f"a place that can be written ({error})"
-            raise OutputError("--truth", str(path), place) from None
+            allowed = f"a file that can be written ({error})"
+            raise OutputError("--truth", str(path), allowed) from None
         self._lines: deque[tuple[float, float, float, float]] = deque()
-        self._ending = threading.Event()
+        self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="truth", daemon=True)
         self._thread.start()
 
     def add(self, now: float, state: NDArray[np.float64]) -> None:
-        """The tip (3,) [m, rad, rad] at an instant of the monotonic clock [s]."""
+        """Add the tip state (3,) [m, rad, rad] at a time of the monotonic clock [s]."""
         self._lines.append((float(now), float(state[0]), float(state[1]), float(state[2])))
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *failure: object) -> None:
-        self._ending.set()
+        self._stopping.set()
         self._thread.join()
 
     def _run(self) -> None:
-        step_back(OTHERS)
+        lower_realtime_priority(OTHERS)
         with self._file as file:
             file.write(",".join(TRUTH.names or ()) + "\n")
             is_last = False
             while not is_last:
-                is_last = self._ending.wait(_WRITE_PERIOD)
+                is_last = self._stopping.wait(_WRITE_PERIOD)
                 while self._lines:
                     now, *state = self._lines.popleft()
                     file.write(f"{now!r}," + ",".join(f"{x:.9g}" for x in state) + "\n")
                 file.flush()
 
 
-def read_truth(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Instants (n,) [s, monotonic clock] and true tip states (n, 3) [m, rad, rad] of a bench."""
+def read_ground_truth(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Read times (n,) [s, monotonic clock] and true tip states (n, 3) [m, rad, rad]."""
     table = np.loadtxt(path, TRUTH, delimiter=",", skiprows=1)
     return table["time"], per_dof(table, "true")

@@ -1,16 +1,17 @@
-"""What goes wrong ends in a quick stop of all motors and an error that says what to do."""
+"""Every fault ends in a quick stop of all motors and an error with a remedy."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 import pytest
-from drive_rig import drives_config
+from drive_settings import drives_config
 from tautscope.bench.can_bus import Hub, LocalBus
 from tautscope.bench.drives import SimulatedDrives
-from tautscope.config import DrivesConfig
 from tautscope.dof import Dof
 from tautscope.errors import (
     BusError,
@@ -24,8 +25,9 @@ from tautscope.errors import (
     SilentDriveError,
     StateError,
 )
-from tautscope.hardware.cia402 import AT_REST, State
+from tautscope.hardware.cia402 import STOPPED_STATES, State
 from tautscope.hardware.drives import Drives, open_drives
+from waiting import until
 
 SPEED = np.array([0.01, 1.5, 0.8])
 Bench = Callable[..., SimulatedDrives]
@@ -40,12 +42,24 @@ def drive(drives: Drives, cycles: int, speed: np.ndarray = SPEED) -> None:
         time.sleep(drives.cycle / 2)
 
 
+@contextmanager
+def running(
+    hub: Hub, bench: Bench, *plant: Any, **changes: Any
+) -> Iterator[tuple[SimulatedDrives, Drives]]:
+    """Simulated drives and their master, enabled."""
+    config = drives_config(channel=str(hub.path), **changes)
+    rig = bench(config, *plant)
+    with open_drives(config) as drives:
+        drives.start()
+        yield rig, drives
+
+
 def at_rest(rig: SimulatedDrives) -> bool:
-    return all(state in AT_REST for state in rig.states.values())
+    return all(state in STOPPED_STATES for state in rig.states.values())
 
 
 @pytest.mark.parametrize(
-    ("kind", "errors", "says"),
+    ("kind", "errors", "message"),
     [
         ("fault", EmergencyError, "emergency 0x4310"),
         ("freeze", FollowingError, "blocks the motor"),
@@ -55,62 +69,46 @@ def at_rest(rig: SimulatedDrives) -> bool:
         ("refuse", StateError, "changed from mode 8 to 0"),
     ],
 )
-def test_a_fault_while_running_stops_all_motors(
-    hub: Hub, bench: Bench, kind: str, errors: type[DriveError], says: str
+def test_fault_while_running_stops_all_motors(
+    hub: Hub, bench: Bench, kind: str, errors: type[DriveError], message: str
 ) -> None:
-    config = drives_config(channel=str(hub.path))
-    rig = bench(config)
-    with open_drives(config) as drives:
-        drives.start()
+    with running(hub, bench) as (rig, drives):
         drive(drives, 5)
         rig.inject(kind, Dof.ROTATION, 60.0)  # type: ignore[arg-type]
-        with pytest.raises(errors, match=says) as found:
+        with pytest.raises(errors, match=message) as found:
             drive(drives, 10_000)
         assert "rotation, node 2" in str(found.value)
-        assert not drives.running
+        assert not drives.is_running
         if kind in ("drop", "delay"):
             assert "quick stop is not confirmed" in str(found.value.__notes__)
-            # It did hear it, or lost our heartbeat.
+            # It received the quick stop, or missed the master's heartbeat.
             rig.clear(Dof.ROTATION)
-            wait_for(lambda: at_rest(rig))
+            until(lambda: at_rest(rig))
         assert at_rest(rig)
-        with pytest.raises(StateError, match="before start or after stop"):
+        with pytest.raises(StateError, match="before start\\(\\) or after stop"):
             drives.exchange([0, 0, 0])
 
 
-def wait_for(condition: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + 30
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
-
-
-def test_a_pause_of_ours_is_not_blamed_on_a_drive(hub: Hub, bench: Bench) -> None:
-    """The drives' heartbeats came meanwhile and wait to be read; ours stayed away, they say."""
-    config = drives_config(channel=str(hub.path), heartbeat_timeout=0.6, heartbeat_period=0.02)
-    rig = bench(config)
-    with open_drives(config) as drives:
-        drives.start()
+def test_pause_of_the_master_is_reported(hub: Hub, bench: Bench) -> None:
+    """The drives report the missing heartbeat of the master."""
+    with running(hub, bench, heartbeat_timeout=0.6, heartbeat_period=0.02) as (rig, drives):
         drive(drives, 3)
-        time.sleep(2 * config.heartbeat_timeout)
+        time.sleep(2 * drives.config.heartbeat_timeout)
         with pytest.raises(EmergencyError, match="emergency 0x8130") as found:
             drive(drives, 1)
         assert "This computer paused for" in str(found.value.__notes__)
         assert at_rest(rig)
 
 
-def test_answers_that_are_a_little_late_are_counted(hub: Hub, bench: Bench) -> None:
-    config = drives_config(channel=str(hub.path))
-    rig = bench(config)
-    with open_drives(config) as drives:
-        drives.start()
-        rig.inject("delay", Dof.BENDING, 3 * config.cycle)
+def test_late_answers_are_counted(hub: Hub, bench: Bench) -> None:
+    with running(hub, bench) as (rig, drives):
+        rig.inject("delay", Dof.BENDING, 3 * drives.config.cycle)
         drive(drives, 10)
-        assert drives.traffic.late[Dof.BENDING] >= 1
-        assert drives.traffic.cycles == 10
+        assert drives.statistics.late[Dof.BENDING] >= 1
+        assert drives.statistics.cycles == 10
 
 
-def test_a_fault_is_kept_until_it_is_acknowledged(hub: Hub, bench: Bench) -> None:
+def test_fault_persists_until_it_is_reset(hub: Hub, bench: Bench) -> None:
     config = drives_config(channel=str(hub.path))
     rig = bench(config)
     with open_drives(config) as drives:
@@ -128,32 +126,31 @@ def test_a_fault_is_kept_until_it_is_acknowledged(hub: Hub, bench: Bench) -> Non
 
 
 @pytest.mark.parametrize("is_running", [True, False])
-def test_disabling_stops_first_and_then_takes_the_power(
+def test_disable_quick_stops_before_it_disables_voltage(
     hub: Hub, bench: Bench, *, is_running: bool
 ) -> None:
     config = drives_config(channel=str(hub.path))
     rig = bench(config)
     with open_drives(config) as drives:
-        drives.disable()  # never enabled: nothing to do
+        drives.disable()  # never enabled: no effect
         drives.start()
         drive(drives, 5)
         if not is_running:
             drives.stop()
         drives.disable()
         assert set(rig.states.values()) == {State.SWITCH_ON_DISABLED}
-        with pytest.raises(StateError, match="before start or after stop"):
+        with pytest.raises(StateError, match="before start\\(\\) or after stop"):
             drives.exchange([0, 0, 0])
-    went = [(event.dof, event.what) for event in rig.events if not event.what.startswith("fault")]
+    entered = [
+        (event.dof, event.what) for event in rig.events if not event.what.startswith("fault")
+    ]
     for dof in Dof:
-        states = [what for who, what in went if who == dof.label]
+        states = [what for source, what in entered if source == dof.label]
         assert states[-3:] == ["operation enabled", "quick stop active", "switch on disabled"]
 
 
-def test_a_drive_that_is_not_disabled_is_said(hub: Hub, bench: Bench) -> None:
-    config = drives_config(channel=str(hub.path), state_timeout=1.0)
-    rig = bench(config)
-    with open_drives(config) as drives:
-        drives.start()
+def test_unconfirmed_disabling_raises(hub: Hub, bench: Bench) -> None:
+    with running(hub, bench, state_timeout=1.0) as (rig, drives):
         drives.stop()
         rig.inject("drop", Dof.ROTATION)
         with pytest.raises(StateError, match="rotation, node 2: disabling is not confirmed"):
@@ -163,7 +160,7 @@ def test_a_drive_that_is_not_disabled_is_said(hub: Hub, bench: Bench) -> None:
 
 
 @pytest.mark.parametrize(
-    ("command", "says"),
+    ("command", "message"),
     [
         ([np.nan, 0, 0], r"command\[insertion\].*finite"),
         ([0, 0, np.inf], r"command\[bending\].*finite"),
@@ -173,26 +170,20 @@ def test_a_drive_that_is_not_disabled_is_said(hub: Hub, bench: Bench) -> None:
         ("left", "command: got"),
     ],
 )
-def test_a_command_that_must_not_be_sent(
-    hub: Hub, bench: Bench, command: object, says: str
+def test_invalid_commands_are_refused(
+    hub: Hub, bench: Bench, command: object, message: str
 ) -> None:
-    config = drives_config(channel=str(hub.path))
-    rig = bench(config)
-    with open_drives(config) as drives:
-        drives.start()
-        with pytest.raises(SignalError, match=says):
+    with running(hub, bench) as (rig, drives):
+        with pytest.raises(SignalError, match=message):
             drives.exchange(command)  # type: ignore[arg-type]
         assert at_rest(rig)
-        assert not drives.running
+        assert not drives.is_running
 
 
-def test_an_encoder_that_jumps(hub: Hub, bench: Bench) -> None:
-    """A plant that says what cannot be: the following error or the jump is noticed."""
+def test_encoder_jump_stops_all_motors(hub: Hub, bench: Bench) -> None:
+    """The plant reports an impossible position."""
     jump = np.zeros(3)
-    config = drives_config(channel=str(hub.path))
-    rig = bench(config, lambda told: told + jump)
-    with open_drives(config) as drives:
-        drives.start()
+    with running(hub, bench, lambda demand: demand + jump) as (rig, drives):
         drive(drives, 5)
         jump[Dof.INSERTION] = 0.02
         with pytest.raises(FollowingError, match="insertion, node 1"):
@@ -200,25 +191,20 @@ def test_an_encoder_that_jumps(hub: Hub, bench: Bench) -> None:
     assert at_rest(rig)
 
 
-def test_a_second_master_is_refused_and_stops_the_first(
-    hub: Hub, bench: Bench, station: Callable[[], LocalBus]
-) -> None:
-    config = drives_config(channel=str(hub.path))
-    rig = bench(config)
-    with open_drives(config) as drives:
-        drives.start()
+def test_second_master_is_refused(hub: Hub, bench: Bench, station: Callable[[], LocalBus]) -> None:
+    with running(hub, bench) as (rig, drives):
         drive(drives, 5)
-        # The second sees the first's SYNC, if only the first goes on.
+        # The second receives the first's SYNC.
         with pytest.raises(SecondMasterError):
-            listen_while(drives, config)
-        assert drives.running
+            listen_while(drives)
+        assert drives.is_running
     assert at_rest(rig)
 
 
-def listen_while(drives: Drives, config: DrivesConfig) -> None:
+def listen_while(drives: Drives) -> None:
     import threading
 
-    from tautscope.hardware.canopen_drives import CanopenLink
+    from tautscope.hardware.canopen_fieldbus import CanopenFieldbus
 
     ending = threading.Event()
 
@@ -230,14 +216,14 @@ def listen_while(drives: Drives, config: DrivesConfig) -> None:
     thread = threading.Thread(target=go_on)
     thread.start()
     try:
-        CanopenLink(config).close()
+        CanopenFieldbus(drives.config).close()
     finally:
         ending.set()
         thread.join()
 
 
-def test_the_bus_is_unplugged(hub: Hub, bench: Bench) -> None:
-    """Nobody can tell the drives to stop; they miss our heartbeat."""
+def test_unplugged_bus(hub: Hub, bench: Bench) -> None:
+    """No command reaches the drives; they miss the master's heartbeat."""
     config = drives_config(channel=str(hub.path))
     rig = bench(config)
     drives = open_drives(config)
@@ -247,10 +233,10 @@ def test_the_bus_is_unplugged(hub: Hub, bench: Bench) -> None:
     with pytest.raises(BusError, match="Plug the adapter in"):
         drive(drives, 10_000)
     drives.close()
-    wait_for(lambda: set(rig.states.values()) == {State.QUICK_STOP_ACTIVE})
+    until(lambda: set(rig.states.values()) == {State.QUICK_STOP_ACTIVE})
 
 
-def test_a_fault_that_does_not_exist(bench: Bench) -> None:
+def test_unknown_fault_is_refused(bench: Bench) -> None:
     rig = bench(drives_config())
     with pytest.raises(ConfigError, match=r"fault: got 'explode'"):
         rig.inject("explode", Dof.BENDING)  # type: ignore[arg-type]

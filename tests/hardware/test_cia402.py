@@ -1,4 +1,4 @@
-"""Statuswords, controlwords and mappings, bit by bit, against what standards and makers printed.
+"""Statuswords, controlwords and PDO mappings against published tables.
 
 DS402  statusword patterns of CiA DS402-2 V3.0, as printed by Toshiba for VF-S15, 6.1.2
 Elmo2  Elmo MAN-CAN402IG 1.2, page 27 (controlword)
@@ -24,7 +24,7 @@ MAPPINGS = {
 
 
 @pytest.mark.parametrize("entry", MAPPINGS, ids=str)
-def test_mapping_of_an_object(entry: Entry) -> None:
+def test_pdo_mapping_entry(entry: Entry) -> None:
     assert entry.mapping == MAPPINGS[entry]
 
 
@@ -44,7 +44,7 @@ COMMANDS = {  # Elmo2: bits 7, 3, 2, 1, 0; the other bits are not part of the co
     cia402.DISABLE_VOLTAGE: "0xxxxx0x",
     cia402.QUICK_STOP: "0xxxx01x",
     cia402.ENABLE_OPERATION: "0xxx1111",
-    cia402.INTERPOLATE: "0xx11111",
+    cia402.ENABLE_INTERPOLATION: "0xx11111",
     cia402.FAULT_RESET: "1xxxxxxx",
 }
 

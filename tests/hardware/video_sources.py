@@ -1,22 +1,20 @@
-"""Sources of pictures for tests: FFmpeg's own, and DV as the article's rig gave it."""
+"""Video sources for tests: FFmpeg's test sources, and DV as in the article's rig."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import av
 import numpy as np
 from tautscope.config import CameraConfig, SourceConfig
+from waiting import TIMEOUT
 
 SIZE = {"width": 64, "height": 48}
-PATIENCE = 60.0  # s; a loaded machine is slow, and no test waits for all of it
 
 
 def camera(url: str, format_name: str | None = "lavfi", **changes: Any) -> CameraConfig:
-    source = {"reconnect_period": 0.01, "start_timeout": PATIENCE, "timeout": PATIENCE}
+    source = {"reconnect_period": 0.01, "start_timeout": TIMEOUT, "timeout": TIMEOUT}
     layout = SIZE | {
         key: changes.pop(key) for key in ("width", "height", "pixel_format") if key in changes
     }
@@ -29,15 +27,8 @@ def pattern(more: str = "", size: str = "64x48") -> str:
     return f"testsrc2=size={size}:rate=50{more},realtime"
 
 
-def until(condition: Callable[[], bool]) -> None:
-    end = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.005)
-
-
 def write_dv(path: Path, frames: int, pixel_format: str = "yuv420p") -> None:
-    """A bright bar that moves 10 px per field. DV's second lines come first in time."""
+    """A bright bar that moves 10 px per field. In DV the lower field comes first."""
     with av.open(str(path), "w") as container:
         stream = container.add_stream("dvvideo", rate=25)
         stream.width, stream.height, stream.pix_fmt = 720, 576, pixel_format

@@ -1,13 +1,14 @@
-"""A bus that is written down, and a link on it."""
+"""A bus that records frames, and a fieldbus on it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import can
-from drive_rig import AXES, drives_config
+from drive_settings import AXES, drives_config
 from tautscope.dof import Dof
-from tautscope.hardware.canopen_drives import CanopenLink
+from tautscope.hardware.canopen_fieldbus import CanopenFieldbus
 
 
 def frame(identifier: int, data: bytes) -> str:
@@ -15,10 +16,10 @@ def frame(identifier: int, data: bytes) -> str:
 
 
 class Transcript(can.BusABC):
-    """A bus that writes down what is sent and answers from a table."""
+    """A bus that records sent frames and answers from a table."""
 
     def __init__(self, answer: Callable[[str], list[str]] = lambda sent: []) -> None:
-        super().__init__(channel="transcript")
+        super().__init__(channel="bus_transcript")
         self.sent: list[str] = []
         self.waiting: list[str] = []
         self._answer = answer
@@ -40,12 +41,20 @@ class Transcript(can.BusABC):
 QUICK = {"heartbeat_period": 0.001, "cycle": 0.001, "reply_timeout": 5e-4}
 
 
-def link_to(answers: dict[str, str], node: int = 1) -> tuple[CanopenLink, Transcript]:
-    """A link whose insertion drive has this node id."""
+@contextmanager
+def open_transcript(
+    answers: dict[str, str], node: int = 1
+) -> Iterator[tuple[CanopenFieldbus, Transcript]]:
+    """Open a fieldbus whose insertion drive has this node id."""
     bus = Transcript(lambda sent: [answers[sent]] if sent in answers else [])
     others = [other for other in range(1, 5) if other != node]
     axes = {
         dof.label: AXES[dof.label] | {"node": number}
         for dof, number in zip(Dof, [node, *others], strict=False)
     }
-    return CanopenLink(drives_config(**QUICK, **axes), bus), bus
+    fieldbus = CanopenFieldbus(drives_config(**QUICK, **axes), bus)
+    try:
+        yield fieldbus, bus
+    finally:
+        fieldbus.stop_communication([])  # no SDO transfers when it is closed
+        fieldbus.close()

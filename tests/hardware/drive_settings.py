@@ -1,4 +1,4 @@
-"""A rig of three drives to test on; times are generous, as the machine may be busy."""
+"""Settings of three drives for tests; long timeouts, for a busy computer."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ AXES = {
     },
 }
 
-UNHURRIED = {
+TIMES = {
     "interface": "tautscope",
     "heartbeat_period": 0.1,
     "heartbeat_timeout": 3.0,
@@ -49,7 +49,7 @@ UNHURRIED = {
 
 
 def drives_document(**changes: Any) -> dict[str, Any]:
-    return {**{dof: dict(axis) for dof, axis in AXES.items()}, **UNHURRIED, **changes}
+    return {**{dof: dict(axis) for dof, axis in AXES.items()}, **TIMES, **changes}
 
 
 def drives_config(**changes: Any) -> DrivesConfig:

@@ -1,4 +1,4 @@
-"""Motors that follow within the lag are let be, those that do not are noticed; laws, no bus."""
+"""Property tests of the following error monitor."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from drive_rig import AXES, drives_config
+from drive_settings import AXES, drives_config
 from numpy.typing import NDArray
 from tautscope.config import DrivesConfig
 from tautscope.dof import Dof
-from tautscope.hardware.following import Following
+from tautscope.hardware.following_error import FollowingErrorMonitor
 
 PERIODS = (0.002, 0.005, 0.01)
 LIMIT, WINDOW = 1e-3, 0.4e-3
@@ -30,23 +30,23 @@ def on_insertion(value: float) -> NDArray[np.float64]:
     return np.array([value, 0.0, 0.0])
 
 
-def strayed_after(
-    following: Following, commands: NDArray[np.float64], positions: NDArray[np.float64]
+def first_exceeded(
+    following: FollowingErrorMonitor, commands: NDArray[np.float64], positions: NDArray[np.float64]
 ) -> int | None:
-    """The first period in which insertion strays."""
-    following.begin(on_insertion(positions[0]))
+    """The first period in which the following error of insertion is too large."""
+    following.reset(on_insertion(positions[0]))
     for count, (command, position) in enumerate(zip(commands, positions, strict=True)):
-        strays = following.strays(on_insertion(command), on_insertion(position))
-        assert not strays[1:].any()
-        if strays[Dof.INSERTION]:
+        exceeded = following.update(on_insertion(command), on_insertion(position))
+        assert not exceeded[1:].any()
+        if exceeded[Dof.INSERTION]:
             return count
     return None
 
 
 @pytest.mark.parametrize("period", PERIODS)
 @pytest.mark.parametrize("seed", range(5))
-def test_a_motor_within_the_lag_never_strays(period: float, seed: int) -> None:
-    """However wildly it is told to move: here a dead time, then an average over the rest."""
+def test_motor_within_the_lag_never_exceeds_the_limits(period: float, seed: int) -> None:
+    """Random commands; the motor has a dead time, then a moving average of the remaining lag."""
     chance = np.random.default_rng(seed)
     ticks = round(0.02 / period)
     commands = chance.uniform(-0.05, 0.05, 500)
@@ -56,19 +56,19 @@ def test_a_motor_within_the_lag_never_strays(period: float, seed: int) -> None:
         [padded[k : k + ticks - dead + 1].mean() for k in range(len(commands))], np.float64
     )
     error = chance.uniform(-WINDOW, WINDOW, len(commands)) * (1 - 1e-9)
-    assert strayed_after(Following(config(), period), commands, behind + error) is None
+    assert first_exceeded(FollowingErrorMonitor(config(), period), commands, behind + error) is None
 
 
 @pytest.mark.parametrize("period", PERIODS)
 @pytest.mark.parametrize("pending", [0, 1, 3])
 @pytest.mark.parametrize("late", [0.01, 0.02, 0.03, 0.06])
-def test_a_motor_that_is_later_strays_as_far_as_it_moves(
-    period: float, pending: int, late: float
-) -> None:
-    """At constant speed the error is that of the time beyond the lag: at once, or in the end."""
+def test_motor_beyond_the_lag_exceeds_the_limits(period: float, pending: int, late: float) -> None:
+    """At constant speed the error is the travel in the time beyond the lag."""
     speed, times = 0.06, np.arange(0.0, 1.0, period)
     positions = speed * np.maximum(times - late, 0.0)
-    found = strayed_after(Following(config(), period, pending), speed * times, positions)
+    found = first_exceeded(
+        FollowingErrorMonitor(config(), period, pending), speed * times, positions
+    )
     error = speed * (late - 0.02 - pending * period)
     if error <= WINDOW:
         assert found is None
@@ -82,50 +82,52 @@ def test_a_motor_that_is_later_strays_as_far_as_it_moves(
 
 @pytest.mark.parametrize("period", PERIODS)
 @pytest.mark.parametrize("side", [-1, 1])
-def test_a_small_error_is_borne_for_the_timeout_and_no_longer(period: float, side: int) -> None:
+def test_small_error_is_tolerated_until_the_timeout(period: float, side: int) -> None:
     most = round(0.05 / period)
     for length in (most - 1, most, most + 1):
         errors = np.zeros(2 * length + 4)
         errors[1 : 1 + length] = errors[3 + length : 3 + 2 * length] = side * 1.5 * WINDOW
-        found = strayed_after(Following(config(), period), np.zeros(len(errors)), errors)
-        # One good reading between, and it begins anew.
+        found = first_exceeded(
+            FollowingErrorMonitor(config(), period), np.zeros(len(errors)), errors
+        )
+        # One position inside the window resets the timer.
         assert found == (most + 1 if length > most else None), length
 
 
-def test_a_large_error_is_not_borne_at_all() -> None:
+def test_large_error_is_detected_at_once() -> None:
     for size in (-1.001, 1.001):
         errors = np.array([0.0, 0.999, size]) * LIMIT
-        assert strayed_after(Following(config(), 0.005), np.zeros(3), errors) == 2
+        assert first_exceeded(FollowingErrorMonitor(config(), 0.005), np.zeros(3), errors) == 2
 
 
 def test_each_motor_has_its_own_limits() -> None:
-    following = Following(drives_config(), 0.01)
+    following = FollowingErrorMonitor(drives_config(), 0.01)
     for dof, share in itertools.product(Dof, (0.99, 1.01)):
-        following.begin(REST)
+        following.reset(REST)
         position = np.zeros(3)
         position[dof] = share * drives_config()[dof].following_error
         expected = [share > 1 and other is dof for other in Dof]
-        np.testing.assert_array_equal(following.strays(REST, position), expected, f"{dof} {share}")
+        np.testing.assert_array_equal(following.update(REST, position), expected, f"{dof} {share}")
 
 
-def test_what_was_not_read_is_not_judged_and_its_time_stands() -> None:
-    """A late answer neither stops a motor nor excuses it."""
-    following = Following(config(), 0.01)
+def test_old_positions_are_not_checked_and_hold_the_timer() -> None:
+    """A late answer neither raises nor clears an error."""
+    following = FollowingErrorMonitor(config(), 0.01)
     far, small = on_insertion(5 * LIMIT), on_insertion(1.5 * WINDOW)
     late = (False, True, True)
-    assert not following.strays(REST, far, late).any()
+    assert not following.update(REST, far, late).any()
     for _ in range(5):
-        assert not following.strays(REST, small).any()
-        assert not following.strays(REST, REST, late).any()
-    assert following.strays(REST, small)[Dof.INSERTION]
+        assert not following.update(REST, small).any()
+        assert not following.update(REST, REST, late).any()
+    assert following.update(REST, small)[Dof.INSERTION]
 
 
-def test_it_begins_anew() -> None:
-    following = Following(config(), 0.01)
+def test_reset_clears_the_timer() -> None:
+    following = FollowingErrorMonitor(config(), 0.01)
     for _ in range(5):
-        following.strays(REST, on_insertion(1.5 * WINDOW))
+        following.update(REST, on_insertion(1.5 * WINDOW))
     start = on_insertion(0.03)
-    following.begin(start)
-    assert not following.strays(start, start + on_insertion(1.5 * WINDOW)).any()
-    np.testing.assert_array_equal(following.least, start)
-    np.testing.assert_array_equal(following.largest, start)
+    following.reset(start)
+    assert not following.update(start, start + on_insertion(1.5 * WINDOW)).any()
+    np.testing.assert_array_equal(following.lower, start)
+    np.testing.assert_array_equal(following.upper, start)
