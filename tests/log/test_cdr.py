@@ -1,4 +1,4 @@
-"""Our CDR and definitions against rosbags, which has both of its own."""
+"""CDR encoding and message definitions, compared with rosbags."""
 
 from contextlib import suppress
 from typing import Any
@@ -89,7 +89,7 @@ def test_definitions_are_those_of_ros(kind: str) -> None:
 
 @settings(max_examples=25, deadline=None)
 @given(data=st.data())
-def test_a_torn_message_is_named(data: st.DataObject) -> None:
+def test_a_truncated_message_is_rejected(data: st.DataObject) -> None:
     kind = "sensor_msgs/msg/JointState"
     whole = encode(kind, data.draw(values(kind)))
     cut = data.draw(st.integers(0, len(whole) - 1))
@@ -99,6 +99,6 @@ def test_a_torn_message_is_named(data: st.DataObject) -> None:
 
 @settings(max_examples=25, deadline=None)
 @given(st.binary(max_size=200), st.sampled_from(KINDS))
-def test_any_bytes_give_a_message_or_an_error_that_names_it(noise: bytes, kind: str) -> None:
+def test_any_bytes_give_a_message_or_a_named_error(noise: bytes, kind: str) -> None:
     with suppress(RecordError):
         decode(kind, b"\x00\x01\x00\x00" + noise)

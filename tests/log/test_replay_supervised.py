@@ -1,4 +1,4 @@
-"""A replay is identical also where the guards acted, and where images were looked at aside."""
+"""Replay of runs with supervisor actions and with images processed in the background."""
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from tautscope.config import Config
 from tautscope.errors import RecordError
 from tautscope.experiment import run_experiment
-from tautscope.log.reader import Log, Told, read_log
-from tautscope.log.replay import _tell, listen_to_log, replay_same
+from tautscope.log.reader import Log, Request, read_log
+from tautscope.log.replay import _send_request, estimate_from_log, replay_same
 from tautscope.log.writer import LogWriter
 from tautscope.recording import Recording, per_dof
 from tautscope.reduction import HysteresisReduction, Report
@@ -22,11 +22,11 @@ from tautscope.rig import Frame, Sample
 SECONDS = 7.0
 SILENT_FROM = 6.6
 PAUSE = 0.2
-"""A stall [s], beyond `safety.stall`."""
+"""Length of a stall [s], above `safety.stall`."""
 
 
-class Troubled(DrawnRig):
-    """One thing after the other is wrong with its camera, then its clock."""
+class FaultyCameraRig(DrawnRig):
+    """A rig with several faults of the camera, one after the other, then of the clock."""
 
     def step(self, command: ArrayLike) -> Sample:
         sample = super().step(command)
@@ -46,8 +46,8 @@ class Troubled(DrawnRig):
         return replace(sample, time=time + late, frame=frame)
 
 
-class Jumping(SineSequence):
-    """A hand that lets go, and takes hold elsewhere; in the end it is silent."""
+class JumpingReference(SineSequence):
+    """A reference that jumps, and is not updated any more at the end."""
 
     made_at = 0.0
 
@@ -57,11 +57,11 @@ class Jumping(SineSequence):
 
 
 def flags(run: Recording) -> set[str]:
-    """The names at the beginning of what is told."""
+    """Names of the flags in the warnings."""
     return {line.partition(" ")[0] for line in run.warnings}
 
 
-TOLD = {
+REQUESTS = {
     0.5: ("before", "raise_flag following_error"),
     0.9: ("before", "engage"),
     1.2: ("step", "raise_flag start_check"),
@@ -72,17 +72,17 @@ TOLD = {
     2.1: ("after", "engage"),
     2.4: ("after", "raise_flag following_error"),
 }
-"""When [s] the loop is told what, by whom: before or after an image update, or by the rig."""
+"""Time [s] -> when the request is made (before or after an image update, or in a step), request."""
 
 
-class Telling(DrawnRig):
-    """Tells the loop while a command is under way."""
+class RequestingRig(DrawnRig):
+    """A rig that sends requests to the loop."""
 
     loop: HysteresisReduction | None = None
 
     def __init__(self, config: Config) -> None:
         super().__init__(config)
-        self.waiting = dict(TOLD)
+        self.waiting = dict(REQUESTS)
 
     def step(self, command: ArrayLike) -> Sample:
         sample = super().step(command)
@@ -111,7 +111,7 @@ def test_a_replay_repeats_the_requests_to_the_loop(
     config = config.replace(profile=profile)
     reference = SineSequence(config.experiment)
     reference.duration = 3.0
-    path, rig = tmp_path / "run.mcap", Telling(config)
+    path, rig = tmp_path / "run.mcap", RequestingRig(config)
     with LogWriter(path, config, wait=True) as log:
         run = run_experiment(rig, reference, config, look=rig.look, log=log)
     assert not rig.waiting
@@ -122,25 +122,27 @@ def test_a_replay_repeats_the_requests_to_the_loop(
     assert found.same_updates == found.updates == len(run.frames)
     for name in run.trace.dtype.names or ():
         np.testing.assert_array_equal(again.trace[name], run.trace[name], err_msg=name)
-    told = [event.what for event in written.events.values() if isinstance(event, Told)]
-    assert sorted(told) == sorted(what for _, what in TOLD.values())
-    effects = [untold(written, skip, monkeypatch) for skip in range(len(told))]
-    assert all(effects), list(zip(told, effects, strict=True))
-    listened = listen_to_log(written, config)
-    assert len(listened.recording.trace) == len(run.trace)
+    requests = [event.text for event in written.events.values() if isinstance(event, Request)]
+    assert sorted(requests) == sorted(what for _, what in REQUESTS.values())
+    effects = [
+        first_difference_without(written, skip, monkeypatch) for skip in range(len(requests))
+    ]
+    assert all(effects), list(zip(requests, effects, strict=True))
+    estimated, _ = estimate_from_log(written, config)
+    assert len(estimated.trace) == len(run.trace)
 
 
-def untold(log: Log, skip: int, monkeypatch: pytest.MonkeyPatch) -> str:
-    """The first difference where the loop is not told one thing of all."""
-    told: list[str] = []
+def first_difference_without(log: Log, skip: int, monkeypatch: pytest.MonkeyPatch) -> str:
+    """The first difference of a replay without one of the requests."""
+    requests: list[str] = []
 
     def tell(loop: HysteresisReduction, what: str) -> None:
-        told.append(what)
-        if len(told) - 1 != skip:
-            _tell(loop, what)
+        requests.append(what)
+        if len(requests) - 1 != skip:
+            _send_request(loop, what)
 
     with monkeypatch.context() as patch:
-        patch.setattr("tautscope.log.replay._tell", tell)
+        patch.setattr("tautscope.log.replay._send_request", tell)
         return replay_same(log)[0].first_difference
 
 
@@ -152,23 +154,23 @@ def test_an_unknown_request_is_rejected(tmp_path: Path, config: Config) -> None:
         replay_same(read_log(tmp_path / "run.mcap"))
 
 
-NOTICED = {"dropped", "late", "clock", "reference_jump", "late_tick", "reference_late"}
+EXPECTED_FLAGS = {"dropped", "late", "clock", "reference_jump", "late_tick", "reference_late"}
 
 
 @pytest.mark.parametrize("profile", ["paper", "best"])
-@pytest.mark.parametrize("is_aside", [False, True], ids=["ahead", "aside"])
+@pytest.mark.parametrize("is_background", [False, True], ids=["ahead", "background"])
 def test_a_replay_is_identical_where_the_supervisor_acted(
-    tmp_path: Path, config: Config, profile: str, *, is_aside: bool
+    tmp_path: Path, config: Config, profile: str, *, is_background: bool
 ) -> None:
     config = config.replace(profile=profile)
-    reference = Jumping(config.experiment)
+    reference = JumpingReference(config.experiment)
     reference.duration = SECONDS
     path = tmp_path / "run.mcap"
-    with ThreadPoolExecutor(1) as eyes, LogWriter(path, config, wait=True) as log:
-        aside = eyes if is_aside else None
-        run = run_experiment(Troubled(config), reference, config, log=log, aside=aside)
-    if not is_aside:  # which frames are seen aside is a matter of time
-        assert flags(run) >= NOTICED
+    with ThreadPoolExecutor(1) as executor, LogWriter(path, config, wait=True) as log:
+        aside = executor if is_background else None
+        run = run_experiment(FaultyCameraRig(config), reference, config, log=log, aside=aside)
+    if not is_background:  # which frames are processed in the background depends on timing
+        assert flags(run) >= EXPECTED_FLAGS
     assert flags(run) >= {"reference_jump", "reference_late"}
     silent = run.trace["time"] - PAUSE > SILENT_FROM + config.safety.reference_age
     assert np.ptp(per_dof(run.trace[silent], "command"), axis=0).max() == 0.0

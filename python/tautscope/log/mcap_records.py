@@ -17,49 +17,48 @@ from mcap.writer import MCAP0_MAGIC
 
 from tautscope.errors import MissingPathError, RecordError
 
-_LARGEST_CHUNK = 2**30
-"""What a chunk may say it unpacks to [bytes]; ours are a few MB, and a hostile one would fill the
-memory."""
-_WITH_MESSAGES = (Opcode.CHUNK, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
+_MAX_CHUNK_SIZE = 2**30
+"""Largest accepted size of an uncompressed chunk [bytes]; a damaged one could fill the memory."""
+_MESSAGE_OPCODES = (Opcode.CHUNK, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
 
 
 @dataclass(slots=True)
 class Damage:
-    """What of a file could not be read.
+    """The parts of a file that could not be read.
 
     Attributes:
-        is_torn: It ends before its end mark.
-        lost_bytes: After the last whole record.
-        bad_chunks: Chunks whose checksum or content is wrong, left out.
+        is_truncated: Whether the end mark is missing.
+        lost_bytes: Bytes after the last complete record.
+        bad_chunks: Number of chunks with a wrong checksum or content; they are skipped.
     """
 
-    is_torn: bool = True
+    is_truncated: bool = True
     lost_bytes: int = 0
     bad_chunks: int = 0
 
     def __bool__(self) -> bool:
-        """Whether there is any."""
-        return self.is_torn or self.bad_chunks > 0
+        """Whether there is any damage."""
+        return self.is_truncated or self.bad_chunks > 0
 
 
 @dataclass(frozen=True, slots=True)
 class RawRecord:
-    """A record of the file: where it begins, what it is, and its bytes."""
+    """A record of an MCAP file: byte offset, opcode and content."""
 
     offset: int
     opcode: int
     payload: bytes
 
-    def unpacked(self) -> list[McapRecord]:
-        """The schemas, channels and messages it is or holds; whatever is wrong with it raises."""
+    def unpack(self) -> list[McapRecord]:
+        """The schemas, channels and messages of the record; damaged bytes raise any exception."""
         stream = ReadDataStream(BytesIO(self.payload))
         if self.opcode == Opcode.CHUNK:
             chunk = Chunk.read(stream)
             sizes = [chunk.uncompressed_size]
             if chunk.compression == "zstd":
                 sizes.append(zstandard.frame_content_size(chunk.data))
-            if max(sizes) > _LARGEST_CHUNK:
-                raise ValueError(f"a chunk that unpacks to {max(sizes)} bytes")
+            if max(sizes) > _MAX_CHUNK_SIZE:
+                raise ValueError(f"chunk of {max(sizes)} bytes")
             return breakup_chunk(chunk, validate_crc=True)
         if self.opcode == Opcode.SCHEMA:
             return [Schema.read(stream)]
@@ -68,12 +67,12 @@ class RawRecord:
         return [Message.read(stream, len(self.payload))]
 
 
-def raw_records(file: IO[bytes], damage: Damage) -> Iterator[RawRecord]:
-    """Every whole record from the file's position on that can hold messages.
+def read_records(file: IO[bytes], damage: Damage) -> Iterator[RawRecord]:
+    """Read the complete records that can contain messages, from the file's position on.
 
     Args:
-        file: Seekable, behind the magic or at the beginning of a record.
-        damage: Told how the file ends.
+        file: Seekable, positioned at the beginning of a record.
+        damage: Receives the damage at the end of the file.
     """
     offset = file.tell()
     size = file.seek(0, 2)
@@ -84,24 +83,24 @@ def raw_records(file: IO[bytes], damage: Damage) -> Iterator[RawRecord]:
         damage.lost_bytes = size - offset
         if len(head) < 9 or offset + 9 + length > size:
             return
-        if head[0] in _WITH_MESSAGES:
+        if head[0] in _MESSAGE_OPCODES:
             yield RawRecord(offset, head[0], file.read(length))
         offset += 9 + length
         if head[0] == Opcode.FOOTER:
             file.seek(offset)
-            damage.is_torn = file.read() != MCAP0_MAGIC
-            damage.lost_bytes = size - offset if damage.is_torn else 0
+            damage.is_truncated = file.read() != MCAP0_MAGIC
+            damage.lost_bytes = size - offset if damage.is_truncated else 0
             return
 
 
-def messages_in(path: Path, damage: Damage) -> Iterator[tuple[RawRecord, str, Message]]:
-    """Every message of an MCAP file that can be read, with its topic, in the order of the file.
+def read_messages(path: Path, damage: Damage) -> Iterator[tuple[RawRecord, str, Message]]:
+    """Read the undamaged messages of an MCAP file with record and topic, in the file's order.
 
     Raises:
         MissingPathError: There is no such file.
-        RecordError: It is not MCAP.
+        RecordError: The file is not MCAP.
     """
-    topics: dict[int, str] = {}
+    topic_names: dict[int, str] = {}
     try:
         file = path.open("rb")
     except (FileNotFoundError, IsADirectoryError):
@@ -109,14 +108,14 @@ def messages_in(path: Path, damage: Damage) -> Iterator[tuple[RawRecord, str, Me
     with file:
         if file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
             raise RecordError("log", str(path), "an MCAP file")
-        for raw in raw_records(file, damage):
+        for raw in read_records(file, damage):
             try:
-                records = raw.unpacked()
-            except Exception:  # whatever the library makes of damaged bytes
+                records = raw.unpack()
+            except Exception:  # damaged bytes make the library raise exceptions of any kind
                 damage.bad_chunks += 1
                 continue
             for record in records:
                 if isinstance(record, Channel):
-                    topics[record.id] = record.topic
-                elif isinstance(record, Message) and record.channel_id in topics:
-                    yield raw, topics[record.channel_id], record
+                    topic_names[record.id] = record.topic
+                elif isinstance(record, Message) and record.channel_id in topic_names:
+                    yield raw, topic_names[record.channel_id], record
