@@ -230,8 +230,8 @@ def write(rows: Sequence[dict[str, Any]], command: str) -> Path:
     seeds = max(row["seeds"] for row in rows)
     text = (
         "# Vision robustness\n\nDetection of the markers under image disturbances. Made by\n\n"
-        f"    {command}\n\n(seeds 0 to {seeds - 1}). (!) marks a missed goal. Goals: valid at least "
-        "99 %, wrong accepted\nat most 0.1 % (none without an instrument), error at most "
+        f"    {command}\n\n(seeds 0 to {seeds - 1}). (!) marks a missed goal. Goals: valid at "
+        "least 99 %, wrong accepted\nat most 0.1 % (none without an instrument), error at most "
         f"0.15 px clean\nand 0.5 px elsewhere.\n\n{table(rows)}\n\n"
         f"## Definitions\n\n{DEFINITIONS}"
     )

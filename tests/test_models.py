@@ -271,7 +271,7 @@ def test_a_tip_seen_now_and_then_is_enough(model: Model) -> None:
 @pytest.fixture(scope="module")
 def insertion_record() -> Record:
     """Motor and true tip of the twin's insertion, four periods, no images."""
-    lines = run_path(str(EXAMPLES / "twin_record.py"))["lines"]
+    lines = run_path(str(EXAMPLES / "twin_record.py"))["samples"]
     time, motor, tip = np.array(list(lines(Dof.INSERTION, 4))).T
     return Record(motor, tip, time, np.arange(len(motor)), Cleaning())
 

@@ -45,17 +45,10 @@ def test_recover_repairs_a_truncated_log(capsys: Capture, truncated: Path) -> No
     with AnyReader([truncated.with_name("truncated-recovered.mcap")]) as reader:
         assert reader.message_count > 100
     assert "does not exist yet" in failed(capsys, "recover", str(truncated))
-    assert (
-        main(
-            [
-                "recover",
-                str(truncated.with_name("truncated-recovered.mcap")),
-                "--out",
-                str(truncated.with_name("again.mcap")),
-            ]
-        )
-        == 0
+    recovered, again = (
+        str(truncated.with_name(name)) for name in ("truncated-recovered.mcap", "again.mcap")
     )
+    assert main(["recover", recovered, "--out", again]) == 0
     assert "was complete" in capsys.readouterr().out
 
 
@@ -117,13 +110,8 @@ def test_replay_with_another_configuration_shows_its_estimates(
     width = recording.trace["delta_plus_insertion"] - recording.trace["delta_minus_insertion"]
     assert found["recorded"]["width"] == pytest.approx(width[-1])
     assert found["replayed"]["width"] < 0.5 * width[-1]
-    assert {file.name for file in (tmp_path / "a").iterdir()} == {
-        "trace.csv",
-        "frames.csv",
-        "recording.toml",
-        "config.toml",
-        "replay.png",
-    }
+    written = {"trace.csv", "frames.csv", "recording.toml", "config.toml", "replay.png"}
+    assert {file.name for file in (tmp_path / "a").iterdir()} == written
     assert main([*arguments, str(tmp_path / "b")]) == 0
     output = capsys.readouterr().out
     assert "backlash width at the end" in output
@@ -155,17 +143,9 @@ def test_replay_of_a_video_and_motor_positions(
             recording.trace["time"], per_dof(recording.trace, "command"), strict=True
         ):
             writer.writerow([float(time) - 1000, *map(float, command)])
-    arguments = [
-        "replay",
-        "--video",
-        str(tmp_path / "clip.mkv"),
-        "--motors",
-        str(tmp_path / "motors.csv"),
-        "--video-start",
-        "-1000",
-    ]
-    out = tmp_path / "out"
-    assert main([*arguments, "--out", str(out), "--json"]) == 0
+    video, motors, out = tmp_path / "clip.mkv", tmp_path / "motors.csv", tmp_path / "out"
+    arguments = ["--video", str(video), "--motors", str(motors), "--video-start", "-1000"]
+    assert main(["replay", *arguments, "--out", str(out), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["images"] == pytest.approx(len(recording.frames), abs=1)
     width = recording.trace["delta_plus_insertion"] - recording.trace["delta_minus_insertion"]

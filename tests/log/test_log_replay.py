@@ -143,6 +143,6 @@ def test_sparse_motor_positions_are_not_taken_for_a_held_reference(
     table = tmp_path / "motors.csv"
     np.savetxt(table, rows, "%.17g", delimiter=",", header=names, comments="")
     replayed = estimate_from_video(frames_of(log), table, log.config)
-    there = per_dof(replayed.frames, "predicted")
-    away = np.abs(there - per_dof(recording.frames, "predicted")[: len(there)])
-    assert (away.max(axis=0) <= 1.5 * np.abs(held - commands).max(axis=0) + 1e-9).all()
+    predicted = per_dof(replayed.frames, "predicted")
+    error = np.abs(predicted - per_dof(recording.frames, "predicted")[: len(predicted)])
+    assert (error.max(axis=0) <= 1.5 * np.abs(held - commands).max(axis=0) + 1e-9).all()

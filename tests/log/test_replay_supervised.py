@@ -61,6 +61,15 @@ def flags(run: Recording) -> set[str]:
     return {line.partition(" ")[0] for line in run.warnings}
 
 
+def assert_replays_identically(log: Log, run: Recording) -> None:
+    found, again = replay_same(log)
+    assert found.first_difference == found.ended == ""
+    assert found.same_ticks == found.ticks == len(run.trace)
+    assert found.same_updates == found.updates == len(run.frames)
+    for name in run.trace.dtype.names or ():
+        np.testing.assert_array_equal(again.trace[name], run.trace[name], err_msg=name)
+
+
 REQUESTS = {
     0.5: ("before", "raise_flag following_error"),
     0.9: ("before", "engage"),
@@ -86,17 +95,17 @@ class RequestingRig(DrawnRig):
 
     def step(self, command: ArrayLike) -> Sample:
         sample = super().step(command)
-        self.tell(sample.time, "step")
+        self.send_due(sample.time, "step")
         return sample
 
-    def look(self, loop: HysteresisReduction, frame: Frame) -> Report:
+    def process_frame(self, loop: HysteresisReduction, frame: Frame) -> Report:
         self.loop = loop
-        self.tell(frame.captured_at, "before")
+        self.send_due(frame.captured_at, "before")
         report = loop.on_frame(frame)
-        self.tell(frame.captured_at, "after")
+        self.send_due(frame.captured_at, "after")
         return report
 
-    def tell(self, now: float, place: str) -> None:
+    def send_due(self, now: float, place: str) -> None:
         due = [at for at, (where, _) in self.waiting.items() if where == place and at <= now]
         for at in due:
             request, _, name = self.waiting.pop(at)[1].partition(" ")
@@ -113,17 +122,13 @@ def test_a_replay_repeats_the_requests_to_the_loop(
     reference.duration = 3.0
     path, rig = tmp_path / "run.mcap", RequestingRig(config)
     with LogWriter(path, config, wait=True) as log:
-        run = run_experiment(rig, reference, config, look=rig.look, log=log)
+        run = run_experiment(rig, reference, config, look=rig.process_frame, log=log)
     assert not rig.waiting
     assert flags(run) >= {"following_error"}
-    found, again = replay_same(written := read_log(path))
-    assert found.first_difference == found.ended == ""
-    assert found.same_ticks == found.ticks == len(run.trace)
-    assert found.same_updates == found.updates == len(run.frames)
-    for name in run.trace.dtype.names or ():
-        np.testing.assert_array_equal(again.trace[name], run.trace[name], err_msg=name)
+    written = read_log(path)
+    assert_replays_identically(written, run)
     requests = [event.text for event in written.events.values() if isinstance(event, Request)]
-    assert sorted(requests) == sorted(what for _, what in REQUESTS.values())
+    assert sorted(requests) == sorted(request for _, request in REQUESTS.values())
     effects = [
         first_difference_without(written, skip, monkeypatch) for skip in range(len(requests))
     ]
@@ -136,13 +141,13 @@ def first_difference_without(log: Log, skip: int, monkeypatch: pytest.MonkeyPatc
     """The first difference of a replay without one of the requests."""
     requests: list[str] = []
 
-    def tell(loop: HysteresisReduction, what: str) -> None:
-        requests.append(what)
+    def send(loop: HysteresisReduction, request: str) -> None:
+        requests.append(request)
         if len(requests) - 1 != skip:
-            _send_request(loop, what)
+            _send_request(loop, request)
 
     with monkeypatch.context() as patch:
-        patch.setattr("tautscope.log.replay._send_request", tell)
+        patch.setattr("tautscope.log.replay._send_request", send)
         return replay_same(log)[0].first_difference
 
 
@@ -174,9 +179,4 @@ def test_a_replay_is_identical_where_the_supervisor_acted(
     assert flags(run) >= {"reference_jump", "reference_late"}
     silent = run.trace["time"] - PAUSE > SILENT_FROM + config.safety.reference_age
     assert np.ptp(per_dof(run.trace[silent], "command"), axis=0).max() == 0.0
-    found, again = replay_same(read_log(path))
-    assert found.first_difference == found.ended == ""
-    assert found.same_ticks == found.ticks == len(run.trace)
-    assert found.same_updates == found.updates == len(run.frames)
-    for name in run.trace.dtype.names or ():
-        np.testing.assert_array_equal(again.trace[name], run.trace[name], err_msg=name)
+    assert_replays_identically(read_log(path), run)

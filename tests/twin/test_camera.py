@@ -27,13 +27,8 @@ def opencv(config: Config, p_in_camera: Array) -> Array:
     camera = config.camera
     matrix = np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1]])
     rest = np.zeros(3)
-    pixels = cv2.projectPoints(
-        np.asarray(p_in_camera, float).reshape(-1, 3),
-        rest,
-        rest,
-        matrix,
-        np.array(camera.distortion),
-    )[0]
+    points, distortion = np.asarray(p_in_camera, float).reshape(-1, 3), np.array(camera.distortion)
+    pixels = cv2.projectPoints(points, rest, rest, matrix, distortion)[0]
     return pixels.reshape(*np.shape(p_in_camera)[:-1], 2)
 
 

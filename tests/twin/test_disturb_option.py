@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import pytest
@@ -10,8 +9,6 @@ from tautscope import demo
 from tautscope.cli import main
 from tautscope.config import DISTURBANCES, Config, dump_config, load_config
 from tautscope.errors import ConfigError
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 
 
 def test_an_unknown_name_is_rejected_with_the_known_names(

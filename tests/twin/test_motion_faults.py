@@ -33,23 +33,16 @@ def motor_positions(name, dof=Dof.INSERTION, **changes):
     table = []
     while twin.time < START + DURATION - PERIOD:
         sample = rig.step(command(twin.time))
-        k = len(table) + 1
-        table.append(
-            (
-                sample.time - START,
-                twin.plant.applied[dof],
-                sample.applied[dof],
-                NOMINAL[k].applied[dof],
-            )
-        )
+        true, nominal = twin.plant.applied[dof], NOMINAL[len(table) + 1].applied[dof]
+        table.append((sample.time - START, true, sample.applied[dof], nominal))
     return np.array(table).T
 
 
 def test_axis_off_and_stuck_hold_and_only_off_reports_a_fault():
     for name, is_reported in (("axis_off", True), ("axis_stuck", False)):
-        since, real, read, _ = motor_positions(name)
-        np.testing.assert_array_equal(real, read)
-        assert np.ptp(real[since > 0.02]) < LAG
+        elapsed, position, measured, _ = motor_positions(name)
+        np.testing.assert_array_equal(position, measured)
+        assert np.ptp(position[elapsed > 0.02]) < LAG
         rig = FaultyRig(FeatureTwin(), (fault(name, start=0.0),), SEED)
         rig.reset()
         assert rig.drive_fault is is_reported
@@ -66,46 +59,48 @@ def test_only_the_named_axis_fails(dof):
 
 
 def test_axis_some_catches_up_and_axis_late_follows():
-    since, real, _, nominal = motor_positions("axis_some", severity=0.1)
-    lag = nominal - real
-    assert lag[(since > 0.05) & (since < 0.1)].min() > 4e-4
-    assert np.abs(lag[(since > 0.15) & (since < 0.2)]).max() < LAG
-    since, real, _, nominal = motor_positions("axis_late", severity=0.1)
-    late = np.interp(since - 0.1, since, nominal)
-    assert np.abs(real - late)[since > 0.15].max() < LAG
+    elapsed, position, _, nominal = motor_positions("axis_some", severity=0.1)
+    lag = nominal - position
+    assert lag[(elapsed > 0.05) & (elapsed < 0.1)].min() > 4e-4
+    assert np.abs(lag[(elapsed > 0.15) & (elapsed < 0.2)]).max() < LAG
+    elapsed, position, _, nominal = motor_positions("axis_late", severity=0.1)
+    late = np.interp(elapsed - 0.1, elapsed, nominal)
+    assert np.abs(position - late)[elapsed > 0.15].max() < LAG
 
 
 def test_axis_slow_limited_reversed_scaled_runs():
-    since, real, _, nominal = motor_positions("axis_slow", severity=2.0)
-    speed = np.polyfit(since[since > 0.05], real[since > 0.05], 1)[0]
+    elapsed, position, _, nominal = motor_positions("axis_slow", severity=2.0)
+    speed = np.polyfit(elapsed[elapsed > 0.05], position[elapsed > 0.05], 1)[0]
     assert speed == pytest.approx(2e-3, rel=0.05)
-    at = np.interp(0, since, nominal)
-    since, real, _, _ = motor_positions("axis_limited", severity=1.0)
-    assert real[-1] == pytest.approx(at + 1e-3, abs=LAG)
-    since, real, _, nominal = motor_positions("axis_reversed")
-    np.testing.assert_allclose((real + nominal)[since > 0.05], 2 * at, atol=2 * LAG)
-    since, real, read, nominal = motor_positions("axis_scaled", severity=2.0)
+    at = np.interp(0, elapsed, nominal)
+    elapsed, position, _, _ = motor_positions("axis_limited", severity=1.0)
+    assert position[-1] == pytest.approx(at + 1e-3, abs=LAG)
+    elapsed, position, _, nominal = motor_positions("axis_reversed")
+    np.testing.assert_allclose((position + nominal)[elapsed > 0.05], 2 * at, atol=2 * LAG)
+    elapsed, position, measured, nominal = motor_positions("axis_scaled", severity=2.0)
     np.testing.assert_allclose(
-        (real - at)[since > 0.05], 2 * (nominal - at)[since > 0.05], atol=3e-4
+        (position - at)[elapsed > 0.05], 2 * (nominal - at)[elapsed > 0.05], atol=3e-4
     )
-    np.testing.assert_allclose(read[since > 0.05], nominal[since > 0.05], atol=3e-4)
-    since, real, _, _ = motor_positions("axis_runs", severity=20.0)
-    assert abs(real[-1] - at) == pytest.approx(20e-3 * since[-1], rel=0.1)
-    _, real, _, nominal = motor_positions("axis_shaking", severity=1.0)
-    assert 2e-4 < np.std(real - nominal) < 1e-3
+    np.testing.assert_allclose(measured[elapsed > 0.05], nominal[elapsed > 0.05], atol=3e-4)
+    elapsed, position, _, _ = motor_positions("axis_runs", severity=20.0)
+    assert abs(position[-1] - at) == pytest.approx(20e-3 * elapsed[-1], rel=0.1)
+    _, position, _, nominal = motor_positions("axis_shaking", severity=1.0)
+    assert 2e-4 < np.std(position - nominal) < 1e-3
 
 
 def test_encoder_faults():
-    since, real, read, nominal = motor_positions("encoder_jump", severity=5.0, duration=math.inf)
-    settled = since > 0.1
-    assert np.abs(np.abs(real - nominal)[settled] - 5e-3).max() < LAG
-    np.testing.assert_allclose(read[settled], nominal[settled], atol=LAG)
-    since, real, read, nominal = motor_positions("encoder_stuck")
-    np.testing.assert_array_equal(real, nominal)
-    assert np.ptp(read[since >= 0]) == 0
-    _, real, read, nominal = motor_positions("encoder_noisy", severity=5.0)
-    np.testing.assert_array_equal(real, nominal)
-    assert 1e-3 < np.abs(read - real).max() <= 5e-3
+    elapsed, position, measured, nominal = motor_positions(
+        "encoder_jump", severity=5.0, duration=math.inf
+    )
+    settled = elapsed > 0.1
+    assert np.abs(np.abs(position - nominal)[settled] - 5e-3).max() < LAG
+    np.testing.assert_allclose(measured[settled], nominal[settled], atol=LAG)
+    elapsed, position, measured, nominal = motor_positions("encoder_stuck")
+    np.testing.assert_array_equal(position, nominal)
+    assert np.ptp(measured[elapsed >= 0]) == 0
+    _, position, measured, nominal = motor_positions("encoder_noisy", severity=5.0)
+    np.testing.assert_array_equal(position, nominal)
+    assert 1e-3 < np.abs(measured - position).max() <= 5e-3
 
 
 @pytest.mark.parametrize("name", ["ok", "axis_reversed", "axis_runs", "encoder_stuck"])
@@ -196,14 +191,14 @@ def test_operator_input_faults():
     assert abs(error[0]) == pytest.approx(5e-3)
     _, error = reference_error("hand_spikes", severity=5.0)
     assert (np.abs(error) > 1e-9).sum() == 2
-    since, error = reference_error("hand_fast", severity=100.0)
-    np.testing.assert_allclose(np.abs(error), 0.1 * since, atol=1e-12)
-    since, error = reference_error("hand_silent")
-    np.testing.assert_allclose(error, -0.01 * since, atol=1e-12)
-    since, error = reference_error("hand_late", severity=0.1)
-    np.testing.assert_allclose(error, -0.01 * np.minimum(since, 0.1), atol=1e-4)
-    since, error = reference_error("hand_slow", severity=5.0)
-    assert len(np.unique(np.round(error + 0.01 * since, 9))) == 2
+    elapsed, error = reference_error("hand_fast", severity=100.0)
+    np.testing.assert_allclose(np.abs(error), 0.1 * elapsed, atol=1e-12)
+    elapsed, error = reference_error("hand_silent")
+    np.testing.assert_allclose(error, -0.01 * elapsed, atol=1e-12)
+    elapsed, error = reference_error("hand_late", severity=0.1)
+    np.testing.assert_allclose(error, -0.01 * np.minimum(elapsed, 0.1), atol=1e-4)
+    elapsed, error = reference_error("hand_slow", severity=5.0)
+    assert len(np.unique(np.round(error + 0.01 * elapsed, 9))) == 2
     _, error = reference_error("hand_nan")
     assert not np.isfinite(error).any()
     _, error = reference_error("hand_noisy", severity=1.0)

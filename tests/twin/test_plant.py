@@ -76,11 +76,7 @@ def test_hysteresis_does_not_depend_on_speed():
 def test_no_friction_no_hysteresis():
     free = {"twin.shaft.straight_load": 1e-6, "twin.shaft.load_per_bend": 0.0}
     assert width(plant_for(**free), Dof.INSERTION, slow=2.0) < 0.1 * ARTICLE[Dof.INSERTION]
-    loose = {
-        "twin.cables.friction": 0.0,
-        "twin.cables.joint_friction": 0.0,
-        "twin.cables.slack": 0.0,
-    }
+    loose = {f"twin.cables.{name}": 0.0 for name in ("friction", "joint_friction", "slack")}
     assert width(plant_for(**loose), Dof.BENDING, slow=2.0) < 0.1 * ARTICLE[Dof.BENDING]
 
 

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import argparse
-import math
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
-from tautscope.commands.printing import console, print_json
+from tautscope.commands.printing import print_json
 from tautscope.config import Config, load_config
 from tautscope.errors import FieldError
 
 if TYPE_CHECKING:
-    from tautscope.dof import Dof
-    from tautscope.log.comparison import EstimationQuality
     from tautscope.log.mcap_records import Damage
     from tautscope.log.reader import Log
-    from tautscope.recording import Recording
 
 
 def add_parsers(verbs: arguments.Verbs) -> None:
@@ -142,17 +139,7 @@ def _replay_same(options: argparse.Namespace, log: Log) -> int:
     if options.out is not None:
         write_replay(options.out, replayed, log.recording())
     if options.json:
-        print_json(
-            {
-                "identical": comparison.is_identical,
-                "ticks": comparison.ticks,
-                "same_ticks": comparison.same_ticks,
-                "updates": comparison.updates,
-                "same_updates": comparison.same_updates,
-                "first_difference": comparison.first_difference,
-                "ended": comparison.ended,
-            }
-        )
+        print_json({"identical": comparison.is_identical, **asdict(comparison)})
     else:
         print(
             f"{comparison.same_ticks} of {comparison.ticks} commands and "
@@ -170,6 +157,7 @@ def _replay_same(options: argparse.Namespace, log: Log) -> int:
 
 
 def _estimate_from_log(options: argparse.Namespace, log: Log) -> int:
+    from tautscope.log.estimate_report import write_estimates  # noqa: PLC0415
     from tautscope.log.replay import estimate_from_log  # noqa: PLC0415
 
     if options.config is None:
@@ -178,7 +166,7 @@ def _estimate_from_log(options: argparse.Namespace, log: Log) -> int:
         config = load_config(options.config, options.profile)
     folder = _folder(options)
     replayed, skipped = estimate_from_log(log, config)
-    _report_estimates(options, folder, replayed, log.recording())
+    write_estimates(folder, replayed, log.recording(), as_json=options.json)
     if not options.json:
         if skipped:
             print(f"{skipped} image updates were skipped: their images are not in the log.")
@@ -188,13 +176,14 @@ def _estimate_from_log(options: argparse.Namespace, log: Log) -> int:
 
 def _estimate_from_video(options: argparse.Namespace) -> int:
     from tautscope.hardware.video import read_video  # noqa: PLC0415
+    from tautscope.log.estimate_report import write_estimates  # noqa: PLC0415
     from tautscope.log.replay import estimate_from_video  # noqa: PLC0415
 
     config: Config = load_config(options.config, options.profile)
     folder = _folder(options)
     frames = read_video(options.video, config.camera, options.video_start)
     replayed = estimate_from_video(frames, options.motors, config)
-    _report_estimates(options, folder, replayed, None)
+    write_estimates(folder, replayed, None, as_json=options.json)
     if not options.json:
         images, motors = replayed.frames["captured_at"], replayed.trace["time"]
         print(
@@ -208,70 +197,6 @@ def _folder(options: argparse.Namespace) -> Path:
     from tautscope.output import check_free, default_folder  # noqa: PLC0415
 
     return check_free(options.out or default_folder("replay"))
-
-
-def _report_estimates(
-    options: argparse.Namespace, folder: Path, replayed: Recording, recorded: Recording | None
-) -> None:
-    from tautscope.log.comparison import estimation_quality, write_replay  # noqa: PLC0415
-
-    write_replay(folder, replayed, recorded)
-    after = estimation_quality(replayed, recorded)
-    before = None if recorded is None else estimation_quality(recorded)
-    if options.json:
-        document: dict[str, Any] = {"images": len(replayed.frames), "dof": {}}
-        for dof, figures in after.items():
-            entry = {"replayed": _finite(figures)}
-            if before is not None:
-                entry["recorded"] = _finite(before[dof])
-            document["dof"][dof.label] = entry
-        print_json(document)
-        return
-    _print_table(replayed, before, after)
-    print(f"\nFigure and data: {folder / 'replay.png'}")
-
-
-def _print_table(
-    replayed: Recording,
-    before: dict[Dof, EstimationQuality] | None,
-    after: dict[Dof, EstimationQuality],
-) -> None:
-    from rich.table import Table  # noqa: PLC0415
-
-    table = Table(box=None, pad_edge=False, title_justify="left", title_style="bold")
-    table.title = f"Estimates from {len(replayed.frames)} images"
-    table.add_column("", no_wrap=True)
-    for dof in after:
-        unit = f"{dof.label} [{dof.display_unit}]"
-        if before is not None:
-            table.add_column(f"{unit}\nrecorded", justify="right", style="dim", no_wrap=True)
-        table.add_column("\nreplayed" if before else unit, justify="right", no_wrap=True)
-    for title, name in (
-        ("backlash width at the end", "width"),
-        ("images with the DOF observable", "seen"),
-        ("RMS error of the estimate", "state_rms"),
-        ("RMS change of the estimate", "change_rms"),
-    ):
-        cells = []
-        for dof, figures in after.items():
-            pair = [figures] if before is None else [before[dof], figures]
-            cells += [_cell(getattr(each, name), name, dof.display_scale) for each in pair]
-        if any(cells):
-            table.add_row(title, *cells)
-    console().print(table)
-
-
-def _cell(value: float, name: str, scale: float) -> str:
-    if math.isnan(value):
-        return ""
-    return f"{100 * value:.0f} %" if name == "seen" else f"{scale * value:.3g}"
-
-
-def _finite(figures: EstimationQuality) -> dict[str, float | None]:
-    from tautscope.tables import finite_or_none  # noqa: PLC0415
-
-    names = ("width", "seen", "state_rms", "change_rms")
-    return {name: finite_or_none(getattr(figures, name)) for name in names}
 
 
 def _print_warnings(log: Log) -> None:

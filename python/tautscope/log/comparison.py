@@ -7,6 +7,7 @@ from os import PathLike
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tautscope import metrics
 from tautscope.dof import Dof
@@ -68,11 +69,8 @@ def _quality(run: Recording, other: Recording | None, dof: Dof) -> EstimationQua
     )
 
 
-def _width(trace: Table, name: str) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    width: np.ndarray[tuple[int, ...], np.dtype[np.float64]] = (
-        trace[f"delta_plus_{name}"] - trace[f"delta_minus_{name}"]
-    )
-    return width
+def _width(trace: Table, name: str) -> NDArray[np.float64]:
+    return np.asarray(trace[f"delta_plus_{name}"] - trace[f"delta_minus_{name}"], np.float64)
 
 
 def replay_figure(replayed: Recording, recorded: Recording | None = None) -> Figure:

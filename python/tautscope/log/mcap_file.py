@@ -71,7 +71,7 @@ class McapFile:
         self._spans: list[tuple[int, int]] = []
         self._put(MCAP0_MAGIC + _bytes(Header("ros2", f"tautscope {__version__}")))
         for record in (*self._schemas.values(), *self._channels.values()):
-            _write(record, self._body)
+            record.write(self._body)
 
     def __contains__(self, topic: str) -> bool:
         return topic in self._channels
@@ -96,7 +96,7 @@ class McapFile:
             publish_time=at if sent is None else sent,
             sequence=sequence,
         )
-        _write(message, self._body)
+        message.write(self._body)
         self.counts[topic] += 1
         if self._body.count > CHUNK_SIZE:
             self.flush()
@@ -120,7 +120,7 @@ class McapFile:
         length, offsets, indices = self._at - start, dict[int, int](), RecordBuilder()
         for channel, index in self._indices.items():
             offsets[channel] = self._at + indices.count
-            _write(index, indices)
+            index.write(indices)
         entry = ChunkIndex(
             chunk_length=length,
             chunk_start_offset=start,
@@ -150,9 +150,9 @@ class McapFile:
         for opcode, records in groups:
             begin = summary.count
             for record in records:
-                _write(record, summary)
+                record.write(summary)
             if records:
-                _write(SummaryOffset(opcode, start + begin, summary.count - begin), offsets)
+                SummaryOffset(opcode, start + begin, summary.count - begin).write(offsets)
         offset_start = start + summary.count
         body = _ended(summary) + _ended(offsets)
         footer = Footer(start, offset_start, summary_crc=0)
@@ -184,13 +184,9 @@ class McapFile:
         self._at += len(data)
 
 
-def _write(record: McapRecord, builder: RecordBuilder) -> None:
-    record.write(builder)
-
-
 def _bytes(record: McapRecord) -> bytes:
     builder = RecordBuilder()
-    _write(record, builder)
+    record.write(builder)
     return _ended(builder)
 
 

@@ -27,6 +27,8 @@ from tautscope.rows import Tables, frame_row
 from tautscope.safety import DETECTORS
 
 Floats = NDArray[np.float64]
+Inputs = Iterator[Tick | tuple[float, Frame]]
+"""Ticks, and frames with their arrival time [s], in the order of the run."""
 
 
 @dataclass(slots=True)
@@ -136,19 +138,6 @@ def _frame(log: Log, index: int, update: Update) -> tuple[float, Frame]:
     return float(row["arrived_at"]), frame  # type: ignore[arg-type]
 
 
-@dataclass(frozen=True, slots=True)
-class _TickInput:
-    sample: Sample
-    reference: Floats
-    command: Floats
-
-
-@dataclass(frozen=True, slots=True)
-class _FrameInput:
-    arrived_at: float
-    frame: Frame
-
-
 def estimate_from_log(log: Log, config: Config) -> tuple[Recording, int]:
     """Estimate the states and offsets of a recorded run with another configuration.
 
@@ -189,34 +178,33 @@ def estimate_from_video(
     return run
 
 
-def _log_inputs(log: Log) -> Iterator[_TickInput | _FrameInput]:
+def _log_inputs(log: Log) -> Inputs:
     for index, event in log.events.items():
         if isinstance(event, Tick):
-            yield _TickInput(event.sample, event.reference, event.command)
+            yield event
         # Requests are left out: their effect on the motors is in the recorded commands.
         elif isinstance(event, Update) and log.has_image(index):
-            yield _FrameInput(*_frame(log, index, event))
+            yield _frame(log, index, event)
 
 
-def _video_inputs(
-    frames: Iterable[Frame], times: Floats, positions: Floats
-) -> Iterator[_TickInput | _FrameInput]:
+def _video_inputs(frames: Iterable[Frame], times: Floats, positions: Floats) -> Inputs:
+    ticks = [
+        Tick(Sample(float(time), position), position, position, None, {})
+        for time, position in zip(times, positions, strict=True)
+    ]
     at = 0
     for frame in frames:
-        while at < len(times) and times[at] <= frame.captured_at:
-            yield _TickInput(Sample(float(times[at]), positions[at]), positions[at], positions[at])
+        while at < len(ticks) and times[at] <= frame.captured_at:
+            yield ticks[at]
             at += 1
-        if at == len(times):
+        if at == len(ticks):
             return  # the motor positions after the end of the table are unknown
         if at:
-            yield _FrameInput(frame.captured_at, frame)
-    for time, position in zip(times[at:], positions[at:], strict=True):
-        yield _TickInput(Sample(float(time), position), position, position)
+            yield frame.captured_at, frame
+    yield from ticks[at:]
 
 
-def _estimate(
-    inputs: Iterable[_TickInput | _FrameInput], config: Config, compensated: bool
-) -> Recording:
+def _estimate(inputs: Inputs, config: Config, compensated: bool) -> Recording:
     # Without compensation the loop passes commands on and only estimates. Some detectors are off:
     # the commands were executed already and may be faster than an operator; codecs repeat frames.
     ignored = ("reference_jump", "reference_late", "late_tick", "monitor", "frozen")
@@ -224,11 +212,12 @@ def _estimate(
     loop = HysteresisReduction(config.replace(**off), compensate=False)
     tables = Tables(config)
     for each in inputs:
-        if isinstance(each, _TickInput):
+        if isinstance(each, Tick):
             loop.step(each.command, each.sample.time)
             tables.tick(each.sample, each.reference, each.command)
         else:
-            report = loop.on_frame(each.frame)
-            row = frame_row(each.arrived_at, each.frame, report)
+            arrived_at, frame = each
+            report = loop.on_frame(frame)
+            row = frame_row(arrived_at, frame, report)
             tables.frame(row, report.delta_minus, report.delta_plus)
     return Recording(*tables.tables(), config, compensated, ())

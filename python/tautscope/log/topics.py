@@ -60,9 +60,5 @@ def encode(topic: str, message: cdr.Message) -> bytes:
 
 
 def decode(topic: str, data: bytes) -> dict[str, Any]:
-    """The message of a topic from CDR.
-
-    Raises:
-        RecordError: The bytes are not a message of the topic's type.
-    """
+    """The message of a topic from CDR; errors as `cdr.decode`."""
     return cdr.decode(TYPES[topic], data)

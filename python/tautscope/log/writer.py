@@ -99,13 +99,9 @@ class LogWriter:
         command: Iterable[float],
         made_at: float | None = None,
     ) -> None:
-        """Record a control tick.
+        """Record a control tick: the sample before it, reference u (3,) and command c (3,).
 
-        Args:
-            sample: The sample before the tick.
-            reference: u (3,) [m, rad, rad].
-            command: c (3,) [m, rad, rad].
-            made_at: Rig time of the reference [s], if the loop got it.
+        `made_at` is the rig time of the reference [s], if the loop got it.
         """
         self._start_clock(sample.time)
         self._ticks += 1

@@ -19,6 +19,7 @@ Arrivals = list[tuple[float, Frame]]
 
 PIXEL_NOISE = 0.2
 """Standard deviation of the noise on a frozen measurement [px]."""
+_SWAPPED = [2, 3, 0, 1]
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,16 +56,8 @@ def _random_pixels(fault: FaultState) -> Floats:
     return fault.rng.uniform(0, np.tile(fault.image_size, 2).astype(np.float64))
 
 
-def _swap_bands(features: Floats) -> Floats:
-    return features[[2, 3, 0, 1]]
-
-
 def _swap_some_bands(features: Floats, fault: FaultState) -> Floats:
-    return features if fault.count() % round(fault.spec.size) else _swap_bands(features)
-
-
-def _merge_bands(features: Floats) -> Floats:
-    return np.tile((features[:2] + features[2:]) / 2, 2)
+    return features if fault.count() % round(fault.spec.size) else features[_SWAPPED]
 
 
 def _fix_band_b(features: Floats, fault: FaultState) -> Floats:
@@ -84,10 +77,6 @@ def _zoom(features: Floats, fault: FaultState) -> Floats:
 
 def _add_drift(features: Floats, fault: FaultState) -> Floats:
     return features + fault.channel_shift(fault.sign * fault.spec.size * fault.elapsed)
-
-
-def _add_bias(features: Floats, fault: FaultState) -> Floats:
-    return features + fault.channel_shift(fault.sign * fault.spec.size)
 
 
 def _freeze_noisy(features: Floats, fault: FaultState) -> Floats:
@@ -123,14 +112,14 @@ FEATURE_FAULTS: dict[str, FeatureFault] = {
     "outliers_some": _every_third(_shift_randomly),
     "noisy": lambda features, fault: features + fault.spec.size * fault.rng.standard_normal(4),
     "random": lambda _, fault: _random_pixels(fault),
-    "swapped": lambda features, _: _swap_bands(features),
+    "swapped": lambda features, _: features[_SWAPPED],
     "swapped_some": _swap_some_bands,
-    "merged": lambda features, _: _merge_bands(features),
+    "merged": lambda features, _: np.tile((features[:2] + features[2:]) / 2, 2),
     "band_elsewhere": _fix_band_b,
     "mirrored": lambda features, fault: _mirror(features, fault, vertically=False),
     "turned": lambda features, fault: _mirror(features, fault, vertically=True),
     "zoomed": _zoom,
-    "biased": _add_bias,
+    "biased": lambda features, fault: features + fault.channel_shift(fault.sign * fault.spec.size),
     "drifting": _add_drift,
     "frozen": lambda features, fault: fault.hold("held", features),
     "frozen_noisy": _freeze_noisy,
@@ -184,10 +173,6 @@ def _reorder(due: float, frame: Frame, fault: FaultState) -> Arrivals:
     return [(due, frame), (due + 0.5 * _frame_interval(frame, fault), fault.memory["kept"])]
 
 
-def _drop_randomly(due: float, frame: Frame, fault: FaultState) -> Arrivals:
-    return [] if fault.rng.uniform() < fault.spec.size else [(due, frame)]
-
-
 def _limit_rate(due: float, frame: Frame, fault: FaultState) -> Arrivals:
     if fault.elapsed < fault.memory.get("next", 0.0):
         return []
@@ -207,7 +192,9 @@ ARRIVAL_FAULTS: dict[str, ArrivalFault] = {
     "stamp_jitter": _jitter_stamp,
     "duplicate": _duplicate,
     "reordered": _reorder,
-    "dropped": _drop_randomly,
+    "dropped": lambda due, frame, fault: (
+        [] if fault.rng.uniform() < fault.spec.size else [(due, frame)]
+    ),
     "camera_off": lambda _due, _frame, _fault: [],
     "slow_camera": _limit_rate,
     "stamp_hour": lambda due, frame, fault: [

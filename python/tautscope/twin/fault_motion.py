@@ -69,10 +69,6 @@ def _limit_range(value: float, fault: FaultState) -> float:
     return float(np.clip(value, start - room, start + room))
 
 
-def _reverse(value: float, fault: FaultState) -> float:
-    return 2 * _hold(value, fault) - value
-
-
 def _scale(value: float, fault: FaultState) -> float:
     start = _hold(value, fault)
     return start + fault.spec.size * (value - start)
@@ -112,7 +108,7 @@ DRIVE_FAULTS: dict[str, AxisFault] = {
     "axis_slow": _limit_speed,
     "axis_late": _delay,
     "axis_limited": _limit_range,
-    "axis_reversed": _reverse,
+    "axis_reversed": lambda value, fault: 2 * _hold(value, fault) - value,
     "axis_scaled": _scale,
     "axis_shaking": _add_noise,
     "axis_runs": _hold_and_ramp,

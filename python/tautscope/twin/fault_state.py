@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(slots=True)
 class FaultState:
-    """What a fault model may use.
+    """One injected fault with its state; the input of its fault model.
 
     Attributes:
         spec: Kind, time, severity and DOF.
@@ -40,9 +40,8 @@ class FaultState:
     @classmethod
     def seeded(cls, spec: Fault, seed: int, index: int, **context: Any) -> FaultState:
         """The fault at place ``index`` of a list, with the random generator of a seed."""
-        return cls(
-            spec, np.random.default_rng([seed, index, zlib.crc32(spec.kind.encode())]), **context
-        )
+        rng = np.random.default_rng([seed, index, zlib.crc32(spec.kind.encode())])
+        return cls(spec, rng, **context)
 
     def update(self, time: float) -> bool:
         """Set the elapsed time; returns whether the fault is active at a time [s]."""

@@ -40,10 +40,10 @@ def stool(light: LinearImage, _: Bands, noise: TemporalNoise) -> Disturbed:
     size = max(1, width // 3), max(1, height // 3)
     where = noise.field("where", *size, 4, 0.004)
     # Never none; at most about a quarter of the image.
-    edge = 0.95 - 0.30 * noise.scalar("amount", 80)
+    threshold = 0.95 - 0.30 * noise.scalar("amount", 80)
     kind = 1 + 0.9 * noise.field("kind", *size, 3, 0.0)
     grain = noise.field("grain", *size, 40, 0.0)
-    opacity = np.clip((where - edge) / 0.30, 0, 1) * (0.84 + 0.08 * np.clip(grain, -1, 1))
+    opacity = np.clip((where - threshold) / 0.30, 0, 1) * (0.84 + 0.08 * np.clip(grain, -1, 1))
     parts = np.stack([np.clip(1 - np.abs(kind - k), 0, 1) for k in range(3)], axis=-1)
     colour = parts @ _STOOL / np.maximum(parts.sum(axis=-1, keepdims=True), 1e-3)
     colour *= (1 + 0.07 * grain)[..., None] / 130
@@ -58,7 +58,7 @@ def highlights(light: LinearImage, bands: Bands, noise: TemporalNoise) -> Distur
     along = bands.axis()
     across = np.array([-along[1], along[0]])
     for k in bands.visible_bands():
-        length, girth = max(bands.extent(k, along), 4.0), max(bands.extent(k, across), 4.0)
+        length, thickness = max(bands.extent(k, along), 4.0), max(bands.extent(k, across), 4.0)
         for kind in ("along", "across", "spot"):
             number, level = noise.episode(f"{kind}{k}", 36)
             rng = noise.generator(kind, k, number)
@@ -66,17 +66,17 @@ def highlights(light: LinearImage, bands: Bands, noise: TemporalNoise) -> Distur
                 continue
             shift = noise.scalar(f"shift {kind}{k}", 30)
             if kind == "along":
-                place = 0.1 * shift * length * along + rng.uniform(-0.3, 0.3) * girth * across
-                half = rng.uniform([0.35, 0.03], [0.65, 0.09])
+                offset = 0.1 * shift * length * along + rng.uniform(-0.3, 0.3) * thickness * across
+                semi_axes = rng.uniform([0.35, 0.03], [0.65, 0.09])
             elif kind == "across":
-                place = 0.28 * shift * length * along
-                half = rng.uniform([0.03, 0.30], [0.10, 0.44])
+                offset = 0.28 * shift * length * along
+                semi_axes = rng.uniform([0.03, 0.30], [0.10, 0.44])
             else:
-                place = 0.30 * (shift * length * along + rng.uniform(-1, 1) * girth * across)
-                half = rng.uniform([0.06, 0.05], [0.16, 0.14])
-            half = np.maximum(half * [length, girth], 0.8)
+                offset = 0.30 * (shift * length * along + rng.uniform(-1, 1) * thickness * across)
+                semi_axes = rng.uniform([0.06, 0.05], [0.16, 0.14])
+            semi_axes = np.maximum(semi_axes * [length, thickness], 0.8)
             tilt = float(np.arctan2(along[1], along[0]) + rng.normal(0, 0.1))
-            _Streak(bands.centre(k) + place, half, tilt, level).blend(light, hidden)
+            _Streak(bands.centre(k) + offset, semi_axes, tilt, level).blend(light, hidden)
     return light, hidden
 
 
@@ -86,31 +86,31 @@ class _Streak:
 
     Attributes:
         centre: u, v [px].
-        half: Semi-axes [px].
+        semi_axes: Semi-axes [px].
         tilt: Angle of the first axis, from u to v [rad].
         level: Opacity, 0 to 1.
     """
 
     centre: Floats
-    half: Floats
+    semi_axes: Floats
     tilt: float
     level: float
 
     def blend(self, light: LinearImage, hidden: Mask) -> None:
         """Blend the reflection into the image and mark the pixels it hides, both in place."""
-        box = _crop(light, self.centre, float(self.half.max()) + 10)
+        box = _crop(light, self.centre, float(self.semi_axes.max()) + 10)
         if box is None or self.level < 0.02:
             return
         x, y = _offsets(box, self.centre)
         cos, sin = np.cos(self.tilt), np.sin(self.tilt)
         u, v = x * cos + y * sin, y * cos - x * sin
-        a, b = self.half
+        a, b = self.semi_axes
         ripple = 1 + 0.22 * np.sin(0.35 * u + a) + 0.12 * np.sin(0.83 * u + b)
         b = b * ripple
         # Signed distance to the ellipse [px], to first order.
         level_set = np.hypot(u / a, v / b)
-        edge = (1 - level_set) * level_set / np.maximum(np.hypot(u / a**2, v / b**2), 1e-6)
-        sharp = (1 / (1 + np.exp(-3.3 * np.clip(edge, -8, 8)))).astype(np.float32)
+        distance = (1 - level_set) * level_set / np.maximum(np.hypot(u / a**2, v / b**2), 1e-6)
+        sharp = (1 / (1 + np.exp(-3.3 * np.clip(distance, -8, 8)))).astype(np.float32)
         glow = 0.12 * np.asarray(cv2.GaussianBlur(sharp, (0, 0), 2.5))
         opacity = (np.float32(self.level) * np.maximum(sharp, glow))[..., None]
         part = light[box]

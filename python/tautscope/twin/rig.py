@@ -122,9 +122,9 @@ class Twin:
         # Half a tick of tolerance: n / frame_rate and n * period differ in the last digits.
         if time + self._period / 2 < self._sequence / twin.frame_rate:
             return
-        picture = camera.draw(*plant.centreline(), self._sequence)
-        truth = picture.true_features, picture.true_visible
-        frame = Frame(picture.image, time, self._sequence, *truth)
+        rendered = camera.draw(*plant.centreline(), self._sequence)
+        truth = rendered.true_features, rendered.true_visible
+        frame = Frame(rendered.image, time, self._sequence, *truth)
         delay = twin.latency + twin.latency_jitter * self._timing.uniform(-1, 1)
         self._in_transit.append((time + delay, frame))
         self._sequence += 1
