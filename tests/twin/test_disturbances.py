@@ -42,8 +42,8 @@ def camera(*names: str, **changes: Any) -> TwinCamera:
     return TwinCamera(Config().replace(**{**SMALL, "twin.disturb": names, **changes}))
 
 
-def drawn(by: TwinCamera, sequence: int = 0, state: Array = STATE) -> RenderedImage:
-    return by.draw(*frames_of.centreline(Config(), state), sequence)
+def render(twin_camera: TwinCamera, sequence: int = 0, state: Array = STATE) -> RenderedImage:
+    return twin_camera.draw(*frames_of.centreline(Config(), state), sequence)
 
 
 def level(image: Array) -> Array:
@@ -62,10 +62,10 @@ def test_the_table_follows_the_light_path() -> None:
 @pytest.mark.parametrize("name", DISTURBANCES)
 def test_same_seed_same_bytes_in_any_order(name: str) -> None:
     first, again = camera(name), camera(name)
-    wanted = [drawn(first, k) for k in (3, 700, 31)]
+    wanted = [render(first, k) for k in (3, 700, 31)]
     for k, rendered in reversed(list(zip((3, 700, 31), wanted, strict=True))):
-        drawn(again, 5, STATE + 0.1)
-        repeated = drawn(again, k)
+        render(again, 5, STATE + 0.1)
+        repeated = render(again, k)
         np.testing.assert_array_equal(repeated.image, rendered.image)
         np.testing.assert_array_equal(repeated.true_features, rendered.true_features)
         np.testing.assert_array_equal(repeated.true_visible, rendered.true_visible)
@@ -76,7 +76,7 @@ def test_disturbances_change_the_image_and_not_the_true_features(name: str) -> N
     clean, disturbed = camera(), camera(name)
     changed = 0
     for k in range(0, 200, 40):
-        one, other = drawn(clean, k), drawn(disturbed, k)
+        one, other = render(clean, k), render(disturbed, k)
         changed += bool((one.image != other.image).any())
         assert (other.true_visible <= one.true_visible + 1e-9).all()
         there = np.repeat(other.true_visible > 0, 2)
@@ -91,14 +91,14 @@ def test_disturbances_depend_on_the_seed(name: str, tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "same.png"), grey)
     same = {**QUIET, "twin.background": str(tmp_path)}
     one, other = (camera(name, **same, **{"twin.seed": seed}) for seed in (0, 1))
-    differ = [(drawn(one, k).image != drawn(other, k).image).any() for k in range(0, 300, 60)]
+    differ = [(render(one, k).image != render(other, k).image).any() for k in range(0, 300, 60)]
     assert sum(differ) >= 3
 
 
 @pytest.mark.parametrize("name", [each.name for each in TABLE if each.name != "text"])
 def test_disturbances_vary_smoothly_over_frames(name: str) -> None:
-    by = camera(name, **QUIET)
-    images = [level(drawn(by, k).image) for k in range(45)]
+    twin_camera = camera(name, **QUIET)
+    images = [level(render(twin_camera, k).image) for k in range(45)]
     steps = [np.abs(b - a).mean() for a, b in pairwise(images)]
     span = max(np.abs(image - images[0]).mean() for image in images)
     assert span > 0
@@ -116,10 +116,10 @@ def test_temporal_noise_is_smooth_and_covers_its_range() -> None:
 
 
 def test_debris_hides_up_to_forty_percent_of_a_band() -> None:
-    by = camera("debris")
+    twin_camera = camera("debris")
     shares = []
     for k in range(0, 3000, 12):
-        rendered = drawn(by, k)
+        rendered = render(twin_camera, k)
         shares.append(1 - rendered.true_visible)
     assert np.max(shares) < obstacles.MAX_DEBRIS_SHARE + 0.02
     assert np.max(shares) > 0.33
@@ -128,33 +128,33 @@ def test_debris_hides_up_to_forty_percent_of_a_band() -> None:
 
 def test_the_visible_share_matches_the_changed_pixels() -> None:
     # `true_visible` is compared with the share of the band's green pixels that remains.
-    clean, by = camera(**QUIET, **LARGE), camera("debris", **QUIET, **LARGE)
+    clean, twin_camera = camera(**QUIET, **LARGE), camera("debris", **QUIET, **LARGE)
     state = np.array([15e-3, -0.5, 0.3])
 
-    def green(image: Array) -> Array:
-        blue, grn, red = np.moveaxis(level(image), 2, 0)
-        return np.asarray((grn > 1.35 * red) & (grn > 1.35 * blue))
+    def is_green(image: Array) -> Array:
+        blue, green_level, red = np.moveaxis(level(image), 2, 0)
+        return np.asarray((green_level > 1.35 * red) & (green_level > 1.35 * blue))
 
-    whole = drawn(clean, 0, state)
-    place = whole.true_features.reshape(2, 2)
-    rows, columns = np.nonzero(green(whole.image))
-    nearest = np.linalg.norm(np.stack([columns, rows], 1)[:, None] - place, axis=-1).argmin(1)
+    undisturbed = render(clean, 0, state)
+    centroids = undisturbed.true_features.reshape(2, 2)
+    rows, columns = np.nonzero(is_green(undisturbed.image))
+    nearest = np.linalg.norm(np.stack([columns, rows], 1)[:, None] - centroids, axis=-1).argmin(1)
     compared = 0
     for k in range(5, 420, 30):
-        rendered = drawn(by, k, state)
-        left = green(rendered.image)[rows, columns]
+        rendered = render(twin_camera, k, state)
+        remaining = is_green(rendered.image)[rows, columns]
         for band in (0, 1):
-            share = left[nearest == band].mean()
+            share = remaining[nearest == band].mean()
             assert share == pytest.approx(rendered.true_visible[band], abs=0.04), (k, band)
             compared += share < 0.9
     assert compared >= 3
 
 
 def test_a_band_behind_the_field_stop_is_dark_and_hidden() -> None:
-    by = camera("partial", **QUIET)
+    twin_camera = camera("partial", **QUIET)
     shares = []
     for k in range(0, 900, 30):
-        rendered = drawn(by, k)
+        rendered = render(twin_camera, k)
         shares.append(rendered.true_visible.min())
         if shares[-1] < 0.99:
             assert (rendered.image.max(axis=2) == 0).any()
@@ -163,12 +163,12 @@ def test_a_band_behind_the_field_stop_is_dark_and_hidden() -> None:
 
 
 def test_exposure_is_a_factor_between_a_quarter_and_four_and_clips() -> None:
-    clean, by = level(drawn(camera(**QUIET)).image), camera("exposure", **QUIET)
+    clean, twin_camera = level(render(camera(**QUIET)).image), camera("exposure", **QUIET)
     factors = []
     for k in range(0, 1500, 25):
-        image = level(drawn(by, k).image)
-        free = (image > 5) & (image < 250) & (clean > 20)
-        factor = np.median(image[free] / clean[free])
+        image = level(render(twin_camera, k).image)
+        unsaturated = (image > 5) & (image < 250) & (clean > 20)
+        factor = np.median(image[unsaturated] / clean[unsaturated])
         np.testing.assert_allclose(image, np.clip(factor * clean, 0, 255), atol=0.03 * 255)
         factors.append(factor)
     assert min(factors) == pytest.approx(0.25, rel=0.05)
@@ -176,13 +176,16 @@ def test_exposure_is_a_factor_between_a_quarter_and_four_and_clips() -> None:
 
 
 def test_white_balance_is_one_gain_per_channel() -> None:
-    clean, by = level(drawn(camera(**QUIET)).image), camera("white_balance", **QUIET)
+    clean, twin_camera = level(render(camera(**QUIET)).image), camera("white_balance", **QUIET)
     gains = []
     for k in range(0, 1500, 50):
-        image = level(drawn(by, k).image)
-        free = (clean > 40) & (clean < 190)
+        image = level(render(twin_camera, k).image)
+        unsaturated = (clean > 40) & (clean < 190)
         gains.append(
-            [np.median(image[..., c][free[..., c]] / clean[..., c][free[..., c]]) for c in range(3)]
+            [
+                np.median(image[..., c][unsaturated[..., c]] / clean[..., c][unsaturated[..., c]])
+                for c in range(3)
+            ]
         )
         np.testing.assert_allclose(image, np.clip(clean * gains[-1], 0, 255), atol=2.5)
     assert np.min(gains) == pytest.approx(0.8, rel=0.02)
@@ -212,48 +215,50 @@ def test_blur_preserves_centroid_and_intensity(name: str) -> None:
 
 
 def test_smoke_reduces_contrast() -> None:
-    clean, by = level(drawn(camera(**QUIET)).image), camera("smoke", **QUIET)
-    ratio = [level(drawn(by, k).image).std() / clean.std() for k in range(0, 900, 30)]
+    clean, twin_camera = level(render(camera(**QUIET)).image), camera("smoke", **QUIET)
+    ratio = [level(render(twin_camera, k).image).std() / clean.std() for k in range(0, 900, 30)]
     assert min(ratio) < 0.6
     assert max(ratio) == pytest.approx(1, abs=0.1)
 
 
 def test_highlights_are_saturated_and_lie_on_the_bands() -> None:
-    clean, by = camera(**QUIET), camera("highlights", **QUIET)
-    before = level(drawn(clean, 0).image)
-    place = drawn(clean, 0).true_features.reshape(2, 2)
-    most = 0
+    clean, twin_camera = camera(**QUIET), camera("highlights", **QUIET)
+    before = level(render(clean, 0).image)
+    centroids = render(clean, 0).true_features.reshape(2, 2)
+    largest_count = 0
     for k in range(0, 300, 15):
-        image = level(drawn(by, k).image)
+        image = level(render(twin_camera, k).image)
         white = (image.min(axis=2) > 250) & (before.min(axis=2) < 200)
         rows, columns = np.nonzero(white)
-        far = np.linalg.norm(np.stack([columns, rows], 1)[:, None] - place, axis=-1).min(1)
-        assert far.size == 0 or far.max() < 60
-        most = max(most, white.sum())
-    assert most > 30
+        distances = np.linalg.norm(np.stack([columns, rows], 1)[:, None] - centroids, axis=-1).min(
+            1
+        )
+        assert distances.size == 0 or distances.max() < 60
+        largest_count = max(largest_count, white.sum())
+    assert largest_count > 30
 
 
 def test_overlays_have_no_noise_and_the_tissue_does() -> None:
-    one, other = (drawn(camera("inset", **{"twin.image_noise": 3.0}), k).image for k in (100, 101))
+    one, other = (render(camera("inset", **{"twin.image_noise": 3.0}), k).image for k in (100, 101))
     assert (one[230:235, 10:30] == one[230, 10]).all()
     assert (one[:100] != other[:100]).mean() > 0.5
 
 
 def test_a_band_under_the_inset_has_no_features() -> None:
-    u, v = drawn(camera()).true_features[2:].tolist()
+    u, v = render(camera()).true_features[2:].tolist()
     # The view is shifted so that band B is in the middle of the inset.
     shift = {
         "camera.cx": SMALL["camera.cx"] + 0.16 * 360 - u,
         "camera.cy": SMALL["camera.cy"] + 0.83 * 288 - v,
     }
-    assert drawn(camera(**shift)).true_visible[1] > 0.9
-    hidden = drawn(camera("inset", **shift))
+    assert render(camera(**shift)).true_visible[1] > 0.9
+    hidden = render(camera("inset", **shift))
     assert hidden.true_visible[1] == 0
     assert np.isnan(hidden.true_features[2:]).all()
 
 
 def test_no_instrument_is_empty() -> None:
-    rendered = drawn(camera("no_instrument", **QUIET))
+    rendered = render(camera("no_instrument", **QUIET))
     assert np.isnan(rendered.true_features).all()
     assert (rendered.true_visible == 0).all()
     nothing = camera(**QUIET).draw(np.full((2, 3), np.nan), np.zeros((2, 3)), 0)
@@ -264,10 +269,10 @@ def test_all_disturbances_together_at_any_pose_and_size() -> None:
     rng = np.random.default_rng(4)
     names = [name for name in DISTURBANCES if name != NO_INSTRUMENT]
     for size in [(720, 576), (64, 48), (1, 1)]:
-        by = camera(*names, **{"camera.width": size[0], "camera.height": size[1]})
+        twin_camera = camera(*names, **{"camera.width": size[0], "camera.height": size[1]})
         for k in range(12):
             state = rng.uniform([0, -4, -2.5], [60e-3, 4, 2.5])
-            rendered = drawn(by, int(rng.integers(2**40)), state)
+            rendered = render(twin_camera, int(rng.integers(2**40)), state)
             assert rendered.image.shape == (size[1], size[0], 3)
             assert rendered.image.dtype == np.uint8
             assert ((rendered.true_visible >= 0) & (rendered.true_visible <= 1)).all(), (
