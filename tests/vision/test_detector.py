@@ -9,9 +9,9 @@ import pytest
 from numpy.typing import NDArray
 from scenes import scenes
 from tautscope import _core
-from tautscope.blocks import build_feature_model
 from tautscope.config import Config
 from tautscope.errors import ConfigError, FieldError, FrameError
+from tautscope.loop.construction import build_feature_model
 from tautscope.loop.vision import MarkerDetector
 
 Image = NDArray[np.uint8]

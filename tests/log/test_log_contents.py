@@ -1,4 +1,4 @@
-"""What is written is what was sent, and an independent reader finds all of it."""
+"""Logs contain what was recorded, as read by tautscope and by independent readers."""
 
 import subprocess
 import sys
@@ -12,7 +12,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
 from tautscope.config import CameraConfig, Config, RecordingConfig
 from tautscope.errors import RecordError
-from tautscope.log import messages as msg
+from tautscope.log import topics
 from tautscope.log.export import export_csv, export_rosbag
 from tautscope.log.images import ImageCodec
 from tautscope.log.reader import Update, read_log
@@ -40,15 +40,15 @@ def test_rosbags_reads_every_message_that_was_sent(recorded: Recorded) -> None:
     assert summary.is_complete
     ticks, frames = len(recording.trace), len(recording.frames)
     assert (summary.ticks, summary.updates) == (ticks, frames)
-    for topic in (*msg.OF_TICK, msg.TRUTH):
+    for topic in (*topics.TICK_TOPICS, topics.TRUTH):
         assert counts[topic] == ticks, topic
-    for topic in (*msg.OF_UPDATE, msg.IMAGE):
+    for topic in (*topics.UPDATE_TOPICS, topics.IMAGE):
         assert counts[topic] == frames, topic
-    assert counts[msg.CONFIG] == counts[msg.RUN] == counts[msg.VERSIONS] == 1
+    assert counts[topics.CONFIG] == counts[topics.RUN] == counts[topics.VERSIONS] == 1
 
 
-def test_the_summary_is_that_of_the_messages(recorded: Recorded) -> None:
-    """As the `mcap` library's reader has it, which finds messages by the summary."""
+def test_the_mcap_summary_matches_the_messages(recorded: Recorded) -> None:
+    """Read with the `mcap` library's reader, which finds messages by the summary."""
     path, _, summary = recorded
     with path.open("rb") as file:
         reader = make_reader(file, validate_crcs=True)
@@ -57,8 +57,8 @@ def test_the_summary_is_that_of_the_messages(recorded: Recorded) -> None:
         assert found.statistics is not None
         assert found.statistics.message_count == sum(summary.messages.values())
         counts = found.statistics.channel_message_counts
-        topics = {found.channels[key].topic: number for key, number in counts.items()}
-        assert topics == summary.messages
+        by_topic = {found.channels[key].topic: number for key, number in counts.items()}
+        assert by_topic == summary.messages
         assert len(found.chunk_indexes) == found.statistics.chunk_count > 50
         stamps = [message.log_time for _, _, message in reader.iter_messages(log_time_order=True)]
         assert stamps == sorted(stamps)
@@ -67,34 +67,34 @@ def test_the_summary_is_that_of_the_messages(recorded: Recorded) -> None:
             found.statistics.message_end_time,
         )
         middle = stamps[len(stamps) // 2]
-        late = sum(1 for _ in reader.iter_messages([msg.IMAGE], starting_at=middle))
+        late = sum(1 for _ in reader.iter_messages([topics.IMAGE], starting_at=middle))
     with path.open("rb") as file:
-        front_to_back = NonSeekingReader(file, validate_crcs=True).iter_messages([msg.IMAGE])
+        front_to_back = NonSeekingReader(file, validate_crcs=True).iter_messages([topics.IMAGE])
         assert late == sum(message.log_time >= middle for _, _, message in front_to_back)
 
 
-def test_rosbags_reads_what_the_run_was(recorded: Recorded) -> None:
+def test_rosbags_reads_commands_and_images(recorded: Recorded) -> None:
     path, recording, _ = recorded
-    commands, pictures, stamps = [], [], []
+    commands, images, stamps = [], [], []
     with AnyReader([path]) as reader:
         for connection, at, raw in reader.messages():
-            if connection.topic == msg.COMMAND:
+            if connection.topic == topics.COMMAND:
                 message = reader.deserialize(raw, connection.msgtype)
                 assert message.name == ["insertion", "rotation", "bending"]
                 commands.append(message.position)
                 stamps.append(at)
-            if connection.topic == msg.IMAGE:
+            if connection.topic == topics.IMAGE:
                 message = reader.deserialize(raw, connection.msgtype)
                 assert message.format == "bgr8; png compressed bgr8"
-                pictures.append(cv2.imdecode(message.data, cv2.IMREAD_COLOR))
+                images.append(cv2.imdecode(message.data, cv2.IMREAD_COLOR))
     np.testing.assert_array_equal(commands, per_dof(recording.trace, "command"))
     since_start = (np.array(stamps) - stamps[0]) / 1e9
     np.testing.assert_allclose(since_start, recording.trace["time"], atol=1e-9)
     log = read_log(path)
     seen = [index for index, event in log.events.items() if isinstance(event, Update)]
-    assert len(seen) == len(pictures)
-    for index, picture in zip(seen[::20], pictures[::20], strict=True):
-        np.testing.assert_array_equal(log.image(index), picture)
+    assert len(seen) == len(images)
+    for index, image in zip(seen[::20], images[::20], strict=True):
+        np.testing.assert_array_equal(log.image(index), image)
 
 
 def test_a_log_reads_back_as_the_run(recorded: Recorded, config: Config) -> None:
@@ -139,10 +139,10 @@ def test_every_pixel_format_comes_back_to_the_byte(name: str) -> None:
     image = np.random.default_rng(3).integers(0, 256, shape).astype(np.uint8)
     data = codec.encode(image)
     np.testing.assert_array_equal(codec.decode(data), image)
-    if name == "rgb":  # any viewer shows the colours the camera saw
+    if name == "rgb":  # viewers show the correct colours
         seen = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
         np.testing.assert_array_equal(seen[..., ::-1], image)
-    with pytest.raises(RecordError, match="no picture"):
+    with pytest.raises(RecordError, match="no image"):
         codec.decode(data[:20])
 
 

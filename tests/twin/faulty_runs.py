@@ -1,4 +1,4 @@
-"""A twin whose detector says a straight line, and runs of it with faults."""
+"""A simulated rig with features on a straight line over time, and runs of it with faults."""
 
 from __future__ import annotations
 
@@ -11,37 +11,37 @@ from tautscope.twin.faults import KINDS, Fault, FaultyRig, FeatureFrame, Target
 
 CONFIG = load_config()
 PERIOD = CONFIG.control.period
-EVERY = 8
+TICKS_PER_FRAME = 8
 START, DURATION = 0.4, 0.4
 SEED = 5
 CENTRE = np.array([0.025, 0.0, 0.9])
 
 
-class SeenTwin(Twin):
-    """A twin whose detector says a straight line over time."""
+class FeatureTwin(Twin):
+    """A twin without images whose measured features are those of `true_features_at`."""
 
     def __init__(self) -> None:
         super().__init__(CONFIG, images=False)
-        self._shown = 0
+        self._samples = 0
 
     def reset(self) -> Sample:
-        self._shown = 0
-        return self._look(super().reset())
+        self._samples = 0
+        return self._with_frame(super().reset())
 
     def step(self, command) -> Sample:
-        return self._look(super().step(command))
+        return self._with_frame(super().step(command))
 
-    def _look(self, sample: Sample) -> Sample:
-        self._shown += 1
-        if (self._shown - 1) % EVERY:
+    def _with_frame(self, sample: Sample) -> Sample:
+        self._samples += 1
+        if (self._samples - 1) % TICKS_PER_FRAME:
             return sample
         nothing = np.empty((0, 0, 3), np.uint8)
-        truth = line(sample.time)
-        frame = FeatureFrame(nothing, sample.time, self._shown, truth, features=truth.copy())
+        truth = true_features_at(sample.time)
+        frame = FeatureFrame(nothing, sample.time, self._samples, truth, features=truth.copy())
         return replace(sample, frame=frame)
 
 
-def line(time):
+def true_features_at(time):
     return np.array([100, 200, 150, 260]) + np.array([40, 10, 35, 5]) * time
 
 
@@ -50,7 +50,7 @@ def command(time):
 
 
 def run(*faults, seconds=1.2, seed=SEED, rig=None, twin=None):
-    twin = twin or SeenTwin()
+    twin = twin or FeatureTwin()
     rig = rig or FaultyRig(twin, faults, seed)
     collected = [rig.reset()]
     while twin.time < seconds - 1e-9:
@@ -80,5 +80,7 @@ def digest(collected):
     return sha.hexdigest()
 
 
-BARE = run(rig=(twin := SeenTwin()), twin=twin)
-ONLY = {kind: [row.name for row in KINDS.values() if row.target is kind] for kind in Target}
+NOMINAL = run(rig=(twin := FeatureTwin()), twin=twin)
+KINDS_BY_TARGET = {
+    kind: [row.name for row in KINDS.values() if row.target is kind] for kind in Target
+}

@@ -1,4 +1,4 @@
-"""A replay is identical also where the guards acted, and where images were looked at aside."""
+"""Replay of runs with supervisor actions and with images processed in the background."""
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -10,8 +10,8 @@ from drawn import DrawnRig
 from numpy.typing import ArrayLike, NDArray
 from tautscope.config import Config
 from tautscope.errors import RecordError
-from tautscope.log.reader import Log, Told, read_log
-from tautscope.log.replay import _tell, listen_to_log, replay_same
+from tautscope.log.reader import Log, Request, read_log
+from tautscope.log.replay import _send_request, estimate_from_log, replay_same
 from tautscope.log.writer import LogWriter
 from tautscope.loop.reduction import HysteresisReduction, Report
 from tautscope.loop.references import SineSequence
@@ -22,11 +22,11 @@ from tautscope.runs.recording import Recording, per_dof
 SECONDS = 7.0
 SILENT_FROM = 6.6
 PAUSE = 0.2
-"""A stall [s], beyond `safety.stall`."""
+"""Length of a stall [s], above `safety.stall`."""
 
 
-class Troubled(DrawnRig):
-    """One thing after the other is wrong with its camera, then its clock."""
+class FaultyCameraRig(DrawnRig):
+    """A rig with several faults of the camera, one after the other, then of the clock."""
 
     def step(self, command: ArrayLike) -> Sample:
         sample = super().step(command)
@@ -46,8 +46,8 @@ class Troubled(DrawnRig):
         return replace(sample, time=time + late, frame=frame)
 
 
-class Jumping(SineSequence):
-    """A hand that lets go, and takes hold elsewhere; in the end it is silent."""
+class JumpingReference(SineSequence):
+    """A reference that jumps, and is not updated any more at the end."""
 
     made_at = 0.0
 
@@ -57,11 +57,20 @@ class Jumping(SineSequence):
 
 
 def flags(run: Recording) -> set[str]:
-    """The names at the beginning of what is told."""
+    """Names of the flags in the warnings."""
     return {line.partition(" ")[0] for line in run.warnings}
 
 
-TOLD = {
+def assert_replays_identically(log: Log, run: Recording) -> None:
+    found, again = replay_same(log)
+    assert found.first_difference == found.ended == ""
+    assert found.same_ticks == found.ticks == len(run.trace)
+    assert found.same_updates == found.updates == len(run.frames)
+    for name in run.trace.dtype.names or ():
+        np.testing.assert_array_equal(again.trace[name], run.trace[name], err_msg=name)
+
+
+REQUESTS = {
     0.5: ("before", "raise_flag following_error"),
     0.9: ("before", "engage"),
     1.2: ("step", "raise_flag start_check"),
@@ -72,31 +81,31 @@ TOLD = {
     2.1: ("after", "engage"),
     2.4: ("after", "raise_flag following_error"),
 }
-"""When [s] the loop is told what, by whom: before or after an image update, or by the rig."""
+"""Time [s] -> when the request is made (before or after an image update, or in a step), request."""
 
 
-class Telling(DrawnRig):
-    """Tells the loop while a command is under way."""
+class RequestingRig(DrawnRig):
+    """A rig that sends requests to the loop."""
 
     loop: HysteresisReduction | None = None
 
     def __init__(self, config: Config) -> None:
         super().__init__(config)
-        self.waiting = dict(TOLD)
+        self.waiting = dict(REQUESTS)
 
     def step(self, command: ArrayLike) -> Sample:
         sample = super().step(command)
-        self.tell(sample.time, "step")
+        self.send_due(sample.time, "step")
         return sample
 
-    def look(self, loop: HysteresisReduction, frame: Frame) -> Report:
+    def process_frame(self, loop: HysteresisReduction, frame: Frame) -> Report:
         self.loop = loop
-        self.tell(frame.captured_at, "before")
+        self.send_due(frame.captured_at, "before")
         report = loop.on_frame(frame)
-        self.tell(frame.captured_at, "after")
+        self.send_due(frame.captured_at, "after")
         return report
 
-    def tell(self, now: float, place: str) -> None:
+    def send_due(self, now: float, place: str) -> None:
         due = [at for at, (where, _) in self.waiting.items() if where == place and at <= now]
         for at in due:
             request, _, name = self.waiting.pop(at)[1].partition(" ")
@@ -105,46 +114,44 @@ class Telling(DrawnRig):
 
 
 @pytest.mark.parametrize("profile", ["paper", "best"])
-def test_a_replay_is_told_what_the_loop_was_told(
+def test_a_replay_repeats_the_requests_to_the_loop(
     tmp_path: Path, config: Config, profile: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     config = config.replace(profile=profile)
     reference = SineSequence(config.experiment)
     reference.duration = 3.0
-    path, rig = tmp_path / "run.mcap", Telling(config)
+    path, rig = tmp_path / "run.mcap", RequestingRig(config)
     with LogWriter(path, config, wait=True) as log:
-        run = run_experiment(rig, reference, config, look=rig.look, log=log)
+        run = run_experiment(rig, reference, config, look=rig.process_frame, log=log)
     assert not rig.waiting
     assert flags(run) >= {"following_error"}
-    found, again = replay_same(written := read_log(path))
-    assert found.first_difference == found.ended == ""
-    assert found.same_ticks == found.ticks == len(run.trace)
-    assert found.same_updates == found.updates == len(run.frames)
-    for name in run.trace.dtype.names or ():
-        np.testing.assert_array_equal(again.trace[name], run.trace[name], err_msg=name)
-    told = [event.what for event in written.events.values() if isinstance(event, Told)]
-    assert sorted(told) == sorted(what for _, what in TOLD.values())
-    effects = [untold(written, skip, monkeypatch) for skip in range(len(told))]
-    assert all(effects), list(zip(told, effects, strict=True))
-    listened = listen_to_log(written, config)
-    assert len(listened.recording.trace) == len(run.trace)
+    written = read_log(path)
+    assert_replays_identically(written, run)
+    requests = [event.text for event in written.events.values() if isinstance(event, Request)]
+    assert sorted(requests) == sorted(request for _, request in REQUESTS.values())
+    effects = [
+        first_difference_without(written, skip, monkeypatch) for skip in range(len(requests))
+    ]
+    assert all(effects), list(zip(requests, effects, strict=True))
+    estimated, _ = estimate_from_log(written, config)
+    assert len(estimated.trace) == len(run.trace)
 
 
-def untold(log: Log, skip: int, monkeypatch: pytest.MonkeyPatch) -> str:
-    """The first difference where the loop is not told one thing of all."""
-    told: list[str] = []
+def first_difference_without(log: Log, skip: int, monkeypatch: pytest.MonkeyPatch) -> str:
+    """The first difference of a replay without one of the requests."""
+    requests: list[str] = []
 
-    def tell(loop: HysteresisReduction, what: str) -> None:
-        told.append(what)
-        if len(told) - 1 != skip:
-            _tell(loop, what)
+    def send(loop: HysteresisReduction, request: str) -> None:
+        requests.append(request)
+        if len(requests) - 1 != skip:
+            _send_request(loop, request)
 
     with monkeypatch.context() as patch:
-        patch.setattr("tautscope.log.replay._tell", tell)
+        patch.setattr("tautscope.log.replay._send_request", send)
         return replay_same(log)[0].first_difference
 
 
-def test_an_event_nobody_knows_is_refused(tmp_path: Path, config: Config) -> None:
+def test_an_unknown_request_is_rejected(tmp_path: Path, config: Config) -> None:
     with LogWriter(tmp_path / "run.mcap", config) as log:
         log.tick(Sample(0.0, np.zeros(3)), np.zeros(3), np.zeros(3))
         log.event(0.0, "__init__")
@@ -152,29 +159,24 @@ def test_an_event_nobody_knows_is_refused(tmp_path: Path, config: Config) -> Non
         replay_same(read_log(tmp_path / "run.mcap"))
 
 
-NOTICED = {"dropped", "late", "clock", "reference_jump", "late_tick", "reference_late"}
+EXPECTED_FLAGS = {"dropped", "late", "clock", "reference_jump", "late_tick", "reference_late"}
 
 
 @pytest.mark.parametrize("profile", ["paper", "best"])
-@pytest.mark.parametrize("is_aside", [False, True], ids=["ahead", "aside"])
-def test_a_replay_is_identical_where_guards_acted(
-    tmp_path: Path, config: Config, profile: str, *, is_aside: bool
+@pytest.mark.parametrize("is_background", [False, True], ids=["ahead", "background"])
+def test_a_replay_is_identical_where_the_supervisor_acted(
+    tmp_path: Path, config: Config, profile: str, *, is_background: bool
 ) -> None:
     config = config.replace(profile=profile)
-    reference = Jumping(config.experiment)
+    reference = JumpingReference(config.experiment)
     reference.duration = SECONDS
     path = tmp_path / "run.mcap"
-    with ThreadPoolExecutor(1) as eyes, LogWriter(path, config, wait=True) as log:
-        aside = eyes if is_aside else None
-        run = run_experiment(Troubled(config), reference, config, log=log, aside=aside)
-    if not is_aside:  # which frames are seen aside is a matter of time
-        assert flags(run) >= NOTICED
+    with ThreadPoolExecutor(1) as executor, LogWriter(path, config, wait=True) as log:
+        aside = executor if is_background else None
+        run = run_experiment(FaultyCameraRig(config), reference, config, log=log, aside=aside)
+    if not is_background:  # which frames are processed in the background depends on timing
+        assert flags(run) >= EXPECTED_FLAGS
     assert flags(run) >= {"reference_jump", "reference_late"}
     silent = run.trace["time"] - PAUSE > SILENT_FROM + config.safety.reference_age
     assert np.ptp(per_dof(run.trace[silent], "command"), axis=0).max() == 0.0
-    found, again = replay_same(read_log(path))
-    assert found.first_difference == found.ended == ""
-    assert found.same_ticks == found.ticks == len(run.trace)
-    assert found.same_updates == found.updates == len(run.frames)
-    for name in run.trace.dtype.names or ():
-        np.testing.assert_array_equal(again.trace[name], run.trace[name], err_msg=name)
+    assert_replays_identically(read_log(path), run)

@@ -1,4 +1,4 @@
-"""Faults in the twin act when they say, on nothing else, and never on hardware; seeds reproduce."""
+"""Faults act at their time, on their target and on simulated rigs only; seeds reproduce them."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import math
 
 import numpy as np
 import pytest
-from failing import (
-    BARE,
+from faulty_runs import (
     CONFIG,
     DURATION,
-    ONLY,
+    KINDS_BY_TARGET,
+    NOMINAL,
     PERIOD,
     START,
-    SeenTwin,
+    FeatureTwin,
     digest,
     fault,
     frames,
@@ -21,43 +21,43 @@ from failing import (
 )
 from tautscope import Rig, Sample, Twin
 from tautscope.errors import FieldError
-from tautscope.twin.fault_frames import FEATURES, FRAMES, IMAGES
-from tautscope.twin.fault_motion import DRIVES, ENCODERS, HANDS, PHYSICS
+from tautscope.twin.fault_frames import ARRIVAL_FAULTS, FEATURE_FAULTS, IMAGE_FAULTS
+from tautscope.twin.fault_motion import DRIVE_FAULTS, ENCODER_FAULTS, PLANT_FAULTS, REFERENCE_FAULTS
 from tautscope.twin.faults import KINDS, Fault, FaultyRig, Mode, Target
 
-RANDOM = {
+SEEDED_KINDS = {
     *("outliers", "outliers_some", "noisy", "random", "band_elsewhere", "frozen_noisy"),
     *("not_finite", "jitter", "stamp_jitter", "dropped"),
 }
-"""Kinds that another seed makes different."""
+"""Kinds whose effect depends on the seed."""
 
 
-def test_the_vocabulary_is_whole():
+def test_the_kinds_cover_all_targets_and_modes():
     assert len(KINDS) >= 40
     assert {row.mode for row in KINDS.values()} == set(Mode)
     assert {row.target for row in KINDS.values()} == set(Target)
     for target in (Target.FEATURES, Target.FRAMES, Target.DRIVE):
-        modes = {KINDS[name].mode for name in ONLY[target]}
+        modes = {KINDS[name].mode for name in KINDS_BY_TARGET[target]}
         assert modes >= {Mode.OFF, Mode.STUCK, Mode.GARBAGE, Mode.WRONG, Mode.SLOW}, target
         assert Mode.INTERMITTENT in modes, target
 
 
-def test_every_kind_is_made_somewhere():
-    assert set(ONLY[Target.FEATURES]) == set(FEATURES) >= set(IMAGES)
-    assert set(ONLY[Target.FRAMES]) == set(FRAMES)
-    assert set(ONLY[Target.DRIVE]) == set(DRIVES) | set(ENCODERS)
-    assert set(ONLY[Target.REFERENCE]) == set(HANDS)
-    assert set(ONLY[Target.PHYSICS]) == set(PHYSICS)
-    assert {row.name for row in KINDS.values() if row.on_images} == set(IMAGES) | {"ok"}
+def test_every_kind_has_a_model():
+    assert set(KINDS_BY_TARGET[Target.FEATURES]) == set(FEATURE_FAULTS) >= set(IMAGE_FAULTS)
+    assert set(KINDS_BY_TARGET[Target.FRAMES]) == set(ARRIVAL_FAULTS)
+    assert set(KINDS_BY_TARGET[Target.DRIVE]) == set(DRIVE_FAULTS) | set(ENCODER_FAULTS)
+    assert set(KINDS_BY_TARGET[Target.REFERENCE]) == set(REFERENCE_FAULTS)
+    assert set(KINDS_BY_TARGET[Target.PHYSICS]) == set(PLANT_FAULTS)
+    assert {row.name for row in KINDS.values() if row.on_images} == set(IMAGE_FAULTS) | {"ok"}
 
 
 class Hardware:
-    """A rig with all members, and not a twin."""
+    """A rig with all members of `Twin` that is not a `Twin`."""
 
     control_period = PERIOD
     config = CONFIG
     time = 0.0
-    draws = False
+    has_images = False
 
     def reset(self) -> Sample:
         return Sample(0.0, np.zeros(3))
@@ -69,29 +69,29 @@ class Hardware:
         pass
 
 
-@pytest.mark.parametrize("rig", [Hardware(), None, FaultyRig(SeenTwin(), (), 0), Twin])
-def test_nothing_but_a_twin_is_made_to_fail(rig):
+@pytest.mark.parametrize("rig", [Hardware(), None, FaultyRig(FeatureTwin(), (), 0), Twin])
+def test_faults_are_injected_into_a_twin_only(rig):
     with pytest.raises(FieldError, match="never made on hardware") as error:
         FaultyRig(rig, (), 0)
     assert error.value.field == "twin"
 
 
 def test_it_is_a_rig():
-    assert isinstance(FaultyRig(SeenTwin(), (), 0), Rig)
+    assert isinstance(FaultyRig(FeatureTwin(), (), 0), Rig)
 
 
 @pytest.mark.parametrize("name", KINDS)
 def test_before_it_begins_a_fault_changes_no_bit(name):
     assert digest(run(Fault(name, start=1e6), seconds=0.3)) == digest(
-        BARE[: round(0.3 / PERIOD) + 1]
+        NOMINAL[: round(0.3 / PERIOD) + 1]
     )
 
 
 def test_ok_changes_no_bit():
-    assert digest(run(fault("ok"))) == digest(BARE)
+    assert digest(run(fault("ok"))) == digest(NOMINAL)
 
 
-def test_ok_changes_no_bit_of_a_picture():
+def test_ok_changes_no_bit_of_an_image():
     runs = []
     for wrapped in (False, True):
         twin = Twin(CONFIG)
@@ -103,21 +103,21 @@ def test_ok_changes_no_bit_of_a_picture():
 @pytest.mark.parametrize("name", sorted(KINDS))
 def test_the_same_seed_gives_the_same_bytes(name):
     size = sum(KINDS[name].severity) / 2
-    spoilt = fault(name, severity=size)
-    first, again, other = (digest(run(spoilt, seconds=0.7, seed=s)) for s in (7, 7, 8))
+    faulty = fault(name, severity=size)
+    first, again, other = (digest(run(faulty, seconds=0.7, seed=s)) for s in (7, 7, 8))
     assert first == again, "seed 7"
-    if name in RANDOM:
+    if name in SEEDED_KINDS:
         assert first != other, "seeds 7, 8"
 
 
-@pytest.mark.parametrize("name", ONLY[Target.FEATURES] + ONLY[Target.FRAMES])
-def test_faults_of_the_camera_leave_truth_and_motors_alone(name):
+@pytest.mark.parametrize("name", KINDS_BY_TARGET[Target.FEATURES] + KINDS_BY_TARGET[Target.FRAMES])
+def test_camera_faults_do_not_change_truth_or_motors(name):
     collected = run(fault(name))
-    for got, expected in zip(collected, BARE, strict=True):
-        assert got.time == expected.time
-        np.testing.assert_array_equal(got.true_state, expected.true_state)
-        np.testing.assert_array_equal(got.applied, expected.applied)
-    truth = {frame.sequence: frame for _, frame in frames(BARE)}
+    for actual, expected in zip(collected, NOMINAL, strict=True):
+        assert actual.time == expected.time
+        np.testing.assert_array_equal(actual.true_state, expected.true_state)
+        np.testing.assert_array_equal(actual.applied, expected.applied)
+    truth = {frame.sequence: frame for _, frame in frames(NOMINAL)}
     for _, frame in frames(collected):
         np.testing.assert_array_equal(frame.true_features, truth[frame.sequence].true_features)
 
@@ -133,7 +133,7 @@ def test_faults_of_the_camera_leave_truth_and_motors_alone(name):
         ("fault.severity", {"severity": math.nan}),
     ],
 )
-def test_what_is_no_fault_is_named(field, wrong):
+def test_invalid_faults_are_rejected(field, wrong):
     with pytest.raises(FieldError) as error:
         Fault(**({"kind": "biased"} | wrong))
     assert error.value.field == field
@@ -141,8 +141,8 @@ def test_what_is_no_fault_is_named(field, wrong):
 
 def test_several_faults_act_together():
     collected = frames(run(fault("swapped"), fault("late", severity=0.1)))
-    inside = [(t, f) for t, f in collected if START + 0.1 <= t < START + DURATION]
-    assert inside
-    for time, frame in inside:
+    during = [(t, f) for t, f in collected if START + 0.1 <= t < START + DURATION]
+    assert during
+    for time, frame in during:
         np.testing.assert_array_equal(frame.features, frame.true_features[[2, 3, 0, 1]])
         assert time - frame.captured_at == pytest.approx(0.1, abs=1.01 * PERIOD)

@@ -1,4 +1,4 @@
-"""What lies behind the instrument."""
+"""Background images of the simulated camera."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ import cv2
 import numpy as np
 import pytest
 from tautscope.errors import MissingPathError
-from tautscope.twin.tissue import load_backgrounds, mucosa
+from tautscope.twin.tissue import draw_mucosa, load_backgrounds
 
 
 def test_mucosa_depends_on_its_seed_alone() -> None:
-    one = mucosa(240, 192, 3)
+    one = draw_mucosa(240, 192, 3)
     np.random.default_rng(0).normal(size=10)
-    np.testing.assert_array_equal(one, mucosa(240, 192, 3))
-    assert (one != mucosa(240, 192, 4)).mean() > 0.5
+    np.testing.assert_array_equal(one, draw_mucosa(240, 192, 3))
+    assert (one != draw_mucosa(240, 192, 4)).mean() > 0.5
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_mucosa_looks_like_tissue_and_not_like_a_marker(seed: int) -> None:
-    image = mucosa(720, 576, seed)
+    image = draw_mucosa(720, 576, seed)
     assert image.shape == (576, 720, 3)
     assert image.dtype == np.uint8
     blue, green, red = (float(value) for value in image.reshape(-1, 3).mean(axis=0))
@@ -34,10 +34,10 @@ def test_mucosa_looks_like_tissue_and_not_like_a_marker(seed: int) -> None:
 
 @pytest.mark.parametrize("size", [(1, 1), (7, 90), (1920, 1080)])
 def test_mucosa_of_any_size(size: tuple[int, int]) -> None:
-    assert mucosa(*size, seed=0).shape == (size[1], size[0], 3)
+    assert draw_mucosa(*size, seed=0).shape == (size[1], size[0], 3)
 
 
-def test_a_folder_is_read_by_name_and_fitted(tmp_path: Path) -> None:
+def test_a_folder_is_read_by_name_and_resized(tmp_path: Path) -> None:
     red, blue = np.zeros((20, 30, 3), np.uint8), np.zeros((500, 900, 3), np.uint8)
     red[..., 2], blue[..., 0] = 200, 200
     cv2.imwrite(str(tmp_path / "2.PNG"), red)
@@ -50,7 +50,7 @@ def test_a_folder_is_read_by_name_and_fitted(tmp_path: Path) -> None:
     assert second[..., 2].mean() > 150 > second[..., 0].mean()
 
 
-def test_a_folder_without_images_is_refused_by_name(tmp_path: Path) -> None:
+def test_a_folder_without_images_is_rejected(tmp_path: Path) -> None:
     (tmp_path / "x.png").write_bytes(b"not an image")
     for folder in (tmp_path / "nowhere", tmp_path, tmp_path / "x.png"):
         with pytest.raises(MissingPathError) as caught:

@@ -1,4 +1,4 @@
-"""The same inputs give the same outputs; other configurations are told apart."""
+"""Replay of logs, and estimates with other configurations, videos and motor positions."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -9,7 +9,7 @@ from drawn import SLACK
 from recorded import record
 from tautscope.config import Config
 from tautscope.log.reader import Log, Update, read_log
-from tautscope.log.replay import listen_to_log, listen_to_video, replay_same
+from tautscope.log.replay import estimate_from_log, estimate_from_video, replay_same
 from tautscope.log.writer import LogSummary
 from tautscope.loop.rig import Frame
 from tautscope.runs.recording import Recording, per_dof
@@ -29,18 +29,18 @@ def test_a_replay_is_identical(recorded: Recorded) -> None:
 
 
 @pytest.mark.parametrize(("profile", "share"), [("paper", 1e-9), ("best", 0.01)])
-def test_listening_to_the_same_configuration_estimates_the_same(
+def test_estimates_with_the_same_configuration_are_the_same(
     tmp_path: Path, config: Config, profile: str, share: float
 ) -> None:
-    """Profile best tells intention from tremor by the reference, which a listener has not."""
+    """Profile best separates tremor from motion by the reference, which the estimation lacks."""
     config = config.replace(profile=profile)
     recording, _ = record(tmp_path / "run.mcap", config, 6.0)
-    heard = listen_to_log(read_log(tmp_path / "run.mcap"), config).recording
+    replayed, _ = estimate_from_log(read_log(tmp_path / "run.mcap"), config)
     for group in ("estimate", "delta_minus", "delta_plus"):
-        difference = per_dof(heard.trace, group) - per_dof(recording.trace, group)
+        difference = per_dof(replayed.trace, group) - per_dof(recording.trace, group)
         assert np.nanmax(np.abs(difference) / SLACK) < share, group
     np.testing.assert_array_equal(
-        per_dof(heard.trace, "command"), per_dof(recording.trace, "command")
+        per_dof(replayed.trace, "command"), per_dof(recording.trace, "command")
     )
 
 
@@ -48,11 +48,11 @@ def test_another_configuration_estimates_something_else(recorded: Recorded) -> N
     path, recording, _ = recorded
     log = read_log(path)
     slow = log.config.replace(**{"insertion.smoothing_factor": 0.001})
-    heard = listen_to_log(log, slow).recording
+    replayed, _ = estimate_from_log(log, slow)
     wide = per_dof(recording.trace, "delta_plus")[-1] - per_dof(recording.trace, "delta_minus")[-1]
-    less = per_dof(heard.trace, "delta_plus")[-1] - per_dof(heard.trace, "delta_minus")[-1]
+    less = per_dof(replayed.trace, "delta_plus")[-1] - per_dof(replayed.trace, "delta_minus")[-1]
     assert less[0] < 0.5 * wide[0]
-    assert heard.config == slow
+    assert replayed.config == slow
 
 
 def test_a_changed_input_is_found(recorded: Recorded) -> None:
@@ -75,16 +75,18 @@ def test_the_order_of_ticks_and_images_matters_and_is_kept(recorded: Recorded) -
     assert not isinstance(later, Update)
     kinds = [isinstance(event, Update) for event in log.events.values()]
     assert list(log.events) == list(range(1, len(kinds) + 1))
-    assert kinds[:2] == [False, True]  # the rig's first sample has a frame, its tick comes first
+    assert kinds[:2] == [False, True]  # the first sample has a frame; its tick comes first
 
 
-def test_a_hole_ends_the_comparison_and_is_said(recorded: Recorded) -> None:
+def test_a_gap_ends_the_comparison(recorded: Recorded) -> None:
     log = read_log(recorded[0])
     del log.events[100]
     found, _ = replay_same(log)
     assert found.is_identical
     assert found.ticks + found.updates == 99
-    assert found.ended == f"tick, image update or event 100 of {max(log.events)} is not in the log"
+    assert (
+        found.ended == f"tick, image update or request 100 of {max(log.events)} is not in the log"
+    )
 
 
 def test_jpeg_is_not_identical_but_close(tmp_path: Path, config: Config) -> None:
@@ -109,8 +111,8 @@ def frames_of(log: Log) -> list[Frame]:
     ]
 
 
-def test_video_and_motors_are_a_run_too(recorded: Recorded, tmp_path: Path) -> None:
-    """The same frames, and the commands as a table: the same estimates."""
+def test_estimates_from_video_and_motor_positions(recorded: Recorded, tmp_path: Path) -> None:
+    """The frames of a run and its commands as a table give the estimates of the run."""
     path, recording, _ = recorded
     log = read_log(path)
     frames = frames_of(log)
@@ -121,16 +123,16 @@ def test_video_and_motors_are_a_run_too(recorded: Recorded, tmp_path: Path) -> N
     ):
         lines.append(f"{bending!r},{time!r},{insertion!r},{rotation!r}".replace("np.float64", ""))
     table.write_text("\n".join(lines).replace("(", "").replace(")", "") + "\n")
-    heard = listen_to_video(frames, table, log.config).recording
-    kept = slice(0, len(heard.frames))
+    replayed = estimate_from_video(frames, table, log.config)
+    kept = slice(0, len(replayed.frames))
     np.testing.assert_allclose(
-        per_dof(heard.frames, "estimate"), per_dof(recording.frames, "estimate")[kept], atol=1e-9
+        per_dof(replayed.frames, "estimate"), per_dof(recording.frames, "estimate")[kept], atol=1e-9
     )
-    assert len(heard.frames) >= len(frames) - 1
-    assert len(heard.trace) == len(recording.trace)
+    assert len(replayed.frames) >= len(frames) - 1
+    assert len(replayed.trace) == len(recording.trace)
 
 
-def test_motors_that_were_written_down_ten_times_a_second_are_no_silent_hand(
+def test_sparse_motor_positions_are_not_taken_for_a_held_reference(
     recorded: Recorded, tmp_path: Path
 ) -> None:
     path, recording, _ = recorded
@@ -140,7 +142,7 @@ def test_motors_that_were_written_down_ten_times_a_second_are_no_silent_hand(
     rows = np.column_stack([recording.trace["time"], held])
     table = tmp_path / "motors.csv"
     np.savetxt(table, rows, "%.17g", delimiter=",", header=names, comments="")
-    heard = listen_to_video(frames_of(log), table, log.config).recording
-    there = per_dof(heard.frames, "predicted")
-    away = np.abs(there - per_dof(recording.frames, "predicted")[: len(there)])
-    assert (away.max(axis=0) <= 1.5 * np.abs(held - commands).max(axis=0) + 1e-9).all()
+    replayed = estimate_from_video(frames_of(log), table, log.config)
+    predicted = per_dof(replayed.frames, "predicted")
+    error = np.abs(predicted - per_dof(recording.frames, "predicted")[: len(predicted)])
+    assert (error.max(axis=0) <= 1.5 * np.abs(held - commands).max(axis=0) + 1e-9).all()

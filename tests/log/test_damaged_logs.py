@@ -1,4 +1,4 @@
-"""What a torn or spoilt log still says, and what is no log."""
+"""Truncated and damaged logs, and files that are not logs."""
 
 from pathlib import Path
 
@@ -14,42 +14,42 @@ from tautscope.runs.recording import Recording, per_dof
 Recorded = tuple[Path, Recording, LogSummary]
 
 
-def test_a_torn_log_is_read_up_to_the_tear(recorded: Recorded, tmp_path: Path) -> None:
+def test_a_truncated_log_is_read_up_to_its_end(recorded: Recorded, tmp_path: Path) -> None:
     path, recording, _ = recorded
-    whole = path.read_bytes()
+    complete = path.read_bytes()
     rng = np.random.default_rng(0)
-    torn = tmp_path / "torn.mcap"
+    truncated = tmp_path / "truncated.mcap"
     before = -1
-    for cut in sorted(rng.integers(20_000, len(whole), 12)):
-        torn.write_bytes(whole[:cut])
-        log = read_log(torn)
-        assert log.damage.is_torn
+    for cut in sorted(rng.integers(20_000, len(complete), 12)):
+        truncated.write_bytes(complete[:cut])
+        log = read_log(truncated)
+        assert log.damage.is_truncated
         ticks = [event for event in log.events.values() if isinstance(event, Tick)]
         assert len(ticks) >= before, cut
         before = len(ticks)
         np.testing.assert_array_equal(
             [tick.command for tick in ticks], per_dof(recording.trace, "command")[: len(ticks)]
         )
-        mended = tmp_path / f"{cut}.mcap"
-        found = recover(torn, mended)
-        assert found.damage.is_torn
-        with AnyReader([mended]) as reader:
+        repaired = tmp_path / f"{cut}.mcap"
+        found = recover(truncated, repaired)
+        assert found.damage.is_truncated
+        with AnyReader([repaired]) as reader:
             assert sum(1 for _ in reader.messages()) == sum(found.messages.values())
-        assert list(read_log(mended).events) == list(log.events)
-        assert not read_log(mended).damage
+        assert list(read_log(repaired).events) == list(log.events)
+        assert not read_log(repaired).damage
     assert before > 0.9 * len(recording.trace)
 
 
-def test_a_flipped_bit_costs_no_more_than_its_chunk(recorded: Recorded, tmp_path: Path) -> None:
+def test_a_flipped_bit_costs_at_most_its_chunk(recorded: Recorded, tmp_path: Path) -> None:
     path, recording, _ = recorded
-    whole = path.read_bytes()
+    complete = path.read_bytes()
     rng = np.random.default_rng(1)
-    spoilt = tmp_path / "spoilt.mcap"
-    for at in rng.integers(50_000, len(whole), 20):
-        data = bytearray(whole)
+    damaged = tmp_path / "damaged.mcap"
+    for at in rng.integers(50_000, len(complete), 20):
+        data = bytearray(complete)
         data[at] ^= 1 << int(rng.integers(8))
-        spoilt.write_bytes(data)
-        log = read_log(spoilt)
+        damaged.write_bytes(data)
+        log = read_log(damaged)
         known = {tick.sample.time: tick for tick in log.events.values() if isinstance(tick, Tick)}
         rows = np.isin(recording.trace["time"], list(known))
         np.testing.assert_array_equal(
@@ -57,7 +57,7 @@ def test_a_flipped_bit_costs_no_more_than_its_chunk(recorded: Recorded, tmp_path
         )
 
 
-def test_what_is_no_log_is_named(tmp_path: Path, recorded: Recorded) -> None:
+def test_files_that_are_not_logs_are_rejected(tmp_path: Path, recorded: Recorded) -> None:
     with pytest.raises(MissingPathError, match=r"none\.mcap.*an MCAP file"):
         read_log(tmp_path / "none.mcap")
     (tmp_path / "text.mcap").write_text("no magic at all")

@@ -1,4 +1,4 @@
-"""The twin's picture: its noise, its edges, its sizes, and what is refused."""
+"""The rendered image: noise, clipping, sizes, and rejected input."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from shapes import NOTHING, QUIET, Array, bent, make
+from shapes import NO_INSTRUMENT, QUIET, Array, bent, make
 from tautscope.errors import ConfigError, FieldError
 from tautscope.twin.camera import FRAMES_PER_BACKGROUND, TwinCamera
 
@@ -19,12 +19,12 @@ def test_same_seed_same_bytes_in_any_order() -> None:
     again = TwinCamera(config)
     for k in (2, 0, 3, 1):
         again.draw(*bent(config, 30e-3, -1, 0.2), 7)
-        picture = again.draw(*frames, k)
-        np.testing.assert_array_equal(picture.image, first[k].image)
-        np.testing.assert_array_equal(picture.true_features, first[k].true_features)
+        rendered = again.draw(*frames, k)
+        np.testing.assert_array_equal(rendered.image, first[k].image)
+        np.testing.assert_array_equal(rendered.true_features, first[k].true_features)
 
 
-def test_another_seed_or_number_another_noise() -> None:
+def test_noise_depends_on_seed_and_frame_number() -> None:
     config, camera = make()
     frames = bent(config, 20e-3, 0.5, 0.9)
     image = camera.draw(*frames, 0).image
@@ -36,8 +36,8 @@ def test_another_seed_or_number_another_noise() -> None:
 @pytest.mark.parametrize("sigma", [0.3, 1.0, 2.0, 7.5])
 def test_noise_is_white_and_as_strong_as_configured(sigma: float) -> None:
     config, camera = make(**{"twin.image_noise": sigma})
-    clean = TwinCamera(config.replace(**QUIET)).draw(*NOTHING, 0).image.astype(float)
-    noise = np.array([camera.draw(*NOTHING, k).image - clean for k in range(2)])
+    clean = TwinCamera(config.replace(**QUIET)).draw(*NO_INSTRUMENT, 0).image.astype(float)
+    noise = np.array([camera.draw(*NO_INSTRUMENT, k).image - clean for k in range(2)])
     noise = np.where((clean > 40) & (clean < 215), noise, np.nan)
     assert np.nanstd(noise) == pytest.approx(sigma, rel=0.02)
     assert abs(np.nanmean(noise)) < 0.02 * sigma
@@ -54,7 +54,7 @@ def test_noise_is_white_and_as_strong_as_configured(sigma: float) -> None:
 
 def test_nothing_behind_the_camera_is_drawn() -> None:
     config, camera = make(**QUIET)
-    tissue = camera.draw(*NOTHING, 0).image
+    tissue = camera.draw(*NO_INSTRUMENT, 0).image
     frames = bent(config, 20e-3, 0.0, 0.9)
     pose = {"camera.camera_from_guide.translation": (0.0, 0.0, -0.1)}
     behind = TwinCamera(config.replace(**pose)).draw(*frames, 0)
@@ -69,27 +69,27 @@ def test_nothing_nearer_than_two_millimetres_is_drawn() -> None:
         "instrument.diameter": 0.4e-3,
     }
     config, camera = make(**QUIET, **near)
-    picture = camera.draw(*bent(config, 1e-3, 0.0, 0.0), 0)
-    np.testing.assert_array_equal(picture.image, camera.draw(*NOTHING, 0).image)
-    assert np.isnan(picture.true_features).all()
+    rendered = camera.draw(*bent(config, 1e-3, 0.0, 0.0), 0)
+    np.testing.assert_array_equal(rendered.image, camera.draw(*NO_INSTRUMENT, 0).image)
+    assert np.isnan(rendered.true_features).all()
 
 
-def test_what_passes_the_camera_is_cut_off_safely() -> None:
+def test_geometry_that_passes_the_camera_is_clipped() -> None:
     config, camera = make(**QUIET)
-    tissue = camera.draw(*NOTHING, 0).image
+    tissue = camera.draw(*NO_INSTRUMENT, 0).image
     pose = {
         "camera.camera_from_guide.translation": (0.004, 0.003, -0.03),
         "camera.camera_from_guide.rotation": (0.0, 0.0, 0.0),
     }
     through = TwinCamera(config.replace(**pose))
-    picture = through.draw(*bent(config, 20e-3, 0.0, 0.0), 0)
-    changed = (picture.image != tissue).any(axis=-1)
+    rendered = through.draw(*bent(config, 20e-3, 0.0, 0.0), 0)
+    changed = (rendered.image != tissue).any(axis=-1)
     assert 0.001 < changed.mean() < 0.5
-    # Everything in front of the camera is right of and below the axis.
+    # What is in front of the camera is right of and below the axis.
     assert not changed[: int(config.camera.cy) - 60, : int(config.camera.cx) - 60].any()
 
 
-def test_any_numbers_give_a_picture() -> None:
+def test_any_geometry_gives_an_image() -> None:
     rng = np.random.default_rng(5)
     config, camera = make(**QUIET)
     for trial in range(150):
@@ -102,20 +102,20 @@ def test_any_numbers_give_a_picture() -> None:
             (points if trial % 2 else directions)[where] = rng.choice([np.nan, np.inf, -np.inf, 0])
         if trial % 5 == 0:
             points[:] = points[0]
-        picture = camera.draw(points, directions, trial)
-        assert picture.image.shape == (config.camera.height, config.camera.width, 3)
-        assert picture.image.dtype == np.uint8
-        assert picture.true_features.shape == (4,)
-    # No trial has left anything behind.
-    clean = TwinCamera(config).draw(*NOTHING, 0).image
-    np.testing.assert_array_equal(camera.draw(*NOTHING, 0).image, clean)
+        rendered = camera.draw(points, directions, trial)
+        assert rendered.image.shape == (config.camera.height, config.camera.width, 3)
+        assert rendered.image.dtype == np.uint8
+        assert rendered.true_features.shape == (4,)
+    # No trial changes later images.
+    clean = TwinCamera(config).draw(*NO_INSTRUMENT, 0).image
+    np.testing.assert_array_equal(camera.draw(*NO_INSTRUMENT, 0).image, clean)
 
 
-def test_each_image_is_an_array_of_its_own() -> None:
+def test_images_do_not_share_memory() -> None:
     _, camera = make(**QUIET)
-    first = camera.draw(*NOTHING, 0).image
+    first = camera.draw(*NO_INSTRUMENT, 0).image
     first[:] = 0
-    assert camera.draw(*NOTHING, 0).image.any()
+    assert camera.draw(*NO_INSTRUMENT, 0).image.any()
 
 
 @pytest.mark.parametrize(
@@ -128,7 +128,7 @@ def test_each_image_is_an_array_of_its_own() -> None:
         (np.zeros((3, 3)), np.zeros((3, 3)), -1, "sequence"),
     ],
 )
-def test_frames_of_another_shape_are_refused_by_name(
+def test_centrelines_of_wrong_shape_are_rejected(
     points: Array, directions: Array, sequence: int, field: str
 ) -> None:
     _, camera = make()
@@ -137,14 +137,14 @@ def test_frames_of_another_shape_are_refused_by_name(
     assert caught.value.field == field
 
 
-def test_a_camera_that_cannot_be_made_is_refused_by_name() -> None:
+def test_invalid_camera_parameters_are_named() -> None:
     with pytest.raises(ConfigError) as caught:
         make(**{"twin.image_noise": 300.0})
     assert caught.value.field == "twin.image_noise"
 
 
 @pytest.mark.parametrize("size", [(1, 1), (33, 7), (1280, 720)])
-def test_any_size_of_picture(size: tuple[int, int]) -> None:
+def test_any_image_size(size: tuple[int, int]) -> None:
     config, camera = make(**{"camera.width": size[0], "camera.height": size[1]})
     image = camera.draw(*bent(config, 20e-3, 0.3, 0.9), 0).image
     assert image.shape == (size[1], size[0], 3)
@@ -155,7 +155,7 @@ def test_backgrounds_are_shown_in_turn(tmp_path: Path) -> None:
     for name, level in zip(["b.png", "a.png", "c.png"], grey, strict=True):
         cv2.imwrite(str(tmp_path / name), np.full((30, 40, 3), level, np.uint8))
     config, camera = make(**QUIET, **{"twin.background": str(tmp_path)})
-    levels = [camera.draw(*NOTHING, k * FRAMES_PER_BACKGROUND).image for k in range(4)]
+    levels = [camera.draw(*NO_INSTRUMENT, k * FRAMES_PER_BACKGROUND).image for k in range(4)]
     assert [int(image.mean().round()) for image in levels] == [120, 40, 200, 120]
-    assert camera.draw(*NOTHING, FRAMES_PER_BACKGROUND - 1).image[0, 0, 0] == 120
+    assert camera.draw(*NO_INSTRUMENT, FRAMES_PER_BACKGROUND - 1).image[0, 0, 0] == 120
     assert levels[0].shape == (config.camera.height, config.camera.width, 3)
