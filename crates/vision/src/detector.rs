@@ -35,23 +35,20 @@ impl Detector {
     /// # Errors
     /// A setting is out of its range.
     pub fn new(settings: Settings) -> Result<Self, Error> {
-        let Settings {
-            smoothing,
-            minimum_area,
-            ..
-        } = settings;
+        let (smoothing, minimum_area) = (settings.smoothing, settings.minimum_area);
         if smoothing > 8 {
             return Err(Error::new("smoothing", &smoothing, "0 to 8 passes"));
         }
         if minimum_area < 1 {
             return Err(Error::new("minimum_area", &minimum_area, "at least 1 px"));
         }
-        let trained = (settings.weights, settings.threshold);
-        let discriminants: Vec<ColorDiscriminant> = [trained]
-            .iter()
-            .chain(&settings.alternatives)
-            .map(|(weights, threshold)| ColorDiscriminant::new(*weights, *threshold))
-            .collect::<Result<_, _>>()?;
+        let mut discriminants = vec![ColorDiscriminant::new(
+            settings.weights,
+            settings.threshold,
+        )?];
+        for (weights, threshold) in &settings.alternatives {
+            discriminants.push(ColorDiscriminant::new(*weights, *threshold)?);
+        }
         let scanner = Scanner::new(&discriminants, smoothing, minimum_area);
         let best = Vec::with_capacity(scanner.regions.capacity());
         Ok(Self {

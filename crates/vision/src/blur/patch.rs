@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::math::{floor, real, single};
 use crate::recognition::Outline;
-use crate::scan::{ColorDiscriminant, Consumer, Frame, Group, Row};
+use crate::scan::{Affine, Consumer, Frame, Group, Row};
 
 /// Largest number of samples in a row and in a column: larger patches are sampled more coarsely.
 pub const SIDE: usize = 64;
@@ -52,7 +52,7 @@ impl Patch {
         self.columns = columns.len().div_ceil(step);
         self.differences.clear();
         let format = frame.format();
-        let channels = DIFFERENCES.map(|weights| ColorDiscriminant::affine_of(weights, format));
+        let channels = DIFFERENCES.map(|weights| Affine::new(weights, format));
         let groups = format.whole_groups(columns.clone());
         for v in rows.step_by(step) {
             Row::of(frame, v, groups.clone()).feed(Sample {
@@ -147,7 +147,7 @@ impl Patch {
 }
 
 struct Sample<'a> {
-    channels: [([f64; 3], f64); 2],
+    channels: [Affine; 2],
     skip: usize,
     step: usize,
     count: usize,
@@ -161,7 +161,7 @@ impl Consumer for Sample<'_> {
         let pixels = groups.flat_map(|group| (0..P).map(move |pixel| (group, pixel)));
         let wanted = pixels.skip(self.skip).step_by(self.step).take(self.count);
         self.into.extend(wanted.map(|(group, pixel)| {
-            self.channels.map(|(weights, constant)| {
+            self.channels.map(|Affine { weights, constant }| {
                 let sum: f64 = (weights.iter().enumerate())
                     .map(|(channel, weight)| weight * f64::from(group.channel(pixel, channel)))
                     .sum();

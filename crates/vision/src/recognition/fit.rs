@@ -133,16 +133,10 @@ pub fn fit(
         result = Some(Fit {
             features: position,
             covariance: [0, 1, 2, 3].map(|i| [0, 1, 2, 3].map(|j| covariance[i][j])),
-            growth: [
-                Growth {
-                    rims: rims_a,
-                    sides: sides_a,
-                },
-                Growth {
-                    rims: rims_b,
-                    sides: sides_b,
-                },
-            ],
+            growth: [0, 2].map(|part| Growth {
+                rims: growth[part],
+                sides: growth[part + 1],
+            }),
             edges: [0, 1].map(|band| edges[band] / f64::max(visible[band], 1.0)),
             rims: [0, 1].map(|band| match visible_rims[band] {
                 count if count < LEAST_RIM_SAMPLES => 1.0,

@@ -57,41 +57,30 @@ impl Outline {
 
     /// Counts the pixels inside the outline, the marker pixels, and those of them that are inside `other` too.
     pub(crate) fn count(&self, map: &RunMap, other: &Self) -> Count {
-        let (width, height) = map.size();
+        let (width, _) = map.size();
         let mut count = Count::default();
-        let (mut v, last) = self.rows(height);
-        while v <= last {
-            let mine = self.spans(v, width);
-            let theirs = other.spans(v, width);
-            for (from, to) in mine.each() {
-                count.pixels += to - from + 1.0;
-                count.marker += map.count(v, from, to);
-                for (first, last) in theirs.each() {
-                    let (from, to) = (from.max(first), to.min(last));
-                    if from <= to {
-                        count.shared += map.count(v, from, to);
-                    }
+        self.each_span(map, |v, from, to| {
+            count.pixels += to - from + 1.0;
+            count.marker += map.count(v, from, to);
+            other.each_span_of_row(v, width, |first, last| {
+                let (from, to) = (from.max(first), to.min(last));
+                if from <= to {
+                    count.shared += map.count(v, from, to);
                 }
-            }
-            v += 1.0;
-        }
+            });
+        });
         count
     }
 
     /// Centroid u, v (px) of the part inside the image; None if that part is too small.
     pub(crate) fn centroid_within(&self, map: &RunMap) -> Option<[f64; 2]> {
-        let (width, height) = map.size();
         let (mut pixels, mut sum) = (0.0, [0.0; 2]);
-        let (mut v, last) = self.rows(height);
-        while v <= last {
-            for (from, to) in self.spans(v, width).each() {
-                let count = to - from + 1.0;
-                pixels += count;
-                sum[0] += count * f64::midpoint(from, to);
-                sum[1] += count * v;
-            }
-            v += 1.0;
-        }
+        self.each_span(map, |v, from, to| {
+            let count = to - from + 1.0;
+            pixels += count;
+            sum[0] += count * f64::midpoint(from, to);
+            sum[1] += count * v;
+        });
         (pixels > LEAST_PIECE * self.area).then(|| sum.map(|sum| sum / pixels))
     }
 
@@ -104,45 +93,44 @@ impl Outline {
 
     /// Calls `visit(from, to)` for each part of row `v` inside the outline (px).
     pub(crate) fn each_crossing(&self, v: f64, mut visit: impl FnMut(f64, f64)) {
-        let spans = self.crossings(v);
-        let pairs = spans.crossings.chunks_exact(2).take(spans.len / 2);
-        for pair in pairs {
-            if let [from, to] = pair {
-                visit(*from, *to);
-            }
-        }
-    }
-
-    /// First and last row of an image of this height (px) that the outline may touch.
-    fn rows(&self, height: f64) -> (f64, f64) {
-        let extreme = |pick: fn(f64, f64) -> f64, start| {
-            self.corners.iter().map(|[_, v]| *v).fold(start, pick)
-        };
-        let first = extreme(f64::min, f64::INFINITY).ceil().max(0.0);
-        (
-            first,
-            extreme(f64::max, f64::NEG_INFINITY).min(height - 1.0),
-        )
-    }
-
-    /// First and last pixels of the parts of row `v` inside the outline.
-    fn spans(&self, v: f64, width: f64) -> Spans {
-        let mut spans = self.crossings(v);
-        spans.clip(width);
-        spans
-    }
-
-    /// Where row `v` crosses the outline.
-    fn crossings(&self, v: f64) -> Spans {
-        let mut spans = Spans::default();
+        // A row crosses each arc and each line at most twice.
+        let mut crossings = [0.0; 8];
+        let mut count = 0;
         let next = self.corners.iter().cycle().skip(1);
         for ([u0, v0], [u1, v1]) in self.corners.iter().zip(next) {
-            if (*v0 <= v) != (*v1 <= v) {
-                spans.add(u0 + (v - v0) / (v1 - v0) * (u1 - u0));
+            if (*v0 <= v) != (*v1 <= v)
+                && let Some(crossing) = crossings.get_mut(count)
+            {
+                *crossing = u0 + (v - v0) / (v1 - v0) * (u1 - u0);
+                count += 1;
             }
         }
-        spans.sort();
-        spans
+        let crossings = crossings.get_mut(..count).unwrap_or_default();
+        crossings.sort_by(f64::total_cmp);
+        for [from, to] in crossings.as_chunks().0 {
+            visit(*from, *to);
+        }
+    }
+
+    /// Calls `visit(v, first, last)` with the first and last pixel of each part of a row inside the outline and the image.
+    fn each_span(&self, map: &RunMap, mut visit: impl FnMut(f64, f64, f64)) {
+        let (width, height) = map.size();
+        let rows = || self.corners.iter().map(|[_, v]| *v);
+        let mut v = rows().fold(f64::INFINITY, f64::min).ceil().max(0.0);
+        let last = rows().fold(f64::NEG_INFINITY, f64::max).min(height - 1.0);
+        while v <= last {
+            self.each_span_of_row(v, width, |from, to| visit(v, from, to));
+            v += 1.0;
+        }
+    }
+
+    fn each_span_of_row(&self, v: f64, width: f64, mut visit: impl FnMut(f64, f64)) {
+        self.each_crossing(v, |from, to| {
+            let (from, to) = (from.ceil().max(0.0), (to.ceil() - 1.0).min(width - 1.0));
+            if from <= to {
+                visit(from, to);
+            }
+        });
     }
 }
 
@@ -155,46 +143,6 @@ pub(crate) struct Count {
     pub marker: f64,
     /// Marker pixels inside the other outline too (px).
     pub shared: f64,
-}
-
-/// Crossings of a row with an outline: each arc and each line has at most two.
-#[derive(Default)]
-struct Spans {
-    crossings: [f64; 8],
-    len: usize,
-}
-
-impl Spans {
-    fn add(&mut self, u: f64) {
-        if let Some(slot) = self.crossings.get_mut(self.len) {
-            *slot = u;
-            self.len += 1;
-        }
-    }
-
-    fn sort(&mut self) {
-        let crossings = self.crossings.get_mut(..self.len).unwrap_or_default();
-        crossings.sort_by(f64::total_cmp);
-    }
-
-    fn clip(&mut self, width: f64) {
-        let crossings = self.crossings.get_mut(..self.len).unwrap_or_default();
-        for (index, u) in crossings.iter_mut().enumerate() {
-            *u = if index % 2 == 0 {
-                u.ceil().max(0.0)
-            } else {
-                (u.ceil() - 1.0).min(width - 1.0)
-            };
-        }
-    }
-
-    fn each(&self) -> impl Iterator<Item = (f64, f64)> {
-        let pairs = self.crossings.chunks_exact(2).take(self.len / 2);
-        pairs.filter_map(|pair| match pair {
-            [from, to] if from <= to => Some((*from, *to)),
-            _ => None,
-        })
-    }
 }
 
 #[cfg(test)]

@@ -23,9 +23,11 @@ pub struct ColorDiscriminant {
 
 /// Weights of the three channels of a format, and the weighted sum where all three are 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Affine {
-    weights: [f64; 3],
-    constant: f64,
+pub struct Affine {
+    /// Weights in the order of [`Group`](super::Group).
+    pub weights: [f64; 3],
+    /// Weighted sum at 0.
+    pub constant: f64,
 }
 
 impl ColorDiscriminant {
@@ -35,10 +37,7 @@ impl ColorDiscriminant {
     /// # Errors
     /// A number is not finite, or all weights are zero, or they are outside the range of the fixed-point arithmetic.
     pub fn new(weights: [f64; 3], threshold: f64) -> Result<Self, Error> {
-        let affine = Affine {
-            weights,
-            constant: 0.0,
-        };
+        let affine = Affine::new(weights, PixelFormat::Bgr);
         let finite = weights.iter().all(|weight| weight.is_finite());
         if !finite || !(1e-6..=1e9).contains(&affine.reach()) {
             let allowed = "finite weights of B, G, R, the largest magnitude 1e-8 to 1e6";
@@ -52,22 +51,14 @@ impl ColorDiscriminant {
 
     /// The projection for the pixels of a format.
     pub(crate) fn projection(&self, format: PixelFormat) -> Projection {
-        let affine = self.affine(format);
+        let affine = Affine::new(self.weights, format);
         let scale = RANGE / affine.reach();
         Projection::new(affine.weights, affine.constant, self.threshold, scale)
     }
+}
 
-    /// Weights of a format's three channels, and a constant, for which the weighted sum is `weights . [B, G, R]`.
-    pub(crate) fn affine_of(weights: [f64; 3], format: PixelFormat) -> ([f64; 3], f64) {
-        let discriminant = Self {
-            weights,
-            threshold: 0.0,
-        };
-        let Affine { weights, constant } = discriminant.affine(format);
-        (weights, constant)
-    }
-
-    /// The weighted sum as a function of a format's three channels in the order of [`Group`](super::Group).
+impl Affine {
+    /// The weighted sum of B, G, R as a function of a format's three channels.
     ///
     /// Y, U, V follow ITU-R BT.601 with limited range: Y 16 to 235, U and V 16 to 240 about 128,
     ///
@@ -80,31 +71,20 @@ impl ColorDiscriminant {
     /// Y, U, V outside the cube of B, G, R are not clamped.
     ///
     /// Wrong when a camera gives the full range or BT.709.
-    fn affine(&self, format: PixelFormat) -> Affine {
-        let [blue, green, red] = self.weights;
-        match format {
-            PixelFormat::Bgr | PixelFormat::Bgra => Affine {
-                weights: self.weights,
-                constant: 0.0,
-            },
-            PixelFormat::Rgb => Affine {
-                weights: [red, green, blue],
-                constant: 0.0,
-            },
+    pub fn new([blue, green, red]: [f64; 3], format: PixelFormat) -> Self {
+        let (weights, constant) = match format {
+            PixelFormat::Bgr | PixelFormat::Bgra => ([blue, green, red], 0.0),
+            PixelFormat::Rgb => ([red, green, blue], 0.0),
             PixelFormat::Yuyv | PixelFormat::Uyvy | PixelFormat::Nv12 | PixelFormat::I420 => {
                 let luma = 255.0 / 219.0 * (blue + green + red);
                 let u = 255.0 / 112.0 * 0.886 * (blue - 0.114 / 0.587 * green);
                 let v = 255.0 / 112.0 * 0.701 * (red - 0.299 / 0.587 * green);
-                Affine {
-                    weights: [luma, u, v],
-                    constant: -16.0 * luma - 128.0 * (u + v),
-                }
+                ([luma, u, v], -16.0 * luma - 128.0 * (u + v))
             }
-        }
+        };
+        Self { weights, constant }
     }
-}
 
-impl Affine {
     /// The largest magnitude of the weighted sum over all bytes; at least half of the range of a channel.
     fn reach(&self) -> f64 {
         let side = |sign: f64| {

@@ -23,6 +23,7 @@ mod simd_dot;
 #[path = "no_simd_dot.rs"]
 mod simd_dot;
 
+pub(crate) use discriminant::Affine;
 pub use discriminant::ColorDiscriminant;
 pub use format::{MAX_SIDE, PixelFormat};
 pub use frame::{Frame, Image, Window};

@@ -186,22 +186,14 @@ fn div_ceil(value: i32, divisor: i32) -> i32 {
 }
 
 fn clamped_i16(value: i32) -> i16 {
-    let limits = (i32::from(i16::MIN), i32::from(i16::MAX));
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "clamped to the type's range"
-    )]
-    {
-        value.clamp(limits.0, limits.1) as i16
-    }
+    let limit = if value < 0 { i16::MIN } else { i16::MAX };
+    i16::try_from(value).unwrap_or(limit)
 }
 
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "a cast from a float saturates"
+)]
 fn nearest_i16(value: f64) -> i16 {
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "a cast from a float saturates"
-    )]
-    {
-        value.round() as i16
-    }
+    value.round() as i16
 }

@@ -90,18 +90,12 @@ impl<'a> Row<'a> {
     #[inline(always)]
     pub fn feed<C: Consumer>(self, consumer: C) -> C::Outcome {
         match self {
-            Self::Triples(bytes) => consumer.consume(groups(bytes).map(Triple)),
-            Self::Quadruples(bytes) => consumer.consume(groups(bytes).map(Quadruple)),
-            Self::Yuyv(bytes) => consumer.consume(groups(bytes).map(Yuyv)),
-            Self::Uyvy(bytes) => consumer.consume(groups(bytes).map(Uyvy)),
-            Self::Nv12(y, uv) => {
-                let pairs = groups(y).zip(groups(uv));
-                consumer.consume(pairs.map(|(y, uv)| Nv12(y, uv)))
-            }
-            Self::I420(y, u, v) => {
-                let pairs = groups(y).zip(u.iter().zip(v));
-                consumer.consume(pairs.map(|(y, (u, v))| I420(y, u, v)))
-            }
+            Self::Triples(bytes) => consumer.consume(groups::<3>(bytes)),
+            Self::Quadruples(bytes) => consumer.consume(groups::<4>(bytes)),
+            Self::Yuyv(bytes) => consumer.consume(groups(bytes).map(Packed::<0>)),
+            Self::Uyvy(bytes) => consumer.consume(groups(bytes).map(Packed::<1>)),
+            Self::Nv12(y, uv) => consumer.consume(groups::<2>(y).zip(groups::<2>(uv))),
+            Self::I420(y, u, v) => consumer.consume(groups::<2>(y).zip(u.iter().zip(v))),
         }
     }
 }
@@ -111,62 +105,34 @@ fn groups<const N: usize>(bytes: &[u8]) -> impl Iterator<Item = &[u8; N]> {
     bytes.as_chunks().0.iter()
 }
 
+/// Y of two pixels and their U and V; the first Y is byte `LUMA`, the first of U and V the other one of 0 and 1.
 #[derive(Clone, Copy)]
-struct Triple<'a>(&'a [u8; 3]);
+struct Packed<'a, const LUMA: usize>(&'a [u8; 4]);
 
-#[derive(Clone, Copy)]
-struct Quadruple<'a>(&'a [u8; 4]);
-
-#[derive(Clone, Copy)]
-struct Yuyv<'a>(&'a [u8; 4]);
-
-#[derive(Clone, Copy)]
-struct Uyvy<'a>(&'a [u8; 4]);
-
-#[derive(Clone, Copy)]
-struct Nv12<'a>(&'a [u8; 2], &'a [u8; 2]);
-
-#[derive(Clone, Copy)]
-struct I420<'a>(&'a [u8; 2], &'a u8, &'a u8);
-
-impl Group<1> for Triple<'_> {
+impl<const N: usize> Group<1> for &[u8; N] {
     #[inline(always)]
     fn channel(self, _: usize, channel: usize) -> u8 {
-        self.0[channel]
+        self[channel]
     }
 }
 
-impl Group<1> for Quadruple<'_> {
-    #[inline(always)]
-    fn channel(self, _: usize, channel: usize) -> u8 {
-        self.0[channel]
-    }
-}
-
-impl Group<2> for Yuyv<'_> {
+impl<const LUMA: usize> Group<2> for Packed<'_, LUMA> {
     #[inline(always)]
     fn channel(self, pixel: usize, channel: usize) -> u8 {
-        self.0[[2 * pixel, 1, 3][channel]]
+        self.0[[2 * pixel + LUMA, 1 - LUMA, 3 - LUMA][channel]]
     }
 }
 
-impl Group<2> for Uyvy<'_> {
-    #[inline(always)]
-    fn channel(self, pixel: usize, channel: usize) -> u8 {
-        self.0[[2 * pixel + 1, 0, 2][channel]]
-    }
-}
-
-impl Group<2> for Nv12<'_> {
+impl Group<2> for (&[u8; 2], &[u8; 2]) {
     #[inline(always)]
     fn channel(self, pixel: usize, channel: usize) -> u8 {
         [self.0[pixel], self.1[0], self.1[1]][channel]
     }
 }
 
-impl Group<2> for I420<'_> {
+impl Group<2> for (&[u8; 2], (&u8, &u8)) {
     #[inline(always)]
     fn channel(self, pixel: usize, channel: usize) -> u8 {
-        [self.0[pixel], *self.1, *self.2][channel]
+        [self.0[pixel], *self.1.0, *self.1.1][channel]
     }
 }

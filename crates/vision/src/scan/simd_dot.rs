@@ -129,20 +129,7 @@ impl<S: ByteDot> Registers<S> {
         two_on: &[u8; 64],
     ) -> Self {
         Self {
-            weights: [
-                [
-                    S::i8s::from_slice(simd, &a[0]),
-                    S::i8s::from_slice(simd, &a[1]),
-                ],
-                [
-                    S::i8s::from_slice(simd, &b[0]),
-                    S::i8s::from_slice(simd, &b[1]),
-                ],
-                [
-                    S::i8s::from_slice(simd, &c[0]),
-                    S::i8s::from_slice(simd, &c[1]),
-                ],
-            ],
+            weights: [load(simd, a), load(simd, b), load(simd, c)],
             level: S::i16s::splat(simd, level),
             two_on: S::u8s::from_slice(simd, &two_on[..N]),
         }
@@ -167,6 +154,14 @@ impl<S: ByteDot> Registers<S> {
         }
         largest.simd_ge(self.level).any_true()
     }
+}
+
+#[inline(always)]
+fn load<S: ByteDot, const N: usize>(simd: S, [here, two_on]: &Weights<N>) -> [S::i8s; 2] {
+    [
+        S::i8s::from_slice(simd, here),
+        S::i8s::from_slice(simd, two_on),
+    ]
 }
 
 #[cfg(test)]
