@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from drive_settings import drives_config
+from drive_settings import AXES, drives_config
 from tautscope.bench.can_bus import Hub
 from tautscope.bench.canopen_node import CanopenNode
 from tautscope.bench.drives import SimulatedDrives
@@ -46,18 +46,11 @@ def test_drive_without_position_streaming_mode(hub: Hub, bench: Bench) -> None:
 
 
 def test_missing_drive(hub: Hub, bench: Bench) -> None:
-    config = drives_config(channel=str(hub.path), request_timeout=0.3)
     bench(drives_config())
-    axis = {name: getattr(config.rotation, name) for name in config.rotation.__struct_fields__}
-    other = drives_config(
-        channel=str(hub.path), request_timeout=0.3, rotation=without_none(axis) | {"node": 9}
-    )
+    rotation = AXES["rotation"] | {"node": 9}
+    other = drives_config(channel=str(hub.path), request_timeout=0.3, rotation=rotation)
     with pytest.raises(SilentDriveError, match=r"rotation, node 9.*Check drives.rotation.node"):
         open_drives(other)
-
-
-def without_none(values: dict[str, object]) -> dict[str, object]:
-    return {name: value for name, value in values.items() if value is not None}
 
 
 def test_missing_protection_must_be_waived(hub: Hub, bench: Bench) -> None:

@@ -44,7 +44,9 @@ the TxPDOs are sent."""
 
 
 class SimulatedDrives:
-    """Three drives on one bus, in a thread.
+    """Three drives on one bus, in a thread; a context manager.
+
+    Leaving it powers the drives off and raises the error that ended the thread, if any.
 
     Args:
         bus: The bus; it stays open.
@@ -89,23 +91,7 @@ class SimulatedDrives:
         self._is_disconnected = False
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="simulated drives", daemon=True)
-        self.failure: BaseException | None = None
-
-    def start(self) -> None:
-        """Power on."""
-        self._thread.start()
-
-    def stop(self) -> None:
-        """Power off.
-
-        Raises:
-            BaseException: The error that ended the thread, for example of the plant.
-        """
-        self._stopping.set()
-        if self._thread.ident is not None:
-            self._thread.join()
-        if self.failure is not None:
-            raise self.failure
+        self._failure: BaseException | None = None
 
     def inject(self, kind: FaultKind, dof: Dof, delay: float = 0.3) -> None:
         """Inject a fault; `delay` [s] applies to the kind ``delay``.
@@ -136,11 +122,14 @@ class SimulatedDrives:
         return {dof: self._drives[dof].status for dof in Dof}
 
     def __enter__(self) -> Self:
-        self.start()
+        self._thread.start()
         return self
 
     def __exit__(self, *failure: object) -> None:
-        self.stop()
+        self._stopping.set()
+        self._thread.join()
+        if self._failure is not None:
+            raise self._failure
 
     def _run(self) -> None:
         try:
@@ -149,7 +138,7 @@ class SimulatedDrives:
             while not self._stopping.is_set():
                 self._process_next()
         except BaseException as error:
-            self.failure = error
+            self._failure = error
 
     def _process_next(self) -> None:
         due = min(drive.deadline() for drive in self._drives)

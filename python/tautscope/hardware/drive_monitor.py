@@ -61,11 +61,11 @@ class DriveMonitor:
         self._names = names
         self._modes = modes
         self._scales = [Scale(config[dof], dof.label) for dof in Dof]
-        self._said: list[Feedback] = []
+        self._feedback: list[Feedback] = []
         self._answers = [0, 0, 0]
         # A drive samples its position when the set-point arrives; buffered set-points act later.
-        buffered = Mode.INTERPOLATED_POSITION in modes.values()
-        pending = 1 + (config.lead_points if buffered else 0)
+        is_buffered = Mode.INTERPOLATED_POSITION in modes.values()
+        pending = 1 + (config.lead_points if is_buffered else 0)
         self._following = FollowingErrorMonitor(config, config.cycle, pending)
         self.statistics = BusStatistics()
 
