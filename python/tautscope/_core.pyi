@@ -15,7 +15,6 @@ __all__ = [
     "Instrument",
     "MarkerDetector",
     "Monitors",
-    "MotionMonitor",
     "Play",
     "Reduction",
     "Renderer",
@@ -232,57 +231,7 @@ class AdaptiveAxis:
 
 @final
 class Monitors:
-    def __new__(
-        cls,
-        *,
-        period: float,
-        gain_limit: _Vector3,
-        reference_speed: _Vector3,
-        reference_time: float,
-        reference_count: _Vector3,
-        reference_age: float,
-        late_tick: float,
-        stall: float,
-        command_speed: _Vector3,
-        command_travel: Sequence[tuple[float, float]],
-        width_limit: _Vector3,
-        offset_limit: _Vector3,
-        frame_age: float,
-        frame_gap: float,
-        frozen_travel: _Vector3,
-        innovation_limit: float,
-        start_deviation: _Vector3,
-        innovation_floor: _Vector3,
-        jump: _Vector3,
-        grip_distance: _Vector3,
-        slip: _Vector3,
-        blind_growth: float,
-        motion: MotionMonitor,
-        hold_time: float,
-        hold_travel: float,
-        fade_travel: float,
-        restore_travel: float,
-        good_frames: int,
-        good_ticks: int,
-        off: Sequence[str],
-    ) -> Monitors: ...
-
-@final
-class MotionMonitor:
-    def __new__(
-        cls,
-        *,
-        period: float,
-        tremor_swing: _Vector3,
-        slack: _Vector3,
-        tremor_rate: float,
-        turn: _Vector3,
-        ahead_limit: _Vector3,
-        cycle_swings: int,
-        cycle_time: float,
-        change_limit: _Vector3,
-        change_travel: _Vector3,
-    ) -> MotionMonitor: ...
+    def __new__(cls, safety: object, dofs: Sequence[object], period: float) -> Monitors: ...
 
 @final
 class Reduction:

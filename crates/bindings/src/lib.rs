@@ -41,7 +41,7 @@ mod _core {
     #[pymodule_export]
     use super::instrument::Instrument;
     #[pymodule_export]
-    use super::monitors::{Monitors, MotionMonitor};
+    use super::monitors::Monitors;
     #[pymodule_export]
     use super::play::Play;
     #[pymodule_export]

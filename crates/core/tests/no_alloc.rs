@@ -7,20 +7,17 @@ mod support;
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use support::looped::{adaptive_with, article_with, model};
-use tautscope_core::{
-    Flag, HysteresisReduction, MonitorsSettings, Play, Reaction, Status, Triggers,
-};
+use tautscope_core::{Flag, HysteresisReduction, Play, Reaction, SafetySettings, Status, Triggers};
 
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;
 
 /// The tip below is late by a third of a second, as none in contact is.
-fn patient() -> MonitorsSettings {
-    let mut settings = support::monitors();
-    for grip in &mut settings.frames.grips {
-        grip.slip = 1e3;
+fn patient() -> SafetySettings {
+    SafetySettings {
+        slip: [1e3; 3],
+        ..support::safety()
     }
-    settings
 }
 
 /// Over as many ticks as `TAUTSCOPE_TICKS` says, each loop at least once through every flag.

@@ -98,8 +98,8 @@ fn soak(law: &str, mut reduction: Box<HysteresisReduction>) -> String {
 #[test]
 fn nothing_grows_and_nothing_drifts() {
     let none = |_| Play::new(0.0, 0.0).unwrap();
-    let grown = soak("best", adaptive())
-        + &soak("recovering", article_with(&support::monitors(), 0.1, none));
+    let grown =
+        soak("best", adaptive()) + &soak("recovering", article_with(&support::safety(), 0.1, none));
     soak("paper", article(none));
     assert!(grown.is_empty(), "{grown}");
 }

@@ -130,61 +130,9 @@ def build_weighted_estimator(config: Config) -> _core.WeightedEstimator:
     )
 
 
-def build_guards(config: Config) -> _core.Monitors:
-    """What watches the loop: reference, command, frames, and the reactions to them."""
-    safety = config.safety
-
-    def each(of: Callable[[DofConfig], float]) -> tuple[float, float, float]:
-        return each_dof(lambda dof: of(config[dof]))
-
-    def share(of: float) -> tuple[float, float, float]:
-        insertion, rotation, bending = safety.width_limit
-        return of * insertion, of * rotation, of * bending
-
-    motion = _core.MotionMonitor(
-        period=config.control.period,
-        tremor_swing=each(lambda dof: dof.update_distance * safety.tremor_swing),
-        slack=safety.width_limit,
-        tremor_rate=safety.tremor_rate,
-        turn=each(lambda dof: dof.update_distance),
-        ahead_limit=share(safety.ahead_limit),
-        cycle_swings=safety.cycle_swings,
-        cycle_time=safety.cycle_time,
-        change_limit=safety.change_limit,
-        change_travel=share(safety.change_travel),
-    )
-    return _core.Monitors(
-        period=config.control.period,
-        gain_limit=each(lambda dof: dof.gain_limit),
-        reference_speed=safety.reference_speed,
-        reference_time=safety.reference_time,
-        reference_count=safety.reference_count,
-        reference_age=safety.reference_age,
-        late_tick=safety.late_tick,
-        stall=safety.stall,
-        command_speed=safety.command_speed,
-        command_travel=safety.command_travel,
-        width_limit=safety.width_limit,
-        offset_limit=safety.offset_limit,
-        frame_age=safety.frame_age,
-        frame_gap=safety.frame_gap,
-        frozen_travel=each(lambda dof: dof.update_distance * safety.frozen_travel),
-        innovation_limit=safety.innovation_limit,
-        start_deviation=each(lambda dof: dof.start_deviation),
-        innovation_floor=each(lambda dof: dof.start_deviation * safety.innovation_floor),
-        jump=safety.jump,
-        grip_distance=each(lambda dof: dof.update_distance * safety.grip_distance),
-        slip=safety.slip,
-        blind_growth=safety.blind_growth,
-        motion=motion,
-        hold_time=safety.hold_time,
-        hold_travel=safety.hold_travel,
-        fade_travel=safety.fade_travel,
-        restore_travel=safety.restore_travel,
-        good_frames=safety.good_frames,
-        good_ticks=safety.good_ticks,
-        off=safety.off,
-    )
+def build_monitors(config: Config) -> _core.Monitors:
+    """The monitors and the supervisor of the loop."""
+    return _core.Monitors(config.safety, each_dof(lambda dof: config[dof]), config.control.period)
 
 
 def build_friction(config: Config) -> tuple[float, float, float] | None:
@@ -199,7 +147,7 @@ def build_friction(config: Config) -> tuple[float, float, float] | None:
 def build_loop(config: Config, compensate: bool = True) -> _core.Reduction:
     """The whole loop, Fig. 6, without checks of what goes in: `HysteresisReduction` has those."""
     model = build_feature_model(config)
-    guards = build_guards(config)
+    monitors = build_monitors(config)
     span, period = config.control.history, config.control.period
     start_deviation = each_dof(lambda dof: config[dof].start_deviation)
     if config.profile == "best":
@@ -208,7 +156,7 @@ def build_loop(config: Config, compensate: bool = True) -> _core.Reduction:
             each_dof(lambda dof: build_adaptive_axis(config, dof, compensate)),
             model,
             build_weighted_estimator(config),
-            guards,
+            monitors,
             span=span,
             period=period,
             start_deviation=start_deviation,
@@ -221,7 +169,7 @@ def build_loop(config: Config, compensate: bool = True) -> _core.Reduction:
         each_dof(lambda dof: build_estimator(config[dof])),
         model,
         build_state_estimator(config),
-        guards,
+        monitors,
         span=span,
         period=period,
         start_deviation=start_deviation,

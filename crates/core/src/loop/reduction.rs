@@ -130,7 +130,7 @@ impl HysteresisReduction {
         let mut raised = self.monitors.arrive(&FrameArrival {
             captured_at,
             now: self.history.newest_time(),
-            picture: checksum.map_or_else(
+            image: checksum.map_or_else(
                 || measured.map(|features| ImageIdentity::Features(features.map(f64::to_bits))),
                 |sum| Some(ImageIdentity::Checksum(sum)),
             ),
@@ -154,7 +154,7 @@ impl HysteresisReduction {
         if captured_at <= self.last_used {
             *raised = self
                 .monitors
-                .watched(raised.and(Flags::of(Flag::Duplicate)));
+                .watched(raised.union(Flags::of(Flag::Duplicate)));
             return self.unused(Status::Duplicate, None);
         }
         let Some(past) = past else {
@@ -176,14 +176,16 @@ impl HysteresisReduction {
         let moved = self.whereabouts.moved(&past);
         // The article's estimate jumps by itself wherever a DOF begins or ceases to be held.
         let unasked = match self.state_estimation {
-            StateEstimation::Article(_) => Flags::of(Flag::Jump).and(Flags::of(Flag::Slip)),
+            StateEstimation::Article(_) => Flags::of(Flag::Jump).union(Flags::of(Flag::Slip)),
             StateEstimation::Weighted(_) => Flags::NONE,
         };
         let offsets = self.axes.each_ref().map(Axis::offsets);
         let doubts = |seen: &Seen| {
             let sightings = seen.sightings(&past, offsets);
             let frames = &self.monitors.frames;
-            frames.doubts(&belief, moved, &sightings).without(unasked)
+            frames
+                .check_innovation(&belief, moved, &sightings)
+                .difference(unasked)
         };
         let doubt = doubts(&seen);
         let is_believed = seen.used != [false; 2];
@@ -227,9 +229,9 @@ impl HysteresisReduction {
         };
         *raised = self.monitors.watched(
             raised
-                .and(Flags::when(status == Status::Partial, Flag::Merged))
-                .and(Flags::when(!is_believed, Flag::Lost))
-                .and(Flags::when(
+                .union(Flags::when(status == Status::Partial, Flag::Merged))
+                .union(Flags::when(!is_believed, Flag::Lost))
+                .union(Flags::when(
                     is_believed && status == Status::Held,
                     Flag::Unobservable,
                 )),

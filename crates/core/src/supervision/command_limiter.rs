@@ -1,106 +1,113 @@
-//! The last word on a command: the law's bounds once more, by code and state that share nothing with it.
+//! Limits of the command: the bounds of the law, checked by code and state that share nothing with it.
 
 use crate::error::{ConfigError, require, require_positive};
+use crate::settings::DofSettings;
+use crate::supervision::settings::SafetySettings;
 
-/// What no command may do; one DOF, in its unit.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CommandLimits {
-    /// Largest dc / du.
-    pub gain_limit: f64,
-    /// Largest |dc| in a tick.
-    pub step_limit: f64,
-    /// Least and largest command.
-    pub travel: (f64, f64),
-    /// Largest |c - u|.
-    pub lead_limit: f64,
-}
-
-/// Watches one DOF.
+/// Limits the command of one DOF.
 ///
 /// ```text
-/// 0 <= dc / du <= gain_limit,   dc = 0 where du = 0,   |dc| <= step_limit,
-/// least <= c <= largest,   |c - u| <= lead_limit
+/// 0 <= dc / du <= gain_limit,   dc = 0 where du = 0,   |dc| <= command_speed period,
+/// least <= c <= largest,   |c - u| <= width_limit
 /// ```
 ///
-/// A command that breaks the third is no hand's, whatever the clutch before the law made of it: it does not move. One
-/// outside of the last two, which another bound keeps it from entering at once, comes no farther out. What is permitted is what is sent, and what the law goes on from.
+/// A command that exceeds `command_speed` does not move: no operator input asks for it. A command outside of the last
+/// two bounds, where another bound keeps it from entering at once, moves no farther out. The limited command is the
+/// one that is sent, and the one from which the law continues.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CommandLimiter {
-    settings: CommandLimits,
+    gain_limit: f64,
+    /// Largest |dc| in a tick.
+    step_limit: f64,
+    /// Least and largest command.
+    travel: (f64, f64),
+    /// Largest |c - u|.
+    lead_limit: f64,
+    /// Reference and command of the last tick.
     last: Option<(f64, f64)>,
 }
 
-/// What became of a command.
+/// What the limiter did to a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LimiterResult {
-    /// It was within all bounds and is what it was, bit for bit.
-    Same,
-    /// A limit of travel changed it: that share of the reference's motion is to be thrown away, or the command would
-    /// make up for it later.
+    /// The command was within all bounds and is unchanged, bit for bit.
+    Unchanged,
+    /// A limit of travel or speed changed the command: that share of the reference's motion has to be discarded, or
+    /// the command would catch up later.
     Limited,
-    /// It would have changed faster than any hand asks for, and stays where it is.
+    /// The command exceeded `command_speed` and stays where it was.
     Jump,
-    /// It led the reference too far and was kept at its side. That takes from the compensation and not from the motion.
-    Led,
-    /// It broke the law: the software is wrong.
-    Broken,
+    /// The command led the reference by more than `width_limit` and was kept at that distance. This takes from the
+    /// compensation and not from the motion.
+    LeadLimited,
+    /// The command violated the law: the software is wrong.
+    Violation,
 }
 
 impl CommandLimiter {
-    /// Before the first command.
+    /// The limiter of DOF number `index` before the first command, for a control period in s.
     ///
     /// # Errors
-    /// A limit is not above 0, the gain's below 1, or the travel's ends are not in order.
-    pub fn new(settings: CommandLimits) -> Result<Self, ConfigError> {
-        let gain = settings.gain_limit.is_finite() && settings.gain_limit >= 1.0;
+    /// A limit is not above 0, `gain_limit` is below 1, or the ends of `command_travel` are not in order.
+    pub fn new(
+        safety: &SafetySettings,
+        dof: &DofSettings,
+        index: usize,
+        period: f64,
+    ) -> Result<Self, ConfigError> {
+        let gain_limit = dof.gain_limit;
+        let is_gain = gain_limit.is_finite() && gain_limit >= 1.0;
+        require(is_gain, "gain_limit", gain_limit, "finite, 1 or above")?;
+        let of = |values: [f64; 3]| values.get(index).copied().unwrap_or(f64::NAN);
+        let step_limit = of(safety.command_speed) * period;
+        require_positive("command_speed", step_limit)?;
+        let lead_limit = of(safety.width_limit);
+        require_positive("width_limit", lead_limit)?;
+        let least = of(safety.command_travel.map(|(least, _)| least));
+        let largest = of(safety.command_travel.map(|(_, largest)| largest));
+        let is_ordered = least < largest && (largest - least).is_finite();
         require(
-            gain,
-            "gain_limit",
-            settings.gain_limit,
-            "finite, 1 or above",
-        )?;
-        require_positive("command_speed", settings.step_limit)?;
-        require_positive("lead_limit", settings.lead_limit)?;
-        let (least, largest) = settings.travel;
-        let ordered = least < largest && (largest - least).is_finite();
-        require(
-            ordered,
-            "travel",
+            is_ordered,
+            "command_travel",
             least,
             "finite, below the largest position",
         )?;
         Ok(Self {
-            settings,
-            last: None,
-        })
-    }
-
-    /// The command that may be sent for an admitted reference.
-    ///
-    /// One that is not finite, or of a reference that is not, becomes the last, or NaN before there is one.
-    pub fn permit(&mut self, reference: f64, command: f64) -> (f64, LimiterResult) {
-        let CommandLimits {
             gain_limit,
             step_limit,
             travel: (least, largest),
             lead_limit,
-        } = self.settings;
-        let Some((last_reference, last)) = self.last else {
+            last: None,
+        })
+    }
+
+    /// The limited command for a gated reference.
+    ///
+    /// Where reference or command is not finite, this is the last command, or NaN before the first.
+    pub fn limit(&mut self, reference: f64, command: f64) -> (f64, LimiterResult) {
+        let Self {
+            gain_limit,
+            step_limit,
+            travel: (least, largest),
+            lead_limit,
+            last,
+        } = *self;
+        let Some((last_reference, last)) = last else {
             if !(reference.is_finite() && command.is_finite()) {
-                return (f64::NAN, LimiterResult::Broken);
+                return (f64::NAN, LimiterResult::Violation);
             }
-            let permitted = command.max(least).min(largest);
-            self.last = Some((reference, permitted));
-            let verdict = told(
-                permitted,
+            let limited = command.max(least).min(largest);
+            self.last = Some((reference, limited));
+            let result = result(
+                limited,
                 command,
-                LimiterResult::Same,
+                LimiterResult::Unchanged,
                 LimiterResult::Limited,
             );
-            return (permitted, verdict);
+            return (limited, result);
         };
         if !reference.is_finite() {
-            return (last, LimiterResult::Broken);
+            return (last, LimiterResult::Violation);
         }
         let increment = reference - last_reference;
         let farthest = last + gain_limit * increment;
@@ -111,10 +118,13 @@ impl CommandLimiter {
         };
         if (lawful - last).abs() > step_limit {
             self.last = Some((reference, last));
-            return (
-                last,
-                told(lawful, command, LimiterResult::Jump, LimiterResult::Broken),
+            let result = result(
+                lawful,
+                command,
+                LimiterResult::Jump,
+                LimiterResult::Violation,
             );
+            return (last, result);
         }
         // Never beyond the last command's own distance, so that a limit cannot move anything by itself.
         let ahead = (last - last_reference).max(lead_limit);
@@ -125,30 +135,40 @@ impl CommandLimiter {
             .min(largest.max(last))
             .max(last - step_limit)
             .min(last + step_limit);
-        // Rounding of the lead's bounds may not break the law.
-        let permitted = limited.max(last.min(farthest)).min(last.max(farthest));
-        let permitted = if permitted.is_finite() {
-            permitted
-        } else {
-            last
-        };
-        let bound = told(limited, led, LimiterResult::Led, LimiterResult::Limited);
-        let lawfully = told(permitted, command, LimiterResult::Same, bound);
-        let verdict = told(lawful, command, lawfully, LimiterResult::Broken);
-        self.last = Some((reference, permitted));
-        (permitted, verdict)
+        // Rounding of the bounds on c - u must not violate the law.
+        let sent = limited.max(last.min(farthest)).min(last.max(farthest));
+        let sent = if sent.is_finite() { sent } else { last };
+        let bound = result(
+            limited,
+            led,
+            LimiterResult::LeadLimited,
+            LimiterResult::Limited,
+        );
+        let within_law = result(sent, command, LimiterResult::Unchanged, bound);
+        let result = result(lawful, command, within_law, LimiterResult::Violation);
+        self.last = Some((reference, sent));
+        (sent, result)
     }
 
-    /// The reference is from now on counted from elsewhere.
-    pub fn shift(&mut self, shift: f64) {
+    /// Moves the origin of the reference by `shift`.
+    pub fn shift_reference(&mut self, shift: f64) {
         if let Some((reference, _)) = &mut self.last {
             *reference += shift;
         }
     }
 }
 
-/// A verdict is told bit for bit: one if a bound has left a command what it was, the other if not.
+/// `unchanged` if a bound has left the command as it was, bit for bit, else `changed`.
 #[allow(clippy::float_cmp)]
-fn told(bounded: f64, command: f64, left: LimiterResult, changed: LimiterResult) -> LimiterResult {
-    if bounded == command { left } else { changed }
+fn result(
+    bounded: f64,
+    command: f64,
+    unchanged: LimiterResult,
+    changed: LimiterResult,
+) -> LimiterResult {
+    if bounded == command {
+        unchanged
+    } else {
+        changed
+    }
 }

@@ -1,8 +1,8 @@
-//! What can be noticed to be wrong. The one place where it has a name.
+//! Flags: what the monitors detect, or the rig reports.
 
 macro_rules! flags {
     ($($(#[doc = $doc:literal])+ $flag:ident = $name:literal,)+) => {
-        /// What a guard noticed, or the rig reported.
+        /// A condition that a monitor detected, or that the rig reported.
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
         pub enum Flag { $($(#[doc = $doc])+ $flag,)+ }
 
@@ -10,18 +10,21 @@ macro_rules! flags {
             /// Every flag, in the order of its bit in [`Flags`].
             pub const ALL: &[Self] = &[$(Self::$flag,)+];
 
-            /// As configuration, reports and logs call it.
+            #[cfg(feature = "serde")]
+            const NAMES: &[&str] = &[$($name,)+];
+
+            /// The name in configuration, reports and logs.
             pub const fn name(self) -> &'static str {
                 match self { $(Self::$flag => $name,)+ }
             }
 
-            /// What it says, in a sentence.
+            /// The meaning in one sentence.
             pub const fn meaning(self) -> &'static str {
                 match self { $(Self::$flag => concat!($($doc),+).trim_ascii(),)+ }
             }
 
-            /// The flag of that name.
-            pub fn named(name: &str) -> Option<Self> {
+            /// The flag with the given name.
+            pub fn from_name(name: &str) -> Option<Self> {
                 match name {
                     $($name => Some(Self::$flag),)+
                     _ => None,
@@ -32,57 +35,57 @@ macro_rules! flags {
 }
 
 flags! {
-    /// The picture is the same to the last bit although the command moved.
+    /// The image is identical to an earlier one although the command has moved.
     Frozen = "frozen",
-    /// A frame older than `frame_age` when it came.
+    /// The frame was older than `frame_age` when it arrived.
     Late = "late",
-    /// A frame that was captured no later than the one before.
+    /// The frame was captured no later than the one before it.
     Duplicate = "duplicate",
-    /// No frame for longer than `frame_gap`.
+    /// No frame has arrived for longer than `frame_gap`.
     Dropped = "dropped",
-    /// A time that is ahead of the control tick, goes back, or is no number.
+    /// A time is later than the control tick, goes back, or is not a number.
     Clock = "clock",
-    /// An image too far from what model and last images make one expect.
+    /// The measured state is too far from the predicted state.
     Innovation = "innovation",
-    /// An image in which the tip went farther than its command.
+    /// The tip moved farther between two images than its command did.
     Jump = "jump",
-    /// An image in which a tip in contact does not go with its command.
+    /// The tip was in contact and did not move with its command.
     Slip = "slip",
-    /// An image that would be as expected with the markers exchanged.
+    /// The image agrees with the prediction if its two markers are exchanged.
     Swapped = "swapped",
-    /// One marker alone, or two of which one is where it cannot be.
+    /// Only one marker was found, or one of the two is where it cannot be.
     Merged = "merged",
-    /// No marker, or none that could be believed.
+    /// No marker was found, or none that agrees with the prediction.
     Lost = "lost",
-    /// Both markers, and yet a DOF that they do not determine.
+    /// Both markers were found, but they do not determine every degree of freedom.
     Unobservable = "unobservable",
-    /// A drive is not where it was told to be; the rig says so.
+    /// The rig reports that a drive does not follow its command.
     FollowingError = "following_error",
-    /// A reference that gained more in `reference_time` than `reference_speed` allows, or all at once.
+    /// The reference was faster than `reference_speed` over `reference_time`, or jumped.
     ReferenceJump = "reference_jump",
-    /// A reference older than `reference_age`, or one that moves on as no hand does after it was silent for so long.
+    /// The reference was older than `reference_age`, or jumped after its device had been silent for as long.
     ReferenceLate = "reference_late",
-    /// A reference that is no number.
+    /// The reference is not a finite number.
     ReferenceInvalid = "reference_invalid",
-    /// A control tick that came too late.
+    /// A control tick came too late.
     LateTick = "late_tick",
-    /// A drive or its bus failed; the rig says so.
+    /// The rig reports a fault of a drive or of its bus.
     DriveFault = "drive_fault",
-    /// The tip does not go where the command goes, by sign or by scale; the rig says so.
+    /// The rig reports that the tip does not follow its command in sign or scale.
     StartCheck = "start_check",
-    /// More slack was learnt than there can be.
+    /// The estimated slack reached `width_limit` or `offset_limit`.
     WidthLimit = "width_limit",
-    /// The monitor changed a command.
+    /// The command limiter changed a command.
     Monitor = "monitor",
-    /// A command that would have changed faster than `command_speed`.
+    /// A command would have moved faster than `command_speed`.
     CommandJump = "command_jump",
-    /// A hand that trembles: `tremor_rate` reversals in a second, each within the slack.
+    /// The reference reverses more than `tremor_rate` times a second within the slack.
     Tremor = "tremor",
-    /// A tip that came farther than its reference since the reference turned.
+    /// The tip has moved farther than the reference since the reference turned.
     Overcompensation = "overcompensation",
-    /// Reference and tip that swing farther each time, one after the other.
+    /// Reference and tip oscillate with growing swings.
     LimitCycle = "limit_cycle",
-    /// Images that say another slack than was learnt: the instrument has changed, or they are wrong.
+    /// The estimated slack changed after it had settled: the instrument has changed, or the images are wrong.
     SlackChanged = "slack_changed",
 }
 
@@ -91,47 +94,102 @@ flags! {
 pub struct Flags(u32);
 
 impl Flags {
-    /// None of them.
+    /// The empty set.
     pub const NONE: Self = Self(0);
 
-    /// One of them.
+    /// The set of one flag.
     pub const fn of(flag: Flag) -> Self {
         Self(1 << flag as u32)
     }
 
-    /// One of them, if it holds.
-    pub const fn when(holds: bool, flag: Flag) -> Self {
-        if holds { Self::of(flag) } else { Self::NONE }
+    /// The set of one flag if a condition holds, else the empty set.
+    pub const fn when(condition: bool, flag: Flag) -> Self {
+        if condition {
+            Self::of(flag)
+        } else {
+            Self::NONE
+        }
     }
 
-    /// Those in either.
+    /// The flags that are in either set.
     #[must_use]
-    pub const fn and(self, other: Self) -> Self {
+    pub const fn union(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 
-    /// Those that are not in the other.
+    /// The flags of this set that are not in the other.
     #[must_use]
-    pub const fn without(self, other: Self) -> Self {
+    pub const fn difference(self, other: Self) -> Self {
         Self(self.0 & !other.0)
     }
 
-    /// Whether the flag is in it.
-    pub const fn has(self, flag: Flag) -> bool {
+    /// Whether the set contains a flag.
+    pub const fn contains(self, flag: Flag) -> bool {
         self.0 & (1 << flag as u32) != 0
     }
 
-    /// Whether there is none.
+    /// Whether the set is empty.
     pub const fn is_empty(self) -> bool {
         self.0 == 0
     }
 
-    /// Each of them, in order.
+    /// The flags of the set, in the order of [`Flag::ALL`].
     pub fn iter(self) -> impl Iterator<Item = Flag> {
         Flag::ALL
             .iter()
             .copied()
-            .filter(move |flag| self.has(*flag))
+            .filter(move |flag| self.contains(*flag))
+    }
+}
+
+#[cfg(feature = "serde")]
+mod deserialize {
+    use super::{Flag, Flags};
+    use core::fmt;
+    use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Visitor};
+
+    struct Name;
+
+    impl Visitor<'_> for Name {
+        type Value = Flag;
+
+        fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+            formatter.write_str("the name of a flag")
+        }
+
+        fn visit_str<E: Error>(self, name: &str) -> Result<Flag, E> {
+            Flag::from_name(name).ok_or_else(|| E::unknown_variant(name, Flag::NAMES))
+        }
+    }
+
+    impl<'de> Deserialize<'de> for Flag {
+        fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+            deserializer.deserialize_str(Name)
+        }
+    }
+
+    struct Names;
+
+    impl<'de> Visitor<'de> for Names {
+        type Value = Flags;
+
+        fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+            formatter.write_str("a sequence of names of flags")
+        }
+
+        fn visit_seq<A: SeqAccess<'de>>(self, mut names: A) -> Result<Flags, A::Error> {
+            let mut flags = Flags::NONE;
+            while let Some(flag) = names.next_element()? {
+                flags = flags.union(Flags::of(flag));
+            }
+            Ok(flags)
+        }
+    }
+
+    impl<'de> Deserialize<'de> for Flags {
+        fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+            deserializer.deserialize_seq(Names)
+        }
     }
 }
 
@@ -140,15 +198,29 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_flag_has_a_bit_and_a_name_of_its_own() {
+    fn flags_have_distinct_bits_and_names() {
         let mut seen = Flags::NONE;
         for flag in Flag::ALL {
-            assert!(!seen.has(*flag));
-            seen = seen.and(Flags::of(*flag));
-            assert_eq!(Flag::named(flag.name()), Some(*flag));
+            assert!(!seen.contains(*flag));
+            seen = seen.union(Flags::of(*flag));
+            assert_eq!(Flag::from_name(flag.name()), Some(*flag));
         }
         assert!(seen.iter().eq(Flag::ALL.iter().copied()));
-        assert!(seen.without(seen).is_empty());
-        assert_eq!(Flag::named("nothing"), None);
+        assert!(seen.difference(seen).is_empty());
+        assert_eq!(Flag::from_name("nothing"), None);
+    }
+
+    #[cfg(feature = "serde")]
+    #[test]
+    fn a_set_is_deserialized_from_names() {
+        use serde::de::Deserialize;
+        use serde::de::value::{Error, SeqDeserializer};
+        let flags = |names: &[&'static str]| {
+            Flags::deserialize(SeqDeserializer::<_, Error>::new(names.iter().copied()))
+        };
+        let lost_and_late = Flags::of(Flag::Lost).union(Flags::of(Flag::Late));
+        assert_eq!(flags(&["lost", "late"]), Ok(lost_and_late));
+        assert_eq!(flags(&[]), Ok(Flags::NONE));
+        assert!(flags(&["lost", "frost"]).is_err());
     }
 }

@@ -1,43 +1,35 @@
-//! Whether a hand can have moved as its device says: not from rest, nor out of its motion, all at once.
+//! Monitor of the operator's input device: silence, and jumps that no operator makes.
 
 use crate::dof::PerDof;
 use crate::error::{ConfigError, require_positive};
 use crate::supervision::flags::{Flag, Flags};
+use crate::supervision::settings::SafetySettings;
 
-/// What a hand and its device can do.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct InputDeviceSettings {
-    /// Control period, in s.
-    pub period: f64,
-    /// Speed that a hand gains or loses at most while its device says nothing new [m/s, rad/s, rad/s].
-    pub speed: PerDof<f64>,
-    /// What the device counts in [m, rad, rad].
-    pub count: PerDof<f64>,
-    /// Longest time between two values of a device that speaks, in s.
-    pub silence: f64,
-}
-
-/// Watches each DOF of what the hand's device says.
+/// Checks each DOF of the input device's values.
 ///
 /// ```text
-/// |du - v T| <= speed T + count         T <= silence
-/// |du|       <= speed dt + count        T > silence
+/// |du - v T| <= reference_speed T + reference_count         T <= reference_age
+/// |du|       <= reference_speed dt + reference_count        T > reference_age
 /// ```
 ///
-/// with the increment du of the device's value, the time T for which it had repeated itself to the bit, its speed v of
-/// before, and the time dt of this tick, a control period at least. A hand that goes on as it did passes, with a device
-/// that is slower than the loop as well; so does one that rests, and goes on by a count or from rest. A hand that moved
-/// while its device said nothing does not.
+/// with the increment du of the device's value, the time T for which the value had repeated itself to the bit, its speed
+/// v before that, and the time dt of this tick, at least one control period. An input that continues at its speed passes,
+/// also from a device that is slower than the loop; so does one at rest that moves by a count, or accelerates from rest.
+/// An input that moved while its device was silent does not.
 ///
-/// Minimum-jerk motion (Flash and Hogan 1985), x = d (10 s^3 - 15 s^4 + 6 s^5) over a time D, gains 5.8 d / D^2 at most:
-/// to 20 mm in 0.5 s it changes its increment by 12 um in 5 ms, and a tremor of 1 mm at 12 Hz by 0.14 mm.
+/// Minimum-jerk motion (Flash and Hogan 1985), x = d (10 s^3 - 15 s^4 + 6 s^5) over a time D, has an acceleration of at
+/// most 5.8 d / D^2: over 20 mm in 0.5 s its increment changes by 12 um in 5 ms; that of a tremor of 1 mm at 12 Hz
+/// changes by 0.14 mm.
 ///
-/// Wrong about a hand that moved by less than that in silence, or whose device is late and never catches up; and where
-/// a device counts more coarsely than `count`, or tells less than some 30 values a second, so that a quick start of the
-/// hand passes for silence.
+/// Wrong when an input moved by less than these bounds in silence, when a device is late and never catches up, and when
+/// a device has a coarser resolution than `reference_count` or gives fewer than about 30 values a second, so that a fast
+/// start passes for silence.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InputDeviceMonitor {
-    settings: InputDeviceSettings,
+    period: f64,
+    reference_speed: PerDof<f64>,
+    reference_count: PerDof<f64>,
+    reference_age: f64,
     /// v.
     speeds: PerDof<f64>,
     /// T.
@@ -45,57 +37,60 @@ pub struct InputDeviceMonitor {
 }
 
 impl InputDeviceMonitor {
-    /// Of a hand at rest.
+    /// The monitor of an input at rest, for a control period in s.
     ///
     /// # Errors
     /// A value is not a finite number above 0.
-    pub fn new(settings: InputDeviceSettings) -> Result<Self, ConfigError> {
-        require_positive("period", settings.period)?;
+    pub fn new(safety: &SafetySettings, period: f64) -> Result<Self, ConfigError> {
+        require_positive("period", period)?;
         for (field, values) in [
-            ("reference_speed", settings.speed),
-            ("reference_count", settings.count),
+            ("reference_speed", safety.reference_speed),
+            ("reference_count", safety.reference_count),
         ] {
             for value in values {
                 require_positive(field, value)?;
             }
         }
-        require_positive("reference_age", settings.silence)?;
+        require_positive("reference_age", safety.reference_age)?;
         Ok(Self {
-            settings,
+            period,
+            reference_speed: safety.reference_speed,
+            reference_count: safety.reference_count,
+            reference_age: safety.reference_age,
             speeds: [0.0; 3],
             repeated: [0.0; 3],
         })
     }
 
-    /// A tick `gap` in s after the last one, in which the device's values moved by `moved` (3,) [m, rad, rad].
+    /// Check the increments (3,) [m, rad, rad] of a tick that came `elapsed` in s after the last one.
     ///
-    /// `ReferenceLate` after a silence, `ReferenceJump` out of a motion.
-    pub fn tick(&mut self, moved: PerDof<f64>, gap: f64) -> Flags {
-        let gap = gap.max(self.settings.period);
-        let axes = self.speeds.iter_mut().zip(&mut self.repeated).zip(moved);
-        let limits = self.settings.speed.into_iter().zip(self.settings.count);
+    /// Raises `ReferenceLate` after a silence, and `ReferenceJump` out of a motion.
+    pub fn update(&mut self, increments: PerDof<f64>, elapsed: f64) -> Flags {
+        let elapsed = elapsed.max(self.period);
+        let axes = self.speeds.iter_mut().zip(&mut self.repeated);
+        let limits = self.reference_speed.into_iter().zip(self.reference_count);
         let mut raised = Flags::NONE;
-        for (((speed, repeated), moved), (limit, count)) in axes.zip(limits) {
-            *repeated += gap;
-            if moved == 0.0 {
+        for (((speed, repeated), increment), (limit, count)) in axes.zip(increments).zip(limits) {
+            *repeated += elapsed;
+            if increment == 0.0 {
                 continue;
             }
-            let silent = *repeated > self.settings.silence;
-            let (expected, time, flag) = if silent {
-                (0.0, gap, Flag::ReferenceLate)
+            let was_silent = *repeated > self.reference_age;
+            let (expected, time, flag) = if was_silent {
+                (0.0, elapsed, Flag::ReferenceLate)
             } else {
                 (*speed * *repeated, *repeated, Flag::ReferenceJump)
             };
-            let beyond = (moved - expected).abs() > limit * time + count;
-            raised = raised.and(Flags::when(beyond, flag));
-            *speed = moved / *repeated;
+            let is_beyond = (increment - expected).abs() > limit * time + count;
+            raised = raised.union(Flags::when(is_beyond, flag));
+            *speed = increment / *repeated;
             *repeated = 0.0;
         }
         raised
     }
 
-    /// The hand may have been anywhere, and done anything.
-    pub const fn restart(&mut self) {
+    /// Forget the motion before: the next increment is compared with an input at rest.
+    pub const fn reset(&mut self) {
         self.speeds = [0.0; 3];
         self.repeated = [0.0; 3];
     }

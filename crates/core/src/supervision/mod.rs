@@ -1,4 +1,4 @@
-//! What is checked before and after the law, and what is done about it.
+//! Supervision: reference gate, frame gate, command limiter, monitors, and the supervisor with its reactions.
 
 pub(crate) mod change_watch;
 pub(crate) mod command_limiter;
@@ -10,5 +10,6 @@ pub(crate) mod monitors;
 pub(crate) mod motion_monitor;
 pub(crate) mod reactions;
 pub(crate) mod reference_gate;
+pub(crate) mod settings;
 pub(crate) mod supervisor;
 pub(crate) mod turning_points;

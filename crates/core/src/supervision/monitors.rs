@@ -5,37 +5,16 @@ use crate::article::play_limit::PlayLimit;
 use crate::dof::PerDof;
 use crate::error::{ConfigError, require_positive};
 use crate::r#loop::axis::Axis;
+use crate::settings::DofSettings;
 use crate::supervision::change_watch::{ChangeSettings, ChangeWatch};
-use crate::supervision::command_limiter::{CommandLimiter, CommandLimits, LimiterResult};
+use crate::supervision::command_limiter::{CommandLimiter, LimiterResult};
 use crate::supervision::flags::{Flag, Flags};
-use crate::supervision::frame_gate::{FrameArrival, FrameGate, FrameGateSettings};
-use crate::supervision::motion_monitor::{MotionMonitor, MotionMonitorSettings};
+use crate::supervision::frame_gate::{FrameArrival, FrameGate};
+use crate::supervision::motion_monitor::MotionMonitor;
 use crate::supervision::reactions::{Reaction, Source};
-use crate::supervision::reference_gate::{ReferenceGate, ReferenceGateSettings};
-use crate::supervision::supervisor::{Event, Supervisor, SupervisorSettings};
-
-/// What the monitors are set to.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MonitorsSettings {
-    /// Of the reference.
-    pub clutch: ReferenceGateSettings,
-    /// Of the command.
-    pub limits: PerDof<CommandLimits>,
-    /// Of the frames.
-    pub frames: FrameGateSettings,
-    /// Of hand and tip.
-    pub motion: MotionMonitorSettings,
-    /// Of what images teach.
-    pub changes: ChangeSettings,
-    /// Of the reactions.
-    pub supervisor: SupervisorSettings,
-    /// Largest width of the slack [m, rad, rad]; the unit of travel for every reaction.
-    pub width_limit: PerDof<f64>,
-    /// Largest offset of it either way [m, rad, rad].
-    pub offset_limit: PerDof<f64>,
-    /// What is not looked at.
-    pub off: Flags,
-}
+use crate::supervision::reference_gate::ReferenceGate;
+use crate::supervision::settings::SafetySettings;
+use crate::supervision::supervisor::{Event, Supervisor};
 
 /// How the loop stands.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -68,35 +47,42 @@ pub struct Monitors {
 }
 
 impl Monitors {
-    /// From their settings.
+    /// From their settings, for a control period in s.
     ///
     /// # Errors
     /// One is out of range.
-    pub fn new(settings: MonitorsSettings) -> Result<Self, ConfigError> {
-        let [m1, m2, m3] = settings.limits;
-        let [w1, w2, w3] = settings.width_limit;
-        let [o1, o2, o3] = settings.offset_limit;
-        for width in settings.width_limit {
+    pub fn new(
+        safety: &SafetySettings,
+        dofs: &PerDof<DofSettings>,
+        period: f64,
+    ) -> Result<Self, ConfigError> {
+        let [d1, d2, d3] = dofs;
+        let [w1, w2, w3] = safety.width_limit;
+        let [o1, o2, o3] = safety.offset_limit;
+        for width in safety.width_limit {
             require_positive("width_limit", width)?;
         }
         Ok(Self {
-            clutch: ReferenceGate::new(settings.clutch)?,
+            clutch: ReferenceGate::new(safety, period)?,
             limiters: [
-                CommandLimiter::new(m1)?,
-                CommandLimiter::new(m2)?,
-                CommandLimiter::new(m3)?,
+                CommandLimiter::new(safety, d1, 0, period)?,
+                CommandLimiter::new(safety, d2, 1, period)?,
+                CommandLimiter::new(safety, d3, 2, period)?,
             ],
-            frames: FrameGate::new(settings.frames)?,
-            motion: MotionMonitor::new(settings.motion)?,
-            changes: ChangeWatch::new(settings.changes)?,
-            supervisor: Supervisor::new(settings.supervisor)?,
+            frames: FrameGate::new(safety, dofs)?,
+            motion: MotionMonitor::new(safety, dofs, period)?,
+            changes: ChangeWatch::new(ChangeSettings {
+                limit: safety.change_limit,
+                travel: safety.width_limit.map(|width| safety.change_travel * width),
+            })?,
+            supervisor: Supervisor::new(safety)?,
             limits: [
                 PlayLimit::new(w1, o1)?,
                 PlayLimit::new(w2, o2)?,
                 PlayLimit::new(w3, o3)?,
             ],
-            unit: settings.width_limit,
-            off: settings.off,
+            unit: safety.width_limit,
+            off: safety.off,
             time: f64::NAN,
             told: 1.0,
         })
@@ -104,7 +90,7 @@ impl Monitors {
 
     /// Bounds what the axes may believe.
     pub(crate) fn limit(&self, axes: &mut PerDof<Axis>) {
-        if !self.off.has(Flag::WidthLimit) {
+        if !self.off.contains(Flag::WidthLimit) {
             for (axis, limit) in axes.iter_mut().zip(self.limits) {
                 axis.limit(limit);
             }
@@ -120,24 +106,24 @@ impl Monitors {
         time: f64,
     ) {
         let held = self.supervisor.reaction() >= Reaction::HoldMotion;
-        let admission = self.clutch.admit(reference, time, stamp, held, self.off);
+        let admission = self.clutch.step(reference, time, stamp, held, self.off);
         let mut event = Event {
             source: Source::Tick,
             time,
             travel: 0.0,
             raised: admission
                 .raised
-                .and(self.frames.tick(time).without(self.off)),
+                .union(self.frames.check_gap(time).difference(self.off)),
             severe: admission.severe,
         };
-        for (moved, unit) in admission.moved.iter().zip(self.unit) {
+        for (moved, unit) in admission.increments.iter().zip(self.unit) {
             event.travel += moved.abs() / unit;
         }
         if let Some(reference) = admission.reference {
-            let motion = self.motion.tick(reference);
-            event.raised = event.raised.and(self.watched(motion));
+            let motion = self.motion.update_reference(reference);
+            event.raised = event.raised.union(self.watched(motion));
             self.tell(axes);
-            self.step(axes, reference, admission.moved, &mut event);
+            self.step(axes, reference, admission.increments, &mut event);
         }
         self.time = time;
         self.supervisor.update(&event);
@@ -159,20 +145,20 @@ impl Monitors {
         {
             let (before, predicted_state) = (axis.command(), axis.predicted_state());
             axis.step(reference);
-            if self.off.has(Flag::Monitor) {
+            if self.off.contains(Flag::Monitor) {
                 continue;
             }
-            let (permitted, verdict) = monitor.permit(reference, axis.command());
-            if verdict != LimiterResult::Same {
+            let (permitted, verdict) = monitor.limit(reference, axis.command());
+            if verdict != LimiterResult::Unchanged {
                 let jumps = Flags::when(verdict == LimiterResult::Jump, Flag::CommandJump);
                 event.raised = event
                     .raised
-                    .and(Flags::of(Flag::Monitor))
-                    .and(jumps.without(self.off));
-                if verdict == LimiterResult::Broken {
-                    event.severe = event.severe.and(Flags::of(Flag::Monitor));
+                    .union(Flags::of(Flag::Monitor))
+                    .union(jumps.difference(self.off));
+                if verdict == LimiterResult::Violation {
+                    event.severe = event.severe.union(Flags::of(Flag::Monitor));
                 }
-                if verdict != LimiterResult::Led {
+                if verdict != LimiterResult::LeadLimited {
                     let followed = (permitted - before) / (axis.command() - before);
                     *shift = -moved * (1.0 - followed.clamp(0.0, 1.0));
                     if !shift.is_finite() {
@@ -180,14 +166,14 @@ impl Monitors {
                     }
                 }
                 axis.amend(*shift, permitted, predicted_state);
-                monitor.shift(*shift);
+                monitor.shift_reference(*shift);
             }
         }
         self.clutch.shift(shifts);
     }
 
     fn tell(&mut self, axes: &mut PerDof<Axis>) {
-        let lead = self.supervisor.lead();
+        let lead = self.supervisor.gain_share();
         if (lead - self.told).abs() > 0.0 {
             self.told = lead;
             for axis in axes {
@@ -199,19 +185,19 @@ impl Monitors {
     /// A frame came: what is wrong with it, as far as that is looked for.
     pub(crate) fn arrive(&mut self, arrival: &FrameArrival) -> Flags {
         if self.supervisor.reaction() == Reaction::Fade {
-            self.frames.forget();
+            self.frames.reset();
         }
-        self.frames.arrive(arrival).without(self.off)
+        self.frames.check_arrival(arrival).difference(self.off)
     }
 
     /// What is in the set and looked for.
     pub(crate) const fn watched(&self, flags: Flags) -> Flags {
-        flags.without(self.off)
+        flags.difference(self.off)
     }
 
     /// The reference as far as it was admitted [m, rad, rad].
     pub(crate) fn admitted(&self) -> PerDof<f64> {
-        self.clutch.admitted()
+        self.clutch.reference()
     }
 
     /// What an image says of hand and tip.
@@ -222,7 +208,9 @@ impl Monitors {
         measured: PerDof<f64>,
         play: PerDof<Play>,
     ) -> Flags {
-        let flags = self.motion.look(time, reference, measured, play);
+        let flags = self
+            .motion
+            .update_measurement(time, reference, measured, play);
         self.watched(flags)
     }
 
@@ -254,7 +242,7 @@ impl Monitors {
             source: Source::Rig,
             time: self.time,
             travel: 0.0,
-            raised: Flags::of(flag).without(self.off),
+            raised: Flags::of(flag).difference(self.off),
             severe: Flags::NONE,
         });
     }
@@ -276,7 +264,7 @@ impl Monitors {
             reaction: self.supervisor.reaction(),
             flags: self.supervisor.flags(),
             latched: self.supervisor.latched(),
-            lead: self.supervisor.lead(),
+            lead: self.supervisor.gain_share(),
         }
     }
 }

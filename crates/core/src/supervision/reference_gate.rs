@@ -1,249 +1,242 @@
-//! Between the hand and the law: only fresh, finite increments of the reference, taken in time, move anything.
+//! Reference gate: validates the reference before the law, and clutches it (offset between input and reference).
 
 use crate::dof::{PerDof, all_finite};
 use crate::error::{ConfigError, require, require_positive};
 use crate::supervision::flags::{Flag, Flags};
-use crate::supervision::input_device::{InputDeviceMonitor, InputDeviceSettings};
+use crate::supervision::input_device::InputDeviceMonitor;
+use crate::supervision::settings::SafetySettings;
 
-/// Which increments of the reference are taken.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ReferenceGateSettings {
-    /// Control period, in s.
-    pub period: f64,
-    /// Largest speed of the reference over `reference_time` [m/s, rad/s, rad/s].
-    pub reference_speed: PerDof<f64>,
-    /// Over which a speed counts, in s.
-    pub reference_time: f64,
-    /// What its device counts in [m, rad, rad].
-    pub reference_count: PerDof<f64>,
-    /// Oldest reference that moves anything, and longest silence of its device, in s.
-    pub reference_age: f64,
-    /// Periods from one tick to the next beyond which an increment is thrown away.
-    pub late_tick: f64,
-    /// Time from one tick to the next beyond which motion stops, in s.
-    pub stall: f64,
-}
+/// `late_tick` allows this share more: two stamps of up to 10^6 s differ by a period with an error of 10^-10 s.
+const ROUNDING: f64 = 1e-6;
 
-/// Admits increments of the reference.
+/// Passes the increments of the reference that are recent, finite, on time and no faster than an operator moves.
 ///
 /// ```text
-/// admitted = reference + offset
+/// gated reference = reference + offset
 /// ```
 ///
-/// Whatever is thrown away of a motion goes into the offset, so that nothing catches up later. With nothing
-/// thrown away the reference passes bit for bit.
+/// A discarded increment goes into the offset, so that nothing catches up later. With nothing discarded the reference
+/// passes bit for bit.
 ///
-/// What a reference has gained of late, one way, is
+/// The travel of the reference in one direction is a leaky sum of its increments du,
 ///
 /// ```text
-/// gained <- k gained + du,   k = exp(-period / reference_time)
-/// |gained| <= reference_speed period / (1 - k)
+/// travel <- k travel + du,   k = exp(-period / reference_time)
+/// |travel| <= reference_speed period / (1 - k)
 /// ```
 ///
-/// which a steady `reference_speed` just reaches. An increment that would break it is no hand's: it is thrown away,
-/// and motion stops. A tremor comes back before it has gained much; a hand that runs away slower than
-/// `reference_speed` is followed. Nor is what [`InputDeviceMonitor`] says of a hand whose device was silent.
+/// which a steady `reference_speed` just reaches. An increment beyond this bound is discarded, and motion stops. A tremor
+/// reverses before its travel adds up; an input that runs away slower than `reference_speed` is followed.
+/// [`InputDeviceMonitor`] checks the increments as well.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReferenceGate {
-    settings: ReferenceGateSettings,
+    period: f64,
+    reference_age: f64,
+    late_tick: f64,
+    stall: f64,
     /// k.
-    kept: f64,
-    gained: PerDof<f64>,
+    decay: f64,
+    /// `reference_speed` period / (1 - k).
+    travel_limit: PerDof<f64>,
+    travel: PerDof<f64>,
     device: InputDeviceMonitor,
     offset: PerDof<f64>,
-    raw: PerDof<f64>,
-    admitted: Option<PerDof<f64>>,
+    /// The reference of the last tick, without the offset.
+    input: PerDof<f64>,
+    /// The gated reference of the last tick.
+    output: Option<PerDof<f64>>,
     time: Option<f64>,
-    /// Whether the hand may be anywhere: the next reference is where it starts.
-    fresh: bool,
+    /// Whether the next reference sets the offset, wherever it is.
+    is_engaging: bool,
 }
 
-/// What became of a reference.
+/// A reference that has passed the gate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GatedReference {
-    /// What the law is to follow (3,) [m, rad, rad]; None before the first that is finite.
+    /// What the law follows (3,) [m, rad, rad]; None before the first reference that is finite.
     pub reference: Option<PerDof<f64>>,
-    /// Its increments, 0 for the first.
-    pub moved: PerDof<f64>,
+    /// Its increments (3,) [m, rad, rad]; 0 for the first.
+    pub increments: PerDof<f64>,
     /// What was wrong.
     pub raised: Flags,
-    /// What of it stops the motion although its first rung would not.
+    /// The flags in `raised` that go to their last reaction at once.
     pub severe: Flags,
 }
 
 impl ReferenceGate {
-    /// Before the first reference.
+    /// The gate before the first reference, for a control period in s.
     ///
     /// # Errors
-    /// A value is not a finite number above 0, or `late_tick` not above 1.
-    pub fn new(settings: ReferenceGateSettings) -> Result<Self, ConfigError> {
-        require_positive("period", settings.period)?;
-        require_positive("reference_time", settings.reference_time)?;
-        let late = settings.late_tick.is_finite() && settings.late_tick > 1.0;
-        require(late, "late_tick", settings.late_tick, "finite, above 1")?;
-        require_positive("stall", settings.stall)?;
+    /// A value is not a finite number above 0, or `late_tick` is not above 1.
+    pub fn new(safety: &SafetySettings, period: f64) -> Result<Self, ConfigError> {
+        require_positive("period", period)?;
+        require_positive("reference_time", safety.reference_time)?;
+        let is_late_tick = safety.late_tick.is_finite() && safety.late_tick > 1.0;
+        require(
+            is_late_tick,
+            "late_tick",
+            safety.late_tick,
+            "finite, above 1",
+        )?;
+        require_positive("stall", safety.stall)?;
+        let decay = libm::exp(-period / safety.reference_time);
+        let steady = period / (1.0 - decay);
         Ok(Self {
-            settings,
-            kept: libm::exp(-settings.period / settings.reference_time),
-            gained: [0.0; 3],
-            device: InputDeviceMonitor::new(InputDeviceSettings {
-                period: settings.period,
-                speed: settings.reference_speed,
-                count: settings.reference_count,
-                silence: settings.reference_age,
-            })?,
+            period,
+            reference_age: safety.reference_age,
+            late_tick: safety.late_tick,
+            stall: safety.stall,
+            decay,
+            travel_limit: safety.reference_speed.map(|speed| speed * steady),
+            travel: [0.0; 3],
+            device: InputDeviceMonitor::new(safety, period)?,
             offset: [0.0; 3],
-            raw: [f64::NAN; 3],
-            admitted: None,
+            input: [f64::NAN; 3],
+            output: None,
             time: None,
-            fresh: false,
+            is_engaging: false,
         })
     }
 
-    /// The reference at `time` in s, made at `stamp` in s if that is known; nothing of it moves while `held`.
+    /// Gate the reference of `time` in s, made at `stamp` in s if that is known; while `is_held`, nothing moves.
     ///
-    /// What is in `off` is not looked at.
-    pub fn admit(
+    /// The detectors in `off` are switched off.
+    pub fn step(
         &mut self,
         reference: PerDof<f64>,
         time: f64,
         stamp: Option<f64>,
-        held: bool,
+        is_held: bool,
         off: Flags,
     ) -> GatedReference {
-        let gap = self.gap(time);
-        let (late, severe) = self.punctuality(gap, time, stamp);
+        let elapsed = self.elapsed(time);
+        let (late, severe) = self.check_times(elapsed, time, stamp);
         let invalid = Flags::when(!all_finite(reference), Flag::ReferenceInvalid);
-        let (wrong, severe) = (late.without(off), severe.without(off));
-        let mut stopped = held || self.fresh || !wrong.and(severe).is_empty();
-        let mut admission = GatedReference {
-            reference: self.admitted,
-            moved: [0.0; 3],
-            raised: wrong.and(invalid.without(off)),
+        let (late, severe) = (late.difference(off), severe.difference(off));
+        let mut is_stopped = is_held || self.is_engaging || !late.union(severe).is_empty();
+        let mut gated = GatedReference {
+            reference: self.output,
+            increments: [0.0; 3],
+            raised: late.union(invalid.difference(off)),
             severe,
         };
         if !invalid.is_empty() {
-            return admission;
+            return gated;
         }
-        let Some(last) = self.admitted else {
-            if !held {
-                self.admitted = Some(reference);
-                admission.reference = self.admitted;
+        let Some(last) = self.output else {
+            if !is_held {
+                self.output = Some(reference);
+                gated.reference = self.output;
             }
-            self.raw = reference;
-            return admission;
+            self.input = reference;
+            return gated;
         };
-        let wanted = self.wanted(reference, last);
-        if !stopped {
-            let unlike = self
-                .unlike_a_hand(reference, wanted, last, gap)
-                .without(off);
-            admission.raised = admission.raised.and(unlike);
-            stopped = !unlike.is_empty();
+        let next = self.add_offset(reference, last);
+        if !is_stopped {
+            let wrong = self.check_motion(reference, next, last, elapsed);
+            let wrong = wrong.difference(off);
+            gated.raised = gated.raised.union(wrong);
+            is_stopped = !wrong.is_empty();
         }
-        self.raw = reference;
-        self.fresh = false;
-        if stopped {
-            self.gained = [0.0; 3];
-            self.device.restart();
-            for ((offset, last), raw) in self.offset.iter_mut().zip(last).zip(reference) {
-                *offset = last - raw;
+        self.input = reference;
+        self.is_engaging = false;
+        if is_stopped {
+            self.travel = [0.0; 3];
+            self.device.reset();
+            for ((offset, last), input) in self.offset.iter_mut().zip(last).zip(reference) {
+                *offset = last - input;
             }
-            return admission;
+            return gated;
         }
-        for ((moved, wanted), last) in admission.moved.iter_mut().zip(wanted).zip(last) {
-            *moved = wanted - last;
+        for ((increment, next), last) in gated.increments.iter_mut().zip(next).zip(last) {
+            *increment = next - last;
         }
-        self.admitted = Some(wanted);
-        admission.reference = self.admitted;
-        admission
+        self.output = Some(next);
+        gated.reference = self.output;
+        gated
     }
 
-    /// What the reference comes to, with all that was thrown away.
-    fn wanted(&self, reference: PerDof<f64>, last: PerDof<f64>) -> PerDof<f64> {
-        let mut wanted = last;
-        let raws = reference.into_iter().zip(self.raw).zip(self.offset);
-        for (wanted, ((raw, before), offset)) in wanted.iter_mut().zip(raws) {
-            // A hand at rest moves nothing, whatever rounding makes of the offset.
-            if (raw - before).abs() != 0.0 {
-                *wanted = if offset == 0.0 { raw } else { raw + offset };
+    fn add_offset(&self, reference: PerDof<f64>, last: PerDof<f64>) -> PerDof<f64> {
+        let mut sums = last;
+        let inputs = reference.into_iter().zip(self.input).zip(self.offset);
+        for (sum, ((input, before), offset)) in sums.iter_mut().zip(inputs) {
+            // A reference at rest moves nothing, whatever rounding makes of the offset.
+            if (input - before).abs() != 0.0 {
+                *sum = if offset == 0.0 { input } else { input + offset };
             }
         }
-        wanted
+        sums
     }
 
-    /// What no hand does, of this increment and those before it.
-    fn unlike_a_hand(
+    /// Check the increment, together with those before it.
+    fn check_motion(
         &mut self,
         reference: PerDof<f64>,
-        wanted: PerDof<f64>,
+        next: PerDof<f64>,
         last: PerDof<f64>,
-        gap: f64,
+        elapsed: f64,
     ) -> Flags {
-        let mut moved = reference;
-        for (moved, before) in moved.iter_mut().zip(self.raw) {
-            *moved -= before;
+        let mut increments = reference;
+        for (increment, before) in increments.iter_mut().zip(self.input) {
+            *increment -= before;
         }
-        let outruns = Flags::when(self.outruns(wanted, last), Flag::ReferenceJump);
-        self.device.tick(moved, gap).and(outruns)
+        let is_fast = Flags::when(self.exceeds_speed(next, last), Flag::ReferenceJump);
+        self.device.update(increments, elapsed).union(is_fast)
     }
 
-    /// Whether a DOF would gain more than a hand can, counting this increment.
-    fn outruns(&mut self, wanted: PerDof<f64>, last: PerDof<f64>) -> bool {
-        let steady = self.settings.period / (1.0 - self.kept);
-        let axes = self.gained.iter_mut().zip(wanted).zip(last);
-        let mut outruns = false;
-        for (((gained, wanted), last), speed) in axes.zip(self.settings.reference_speed) {
-            *gained = self.kept * *gained + (wanted - last);
-            outruns |= gained.abs() > speed * steady;
+    /// Whether a DOF exceeds its speed limit with this increment.
+    fn exceeds_speed(&mut self, next: PerDof<f64>, last: PerDof<f64>) -> bool {
+        let axes = self.travel.iter_mut().zip(next).zip(last);
+        let mut exceeds = false;
+        for (((travel, next), last), limit) in axes.zip(self.travel_limit) {
+            *travel = self.decay * *travel + (next - last);
+            exceeds |= travel.abs() > limit;
         }
-        outruns
+        exceeds
     }
 
-    /// The reference as far as it was admitted (3,) [m, rad, rad]; NaN before the first.
-    pub fn admitted(&self) -> PerDof<f64> {
-        self.admitted.unwrap_or([f64::NAN; 3])
+    /// The gated reference (3,) [m, rad, rad]; NaN before the first.
+    pub fn reference(&self) -> PerDof<f64> {
+        self.output.unwrap_or([f64::NAN; 3])
     }
 
-    /// The law was kept from following by `shift` (3,) [m, rad, rad]: that part of the motion is thrown away as well.
+    /// Discard `shift` (3,) [m, rad, rad] of the motion: the part by which the command could not follow.
     pub fn shift(&mut self, shift: PerDof<f64>) {
-        let Some(admitted) = &mut self.admitted else {
+        let Some(output) = &mut self.output else {
             return;
         };
-        for ((admitted, offset), shift) in admitted.iter_mut().zip(&mut self.offset).zip(shift) {
+        for ((output, offset), shift) in output.iter_mut().zip(&mut self.offset).zip(shift) {
             // Minus zero plus zero is another number.
             if shift != 0.0 {
-                *admitted += shift;
+                *output += shift;
                 *offset += shift;
             }
         }
     }
 
-    /// The next tick may be late, and the hand anywhere.
+    /// Clutch in at the next reference, however late it comes and wherever it is.
     pub const fn engage(&mut self) {
         self.time = None;
-        self.fresh = true;
+        self.is_engaging = true;
     }
 
     /// Time since the last tick, in s.
-    fn gap(&mut self, time: f64) -> f64 {
-        let gap = self.time.map_or(self.settings.period, |last| time - last);
+    fn elapsed(&mut self, time: f64) -> f64 {
+        let elapsed = self.time.map_or(self.period, |last| time - last);
         if time.is_finite() {
             self.time = Some(time);
         }
-        gap
+        elapsed
     }
 
-    fn punctuality(&self, gap: f64, time: f64, stamp: Option<f64>) -> (Flags, Flags) {
-        let settings = &self.settings;
-        // Clocks that count ticks differ in the last digits.
-        let late = gap > settings.late_tick * settings.period * (1.0 + 1e-6);
-        let jumped = !time.is_finite() || gap < 0.0;
+    fn check_times(&self, elapsed: f64, time: f64, stamp: Option<f64>) -> (Flags, Flags) {
+        let is_late = elapsed > self.late_tick * self.period * (1.0 + ROUNDING);
+        let has_jumped = !time.is_finite() || elapsed < 0.0;
         let age = stamp.map_or(0.0, |stamp| (time - stamp).abs());
-        let old = age.is_nan() || age > settings.reference_age;
-        let raised = Flags::when(late, Flag::LateTick)
-            .and(Flags::when(jumped, Flag::Clock))
-            .and(Flags::when(old, Flag::ReferenceLate));
-        (raised, Flags::when(gap > settings.stall, Flag::LateTick))
+        let is_old = age.is_nan() || age > self.reference_age;
+        let raised = Flags::when(is_late, Flag::LateTick)
+            .union(Flags::when(has_jumped, Flag::Clock))
+            .union(Flags::when(is_old, Flag::ReferenceLate));
+        (raised, Flags::when(elapsed > self.stall, Flag::LateTick))
     }
 }

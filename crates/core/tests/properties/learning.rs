@@ -103,7 +103,7 @@ fn no_more_slack_is_believed_than_may_be() {
     }
     assert!((28.0..=30.0 + 1e-9).contains(&widest), "{widest}");
     let latched = run.reduction.monitors().supervision().latched;
-    assert!(latched.has(Flag::WidthLimit));
+    assert!(latched.contains(Flag::WidthLimit));
 }
 
 #[test]
@@ -149,7 +149,7 @@ fn slack_that_was_learnt_and_changes_is_said() {
     let mut run = Run::new(adaptive(), -6.0, 9.0);
     run.swing(4);
     let latched = run.reduction.monitors().supervision().latched;
-    assert!(!latched.has(Flag::SlackChanged), "{latched:?}");
+    assert!(!latched.contains(Flag::SlackChanged), "{latched:?}");
     for tick in 0..3200 {
         // Some new place of the contact at every image, as if the shaft were bent.
         let more = 10.0 * (f64::from(tick) / 3200.0);
@@ -157,7 +157,7 @@ fn slack_that_was_learnt_and_changes_is_said() {
         run.tick();
     }
     let latched = run.reduction.monitors().supervision().latched;
-    assert!(latched.has(Flag::SlackChanged), "{latched:?}");
+    assert!(latched.contains(Flag::SlackChanged), "{latched:?}");
 }
 
 /// What images have said for as long as a hold lasts is believed in the end.
@@ -178,7 +178,7 @@ fn a_tip_that_has_jumped_is_not_believed_until_it_has_stayed() {
         believed |= worst == Reaction::Fade && supervision.reaction < Reaction::HoldEstimate;
         if tick == 40 {
             assert!(
-                supervision.latched.has(Flag::Jump),
+                supervision.latched.contains(Flag::Jump),
                 "{:?}",
                 supervision.latched
             );

@@ -80,12 +80,12 @@ fn torture(mut reduction: Box<HysteresisReduction>, seed: u64) {
         let stamp = (!chance.once_in(20_000))
             .then_some(time - 0.06 * f64::from(u8::from(chance.once_in(20_000))));
         let now = reduction.step(next, stamp, time);
-        let limits = UNITS.map(support::monitor);
+        let limits = support::safety();
         for dof in 0..3 {
             let dc = now[dof] - command[dof];
             let du = next[dof] - reference[dof];
-            // The clutch's offset, which no one sees, is as large as the travel.
-            let (least, largest) = limits[dof].travel;
+            // The offset of the reference gate, which is not observed here, is as large as the travel.
+            let (least, largest) = limits.command_travel[dof];
             let rounding = 16.0 * f64::EPSILON * (largest - least);
             let facts = format!("seed {seed}, tick {tick}, DOF {dof}: {dc} for {du}");
             assert!(now[dof].is_finite(), "{facts}");
@@ -95,7 +95,10 @@ fn torture(mut reduction: Box<HysteresisReduction>, seed: u64) {
             }
             assert!(dc * du >= 0.0 || dc.abs() <= rounding, "{facts}");
             assert!(dc.abs() <= 5.0 * du.abs() + rounding, "{facts}");
-            assert!(dc.abs() <= limits[dof].step_limit + rounding, "{facts}");
+            assert!(
+                dc.abs() <= limits.command_speed[dof] * PERIOD + rounding,
+                "{facts}"
+            );
             assert!((least..=largest).contains(&now[dof]), "{facts}");
         }
         command = now;

@@ -5,11 +5,11 @@
 
 use tautscope_core::{
     Axis, Camera, Compensator, Estimator, FeatureModel, History, HysteresisReduction, Instrument,
-    Monitors, MonitorsSettings, PerDof, Play, Pose, StateEstimation, StateEstimator,
+    Monitors, PerDof, Play, Pose, SafetySettings, StateEstimation, StateEstimator,
     WeightedEstimator, WeightedSettings, Whereabouts, WhereaboutsSettings,
 };
 
-use super::{PERIOD, UNITS, monitors};
+use super::{PERIOD, UNITS, dofs, safety};
 
 /// What the loop believes of instrument and camera, and what tests take for the truth.
 pub fn model() -> FeatureModel {
@@ -23,12 +23,12 @@ pub fn model() -> FeatureModel {
 
 /// The article's scheme, from the slack that `play` gives for a unit.
 pub fn article(play: impl Fn(f64) -> Play) -> Box<HysteresisReduction> {
-    article_with(&monitors(), 0.0, play)
+    article_with(&safety(), 0.0, play)
 }
 
 /// The same with other monitors and the anchor's return.
 pub fn article_with(
-    monitors: &MonitorsSettings,
+    settings: &SafetySettings,
     recovery: f64,
     play: impl Fn(f64) -> Play,
 ) -> Box<HysteresisReduction> {
@@ -41,29 +41,26 @@ pub fn article_with(
             play(unit),
         )
     });
-    looped(monitors, axes, StateEstimation::Article(watch()))
+    looped(settings, axes, StateEstimation::Article(watch()))
 }
 
 /// Profile `best`.
 pub fn adaptive() -> Box<HysteresisReduction> {
-    adaptive_with(&monitors(), 4.0)
+    adaptive_with(&safety(), 4.0)
 }
 
 /// The same with other monitors, and other ideas of what one marker may say.
-pub fn adaptive_with(
-    monitors: &MonitorsSettings,
-    outlier_distance: f64,
-) -> Box<HysteresisReduction> {
+pub fn adaptive_with(settings: &SafetySettings, outlier_distance: f64) -> Box<HysteresisReduction> {
     let axes = UNITS.map(|unit| Axis::Adaptive(super::axis(unit)));
-    let settings = WeightedSettings {
+    let weights = WeightedSettings {
         marker_deviation: 0.3,
         model_deviation: 0.3,
         sideways_deviation: 0.3e-3,
         outlier_distance,
         steps: 8,
     };
-    let estimator = WeightedEstimator::new(watch(), settings).unwrap();
-    looped(monitors, axes, StateEstimation::Weighted(estimator))
+    let estimator = WeightedEstimator::new(watch(), weights).unwrap();
+    looped(settings, axes, StateEstimation::Weighted(estimator))
 }
 
 fn watch() -> StateEstimator {
@@ -71,7 +68,7 @@ fn watch() -> StateEstimator {
 }
 
 fn looped(
-    monitors: &MonitorsSettings,
+    settings: &SafetySettings,
     axes: PerDof<Axis>,
     estimation: StateEstimation,
 ) -> Box<HysteresisReduction> {
@@ -87,7 +84,7 @@ fn looped(
                 settling_time: 0.15,
             })
             .unwrap(),
-            Monitors::new(*monitors).unwrap(),
+            Monitors::new(settings, &dofs(), PERIOD).unwrap(),
         )
         .with_friction(Some(super::friction())),
     )

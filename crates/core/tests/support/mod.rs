@@ -4,37 +4,54 @@ pub mod looped;
 pub mod stand_in;
 
 use tautscope_core::{
-    AdaptiveAxis, AdaptiveSettings, ChangeLimit, ChangeSettings, CommandLimits, ContactTest, Flags,
-    FrameGateSettings, Friction, FrictionSettings, GripSettings, LeadLaw, MonitorsSettings,
-    MotionMonitorSettings, OffsetPrior, PerDof, Play, ReferenceGateSettings, SupervisorSettings,
+    AdaptiveAxis, AdaptiveSettings, ChangeLimit, ContactTest, DofSettings, Flags, Friction,
+    FrictionSettings, LeadLaw, OffsetPrior, PerDof, Play, SafetySettings,
 };
 
 pub const UNITS: PerDof<f64> = [0.4e-3, 0.04, 0.02];
 pub const PERIOD: f64 = 0.005;
 
-pub fn monitor(unit: f64) -> CommandLimits {
-    CommandLimits {
-        gain_limit: 5.0,
-        step_limit: 5.0 * unit,
-        travel: (-100.0 * unit, 200.0 * unit),
-        lead_limit: 30.0 * unit,
-    }
+/// Settings of the monitors in [`UNITS`].
+pub fn safety() -> SafetySettings {
+    safety_in(UNITS)
 }
 
-pub fn clutch() -> ReferenceGateSettings {
-    ReferenceGateSettings {
-        period: PERIOD,
-        reference_speed: UNITS.map(|unit| unit / PERIOD),
+/// Settings of the monitors with lengths in the given units.
+pub fn safety_in(units: PerDof<f64>) -> SafetySettings {
+    SafetySettings {
+        off: Flags::NONE,
+        width_limit: units.map(|unit| 30.0 * unit),
+        offset_limit: units.map(|unit| 20.0 * unit),
+        reference_speed: units.map(|unit| unit / PERIOD),
         reference_time: 0.05,
-        reference_count: UNITS.map(|unit| 0.125 * unit),
+        command_speed: units.map(|unit| 5.0 * unit / PERIOD),
+        command_travel: units.map(|unit| (-100.0 * unit, 200.0 * unit)),
+        reference_count: units.map(|unit| 0.125 * unit),
         reference_age: 0.05,
         late_tick: 3.0,
         stall: 0.1,
-    }
-}
-
-pub fn supervisor() -> SupervisorSettings {
-    SupervisorSettings {
+        frame_age: 0.3,
+        frame_gap: 0.18,
+        clock_jump: 1.0,
+        frozen_travel: 1.0,
+        innovation_limit: 5.0,
+        innovation_floor: 0.08,
+        innovation_growth: 0.3,
+        innovation_decay: 0.05,
+        jump: units,
+        slip: units,
+        grip_distance: 10.0,
+        blind_growth: 0.1,
+        tremor_swing: 0.5,
+        tremor_rate: 4.0,
+        ahead_limit: 0.1,
+        ahead_ratio: 1.5,
+        offset_decrease: 2.0,
+        cycle_swings: 4,
+        cycle_growth: 1.1,
+        cycle_time: 2.0,
+        change_limit: units.map(|unit| 2.0 * unit),
+        change_travel: 1.5,
         hold_time: 4.0,
         hold_travel: 4.0,
         fade_travel: 2.0,
@@ -44,43 +61,29 @@ pub fn supervisor() -> SupervisorSettings {
     }
 }
 
-pub fn monitors() -> MonitorsSettings {
-    MonitorsSettings {
-        clutch: clutch(),
-        limits: UNITS.map(monitor),
-        frames: FrameGateSettings {
-            frame_age: 0.3,
-            frame_gap: 0.18,
-            frozen_travel: UNITS,
-            innovation_limit: 5.0,
-            start_deviation: [5e-3, 0.6, 0.5],
-            least_deviation: UNITS,
-            jump: UNITS,
-            grips: UNITS.map(|unit| GripSettings {
-                distance: 10.0 * unit,
-                slip: unit,
-            }),
-            blind_growth: 0.1,
-        },
-        motion: MotionMonitorSettings {
-            period: PERIOD,
-            tremor_swing: UNITS.map(|unit| 0.5 * unit),
-            slack: UNITS.map(|unit| 30.0 * unit),
-            tremor_rate: 4.0,
-            turn: UNITS,
-            ahead: UNITS.map(|unit| 3.0 * unit),
-            cycle_swings: 4,
-            cycle_time: 2.0,
-        },
-        changes: ChangeSettings {
-            limit: UNITS.map(|unit| 2.0 * unit),
-            travel: UNITS.map(|unit| 45.0 * unit),
-        },
-        supervisor: supervisor(),
-        width_limit: UNITS.map(|unit| 30.0 * unit),
-        offset_limit: UNITS.map(|unit| 20.0 * unit),
-        off: Flags::NONE,
-    }
+/// Settings of the DOFs, with lengths in [`UNITS`].
+pub fn dofs() -> PerDof<DofSettings> {
+    let [insertion, rotation, bending] = UNITS.map(|unit| DofSettings {
+        update_distance: unit,
+        observable_deviation: 1.0,
+        start_deviation: 5e-3,
+        free_gain: 5.0,
+        gain_limit: 5.0,
+        recovery: 0.0,
+        contact_tolerance: 0.4,
+        smoothing_factor: 0.25,
+        delta_minus: 0.0,
+        delta_plus: 0.0,
+    });
+    let rotation = DofSettings {
+        start_deviation: 0.6,
+        ..rotation
+    };
+    let bending = DofSettings {
+        start_deviation: 0.5,
+        ..bending
+    };
+    [insertion, rotation, bending]
 }
 
 /// Of a shaft of 3.5 mm.

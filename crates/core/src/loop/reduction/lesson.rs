@@ -18,7 +18,7 @@ impl HysteresisReduction {
         let mut triggers = [Triggers::default(); 3];
         let mut changes = [[0.0; 2]; 3];
         let flags = self.watch(past, seen);
-        *raised = raised.and(flags);
+        *raised = raised.union(flags);
         let history = &self.history;
         let outputs = seen.output.iter().zip(seen.output_deviation);
         let signals = seen
@@ -45,12 +45,12 @@ impl HysteresisReduction {
                 let before = axis.predicted_state();
                 let lesson = axis.learn(command, *output, deviation, since);
                 (*triggers, *change) = (lesson.triggers, lesson.change);
-                *raised = raised.and(Flags::when(lesson.is_limited, Flag::WidthLimit));
+                *raised = raised.union(Flags::when(lesson.is_limited, Flag::WidthLimit));
                 let moved = axis.predicted_state() - before;
                 *corrected += if moved.is_finite() { moved } else { 0.0 };
             }
         }
-        *raised = raised.and(self.monitors.taught(changes, past.travel));
+        *raised = raised.union(self.monitors.taught(changes, past.travel));
         triggers
     }
 

@@ -1,0 +1,92 @@
+//! Settings of all monitors and of the supervisor.
+
+use crate::dof::PerDof;
+use crate::supervision::flags::Flags;
+
+/// Section `safety` of the configuration: the same names, units and meaning as in `python/tautscope/config/safety.py`,
+/// which has the defaults.
+///
+/// Lengths of a degree of freedom are in [m, rad, rad]. A constructor checks the settings that it reads, and converts
+/// those that are in multiples of another length.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Deserialize))]
+pub struct SafetySettings {
+    /// Detectors that are switched off.
+    pub off: Flags,
+    /// Largest estimated width of the slack [m, rad, rad]; also the largest |c - u|, and the unit of the travels below.
+    pub width_limit: PerDof<f64>,
+    /// Largest absolute value of an estimated contact offset [m, rad, rad].
+    pub offset_limit: PerDof<f64>,
+    /// Largest speed of the reference over `reference_time` [m/s, rad/s, rad/s].
+    pub reference_speed: PerDof<f64>,
+    /// Time constant of the mean of the reference's speed [s].
+    pub reference_time: f64,
+    /// Largest speed of the command [m/s, rad/s, rad/s].
+    pub command_speed: PerDof<f64>,
+    /// Least and largest command [m, rad, rad].
+    pub command_travel: PerDof<(f64, f64)>,
+    /// Resolution of the input device, or its largest step from rest [m, rad, rad].
+    pub reference_count: PerDof<f64>,
+    /// Largest age of a reference, and longest time for which a moving input device repeats its value [s].
+    pub reference_age: f64,
+    /// Longest time between two control ticks whose motion is followed [control periods].
+    pub late_tick: f64,
+    /// Longest time between two control ticks after which motion goes on by itself [s].
+    pub stall: f64,
+    /// Largest age of a frame on arrival [s].
+    pub frame_age: f64,
+    /// Longest time without a frame [s].
+    pub frame_gap: f64,
+    /// Difference of two capture times by which the clock was set back; a smaller one is a frame out of order [s].
+    pub clock_jump: f64,
+    /// Travel of the command over which no two images are identical [`update_distance`].
+    pub frozen_travel: f64,
+    /// Largest innovation [standard deviations].
+    pub innovation_limit: f64,
+    /// Least standard deviation of the innovation [`start_deviation`].
+    pub innovation_floor: f64,
+    /// Smoothing factor of the innovation variance for an innovation above it.
+    pub innovation_growth: f64,
+    /// Smoothing factor of the innovation variance for an innovation below it.
+    pub innovation_decay: f64,
+    /// Largest motion of the tip between two images beyond that of its command [m, rad, rad].
+    pub jump: PerDof<f64>,
+    /// Largest deviation of a tip in contact from the motion of its command [m, rad, rad].
+    pub slip: PerDof<f64>,
+    /// Travel of the command over which a tip that moves with it is found in contact [`update_distance`].
+    pub grip_distance: f64,
+    /// Growth of the innovation's standard deviation and of `jump` per travel of the command without a marker.
+    pub blind_growth: f64,
+    /// Least swing of a tremor [`update_distance`].
+    pub tremor_swing: f64,
+    /// Reversals per second that are a tremor [1/s].
+    pub tremor_rate: f64,
+    /// Largest lead of the tip over the reference within a stroke [`width_limit`].
+    pub ahead_limit: f64,
+    /// Travel of the tip over that of the reference in a stroke above which the tip overtakes.
+    pub ahead_ratio: f64,
+    /// Largest decrease of a contact offset within a stroke [`ahead_limit`].
+    pub offset_decrease: f64,
+    /// Growing swings in a row that are a limit cycle.
+    pub cycle_swings: u32,
+    /// Least ratio of a swing to the one before it in a limit cycle.
+    pub cycle_growth: f64,
+    /// Longest swing of a limit cycle, one way [s].
+    pub cycle_time: f64,
+    /// Largest change of a contact offset that had settled [m, rad, rad].
+    pub change_limit: PerDof<f64>,
+    /// Travel of the command over which changes of a contact offset add up [`width_limit`].
+    pub change_travel: f64,
+    /// Time until a reaction escalates [s].
+    pub hold_time: f64,
+    /// Travel of the reference until a reaction escalates, summed over the DOFs [`width_limit`].
+    pub hold_travel: f64,
+    /// Travel over which the compensation fades to nothing [`width_limit`].
+    pub fade_travel: f64,
+    /// Travel over which the compensation returns after warnings have been acknowledged [`width_limit`].
+    pub restore_travel: f64,
+    /// Good frames in a row that clear a flag of frames.
+    pub good_frames: u32,
+    /// Good control ticks in a row that clear a flag of ticks.
+    pub good_ticks: u32,
+}
