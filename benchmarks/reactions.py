@@ -7,7 +7,7 @@ import re
 from doc_pages import ROOT, insert
 
 PAGE = ROOT / "docs" / "safety.md"
-SOURCE = ROOT / "crates" / "core" / "src" / "reactions.rs"
+SOURCE = ROOT / "crates" / "core" / "src" / "supervision" / "reactions.rs"
 
 _LADDER = re.compile(r"const (\w+): &\[\(Reaction, Clear\)\] = &(\[.*?\]);")
 _RULE = re.compile(r"rule\(Flag::(\w+),\s*(\w+),\s*(&\[.*?\]|\w+),\s*(true|false)\s*\)", re.DOTALL)

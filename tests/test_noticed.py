@@ -23,17 +23,19 @@ def test_a_line_says_how_often_when_and_the_strongest_reaction() -> None:
         (Reaction.NONE, ()),
         (Reaction.WARN, ("lost",)),
         (Reaction.FADE, ("lost", "late")),
-        (Reaction.HOLD_ESTIMATE, ("late", "safety.off = frozen: nobody looks for it")),
+        (Reaction.HOLD_ESTIMATE, ("late", "safety.off = frozen: the detector is switched off")),
     ]
     lost, late = told(seen, ("lost", "late"))
-    assert lost.startswith("lost (no marker, or none that could be believed) at 2 of 4 images")
+    assert lost.startswith(
+        "lost (no marker was found, or none that agrees with the prediction) at 2 of 4 images"
+    )
     assert "first 0.0 s into the run; meanwhile the compensation faded" in lost
     assert late.startswith("late (") and "at 2 of 4 images, first 0.1 s" in late
 
 
 def test_what_comes_and_goes_between_images_is_told_too() -> None:
     (line,) = told([(Reaction.NONE, ())], ("reference_jump",))
-    assert line.startswith("reference_jump (a reference that gained more")
+    assert line.startswith("reference_jump (the reference was faster")
     assert line.endswith("between two images")
 
 

@@ -1,65 +1,94 @@
-//! Any sequence of events into the supervisor: it never panics, and its lead stays a share.
+//! Any references, images and flags of the rig into the loop: it never panics, and its supervision stays consistent.
 #![no_main]
+
+#[path = "../../crates/core/tests/support/mod.rs"]
+mod support;
 
 use arbitrary::Arbitrary;
 use libfuzzer_sys::fuzz_target;
-use tautscope_core::{Event, Flag, Flags, Reaction, Source, Supervisor, SupervisorSettings};
+use support::looped::{Loop, adaptive, article, model};
+use support::{PERIOD, UNITS};
+use tautscope_core::{Flag, Play, Profile, Reaction};
 
 #[derive(Arbitrary, Debug)]
 enum Action {
-    Update {
-        source: u8,
-        time: f64,
-        travel: f64,
-        raised: u32,
-        severe: u32,
+    /// The next control tick, with the reference moved by 1/64 of its units.
+    Move([i8; 3]),
+    /// An image of the predicted tip.
+    Image {
+        checksum: u64,
     },
+    AnyStep {
+        reference: [f64; 3],
+        stamp: Option<f64>,
+        time: f64,
+    },
+    AnyImage {
+        features: Option<[f64; 4]>,
+        captured_at: f64,
+        checksum: Option<u64>,
+    },
+    Raise(u8),
     Engage,
     Acknowledge,
 }
 
-fn flags(bits: u32) -> Flags {
-    let each = Flag::ALL.iter().enumerate();
-    each.filter(|(place, _)| bits >> place & 1 == 1)
-        .fold(Flags::NONE, |all, (_, flag)| all.and(Flags::of(*flag)))
-}
-
-fuzz_target!(|actions: Vec<Action>| {
-    let mut supervisor = Supervisor::new(SupervisorSettings {
-        hold_time: 4.0,
-        hold_travel: 4.0,
-        fade_travel: 2.0,
-        restore_travel: 2.0,
-        good_frames: 5,
-        good_ticks: 200,
-    })
-    .unwrap();
-    for action in actions {
-        match action {
-            Action::Update {
-                source,
-                time,
-                travel,
-                raised,
-                severe,
-            } => {
-                let raised = flags(raised);
-                supervisor.update(&Event {
-                    source: [Source::Tick, Source::Frame, Source::Rig][usize::from(source % 3)],
-                    time,
-                    travel,
-                    raised,
-                    severe: flags(severe),
-                });
-                assert!(raised.without(supervisor.flags()).is_empty());
-            }
-            Action::Engage => supervisor.engage(),
-            Action::Acknowledge => supervisor.acknowledge(),
-        }
-        assert!((0.0..=1.0).contains(&supervisor.lead()));
-        assert_eq!(
-            supervisor.flags().is_empty(),
-            supervisor.reaction() == Reaction::None
-        );
+fuzz_target!(|input: (bool, Vec<Action>)| {
+    let (is_adaptive, actions) = input;
+    if is_adaptive {
+        run(adaptive(), actions);
+    } else {
+        let play = |unit| Play::new(-12.0 * unit, 12.0 * unit).unwrap();
+        run(article(play), actions);
     }
 });
+
+fn run<P: Profile>(mut reduction: Loop<P>, actions: Vec<Action>) {
+    let (mut now, mut reference) = (0.0, [0.025, 0.0, 0.9]);
+    let mut last = reduction.step(reference, None, now);
+    for action in actions {
+        let was_held = reduction.monitors().supervision().reaction >= Reaction::HoldMotion;
+        let mut command = last;
+        match action {
+            Action::Move(by) => {
+                now += PERIOD;
+                for ((value, by), unit) in reference.iter_mut().zip(by).zip(UNITS) {
+                    *value += f64::from(by) / 64.0 * unit;
+                }
+                command = reduction.step(reference, None, now);
+            }
+            Action::AnyStep {
+                reference,
+                stamp,
+                time,
+            } => command = reduction.step(reference, stamp, time),
+            Action::Image { checksum } => {
+                let seen = model().predict(reduction.predicted_state());
+                let features = seen.map(|seen| seen.features);
+                reduction.on_features(features, None, now, Some(checksum));
+            }
+            Action::AnyImage {
+                features,
+                captured_at,
+                checksum,
+            } => {
+                reduction.on_features(features, None, captured_at, checksum);
+            }
+            Action::Raise(number) => {
+                let flag = Flag::ALL[usize::from(number) % Flag::ALL.len()];
+                reduction.monitors_mut().raise(flag);
+                let supervision = reduction.monitors().supervision();
+                assert!(supervision.flags.contains(flag));
+            }
+            Action::Engage => reduction.monitors_mut().engage(),
+            Action::Acknowledge => reduction.monitors_mut().acknowledge(),
+        }
+        assert!(command.iter().all(|value| value.is_finite()));
+        assert!(!was_held || command == last, "a held command rests");
+        last = command;
+        let supervision = reduction.monitors().supervision();
+        assert!((0.0..=1.0).contains(&supervision.lead));
+        let is_calm = supervision.reaction == Reaction::None;
+        assert_eq!(supervision.flags.is_empty(), is_calm);
+    }
+}

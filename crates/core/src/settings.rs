@@ -1,37 +1,37 @@
-//! Settings that several blocks read: of a DOF, and of the control loop. Names and units are those of the TOML keys.
+//! Settings that several blocks share.
 
-/// One DOF: its compensator, Eqs. (2)-(3), its estimator, Eqs. (4)-(6), and its scale; in m or rad.
+/// One degree of freedom; the same names, units and meaning as in `python/tautscope/config/dof.py`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Deserialize))]
 pub struct DofSettings {
-    /// tau: travel of the command between two updates of the estimator.
+    /// τ: command travel between two estimator updates [m or rad].
     pub update_distance: f64,
-    /// Largest standard deviation of the state per px of marker noise of an observable DOF [m/px, rad/px].
+    /// Largest standard deviation of the state per px of marker noise at which the DOF is observable [m/px or rad/px].
     pub observable_deviation: f64,
-    /// Standard deviation of the tip's distance from the reference before the first image.
+    /// Standard deviation of the tip about the reference before the first image [m or rad].
     pub start_deviation: f64,
-    /// `K_b`: command over reference in the free zone.
+    /// `K_b`: command over reference while the slack is crossed.
     pub free_gain: f64,
     /// Upper bound of every gain.
     pub gain_limit: f64,
-    /// Return of the compensator's anchor to zero, as a share of the reference's travel.
+    /// Share of the reference's travel by which the command returns to the reference after changed offsets.
     pub recovery: f64,
-    /// epsilon of Eq. (4).
+    /// ε in Eq. (4).
     pub contact_tolerance: f64,
-    /// alpha of Eq. (6).
+    /// α in Eq. (6), per `update_distance` travelled.
     pub smoothing_factor: f64,
-    /// Contact offset at the start.
+    /// Contact offset at the start [m or rad].
     pub delta_minus: f64,
-    /// Contact offset at the start, not below `delta_minus`.
+    /// Contact offset at the start [m or rad], not below `delta_minus`.
     pub delta_plus: f64,
 }
 
-/// The loop's clock.
+/// The loop's clock; the same names, units and meaning as in `python/tautscope/config/control.py`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Deserialize))]
 pub struct ControlSettings {
-    /// Control period in s.
+    /// Control period [s].
     pub period: f64,
-    /// How long control ticks are remembered, in s.
+    /// How long control ticks are remembered [s].
     pub history: f64,
 }

@@ -6,21 +6,18 @@
 mod support;
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
-use support::looped::{adaptive_with, article_with, model};
-use tautscope_core::{
-    Flag, HysteresisReduction, MonitorsSettings, Play, Reaction, Status, Triggers,
-};
+use support::looped::{Loop, adaptive_with, article_with, model};
+use tautscope_core::{Flag, Play, Profile, Reaction, SafetySettings, Status, Triggers};
 
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;
 
 /// The tip below is late by a third of a second, as none in contact is.
-fn patient() -> MonitorsSettings {
-    let mut settings = support::monitors();
-    for grip in &mut settings.frames.grips {
-        grip.slip = 1e3;
+fn patient() -> SafetySettings {
+    SafetySettings {
+        slip: [1e3; 3],
+        ..support::safety()
     }
-    settings
 }
 
 /// Over as many ticks as `TAUTSCOPE_TICKS` says, each loop at least once through every flag.
@@ -54,7 +51,7 @@ fn run_best_without_doubt() -> u64 {
 }
 
 /// How many ticks there were.
-fn run(mut reduction: Box<HysteresisReduction>) -> u64 {
+fn run<P: Profile>(mut reduction: Loop<P>) -> u64 {
     let mut ticks = 1;
     let (mut used, mut learnt, mut worst) = (0, 0, Reaction::None);
     let truth = model();

@@ -8,9 +8,9 @@
 mod support;
 
 use support::PERIOD;
-use support::looped::{adaptive, article, article_with};
+use support::looped::{Loop, adaptive, article, article_with};
 use support::stand_in::{World, hand, real};
-use tautscope_core::{HysteresisReduction, Play, Reaction};
+use tautscope_core::{Play, Profile, Reaction};
 
 const TICKS_PER_FRAME: u64 = 8;
 const TENTHS: u8 = 10;
@@ -30,7 +30,7 @@ fn hours() -> f64 {
 }
 
 /// What grew or drifted, in words; nothing if nothing did.
-fn soak(law: &str, mut reduction: Box<HysteresisReduction>) -> String {
+fn soak<P: Profile>(law: &str, mut reduction: Loop<P>) -> String {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -98,8 +98,8 @@ fn soak(law: &str, mut reduction: Box<HysteresisReduction>) -> String {
 #[test]
 fn nothing_grows_and_nothing_drifts() {
     let none = |_| Play::new(0.0, 0.0).unwrap();
-    let grown = soak("best", adaptive())
-        + &soak("recovering", article_with(&support::monitors(), 0.1, none));
+    let grown =
+        soak("best", adaptive()) + &soak("recovering", article_with(&support::safety(), 0.1, none));
     soak("paper", article(none));
     assert!(grown.is_empty(), "{grown}");
 }

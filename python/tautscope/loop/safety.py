@@ -1,4 +1,4 @@
-"""What is watched in the loop, and what is done about it."""
+"""Flags, reactions and state of the supervisor."""
 
 from __future__ import annotations
 
@@ -13,33 +13,33 @@ from tautscope import _core
 from tautscope.config import Config
 
 DETECTORS: tuple[str, ...] = _core.DETECTORS
-"""Names of all flags, from crates/core/src/supervision/flags.rs; `safety.off` may name any."""
+"""Names of all flags; `safety.off` may name any of them."""
 
 MEANINGS: dict[str, str] = dict(zip(DETECTORS, _core.MEANINGS, strict=True))
-"""What each of them says, in a sentence."""
+"""The meaning of each flag, in one sentence."""
 
-_ROWS_BETWEEN = 8
+_ROW_STEP = 8
 
 
 class Reaction(StrEnum):
-    """What the loop does about a flag, R0 to R7; a later one wins over an earlier one."""
+    """What the loop does while a flag is active, R0 to R7; a later one has priority."""
 
     NONE = "none"
-    """Goes on."""
+    """Continue."""
     WARN = "warn"
-    """Goes on, and says so until it is acknowledged."""
+    """Continue, with a warning until it is acknowledged."""
     HOLD_ESTIMATE = "hold_estimate"
-    """Compensates with the slack known; images teach nothing."""
+    """Compensate with the slack estimated so far; images update nothing."""
     FADE = "fade"
-    """The same, and gives the compensation up with motion."""
+    """As `HOLD_ESTIMATE`, and reduce the compensation to nothing with motion."""
     PASS_THROUGH = "pass_through"
-    """Increments of the command are those of the reference; what the command leads by stays."""
+    """Move the command as the reference does, at a constant difference."""
     HOLD_MOTION = "hold_motion"
-    """The command rests; motion of the reference is thrown away."""
+    """Hold the command; motion of the reference is discarded."""
     QUICK_STOP = "quick_stop"
-    """The same, and the rig brings its drives to quick stop."""
+    """As `HOLD_MOTION`, and the rig brings its drives to quick stop."""
     DISABLE = "disable"
-    """The same, and the rig disables its drives."""
+    """As `HOLD_MOTION`, and the rig disables its drives."""
 
     @property
     def rank(self) -> int:
@@ -49,12 +49,12 @@ class Reaction(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Supervision:
-    """How the loop stands.
+    """State of the supervisor.
 
     Attributes:
-        reaction: What is in force.
-        flags: Why, by the names of `DETECTORS`.
-        latched: What has been wrong since the last acknowledgement.
+        reaction: The reaction in force.
+        flags: The active flags, by the names of `DETECTORS`.
+        latched: The flags raised since the last acknowledgement.
         lead: Share of the free gain in use, 0 to 1.
     """
 
@@ -65,10 +65,10 @@ class Supervision:
 
 
 def switched_off(config: Config) -> tuple[str, ...]:
-    """A line for every guard that does not look."""
-    return tuple(f"safety.off = {name}: nobody looks for it" for name in config.safety.off)
+    """A line for every detector that is switched off."""
+    return tuple(f"safety.off = {name}: the detector is switched off" for name in config.safety.off)
 
 
 def checksum(image: NDArray[np.uint8]) -> int:
-    """Of every eighth row: a picture with sensor noise in it never has that of another."""
-    return zlib.crc32(image[::_ROWS_BETWEEN].tobytes())
+    """Checksum of every eighth row; images with sensor noise have different ones."""
+    return zlib.crc32(image[::_ROW_STEP].tobytes())

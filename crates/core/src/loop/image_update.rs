@@ -26,17 +26,17 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
         checksum: Option<u64>,
     ) -> Report {
         let past = self.history.at(captured_at);
-        let mut raised = self.monitors.arrive(&FrameArrival {
+        let mut raised = self.monitors.check_arrival(&FrameArrival {
             captured_at,
             now: self.history.newest_time(),
-            picture: checksum.map_or_else(
+            image: checksum.map_or_else(
                 || measured.map(|features| ImageIdentity::Features(features.map(f64::to_bits))),
                 |sum| Some(ImageIdentity::Checksum(sum)),
             ),
             travel: past.map(|past| past.travel),
         });
         let mut report = self.image_update(measured, covariance, captured_at, past, &mut raised);
-        self.monitors.judged(raised);
+        self.monitors.react_to_frame(raised);
         report.supervision = self.monitors.supervision();
         report
     }
@@ -52,7 +52,7 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
         if captured_at <= self.last_used {
             *raised = self
                 .monitors
-                .watched(raised.union(Flags::of(Flag::Duplicate)));
+                .enabled(raised.union(Flags::of(Flag::Duplicate)));
             return self.unused(Status::Duplicate, None);
         }
         let Some(past) = past else {
@@ -64,7 +64,7 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
         let Some(measured) = measured.filter(|features| usable(*features)) else {
             self.whereabouts.miss(&past);
             self.monitors.frames.miss(past.travel);
-            *raised = self.monitors.watched(Flags::of(Flag::Lost));
+            *raised = self.monitors.enabled(Flags::of(Flag::Lost));
             return self.unused(Status::NoMarkers, Some(past));
         };
         let Some(measurement) = self.measure(&past, measured, covariance) else {
@@ -105,29 +105,29 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
         let belief = self.whereabouts.at(past);
         let moved = self.whereabouts.moved(past);
         let offsets = self.offsets();
-        let doubts = |measurement: &Measurement| {
+        let check = |measurement: &Measurement| {
             let sightings = measurement.sightings(past, offsets);
             let frames = &self.monitors.frames;
             frames
-                .doubts(&belief, moved, &sightings)
+                .check_innovation(&belief, moved, &sightings)
                 .difference(P::UNCHECKED)
         };
-        let doubt = doubts(measurement);
+        let flags = check(measurement);
         let is_used = measurement.used != [false; 2];
         let expected = self.feature_model.predict(belief.state);
         let is_reversed = expected.is_some_and(|expected| reversed(expected.features, measured));
-        if !is_reversed && is_used && doubt.is_empty() {
+        if !is_reversed && is_used && flags.is_empty() {
             return Flags::NONE;
         }
         let [ua, va, ub, vb] = measured;
         let exchanged = self.measure(past, [ub, vb, ua, va], covariance);
         let is_swapped = is_reversed
-            || exchanged.is_some_and(|other| other.used == [true; 2] && doubts(&other).is_empty());
+            || exchanged.is_some_and(|other| other.used == [true; 2] && check(&other).is_empty());
         let swapped = self
             .monitors
-            .watched(Flags::when(is_swapped, Flag::Swapped));
+            .enabled(Flags::when(is_swapped, Flag::Swapped));
         if swapped.is_empty() && is_used {
-            self.monitors.watched(doubt)
+            self.monitors.enabled(flags)
         } else {
             swapped
         }
@@ -157,13 +157,13 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
         let has_outlier = is_used && measurement.used != found(measured);
         let outlier = self
             .monitors
-            .watched(Flags::when(has_outlier, Flag::Innovation));
-        let triggers = if outlier.is_empty() && self.monitors.may_learn() {
+            .enabled(Flags::when(has_outlier, Flag::Innovation));
+        let triggers = if outlier.is_empty() && self.monitors.permits_updates() {
             self.update_offsets(past, measurement, raised)
         } else {
             [Triggers::default(); 3]
         };
-        *raised = self.monitors.watched(
+        *raised = self.monitors.enabled(
             raised
                 .union(Flags::when(status == Status::Partial, Flag::Merged))
                 .union(Flags::when(!is_used, Flag::Lost))
@@ -192,7 +192,7 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
         raised: &mut Flags,
     ) -> PerDof<Triggers> {
         let play = self.play();
-        let motion = self.monitors.look(
+        let motion = self.monitors.check_motion(
             past.time,
             past.reference,
             measurement.observed_output(),
@@ -224,7 +224,7 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
             let moved = axis.predicted_state() - before;
             *corrected += if moved.is_finite() { moved } else { 0.0 };
         }
-        *raised = raised.union(self.monitors.taught(changes, past.travel));
+        *raised = raised.union(self.monitors.check_changes(changes, past.travel));
         triggers
     }
 

@@ -59,9 +59,9 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
         let (command_before, state_before) = (self.command(), self.predicted_state());
         self.monitors
             .step(self.profile.axes_mut(), reference, stamp, time);
-        let (admitted, command) = (self.monitors.admitted(), self.command());
+        let (gated, command) = (self.monitors.reference(), self.command());
         let mut moved = distance(command_before, command);
-        if self.profile.couple(admitted) {
+        if self.profile.couple(gated) {
             // Friction that another DOF takes releases a tip whose command rests.
             let released = distance(state_before, self.predicted_state());
             for (moved, released) in moved.iter_mut().zip(released) {
@@ -73,7 +73,7 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
         }
         let clock_went_back = self.history.push(Entry {
             time,
-            reference: admitted,
+            reference: gated,
             command,
             predicted_state: self.predicted_state(),
             corrected: self.corrected,

@@ -1,7 +1,7 @@
-//! Whether a frame may teach: its time, its picture, and what it says of the state.
+//! Frame gate: whether a frame is used, by its times, by its image, and by the innovation (innovation gate).
 
 use crate::dof::PerDof;
-use crate::error::{ConfigError, require_non_negative, require_positive};
+use crate::error::{ConfigError, require, require_non_negative, require_positive};
 use crate::estimation::posture::Belief;
 use crate::math::linear::square;
 use crate::settings::DofSettings;
@@ -9,158 +9,144 @@ use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::grip::{Grip, GripSettings, Sighting};
 use crate::supervision::settings::SafetySettings;
 
-/// A frame out of order by more than this has a wrong clock, in s.
-const BACK: f64 = 1.0;
-/// Share of the difference by which the spread follows a larger innovation, and a smaller one of a DOF in motion.
-const GROW: f64 = 0.3;
-const SHRINK: f64 = 0.05;
+/// Coverage factor of the image's standard deviation in the bound of a jump: 95 % of a normal distribution.
+const COVERAGE: f64 = 2.0;
 
-/// So many of the image's own standard deviations are no jump.
-const JUMP_DEVIATIONS: f64 = 2.0;
-
-/// When a frame is refused.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FrameGateSettings {
-    /// Oldest frame that is used, in s.
-    pub frame_age: f64,
-    /// Longest time without a frame, in s.
-    pub frame_gap: f64,
-    /// Travel of the command after which no picture repeats itself [m, rad, rad].
-    pub frozen_travel: PerDof<f64>,
-    /// Largest innovation, in standard deviations.
-    pub innovation_limit: f64,
-    /// Spread of the innovations at the start [m, rad, rad].
-    pub start_deviation: PerDof<f64>,
-    /// Least spread [m, rad, rad].
-    pub least_deviation: PerDof<f64>,
-    /// How far a tip may come beyond its command's travel between two images [m, rad, rad].
-    pub jump: PerDof<f64>,
-    /// When a tip is in contact, and has left it.
-    pub grips: PerDof<GripSettings>,
-    /// What spread and jump grow by while nothing is seen, per travel of the command.
-    pub blind_growth: f64,
-}
-
-/// A picture as far as it can be told from another.
+/// What identifies an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ImageIdentity {
-    /// A checksum of its pixels.
+    /// A checksum of the pixels.
     Checksum(u64),
-    /// The bits of the features in it.
+    /// The bits of the features.
     Features([u64; 4]),
 }
 
-/// A frame as it comes.
+/// A frame on arrival.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrameArrival {
-    /// In s.
+    /// Capture time, in s.
     pub captured_at: f64,
-    /// Of the newest control tick, in s.
+    /// Time of the newest control tick, in s.
     pub now: f64,
     /// None if neither pixels nor features are known.
-    pub picture: Option<ImageIdentity>,
-    /// How far the command had gone at capture, forth and back [m, rad, rad]; None beyond the history.
+    pub image: Option<ImageIdentity>,
+    /// Path length of the command at the capture time [m, rad, rad]; None where the history does not reach.
     pub travel: Option<PerDof<f64>>,
 }
 
-/// Watches the frames.
+/// Accepts or refuses frames.
 ///
-/// The innovation of a DOF is what the image alone says less what model and last images make one expect. It is refused
-/// beyond
+/// The innovation of a DOF, measured less predicted state, is refused if
 ///
 /// ```text
-/// innovation^2 > innovation_limit^2 (spread^2 + deviation^2)
+/// innovation^2 > innovation_limit^2 (std^2 + deviation^2)
 /// ```
 ///
-/// with the image's own standard deviation from the markers' covariance, and a spread that follows the root mean square
-/// of the innovations accepted: quickly when they grow, slowly and with motion when they shrink. A refused innovation teaches it nothing.
+/// with the standard deviation `deviation` of the measurement, from the covariance of the markers, and that of the
+/// innovations so far,
+///
+/// ```text
+/// std^2 <- std^2 + a (innovation^2 - std^2),   a = innovation_growth where it grows, else innovation_decay
+/// ```
+///
+/// where the decay also needs motion. Only accepted frames update it. A jump is an innovation beyond the travel of the
+/// command, `jump` and two `deviation`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrameGate {
-    settings: FrameGateSettings,
+    frame_age: f64,
+    frame_gap: f64,
+    clock_jump: f64,
+    /// [m, rad, rad], as all below.
+    frozen_travel: PerDof<f64>,
+    innovation_limit: f64,
+    innovation_growth: f64,
+    innovation_decay: f64,
+    start_std: PerDof<f64>,
+    least_std: PerDof<f64>,
+    jump: PerDof<f64>,
+    blind_growth: f64,
     captured_at: Option<f64>,
     arrived_at: Option<f64>,
-    first: Option<(ImageIdentity, PerDof<f64>)>,
-    spread: PerDof<f64>,
-    /// By how much a jump may be larger [m, rad, rad].
-    blind: PerDof<f64>,
+    /// The image that frames since then repeat, and the path length of the command then.
+    repeated: Option<(ImageIdentity, PerDof<f64>)>,
+    innovation_std: PerDof<f64>,
+    /// What is added to `jump` for motion without a marker.
+    jump_margin: PerDof<f64>,
     travel: PerDof<f64>,
     grips: PerDof<Grip>,
 }
 
 impl FrameGate {
-    /// Before the first frame.
+    /// The gate before the first frame.
     ///
     /// # Errors
-    /// A value is not a finite number above 0; the growth may be 0.
+    /// A value is not a finite number above 0 (`blind_growth` may be 0), or a smoothing factor is above 1.
     pub fn new(safety: &SafetySettings, dofs: &PerDof<DofSettings>) -> Result<Self, ConfigError> {
-        let [i, r, b] = dofs;
-        let each = |of: &dyn Fn(&DofSettings) -> f64| [of(i), of(r), of(b)];
-        let [s1, s2, s3] = safety.slip;
-        let [g1, g2, g3] = each(&|dof| dof.update_distance * safety.grip_distance);
-        let settings = FrameGateSettings {
-            frame_age: safety.frame_age,
-            frame_gap: safety.frame_gap,
-            frozen_travel: each(&|dof| dof.update_distance * safety.frozen_travel),
-            innovation_limit: safety.innovation_limit,
-            start_deviation: each(&|dof| dof.start_deviation),
-            least_deviation: each(&|dof| dof.start_deviation * safety.innovation_floor),
-            jump: safety.jump,
-            grips: [
-                GripSettings {
-                    distance: g1,
-                    slip: s1,
-                },
-                GripSettings {
-                    distance: g2,
-                    slip: s2,
-                },
-                GripSettings {
-                    distance: g3,
-                    slip: s3,
-                },
-            ],
-            blind_growth: safety.blind_growth,
-        };
-        require_positive("frame_age", settings.frame_age)?;
-        require_positive("frame_gap", settings.frame_gap)?;
-        require_positive("innovation_limit", settings.innovation_limit)?;
-        require_non_negative("blind_growth", settings.blind_growth)?;
-        for value in settings.frozen_travel {
-            require_positive("frozen_travel", value)?;
+        let start_std = dofs.map(|dof| dof.start_deviation);
+        let least_std = dofs.map(|dof| dof.start_deviation * safety.innovation_floor);
+        let frozen_travel = dofs.map(|dof| dof.update_distance * safety.frozen_travel);
+        let [grip1, grip2, grip3] = dofs.map(|dof| dof.update_distance * safety.grip_distance);
+        let [slip1, slip2, slip3] = safety.slip;
+        let grips = [(grip1, slip1), (grip2, slip2), (grip3, slip3)]
+            .map(|(distance, slip)| GripSettings { distance, slip });
+        for (field, value) in [
+            ("frame_age", safety.frame_age),
+            ("frame_gap", safety.frame_gap),
+            ("clock_jump", safety.clock_jump),
+            ("innovation_limit", safety.innovation_limit),
+        ] {
+            require_positive(field, value)?;
         }
-        for value in settings.start_deviation {
-            require_positive("start_deviation", value)?;
+        require_non_negative("blind_growth", safety.blind_growth)?;
+        for (field, factor) in [
+            ("innovation_growth", safety.innovation_growth),
+            ("innovation_decay", safety.innovation_decay),
+        ] {
+            let is_factor = factor > 0.0 && factor <= 1.0;
+            require(is_factor, field, factor, "a number above 0, at most 1")?;
         }
-        for value in settings.jump {
-            require_positive("jump", value)?;
-        }
-        for grip in settings.grips {
-            require_positive("grip_distance", grip.distance)?;
-            require_positive("slip", grip.slip)?;
-        }
-        for value in settings.least_deviation {
-            require_positive("innovation_floor", value)?;
+        for (field, values) in [
+            ("frozen_travel", frozen_travel),
+            ("start_deviation", start_std),
+            ("jump", safety.jump),
+            ("grip_distance", grips.map(|grip| grip.distance)),
+            ("slip", safety.slip),
+            ("innovation_floor", least_std),
+        ] {
+            for value in values {
+                require_positive(field, value)?;
+            }
         }
         Ok(Self {
-            settings,
+            frame_age: safety.frame_age,
+            frame_gap: safety.frame_gap,
+            clock_jump: safety.clock_jump,
+            frozen_travel,
+            innovation_limit: safety.innovation_limit,
+            innovation_growth: safety.innovation_growth,
+            innovation_decay: safety.innovation_decay,
+            start_std,
+            least_std,
+            jump: safety.jump,
+            blind_growth: safety.blind_growth,
             captured_at: None,
             arrived_at: None,
-            first: None,
-            spread: settings.start_deviation,
-            blind: settings.start_deviation,
+            repeated: None,
+            innovation_std: start_std,
+            jump_margin: start_std,
             travel: [0.0; 3],
-            grips: settings.grips.map(Grip::new),
+            grips: grips.map(Grip::new),
         })
     }
 
-    /// At a control tick: whether frames stay away. Before the first there is none to miss.
-    pub fn tick(&self, time: f64) -> Flags {
+    /// Check at a control tick that frames arrive. None is missing before the first.
+    pub fn check_gap(&self, time: f64) -> Flags {
         let gap = self.arrived_at.map_or(0.0, |last| time - last);
-        Flags::when(gap > self.settings.frame_gap, Flag::Dropped)
+        Flags::when(gap > self.frame_gap, Flag::Dropped)
     }
 
-    /// What is wrong with a frame before anyone looks at the features.
-    pub fn arrive(&mut self, arrival: &FrameArrival) -> Flags {
+    /// Check the times and the image of a frame, before its features.
+    pub fn check_arrival(&mut self, arrival: &FrameArrival) -> Flags {
         let FrameArrival {
             captured_at, now, ..
         } = *arrival;
@@ -169,95 +155,104 @@ impl FrameGate {
         }
         let since = self.captured_at.map(|last| captured_at - last);
         let is_ahead = captured_at > now && arrival.travel.is_none();
-        let has_jumped = since.is_some_and(|since| since < -BACK);
+        let has_jumped = since.is_some_and(|since| since < -self.clock_jump);
         if !captured_at.is_finite() || is_ahead || has_jumped {
-            // What comes next is compared with the new time.
+            // The next frame is compared with the new time.
             self.captured_at = Some(captured_at).filter(|_| has_jumped);
             return Flags::of(Flag::Clock);
         }
         self.captured_at = Some(captured_at);
-        Flags::when(now - captured_at > self.settings.frame_age, Flag::Late)
-            .union(Flags::when(self.repeats(arrival), Flag::Frozen))
+        Flags::when(now - captured_at > self.frame_age, Flag::Late)
+            .union(Flags::when(self.is_frozen(arrival), Flag::Frozen))
     }
 
-    fn repeats(&mut self, arrival: &FrameArrival) -> bool {
-        let (Some(picture), Some(travel)) = (arrival.picture, arrival.travel) else {
+    fn is_frozen(&mut self, arrival: &FrameArrival) -> bool {
+        let (Some(image), Some(travel)) = (arrival.image, arrival.travel) else {
             return false;
         };
-        match self.first {
-            Some((first, then)) if first == picture => travel
+        match self.repeated {
+            Some((repeated, then)) if repeated == image => travel
                 .iter()
                 .zip(then)
-                .zip(self.settings.frozen_travel)
+                .zip(self.frozen_travel)
                 .any(|((now, then), limit)| now - then >= limit),
             _ => {
-                self.first = Some((picture, travel));
+                self.repeated = Some((image, travel));
                 false
             }
         }
     }
 
-    /// What cannot be believed of an image, of which each DOF says what is seen of it; how far the tip may have gone
-    /// since the last.
-    pub fn doubts(&self, belief: &Belief, moved: PerDof<f64>, seen: &PerDof<Sighting>) -> Flags {
-        let reach = moved.iter().zip(self.settings.jump).zip(self.blind);
-        let axes = seen.iter().zip(belief.state).zip(self.spread).zip(reach);
-        let mut doubts = Flags::NONE;
-        for ((((seen, expected), spread), ((moved, jump), blind)), grip) in axes.zip(&self.grips) {
-            let (surprise, deviation) = ((seen.tip - expected).abs(), seen.deviation);
-            if !(surprise.is_finite() && deviation.is_finite()) {
+    /// Check what was measured of each DOF against the prediction, where the tip may have moved by `moved` since the
+    /// last image.
+    pub fn check_innovation(
+        &self,
+        prediction: &Belief,
+        moved: PerDof<f64>,
+        measured: &PerDof<Sighting>,
+    ) -> Flags {
+        let reach = moved.iter().zip(self.jump).zip(self.jump_margin);
+        let stds = prediction.state.into_iter().zip(self.innovation_std);
+        let mut flags = Flags::NONE;
+        for (((seen, (predicted, std)), ((moved, jump), margin)), grip) in
+            measured.iter().zip(stds).zip(reach).zip(&self.grips)
+        {
+            let (innovation, deviation) = ((seen.tip - predicted).abs(), seen.deviation);
+            if !(innovation.is_finite() && deviation.is_finite()) {
                 continue;
             }
-            let limit = square(self.settings.innovation_limit);
-            let fits = square(surprise) <= limit * (square(spread) + square(deviation));
-            let reaches = surprise <= moved + jump + blind + JUMP_DEVIATIONS * deviation;
-            doubts = doubts
+            let limit = square(self.innovation_limit);
+            let fits = square(innovation) <= limit * (square(std) + square(deviation));
+            let is_reachable = innovation <= moved + jump + margin + COVERAGE * deviation;
+            flags = flags
                 .union(Flags::when(!fits, Flag::Innovation))
-                .union(Flags::when(!reaches, Flag::Jump))
+                .union(Flags::when(!is_reachable, Flag::Jump))
                 .union(Flags::when(grip.slips(seen), Flag::Slip));
         }
-        doubts
+        flags
     }
 
-    /// An image was believed.
-    pub fn accept(&mut self, belief: &Belief, seen: &PerDof<Sighting>) {
-        let axes = seen.iter().zip(belief.state).zip(&mut self.spread);
-        let axes = axes.zip(self.travel).zip(self.settings.least_deviation);
-        for (((((seen, expected), spread), then), least), grip) in axes.zip(&mut self.grips) {
-            let surprise = square(seen.tip - expected);
-            if surprise.is_finite() {
-                let change = surprise - square(*spread);
-                let rate = if change > 0.0 {
-                    GROW
+    /// Update the standard deviation of the innovation with a frame that was accepted.
+    pub fn accept(&mut self, prediction: &Belief, measured: &PerDof<Sighting>) {
+        let axes = measured.iter().zip(prediction.state);
+        let axes = axes.zip(&mut self.innovation_std).zip(self.travel);
+        for (((((seen, predicted), std), then), least), grip) in
+            axes.zip(self.least_std).zip(&mut self.grips)
+        {
+            let variance = square(seen.tip - predicted);
+            if variance.is_finite() {
+                let change = variance - square(*std);
+                let factor = if change > 0.0 {
+                    self.innovation_growth
                 } else {
-                    // A DOF at rest shows nothing of how well its motion is foreseen.
-                    SHRINK * ((seen.travel - then) / least).min(1.0)
+                    // At rest an innovation does not show how well motion is predicted.
+                    self.innovation_decay * ((seen.travel - then) / least).min(1.0)
                 };
-                *spread = libm::sqrt(square(*spread) + rate * change).max(least);
+                *std = libm::sqrt(square(*std) + factor * change).max(least);
             }
             grip.follow(seen);
         }
-        self.blind = [0.0; 3];
-        self.travel = seen.map(|seen| seen.travel);
+        self.jump_margin = [0.0; 3];
+        self.travel = measured.map(|seen| seen.travel);
     }
 
-    /// Nothing was seen.
+    /// Widen the bounds after a frame without a marker.
     pub fn miss(&mut self, travel: PerDof<f64>) {
         let moved = travel.iter().zip(self.travel);
-        let axes = self.spread.iter_mut().zip(&mut self.blind);
-        let axes = axes.zip(self.settings.start_deviation);
-        for (((spread, blind), most), (now, then)) in axes.zip(moved) {
-            let growth = self.settings.blind_growth * (now - then).max(0.0);
-            *spread = (*spread + growth).min(most).max(*spread);
-            *blind = (*blind + growth).min(most);
+        let axes = self.innovation_std.iter_mut().zip(&mut self.jump_margin);
+        let axes = axes.zip(self.start_std);
+        for (((std, margin), most), (now, then)) in axes.zip(moved) {
+            let growth = self.blind_growth * (now - then).max(0.0);
+            *std = (*std + growth).min(most).max(*std);
+            *margin = (*margin + growth).min(most);
         }
         self.travel = travel;
     }
 
-    /// What has been refused for so long may be the truth: believe the next images again.
-    pub const fn forget(&mut self) {
-        self.spread = self.settings.start_deviation;
-        self.blind = self.settings.start_deviation;
+    /// Return to the wide bounds of the start, after which frames that were refused for long are accepted.
+    pub const fn reset(&mut self) {
+        self.innovation_std = self.start_std;
+        self.jump_margin = self.start_std;
         let [first, second, third] = &mut self.grips;
         first.release();
         second.release();

@@ -1,4 +1,4 @@
-//! What is checked before and after the law, and what is done about it.
+//! Supervision: reference gate, frame gate, command limiter, monitors, and the supervisor with its reactions.
 
 pub(crate) mod change_watch;
 pub(crate) mod command_limiter;

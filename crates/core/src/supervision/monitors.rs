@@ -15,16 +15,16 @@ use crate::supervision::reference_gate::ReferenceGate;
 use crate::supervision::settings::SafetySettings;
 use crate::supervision::supervisor::{Event, Supervisor};
 
-/// How the loop stands.
+/// State of the supervision.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Supervision {
-    /// What is in force.
+    /// The reaction in force.
     pub reaction: Reaction,
-    /// Why.
+    /// The flags that cause it.
     pub flags: Flags,
-    /// What has been wrong since the last acknowledgement.
+    /// The flags raised since the last acknowledgement.
     pub latched: Flags,
-    /// Share of the free gain in use, 0 to 1.
+    /// Share of the compensation in use, 0 to 1.
     pub lead: f64,
 }
 
@@ -127,15 +127,15 @@ impl Monitors {
             travel: 0.0,
             raised: gated
                 .raised
-                .union(self.frames.tick(time).difference(self.off)),
+                .union(self.frames.check_gap(time).difference(self.off)),
             severe: gated.severe,
         };
         for (increment, unit) in gated.increments.iter().zip(self.unit) {
             event.travel += increment.abs() / unit;
         }
         if let Some(reference) = gated.reference {
-            let motion = self.motion.tick(reference);
-            event.raised = event.raised.union(self.watched(motion));
+            let motion = self.motion.update_reference(reference);
+            event.raised = event.raised.union(self.enabled(motion));
             self.set_share(laws);
             self.step_laws(laws, reference, gated.increments, &mut event);
         }
@@ -198,7 +198,7 @@ impl Monitors {
     }
 
     fn set_share<L: Law>(&mut self, laws: &mut PerDof<L>) {
-        let share = self.supervisor.lead();
+        let share = self.supervisor.gain_share();
         if (share - self.share).abs() > 0.0 {
             self.share = share;
             for law in laws {
@@ -207,51 +207,67 @@ impl Monitors {
         }
     }
 
-    /// A frame came: what is wrong with it, as far as that is looked for.
-    pub(crate) fn arrive(&mut self, arrival: &FrameArrival) -> Flags {
+    /// Check a frame on its arrival.
+    pub(crate) fn check_arrival(&mut self, arrival: &FrameArrival) -> Flags {
         if self.supervisor.reaction() == Reaction::Fade {
-            self.frames.forget();
+            self.frames.reset();
         }
-        self.frames.arrive(arrival).difference(self.off)
+        let flags = self.frames.check_arrival(arrival);
+        self.enabled(flags)
     }
 
-    /// What is in the set and looked for.
-    pub(crate) const fn watched(&self, flags: Flags) -> Flags {
+    /// The flags of a set whose detectors are not switched off.
+    pub(crate) const fn enabled(&self, flags: Flags) -> Flags {
         flags.difference(self.off)
     }
 
-    /// The reference as far as it was admitted [m, rad, rad].
-    pub(crate) fn admitted(&self) -> PerDof<f64> {
+    /// The reference behind the gate (3,) [m, rad, rad]; NaN before the first.
+    pub(crate) fn reference(&self) -> PerDof<f64> {
         self.gate.reference()
     }
 
-    /// What an image says of hand and tip.
-    pub(crate) fn look(
+    /// Check reference and measured tip (3,) [m, rad, rad] of an image of `time` in s, with the estimated play.
+    pub(crate) fn check_motion(
         &mut self,
         time: f64,
         reference: PerDof<f64>,
         measured: PerDof<f64>,
         play: PerDof<Play>,
     ) -> Flags {
-        let flags = self.motion.look(time, reference, measured, play);
-        self.watched(flags)
+        let flags = self
+            .motion
+            .update_measurement(time, reference, measured, play);
+        self.enabled(flags)
     }
 
-    /// What an image changed of the contact offsets, and how far the command had gone when it was captured.
-    pub(crate) fn taught(&mut self, changes: PerDof<[f64; 2]>, travel: PerDof<f64>) -> Flags {
+    /// Check what an image changed of (`delta_minus`, `delta_plus`), with the travel of the command at its capture.
+    pub(crate) fn check_changes(
+        &mut self,
+        changes: PerDof<[f64; 2]>,
+        travel: PerDof<f64>,
+    ) -> Flags {
         let flags = self.changes.look(changes, travel);
-        self.watched(flags)
+        self.enabled(flags)
     }
 
-    /// Whether images may teach.
-    pub(crate) fn may_learn(&self) -> bool {
+    /// Whether images may update the offsets.
+    pub(crate) fn permits_updates(&self) -> bool {
         self.supervisor.reaction() < Reaction::HoldEstimate
     }
 
-    /// All that was wrong with a frame.
-    pub(crate) fn judged(&mut self, raised: Flags) {
+    /// React to the flags of a frame.
+    pub(crate) fn react_to_frame(&mut self, raised: Flags) {
+        self.update(Source::Frame, raised);
+    }
+
+    /// Raise a flag of the rig.
+    pub fn raise(&mut self, flag: Flag) {
+        self.update(Source::Rig, self.enabled(Flags::of(flag)));
+    }
+
+    fn update(&mut self, source: Source, raised: Flags) {
         self.supervisor.update(&Event {
-            source: Source::Frame,
+            source,
             time: self.time,
             travel: 0.0,
             raised,
@@ -259,18 +275,7 @@ impl Monitors {
         });
     }
 
-    /// Something only the rig can see.
-    pub fn raise(&mut self, flag: Flag) {
-        self.supervisor.update(&Event {
-            source: Source::Rig,
-            time: self.time,
-            travel: 0.0,
-            raised: Flags::of(flag).difference(self.off),
-            severe: Flags::NONE,
-        });
-    }
-
-    /// The operator goes on: the first increment of the reference is zero.
+    /// The operator re-engages: the first increment of the reference is zero.
     pub fn engage(&mut self) {
         self.supervisor.engage();
         self.gate.engage();
@@ -281,13 +286,13 @@ impl Monitors {
         self.supervisor.acknowledge();
     }
 
-    /// How the loop stands.
+    /// State of the supervision now.
     pub fn supervision(&self) -> Supervision {
         Supervision {
             reaction: self.supervisor.reaction(),
             flags: self.supervisor.flags(),
             latched: self.supervisor.latched(),
-            lead: self.supervisor.lead(),
+            lead: self.supervisor.gain_share(),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Whether hand and tip move as they should: tremor, a tip that outruns its reference, a limit cycle of both.
+//! Motion monitor: tremor, overcompensation, and limit cycles of operator and instrument.
 
 use crate::article::play::Play;
 use crate::dof::PerDof;
@@ -8,61 +8,48 @@ use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::settings::SafetySettings;
 use crate::supervision::turning_points::TurningPoints;
 
-/// Over which reversals are counted, in s.
-const COUNTED: f64 = 1.0;
-/// A swing grows if it is so many times the one before it.
-const GROWTH: f64 = 1.1;
-/// A tip that travels more than so many times what its reference does has not crossed a slack.
-const OUTRUN: f64 = 1.5;
-/// Slack unlearnt in a stroke that was not there, in `ahead`; less is what any learning does.
-const UNLEARNT: f64 = 2.0;
+/// Time constant of the rate of reversals, in s: `tremor_rate` counts those of a second.
+const TREMOR_TIME: f64 = 1.0;
 
-/// When a motion is wrong.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MotionMonitorSettings {
-    /// Control period, in s.
-    pub period: f64,
-    /// Least swing of a tremor [m, rad, rad].
-    pub tremor_swing: PerDof<f64>,
-    /// Largest swing of a tremor [m, rad, rad].
-    pub slack: PerDof<f64>,
-    /// Reversals in a second that are a tremor.
-    pub tremor_rate: f64,
-    /// How far a motion comes back before it has turned [m, rad, rad].
-    pub turn: PerDof<f64>,
-    /// How much farther than the reference the tip may come in a stroke [m, rad, rad].
-    pub ahead: PerDof<f64>,
-    /// Swings in a row, each larger than the one before, that are a limit cycle.
-    pub cycle_swings: u32,
-    /// Longest swing of a limit cycle, in s.
-    pub cycle_time: f64,
-}
-
-/// Watches reference and tip of every DOF.
+/// Monitors reference and tip of every DOF.
 ///
 /// ```text
 /// tremor             rate <- exp(-period / 1 s) rate + reversals,   rate > tremor_rate
-/// overcompensation   d (m - m0) > 1.5 d (u - u0),   d (m - m0) - d (u - u0) > ahead   and   d (m - u) > ahead,
-///                    or d (delta0 - delta) > 2 ahead
-/// limit cycle        cycle_swings swings of u and as many of m, each 1.1 times the one before it or more
+/// overcompensation   d (m - m0) > ahead_ratio d (u - u0)   and
+///                    d (m - m0) - d (u - u0) > ahead   and   d (m - u) > ahead,
+///                    or d (delta0 - delta) > offset_decrease ahead
+/// limit cycle        cycle_swings swings of u and as many of m, each at least cycle_growth times the one before it
 /// ```
 ///
-/// with the reference u, the measured tip m, the contact offset delta that its motion uses, all three when the reference
-/// turned last (u0, m0, delta0), and the direction d it has taken since. A slack that is crossed leaves the tip behind; it comes farther than its reference only if less slack
-/// was there than was made up for. Of a tip that had been left behind before it is no sign, nor is a bias of the images.
+/// with the reference u, the measured tip m, the contact offset delta that the stroke uses, their values u0, m0 and delta0
+/// when the reference turned last, the direction d since then, and ahead = `ahead_limit` `width_limit`. A tremor's
+/// swings are at least `tremor_swing` and shorter than `width_limit`.
 ///
-/// Wrong about over-compensation where images tell a wrong time, for the tip is then seen too late.
+/// While the slack is crossed, the tip stays behind its reference; it moves farther only if there was less slack than was
+/// compensated. The three conditions together exclude a tip that had been left behind before, and a bias of the images.
+///
+/// Wrong about overcompensation when the images' time stamps are wrong, because the tip is then measured too late.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotionMonitor {
-    axes: PerDof<Motion>,
-    kept: f64,
+    axes: PerDof<DofMotion>,
+    /// exp(-period / 1 s).
+    decay: f64,
     tremor_rate: f64,
     cycle_swings: u32,
+    stroke: StrokeLimits,
+}
+
+/// Limits of a stroke that all DOFs share.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct StrokeLimits {
+    ahead_ratio: f64,
+    offset_decrease: f64,
+    cycle_growth: f64,
     cycle_time: f64,
 }
 
 impl MotionMonitor {
-    /// Before the first motion.
+    /// The monitor before the first motion, for a control period in s.
     ///
     /// # Errors
     /// A value is not a finite number above 0, or `cycle_swings` is 0.
@@ -71,171 +58,183 @@ impl MotionMonitor {
         dofs: &PerDof<DofSettings>,
         period: f64,
     ) -> Result<Self, ConfigError> {
-        let settings = MotionMonitorSettings {
-            period,
-            tremor_swing: dofs.map(|dof| dof.update_distance * safety.tremor_swing),
-            slack: safety.width_limit,
-            tremor_rate: safety.tremor_rate,
-            turn: dofs.map(|dof| dof.update_distance),
-            ahead: safety.width_limit.map(|width| safety.ahead_limit * width),
-            cycle_swings: safety.cycle_swings,
-            cycle_time: safety.cycle_time,
-        };
-        require_positive("period", settings.period)?;
+        let tremor_swing = dofs.map(|dof| dof.update_distance * safety.tremor_swing);
+        let turn = dofs.map(|dof| dof.update_distance);
+        let ahead = safety.width_limit.map(|width| safety.ahead_limit * width);
         for (field, lengths) in [
-            ("tremor_swing", settings.tremor_swing),
-            ("width_limit", settings.slack),
-            ("update_distance", settings.turn),
-            ("ahead_limit", settings.ahead),
+            ("tremor_swing", tremor_swing),
+            ("width_limit", safety.width_limit),
+            ("update_distance", turn),
+            ("ahead_limit", ahead),
         ] {
             for length in lengths {
                 require_positive(field, length)?;
             }
         }
-        require_positive("tremor_rate", settings.tremor_rate)?;
-        require_positive("cycle_time", settings.cycle_time)?;
-        let swings = settings.cycle_swings;
+        for (field, value) in [
+            ("period", period),
+            ("tremor_rate", safety.tremor_rate),
+            ("ahead_ratio", safety.ahead_ratio),
+            ("offset_decrease", safety.offset_decrease),
+            ("cycle_growth", safety.cycle_growth),
+            ("cycle_time", safety.cycle_time),
+        ] {
+            require_positive(field, value)?;
+        }
+        let swings = safety.cycle_swings;
         require(swings > 0, "cycle_swings", f64::from(swings), "1 or above")?;
-        let [t1, t2, t3] = settings.tremor_swing;
-        let [s1, s2, s3] = settings.slack;
-        let [b1, b2, b3] = settings.turn;
-        let [a1, a2, a3] = settings.ahead;
+        let [t1, t2, t3] = tremor_swing;
+        let [w1, w2, w3] = safety.width_limit;
+        let [b1, b2, b3] = turn;
+        let [a1, a2, a3] = ahead;
         Ok(Self {
             axes: [
-                Motion::new(t1, s1, b1, a1),
-                Motion::new(t2, s2, b2, a2),
-                Motion::new(t3, s3, b3, a3),
+                DofMotion::new(t1, w1, b1, a1),
+                DofMotion::new(t2, w2, b2, a2),
+                DofMotion::new(t3, w3, b3, a3),
             ],
-            kept: libm::exp(-settings.period / COUNTED),
-            tremor_rate: settings.tremor_rate,
+            decay: libm::exp(-period / TREMOR_TIME),
+            tremor_rate: safety.tremor_rate,
             cycle_swings: swings,
-            cycle_time: settings.cycle_time,
+            stroke: StrokeLimits {
+                ahead_ratio: safety.ahead_ratio,
+                offset_decrease: safety.offset_decrease,
+                cycle_growth: safety.cycle_growth,
+                cycle_time: safety.cycle_time,
+            },
         })
     }
 
-    /// A control tick with what was admitted of the reference.
-    pub fn tick(&mut self, reference: PerDof<f64>) -> Flags {
-        let mut trembles = false;
+    /// Update with the gated reference of a control tick.
+    pub fn update_reference(&mut self, reference: PerDof<f64>) -> Flags {
+        let mut is_tremor = false;
         for (axis, reference) in self.axes.iter_mut().zip(reference) {
-            axis.reversals *= self.kept;
-            if axis
-                .hand
-                .follow(reference)
-                .is_some_and(|swing| swing < axis.slack)
-            {
+            axis.reversals *= self.decay;
+            let swing = axis.every_tick.update(reference);
+            if swing.is_some_and(|swing| swing < axis.width_limit) {
                 axis.reversals += 1.0;
             }
-            trembles |= axis.reversals > self.tremor_rate;
+            is_tremor |= axis.reversals > self.tremor_rate;
         }
-        Flags::when(trembles, Flag::Tremor)
+        Flags::when(is_tremor, Flag::Tremor)
     }
 
-    /// An image of `time` in s: the reference then, the tip as measured, NaN where it was not, and the slack believed
-    /// in.
-    pub fn look(
+    /// Update with an image of `time` in s: the reference then, the measured tip, NaN where it was not measured, and the
+    /// estimated play.
+    pub fn update_measurement(
         &mut self,
         time: f64,
         reference: PerDof<f64>,
         measured: PerDof<f64>,
         play: PerDof<Play>,
     ) -> Flags {
-        let (mut is_over, mut cycles) = (false, false);
+        let (mut is_ahead, mut cycles) = (false, false);
         let signals = reference.into_iter().zip(measured).zip(play);
         for (axis, ((reference, measured), play)) in self.axes.iter_mut().zip(signals) {
             if reference.is_finite() && measured.is_finite() {
-                is_over |= axis.look(time, reference, measured, play, self.cycle_time);
+                is_ahead |= axis.update(time, reference, measured, play, &self.stroke);
                 cycles |= axis
                     .growing
                     .iter()
                     .all(|each| each.count >= self.cycle_swings);
             }
         }
-        Flags::when(is_over, Flag::Overcompensation).union(Flags::when(cycles, Flag::LimitCycle))
+        Flags::when(is_ahead, Flag::Overcompensation).union(Flags::when(cycles, Flag::LimitCycle))
     }
 }
 
-/// One DOF.
+/// Motion of one DOF.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Motion {
-    slack: f64,
+struct DofMotion {
+    width_limit: f64,
     ahead: f64,
-    hand: TurningPoints,
+    /// Turning points of the reference, by every control tick.
+    every_tick: TurningPoints,
     reversals: f64,
+    /// Turning points of the reference and of the tip, by every image.
     reference: TurningPoints,
     tip: TurningPoints,
-    /// Reference and tip where the reference came farthest, and where it turned last.
-    farthest: (f64, f64),
+    /// Reference and tip at the extreme of the reference in this stroke, and of the last one.
+    extreme: (f64, f64),
     start: Option<(f64, f64)>,
-    /// The slack believed in then.
-    play: Option<Play>,
-    /// Of reference and tip.
-    growing: [Growing; 2],
+    /// The estimated play when the reference turned last.
+    start_play: Option<Play>,
+    /// Swings of reference and tip.
+    growing: [GrowingSwings; 2],
 }
 
-impl Motion {
-    const fn new(tremor_swing: f64, slack: f64, turn: f64, ahead: f64) -> Self {
-        let still = Growing {
+impl DofMotion {
+    const fn new(tremor_swing: f64, width_limit: f64, turn: f64, ahead: f64) -> Self {
+        let still = GrowingSwings {
             count: 0,
             swing: f64::INFINITY,
             time: f64::NAN,
         };
         Self {
-            slack,
+            width_limit,
             ahead,
-            hand: TurningPoints::new(tremor_swing),
+            every_tick: TurningPoints::new(tremor_swing),
             reversals: 0.0,
             reference: TurningPoints::new(turn),
             tip: TurningPoints::new(turn),
-            farthest: (f64::NAN, f64::NAN),
+            extreme: (f64::NAN, f64::NAN),
             start: None,
-            play: None,
+            start_play: None,
             growing: [still; 2],
         }
     }
 
-    /// Whether the tip has outrun its reference, or slack was unlearnt in this stroke.
-    fn look(&mut self, time: f64, reference: f64, measured: f64, play: Play, longest: f64) -> bool {
+    /// Whether the tip has overtaken its reference, or the offset in use has decreased, in this stroke.
+    fn update(
+        &mut self,
+        time: f64,
+        reference: f64,
+        measured: f64,
+        play: Play,
+        limits: &StrokeLimits,
+    ) -> bool {
         let [of_reference, of_tip] = &mut self.growing;
-        if let Some(swing) = self.reference.follow(reference) {
-            of_reference.turned(time, swing, longest);
-            self.start = Some(self.farthest);
-            self.play = Some(play);
+        if let Some(swing) = self.reference.update(reference) {
+            of_reference.update(time, swing, limits);
+            self.start = Some(self.extreme);
+            self.start_play = Some(play);
         }
-        if let Some(swing) = self.tip.follow(measured) {
-            of_tip.turned(time, swing, longest);
+        if let Some(swing) = self.tip.update(measured) {
+            of_tip.update(time, swing, limits);
         }
-        if self.reference.is_farthest(reference) {
-            self.farthest = (reference, measured);
+        if self.reference.is_extreme(reference) {
+            self.extreme = (reference, measured);
         }
         let direction = self.reference.direction();
-        let outrun = self.start.is_some_and(|(reference0, measured0)| {
+        let has_overtaken = self.start.is_some_and(|(reference0, measured0)| {
             let (travel, tip) = (reference - reference0, measured - measured0);
-            direction * tip > OUTRUN * direction * travel
+            direction * tip > limits.ahead_ratio * direction * travel
                 && direction * (measured - reference) > self.ahead
                 && direction * (tip - travel) > self.ahead
         });
-        let unlearnt = self.play.map_or(0.0, |then| {
+        let decrease = self.start_play.map_or(0.0, |start| {
             if direction > 0.0 {
-                then.delta_plus() - play.delta_plus()
+                start.delta_plus() - play.delta_plus()
             } else {
-                play.delta_minus() - then.delta_minus()
+                play.delta_minus() - start.delta_minus()
             }
         });
-        outrun || unlearnt > UNLEARNT * self.ahead
+        has_overtaken || decrease > limits.offset_decrease * self.ahead
     }
 }
 
-/// How many swings in a row have grown.
+/// Count of swings in a row that have grown.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Growing {
+struct GrowingSwings {
     count: u32,
     swing: f64,
     time: f64,
 }
 
-impl Growing {
-    fn turned(&mut self, time: f64, swing: f64, longest: f64) {
-        let grows = time - self.time <= longest && swing >= GROWTH * self.swing;
+impl GrowingSwings {
+    fn update(&mut self, time: f64, swing: f64, limits: &StrokeLimits) {
+        let grows =
+            time - self.time <= limits.cycle_time && swing >= limits.cycle_growth * self.swing;
         self.count = if grows {
             self.count.saturating_add(1)
         } else {

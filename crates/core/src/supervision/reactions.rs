@@ -1,29 +1,29 @@
-//! What is done about each flag: the table, and its words.
+//! The reaction to each flag.
 
 use crate::supervision::flags::Flag;
 
-/// What the loop does about a flag; a later one wins over an earlier one.
+/// What the loop does while a flag is active; a later reaction has priority over an earlier one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Reaction {
-    /// Goes on.
+    /// Continue.
     None,
-    /// R1: goes on, and says so until it is acknowledged.
+    /// R1: continue, with a warning until it is acknowledged.
     Warn,
-    /// R2: compensates with the slack known; images teach nothing.
+    /// R2: compensate with the slack estimated so far; images update nothing.
     HoldEstimate,
-    /// R3: the same, and gives the compensation up with motion.
+    /// R3: as R2, and reduce the compensation to nothing with motion.
     Fade,
-    /// R4: command increments are reference increments; what the command leads by stays.
+    /// R4: the command moves as the reference does, at a constant difference.
     PassThrough,
-    /// R5: the command rests; motion of the reference is thrown away.
+    /// R5: hold the command; motion of the reference is discarded.
     HoldMotion,
-    /// R6: the same, and the rig brings its drives to quick stop.
+    /// R6: as R5, and the rig brings its drives to quick stop.
     QuickStop,
-    /// R7: the same, and the rig disables its drives.
+    /// R7: as R5, and the rig disables its drives.
     Disable,
 }
 
-/// What ends a reaction.
+/// What clears a flag.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Clear {
     /// Enough good frames or ticks in a row.
@@ -34,28 +34,28 @@ pub enum Clear {
     Restart,
 }
 
-/// Whose good events clear a flag.
+/// Where an event comes from; good events of a flag's source clear it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Source {
     /// A control tick.
     Tick,
     /// A frame.
     Frame,
-    /// The rig; it does not say when all is well.
+    /// The rig, which does not report good events.
     Rig,
 }
 
-/// How a flag is answered.
+/// The reactions to a flag.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Rule {
     /// The flag.
     pub flag: Flag,
-    /// Whose good events clear it.
+    /// The source whose good events clear it.
     pub source: Source,
-    /// One answer after the other. A flag that is severe goes to the last at once.
-    pub ladder: &'static [(Reaction, Clear)],
-    /// Whether a flag that is raised again after `hold_time` or `hold_travel` on a rung climbs to the next.
-    pub climbs: bool,
+    /// Reactions in the order of escalation, and what clears the flag at each. A severe flag goes to the last at once.
+    pub levels: &'static [(Reaction, Clear)],
+    /// Whether a flag that is raised again after `hold_time` or `hold_travel` at a level goes to the next.
+    pub escalates: bool,
 }
 
 use Clear::{Auto, Engage, Restart};
@@ -68,21 +68,21 @@ const WARN: &[(Reaction, Clear)] = &[(Warn, Auto)];
 const fn rule(
     flag: Flag,
     source: Source,
-    ladder: &'static [(Reaction, Clear)],
-    climbs: bool,
+    levels: &'static [(Reaction, Clear)],
+    escalates: bool,
 ) -> Rule {
     Rule {
         flag,
         source,
-        ladder,
-        climbs,
+        levels,
+        escalates,
     }
 }
 
-/// Every flag's rule, in the order of the flags.
+/// The rule of every flag, in the order of the flags.
 ///
-/// A frame without markers teaches nothing by itself, so `lost` need not hold before it fades; two markers
-/// that leave a DOF undetermined hold it by themselves.
+/// `lost` fades without a hold because a frame without markers updates nothing in any case; `unobservable` needs no hold
+/// because the state estimation holds a DOF that the markers do not determine.
 #[rustfmt::skip]
 pub static TABLE: [Rule; 26] = [
     rule(Flag::Frozen,           Frame, HOLD_THEN_FADE,                          true),

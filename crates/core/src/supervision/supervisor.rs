@@ -1,82 +1,76 @@
-//! Which reaction is in force when images, reference or drives cannot be trusted.
+//! The supervisor: which reaction is in force, by the flags that the monitors raise.
 
 use crate::error::{ConfigError, require, require_non_negative, require_positive};
 use crate::supervision::flags::Flags;
 use crate::supervision::reactions::{Clear, Reaction, Rule, Source, TABLE};
 use crate::supervision::settings::SafetySettings;
 
-/// The bounds of the table's reactions.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SupervisorSettings {
-    /// Longest time on a rung, in s.
-    pub hold_time: f64,
-    /// Longest travel on a rung.
-    pub hold_travel: f64,
-    /// Travel over which the compensation fades from whole to nothing.
-    pub fade_travel: f64,
-    /// Travel over which it comes back.
-    pub restore_travel: f64,
-    /// Good frames in a row that clear a flag of frames.
-    pub good_frames: u32,
-    /// Good ticks in a row that clear a flag of ticks.
-    pub good_ticks: u32,
-}
-
-/// What was noticed in a control tick or a frame.
+/// What the monitors found at a control tick or in a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Event {
-    /// Tick or frame; both may raise any flag.
+    /// Where the event comes from; any source may raise any flag.
     pub source: Source,
-    /// On the clock of the control tick, in s.
+    /// Time of the control tick, in s.
     pub time: f64,
-    /// How far the reference has moved since the last event.
+    /// Travel of the reference since the last event [`width_limit`].
     pub travel: f64,
-    /// What is wrong.
+    /// The flags that are raised.
     pub raised: Flags,
-    /// That of it which goes to the last rung at once.
+    /// The flags that go to their last level at once.
     pub severe: Flags,
 }
 
-/// Which reaction is in force: a function of the events so far, and of nothing else.
+/// Selects the reaction in force from the events so far, and from nothing else.
 ///
-/// Travel is without unit: the sum over the DOFs of |du| over the largest width, so that 1 is about one crossing of
-/// the slack.
+/// Travel is dimensionless: the sum over the DOFs of |du| over `width_limit`, so that 1 is about one crossing of the
+/// slack.
 ///
 /// ```text
-/// lead <- lead - travel / fade_travel       while fading
-/// lead <- lead + travel / restore_travel    otherwise, once every warning has been acknowledged
+/// gain_share <- gain_share - travel / fade_travel       while fading
+/// gain_share <- gain_share + travel / restore_travel    otherwise, once every warning has been acknowledged
 /// ```
 ///
-/// the share of the free gain in use, 0 to 1. Time alone never changes it: without motion nothing moves.
+/// is the share of the free gain in use, 0 to 1. It changes with motion only, never with time, so that nothing moves by
+/// itself.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Supervisor {
-    settings: SupervisorSettings,
-    standing: [Option<Standing>; TABLE.len()],
-    /// Of all that stands.
+    settings: Settings,
+    active: [Option<ActiveFlag>; TABLE.len()],
     reaction: Reaction,
     flags: Flags,
     latched: Flags,
-    lead: f64,
+    gain_share: f64,
     time: f64,
     travel: f64,
 }
 
-/// Where a flag stands on its ladder.
+/// The settings that escalate and clear flags.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Standing {
-    rung: usize,
+struct Settings {
+    hold_time: f64,
+    hold_travel: f64,
+    fade_travel: f64,
+    restore_travel: f64,
+    good_frames: u32,
+    good_ticks: u32,
+}
+
+/// The level of a flag's reaction, since when, and the good events in a row since the flag was raised last.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct ActiveFlag {
+    level: usize,
     since: f64,
     since_travel: f64,
-    good: u32,
+    good_events: u32,
 }
 
 impl Supervisor {
-    /// Nothing noticed yet.
+    /// The supervisor before the first event.
     ///
     /// # Errors
     /// A travel is not above 0, a time or the travel of a hold negative, a count 0, or one not finite.
     pub fn new(safety: &SafetySettings) -> Result<Self, ConfigError> {
-        let settings = SupervisorSettings {
+        let settings = Settings {
             hold_time: safety.hold_time,
             hold_travel: safety.hold_travel,
             fade_travel: safety.fade_travel,
@@ -96,17 +90,17 @@ impl Supervisor {
         }
         Ok(Self {
             settings,
-            standing: [None; TABLE.len()],
+            active: [None; TABLE.len()],
             reaction: Reaction::None,
             flags: Flags::NONE,
             latched: Flags::NONE,
-            lead: 1.0,
+            gain_share: 1.0,
             time: f64::NEG_INFINITY,
             travel: 0.0,
         })
     }
 
-    /// Take in an event. A time that is not finite counts as the last one, such a travel as none.
+    /// Update with an event. A time that is not finite counts as the last one, and such a travel as none.
     #[inline(never)]
     pub fn update(&mut self, event: &Event) {
         let travel = if event.travel.is_finite() {
@@ -118,141 +112,142 @@ impl Supervisor {
             self.time = event.time;
         }
         self.travel += travel;
-        for (rule, standing) in TABLE.iter().zip(&mut self.standing) {
+        for (rule, active) in TABLE.iter().zip(&mut self.active) {
             let now = (self.time, self.travel);
-            if take(standing, rule, &self.settings, event, now) {
+            if update_flag(active, rule, &self.settings, event, now) {
                 self.latched = self.latched.union(Flags::of(rule.flag));
             }
         }
-        self.sum_up();
-        self.move_lead(travel);
+        self.summarize();
+        self.update_gain_share(travel);
     }
 
-    fn move_lead(&mut self, travel: f64) {
+    fn update_gain_share(&mut self, travel: f64) {
         match self.reaction {
             Reaction::Fade => {
-                self.lead = (self.lead - travel / self.settings.fade_travel).max(0.0);
+                self.gain_share = (self.gain_share - travel / self.settings.fade_travel).max(0.0);
             }
-            Reaction::PassThrough => self.lead = 0.0,
+            Reaction::PassThrough => self.gain_share = 0.0,
             Reaction::None | Reaction::Warn | Reaction::HoldEstimate => {
-                if self.lead < 1.0 && self.latched.is_empty() {
-                    self.lead = (self.lead + travel / self.settings.restore_travel).min(1.0);
+                if self.gain_share < 1.0 && self.latched.is_empty() {
+                    self.gain_share =
+                        (self.gain_share + travel / self.settings.restore_travel).min(1.0);
                 }
             }
             Reaction::HoldMotion | Reaction::QuickStop | Reaction::Disable => {}
         }
     }
 
-    /// The operator has the instrument and the master in view and goes on.
+    /// The operator re-engages: clear the flags that need it.
     pub fn engage(&mut self) {
-        for (rule, standing) in TABLE.iter().zip(&mut self.standing) {
-            if standing.is_some_and(|standing| standing.clear(rule) == Some(Clear::Engage)) {
-                *standing = None;
+        for (rule, active) in TABLE.iter().zip(&mut self.active) {
+            if active.is_some_and(|active| active.clear(rule) == Some(Clear::Engage)) {
+                *active = None;
             }
         }
-        self.sum_up();
+        self.summarize();
     }
 
     // Unrolled over the table wherever it is called, it would take minutes to compile.
     #[inline(never)]
-    fn sum_up(&mut self) {
+    fn summarize(&mut self) {
         (self.reaction, self.flags) = (Reaction::None, Flags::NONE);
-        for (rule, standing) in TABLE.iter().zip(&self.standing) {
-            if let Some(standing) = standing {
+        for (rule, active) in TABLE.iter().zip(&self.active) {
+            if let Some(active) = active {
                 self.flags = self.flags.union(Flags::of(rule.flag));
-                if let Some((reaction, _)) = rule.ladder.get(standing.rung) {
+                if let Some((reaction, _)) = rule.levels.get(active.level) {
                     self.reaction = self.reaction.max(*reaction);
                 }
             }
         }
     }
 
-    /// The operator has seen the warnings.
+    /// The operator acknowledges the warnings.
     pub const fn acknowledge(&mut self) {
         self.latched = Flags::NONE;
     }
 
-    /// The highest reaction of all flags in force.
+    /// The highest reaction of all active flags.
     pub const fn reaction(&self) -> Reaction {
         self.reaction
     }
 
-    /// The flags in force.
+    /// The active flags.
     pub const fn flags(&self) -> Flags {
         self.flags
     }
 
-    /// What has been raised since the last acknowledgement.
+    /// The flags raised or escalated since the last acknowledgement.
     pub const fn latched(&self) -> Flags {
         self.latched
     }
 
     /// Share of the free gain in use, 0 to 1.
-    pub const fn lead(&self) -> f64 {
-        self.lead
+    pub const fn gain_share(&self) -> f64 {
+        self.gain_share
     }
 }
 
-/// What an event makes of a flag; whether it climbed, or is new.
-// As above.
+/// Update a flag with an event. Returns whether the flag is new or has escalated.
+// Not inlined, as above.
 #[inline(never)]
-fn take(
-    standing: &mut Option<Standing>,
+fn update_flag(
+    active: &mut Option<ActiveFlag>,
     rule: &Rule,
-    settings: &SupervisorSettings,
+    settings: &Settings,
     event: &Event,
     (time, travel): (f64, f64),
 ) -> bool {
     let severe = event.severe.contains(rule.flag);
     if severe || event.raised.contains(rule.flag) {
-        let start = if severe { rule.ladder.len() - 1 } else { 0 };
-        let rung = standing.map_or(start, |now| {
-            now.next(rule, settings, time, travel).max(start)
+        let start = if severe { rule.levels.len() - 1 } else { 0 };
+        let level = active.map_or(start, |now| {
+            now.next_level(rule, settings, time, travel).max(start)
         });
-        if let Some(now) = standing
-            && now.rung == rung
+        if let Some(now) = active
+            && now.level == level
         {
-            now.good = 0;
-            // A clock that was set back starts the hold afresh.
+            now.good_events = 0;
+            // A clock that was set back restarts the hold.
             now.since = now.since.min(time);
             return false;
         }
-        *standing = Some(Standing {
-            rung,
+        *active = Some(ActiveFlag {
+            level,
             since: time,
             since_travel: travel,
-            good: 0,
+            good_events: 0,
         });
         return true;
     }
-    if let Some(now) = standing
+    if let Some(now) = active
         && event.source == rule.source
     {
         let needed = match rule.source {
             Source::Frame => settings.good_frames,
             Source::Tick | Source::Rig => settings.good_ticks,
         };
-        now.good = now.good.saturating_add(1);
-        if now.good >= needed && now.clear(rule) == Some(Clear::Auto) {
-            *standing = None;
+        now.good_events = now.good_events.saturating_add(1);
+        if now.good_events >= needed && now.clear(rule) == Some(Clear::Auto) {
+            *active = None;
         }
     }
     false
 }
 
-impl Standing {
-    /// The rung on which a flag stands that is raised again.
-    fn next(&self, rule: &Rule, settings: &SupervisorSettings, time: f64, travel: f64) -> usize {
-        let over = time - self.since >= settings.hold_time
+impl ActiveFlag {
+    /// The level of a flag that is raised again.
+    fn next_level(&self, rule: &Rule, settings: &Settings, time: f64, travel: f64) -> usize {
+        let is_over = time - self.since >= settings.hold_time
             || travel - self.since_travel >= settings.hold_travel;
-        if rule.climbs && over {
-            (self.rung + 1).min(rule.ladder.len() - 1)
+        if rule.escalates && is_over {
+            (self.level + 1).min(rule.levels.len() - 1)
         } else {
-            self.rung
+            self.level
         }
     }
 
     fn clear(&self, rule: &Rule) -> Option<Clear> {
-        rule.ladder.get(self.rung).map(|(_, clear)| *clear)
+        rule.levels.get(self.level).map(|(_, clear)| *clear)
     }
 }

@@ -1,19 +1,19 @@
-//! Where a signal turns.
+//! Turning points of a signal.
 
-/// Follows a signal and tells where it turned, once it has come back by more than `band`.
+/// Detects the turning points of a signal: it has turned once it has come back from its extreme by more than `band`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TurningPoints {
     band: f64,
-    /// 1 upwards, -1 downwards, 0 before either is clear.
+    /// 1 rising, -1 falling, 0 before the signal has moved by `band`.
     direction: f64,
-    /// How far it came in this direction.
+    /// The farthest value in this direction.
     extreme: f64,
-    /// Where the last swing began.
+    /// The turning point where this swing began.
     turn: f64,
 }
 
 impl TurningPoints {
-    /// Before the first value; `band` in the unit of the signal.
+    /// The detector before the first value; `band` is in the unit of the signal.
     pub const fn new(band: f64) -> Self {
         Self {
             band,
@@ -23,19 +23,19 @@ impl TurningPoints {
         }
     }
 
-    /// 1 while the signal goes up, -1 while it goes down, 0 before that is clear.
+    /// 1 while the signal rises, -1 while it falls, 0 before it has moved by `band`.
     pub const fn direction(&self) -> f64 {
         self.direction
     }
 
-    /// Whether the last value was the farthest in its direction.
-    #[allow(clippy::float_cmp)] // it is that value
-    pub fn is_farthest(&self, value: f64) -> bool {
+    /// Whether the last value is the farthest in its direction.
+    #[allow(clippy::float_cmp)] // it is the same value
+    pub fn is_extreme(&self, value: f64) -> bool {
         value == self.extreme
     }
 
-    /// The next value; the length of the swing that it shows to be over, if it does.
-    pub fn follow(&mut self, value: f64) -> Option<f64> {
+    /// Update with the next value. Returns the length of the last swing when the signal has turned.
+    pub fn update(&mut self, value: f64) -> Option<f64> {
         if !value.is_finite() {
             return None;
         }
@@ -64,14 +64,14 @@ mod tests {
 
     #[test]
     fn a_sine_turns_twice_a_period_and_noise_within_the_band_never() {
-        let mut swings = TurningPoints::new(0.1);
+        let mut points = TurningPoints::new(0.1);
         let mut found = [0.0; 8];
         let mut count = 0;
         for tick in 0..4000 {
             let time = f64::from(tick) * 1e-3;
             let noise = if tick % 2 == 0 { 0.02 } else { -0.02 };
             let value = libm::sin(core::f64::consts::TAU * time) + noise;
-            if let Some(swing) = swings.follow(value) {
+            if let Some(swing) = points.update(value) {
                 found[count] = swing;
                 count += 1;
             }
@@ -84,14 +84,14 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_is_no_turn() {
-        let mut swings = TurningPoints::new(0.1);
-        assert_eq!(swings.follow(f64::NAN), None);
+    fn values_that_are_not_finite_are_ignored() {
+        let mut points = TurningPoints::new(0.1);
+        assert_eq!(points.update(f64::NAN), None);
         for value in [0.0, 1.0, f64::NAN, 2.0] {
-            assert_eq!(swings.follow(value), None);
+            assert_eq!(points.update(value), None);
         }
-        assert!(swings.direction() > 0.0 && swings.is_farthest(2.0));
-        assert_eq!(swings.follow(1.5), Some(2.0));
-        assert!(swings.direction() < 0.0 && !swings.is_farthest(2.0));
+        assert!(points.direction() > 0.0 && points.is_extreme(2.0));
+        assert_eq!(points.update(1.5), Some(2.0));
+        assert!(points.direction() < 0.0 && !points.is_extreme(2.0));
     }
 }

@@ -3,7 +3,7 @@
 use crate::adaptive::axis::AdaptiveAxis;
 use crate::adaptive::contact::ContactTest;
 use crate::adaptive::lead::LeadLaw;
-use crate::adaptive::settings::AdaptiveSettings;
+use crate::adaptive::parameters::AxisParameters;
 use crate::adaptive::withheld::ChangeLimit;
 use crate::article::play::{Play, PlayState};
 use proptest::prelude::*;
@@ -13,8 +13,8 @@ use super::{config, plays};
 
 const PERIOD: f64 = 0.005;
 
-pub(crate) fn settings(tremor_time: f64, period: f64) -> AdaptiveSettings {
-    AdaptiveSettings {
+pub(crate) fn settings(tremor_time: f64, period: f64) -> AxisParameters {
+    AxisParameters {
         law: LeadLaw {
             free_gain: 5.0,
             contact_gain: 2.0,

@@ -1,95 +1,97 @@
-//! What leaves the loop, whatever goes in.
+//! The command limiter: its output keeps the law for any input.
 
-use crate::supervision::command_limiter::{CommandLimiter, CommandLimits, LimiterResult};
+use crate::error::ConfigError;
+use crate::settings::DofSettings;
+use crate::supervision::command_limiter::{CommandLimiter, LimiterResult};
+use crate::supervision::settings::SafetySettings;
 use proptest::prelude::*;
 
-use super::{config, support};
+use super::config;
+use super::support::{PERIOD, dofs, safety_in};
 
 fn any_number() -> impl Strategy<Value = f64> {
     prop_oneof![8 => -300.0..300.0, 1 => any::<f64>(), 1 => Just(f64::NAN)]
 }
 
-#[test]
-fn settings_out_of_range_are_named() {
-    let good = support::monitor(1.0);
-    let cases = [
-        (
-            "gain_limit",
-            CommandLimits {
-                gain_limit: 0.9,
-                ..good
-            },
-        ),
-        (
-            "command_speed",
-            CommandLimits {
-                step_limit: 0.0,
-                ..good
-            },
-        ),
-        (
-            "lead_limit",
-            CommandLimits {
-                lead_limit: f64::NAN,
-                ..good
-            },
-        ),
-        (
-            "travel",
-            CommandLimits {
-                travel: (1.0, 1.0),
-                ..good
-            },
-        ),
-        (
-            "travel",
-            CommandLimits {
-                travel: (f64::NEG_INFINITY, 1.0),
-                ..good
-            },
-        ),
-    ];
-    for (field, settings) in cases {
-        assert_eq!(CommandLimiter::new(settings).unwrap_err().field, field);
-    }
+fn settings() -> SafetySettings {
+    safety_in([1.0; 3])
+}
+
+fn with(settings: &SafetySettings) -> Result<CommandLimiter, ConfigError> {
+    CommandLimiter::new(settings, &dofs()[1], 1, PERIOD)
+}
+
+fn new_limiter() -> CommandLimiter {
+    with(&settings()).unwrap()
 }
 
 #[test]
-fn each_limit_binds_and_a_broken_law_is_told_from_a_limit() {
-    let start = || {
-        let mut monitor = CommandLimiter::new(support::monitor(1.0)).unwrap();
-        assert_eq!(monitor.permit(0.0, 0.0), (0.0, LimiterResult::Same));
-        monitor
+fn settings_out_of_range_are_named() {
+    type Change = fn(&mut SafetySettings);
+    let changes: [(&str, Change); 4] = [
+        ("command_speed", |s| s.command_speed[1] = 0.0),
+        ("width_limit", |s| s.width_limit[1] = f64::NAN),
+        ("command_travel", |s| s.command_travel[1] = (1.0, 1.0)),
+        ("command_travel", |s| {
+            s.command_travel[1] = (f64::NEG_INFINITY, 1.0);
+        }),
+    ];
+    for (field, change) in changes {
+        let mut wrong = settings();
+        change(&mut wrong);
+        assert_eq!(with(&wrong).unwrap_err().field, field);
+    }
+    let [dof, ..] = dofs();
+    let wrong = DofSettings {
+        gain_limit: 0.9,
+        ..dof
     };
-    assert_eq!(start().permit(1.0, 5.0), (5.0, LimiterResult::Same));
-    assert_eq!(start().permit(1.0, 5.1), (5.0, LimiterResult::Broken));
-    assert_eq!(start().permit(1.0, -0.1), (0.0, LimiterResult::Broken));
-    assert_eq!(start().permit(0.0, 1e-300), (0.0, LimiterResult::Broken));
-    assert_eq!(start().permit(1.0, f64::NAN), (0.0, LimiterResult::Broken));
-    assert_eq!(start().permit(-1.0, f64::NAN), (0.0, LimiterResult::Broken));
+    let error = CommandLimiter::new(&settings(), &wrong, 0, PERIOD).unwrap_err();
+    assert_eq!(error.field, "gain_limit");
+}
+
+#[test]
+fn each_limit_binds_and_a_violation_of_the_law_differs_from_a_limit() {
+    let start = || {
+        let mut limiter = new_limiter();
+        assert_eq!(limiter.limit(0.0, 0.0), (0.0, LimiterResult::Unchanged));
+        limiter
+    };
+    assert_eq!(start().limit(1.0, 5.0), (5.0, LimiterResult::Unchanged));
+    assert_eq!(start().limit(1.0, 5.1), (5.0, LimiterResult::Violation));
+    assert_eq!(start().limit(1.0, -0.1), (0.0, LimiterResult::Violation));
+    assert_eq!(start().limit(0.0, 1e-300), (0.0, LimiterResult::Violation));
+    assert_eq!(
+        start().limit(1.0, f64::NAN),
+        (0.0, LimiterResult::Violation)
+    );
+    assert_eq!(
+        start().limit(-1.0, f64::NAN),
+        (0.0, LimiterResult::Violation)
+    );
     for reference in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         for command in [0.0, 1.0, f64::NAN] {
-            let mut monitor = start();
+            let mut limiter = start();
             assert_eq!(
-                monitor.permit(reference, command),
-                (0.0, LimiterResult::Broken)
+                limiter.limit(reference, command),
+                (0.0, LimiterResult::Violation)
             );
-            // And counts from the last that was one.
-            assert_eq!(monitor.permit(1.0, 1.0), (1.0, LimiterResult::Same));
+            // The increment counts from the last reference that was finite.
+            assert_eq!(limiter.limit(1.0, 1.0), (1.0, LimiterResult::Unchanged));
         }
     }
-    assert_eq!(start().permit(2.0, 5.1), (0.0, LimiterResult::Jump));
-    assert_eq!(start().permit(-2.0, -9.0), (0.0, LimiterResult::Jump));
-    assert_eq!(start().permit(2.0, 10.1), (0.0, LimiterResult::Broken));
+    assert_eq!(start().limit(2.0, 5.1), (0.0, LimiterResult::Jump));
+    assert_eq!(start().limit(-2.0, -9.0), (0.0, LimiterResult::Jump));
+    assert_eq!(start().limit(2.0, 10.1), (0.0, LimiterResult::Violation));
     let mut far = start();
     for step in 1..=200 {
-        far.permit(f64::from(step), f64::from(step));
+        far.limit(f64::from(step), f64::from(step));
     }
-    assert_eq!(far.permit(201.0, 201.0), (200.0, LimiterResult::Limited));
+    assert_eq!(far.limit(201.0, 201.0), (200.0, LimiterResult::Limited));
     let mut ahead = start();
     let mut command: f64 = 0.0;
     for step in 1..=20 {
-        command = ahead.permit(f64::from(step), command + 5.0).0;
+        command = ahead.limit(f64::from(step), command + 5.0).0;
         assert!(command - f64::from(step) <= 30.0);
     }
     assert!((command - 50.0).abs() < 1e-12, "{command}");
@@ -99,28 +101,26 @@ proptest! {
     #![proptest_config(config())]
 
     #[test]
-    fn what_leaves_keeps_the_law_and_what_keeps_it_passes(
+    fn the_output_keeps_the_law_and_a_command_that_keeps_it_passes(
         samples in prop::collection::vec((any_number(), any_number(), 0.0..5.0, any::<bool>()), 1..200)
     ) {
-        let settings = support::monitor(1.0);
-        let mut monitor = CommandLimiter::new(settings).unwrap();
-        prop_assert_eq!(monitor.permit(1.0, 1.0), (1.0, LimiterResult::Same));
+        let mut limiter = new_limiter();
+        prop_assert_eq!(limiter.limit(1.0, 1.0), (1.0, LimiterResult::Unchanged));
         let (mut reference, mut command) = (1.0, 1.0);
         for (next, wild, gain, lawful) in samples {
-            // One step of the reference, or anything at all.
+            // A lawful step, or any numbers.
             let next: f64 = if lawful { reference + next.clamp(-1.0, 1.0) } else { next };
             let proposed = if lawful { command + gain * (next - reference) } else { wild };
-            let (permitted, verdict) = monitor.permit(next, proposed);
+            let (limited, result) = limiter.limit(next, proposed);
             let du = if next.is_finite() { next - reference } else { 0.0 };
-            let dc = permitted - command;
+            let dc = limited - command;
             let rounding = 8.0 * f64::EPSILON * (command.abs() + reference.abs() + 5.0 * du.abs());
-            prop_assert!(permitted.is_finite());
+            prop_assert!(limited.is_finite());
             prop_assert!(dc * du >= 0.0 && dc.abs() <= 5.0 * du.abs() + rounding);
-            prop_assert!(dc.abs() <= settings.step_limit + rounding);
-            let (least, largest) = settings.travel;
-            prop_assert!(permitted >= least.min(command) && permitted <= largest.max(command));
-            prop_assert_eq!(verdict == LimiterResult::Same, permitted.to_bits() == proposed.to_bits() || permitted == proposed);
-            command = permitted;
+            prop_assert!(dc.abs() <= 5.0 + rounding);
+            prop_assert!(limited >= command.min(-100.0) && limited <= command.max(200.0));
+            prop_assert_eq!(result == LimiterResult::Unchanged, limited.to_bits() == proposed.to_bits() || limited == proposed);
+            command = limited;
             if next.is_finite() {
                 reference = next;
             }
@@ -129,93 +129,101 @@ proptest! {
 }
 
 #[test]
-fn a_lead_that_is_limited_is_no_lost_motion_either_way() {
+fn a_limited_lead_loses_no_motion_in_either_direction() {
     for sign in [1.0, -1.0] {
-        let mut monitor = CommandLimiter::new(support::monitor(1.0)).unwrap();
-        monitor.permit(0.0, 0.0);
+        let mut limiter = new_limiter();
+        limiter.limit(0.0, 0.0);
         for step in 1..=7 {
             let reference = sign * f64::from(step);
             let command = 5.0 * reference;
             assert_eq!(
-                monitor.permit(reference, command),
-                (command, LimiterResult::Same)
+                limiter.limit(reference, command),
+                (command, LimiterResult::Unchanged)
             );
         }
         assert_eq!(
-            monitor.permit(sign * 8.0, sign * 40.0),
-            (sign * 38.0, LimiterResult::Led)
+            limiter.limit(sign * 8.0, sign * 40.0),
+            (sign * 38.0, LimiterResult::LeadLimited)
         );
         assert_eq!(
-            monitor.permit(sign * 9.0, sign * 43.0),
-            (sign * 39.0, LimiterResult::Led)
+            limiter.limit(sign * 9.0, sign * 43.0),
+            (sign * 39.0, LimiterResult::LeadLimited)
         );
         assert_eq!(
-            monitor.permit(sign * 8.0, sign * 34.0),
-            (sign * 34.0, LimiterResult::Same)
+            limiter.limit(sign * 8.0, sign * 34.0),
+            (sign * 34.0, LimiterResult::Unchanged)
         );
     }
 }
 
 #[test]
-fn the_first_command_is_where_it_may_be_and_a_number() {
-    let new = || CommandLimiter::new(support::monitor(1.0)).unwrap();
+fn the_first_command_is_finite_and_within_the_travel() {
     for (reference, command) in [(f64::NAN, 0.0), (0.0, f64::NAN), (f64::INFINITY, 0.0)] {
-        let (permitted, verdict) = new().permit(reference, command);
-        assert!(permitted.is_nan());
-        assert_eq!(verdict, LimiterResult::Broken);
+        let (limited, result) = new_limiter().limit(reference, command);
+        assert!(limited.is_nan());
+        assert_eq!(result, LimiterResult::Violation);
     }
-    assert_eq!(new().permit(190.0, 190.0), (190.0, LimiterResult::Same));
-    assert_eq!(new().permit(190.0, 210.0), (200.0, LimiterResult::Limited));
     assert_eq!(
-        new().permit(-90.0, -110.0),
+        new_limiter().limit(190.0, 190.0),
+        (190.0, LimiterResult::Unchanged)
+    );
+    assert_eq!(
+        new_limiter().limit(190.0, 210.0),
+        (200.0, LimiterResult::Limited)
+    );
+    assert_eq!(
+        new_limiter().limit(-90.0, -110.0),
         (-100.0, LimiterResult::Limited)
     );
 }
 
 #[test]
-fn what_the_reference_is_shifted_by_is_no_motion_of_it() {
+fn a_shift_of_the_reference_is_no_motion() {
     for shift in [0.7, -0.7] {
-        let mut monitor = CommandLimiter::new(support::monitor(1.0)).unwrap();
-        monitor.permit(2.0, 3.0);
-        monitor.shift(shift);
+        let mut limiter = new_limiter();
+        limiter.limit(2.0, 3.0);
+        limiter.shift_reference(shift);
         assert_eq!(
-            monitor.permit(2.0 + shift, 3.1),
-            (3.0, LimiterResult::Broken)
+            limiter.limit(2.0 + shift, 3.1),
+            (3.0, LimiterResult::Violation)
         );
-        assert_eq!(monitor.permit(2.1 + shift, 3.1), (3.1, LimiterResult::Same));
+        assert_eq!(
+            limiter.limit(2.1 + shift, 3.1),
+            (3.1, LimiterResult::Unchanged)
+        );
     }
 }
 
-/// At the end of the lead the command has to go with the reference, but no faster than a command may.
+/// At the limit of the lead the command moves with the reference, but no faster than `command_speed`.
 #[test]
-fn a_lead_that_is_limited_moves_nothing_faster_than_it_may() {
+fn a_limited_lead_moves_the_command_no_faster_than_its_speed_limit() {
     for sign in [1.0, -1.0] {
-        let mut monitor = CommandLimiter::new(support::monitor(1.0)).unwrap();
-        monitor.permit(0.0, sign * 30.0);
-        let found = monitor.permit(-10.0 * sign, sign * 29.0);
+        let mut limiter = new_limiter();
+        limiter.limit(0.0, sign * 30.0);
+        let found = limiter.limit(-10.0 * sign, sign * 29.0);
         assert_eq!(found, (sign * 25.0, LimiterResult::Limited));
     }
 }
 
-/// A command that is out already comes back as it likes, and no farther out.
+/// A command outside of a limit may return, and moves no farther out.
 #[test]
-fn from_beyond_a_limit_it_only_comes_back() {
+fn a_command_outside_of_a_limit_only_returns() {
     for sign in [1.0, -1.0] {
-        let mut monitor = CommandLimiter::new(support::monitor(1.0)).unwrap();
-        monitor.permit(0.0, sign * 40.0);
+        let mut limiter = new_limiter();
+        limiter.limit(0.0, sign * 40.0);
         let at = |reference: f64| sign * reference;
-        // The lead of 40 is more than may be: it grows no farther, and shrinks.
+        // The lead of 40 is above its limit: it may shrink, and does not grow.
         assert_eq!(
-            monitor.permit(at(1.0), at(43.0)),
-            (at(41.0), LimiterResult::Led)
+            limiter.limit(at(1.0), at(43.0)),
+            (at(41.0), LimiterResult::LeadLimited)
         );
         assert_eq!(
-            monitor.permit(at(2.0), at(41.5)),
-            (at(41.5), LimiterResult::Same)
+            limiter.limit(at(2.0), at(41.5)),
+            (at(41.5), LimiterResult::Unchanged)
         );
         assert_eq!(
-            monitor.permit(at(1.0), at(40.5)),
-            (at(40.5), LimiterResult::Same)
+            limiter.limit(at(1.0), at(40.5)),
+            (at(40.5), LimiterResult::Unchanged)
         );
     }
 }

@@ -1,28 +1,28 @@
-//! Compensation that is given up with motion, and comes back once the warning has been seen; a tip that outruns its hand.
+//! Compensation that fades with motion and returns once the warning is acknowledged; a tip that overtakes the reference.
 
 use crate::article::play::Play;
 use crate::dof::PerDof;
-use crate::r#loop::reduction::HysteresisReduction;
+use crate::r#loop::paper::Paper;
 use crate::supervision::flags::{Flag, Flags};
-use crate::supervision::monitors::MonitorsSettings;
 use crate::supervision::reactions::Reaction;
+use crate::supervision::settings::SafetySettings;
 
-use super::support::looped::{article, article_with, model};
-use super::support::{PERIOD, UNITS, monitors};
+use super::support::looped::{Loop, article, article_with, model};
+use super::support::{PERIOD, UNITS, safety};
 
 const START: PerDof<f64> = [0.025, 0.0, 0.9];
 
-/// A hand that goes forth and back along the insertion, in its unit.
-struct Hand {
-    reduction: Box<HysteresisReduction>,
+/// A reference that moves forth and back along the insertion, in its unit.
+struct Strokes {
+    reduction: Loop<Paper>,
     tick: u32,
     place: f64,
     side: f64,
     command: PerDof<f64>,
 }
 
-impl Hand {
-    fn new(mut reduction: Box<HysteresisReduction>) -> Self {
+impl Strokes {
+    fn new(mut reduction: Loop<Paper>) -> Self {
         let command = reduction.step(START, None, 0.0);
         Self {
             reduction,
@@ -37,7 +37,7 @@ impl Hand {
         f64::from(self.tick) * PERIOD
     }
 
-    /// On by so much: how much farther the command goes, as a factor.
+    /// Move on; the increment of the command over that of the reference.
     fn go(&mut self, by: f64) -> f64 {
         if self.side * self.place > 16.0 {
             self.side = -self.side;
@@ -53,7 +53,7 @@ impl Hand {
         moved / (self.side * by * UNITS[0])
     }
 
-    /// By so many units, with images as they should be, and what the rig says: the largest factor.
+    /// Move by so many units, with nominal images and a flag of the rig; the largest factor.
     fn travel(&mut self, units: u32, flag: Option<Flag>) -> f64 {
         let mut most = 0.0_f64;
         for _ in 0..10 * units {
@@ -62,14 +62,14 @@ impl Hand {
             }
             most = most.max(self.go(0.1));
             if self.tick.is_multiple_of(8) {
-                self.sees(self.reduction.predicted_state());
+                self.image_update(self.reduction.predicted_state());
             }
         }
         most
     }
 
-    /// An image of a tip.
-    fn sees(&mut self, tip: PerDof<f64>) {
+    /// Image update with a given tip.
+    fn image_update(&mut self, tip: PerDof<f64>) {
         let features = model().predict(tip).map(|seen| seen.features);
         let time = self.time();
         self.reduction
@@ -78,53 +78,53 @@ impl Hand {
 }
 
 #[test]
-fn compensation_goes_with_motion_and_comes_back_once_the_warning_was_seen() {
+fn compensation_fades_with_motion_and_returns_once_the_warning_is_acknowledged() {
     let play = |unit: f64| Play::new(-12.0 * unit, 12.0 * unit).unwrap();
-    let mut hand = Hand::new(article(play));
+    let mut strokes = Strokes::new(article(play));
     let whole = |factor: f64| (factor - 5.0).abs() < 1e-6;
     let none = |factor: f64| (factor - 1.0).abs() < 1e-6;
-    assert!(whole(hand.travel(100, None)));
+    assert!(whole(strokes.travel(100, None)));
     // Four widths of 30, and two more to fade.
-    assert!(whole(hand.travel(100, Some(Flag::Frozen))));
-    hand.travel(82, Some(Flag::Frozen));
-    let supervision = hand.reduction.monitors().supervision();
+    assert!(whole(strokes.travel(100, Some(Flag::Frozen))));
+    strokes.travel(82, Some(Flag::Frozen));
+    let supervision = strokes.reduction.monitors().supervision();
     assert_eq!(
         (supervision.reaction, supervision.lead),
         (Reaction::Fade, 0.0)
     );
-    let factor = hand.travel(100, Some(Flag::Frozen));
+    let factor = strokes.travel(100, Some(Flag::Frozen));
     assert!(none(factor), "{factor}");
-    assert!(none(hand.travel(5, None)));
-    let supervision = hand.reduction.monitors().supervision();
+    assert!(none(strokes.travel(5, None)));
+    let supervision = strokes.reduction.monitors().supervision();
     assert_eq!(supervision.reaction, Reaction::None);
     assert_eq!(supervision.latched, Flags::of(Flag::Frozen));
-    let factor = hand.travel(100, None);
-    assert!(none(factor), "nobody has seen the warning: {factor}");
-    hand.reduction.monitors_mut().acknowledge();
-    let supervision = hand.reduction.monitors().supervision();
+    let factor = strokes.travel(100, None);
+    assert!(none(factor), "the warning was not acknowledged: {factor}");
+    strokes.reduction.monitors_mut().acknowledge();
+    let supervision = strokes.reduction.monitors().supervision();
     assert_eq!(supervision.latched, Flags::NONE);
-    hand.travel(62, None);
-    assert_eq!(hand.reduction.monitors().supervision().lead, 1.0);
-    let factor = hand.travel(100, None);
+    strokes.travel(62, None);
+    assert_eq!(strokes.reduction.monitors().supervision().lead, 1.0);
+    let factor = strokes.travel(100, None);
     assert!(whole(factor), "{factor}");
 }
 
-/// More slack made up for than there is: none.
+/// The instrument has no slack.
 #[test]
-fn a_tip_that_outruns_its_hand_is_said_unless_it_is_not_looked_for() {
+fn a_tip_that_overtakes_the_reference_is_reported_unless_its_detector_is_off() {
     for off in [Flags::NONE, Flags::of(Flag::Overcompensation)] {
-        let settings = MonitorsSettings { off, ..monitors() };
+        let settings = SafetySettings { off, ..safety() };
         let play = |unit: f64| Play::new(-12.0 * unit, 12.0 * unit).unwrap();
-        let mut hand = Hand::new(article_with(&settings, 0.0, play));
+        let mut strokes = Strokes::new(article_with(&settings, 0.0, play));
         for tick in 1..=400_u32 {
-            hand.go(0.4);
+            strokes.go(0.4);
             if tick.is_multiple_of(8) {
-                hand.sees(hand.command);
+                strokes.image_update(strokes.command);
             }
         }
-        let latched = hand.reduction.monitors().supervision().latched;
+        let latched = strokes.reduction.monitors().supervision().latched;
         assert_eq!(
-            latched.has(Flag::Overcompensation),
+            latched.contains(Flag::Overcompensation),
             off.is_empty(),
             "{latched:?}"
         );

@@ -1,4 +1,4 @@
-//! What no picture and no tip does, and what every tip may: repeat themselves, jump and slip.
+//! The frame gate: frozen images, jumps of the tip, and slip out of contact.
 
 use crate::dof::PerDof;
 use crate::estimation::posture::Belief;
@@ -7,7 +7,8 @@ use crate::supervision::frame_gate::{FrameArrival, FrameGate, ImageIdentity};
 use crate::supervision::grip::{Grip, GripSettings, Sighting};
 use proptest::prelude::*;
 
-use super::{config, support};
+use super::config;
+use super::support::{UNITS, dofs, safety};
 
 const SETTINGS: GripSettings = GripSettings {
     distance: 6.0,
@@ -53,7 +54,7 @@ impl Motion {
         self.tip = self.tip.clamp(self.command - half, self.command + half);
     }
 
-    /// To a place, every image believed; whether one slipped.
+    /// Move to a place with every image accepted; whether one slipped.
     fn to(&mut self, place: f64, offsets: (f64, f64)) -> bool {
         let mut slipped = false;
         while (place - self.command).abs() > 1e-9 {
@@ -65,7 +66,7 @@ impl Motion {
         slipped
     }
 
-    /// On, with images that stand still: how far the command came before one slipped.
+    /// Move on with frozen images; the travel of the command until one slipped.
     fn stuck(&mut self, by: f64, offsets: (f64, f64)) -> f64 {
         let (start, still) = (self.command, self.tip);
         for _ in 0..200 {
@@ -84,7 +85,7 @@ proptest! {
     #![proptest_config(config())]
 
     #[test]
-    fn a_tip_behind_its_slack_never_slips(
+    fn a_tip_within_its_slack_never_slips(
         width in 0.0..12.0, places in prop::collection::vec(-30.0..30.0, 1..12),
     ) {
         let mut motion = Motion::new(width);
@@ -95,11 +96,11 @@ proptest! {
     }
 
     #[test]
-    fn a_picture_that_stands_still_slips_once_a_held_tip_should_have_moved(
+    fn a_frozen_image_slips_once_a_tip_in_contact_should_have_moved(
         width in 0.0..12.0, by in 0.06..0.5,
     ) {
         let mut motion = Motion::new(width);
-        // In whole steps: a last short one would be a rest.
+        // In whole steps: a shorter last one would be a rest.
         prop_assert!(!motion.to((width + 10.0).ceil(), ANY));
         let came = motion.stuck(by, ANY);
         // |off| = travel > slip + 0.15 travel + deviation, from where it was found held
@@ -112,33 +113,32 @@ proptest! {
     }
 
     #[test]
-    fn a_picture_repeats_itself_once_the_command_went_so_far(
+    fn an_image_is_frozen_once_the_command_has_moved(
         dof in 0_usize..3, went in 0.0..3.0, sum in any::<u64>(), other in any::<u64>(),
     ) {
         prop_assume!(f64::abs(went - 1.0) > 1e-6 && sum != other);
-        let settings = support::monitors().frames;
-        let mut watch = FrameGate::new(settings).unwrap();
+        let mut gate = FrameGate::new(&safety(), &dofs()).unwrap();
         let mut arrive = |time: f64, travel: f64, sum: u64| {
             let mut way = [0.0; 3];
-            way[dof] = settings.frozen_travel[dof] * travel;
-            watch.arrive(&FrameArrival {
+            way[dof] = UNITS[dof] * travel;
+            gate.check_arrival(&FrameArrival {
                 captured_at: time,
                 now: time,
-                picture: Some(ImageIdentity::Checksum(sum)),
+                image: Some(ImageIdentity::Checksum(sum)),
                 travel: Some(way),
             })
         };
         prop_assert_eq!(arrive(0.0, 5.0, sum), Flags::NONE);
         let frozen = Flags::when(went > 1.0, Flag::Frozen);
         prop_assert_eq!(arrive(0.04, 5.0 + went, sum), frozen);
-        // It is the first of its like that counts, and another picture is well.
+        // The travel counts from the first of the identical images; another image is not frozen.
         prop_assert_eq!(arrive(0.08, 6.0 + went, sum), Flags::of(Flag::Frozen));
         prop_assert_eq!(arrive(0.12, 9.0 + went, other), Flags::NONE);
         prop_assert_eq!(arrive(0.16, 9.0 + went, sum), Flags::NONE);
     }
 
     #[test]
-    fn a_tip_that_goes_half_as_far_as_its_command_is_never_held(places in prop::collection::vec(-30.0..30.0, 1..8)) {
+    fn a_tip_that_moves_half_as_far_as_its_command_is_never_in_contact(places in prop::collection::vec(-30.0..30.0, 1..8)) {
         let mut motion = Motion::new(0.0);
         for place in places {
             while f64::abs(place - motion.command) > 1e-9 {
@@ -151,38 +151,37 @@ proptest! {
     }
 
     #[test]
-    fn a_tip_jumps_beyond_its_command_and_two_deviations(
-        surprise in -20.0..20.0, moved in 0.0..5.0, deviation in 0.01..1.0, dof in 0_usize..3,
+    fn a_tip_jumps_beyond_its_command_and_two_standard_deviations(
+        innovation in -20.0..20.0, moved in 0.0..5.0, deviation in 0.01..1.0, dof in 0_usize..3,
     ) {
-        let settings = support::monitors().frames;
-        let unit = settings.jump[dof];
-        let mut watch = FrameGate::new(settings).unwrap();
-        let belief = Belief { state: [0.0; 3], deviation: [1.0; 3] };
+        let unit = safety().jump[dof];
+        let mut gate = FrameGate::new(&safety(), &dofs()).unwrap();
+        let prediction = Belief { state: [0.0; 3], deviation: [1.0; 3] };
         let mut seen: PerDof<Sighting> = [0, 1, 2].map(|_| Sighting {
             command: 0.0, travel: 0.0, tip: f64::NAN, deviation: f64::NAN, offsets: ANY,
         });
         let mut way = [0.0; 3];
         way[dof] = unit * moved;
-        // At the start, and after what was refused for long, anything within `start_deviation` more.
-        seen[dof] = Sighting { tip: unit * surprise, deviation: unit * deviation, ..seen[dof] };
-        let jumps = |watch: &FrameGate| watch.doubts(&belief, way, &seen).has(Flag::Jump);
+        // At the start, and after a reset, the bound is wider by `start_deviation`.
+        seen[dof] = Sighting { tip: unit * innovation, deviation: unit * deviation, ..seen[dof] };
+        let jumps = |gate: &FrameGate| gate.check_innovation(&prediction, way, &seen).contains(Flag::Jump);
         let limit = moved + 1.0 + 2.0 * deviation;
-        let start = settings.start_deviation[dof] / unit;
-        let far = f64::abs(surprise);
+        let start = dofs()[dof].start_deviation / unit;
+        let far = f64::abs(innovation);
         prop_assume!(f64::abs(far - limit) > 1e-6 && f64::abs(far - limit - start) > 1e-6);
-        prop_assert_eq!(jumps(&watch), far > limit + start);
+        prop_assert_eq!(jumps(&gate), far > limit + start);
         let nothing = seen.map(|seen| Sighting { tip: f64::NAN, ..seen });
-        watch.accept(&belief, &nothing);
-        prop_assert_eq!(jumps(&watch), far > limit);
-        watch.forget();
-        prop_assert_eq!(jumps(&watch), far > limit + start);
-        prop_assert_eq!(watch.doubts(&belief, way, &nothing), Flags::NONE);
+        gate.accept(&prediction, &nothing);
+        prop_assert_eq!(jumps(&gate), far > limit);
+        gate.reset();
+        prop_assert_eq!(jumps(&gate), far > limit + start);
+        prop_assert_eq!(gate.check_innovation(&prediction, way, &nothing), Flags::NONE);
     }
 }
 
-/// In the slack a tip stands still as a picture does that is stuck; what was learnt of the slack ends that.
+/// In the slack a tip stands still as in a frozen image; the estimated slack says how long it may.
 #[test]
-fn a_tip_is_left_no_farther_behind_than_was_learnt_once_the_command_has_turned_three_times() {
+fn a_tip_lags_no_farther_than_the_estimated_slack_once_the_command_has_turned_three_times() {
     let width = 8.0;
     let allowed = (-width / 2.0, width / 2.0);
     for (turns, came) in [
@@ -207,13 +206,13 @@ fn a_tip_is_left_no_farther_behind_than_was_learnt_once_the_command_has_turned_t
     }
 }
 
-/// Errors of 0.45 deviations, as images of the twin have them, where they are as large as what counts as a slip.
+/// Errors of 0.45 standard deviations, as in images of the twin, where the standard deviation is as large as a slip.
 #[test]
-fn noise_of_images_is_no_slip_of_a_tip_that_goes_with_its_command() {
+fn image_noise_is_no_slip_of_a_tip_that_moves_with_its_command() {
     let deviation = SETTINGS.slip;
     let mut chance = 9_u64;
     let mut noise = || {
-        // The sum of twelve even ones has deviation 1.
+        // The sum of twelve uniform numbers has standard deviation 1.
         let sum: f64 = (0..12)
             .map(|_| {
                 chance ^= chance << 13;

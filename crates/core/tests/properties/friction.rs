@@ -4,7 +4,16 @@ use crate::adaptive::friction::{Friction, FrictionSettings, SlackShare};
 use proptest::prelude::*;
 
 use super::config;
-use super::support::friction;
+
+/// Of a shaft of 3.5 mm.
+fn friction() -> Friction {
+    Friction::new(FrictionSettings {
+        arm: 1.75e-3,
+        memory: 0.2e-3,
+        deviation: 0.25,
+    })
+    .unwrap()
+}
 
 /// Of a shaft of 3.5 mm with 10 mm and 1.8 rad of slack.
 const ARM: f64 = 1.75e-3;

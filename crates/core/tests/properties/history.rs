@@ -1,6 +1,6 @@
 //! The command in force when a frame was captured.
 
-use crate::estimation::history::{Entry, History};
+use crate::estimation::history::{Entry, History, history_entries};
 use proptest::prelude::*;
 
 use super::{close, config};
@@ -18,8 +18,9 @@ fn entry(time: f64) -> Entry {
     }
 }
 
-fn filled(span: f64, ticks: u32) -> History {
-    let mut history = History::new(span, PERIOD).unwrap();
+fn filled(span: f64, ticks: u32) -> History<Vec<Entry>> {
+    let storage = vec![Entry::BLANK; history_entries(span, PERIOD)];
+    let mut history = History::new(span, PERIOD, storage).unwrap();
     for tick in 0..ticks {
         assert!(!history.push(entry(f64::from(tick) * PERIOD)));
     }
@@ -31,9 +32,9 @@ proptest! {
 
     #[test]
     fn between_ticks_it_interpolates(ticks in 2_u32..3000, share in 0.0..1.0) {
-        let history = filled(100.0, ticks);
+        let history = filled(5.0, ticks);
         let newest = f64::from(ticks - 1) * PERIOD;
-        let kept = f64::from(ticks.min(1024) - 1) * PERIOD;
+        let kept = f64::from((ticks - 1).min(1000)) * PERIOD;
         let time = newest - share * (kept - 1e-9);
         let found = history.at(time).unwrap();
         let expected = entry(time);
@@ -55,12 +56,13 @@ fn beyond_either_end_there_is_nothing() {
         history.at(newest - 1.0 - 1e-9).is_none(),
         "older than the span"
     );
-    assert!(
-        filled(100.0, 3000)
-            .at(2999.0 * PERIOD - 1023.5 * PERIOD)
-            .is_none(),
-        "overwritten"
-    );
+    let mut quick = filled(1.0, 0);
+    for tick in 0..400 {
+        quick.push(entry(f64::from(tick) * PERIOD / 2.0));
+    }
+    let now = quick.newest_time();
+    assert!(quick.at(now - 0.5).is_some());
+    assert!(quick.at(now - 0.6).is_none(), "overwritten");
     assert!(filled(100.0, 3).at(-1e-9).is_none(), "before the first");
     assert_eq!(
         history.at(newest + 0.9 * PERIOD).unwrap().command,
@@ -72,7 +74,10 @@ fn beyond_either_end_there_is_nothing() {
     );
     assert!(history.at(f64::NAN).is_none());
     assert!(
-        History::new(1.0, PERIOD).unwrap().at(0.0).is_none(),
+        History::new(0.5, PERIOD, [Entry::BLANK; 102])
+            .unwrap()
+            .at(0.0)
+            .is_none(),
         "empty"
     );
 }
@@ -105,6 +110,9 @@ fn the_same_time_again_replaces_and_what_is_not_finite_is_left_out() {
 
 #[test]
 fn bad_spans_are_named() {
-    assert_eq!(History::new(0.0, 0.1).unwrap_err().field, "span");
-    assert_eq!(History::new(1.0, f64::NAN).unwrap_err().field, "period");
+    let new = |span, period| History::new(span, period, [Entry::BLANK; 12]);
+    assert_eq!(new(0.0, 0.1).unwrap_err().field, "span");
+    assert_eq!(new(1.0, f64::NAN).unwrap_err().field, "period");
+    assert!(new(1.0, 0.1).is_ok());
+    assert_eq!(new(1.1, 0.1).unwrap_err().field, "history");
 }

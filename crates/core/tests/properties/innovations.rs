@@ -1,33 +1,33 @@
-//! Whether a frame may teach: how far it may be from what is expected.
+//! The innovation gate: the bound of the innovation, and how its standard deviation adapts.
 
 use crate::dof::PerDof;
 use crate::estimation::posture::Belief;
 use crate::supervision::flags::Flag;
-use crate::supervision::frame_gate::{FrameGate, FrameGateSettings};
+use crate::supervision::frame_gate::FrameGate;
 use crate::supervision::grip::Sighting;
 use proptest::prelude::*;
 
 use super::config;
-use super::support::monitors;
+use super::support::{dofs, safety};
 
-/// The images of one DOF, with lengths in its least spread.
+/// The images of one DOF, with lengths in its least standard deviation.
 struct Bench {
-    watch: FrameGate,
-    settings: FrameGateSettings,
+    gate: FrameGate,
+    /// Least standard deviations.
+    unit: PerDof<f64>,
     dof: usize,
-    belief: Belief,
+    prediction: Belief,
     travel: PerDof<f64>,
 }
 
 impl Bench {
     fn new(dof: usize) -> Self {
-        let settings = monitors().frames;
-        let unit = settings.least_deviation;
+        let unit = dofs().map(|dof| dof.start_deviation * safety().innovation_floor);
         Self {
-            watch: FrameGate::new(settings).unwrap(),
-            settings,
+            gate: FrameGate::new(&safety(), &dofs()).unwrap(),
+            unit,
             dof,
-            belief: Belief {
+            prediction: Belief {
                 state: unit.map(|unit| -3.0 * unit),
                 deviation: unit,
             },
@@ -35,8 +35,8 @@ impl Bench {
         }
     }
 
-    fn seen(&self, surprise: f64, deviation: f64) -> PerDof<Sighting> {
-        let unit = self.settings.least_deviation[self.dof];
+    fn seen(&self, innovation: f64, deviation: f64) -> PerDof<Sighting> {
+        let unit = self.unit[self.dof];
         let mut seen = [0, 1, 2].map(|dof| Sighting {
             command: 0.0,
             travel: self.travel[dof],
@@ -44,20 +44,22 @@ impl Bench {
             deviation: f64::NAN,
             offsets: (f64::NEG_INFINITY, f64::INFINITY),
         });
-        seen[self.dof].tip = self.belief.state[self.dof] + surprise * unit;
+        seen[self.dof].tip = self.prediction.state[self.dof] + innovation * unit;
         seen[self.dof].deviation = deviation * unit;
         seen
     }
 
-    fn refuses(&self, surprise: f64, deviation: f64) -> bool {
-        let seen = self.seen(surprise, deviation);
-        let doubts = self.watch.doubts(&self.belief, [1e3; 3], &seen);
-        doubts.has(Flag::Innovation)
+    fn refuses(&self, innovation: f64, deviation: f64) -> bool {
+        let seen = self.seen(innovation, deviation);
+        let flags = self
+            .gate
+            .check_innovation(&self.prediction, [1e3; 3], &seen);
+        flags.contains(Flag::Innovation)
     }
 
-    /// Found from what an image without deviation of its own may say.
-    fn spread(&self) -> f64 {
-        let limit = self.settings.innovation_limit;
+    /// The standard deviation in use, found by the bound of an image that is exact.
+    fn std(&self) -> f64 {
+        let limit = safety().innovation_limit;
         let (mut fits, mut refused) = (0.0, 1e4);
         for _ in 0..60 {
             let middle = f64::midpoint(fits, refused);
@@ -71,15 +73,15 @@ impl Bench {
     }
 
     fn goes(&mut self, way: f64) {
-        self.travel[self.dof] += way * self.settings.least_deviation[self.dof];
+        self.travel[self.dof] += way * self.unit[self.dof];
     }
 
-    /// An image that is believed; the square of the spread then.
-    fn accept(&mut self, surprise: f64, way: f64) -> f64 {
+    /// Accept an image; the variance then.
+    fn accept(&mut self, innovation: f64, way: f64) -> f64 {
         self.goes(way);
-        let seen = self.seen(surprise, 0.1);
-        self.watch.accept(&self.belief, &seen);
-        self.spread().powi(2)
+        let seen = self.seen(innovation, 0.1);
+        self.gate.accept(&self.prediction, &seen);
+        self.std().powi(2)
     }
 }
 
@@ -90,37 +92,37 @@ fn near(found: f64, expected: f64) -> bool {
 proptest! {
     #![proptest_config(config())]
 
-    /// surprise^2 > limit^2 (spread^2 + deviation^2), with the spread of the start
+    /// innovation^2 > `innovation_limit`^2 (std^2 + deviation^2), with the standard deviation of the start
     #[test]
-    fn an_innovation_is_refused_beyond_so_many_deviations(
+    fn an_innovation_is_refused_beyond_its_limit_of_standard_deviations(
         dof in 0..3_usize, share in 0.1..2.0_f64, deviation in 0.0..30.0, above in prop::bool::ANY,
     ) {
         prop_assume!(f64::abs(share - 1.0) > 1e-6);
         let bench = Bench::new(dof);
-        let start = bench.settings.start_deviation[dof] / bench.settings.least_deviation[dof];
-        let limit = bench.settings.innovation_limit * f64::hypot(start, deviation);
-        let surprise = if above { share * limit } else { -share * limit };
-        prop_assert_eq!(bench.refuses(surprise, deviation), share > 1.0);
-        // Of what has no deviation nothing is said.
-        prop_assert!(!bench.refuses(surprise, f64::NAN));
+        let start = 1.0 / safety().innovation_floor;
+        let limit = safety().innovation_limit * f64::hypot(start, deviation);
+        let innovation = if above { share * limit } else { -share * limit };
+        prop_assert_eq!(bench.refuses(innovation, deviation), share > 1.0);
+        // Without a standard deviation there is no bound.
+        prop_assert!(!bench.refuses(innovation, f64::NAN));
         prop_assert!(!bench.refuses(f64::NAN, deviation));
     }
 
-    /// The square of the spread goes to that of the innovations, by the same share of what is left each time.
+    /// The variance approaches that of the innovations by a constant factor per image.
     #[test]
-    fn the_spread_follows_innovations_up_at_once_and_down_slowly_with_motion(
+    fn the_standard_deviation_grows_quickly_and_decays_slowly_with_motion(
         dof in 0..3_usize, large in 40.0..200.0, small in 2.0..5.0,
     ) {
         let mut bench = Bench::new(dof);
-        let left = |bench: &mut Bench, surprise: f64, way: f64| {
-            let before = bench.spread().powi(2) - surprise * surprise;
-            (bench.accept(surprise, way) - surprise * surprise) / before
+        let left = |bench: &mut Bench, innovation: f64, way: f64| {
+            let before = bench.std().powi(2) - innovation * innovation;
+            (bench.accept(innovation, way) - innovation * innovation) / before
         };
         let up = left(&mut bench, large, 0.0);
         prop_assert!((0.3..0.9).contains(&up), "{}", up);
         prop_assert!(near(left(&mut bench, -large, 5.0), up), "with motion as well as without");
         let rest = left(&mut bench, small, 0.0);
-        prop_assert!(near(rest, 1.0), "at rest nothing is learnt: {}", rest);
+        prop_assert!(near(rest, 1.0), "no decay at rest: {}", rest);
         let down = left(&mut bench, small, 1.0);
         prop_assert!(down > up && down < 0.99, "{}", down);
         let far = left(&mut bench, -small, 9.0);
@@ -129,36 +131,36 @@ proptest! {
         prop_assert!(near(half, f64::midpoint(1.0, down)), "{}, not half of {}", half, down);
     }
 
-    /// Both grow by `blind_growth` of the travel, and no farther than at the start; motion already seen counts no more.
+    /// Both bounds grow by `blind_growth` times the travel, to at most those of the start; motion before the last image does not count.
     #[test]
-    fn what_is_not_seen_may_be_farther_off(dof in 0..3_usize, ways in prop::collection::vec(0.0..20.0, 1..6)) {
+    fn the_bounds_widen_with_motion_without_a_marker(dof in 0..3_usize, ways in prop::collection::vec(0.0..20.0, 1..6)) {
         let mut bench = Bench::new(dof);
         for _ in 0..300 {
             bench.accept(0.5, 4.0);
         }
-        let least = bench.spread();
-        prop_assert!(near(least, 1.0), "the least spread there is: {}", least);
-        let start = bench.settings.start_deviation[dof] / bench.settings.least_deviation[dof];
+        let least = bench.std();
+        prop_assert!(near(least, 1.0), "the least standard deviation: {}", least);
+        let start = 1.0 / safety().innovation_floor;
         let mut blind = 0.0;
         for way in ways {
             bench.goes(way);
-            blind += way * bench.settings.blind_growth;
-            bench.watch.miss(bench.travel);
-            let spread = bench.spread();
+            blind += way * safety().blind_growth;
+            bench.gate.miss(bench.travel);
+            let std = bench.std();
             let expected = (1.0 + blind).min(start);
-            prop_assert!(near(spread, expected), "{}, not {}", spread, expected);
-            let reach = bench.settings.jump[dof] / bench.settings.least_deviation[dof] + blind.min(start);
+            prop_assert!(near(std, expected), "{}, not {}", std, expected);
+            let reach = safety().jump[dof] / bench.unit[dof] + blind.min(start);
             for (far, jumps) in [(reach - 1e-6, false), (reach + 1e-6, true)] {
-                let doubts = bench.watch.doubts(&bench.belief, [0.0; 3], &bench.seen(far, 0.0));
-                prop_assert_eq!(doubts.has(Flag::Jump), jumps, "{}", far);
+                let flags = bench.gate.check_innovation(&bench.prediction, [0.0; 3], &bench.seen(far, 0.0));
+                prop_assert_eq!(flags.contains(Flag::Jump), jumps, "{}", far);
             }
         }
-        // A wider spread than the start's, which large innovations have taught, stays.
+        // A standard deviation above that of the start, after large innovations, stays.
         let wide = bench.accept(50.0 * start, 0.0).sqrt();
         bench.goes(1.0);
-        bench.watch.miss(bench.travel);
-        prop_assert!(near(bench.spread(), wide));
-        bench.watch.forget();
-        prop_assert!(near(bench.spread(), start));
+        bench.gate.miss(bench.travel);
+        prop_assert!(near(bench.std(), wide));
+        bench.gate.reset();
+        prop_assert!(near(bench.std(), start));
     }
 }

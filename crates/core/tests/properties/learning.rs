@@ -2,11 +2,11 @@
 
 use crate::article::play::{Play, PlayState};
 use crate::dof::PerDof;
-use crate::r#loop::reduction::HysteresisReduction;
+use crate::r#loop::profile::Profile;
 use crate::supervision::flags::Flag;
 use crate::supervision::reactions::Reaction;
 
-use super::support::looped::{adaptive, article, model};
+use super::support::looped::{Loop, adaptive, article, model};
 use super::support::{PERIOD, UNITS};
 
 const CENTRES: PerDof<f64> = [0.025, 0.0, 0.9];
@@ -14,15 +14,15 @@ const CENTRES: PerDof<f64> = [0.025, 0.0, 0.9];
 const SWING: f64 = 8.0;
 
 /// A loop and an instrument whose insertion has slack; exact images.
-struct Run {
-    reduction: Box<HysteresisReduction>,
+struct Run<P> {
+    reduction: Loop<P>,
     slack: Play,
     tip: PlayState,
     tick: u32,
 }
 
-impl Run {
-    fn new(reduction: Box<HysteresisReduction>, minus: f64, plus: f64) -> Self {
+impl<P: Profile> Run<P> {
+    fn new(reduction: Loop<P>, minus: f64, plus: f64) -> Self {
         Self {
             reduction,
             slack: Play::new(minus * UNITS[0], plus * UNITS[0]).unwrap(),
@@ -59,7 +59,7 @@ impl Run {
     }
 }
 
-fn learns_and_is_held(reduction: Box<HysteresisReduction>) {
+fn learns_and_is_held<P: Profile>(reduction: Loop<P>) {
     let mut run = Run::new(reduction, -6.0, 9.0);
     run.swing(4);
     let (minus, plus) = run.believed();
@@ -103,7 +103,7 @@ fn no_more_slack_is_believed_than_may_be() {
     }
     assert!((28.0..=30.0 + 1e-9).contains(&widest), "{widest}");
     let latched = run.reduction.monitors().supervision().latched;
-    assert!(latched.has(Flag::WidthLimit));
+    assert!(latched.contains(Flag::WidthLimit));
 }
 
 #[test]
@@ -149,7 +149,7 @@ fn slack_that_was_learnt_and_changes_is_said() {
     let mut run = Run::new(adaptive(), -6.0, 9.0);
     run.swing(4);
     let latched = run.reduction.monitors().supervision().latched;
-    assert!(!latched.has(Flag::SlackChanged), "{latched:?}");
+    assert!(!latched.contains(Flag::SlackChanged), "{latched:?}");
     for tick in 0..3200 {
         // Some new place of the contact at every image, as if the shaft were bent.
         let more = 10.0 * (f64::from(tick) / 3200.0);
@@ -157,7 +157,7 @@ fn slack_that_was_learnt_and_changes_is_said() {
         run.tick();
     }
     let latched = run.reduction.monitors().supervision().latched;
-    assert!(latched.has(Flag::SlackChanged), "{latched:?}");
+    assert!(latched.contains(Flag::SlackChanged), "{latched:?}");
 }
 
 /// What images have said for as long as a hold lasts is believed in the end.
@@ -178,7 +178,7 @@ fn a_tip_that_has_jumped_is_not_believed_until_it_has_stayed() {
         believed |= worst == Reaction::Fade && supervision.reaction < Reaction::HoldEstimate;
         if tick == 40 {
             assert!(
-                supervision.latched.has(Flag::Jump),
+                supervision.latched.contains(Flag::Jump),
                 "{:?}",
                 supervision.latched
             );

@@ -1,25 +1,25 @@
-//! What the monitors of the whole loop do about a hand, its device and its time.
+//! The monitors in the loop: the operator's input, its device and its times.
 
 use crate::article::play::Play;
 use crate::dof::PerDof;
-use crate::r#loop::reduction::HysteresisReduction;
+use crate::r#loop::paper::Paper;
 use crate::supervision::flags::{Flag, Flags};
-use crate::supervision::monitors::MonitorsSettings;
 use crate::supervision::reactions::Reaction;
 use crate::supervision::reference_gate::ReferenceGate;
+use crate::supervision::settings::SafetySettings;
 
-use super::support::looped::{article, article_with};
-use super::support::{self, PERIOD, UNITS, monitors};
+use super::support::looped::{Loop, article, article_with};
+use super::support::{PERIOD, UNITS, safety};
 
 #[test]
-fn a_stall_throws_its_motion_away_and_stops_until_re_engaged() {
+fn the_motion_of_a_stall_is_discarded_and_motion_stops_until_re_engaged() {
     let mut reduction = article(|unit| Play::new(-12.0 * unit, 12.0 * unit).unwrap());
-    let (mut time, mut hand) = (0.0, 0.025);
-    let mut last = reduction.step([hand, 0.0, 0.9], None, time);
-    let mut tick = |reduction: &mut HysteresisReduction, dt: f64, move_by: f64| {
+    let (mut time, mut input) = (0.0, 0.025);
+    let mut last = reduction.step([input, 0.0, 0.9], None, time);
+    let mut tick = |reduction: &mut Loop<Paper>, dt: f64, move_by: f64| {
         time += dt;
-        hand += move_by;
-        let now = reduction.step([hand, 0.0, 0.9], None, time);
+        input += move_by;
+        let now = reduction.step([input, 0.0, 0.9], None, time);
         let moved = now[0] - last[0];
         last = now;
         moved
@@ -43,7 +43,7 @@ fn a_stall_throws_its_motion_away_and_stops_until_re_engaged() {
 
 const START: PerDof<f64> = [0.025, 0.0, 0.9];
 
-fn begun() -> Box<HysteresisReduction> {
+fn begun() -> Loop<Paper> {
     let mut reduction = article(|_| Play::new(0.0, 0.0).unwrap());
     reduction.step(START, Some(0.0), 0.0);
     reduction
@@ -51,12 +51,12 @@ fn begun() -> Box<HysteresisReduction> {
 
 #[test]
 fn a_reference_that_is_old_or_invalid_stops_motion() {
-    for (hand, stamp) in [(0.0251, -0.06), (f64::NAN, 0.0)] {
+    for (input, stamp) in [(0.0251, -0.06), (f64::NAN, 0.0)] {
         let mut reduction = begun();
-        let command = reduction.step([hand, 0.0, 0.9], Some(stamp), PERIOD);
+        let command = reduction.step([input, 0.0, 0.9], Some(stamp), PERIOD);
         assert_eq!(command, START);
         let reaction = reduction.monitors().supervision().reaction;
-        assert_eq!(reaction, Reaction::HoldMotion, "{hand} of {stamp} s");
+        assert_eq!(reaction, Reaction::HoldMotion, "{input} of {stamp} s");
     }
 }
 
@@ -64,7 +64,12 @@ fn a_reference_that_is_old_or_invalid_stops_motion() {
 fn a_reference_that_is_too_fast_stops_motion() {
     let mut fast = begun();
     assert_eq!(fast.step([0.035, 0.0, 0.9], Some(0.0), PERIOD), START);
-    assert!(fast.monitors().supervision().flags.has(Flag::ReferenceJump));
+    assert!(
+        fast.monitors()
+            .supervision()
+            .flags
+            .contains(Flag::ReferenceJump)
+    );
     assert_eq!(fast.monitors().supervision().reaction, Reaction::HoldMotion);
     fast.monitors_mut().engage();
     let [time, then] = [2.0 * PERIOD, 3.0 * PERIOD];
@@ -74,23 +79,23 @@ fn a_reference_that_is_too_fast_stops_motion() {
     assert!((moved - 1e-4).abs() < 1e-12, "nothing catches up: {moved}");
 }
 
-/// The increments of a hand that gains `gain` in m/s with every tick, up to a speed in m/s.
-fn runs_up(speed: f64, gain: f64) -> impl Iterator<Item = f64> {
+/// The increments of an input that accelerates by `gain` in m/s per tick up to a speed in m/s.
+fn accelerated(speed: f64, gain: f64) -> impl Iterator<Item = f64> {
     (1..2000).map(move |tick| speed.min(gain * f64::from(tick)) * PERIOD)
 }
 
-/// How far it comes before it is stopped, in m; None if it never is.
+/// How far such an input is followed before it is stopped, in m; None if it is not stopped.
 fn followed(speed: f64, gain: f64) -> Option<f64> {
-    let mut clutch = ReferenceGate::new(support::clutch()).unwrap();
-    let (mut time, mut hand, mut gone) = (0.0, 0.0, 0.0);
-    clutch.admit([hand; 3], time, None, false, Flags::NONE);
-    for increment in runs_up(speed, gain) {
+    let mut gate = ReferenceGate::new(&safety(), PERIOD).unwrap();
+    let (mut time, mut input, mut gone) = (0.0, 0.0, 0.0);
+    gate.step([input; 3], time, None, false, Flags::NONE);
+    for increment in accelerated(speed, gain) {
         time += PERIOD;
-        hand += increment;
-        let admission = clutch.admit([hand, 0.0, 0.0], time, None, false, Flags::NONE);
-        gone += admission.moved[0];
-        if admission.raised.has(Flag::ReferenceJump) {
-            assert_eq!(admission.moved, [0.0; 3]);
+        input += increment;
+        let gated = gate.step([input, 0.0, 0.0], time, None, false, Flags::NONE);
+        gone += gated.increments[0];
+        if gated.raised.contains(Flag::ReferenceJump) {
+            assert_eq!(gated.increments, [0.0; 3]);
             return Some(gone);
         }
     }
@@ -98,14 +103,14 @@ fn followed(speed: f64, gain: f64) -> Option<f64> {
 }
 
 #[test]
-fn a_hand_is_followed_at_its_speed_limit_and_a_faster_one_no_farther_than_the_law_says() {
-    let settings = support::clutch();
+fn an_input_at_the_speed_limit_is_followed_and_a_faster_one_no_farther_than_the_law_allows() {
+    let settings = safety();
     let (limit, over) = (settings.reference_speed[0], settings.reference_time);
     assert_eq!(followed(limit * (1.0 - 1e-9), limit), None);
     let steady = limit * PERIOD / -libm::expm1(-PERIOD / over);
     for ratio in [1.1, 1.5, 3.0, 10.0, 100.0] {
         let gone = followed(ratio * limit, limit).unwrap();
-        let increments: Vec<f64> = runs_up(ratio * limit, limit).collect();
+        let increments: Vec<f64> = accelerated(ratio * limit, limit).collect();
         let gained = |ticks: usize| -> f64 {
             let ages = (0_u32..).map(|ago| PERIOD / over * f64::from(ago));
             let last = increments[..=ticks].iter().rev().zip(ages);
@@ -121,67 +126,64 @@ fn a_hand_is_followed_at_its_speed_limit_and_a_faster_one_no_farther_than_the_la
 }
 
 #[test]
-fn a_hand_that_is_faster_all_at_once_moves_nothing() {
-    let settings = support::clutch();
+fn an_input_that_is_too_fast_at_once_moves_nothing() {
+    let settings = safety();
     let limit = settings.reference_speed[0] + settings.reference_count[0] / PERIOD;
     assert_eq!(followed(1.001 * limit, f64::INFINITY), Some(0.0));
 }
 
 #[test]
 fn a_device_that_was_silent_moves_nothing_until_re_engaged() {
-    let settings = support::clutch();
+    let settings = safety();
     let speed = 0.5 * settings.reference_speed[0];
     for off in [Flags::NONE, Flags::of(Flag::ReferenceLate)] {
-        let mut clutch = ReferenceGate::new(settings).unwrap();
+        let mut gate = ReferenceGate::new(&settings, PERIOD).unwrap();
         let mut held = false;
-        let mut thrown = 0.0;
+        let mut discarded = 0.0;
         for tick in 0..200 {
             let time = f64::from(tick) * PERIOD;
-            // Longer than `reference_age`, and less than `reference_jump` would see.
-            let said = if (100..115).contains(&tick) { 99 } else { tick };
-            let hand = [speed * PERIOD * f64::from(said), 0.0, 0.0];
-            let admission = clutch.admit(hand, time, None, held, off);
+            // Longer than `reference_age`, and less than `reference_jump` detects.
+            let value = if (100..115).contains(&tick) { 99 } else { tick };
+            let input = [speed * PERIOD * f64::from(value), 0.0, 0.0];
+            let gated = gate.step(input, time, None, held, off);
             if tick == 115 {
-                assert_eq!(
-                    admission.raised,
-                    Flags::of(Flag::ReferenceLate).without(off)
-                );
-                held = !admission.raised.is_empty();
-                thrown = if held {
+                assert_eq!(gated.raised, Flags::of(Flag::ReferenceLate).difference(off));
+                held = !gated.raised.is_empty();
+                discarded = if held {
                     8.0 * settings.reference_speed[0] * PERIOD
                 } else {
                     0.0
                 };
             } else {
-                assert_eq!(admission.raised, Flags::NONE, "tick {tick}");
+                assert_eq!(gated.raised, Flags::NONE, "tick {tick}");
             }
             if tick == 150 && held {
                 held = false;
-                clutch.engage();
-                thrown += speed * PERIOD * 36.0;
+                gate.engage();
+                discarded += speed * PERIOD * 36.0;
             }
         }
-        let gone = clutch.admitted()[0];
-        let hand = speed * PERIOD * 199.0;
+        let gone = gate.reference()[0];
+        let input = speed * PERIOD * 199.0;
         assert!(
-            (hand - gone - thrown).abs() < 1e-12,
-            "{hand} {gone} {thrown}"
+            (input - gone - discarded).abs() < 1e-12,
+            "{input} {gone} {discarded}"
         );
     }
 }
 
 #[test]
-fn a_jump_that_nobody_saw_before_the_law_is_stopped_behind_it_and_moves_nothing() {
+fn a_jump_that_passes_the_gate_is_stopped_by_the_command_limiter_and_moves_nothing() {
     for jump in [6.0, -6.0, 40.0] {
-        let settings = MonitorsSettings {
+        let settings = SafetySettings {
             off: Flags::of(Flag::ReferenceJump),
-            ..monitors()
+            ..safety()
         };
         let mut reduction = article_with(&settings, 0.0, |unit| {
             Play::new(-5.0 * unit, 5.0 * unit).unwrap()
         });
         let mut time = 0.0;
-        let mut go = |reduction: &mut HysteresisReduction, at: f64| {
+        let mut go = |reduction: &mut Loop<Paper>, at: f64| {
             time += PERIOD;
             reduction.step([at * UNITS[0], 0.0, 0.0], None, time)[0]
         };
@@ -196,9 +198,13 @@ fn a_jump_that_nobody_saw_before_the_law_is_stopped_behind_it_and_moves_nothing(
                 .monitors()
                 .supervision()
                 .flags
-                .has(Flag::CommandJump)
+                .contains(Flag::CommandJump)
         );
-        assert_eq!(go(&mut reduction, 10.0), before, "nor does the way back");
+        assert_eq!(
+            go(&mut reduction, 10.0),
+            before,
+            "the way back moves nothing either"
+        );
         reduction.monitors_mut().engage();
         go(&mut reduction, 10.0);
         let moved = go(&mut reduction, 10.1) - before;
@@ -210,13 +216,13 @@ fn a_jump_that_nobody_saw_before_the_law_is_stopped_behind_it_and_moves_nothing(
 }
 
 #[test]
-fn a_trembling_hand_is_no_fast_one() {
-    let mut clutch = ReferenceGate::new(support::clutch()).unwrap();
+fn a_tremor_is_not_too_fast() {
+    let mut gate = ReferenceGate::new(&safety(), PERIOD).unwrap();
     for tick in 0..4000 {
         let time = f64::from(tick) * PERIOD;
         let shake = 3e-3 * time.min(1.0) * (60.0 * time).sin();
-        let admission = clutch.admit([shake, 0.0, 0.0], time, None, false, Flags::NONE);
-        assert_eq!(admission.raised, Flags::NONE, "tick {tick}");
-        assert_eq!(admission.reference, Some([shake, 0.0, 0.0]));
+        let gated = gate.step([shake, 0.0, 0.0], time, None, false, Flags::NONE);
+        assert_eq!(gated.raised, Flags::NONE, "tick {tick}");
+        assert_eq!(gated.reference, Some([shake, 0.0, 0.0]));
     }
 }

@@ -1,20 +1,21 @@
-//! Tremor, over-compensation and limit cycles: what is noticed, and what is not.
+//! The motion monitor: what is a tremor, overcompensation or a limit cycle, and what is not.
 
 use crate::article::play::Play;
 use crate::dof::PerDof;
 use crate::supervision::flags::{Flag, Flags};
-use crate::supervision::motion_monitor::{MotionMonitor, MotionMonitorSettings};
+use crate::supervision::motion_monitor::MotionMonitor;
+use crate::supervision::settings::SafetySettings;
 use proptest::prelude::*;
 
 use super::config;
-use super::support::{PERIOD, UNITS, monitors};
+use super::support::{PERIOD, UNITS, dofs, safety};
 
 const UNIT: f64 = UNITS[0];
 /// Control ticks from frame to frame.
 const FRAME: u32 = 8;
 
-fn settings() -> MotionMonitorSettings {
-    monitors().motion
+fn new_monitor() -> MotionMonitor {
+    MotionMonitor::new(&safety(), &dofs(), PERIOD).unwrap()
 }
 
 fn along(value: f64) -> PerDof<f64> {
@@ -25,16 +26,21 @@ fn none() -> PerDof<Play> {
     [Play::new(0.0, 0.0).unwrap(); 3]
 }
 
-/// All that is raised while reference and tip go as said, for so many seconds.
+/// All flags raised while reference and tip move for so many seconds.
 fn raised(seconds: f64, reference: impl Fn(f64) -> f64, tip: impl Fn(f64) -> f64) -> Flags {
-    let mut watch = MotionMonitor::new(settings()).unwrap();
+    let mut monitor = new_monitor();
     let mut all = Flags::NONE;
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     for tick in 0..(seconds / PERIOD) as u32 {
         let time = f64::from(tick) * PERIOD;
-        all = all.and(watch.tick(along(reference(time))));
+        all = all.union(monitor.update_reference(along(reference(time))));
         if tick % FRAME == 0 {
-            all = all.and(watch.look(time, along(reference(time)), along(tip(time)), none()));
+            all = all.union(monitor.update_measurement(
+                time,
+                along(reference(time)),
+                along(tip(time)),
+                none(),
+            ));
         }
     }
     all
@@ -48,7 +54,7 @@ proptest! {
     #![proptest_config(config())]
 
     #[test]
-    fn a_tip_that_follows_or_lags_behind_raises_nothing(
+    fn a_tip_that_follows_or_lags_raises_nothing(
         amplitude in 2.0..40.0_f64,
         period in 2.0..12.0_f64,
         slack in 0.0..25.0_f64,
@@ -67,12 +73,12 @@ proptest! {
     }
 
     #[test]
-    fn a_tip_that_outruns_its_reference_after_a_turn_is_over_compensated(
+    fn a_tip_that_overtakes_its_reference_after_a_turn_is_overcompensated(
         amplitude in 12.0..40.0_f64,
         period in 4.0..12.0_f64,
         over in 6.0..12.0_f64,
     ) {
-        // After each turn it goes five times as fast until it is ahead by `over`, and stays so.
+        // After each turn the tip is five times as fast until it is ahead by `over`.
         let reference = sine(amplitude * UNIT, period);
         let last = core::cell::Cell::new((0.0_f64, 0.0_f64));
         let tip = |time: f64| {
@@ -89,15 +95,15 @@ proptest! {
 }
 
 #[test]
-fn slack_that_is_unlearnt_in_a_stroke_was_made_up_for_in_vain() {
+fn an_offset_that_decreases_within_a_stroke_is_overcompensation() {
     for (shrunk, expected) in [(5.0, Flags::NONE), (7.0, Flags::of(Flag::Overcompensation))] {
         for sign in [1.0, -1.0] {
-            let mut watch = MotionMonitor::new(settings()).unwrap();
+            let mut monitor = new_monitor();
             let mut all = Flags::NONE;
             for tick in 0..400_u32 {
                 let time = f64::from(tick) * PERIOD;
                 let reference = sign * 20.0 * UNIT * (4.0 * time).sin();
-                // Well into the stroke back, the contact it uses comes nearer.
+                // Well into the stroke back, the contact offset in use decreases.
                 let now = if time > 0.8 { 12.0 - shrunk } else { 12.0 } * UNIT;
                 let play = if sign > 0.0 {
                     Play::new(-now, 12.0 * UNIT).unwrap()
@@ -105,7 +111,7 @@ fn slack_that_is_unlearnt_in_a_stroke_was_made_up_for_in_vain() {
                     Play::new(-12.0 * UNIT, now).unwrap()
                 };
                 let at = along(reference);
-                all = all.and(watch.look(time, at, at, [play; 3]));
+                all = all.union(monitor.update_measurement(time, at, at, [play; 3]));
                 if time > 1.1 {
                     break;
                 }
@@ -116,7 +122,7 @@ fn slack_that_is_unlearnt_in_a_stroke_was_made_up_for_in_vain() {
 }
 
 #[test]
-fn a_hand_trembles_from_four_reversals_a_second_on_and_only_within_the_slack() {
+fn a_tremor_is_four_reversals_a_second_or_more_within_the_slack() {
     let tremor = Flags::of(Flag::Tremor);
     for (amplitude, frequency, expected) in [
         (1.0, 6.0, tremor),
@@ -126,12 +132,12 @@ fn a_hand_trembles_from_four_reversals_a_second_on_and_only_within_the_slack() {
         (0.2, 10.0, Flags::NONE),
         (20.0, 4.0, Flags::NONE),
     ] {
-        let mut watch = MotionMonitor::new(settings()).unwrap();
+        let mut monitor = new_monitor();
         let mut all = Flags::NONE;
         for tick in 0..1000 {
             let time = f64::from(tick) * PERIOD;
             let shake = amplitude * UNIT * (core::f64::consts::TAU * frequency * time).sin();
-            all = all.and(watch.tick(along(shake)));
+            all = all.union(monitor.update_reference(along(shake)));
         }
         assert_eq!(all, expected, "{amplitude} at {frequency} Hz");
     }
@@ -150,45 +156,51 @@ fn swings_that_grow_together_are_a_limit_cycle() {
     let cycle = |growth, period| {
         let both = growing(growth, period);
         // Four turns that show five swings.
-        raised(4.5 * period, &both, |time| 0.8 * both(time)).has(Flag::LimitCycle)
+        raised(4.5 * period, &both, |time| 0.8 * both(time)).contains(Flag::LimitCycle)
     };
     assert!(cycle(1.2, 1.0) && cycle(1.3, 2.0));
     assert!(!cycle(1.0, 1.0), "it does not grow");
     assert!(!cycle(0.8, 1.0), "it dies out");
+    assert!(!cycle(1.3, 5.0), "so slow an oscillation is intended");
+    let input = growing(1.3, 1.0);
+    let still = raised(4.5, &input, |_| 0.0);
     assert!(
-        !cycle(1.3, 5.0),
-        "a hand that works so slowly does what it means"
+        !still.contains(Flag::LimitCycle),
+        "the tip takes no part in it"
     );
-    let hand = growing(1.3, 1.0);
-    let still = raised(4.5, &hand, |_| 0.0);
-    assert!(!still.has(Flag::LimitCycle), "the tip has no part in it");
 }
 
 #[test]
-fn what_was_not_measured_says_nothing() {
-    let mut watch = MotionMonitor::new(settings()).unwrap();
+fn a_tip_that_was_not_measured_raises_nothing() {
+    let mut monitor = new_monitor();
     for tick in 0..400 {
         let time = f64::from(tick) * PERIOD;
-        let found = watch.look(time, along(sine(0.01, 1.0)(time)), [f64::NAN; 3], none());
+        let found =
+            monitor.update_measurement(time, along(sine(0.01, 1.0)(time)), [f64::NAN; 3], none());
         assert_eq!(found, Flags::NONE);
     }
 }
 
 #[test]
 fn bad_settings_are_named() {
-    type Change = fn(&mut MotionMonitorSettings);
-    let changes: [(&str, Change); 7] = [
-        ("period", |s| s.period = 0.0),
-        ("tremor_swing", |s| s.tremor_swing[1] = -1.0),
-        ("width_limit", |s| s.slack[2] = f64::NAN),
+    type Change = fn(&mut SafetySettings);
+    let changes: [(&str, Change); 9] = [
+        ("tremor_swing", |s| s.tremor_swing = -1.0),
+        ("width_limit", |s| s.width_limit[2] = f64::NAN),
         ("tremor_rate", |s| s.tremor_rate = 0.0),
-        ("ahead_limit", |s| s.ahead[0] = f64::INFINITY),
+        ("ahead_limit", |s| s.ahead_limit = f64::INFINITY),
         ("cycle_swings", |s| s.cycle_swings = 0),
         ("cycle_time", |s| s.cycle_time = 0.0),
+        ("cycle_growth", |s| s.cycle_growth = -1.1),
+        ("ahead_ratio", |s| s.ahead_ratio = 0.0),
+        ("offset_decrease", |s| s.offset_decrease = f64::NAN),
     ];
     for (field, change) in changes {
-        let mut wrong = settings();
+        let mut wrong = safety();
         change(&mut wrong);
-        assert_eq!(MotionMonitor::new(wrong).unwrap_err().field, field);
+        let error = MotionMonitor::new(&wrong, &dofs(), PERIOD).unwrap_err();
+        assert_eq!(error.field, field);
     }
+    let error = MotionMonitor::new(&safety(), &dofs(), 0.0).unwrap_err();
+    assert_eq!(error.field, "period");
 }

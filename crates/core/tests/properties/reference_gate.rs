@@ -1,37 +1,38 @@
-//! What comes of a hand's motion, and of its time.
+//! The reference gate: motion, rest, holds and times of the reference.
 
 use crate::supervision::flags::{Flag, Flags};
-use crate::supervision::reference_gate::{GatedReference, ReferenceGate, ReferenceGateSettings};
+use crate::supervision::reference_gate::{GatedReference, ReferenceGate};
+use crate::supervision::settings::SafetySettings;
 use proptest::prelude::*;
 
 use super::config;
-use super::support::{self, PERIOD, UNITS};
+use super::support::{PERIOD, UNITS, safety};
 
-/// Ticks of a hand that moves all DOFs, in units.
+/// A gate whose input moves all DOFs, in units.
 struct Bench {
-    clutch: ReferenceGate,
+    gate: ReferenceGate,
     time: f64,
-    hand: f64,
+    input: f64,
 }
 
 impl Bench {
-    fn new(hand: f64) -> Self {
+    fn new(input: f64) -> Self {
         let mut bench = Self {
-            clutch: ReferenceGate::new(support::clutch()).unwrap(),
+            gate: ReferenceGate::new(&safety(), PERIOD).unwrap(),
             time: 0.0,
-            hand,
+            input,
         };
-        let first = bench.to(hand, false);
-        assert_eq!(first.reference, Some(UNITS.map(|unit| hand * unit)));
-        assert_eq!(first.moved, [0.0; 3]);
+        let first = bench.to(input, false);
+        assert_eq!(first.reference, Some(UNITS.map(|unit| input * unit)));
+        assert_eq!(first.increments, [0.0; 3]);
         bench
     }
 
-    fn to(&mut self, hand: f64, held: bool) -> GatedReference {
-        (self.hand, self.time) = (hand, self.time + PERIOD);
-        let reference = UNITS.map(|unit| hand * unit);
-        self.clutch
-            .admit(reference, self.time, None, held, Flags::NONE)
+    fn to(&mut self, input: f64, is_held: bool) -> GatedReference {
+        (self.input, self.time) = (input, self.time + PERIOD);
+        let reference = UNITS.map(|unit| input * unit);
+        self.gate
+            .step(reference, self.time, None, is_held, Flags::NONE)
     }
 }
 
@@ -58,39 +59,39 @@ fn ticks() -> impl Strategy<Value = Vec<Tick>> {
 proptest! {
     #![proptest_config(config())]
 
-    /// What is admitted moves by what the hand does, wherever it was when it was let go on; at rest by nothing at all.
+    /// The output moves by what the input does, also after a hold, and rests to the bit while the input rests.
     #[test]
-    fn it_moves_as_the_hand_does_and_with_it_rests_to_the_bit(start in -3.0..3.0, ticks in ticks()) {
+    fn the_output_moves_as_the_input_does_and_rests_to_the_bit_with_it(start in -3.0..3.0, ticks in ticks()) {
         let mut bench = Bench::new(start);
         for tick in ticks {
-            let (before, hand) = (bench.clutch.admitted(), bench.hand);
-            let admission = match tick {
-                Tick::Moves(by) => bench.to(hand + by, false),
-                Tick::Rests => bench.to(hand, false),
-                Tick::Held(by) => bench.to(hand + by, true),
+            let (before, input) = (bench.gate.reference(), bench.input);
+            let gated = match tick {
+                Tick::Moves(by) => bench.to(input + by, false),
+                Tick::Rests => bench.to(input, false),
+                Tick::Held(by) => bench.to(input + by, true),
                 Tick::Shifted(by) => {
-                    bench.clutch.shift([0.0, by * UNITS[1], 0.0]);
-                    let shifted = bench.clutch.admitted();
+                    bench.gate.shift([0.0, by * UNITS[1], 0.0]);
+                    let shifted = bench.gate.reference();
                     prop_assert_eq!([shifted[0], shifted[2]], [before[0], before[2]]);
                     prop_assert!((shifted[1] - before[1] - by * UNITS[1]).abs() < 1e-12);
                     continue;
                 }
-                // To the other side of its own zero, as slowly as it takes.
+                // To the other side of its zero, slowly enough.
                 Tick::Back => {
-                    if hand.abs() > 0.2 {
+                    if input.abs() > 0.2 {
                         continue;
                     }
-                    bench.to(-hand, false)
+                    bench.to(-input, false)
                 }
             };
-            prop_assert_eq!(admission.raised, Flags::NONE);
-            let after = bench.clutch.admitted();
-            prop_assert_eq!(admission.reference, Some(after));
+            prop_assert_eq!(gated.raised, Flags::NONE);
+            let after = bench.gate.reference();
+            prop_assert_eq!(gated.reference, Some(after));
             for dof in 0..3 {
-                let moved = admission.moved[dof];
+                let moved = gated.increments[dof];
                 prop_assert_eq!(moved, after[dof] - before[dof]);
                 let by = match tick {
-                    Tick::Moves(_) | Tick::Back => bench.hand - hand,
+                    Tick::Moves(_) | Tick::Back => bench.input - input,
                     _ => 0.0,
                 };
                 if by == 0.0 {
@@ -103,24 +104,24 @@ proptest! {
     }
 }
 
-fn admit(clutch: &mut ReferenceGate, hand: f64, time: f64, stamp: Option<f64>) -> GatedReference {
-    clutch.admit([hand; 3], time, stamp, false, Flags::NONE)
+fn step(gate: &mut ReferenceGate, input: f64, time: f64, stamp: Option<f64>) -> GatedReference {
+    gate.step([input; 3], time, stamp, false, Flags::NONE)
 }
 
-/// A hand that has been at rest at 0 at time 0.
-fn begun() -> ReferenceGate {
-    begun_with(support::clutch())
+/// A gate whose input was at 0 at time 0.
+fn started() -> ReferenceGate {
+    started_with(&safety())
 }
 
-fn begun_with(settings: ReferenceGateSettings) -> ReferenceGate {
-    let mut clutch = ReferenceGate::new(settings).unwrap();
-    assert!(clutch.admitted().iter().all(|value| value.is_nan()));
-    assert_eq!(admit(&mut clutch, 0.0, 0.0, None).raised, Flags::NONE);
-    clutch
+fn started_with(settings: &SafetySettings) -> ReferenceGate {
+    let mut gate = ReferenceGate::new(settings, PERIOD).unwrap();
+    assert!(gate.reference().iter().all(|value| value.is_nan()));
+    assert_eq!(step(&mut gate, 0.0, 0.0, None).raised, Flags::NONE);
+    gate
 }
 
 #[test]
-fn a_tick_is_late_beyond_three_periods_and_a_stall_beyond_its_time() {
+fn a_tick_is_late_after_three_periods_and_severe_after_the_stall_time() {
     let late = Flags::of(Flag::LateTick);
     for (gap, raised, severe) in [
         (PERIOD, Flags::NONE, Flags::NONE),
@@ -132,33 +133,33 @@ fn a_tick_is_late_beyond_three_periods_and_a_stall_beyond_its_time() {
         (-1e-9, Flags::of(Flag::Clock), Flags::NONE),
         (f64::NAN, Flags::of(Flag::Clock), Flags::NONE),
     ] {
-        // The first tick has none before it.
+        // The first tick cannot be late.
         for start in [0.0, 4.0] {
-            let mut clutch = ReferenceGate::new(support::clutch()).unwrap();
-            let first = admit(&mut clutch, 0.0, start, None);
+            let mut gate = ReferenceGate::new(&safety(), PERIOD).unwrap();
+            let first = step(&mut gate, 0.0, start, None);
             assert_eq!((first.raised, first.severe), (Flags::NONE, Flags::NONE));
             if gap == 0.1 && start > 0.0 {
                 continue;
             }
-            let next = admit(&mut clutch, 1e-4, start + gap, None);
-            // A clock that is no number cannot tell an age either.
+            let next = step(&mut gate, 1e-4, start + gap, None);
+            // With a time that is not finite there is no age either.
             let found = (next.raised, next.severe);
             assert_eq!(found, (raised, severe), "{start} s and {gap} s");
             let moves = raised.is_empty();
-            assert_eq!(next.moved[0] > 0.0, moves, "{start} s and {gap} s");
+            assert_eq!(next.increments[0] > 0.0, moves, "{start} s and {gap} s");
         }
     }
-    let mut clutch = begun();
-    clutch.engage();
-    assert_eq!(admit(&mut clutch, 5.0, 9.0, None).raised, Flags::NONE);
-    let stalled = admit(&mut clutch, 5.0, 19.0, None);
+    let mut gate = started();
+    gate.engage();
+    assert_eq!(step(&mut gate, 5.0, 9.0, None).raised, Flags::NONE);
+    let stalled = step(&mut gate, 5.0, 19.0, None);
     assert_eq!((stalled.raised, stalled.severe), (late, late));
 }
 
 #[test]
-fn a_reference_is_old_beyond_its_age_either_way() {
+fn a_reference_is_late_if_its_stamp_differs_by_more_than_its_age() {
     let old = Flags::of(Flag::ReferenceLate);
-    let age = support::clutch().reference_age;
+    let age = safety().reference_age;
     for (time, stamp, raised) in [
         (age, 0.0, Flags::NONE),
         (age, 2.0 * age, Flags::NONE),
@@ -168,27 +169,26 @@ fn a_reference_is_old_beyond_its_age_either_way() {
         (8.0, f64::NAN, old),
         (8.0, f64::INFINITY, old),
     ] {
-        let mut clutch = begun();
-        clutch.engage();
-        let found = admit(&mut clutch, 0.0, time, Some(stamp));
+        let mut gate = started();
+        gate.engage();
+        let found = step(&mut gate, 0.0, time, Some(stamp));
         assert_eq!(found.raised, raised, "{stamp} s at {time} s");
     }
 }
 
-/// Nothing is looked at that is off, and nothing stops for it.
 #[test]
-fn what_is_off_stops_nothing() {
-    for (flag, hand, time, stamp) in [
+fn a_detector_that_is_off_raises_and_stops_nothing() {
+    for (flag, input, time, stamp) in [
         (Flag::LateTick, 1e-4, 1.0, Some(1.0)),
         (Flag::ReferenceLate, 1e-4, PERIOD, Some(-1.0)),
         (Flag::ReferenceJump, 1.0, PERIOD, None),
         (Flag::Clock, 1e-4, -0.5, None),
     ] {
         for off in [Flags::NONE, Flags::of(flag)] {
-            let mut clutch = begun();
-            let found = clutch.admit([hand, 0.0, 0.0], time, stamp, false, off);
-            assert_eq!(found.raised.has(flag), off.is_empty(), "{flag:?}");
-            assert_eq!(found.moved[0] > 0.0, !off.is_empty(), "{flag:?}");
+            let mut gate = started();
+            let found = gate.step([input, 0.0, 0.0], time, stamp, false, off);
+            assert_eq!(found.raised.contains(flag), off.is_empty(), "{flag:?}");
+            assert_eq!(found.increments[0] > 0.0, !off.is_empty(), "{flag:?}");
             assert_eq!(
                 found.severe.is_empty(),
                 !off.is_empty() || flag != Flag::LateTick
@@ -197,27 +197,21 @@ fn what_is_off_stops_nothing() {
     }
 }
 
-/// Any one DOF may, and the least farther is too far.
+/// The bound holds for each DOF, in each direction.
 #[test]
-fn a_hand_may_gain_what_its_speed_limit_does_in_the_time_and_no_more() {
-    // A step from rest is what the watch over the device looks at.
-    let settings = ReferenceGateSettings {
+fn the_reference_may_travel_as_far_as_its_speed_limit_allows_and_no_farther() {
+    // The input device monitor would refuse a step from rest.
+    let settings = SafetySettings {
         reference_count: [1e3; 3],
-        ..support::clutch()
+        ..safety()
     };
-    let ReferenceGateSettings {
-        period,
-        reference_speed,
-        reference_time,
-        ..
-    } = settings;
-    let steady = period / (1.0 - libm::exp(-period / reference_time));
+    let steady = PERIOD / (1.0 - libm::exp(-PERIOD / settings.reference_time));
     for dof in 0..3 {
         for (share, raised) in [(1.0, false), (1.0 + 1e-9, true), (-1.0 - 1e-9, true)] {
             let mut reference = [0.0; 3];
-            reference[dof] = reference_speed[dof] * steady * share;
-            let mut clutch = begun_with(settings);
-            let found = clutch.admit(reference, PERIOD, None, false, Flags::NONE);
+            reference[dof] = settings.reference_speed[dof] * steady * share;
+            let mut gate = started_with(&settings);
+            let found = gate.step(reference, PERIOD, None, false, Flags::NONE);
             assert_eq!(
                 found.raised,
                 Flags::when(raised, Flag::ReferenceJump),
@@ -228,20 +222,20 @@ fn a_hand_may_gain_what_its_speed_limit_does_in_the_time_and_no_more() {
 }
 
 #[test]
-fn what_is_no_number_is_not_admitted_nor_anything_while_held() {
+fn nothing_passes_that_is_not_finite_or_while_motion_is_held() {
     let invalid = Flags::of(Flag::ReferenceInvalid);
-    let mut clutch = ReferenceGate::new(support::clutch()).unwrap();
-    let wrong = admit(&mut clutch, f64::NAN, 0.0, None);
+    let mut gate = ReferenceGate::new(&safety(), PERIOD).unwrap();
+    let wrong = step(&mut gate, f64::NAN, 0.0, None);
     assert_eq!((wrong.reference, wrong.raised), (None, invalid));
-    let held = clutch.admit([0.5; 3], PERIOD, None, true, Flags::NONE);
+    let held = gate.step([0.5; 3], PERIOD, None, true, Flags::NONE);
     assert_eq!((held.reference, held.raised), (None, Flags::NONE));
-    clutch.shift([1.0; 3]);
-    let first = admit(&mut clutch, 0.3, 2.0 * PERIOD, None);
+    gate.shift([1.0; 3]);
+    let first = step(&mut gate, 0.3, 2.0 * PERIOD, None);
     assert_eq!(first.reference, Some([0.3; 3]));
-    let wrong = admit(&mut clutch, f64::INFINITY, 3.0 * PERIOD, None);
+    let wrong = step(&mut gate, f64::INFINITY, 3.0 * PERIOD, None);
     assert_eq!((wrong.reference, wrong.raised), (Some([0.3; 3]), invalid));
-    assert_eq!(wrong.moved, [0.0; 3]);
-    let unseen = clutch.admit(
+    assert_eq!(wrong.increments, [0.0; 3]);
+    let unseen = gate.step(
         [f64::NAN; 3],
         4.0 * PERIOD,
         None,
@@ -252,14 +246,13 @@ fn what_is_no_number_is_not_admitted_nor_anything_while_held() {
         (unseen.reference, unseen.raised),
         (Some([0.3; 3]), Flags::NONE)
     );
-    assert_eq!(clutch.admitted(), [0.3; 3]);
+    assert_eq!(gate.reference(), [0.3; 3]);
 }
 
 #[test]
 fn settings_out_of_range_are_named() {
-    type Change = fn(&mut ReferenceGateSettings);
-    let changes: [(&str, Change); 7] = [
-        ("period", |s| s.period = 0.0),
+    type Change = fn(&mut SafetySettings);
+    let changes: [(&str, Change); 6] = [
         ("reference_speed", |s| s.reference_speed[1] = 0.0),
         ("reference_time", |s| s.reference_time = f64::NAN),
         ("reference_age", |s| s.reference_age = -1.0),
@@ -268,8 +261,10 @@ fn settings_out_of_range_are_named() {
         ("stall", |s| s.stall = 0.0),
     ];
     for (field, change) in changes {
-        let mut wrong = support::clutch();
+        let mut wrong = safety();
         change(&mut wrong);
-        assert_eq!(ReferenceGate::new(wrong).unwrap_err().field, field);
+        assert_eq!(ReferenceGate::new(&wrong, PERIOD).unwrap_err().field, field);
     }
+    let error = ReferenceGate::new(&safety(), 0.0).unwrap_err();
+    assert_eq!(error.field, "period");
 }

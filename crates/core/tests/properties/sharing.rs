@@ -1,17 +1,16 @@
 //! How much friction is shared: what offsets say of it, and what the loop makes of slacks that are apart.
 
-use std::thread;
-
 use crate::adaptive::offset_map::Side;
 use crate::adaptive::sharing::Sharing;
 use crate::article::play::{Play, PlayState};
 use crate::dof::PerDof;
-use crate::r#loop::reduction::{HysteresisReduction, Status};
+use crate::r#loop::profile::Profile;
+use crate::r#loop::report::Status;
 use proptest::prelude::*;
 
 use super::config;
 use super::friction_step::slid;
-use super::support::looped::{adaptive, model};
+use super::support::looped::{Loop, adaptive, adaptive_uncoupled, model};
 use super::support::stand_in::{WIDTH, World, hand};
 use super::support::{PERIOD, UNITS};
 
@@ -123,7 +122,7 @@ impl Shaft {
 }
 
 /// What the prediction of a loop that has learnt such an instrument is off without images, root mean square in [`UNITS`].
-fn blindly_off(mut reduction: Box<HysteresisReduction>) -> [f64; 2] {
+fn blindly_off<P: Profile>(mut reduction: Loop<P>) -> [f64; 2] {
     let mut shaft = Shaft::new(hand(0.0));
     let (mut sums, mut count) = ([0.0; 2], 0.0);
     for tick in 0..20_000_u32 {
@@ -147,13 +146,7 @@ fn blindly_off(mut reduction: Box<HysteresisReduction>) -> [f64; 2] {
 #[test]
 fn one_friction_is_foreseen_by_who_expects_one() {
     let expects = blindly_off(adaptive());
-    // Not optimised, moving a loop takes more stack than a test has.
-    let without = thread::Builder::new()
-        .stack_size(16 << 20)
-        .spawn(|| blindly_off(Box::new(adaptive().with_friction(None))))
-        .unwrap()
-        .join()
-        .unwrap();
+    let without = blindly_off(adaptive_uncoupled());
     for (expects, without) in expects.iter().zip(without) {
         assert!(2.0 * expects < without, "{expects} {without}");
     }

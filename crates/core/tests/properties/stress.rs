@@ -1,11 +1,12 @@
 //! The whole loop, monitors included, under anything that may come.
 
 use crate::article::play::Play;
-use crate::r#loop::reduction::{HysteresisReduction, Status};
+use crate::r#loop::profile::Profile;
+use crate::r#loop::report::Status;
 use crate::supervision::flags::Flag;
 use crate::supervision::reactions::Reaction;
 
-use super::support::looped::{adaptive, article, model};
+use super::support::looped::{Loop, adaptive, article, model};
 use super::support::{self, PERIOD, UNITS};
 
 /// Xorshift.
@@ -38,7 +39,7 @@ fn steps() -> u64 {
 
 /// A hand that moves, rests, trembles and jumps, ticks that come late, images of every kind, an operator who goes on:
 /// every command keeps the law.
-fn torture(mut reduction: Box<HysteresisReduction>, seed: u64) {
+fn stress<P: Profile>(mut reduction: Loop<P>, seed: u64) {
     let mut chance = Chance(seed);
     let truth = model();
     let (mut reference, mut speed, mut time) = ([0.025, 0.0, 0.9], [0.0; 3], 0.0);
@@ -80,12 +81,12 @@ fn torture(mut reduction: Box<HysteresisReduction>, seed: u64) {
         let stamp = (!chance.once_in(20_000))
             .then_some(time - 0.06 * f64::from(u8::from(chance.once_in(20_000))));
         let now = reduction.step(next, stamp, time);
-        let limits = UNITS.map(support::monitor);
+        let limits = support::safety();
         for dof in 0..3 {
             let dc = now[dof] - command[dof];
             let du = next[dof] - reference[dof];
-            // The clutch's offset, which no one sees, is as large as the travel.
-            let (least, largest) = limits[dof].travel;
+            // The offset of the reference gate, which is not observed here, is as large as the travel.
+            let (least, largest) = limits.command_travel[dof];
             let rounding = 16.0 * f64::EPSILON * (largest - least);
             let facts = format!("seed {seed}, tick {tick}, DOF {dof}: {dc} for {du}");
             assert!(now[dof].is_finite(), "{facts}");
@@ -95,7 +96,10 @@ fn torture(mut reduction: Box<HysteresisReduction>, seed: u64) {
             }
             assert!(dc * du >= 0.0 || dc.abs() <= rounding, "{facts}");
             assert!(dc.abs() <= 5.0 * du.abs() + rounding, "{facts}");
-            assert!(dc.abs() <= limits[dof].step_limit + rounding, "{facts}");
+            assert!(
+                dc.abs() <= limits.command_speed[dof] * PERIOD + rounding,
+                "{facts}"
+            );
             assert!((least..=largest).contains(&now[dof]), "{facts}");
         }
         command = now;
@@ -135,12 +139,12 @@ fn torture(mut reduction: Box<HysteresisReduction>, seed: u64) {
 
 #[test]
 fn no_command_ever_breaks_the_law_in_the_articles_scheme() {
-    torture(article(|_| Play::new(0.0, 0.0).unwrap()), 2013);
+    stress(article(|_| Play::new(0.0, 0.0).unwrap()), 2013);
 }
 
 #[test]
 fn no_command_ever_breaks_the_law_in_the_best_profile() {
-    torture(adaptive(), 652);
+    stress(adaptive(), 652);
 }
 
 /// c - u - (1 - 1 / `K_b`) p is what it was, however many reversals came.

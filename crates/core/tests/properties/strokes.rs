@@ -2,16 +2,12 @@
 
 use crate::article::play::Play;
 use crate::supervision::flags::{Flag, Flags};
-use crate::supervision::motion_monitor::{MotionMonitor, MotionMonitorSettings};
+use crate::supervision::motion_monitor::MotionMonitor;
 use crate::supervision::turning_points::TurningPoints;
 use proptest::prelude::*;
 
 use super::config;
-use super::support::{UNITS, monitors};
-
-fn settings() -> MotionMonitorSettings {
-    monitors().motion
-}
+use super::support::{PERIOD, UNITS, dofs, safety};
 
 /// One DOF, in units.
 struct Bench {
@@ -23,7 +19,7 @@ struct Bench {
 impl Bench {
     fn new(dof: usize) -> Self {
         Self {
-            watch: MotionMonitor::new(settings()).unwrap(),
+            watch: MotionMonitor::new(&safety(), &dofs(), PERIOD).unwrap(),
             dof,
             // No time is near 0.
             time: 50.0,
@@ -38,7 +34,8 @@ impl Bench {
         references[self.dof] = reference * unit;
         tips[self.dof] = tip * unit;
         let play = Play::new(minus * unit, plus * unit).unwrap();
-        self.watch.look(self.time, references, tips, [play; 3])
+        self.watch
+            .update_measurement(self.time, references, tips, [play; 3])
     }
 }
 
@@ -72,7 +69,7 @@ proptest! {
             let ahead: [f64; 3] = [gone - 1.5 * travel, gone - travel - AHEAD, gone - travel + sign * lag - AHEAD];
             prop_assume!(ahead.iter().all(|each| each.abs() > 1e-6));
             let expected = ahead.iter().all(|each| *each > 0.0);
-            prop_assert_eq!(found.has(Flag::Overcompensation), expected, "{} of {}, {}", gone, travel, lag);
+            prop_assert_eq!(found.contains(Flag::Overcompensation), expected, "{} of {}, {}", gone, travel, lag);
         }
     }
 
@@ -126,7 +123,7 @@ proptest! {
                 *last = (now, shown > 0 && now >= 1.1 * last.0);
             }
             shown += 1;
-            prop_assert_eq!(found.has(Flag::LimitCycle), grown.iter().all(|each| *each >= 4), "leg {}", count);
+            prop_assert_eq!(found.contains(Flag::LimitCycle), grown.iter().all(|each| *each >= 4), "leg {}", count);
         }
     }
 
@@ -136,24 +133,24 @@ proptest! {
         ways in prop::collection::vec(0.1..5.0_f64, 2..20), steps in 1..9_u32, band in 0.05..0.09,
     ) {
         let mut swings = TurningPoints::new(band);
-        prop_assert_eq!((swings.follow(7.0), swings.direction()), (None, 0.0));
+        prop_assert_eq!((swings.update(7.0), swings.direction()), (None, 0.0));
         let (mut at, mut side) = (7.0, 1.0);
         for (count, way) in ways.iter().enumerate() {
             let from = at;
             let mut found = Vec::new();
             for step in 1..=steps {
                 at = from + side * way * f64::from(step) / f64::from(steps);
-                found.extend(swings.follow(at));
+                found.extend(swings.update(at));
                 // Back within the band it turns nowhere.
                 if swings.direction() == side {
-                    prop_assert_eq!(swings.follow(at - side * 0.9 * band), None);
+                    prop_assert_eq!(swings.update(at - side * 0.9 * band), None);
                 }
             }
             let expected = usize::from(count > 0);
             prop_assert_eq!(found.len(), expected, "leg {}", count);
             prop_assert!(found.iter().all(|swing| (swing - ways[count - 1]).abs() < 1e-9));
             prop_assert_eq!(swings.direction(), side);
-            prop_assert!(swings.is_farthest(at) && !swings.is_farthest(from));
+            prop_assert!(swings.is_extreme(at) && !swings.is_extreme(from));
             side = -side;
         }
     }
@@ -170,22 +167,22 @@ fn an_image_that_shows_no_tip_says_nothing_of_what_was_seen_before() {
         at += leg;
         found = bench.look(0.5, at, at, NO_SLACK);
     }
-    assert!(found.has(Flag::LimitCycle));
+    assert!(found.contains(Flag::LimitCycle));
     assert_eq!(bench.look(0.1, at, f64::NAN, NO_SLACK), Flags::NONE);
     assert_eq!(bench.look(0.1, f64::NAN, at, NO_SLACK), Flags::NONE);
-    assert!(bench.look(0.1, at, at, NO_SLACK).has(Flag::LimitCycle));
+    assert!(bench.look(0.1, at, at, NO_SLACK).contains(Flag::LimitCycle));
 }
 
 /// One tremor in any DOF is one.
 #[test]
 fn any_dof_may_tremble() {
     for dof in 0..3 {
-        let mut watch = MotionMonitor::new(settings()).unwrap();
+        let mut watch = MotionMonitor::new(&safety(), &dofs(), PERIOD).unwrap();
         let mut all = Flags::NONE;
         for tick in 0..1000_u32 {
             let mut hand = [0.0; 3];
             hand[dof] = UNITS[dof] * if tick % 20 < 10 { 1.0 } else { -1.0 };
-            all = all.and(watch.tick(hand));
+            all = all.union(watch.update_reference(hand));
         }
         assert_eq!(all, Flags::of(Flag::Tremor), "{dof}");
     }

@@ -1,14 +1,16 @@
-//! The table, and what the supervisor makes of any sequence of events.
+//! The supervisor: the table of reactions, and any sequence of events.
 
 use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::reactions::{Clear, Reaction, Source, TABLE};
-use crate::supervision::supervisor::{Event, Supervisor, SupervisorSettings};
+use crate::supervision::settings::SafetySettings;
+use crate::supervision::supervisor::{Event, Supervisor};
 use proptest::prelude::*;
 
-use super::{config, support};
+use super::config;
+use super::support::safety;
 
 fn supervisor() -> Supervisor {
-    Supervisor::new(support::supervisor()).unwrap()
+    Supervisor::new(&safety()).unwrap()
 }
 
 fn event(source: Source, time: f64, travel: f64, raised: Flags) -> Event {
@@ -31,7 +33,7 @@ enum Action {
 fn flags() -> impl Strategy<Value = Flags> {
     prop::collection::vec(prop::sample::select(Flag::ALL), 0..3).prop_map(|all| {
         all.into_iter()
-            .fold(Flags::NONE, |sum, one| sum.and(Flags::of(one)))
+            .fold(Flags::NONE, |sum, one| sum.union(Flags::of(one)))
     })
 }
 
@@ -58,7 +60,7 @@ fn apply(supervisor: &mut Supervisor, now: &mut f64, action: &Action, more: Flag
                 source: *source,
                 time: if step.is_nan() { f64::NAN } else { *now },
                 travel: *travel,
-                raised: raised.and(more),
+                raised: raised.union(more),
                 severe: *severe,
             });
         }
@@ -68,40 +70,40 @@ fn apply(supervisor: &mut Supervisor, now: &mut f64, action: &Action, more: Flag
 }
 
 #[test]
-fn the_table_has_every_flag_in_its_place_and_ladders_go_up() {
+fn the_table_has_every_flag_in_its_place_and_levels_increase() {
     assert_eq!(TABLE.len(), Flag::ALL.len());
     for (rule, flag) in TABLE.iter().zip(Flag::ALL) {
         assert_eq!(rule.flag, *flag);
-        assert!(!rule.ladder.is_empty(), "{flag:?}");
-        assert!(rule.ladder.is_sorted_by(|a, b| a.0 < b.0), "{flag:?}");
-        for (reaction, clear) in rule.ladder {
-            let by_itself = *clear == Clear::Auto;
-            // Motion that has been stopped never starts by itself; drives that were disabled need a new start.
-            assert_eq!(by_itself, *reaction < Reaction::PassThrough, "{flag:?}");
+        assert!(!rule.levels.is_empty(), "{flag:?}");
+        assert!(rule.levels.is_sorted_by(|a, b| a.0 < b.0), "{flag:?}");
+        for (reaction, clear) in rule.levels {
+            let is_automatic = *clear == Clear::Auto;
+            // Motion that was stopped never restarts by itself; drives that were disabled need a new start.
+            assert_eq!(is_automatic, *reaction < Reaction::PassThrough, "{flag:?}");
             assert_eq!(
                 *clear == Clear::Restart,
                 *reaction == Reaction::Disable,
                 "{flag:?}"
             );
-            assert!(!by_itself || rule.source != Source::Rig, "{flag:?}");
+            assert!(!is_automatic || rule.source != Source::Rig, "{flag:?}");
         }
-        assert!(!rule.climbs || rule.ladder.len() > 1, "{flag:?}");
+        assert!(!rule.escalates || rule.levels.len() > 1, "{flag:?}");
     }
 }
 
 #[test]
-fn every_rung_is_reached_and_cleared_as_the_table_says() {
+fn every_level_is_reached_and_cleared_as_the_table_says() {
     for rule in &TABLE {
-        for (rung, (reaction, clear)) in rule.ladder.iter().enumerate() {
+        for (level, (reaction, clear)) in rule.levels.iter().enumerate() {
             let mut supervisor = supervisor();
             let flag = Flags::of(rule.flag);
-            let severe = if rung > 0 && !rule.climbs {
+            let severe = if level > 0 && !rule.escalates {
                 flag
             } else {
                 Flags::NONE
             };
             let mut now = 0.0;
-            for _ in 0..=rung {
+            for _ in 0..=level {
                 supervisor.update(&Event {
                     source: rule.source,
                     time: now,
@@ -144,7 +146,7 @@ fn every_rung_is_reached_and_cleared_as_the_table_says() {
             assert_eq!(
                 supervisor.latched(),
                 flag,
-                "a warning stays until it is seen"
+                "a warning stays until it is acknowledged"
             );
             supervisor.acknowledge();
             assert!(supervisor.latched().is_empty());
@@ -153,7 +155,7 @@ fn every_rung_is_reached_and_cleared_as_the_table_says() {
 }
 
 #[test]
-fn hold_ends_by_time_or_by_travel_then_motion_fades_and_comes_back_once_seen() {
+fn a_hold_ends_by_time_or_travel_and_compensation_returns_once_acknowledged() {
     let frozen = Flags::of(Flag::Frozen);
     let mut by_travel = supervisor();
     by_travel.update(&event(Source::Frame, 0.0, 0.0, frozen));
@@ -168,32 +170,32 @@ fn hold_ends_by_time_or_by_travel_then_motion_fades_and_comes_back_once_seen() {
     supervisor.update(&event(Source::Frame, 0.0, 0.0, frozen));
     supervisor.update(&event(Source::Frame, 4.0, 0.0, frozen));
     assert_eq!(supervisor.reaction(), Reaction::Fade);
-    // Not by the clock.
+    // Time alone changes nothing.
     supervisor.update(&event(Source::Tick, 1000.0, 0.0, Flags::NONE));
-    assert!((supervisor.lead() - 1.0).abs() < 1e-12);
+    assert!((supervisor.gain_share() - 1.0).abs() < 1e-12);
     supervisor.update(&event(Source::Tick, 1000.0, 0.5, Flags::NONE));
-    assert!((supervisor.lead() - 0.75).abs() < 1e-12);
+    assert!((supervisor.gain_share() - 0.75).abs() < 1e-12);
     for _ in 0..5 {
         supervisor.update(&event(Source::Frame, 1000.0, 0.0, Flags::NONE));
     }
     assert_eq!(supervisor.reaction(), Reaction::None);
     supervisor.update(&event(Source::Tick, 1001.0, 9.0, Flags::NONE));
     assert!(
-        (supervisor.lead() - 0.75).abs() < 1e-12,
-        "nobody has seen the warning"
+        (supervisor.gain_share() - 0.75).abs() < 1e-12,
+        "the warning was not acknowledged"
     );
     supervisor.acknowledge();
     supervisor.update(&event(Source::Tick, 1001.0, 0.3, Flags::NONE));
-    assert!((supervisor.lead() - 0.9).abs() < 1e-12);
+    assert!((supervisor.gain_share() - 0.9).abs() < 1e-12);
     supervisor.update(&event(Source::Tick, 1001.0, 9.0, Flags::NONE));
-    assert!((supervisor.lead() - 1.0).abs() < 1e-12);
+    assert!((supervisor.gain_share() - 1.0).abs() < 1e-12);
 }
 
-/// The longest time and travel there may be: with either the hold is over.
+/// A hold is over when its time or its travel is reached.
 #[test]
 fn a_hold_ends_on_its_bound() {
     let frozen = Flags::of(Flag::Frozen);
-    let settings = support::supervisor();
+    let settings = safety();
     for (time, travel, expected) in [
         (settings.hold_time, 0.0, Reaction::Fade),
         (0.0, settings.hold_travel, Reaction::Fade),
@@ -209,53 +211,19 @@ fn a_hold_ends_on_its_bound() {
 
 #[test]
 fn settings_out_of_range_are_named() {
-    let good = support::supervisor();
-    let cases: [(&str, SupervisorSettings); 6] = [
-        (
-            "hold_time",
-            SupervisorSettings {
-                hold_time: -1.0,
-                ..good
-            },
-        ),
-        (
-            "hold_travel",
-            SupervisorSettings {
-                hold_travel: f64::NAN,
-                ..good
-            },
-        ),
-        (
-            "fade_travel",
-            SupervisorSettings {
-                fade_travel: 0.0,
-                ..good
-            },
-        ),
-        (
-            "restore_travel",
-            SupervisorSettings {
-                restore_travel: 0.0,
-                ..good
-            },
-        ),
-        (
-            "good_frames",
-            SupervisorSettings {
-                good_frames: 0,
-                ..good
-            },
-        ),
-        (
-            "good_ticks",
-            SupervisorSettings {
-                good_ticks: 0,
-                ..good
-            },
-        ),
+    type Change = fn(&mut SafetySettings);
+    let changes: [(&str, Change); 6] = [
+        ("hold_time", |s| s.hold_time = -1.0),
+        ("hold_travel", |s| s.hold_travel = f64::NAN),
+        ("fade_travel", |s| s.fade_travel = 0.0),
+        ("restore_travel", |s| s.restore_travel = 0.0),
+        ("good_frames", |s| s.good_frames = 0),
+        ("good_ticks", |s| s.good_ticks = 0),
     ];
-    for (field, settings) in cases {
-        assert_eq!(Supervisor::new(settings).unwrap_err().field, field);
+    for (field, change) in changes {
+        let mut wrong = safety();
+        change(&mut wrong);
+        assert_eq!(Supervisor::new(&wrong).unwrap_err().field, field);
     }
 }
 
@@ -263,23 +231,23 @@ proptest! {
     #![proptest_config(config())]
 
     #[test]
-    fn any_events_keep_the_lead_a_share_and_change_it_by_motion_alone(actions in actions()) {
+    fn any_events_keep_the_gain_share_from_0_to_1_and_change_it_with_motion_only(actions in actions()) {
         let (mut supervisor, mut now) = (supervisor(), 0.0);
         for action in actions {
-            let before = supervisor.lead();
+            let before = supervisor.gain_share();
             apply(&mut supervisor, &mut now, &action, Flags::NONE);
-            let lead = supervisor.lead();
-            prop_assert!((0.0..=1.0).contains(&lead));
+            let share = supervisor.gain_share();
+            prop_assert!((0.0..=1.0).contains(&share));
             let passes = supervisor.reaction() == Reaction::PassThrough;
             let still = !matches!(action, Action::Update(_, _, travel, _, _) if travel > 0.0);
-            prop_assert!(passes || !still || (lead - before).abs() == 0.0);
+            prop_assert!(passes || !still || (share - before).abs() == 0.0);
             prop_assert!(!supervisor.flags().is_empty() || supervisor.reaction() == Reaction::None);
         }
     }
 
-    /// The same history with one more flag raised all the time never has the milder reaction.
+    /// With one more flag raised at every event, the reaction is never weaker.
     #[test]
-    fn more_flags_are_never_answered_more_mildly(
+    fn more_flags_never_weaken_the_reaction(
         actions in actions(), extra in prop::sample::select(Flag::ALL)
     ) {
         let (mut with, mut without) = (supervisor(), supervisor());
@@ -287,7 +255,7 @@ proptest! {
         for action in actions {
             apply(&mut with, &mut now, &action, Flags::of(extra));
             apply(&mut without, &mut again, &action, Flags::NONE);
-            // What stops motion is cleared by re-engaging, a milder flag is not.
+            // Re-engaging clears a flag that stops motion, and not a weaker one.
             if matches!(action, Action::Update(..)) {
                 prop_assert!(with.reaction() >= without.reaction());
             }

@@ -2,7 +2,8 @@
 
 use crate::article::state::StateEstimator;
 use crate::estimation::posture::Belief;
-use crate::estimation::weighted::{WeightedEstimator, WeightedSettings};
+use crate::estimation::settings::StateEstimationSettings;
+use crate::estimation::weighted::WeightedEstimator;
 use crate::model::camera::{Camera, Pose};
 use crate::model::features::FeatureModel;
 use crate::model::instrument::Instrument;
@@ -10,11 +11,13 @@ use proptest::prelude::*;
 
 use super::config;
 
-const SETTINGS: WeightedSettings = WeightedSettings {
+const SETTINGS: StateEstimationSettings = StateEstimationSettings {
     marker_deviation: 0.3,
     model_deviation: 0.3,
     sideways_deviation: 0.3e-3,
     outlier_distance: 4.0,
+    rest_deviation: 0.0,
+    settling_time: 0.0,
     steps: 12,
 };
 
@@ -26,7 +29,7 @@ fn model() -> FeatureModel {
     )
 }
 
-fn estimator(settings: WeightedSettings) -> WeightedEstimator {
+fn estimator(settings: StateEstimationSettings) -> WeightedEstimator {
     let watch = StateEstimator::new([2e-3, 0.1, 0.1]).unwrap();
     WeightedEstimator::new(watch, settings).unwrap()
 }
@@ -80,27 +83,27 @@ proptest! {
 fn settings_are_checked() {
     let watch = StateEstimator::new([1.0; 3]).unwrap();
     let refused = |settings| WeightedEstimator::new(watch, settings).unwrap_err().field;
-    let wrong = WeightedSettings {
+    let wrong = StateEstimationSettings {
         marker_deviation: 0.0,
         ..SETTINGS
     };
     assert_eq!(refused(wrong), "marker_deviation");
-    let wrong = WeightedSettings {
+    let wrong = StateEstimationSettings {
         model_deviation: -1.0,
         ..SETTINGS
     };
     assert_eq!(refused(wrong), "model_deviation");
-    let wrong = WeightedSettings {
+    let wrong = StateEstimationSettings {
         sideways_deviation: f64::NAN,
         ..SETTINGS
     };
     assert_eq!(refused(wrong), "sideways_deviation");
-    let wrong = WeightedSettings {
+    let wrong = StateEstimationSettings {
         outlier_distance: 0.0,
         ..SETTINGS
     };
     assert_eq!(refused(wrong), "outlier_distance");
-    let wrong = WeightedSettings {
+    let wrong = StateEstimationSettings {
         steps: 0,
         ..SETTINGS
     };

@@ -3,11 +3,11 @@
 use crate::article::compensator::{Compensator, CompensatorState};
 use crate::article::play::Play;
 use crate::supervision::flags::{Flag, Flags};
-use crate::supervision::monitors::MonitorsSettings;
 use crate::supervision::reactions::Reaction;
+use crate::supervision::settings::SafetySettings;
 
 use super::support::looped::{article, article_with};
-use super::support::{PERIOD, UNITS, monitors};
+use super::support::{PERIOD, UNITS, safety};
 
 /// While nothing is wrong, what the loop commands is what the law does by itself.
 #[test]
@@ -77,7 +77,7 @@ fn the_end_of_the_travel_stops_nothing_else() {
 #[test]
 fn a_hand_that_trembles_is_said_unless_it_is_not_looked_for() {
     for off in [Flags::NONE, Flags::of(Flag::Tremor)] {
-        let settings = MonitorsSettings { off, ..monitors() };
+        let settings = SafetySettings { off, ..safety() };
         let mut reduction = article_with(&settings, 0.0, |_| Play::new(0.0, 0.0).unwrap());
         for tick in 0..1000_u32 {
             let time = f64::from(tick) * PERIOD;
@@ -85,21 +85,21 @@ fn a_hand_that_trembles_is_said_unless_it_is_not_looked_for() {
             reduction.step([hand, 0.0, 0.0], None, time);
         }
         let latched = reduction.monitors().supervision().latched;
-        assert_eq!(latched, Flags::of(Flag::Tremor).without(off));
+        assert_eq!(latched, Flags::of(Flag::Tremor).difference(off));
     }
 }
 
 #[test]
 fn what_the_rig_says_counts_unless_it_is_not_looked_for() {
     for off in [Flags::NONE, Flags::of(Flag::FollowingError)] {
-        let settings = MonitorsSettings { off, ..monitors() };
+        let settings = SafetySettings { off, ..safety() };
         let mut reduction = article_with(&settings, 0.0, |_| Play::new(0.0, 0.0).unwrap());
         reduction.step([0.0; 3], None, 0.0);
         reduction.monitors_mut().raise(Flag::FollowingError);
         let supervision = reduction.monitors().supervision();
         assert_eq!(
             supervision.flags,
-            Flags::of(Flag::FollowingError).without(off)
+            Flags::of(Flag::FollowingError).difference(off)
         );
         assert_eq!(supervision.reaction == Reaction::None, !off.is_empty());
     }

@@ -1,94 +1,69 @@
-//! The whole loop of either profile, with every guard.
+//! The whole loop of either profile, with all monitors.
 
 // Every test takes of it what it needs.
 #![allow(dead_code)]
 
 use tautscope_core::{
-    Axis, Camera, Compensator, Estimator, FeatureModel, History, HysteresisReduction, Instrument,
-    Monitors, MonitorsSettings, PerDof, Play, Pose, StateEstimation, StateEstimator,
-    WeightedEstimator, WeightedSettings, Whereabouts, WhereaboutsSettings,
+    Best, Entry, FeatureModel, HysteresisReduction, Paper, Play, Profile, SafetySettings, Settings,
+    history_entries,
 };
 
-use super::{PERIOD, UNITS, monitors};
+use super::{UNITS, safety, settings};
 
-/// What the loop believes of instrument and camera, and what tests take for the truth.
+/// A loop with its history on the heap.
+pub type Loop<P> = HysteresisReduction<P, Vec<Entry>>;
+
+/// Predicted features of the loop, and the ground truth of tests.
 pub fn model() -> FeatureModel {
-    let distortion = [-0.18, 0.05, 0.001, -0.001, -0.005, 0.0, 0.0, 0.0];
-    FeatureModel::new(
-        Instrument::new(18.5e-3, 5e-3, 15e-3, 1.75e-3, 4e-3).unwrap(),
-        Camera::new([424.0, 454.0], [349.6, 285.0], distortion).unwrap(),
-        Pose::new([9e-3, 7e-3, 8e-3], [0.29, -0.37, 0.0]).unwrap(),
-    )
+    settings(&safety()).feature_model().unwrap()
 }
 
-/// The article's scheme, from the slack that `play` gives for a unit.
-pub fn article(play: impl Fn(f64) -> Play) -> Box<HysteresisReduction> {
-    article_with(&monitors(), 0.0, play)
+/// Profile `paper` that starts from the play that `play` gives for a unit.
+pub fn article(play: impl Fn(f64) -> Play) -> Loop<Paper> {
+    article_with(&safety(), 0.0, play)
 }
 
-/// The same with other monitors and the anchor's return.
+/// [`article`] with these settings of the monitors, and the anchor's return.
 pub fn article_with(
-    monitors: &MonitorsSettings,
+    safety: &SafetySettings,
     recovery: f64,
     play: impl Fn(f64) -> Play,
-) -> Box<HysteresisReduction> {
-    let axes = UNITS.map(|unit| {
-        Axis::new(
-            Compensator::new(5.0, 5.0)
-                .and_then(|law| law.with_recovery(recovery))
-                .unwrap(),
-            Estimator::new(unit, 0.4, 0.25).unwrap(),
-            play(unit),
-        )
-    });
-    looped(monitors, axes, StateEstimation::Article(watch()))
+) -> Loop<Paper> {
+    let mut settings = settings(safety);
+    let dofs = [
+        &mut settings.insertion,
+        &mut settings.rotation,
+        &mut settings.bending,
+    ];
+    for (dof, unit) in dofs.into_iter().zip(UNITS) {
+        let play = play(unit);
+        dof.recovery = recovery;
+        (dof.delta_minus, dof.delta_plus) = (play.delta_minus(), play.delta_plus());
+    }
+    looped(&settings)
 }
 
 /// Profile `best`.
-pub fn adaptive() -> Box<HysteresisReduction> {
-    adaptive_with(&monitors(), 4.0)
+pub fn adaptive() -> Loop<Best> {
+    adaptive_with(&safety(), 4.0)
 }
 
-/// The same with other monitors, and other ideas of what one marker may say.
-pub fn adaptive_with(
-    monitors: &MonitorsSettings,
-    outlier_distance: f64,
-) -> Box<HysteresisReduction> {
-    let axes = UNITS.map(|unit| Axis::Adaptive(super::axis(unit)));
-    let settings = WeightedSettings {
-        marker_deviation: 0.3,
-        model_deviation: 0.3,
-        sideways_deviation: 0.3e-3,
-        outlier_distance,
-        steps: 8,
-    };
-    let estimator = WeightedEstimator::new(watch(), settings).unwrap();
-    looped(monitors, axes, StateEstimation::Weighted(estimator))
+/// [`adaptive`] with these settings of the monitors, and the distance from which a marker is an outlier.
+pub fn adaptive_with(safety: &SafetySettings, outlier_distance: f64) -> Loop<Best> {
+    let mut settings = settings(safety);
+    settings.state_estimation.outlier_distance = outlier_distance;
+    looped(&settings)
 }
 
-fn watch() -> StateEstimator {
-    StateEstimator::new([1.0; 3]).unwrap()
+/// [`adaptive`] whose insertion and rotation have friction of their own.
+pub fn adaptive_uncoupled() -> Loop<Best> {
+    let mut settings = settings(&safety());
+    settings.adaptive.one_friction = false;
+    looped(&settings)
 }
 
-fn looped(
-    monitors: &MonitorsSettings,
-    axes: PerDof<Axis>,
-    estimation: StateEstimation,
-) -> Box<HysteresisReduction> {
-    Box::new(
-        HysteresisReduction::new(
-            axes,
-            model(),
-            estimation,
-            History::new(2.0, PERIOD).unwrap(),
-            Whereabouts::new(WhereaboutsSettings {
-                start_deviation: [5e-3, 0.6, 0.5],
-                rest_deviation: [2e-4, 0.02, 0.01],
-                settling_time: 0.15,
-            })
-            .unwrap(),
-            Monitors::new(*monitors).unwrap(),
-        )
-        .with_friction(Some(super::friction())),
-    )
+fn looped<P: Profile>(settings: &Settings) -> Loop<P> {
+    let control = settings.control;
+    let storage = vec![Entry::BLANK; history_entries(control.history, control.period)];
+    HysteresisReduction::new(settings, storage).unwrap()
 }

@@ -1,40 +1,57 @@
-//! Monitors for the tests of the loop: lengths in units of 0.4 mm, 0.04 rad, 0.02 rad.
+//! Settings for the tests of the loop: lengths in units of 0.4 mm, 0.04 rad, 0.02 rad.
 
 pub mod looped;
 pub mod stand_in;
 
 use tautscope_core::{
-    AdaptiveAxis, AdaptiveSettings, ChangeLimit, ChangeSettings, CommandLimits, ContactTest, Flags,
-    FrameGateSettings, Friction, FrictionSettings, GripSettings, LeadLaw, MonitorsSettings,
-    MotionMonitorSettings, OffsetPrior, PerDof, Play, ReferenceGateSettings, SupervisorSettings,
+    AdaptiveSettings, CameraSettings, ControlSettings, DofSettings, Flags, InstrumentSettings,
+    PerDof, PoseSettings, SafetySettings, Settings, StateEstimationSettings,
 };
 
 pub const UNITS: PerDof<f64> = [0.4e-3, 0.04, 0.02];
 pub const PERIOD: f64 = 0.005;
 
-pub fn monitor(unit: f64) -> CommandLimits {
-    CommandLimits {
-        gain_limit: 5.0,
-        step_limit: 5.0 * unit,
-        travel: (-100.0 * unit, 200.0 * unit),
-        lead_limit: 30.0 * unit,
-    }
+/// Settings of the monitors in [`UNITS`].
+pub fn safety() -> SafetySettings {
+    safety_in(UNITS)
 }
 
-pub fn clutch() -> ReferenceGateSettings {
-    ReferenceGateSettings {
-        period: PERIOD,
-        reference_speed: UNITS.map(|unit| unit / PERIOD),
+/// Settings of the monitors with lengths in the given units.
+pub fn safety_in(units: PerDof<f64>) -> SafetySettings {
+    SafetySettings {
+        off: Flags::NONE,
+        width_limit: units.map(|unit| 30.0 * unit),
+        offset_limit: units.map(|unit| 20.0 * unit),
+        reference_speed: units.map(|unit| unit / PERIOD),
         reference_time: 0.05,
-        reference_count: UNITS.map(|unit| 0.125 * unit),
+        command_speed: units.map(|unit| 5.0 * unit / PERIOD),
+        command_travel: units.map(|unit| (-100.0 * unit, 200.0 * unit)),
+        reference_count: units.map(|unit| 0.125 * unit),
         reference_age: 0.05,
         late_tick: 3.0,
         stall: 0.1,
-    }
-}
-
-pub fn supervisor() -> SupervisorSettings {
-    SupervisorSettings {
+        frame_age: 0.3,
+        frame_gap: 0.18,
+        clock_jump: 1.0,
+        frozen_travel: 1.0,
+        innovation_limit: 5.0,
+        innovation_floor: 0.08,
+        innovation_growth: 0.3,
+        innovation_decay: 0.05,
+        jump: units,
+        slip: units,
+        grip_distance: 10.0,
+        blind_growth: 0.1,
+        tremor_swing: 0.5,
+        tremor_rate: 4.0,
+        ahead_limit: 0.1,
+        ahead_ratio: 1.5,
+        offset_decrease: 2.0,
+        cycle_swings: 4,
+        cycle_growth: 1.1,
+        cycle_time: 2.0,
+        change_limit: units.map(|unit| 2.0 * unit),
+        change_travel: 1.5,
         hold_time: 4.0,
         hold_travel: 4.0,
         fade_travel: 2.0,
@@ -44,92 +61,97 @@ pub fn supervisor() -> SupervisorSettings {
     }
 }
 
-pub fn monitors() -> MonitorsSettings {
-    MonitorsSettings {
-        clutch: clutch(),
-        limits: UNITS.map(monitor),
-        frames: FrameGateSettings {
-            frame_age: 0.3,
-            frame_gap: 0.18,
-            frozen_travel: UNITS,
-            innovation_limit: 5.0,
-            start_deviation: [5e-3, 0.6, 0.5],
-            least_deviation: UNITS,
-            jump: UNITS,
-            grips: UNITS.map(|unit| GripSettings {
-                distance: 10.0 * unit,
-                slip: unit,
-            }),
-            blind_growth: 0.1,
-        },
-        motion: MotionMonitorSettings {
-            period: PERIOD,
-            tremor_swing: UNITS.map(|unit| 0.5 * unit),
-            slack: UNITS.map(|unit| 30.0 * unit),
-            tremor_rate: 4.0,
-            turn: UNITS,
-            ahead: UNITS.map(|unit| 3.0 * unit),
-            cycle_swings: 4,
-            cycle_time: 2.0,
-        },
-        changes: ChangeSettings {
-            limit: UNITS.map(|unit| 2.0 * unit),
-            travel: UNITS.map(|unit| 45.0 * unit),
-        },
-        supervisor: supervisor(),
-        width_limit: UNITS.map(|unit| 30.0 * unit),
-        offset_limit: UNITS.map(|unit| 20.0 * unit),
-        off: Flags::NONE,
-    }
-}
-
-/// Of a shaft of 3.5 mm.
-pub fn friction() -> Friction {
-    Friction::new(FrictionSettings {
-        arm: 1.75e-3,
-        memory: 0.2e-3,
-        deviation: 0.25,
-    })
-    .unwrap()
-}
-
-/// A DOF of profile `best` with lengths in units of `unit`.
-pub fn axis(unit: f64) -> AdaptiveAxis {
-    let settings = AdaptiveSettings {
-        law: LeadLaw {
-            free_gain: 5.0,
-            contact_gain: 2.0,
-            taper: unit,
-            settling: unit,
-        },
-        cautious_gain: 1.5,
-        cautious_deviation: 3.0 * unit,
-        prior: OffsetPrior {
-            spacing: 6.0 * unit,
-            level: 20.0 * unit,
-            tilt: 0.3,
-            local: unit,
-            correlation: 40.0 * unit,
-            level_drift: unit,
-            tilt_drift: 0.1,
-            local_drift: unit,
-            symmetry: 0.8,
-        },
-        change: ChangeLimit {
-            rate: 0.03,
-            spare: unit,
-            known: 50.0 * unit,
-        },
-        contact: ContactTest {
-            distance: 3.0 * unit,
-            moved: 3.0 * unit,
-            tolerance: 0.25,
-        },
-        model_deviation: unit,
-        correction: 1.0,
+/// Settings of the DOFs, with lengths in [`UNITS`].
+pub fn dofs() -> PerDof<DofSettings> {
+    let [insertion, rotation, bending] = UNITS.map(|unit| DofSettings {
+        update_distance: unit,
+        observable_deviation: 1.0,
+        start_deviation: 5e-3,
+        free_gain: 5.0,
         gain_limit: 5.0,
-        tremor_time: 0.15,
-        period: 0.005,
+        recovery: 0.0,
+        contact_tolerance: 0.4,
+        smoothing_factor: 0.25,
+        delta_minus: 0.0,
+        delta_plus: 0.0,
+    });
+    let rotation = DofSettings {
+        start_deviation: 0.6,
+        ..rotation
     };
-    AdaptiveAxis::new(settings, Play::new(0.0, 0.0).unwrap()).unwrap()
+    let bending = DofSettings {
+        start_deviation: 0.5,
+        ..bending
+    };
+    [insertion, rotation, bending]
+}
+
+/// Settings of a loop with these settings of the monitors.
+pub fn settings(safety: &SafetySettings) -> Settings {
+    let [insertion, rotation, bending] = dofs();
+    Settings {
+        insertion,
+        rotation,
+        bending,
+        instrument: InstrumentSettings {
+            bending_length: 18.5e-3,
+            marker_a: 5e-3,
+            marker_b: 15e-3,
+            diameter: 3.5e-3,
+            band_length: 4e-3,
+        },
+        camera: CameraSettings {
+            fx: 424.0,
+            fy: 454.0,
+            cx: 349.6,
+            cy: 285.0,
+            distortion: [-0.18, 0.05, 0.001, -0.001, -0.005, 0.0, 0.0, 0.0],
+            camera_from_guide: PoseSettings {
+                translation: [9e-3, 7e-3, 8e-3],
+                rotation: [0.29, -0.37, 0.0],
+            },
+        },
+        control: ControlSettings {
+            period: PERIOD,
+            history: 2.0,
+        },
+        safety: *safety,
+        adaptive: AdaptiveSettings {
+            contact_gain: 2.0,
+            cautious_gain: 1.5,
+            cautious_deviation: 3.0,
+            taper: 1.0,
+            settling: 1.0,
+            tremor_time: 0.15,
+            node_spacing: 6.0,
+            level_deviation: 20.0,
+            gain_deviation: 0.3,
+            local_deviation: 1.0,
+            correlation: 40.0,
+            level_drift: 0.2,
+            gain_drift: 0.002,
+            local_drift: 0.03,
+            symmetry: 0.8,
+            change_rate: UNITS.map(|unit| 0.03 / unit),
+            change_spare: 1.0,
+            known_travel: 50.0,
+            contact_distance: 3.0,
+            contact_moved: 3.0,
+            slope_tolerance: 0.25,
+            model_deviation: 1.0,
+            state_correction: 1.0,
+            one_friction: true,
+            friction_memory: 0.5,
+            friction_deviation: 0.25,
+        },
+        state_estimation: StateEstimationSettings {
+            marker_deviation: 0.3,
+            model_deviation: 0.3,
+            sideways_deviation: 0.3e-3,
+            outlier_distance: 4.0,
+            steps: 8,
+            rest_deviation: 0.5,
+            settling_time: 0.15,
+        },
+    }
 }
