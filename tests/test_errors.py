@@ -23,7 +23,7 @@ def test_an_error_says_where_what_and_what_may_come(kind: type[errors.FieldError
 def test_importing_the_package_is_light() -> None:
     script = (
         "import sys, tautscope\n"
-        "tautscope.load_config(); tautscope.report.metrics; tautscope.runs.replay\n"
+        "tautscope.load_config(); tautscope.metrics; tautscope.replay\n"
         "heavy = {'mujoco', 'cv2', 'matplotlib', 'can', 'rich'} & set(sys.modules)\n"
         "sys.exit(f'imported: {heavy}' if heavy else 0)"
     )

@@ -226,7 +226,7 @@ class Answering(Executor):
 def test_images_looked_at_aside_hold_up_no_tick(late: int, compensated: Recording) -> None:
     """Every tick is made; with slow eyes fewer frames are seen, each later and as it would be."""
     eyes = Answering(late)
-    aside = run_experiment(DrawnRig(CONFIG), REFERENCE, CONFIG, aside=eyes)
+    aside = run_experiment(DrawnRig(CONFIG), REFERENCE, CONFIG, executor=eyes)
     np.testing.assert_array_equal(aside.trace["time"], compensated.trace["time"])
     assert eyes.asked >= len(aside.frames) > 0
     assert (np.diff(aside.frames["captured_at"]) > 0).all()

@@ -11,8 +11,8 @@ import pytest
 from matplotlib.figure import Figure
 from tautscope.dof import Dof
 from tautscope.report import figures, tables
-from tautscope.report.demo import Demo
-from tautscope.report.report import Picture, demo_report, run_report
+from tautscope.report.demo import Demo, demo_report
+from tautscope.report.report import CaptionedFigure, run_report
 from tautscope.report.results import DofResult, evaluate
 from tautscope.report.tables import ROWS, article_cell, cell
 from tautscope.runs.recording import Recording
@@ -58,7 +58,8 @@ def demo(runs: tuple[Recording, Recording]) -> Demo:
 
 
 def test_the_report_needs_nothing_else(demo: Demo) -> None:
-    page_text = demo_report(demo, [Picture(Figure(figsize=(2, 1)), "A <figure> of nothing.")])
+    figure = CaptionedFigure(Figure(figsize=(2, 1)), "A <figure> of nothing.")
+    page_text = demo_report(demo, [figure])
     page = Page(page_text)
     assert page.open == []
     assert {"script", "link", "iframe"}.isdisjoint(page.tags)

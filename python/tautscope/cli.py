@@ -7,12 +7,9 @@ import sys
 from collections.abc import Sequence
 
 from tautscope._core import __version__
-from tautscope.commands import analyze, arguments, demo
+from tautscope.commands import analyze, arguments, demo, doctor, hardware, log
 from tautscope.config import dump_config, load_config
 from tautscope.errors import TautscopeError
-from tautscope.hardware import commands as hardware
-from tautscope.hardware.doctor import commands as doctor
-from tautscope.log import commands as log
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -1,17 +1,15 @@
 """Users import runs on a rig from here; the code is in `tautscope.runs.experiment`."""
 
 from tautscope.runs.experiment import (
+    ImageUpdate,
     Log,
-    Look,
     Progress,
-    Seen,
     run_experiment,
 )
 
 __all__ = [
+    "ImageUpdate",
     "Log",
-    "Look",
     "Progress",
-    "Seen",
     "run_experiment",
 ]

@@ -166,7 +166,7 @@ def test_a_replay_is_identical_where_guards_acted(
     path = tmp_path / "run.mcap"
     with ThreadPoolExecutor(1) as eyes, LogWriter(path, config, wait=True) as log:
         aside = eyes if is_aside else None
-        run = run_experiment(Troubled(config), reference, config, log=log, aside=aside)
+        run = run_experiment(Troubled(config), reference, config, log=log, executor=aside)
     if not is_aside:  # which frames are seen aside is a matter of time
         assert flags(run) >= NOTICED
     assert flags(run) >= {"reference_jump", "reference_late"}

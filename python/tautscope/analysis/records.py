@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from os import PathLike
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.analysis.models.registry import MODELS, NO_MODEL, Model
-from tautscope.analysis.models.task import Floats, Prediction, Task
+from tautscope.analysis.models.task import Prediction, Task
 from tautscope.config import Config
 from tautscope.errors import RecordError
 from tautscope.report import metrics
 from tautscope.report.tables import finite_or_none
-from tautscope.runs.output_folder import new_folder
 from tautscope.runs.replay import Record
 
 
@@ -114,41 +112,3 @@ def analyze(
         return Entry(model, prediction, metrics.rms(errors))
 
     return Analysis(record, half, tuple(entry(model) for model in models))
-
-
-def write_analysis(analysis: Analysis, folder: str | PathLike[str]) -> None:
-    """Make a folder with analysis.csv (every sample) and analyze.png, or nothing.
-
-    Raises:
-        OutputError: The folder holds something already, or cannot be written.
-    """
-    # matplotlib takes half a second
-    from tautscope.analysis.figure import analysis_figure  # noqa: PLC0415
-    from tautscope.report.figures import style  # noqa: PLC0415
-
-    columns = _columns(analysis)
-    figure = analysis_figure(analysis)
-    with new_folder(folder) as place, style():
-        np.savetxt(
-            place / "analysis.csv",
-            np.column_stack(list(columns.values())),
-            delimiter=",",
-            header=",".join(columns),
-            comments="",
-            fmt=["%d", *["%.9g"] * (len(columns) - 1)],
-        )
-        figure.savefig(place / "analyze.png")
-
-
-def _columns(analysis: Analysis) -> dict[str, Floats | NDArray[np.int64]]:
-    """Line of the file, time if it was read, signals, then what each model said and knew."""
-    record = analysis.record
-    columns: dict[str, Floats | NDArray[np.int64]] = {"line": record.rows}
-    if record.time is not None:
-        columns["time"] = record.time
-    columns |= {"command": record.command, "measured": record.measured}
-    for entry in analysis.entries:
-        columns[entry.model.name] = entry.prediction.tip
-        for name, trace in entry.prediction.traces.items():
-            columns[f"{entry.model.name}_{name}"] = trace
-    return columns

@@ -1,1 +1,1 @@
-"""Verbs of the command line; those of logs, of hardware and ``doctor`` are in their packages."""
+"""The verbs of the command line, and what they share: options, printing, progress."""

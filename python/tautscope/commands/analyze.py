@@ -50,15 +50,16 @@ def add_parser(verbs: arguments.Verbs) -> None:
 
 
 def _run(options: argparse.Namespace) -> None:
-    from tautscope.analysis import records as analysis  # noqa: PLC0415
+    from tautscope.analysis.output import write_analysis  # noqa: PLC0415
+    from tautscope.analysis.records import analyze  # noqa: PLC0415
     from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
     from tautscope.runs.replay import read_record  # noqa: PLC0415
 
     config = load_config(options.config)
     folder = check_free(options.out or default_folder("analyze"))
     record = read_record(options.file, options.command, options.measured, options.time)
-    found = analysis.analyze(record, config, options.update_distance, options.gain)
-    analysis.write_analysis(found, folder)
+    found = analyze(record, config, options.update_distance, options.gain)
+    write_analysis(found, folder)
     if options.json:
         print_json(found.to_json())
     else:

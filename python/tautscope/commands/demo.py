@@ -136,5 +136,5 @@ def _print_table1(demo: Demo, folder: Path) -> None:
         f"Widths in the last two periods, of the true tip unless said."
     )
     for line in demo.compensated.warnings:
-        screen.print(f"Noticed: {line}.", soft_wrap=True)
+        screen.print(f"Warning: {line}.", soft_wrap=True)
     screen.print(f"Report, figures and traces: {folder / 'report.html'}", soft_wrap=True)

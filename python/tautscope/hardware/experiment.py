@@ -139,21 +139,22 @@ def run_on_hardware(
 
 def write_run_folder(run: HardwareRun, folder: Path) -> None:
     """Tables, timing, figures and report, beside the logs that are there."""
+    from tautscope.hardware.timing_figure import timing_figure  # noqa: PLC0415  matplotlib
     from tautscope.report import figures, report, tables  # noqa: PLC0415  matplotlib takes half a second
 
     first, results = run.compensated, run.results
     first.recording.write(folder)
-    picture = figures.timing_figure(first.timing)
+    picture = timing_figure(first.timing)
     plain = None if run.uncompensated is None else run.uncompensated.recording
     loops = figures.figure9(plain, first.recording)
     pictures = [
-        report.Picture(
+        report.CaptionedFigure(
             loops,
             "Fig. 9. (a)-(c) with compensation: reference, command, estimate and both contact "
             "offsets. (d)-(f) loops of the estimate; the first period, in which the slack is "
             "learnt, is thin. The dashed line is a perfect tip.",
         ),
-        report.Picture(
+        report.CaptionedFigure(
             picture,
             "How punctual the run was. (a), (b) how much later than due each set-point was sent; "
             "(c), (d) from capture until the loop was given the frame.",
@@ -200,7 +201,7 @@ def _run(
                 compensate,
                 lambda elapsed, duration: progress(min(elapsed / duration, 1.0)),
                 log=_Watched(log, config),
-                aside=eyes,
+                executor=eyes,
                 watch=lambda standing: _obey(rig, standing),
             )
         except BaseException as error:

@@ -27,7 +27,7 @@ from tautscope.log.images import ImageCodec
 from tautscope.loop.references import Segment
 from tautscope.loop.rig import Sample
 from tautscope.runs.recording import Recording
-from tautscope.runs.run_recorder import Row, Tables
+from tautscope.runs.run_recorder import Row, RunRecorder
 
 _LARGEST_CHUNK = 2**30
 """What a chunk may say it unpacks to [bytes]; ours are a few MB, and a hostile one would fill the
@@ -142,13 +142,13 @@ class Log:
 
     def recording(self) -> Recording:
         """Trace and frames, as `run_experiment` returned them; the snapshot is None."""
-        tables = Tables(self.config)
+        recorder = RunRecorder(self.config)
         for event in self.events.values():
             if isinstance(event, Tick):
-                tables.tick(event.sample, event.reference, event.command)
+                recorder.add_tick(event.sample, event.reference, event.command)
             elif isinstance(event, Update):
-                tables.frame(event.row, event.delta_minus, event.delta_plus)
-        return Recording(*tables.tables(), self.config, self.compensated, self.segments)
+                recorder.add_frame(event.row, event.delta_minus, event.delta_plus)
+        return Recording(*recorder.tables(), self.config, self.compensated, self.segments)
 
 
 @dataclass(frozen=True, slots=True)

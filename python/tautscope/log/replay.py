@@ -24,7 +24,7 @@ from tautscope.loop.rig import Frame, Sample
 from tautscope.loop.safety import DETECTORS
 from tautscope.runs.recording import FEATURES, FRAME_COLUMNS, Recording
 from tautscope.runs.replay import read_motors
-from tautscope.runs.run_recorder import Tables, frame_row
+from tautscope.runs.run_recorder import RunRecorder, frame_row
 
 Floats = NDArray[np.float64]
 
@@ -67,13 +67,13 @@ def replay_same(log: Log) -> tuple[Identity, Recording]:
         RecordError: The log has no tick, or an event that this version does not know.
     """
     loop = HysteresisReduction(log.config, log.compensated)
-    found, tables = Identity(), Tables(log.config)
+    found, recorder = Identity(), RunRecorder(log.config)
     clock = _clock(log)
     for index in range(1, max(log.events, default=0) + 1):
         event = log.events.get(index)
         if isinstance(event, Tick):
             command = loop.step(event.reference, event.sample.time, event.made_at)
-            tables.tick(event.sample, event.reference, command)
+            recorder.add_tick(event.sample, event.reference, command)
             inputs = event.sample, event.reference
             again = msg.tick_messages(clock, *inputs, command, event.made_at)
             found.ticks += 1
@@ -83,7 +83,7 @@ def replay_same(log: Log) -> tuple[Identity, Recording]:
         elif event is not None and log.has_image(index):
             now, frame = _frame(log, index, event)
             report = loop.on_frame(frame)
-            tables.frame(frame_row(now, frame, report), report.delta_minus, report.delta_plus)
+            recorder.add_frame(frame_row(now, frame, report), report.delta_minus, report.delta_plus)
             again = msg.update_messages(clock, now, frame, report)
             found.updates += 1
             found.same_updates += _is_same(found, event, again, f"image {frame.sequence}")
@@ -91,7 +91,7 @@ def replay_same(log: Log) -> tuple[Identity, Recording]:
             what = "image" if event is not None else "tick, image update or event"
             found.ended = f"{what} {index} of {max(log.events)} is not in the log"
             break
-    return found, Recording(*tables.tables(), log.config, log.compensated, log.segments)
+    return found, Recording(*recorder.tables(), log.config, log.compensated, log.segments)
 
 
 def _tell(loop: HysteresisReduction, what: str) -> None:
@@ -236,13 +236,13 @@ def _listen(inputs: Iterable[_Motion | _Sight], config: Config, compensated: boo
     deaf = ("reference_jump", "reference_late", "late_tick", "monitor", "frozen")
     moved = {"safety.off": [*config.safety.off, *deaf]}
     loop = HysteresisReduction(config.replace(**moved), compensate=False)
-    tables = Tables(config)
+    recorder = RunRecorder(config)
     for each in inputs:
         if isinstance(each, _Motion):
             loop.step(each.command, each.sample.time)
-            tables.tick(each.sample, each.reference, each.command)
+            recorder.add_tick(each.sample, each.reference, each.command)
         else:
             report = loop.on_frame(each.frame)
             row = frame_row(each.now, each.frame, report)
-            tables.frame(row, report.delta_minus, report.delta_plus)
-    return Recording(*tables.tables(), config, compensated, ())
+            recorder.add_frame(row, report.delta_minus, report.delta_plus)
+    return Recording(*recorder.tables(), config, compensated, ())

@@ -1,4 +1,4 @@
-"""What is watched in the loop, and what is done about it."""
+"""The flags that monitors raise in the loop, and the reactions to them."""
 
 from __future__ import annotations
 
@@ -13,33 +13,33 @@ from tautscope import _core
 from tautscope.config import Config
 
 DETECTORS: tuple[str, ...] = _core.DETECTORS
-"""The names of all flags, as crates/core/src/flags.rs has them; `safety.off` may name any."""
+"""Names of all flags, defined in crates/core/src/flags.rs; `safety.off` may name any."""
 
 MEANINGS: dict[str, str] = dict(zip(DETECTORS, _core.MEANINGS, strict=True))
-"""What each of them says, in a sentence."""
+"""The meaning of each flag, in a sentence."""
 
 _ROWS_BETWEEN = 8
 
 
 class Reaction(StrEnum):
-    """What the loop does about a flag, R0 to R7; a later one wins over an earlier one."""
+    """Reaction of the loop to a flag, R0 to R7; the later one in this list takes precedence."""
 
     NONE = "none"
-    """Goes on."""
+    """The loop continues."""
     WARN = "warn"
-    """Goes on, and says so until it is acknowledged."""
+    """The loop continues; the warning stays until it is acknowledged."""
     HOLD_ESTIMATE = "hold_estimate"
-    """Compensates with the slack known; images teach nothing."""
+    """Compensation continues with the current offsets; images update no estimate."""
     FADE = "fade"
-    """The same, and gives the compensation up with motion."""
+    """As `HOLD_ESTIMATE`, and the compensation fades out with motion."""
     PASS_THROUGH = "pass_through"
-    """Increments of the command are those of the reference; what the command leads by stays."""
+    """Command increments equal reference increments; the compensation offset is constant."""
     HOLD_MOTION = "hold_motion"
-    """The command rests; motion of the reference is thrown away."""
+    """The command is constant; motion of the reference is discarded."""
     QUICK_STOP = "quick_stop"
-    """The same, and the rig brings its drives to quick stop."""
+    """As `HOLD_MOTION`, and the rig brings its drives to quick stop."""
     DISABLE = "disable"
-    """The same, and the rig disables its drives."""
+    """As `HOLD_MOTION`, and the rig disables its drives."""
 
     @property
     def rank(self) -> int:
@@ -49,13 +49,13 @@ class Reaction(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Supervision:
-    """How the loop stands.
+    """State of the supervisor.
 
     Attributes:
-        reaction: What is in force.
-        flags: Why, by the names of `DETECTORS`.
-        latched: What has been wrong since the last acknowledgement.
-        lead: Share of the free gain in use, 0 to 1.
+        reaction: The reaction in force.
+        flags: The flags in force, by the names of `DETECTORS`.
+        latched: Every flag raised since the last acknowledgement.
+        lead: Share of the gap-crossing gain in use, 0 to 1.
     """
 
     reaction: Reaction
@@ -64,11 +64,11 @@ class Supervision:
     lead: float
 
 
-def switched_off(config: Config) -> tuple[str, ...]:
-    """A line for every guard that does not look."""
+def disabled_monitors(config: Config) -> tuple[str, ...]:
+    """A line for every monitor that ``safety.off`` disables; logs contain these very words."""
     return tuple(f"safety.off = {name}: nobody looks for it" for name in config.safety.off)
 
 
 def checksum(image: NDArray[np.uint8]) -> int:
-    """Of every eighth row: a picture with sensor noise in it never has that of another."""
+    """Checksum of every eighth row: differs between any two images with sensor noise."""
     return zlib.crc32(image[::_ROWS_BETWEEN].tobytes())

@@ -18,7 +18,7 @@ from tautscope.dof import Dof
 from tautscope.errors import MissingPathError, RecordError, SignalError
 
 if TYPE_CHECKING:
-    from tautscope import Estimator
+    from tautscope._core import Estimator
 
 Floats = NDArray[np.float64]
 

@@ -116,7 +116,7 @@ def _run(options: argparse.Namespace) -> int:
     for dof, result in found.results.items():
         print(_seen(dof, result))
     for warning in found.compensated.recording.warnings:
-        print(f"Noticed: {warning}.")
+        print(f"Warning: {warning}.")
     print(f"Report, figures and traces: {folder / 'report.html'}")
     return 0
 

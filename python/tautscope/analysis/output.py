@@ -1,17 +1,52 @@
-"""The figure of an analysis: every model's error and loop, one below the other."""
+"""The files of an analysis: every sample as CSV, every model's error and loop as a figure."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from os import PathLike
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from tautscope.analysis.models.registry import NO_MODEL
+from tautscope.analysis.models.task import Floats
+from tautscope.analysis.records import Analysis
 from tautscope.report.figures import BLUE, GREY, PAGE, style
+from tautscope.runs.output_folder import new_folder
 
-if TYPE_CHECKING:
-    from tautscope.analysis.records import Analysis
+
+def write_analysis(analysis: Analysis, folder: str | PathLike[str]) -> None:
+    """Make a folder with analysis.csv (every sample) and analyze.png, or nothing.
+
+    Raises:
+        OutputError: The folder holds something already, or cannot be written.
+    """
+    columns = _columns(analysis)
+    figure = analysis_figure(analysis)
+    with new_folder(folder) as place, style():
+        np.savetxt(
+            place / "analysis.csv",
+            np.column_stack(list(columns.values())),
+            delimiter=",",
+            header=",".join(columns),
+            comments="",
+            fmt=["%d", *["%.9g"] * (len(columns) - 1)],
+        )
+        figure.savefig(place / "analyze.png")
+
+
+def _columns(analysis: Analysis) -> dict[str, Floats | NDArray[np.int64]]:
+    """Line of the file, time if it was read, signals, then what each model said and knew."""
+    record = analysis.record
+    columns: dict[str, Floats | NDArray[np.int64]] = {"line": record.rows}
+    if record.time is not None:
+        columns["time"] = record.time
+    columns |= {"command": record.command, "measured": record.measured}
+    for entry in analysis.entries:
+        columns[entry.model.name] = entry.prediction.tip
+        for name, trace in entry.prediction.traces.items():
+            columns[f"{entry.model.name}_{name}"] = trace
+    return columns
 
 
 def analysis_figure(found: Analysis) -> Figure:
