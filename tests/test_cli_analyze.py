@@ -72,8 +72,8 @@ def test_analyze_prints_a_row_per_model(capsys: pytest.CaptureFixture[str], tmp_
     text = capsys.readouterr().out
     for model in MODELS:
         assert f"\n{model.title} " in text
-        assert model.learns in text
-    assert "2999 samples, 1500 of them scored; lines without a command, left out: 1;" in text
+        assert model.fitted_to in text
+    assert "2999 samples, 1500 of them scored; lines without a command, removed: 1;" in text
     assert "not checked without --time" in text
 
 

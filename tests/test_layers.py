@@ -68,7 +68,7 @@ def test_a_planted_circle_is_found(copy: Path, planted: str) -> None:
     [
         ("loop/rig.py", "tautscope.runs.recording"),
         ("twin/camera.py", "tautscope.runs.output_folder"),
-        ("log/journal.py", "tautscope.analysis.records"),
+        ("log/journal.py", "tautscope.analysis.comparison"),
         ("runs/trials.py", "tautscope.rig"),
         (None, None),
     ],

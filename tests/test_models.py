@@ -10,16 +10,16 @@ from drawn import EXAMPLES
 from numpy.typing import NDArray
 from play_model import play
 from scipy.integrate import solve_ivp
+from tautscope.analysis.comparison import analyze
 from tautscope.analysis.models import bouc_wen, constant_play, prandtl_ishlinskii
 from tautscope.analysis.models.bouc_wen import BoucWen, hysteretic_variable
 from tautscope.analysis.models.prandtl_ishlinskii import PrandtlIshlinskii
 from tautscope.analysis.models.registry import MODELS, Model
 from tautscope.analysis.models.task import Task
-from tautscope.analysis.records import analyze
 from tautscope.config import load_config
 from tautscope.dof import Dof
 from tautscope.report.metrics import rms
-from tautscope.runs.replay import Cleaning, Record
+from tautscope.runs.records import Cleaning, Record
 
 Floats = NDArray[np.float64]
 
@@ -233,13 +233,13 @@ def test_what_a_model_may_see(model: Model) -> None:
     changed[at:] += 5
     before = model.run(task(command, measured)).tip
     after = model.run(task(command, changed)).tip
-    if model.learns == "whole record":
+    if model.fitted_to == "whole record":
         assert not np.array_equal(before, after)
     else:
         np.testing.assert_array_equal(after[: at + 1], before[: at + 1])
-    if model.learns == "first half":
+    if model.fitted_to == "first half":
         np.testing.assert_array_equal(after, before)
-    if model.learns == "on-line":
+    if model.fitted_to == "on-line":
         assert not np.array_equal(before[at + 1 :], after[at + 1 :])
         assert np.isnan(before[:1200]).all()
         assert np.isfinite(before[1200:]).all()

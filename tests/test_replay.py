@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from play_model import play
+from tautscope import replay
 from tautscope._core import Estimator
 from tautscope.errors import MissingPathError, RecordError, SignalError
-from tautscope.runs import replay
 
 WIDTH = 10.0
 

@@ -150,7 +150,7 @@ def test_a_loop_that_was_never_seen_is_said(runs: tuple[Recording, Recording]) -
     recording = replace(runs[1], frames=runs[1].frames.copy())
     recording.frames["observable_rotation"] = False
     for index, axis in enumerate(figures.figure9(None, recording).axes[3:]):
-        assert [text.get_text() for text in axis.texts] == ["not seen"] * (index == 1)
+        assert [text.get_text() for text in axis.texts] == ["not measured"] * (index == 1)
 
 
 def test_figure5_names_the_markers_where_they_are(runs: tuple[Recording, Recording]) -> None:

@@ -1,19 +1,19 @@
-"""What can go wrong: one base class, one subclass per cause, each carrying the facts."""
+"""Errors: one base class, one subclass per cause; each has the facts as attributes."""
 
 from __future__ import annotations
 
 
 class TautscopeError(Exception):
-    """Base of every error this package raises on purpose."""
+    """Base class of all errors of this package."""
 
 
 class FieldError(TautscopeError, ValueError):
-    """A named input holds what it may not.
+    """An input has a value that is not allowed.
 
     Args:
-        field: Where, as a path the user can find (``insertion.free_gain``, ``reference``).
-        value: What came.
-        allowed: What may come, in words.
+        field: Name of the input, as the user knows it (``insertion.free_gain``, ``reference``).
+        value: Its value.
+        allowed: Allowed values, in words.
     """
 
     def __init__(self, field: str, value: object, allowed: str) -> None:
@@ -23,7 +23,7 @@ class FieldError(TautscopeError, ValueError):
         super().__init__(f"{field}: got {value!r}, expected {allowed}")
 
     def __reduce__(self) -> tuple[type[FieldError], tuple[str, object, str]]:
-        """Pickle by the facts, so that the error survives the way back from a worker process."""
+        """Pickle the facts, so that a worker process can return the error."""
         return type(self), (self.field, self.value, self.allowed)
 
 
@@ -32,32 +32,32 @@ class ConfigError(FieldError):
 
 
 class FrameError(FieldError):
-    """An image is not what a camera of this configuration gives."""
+    """An image does not have the shape or type of the configured camera."""
 
 
 class SignalError(FieldError):
-    """A reference or command is not three finite numbers."""
+    """A signal has the wrong shape, or a value that is not a finite number."""
 
 
 class RecordError(FieldError):
-    """A recorded file lacks a column or holds what is not a number."""
+    """A recorded file lacks a column, or a cell is not a number."""
 
 
 class MissingPathError(FieldError):
-    """A file or folder that was asked for is not there, or holds nothing usable."""
+    """A file or folder does not exist, or has no usable content."""
 
 
 class OutputError(FieldError):
-    """A result cannot be written where it was asked for."""
+    """A result cannot be written to the given place."""
 
 
 class DriveError(TautscopeError):
-    """A drive or its bus did what must stop the run.
+    """A fault of a drive or its bus that stops the run.
 
     Args:
-        node: Which drive, as a person finds it (``rotation, node 2``), or the bus.
-        what: What came, against what was asked.
-        remedy: What to do.
+        node: The drive (``rotation, node 2``), or the bus.
+        what: What happened.
+        remedy: What to do next.
     """
 
     def __init__(self, node: str, what: str, remedy: str) -> None:
@@ -67,28 +67,28 @@ class DriveError(TautscopeError):
         super().__init__(f"{node}: {what}. {remedy}")
 
     def __reduce__(self) -> tuple[type[DriveError], tuple[str, str, str]]:
-        """Pickle by the facts, so that the error survives the way back from a worker process."""
+        """Pickle the facts, so that a worker process can return the error."""
         return type(self), (self.node, self.what, self.remedy)
 
 
 class BusError(DriveError):
-    """The bus cannot be opened, was unplugged, or no longer takes or gives frames."""
+    """The bus cannot be opened, was unplugged, or no longer transfers frames."""
 
 
 class SecondMasterError(DriveError):
-    """Somebody else commands drives on the same bus."""
+    """Another master commands drives on the same bus."""
 
 
 class SettingRefusedError(DriveError):
-    """A drive refused a setting, or reads back another value than was written."""
+    """A drive refused a setting, or returned another value than was written."""
 
 
 class ModeRefusedError(DriveError):
-    """A drive has no mode that follows streamed positions, or did not enter it."""
+    """A drive has no mode for streamed positions, or did not enter it."""
 
 
 class StateError(DriveError):
-    """A drive did not reach a state, or left the one it should be in."""
+    """A drive did not reach a state, or left it."""
 
 
 class EmergencyError(DriveError):
@@ -96,7 +96,7 @@ class EmergencyError(DriveError):
 
 
 class HeartbeatError(DriveError):
-    """A drive's heartbeat stayed away."""
+    """The heartbeat of a drive is missing."""
 
 
 class SilentDriveError(DriveError):
@@ -104,12 +104,12 @@ class SilentDriveError(DriveError):
 
 
 class FollowingError(DriveError):
-    """A drive is not where it was told to be, or its position jumped."""
+    """The following error of a drive is too large, or its position jumped."""
 
 
 class CameraError(FieldError):
-    """A camera is not there, or does not give the pictures it should."""
+    """A camera does not exist, or does not deliver the configured images."""
 
 
 class CameraMismatchError(CameraError):
-    """What is there cannot be used as configured; to wait for it is no use."""
+    """A camera exists but cannot be used as configured; waiting does not help."""

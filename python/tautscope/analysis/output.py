@@ -8,18 +8,18 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from tautscope.analysis.models.registry import NO_MODEL
+from tautscope.analysis.comparison import Analysis
+from tautscope.analysis.models.registry import LINEAR_FIT
 from tautscope.analysis.models.task import Floats
-from tautscope.analysis.records import Analysis
 from tautscope.report.figures import BLUE, GREY, PAGE, style
 from tautscope.runs.output_folder import new_folder
 
 
 def write_analysis(analysis: Analysis, folder: str | PathLike[str]) -> None:
-    """Make a folder with analysis.csv (every sample) and analyze.png, or nothing.
+    """Make a folder with analysis.csv (every sample) and analyze.png, complete or not at all.
 
     Raises:
-        OutputError: The folder holds something already, or cannot be written.
+        OutputError: The folder is not empty, or cannot be written.
     """
     columns = _columns(analysis)
     figure = analysis_figure(analysis)
@@ -36,7 +36,7 @@ def write_analysis(analysis: Analysis, folder: str | PathLike[str]) -> None:
 
 
 def _columns(analysis: Analysis) -> dict[str, Floats | NDArray[np.int64]]:
-    """Line of the file, time if it was read, signals, then what each model said and knew."""
+    """Line of the file, time if it was read, signals, then predictions and traces of each model."""
     record = analysis.record
     columns: dict[str, Floats | NDArray[np.int64]] = {"line": record.rows}
     if record.time is not None:
@@ -49,43 +49,45 @@ def _columns(analysis: Analysis) -> dict[str, Floats | NDArray[np.int64]]:
     return columns
 
 
-def analysis_figure(found: Analysis) -> Figure:
+def analysis_figure(analysis: Analysis) -> Figure:
     """A row per model: its error over the record, and its loop over the measured one.
 
-    The horizontal axis is the record's time if it was read, and counts samples if not. Loops are
-    of the second half. Errors have one scale, wide enough for all but the largest hundredth; "no
-    model", usually far larger, has its own.
+    The horizontal axis is the record's time if it was read, else the sample number. Loops are of
+    the second half. All errors have one scale, set by their 99th percentiles; only the linear fit,
+    whose error is usually far larger, has its own.
     """
-    record = found.record
+    record = analysis.record
     at = np.arange(len(record.rows)) if record.time is None else record.time
-    tip = np.isfinite(record.measured)
-    errors = [entry.prediction.tip - record.measured for entry in found.entries]
-    reach = [1.1 * float(np.quantile(np.abs(error[found.scored]), 0.99)) for error in errors]
-    plain = [entry.model is NO_MODEL for entry in found.entries]
-    common = max((size for size, own in zip(reach, plain, strict=True) if not own), default=0.0)
+    measured = np.isfinite(record.measured)
+    errors = [entry.prediction.tip - record.measured for entry in analysis.entries]
+    limits = [1.1 * float(np.quantile(np.abs(error[analysis.scored]), 0.99)) for error in errors]
+    is_linear = [entry.model is LINEAR_FIT for entry in analysis.entries]
+    common = max(
+        (limit for limit, own in zip(limits, is_linear, strict=True) if not own), default=0.0
+    )
     with style():
-        count = len(found.entries)
+        count = len(analysis.entries)
         figure = Figure(figsize=(PAGE, 1.15 * count + 0.5), layout="constrained")
         axes = figure.subplots(count, 2, sharex="col", squeeze=False, width_ratios=(3.2, 1))
-        for row, entry in enumerate(found.entries):
+        for row, entry in enumerate(analysis.entries):
             strip, loop = axes[row]
-            strip.axvspan(at[0], at[found.half], color="#f0f0f0", linewidth=0)
+            strip.axvspan(at[0], at[analysis.half], color="#f0f0f0", linewidth=0)
             strip.axhline(0, color=GREY, linewidth=0.5)
-            strip.plot(at[tip], errors[row][tip], color=BLUE, linewidth=0.7)
-            if not np.isfinite(errors[row][: found.half]).any():
-                middle = (at[0] + at[found.half]) / 2
-                strip.text(middle, 0, "learning: no prediction", ha="center", va="bottom")
+            strip.plot(at[measured], errors[row][measured], color=BLUE, linewidth=0.7)
+            if not np.isfinite(errors[row][: analysis.half]).any():
+                middle = (at[0] + at[analysis.half]) / 2
+                strip.text(middle, 0, "calibration: no prediction", ha="center", va="bottom")
             strip.set_title(f"{entry.model.title}: {entry.rmse:.3g}")
             strip.set_ylabel("error")
-            limit = reach[row] if plain[row] else common
+            limit = limits[row] if is_linear[row] else common
             if limit > 0:
                 strip.set_ylim(-limit, limit)
-            command = record.command[found.scored]
+            command = record.command[analysis.scored]
             for values, colour, width in (
                 (record.measured, GREY, 1.6),
                 (entry.prediction.tip, BLUE, 0.7),
             ):
-                loop.plot(command, values[found.scored], color=colour, linewidth=width)
+                loop.plot(command, values[analysis.scored], color=colour, linewidth=width)
             loop.set_ylabel("tip")
             loop.locator_params(axis="x", nbins=3)
         axes[0, 0].set_xlim(at[0], at[-1])

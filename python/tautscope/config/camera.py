@@ -1,4 +1,4 @@
-"""The camera: its projection, the source of its images, the guide's pose in front of it."""
+"""The camera: projection, source of images, pose of the guide."""
 
 from __future__ import annotations
 
@@ -15,57 +15,57 @@ Vector8 = tuple[float, float, float, float, float, float, float, float]
 
 
 class PoseConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Pose of the guide (where the instrument leaves the scope) in the camera's frame."""
+    """Pose of the guide, where the instrument leaves the scope, in the camera frame."""
 
     translation: Vector3 = (13.5e-3, 14e-3, 15e-3)
-    """Guide's origin in the camera's frame: x right, y down, z forward [m] [ours]."""
+    """Origin of the guide in the camera frame: x right, y down, z forward [m] [ours]."""
     rotation: Vector3 = (0.32, -0.26, 0.0)
-    """Rotation vector, axis times angle [rad], that turns guide axes into camera axes; the
-    guide's z axis is the channel's axis, outwards [ours]."""
+    """Rotation vector, axis times angle [rad], from guide to camera coordinates; the guide's z axis
+    is the axis of the channel, outwards [ours]."""
 
 
 class SourceConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Where a camera's images come from, in FFmpeg's words. All [ours]."""
+    """Source of the camera's images, in the terms of FFmpeg. All [ours]."""
 
     url: str = "/dev/video0"
     """Device, file, ``pipe:0``, ``udp://...``, ``rtsp://...``, or a filter graph for lavfi."""
     format: str | None = "v4l2"
-    """FFmpeg's input format: v4l2, dv, mpegts, lavfi, ...; left empty, it is guessed."""
+    """FFmpeg's input format: v4l2, dv, mpegts, lavfi, ...; if empty, FFmpeg guesses it."""
     options: dict[str, str] = field(default_factory=dict)
-    """FFmpeg's options of that format: ``video_size``, ``framerate``, ``input_format``, ..."""
+    """FFmpeg's options of the format: ``video_size``, ``framerate``, ``input_format``, ..."""
     deinterlace: Deinterlace = "bwdif"
-    """What becomes of interlaced frames: ``bwdif`` makes each field a frame, one frame late."""
+    """Deinterlacing: ``bwdif`` makes a frame of each field, delayed by one frame."""
     clock: CameraClock = "stream"
-    """When a frame was captured: ``stream``, its time stamp put on our clock by the quickest of
-    the frames of `clock_window`; ``device``, its time stamp as it is, the system's monotonic clock
-    (V4L2); ``arrival``, when it arrived, for a source without time stamps."""
+    """Source of the capture time: ``stream``, the frame's time stamp, shifted to our clock by the
+    frame with the least delay in `clock_window`; ``device``, the time stamp in the system's
+    monotonic clock (V4L2); ``arrival``, the time of arrival, for a source without time stamps."""
     clock_window: Positive = 10.0
-    """[s]."""
+    """Duration over which ``stream`` finds the frame with the least delay [s]."""
     delay: NonNegative = 0.0
-    """From exposure to time stamp for ``device``, else of the quickest frame from exposure to
-    arrival [s]; to be measured, since none of these can tell."""
+    """Delay from exposure to time stamp with ``device``, else least delay from exposure to arrival
+    [s]; must be measured, no clock contains it."""
     timeout: Positive = 2.0
-    """Without a frame for so long a source is lost, and opened anew [s]."""
+    """Time without a frame after which the source is opened again [s]."""
     reconnect_period: Positive = 0.5
-    """Between two attempts to open it [s]."""
+    """Time between two attempts to open the source [s]."""
     start_timeout: Positive = 10.0
-    """For the frames of the self-test at the start [s]."""
+    """Time limit for the frames of the self-test at the start [s]."""
     lost_timeout: Positive = 5.0
-    """Without a frame for so long a run on hardware ends, and the motors stop [s]."""
+    """Time without a frame after which a run on hardware ends and the motors stop [s]."""
     darkest: Annotated[int, Meta(ge=1, le=255)] = 24
-    """A picture without a pixel above this is black [grey levels]; video black is 16."""
+    """An image without a pixel above this is black [grey levels]; video black is 16."""
 
 
 class CameraConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Pinhole with OpenCV's distortion, Eq. (8)."""
+    """Pinhole camera with OpenCV's distortion model, Eq. (8)."""
 
     width: Annotated[int, Meta(ge=1, le=8192)] = 720
     """[px], PAL DV [paper]."""
     height: Annotated[int, Meta(ge=1, le=8192)] = 576
     """[px], PAL DV [paper]."""
     pixel_format: PixelFormat = "bgr"
-    """Layout of the 8-bit pixels; the YUV formats in BT.601 with limited range, the width even, in
-    nv12 and i420 the height too."""
+    """Layout of the 8-bit pixels. YUV formats are BT.601 with limited range and need an even
+    width, nv12 and i420 also an even height."""
     fx: Positive = 424.0
     """Focal length along x [px] [public colonoscope calibration]."""
     fy: Positive = 454.0
@@ -75,6 +75,6 @@ class CameraConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     cy: float = 285.0
     """Principal point [px]."""
     distortion: Vector8 = (-0.18, 0.05, 0.0, 0.0, -0.005, 0.0, 0.0, 0.0)
-    """k1, k2, p1, p2, k3, k4, k5, k6 in OpenCV's order and meaning [ours]."""
+    """k1, k2, p1, p2, k3, k4, k5, k6, as in OpenCV [ours]."""
     source: SourceConfig = field(default_factory=SourceConfig)
     camera_from_guide: PoseConfig = field(default_factory=PoseConfig)

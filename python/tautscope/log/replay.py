@@ -23,7 +23,7 @@ from tautscope.loop.reduction import HysteresisReduction
 from tautscope.loop.rig import Frame, Sample
 from tautscope.loop.safety import DETECTORS
 from tautscope.runs.recording import FEATURES, FRAME_COLUMNS, Recording
-from tautscope.runs.replay import read_motors
+from tautscope.runs.records import read_motors
 from tautscope.runs.run_recorder import RunRecorder, frame_row
 
 Floats = NDArray[np.float64]
@@ -186,7 +186,7 @@ def listen_to_video(frames: Iterable[Frame], motors: str | PathLike[str], config
 
     Args:
         frames: In order, captured on the clock of the table.
-        motors: CSV file, see `tautscope.runs.replay.read_motors`.
+        motors: CSV file, see `tautscope.runs.records.read_motors`.
         config: Of instrument, camera and loop.
 
     Raises:
