@@ -20,11 +20,10 @@ class FieldError(TautscopeError, ValueError):
         self.field = field
         self.value = value
         self.allowed = allowed
-        super().__init__(f"{field}: got {value!r}, expected {allowed}")
+        super().__init__(field, value, allowed)
 
-    def __reduce__(self) -> tuple[type[FieldError], tuple[str, object, str]]:
-        """Pickle the facts, so that a worker process can return the error."""
-        return type(self), (self.field, self.value, self.allowed)
+    def __str__(self) -> str:
+        return f"{self.field}: got {self.value!r}, expected {self.allowed}"
 
 
 class ConfigError(FieldError):
@@ -64,11 +63,10 @@ class DriveError(TautscopeError):
         self.node = node
         self.what = what
         self.remedy = remedy
-        super().__init__(f"{node}: {what}. {remedy}")
+        super().__init__(node, what, remedy)
 
-    def __reduce__(self) -> tuple[type[DriveError], tuple[str, str, str]]:
-        """Pickle the facts, so that a worker process can return the error."""
-        return type(self), (self.node, self.what, self.remedy)
+    def __str__(self) -> str:
+        return f"{self.node}: {self.what}. {self.remedy}"
 
 
 class BusError(DriveError):

@@ -68,28 +68,13 @@ def check_finite(value: Any, path: str) -> None:
 
 def check_dof(dof: Dof, settings: DofConfig) -> None:
     """The relations in a DOF's block. This and all below raise `ConfigError` with the key."""
-    limit = f"at most {dof.label}.gain_limit = {settings.gain_limit}"
-    _require(
-        settings.free_gain <= settings.gain_limit,
-        f"{dof.label}.free_gain",
-        settings.free_gain,
-        limit,
-    )
-    limit = f"at most {dof.label}.delta_plus = {settings.delta_plus}"
-    _require(
-        settings.delta_minus <= settings.delta_plus,
-        f"{dof.label}.delta_minus",
-        settings.delta_minus,
-        limit,
-    )
+    _require_at_most(dof.label, settings, "free_gain", "gain_limit")
+    _require_at_most(dof.label, settings, "delta_minus", "delta_plus")
 
 
 def check_adaptive(adaptive: AdaptiveConfig) -> None:
     """The relations in block ``adaptive``."""
-    gain, limit = adaptive.cautious_gain, adaptive.contact_gain
-    _require(
-        gain <= limit, "adaptive.cautious_gain", gain, f"at most adaptive.contact_gain = {limit}"
-    )
+    _require_at_most("adaptive", adaptive, "cautious_gain", "contact_gain")
 
 
 def check_instrument(instrument: InstrumentConfig) -> None:
@@ -104,8 +89,7 @@ def check_instrument(instrument: InstrumentConfig) -> None:
 
 def check_twin(twin: TwinConfig) -> None:
     """The relations in block ``twin``."""
-    jitter, limit = twin.latency_jitter, twin.latency
-    _require(jitter <= limit, "twin.latency_jitter", jitter, f"at most twin.latency = {limit}")
+    _require_at_most("twin", twin, "latency_jitter", "latency")
     _require_names("twin.disturb", twin.disturb, DISTURBANCES)
 
 
@@ -161,12 +145,7 @@ def check_drives(drives: DrivesConfig) -> None:
             axis.counts_per_unit,
             f"less than 2^31 counts over the travel {axis.travel}",
         )
-        _require(
-            axis.following_window <= axis.following_error,
-            f"{path}.following_window",
-            axis.following_window,
-            f"at most {path}.following_error = {axis.following_error}",
-        )
+        _require_at_most(path, axis, "following_window", "following_error")
         _require(
             axis.speed_limit * drives.cycle * axis.counts_per_unit >= 1,
             f"{path}.counts_per_unit",
@@ -202,3 +181,8 @@ def _require(is_valid: bool, field: str, value: object, allowed: str) -> None:
 def _require_names(field: str, names: Sequence[str], allowed: Sequence[str]) -> None:
     for index, name in enumerate(names):
         _require(name in allowed, f"{field}[{index}]", name, "one of " + ", ".join(allowed))
+
+
+def _require_at_most(path: str, block: object, name: str, limit_name: str) -> None:
+    value, limit = getattr(block, name), getattr(block, limit_name)
+    _require(value <= limit, f"{path}.{name}", value, f"at most {path}.{limit_name} = {limit}")

@@ -65,8 +65,8 @@ class DrivesConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     heartbeat_period: Positive = 0.02
     """Heartbeat period of master and drives [s], whole milliseconds."""
     heartbeat_timeout: Positive = 0.08
-    """Time without a heartbeat after which a drive stops itself, or the master stops all drives [s],
-    whole milliseconds."""
+    """Time without a heartbeat after which a drive, or the master, stops the motors [s], whole
+    milliseconds."""
     state_timeout: Positive = 1.0
     """Time limit for each change of a drive's state [s]."""
     request_timeout: Positive = 0.3
