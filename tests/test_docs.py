@@ -120,7 +120,7 @@ def test_the_citation_is_of_this_version() -> None:
 def test_the_ros_node_takes_images_and_gives_set_points(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """ROS is not installed here: its parts are stand-ins that keep what they are given."""
+    """ROS is not installed here: test doubles record what they receive."""
     sent: list[list[float]] = []
     callbacks: dict[str, Callable[..., None]] = {}
     now = SimpleNamespace(nanoseconds=0)
@@ -165,7 +165,7 @@ def test_the_ros_node_takes_images_and_gives_set_points(
 
     rig, reference = DrawnRig(config), SineSequence(config.experiment)
     callbacks["timer"]()
-    assert sent == [], "no command before the hand has said anything"
+    assert sent == [], "no command before the first reference"
     sample = rig.reset()
     while sample.time < 8:
         now.nanoseconds = round(1e9 * sample.time)
