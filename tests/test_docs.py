@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import tautscope
-from drawn import SLACK, DrawnRig, short_experiment
+from drawn import BACKLASH, DrawnRig, short_experiment
 from tautscope.cli import _parser
 from tautscope.config import dump_config
 from tautscope.dof import Dof
@@ -188,4 +188,4 @@ def test_the_ros_node_takes_images_and_gives_set_points(
             )
         sample = rig.step(sent[-1])
     slack = node.loop.delta_plus - node.loop.delta_minus
-    assert slack[Dof.INSERTION] == pytest.approx(SLACK[Dof.INSERTION], rel=0.2)
+    assert slack[Dof.INSERTION] == pytest.approx(BACKLASH[Dof.INSERTION], rel=0.2)

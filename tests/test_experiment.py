@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from drawn import SLACK, BadFrameRig, DrawnRig, short_experiment
+from drawn import BACKLASH, BadFrameRig, DrawnRig, short_experiment
 from numpy.typing import ArrayLike, NDArray
 from tautscope.dof import Dof
 from tautscope.errors import (
@@ -72,7 +72,7 @@ def test_the_slack_goes_down_to_what_the_gain_leaves(
     uncompensated: Recording, compensated: Recording, dof: Dof
 ) -> None:
     result = evaluate(uncompensated, compensated)[dof]
-    slack = SLACK[dof]
+    slack = BACKLASH[dof]
     sine = CONFIG.experiment[dof]
     per_tick = 2 * np.pi * sine.amplitude / sine.period * DrawnRig.control_period
     # The rig's tip is where the command of the tick before has put it.

@@ -177,7 +177,7 @@ def demo_report(demo: Demo, figures: Sequence[CaptionedFigure]) -> str:
             " ".join(_PROFILES[name] for name in profiles)
         }
 Widths over the last two periods of each degree of freedom: mean over 41 levels across the central
-80&nbsp;% of the tip&rsquo;s range, of the true tip unless said otherwise.</p>
+80&nbsp;% of the tip&rsquo;s range, of the true tip unless stated otherwise.</p>
 {report.warning_list(demo.compensated.warnings)}
 <h2>Figures{f", profile {demo.config.profile}" if len(profiles) > 1 else ""}</h2>
 {report.figure_list(figures)}

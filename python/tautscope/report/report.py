@@ -112,7 +112,7 @@ def results_table(columns: Mapping[str, Sequence[Results]], by_camera: bool = Fa
     Args:
         columns: Results per seed, by the column's title.
         by_camera: Compare the article with the figures measured by the camera, and leave out rows
-            without a known value.
+            without a value.
     """
     sources = [(each, tables.median(each), tables.worst(each)) for each in columns.values()]
     *_, (last, dofs, _) = sources

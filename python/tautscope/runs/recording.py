@@ -113,7 +113,7 @@ class Recording:
         return float(self.trace["time"][0]) + segment.start
 
     def save(self, folder: str | PathLike[str]) -> None:
-        """Make `folder` with trace.csv, frames.csv, recording.toml and config.toml, or nothing.
+        """Make `folder` with trace.csv, frames.csv, recording.toml and config.toml.
 
         Raises:
             OutputError: The folder is not empty, or cannot be written.

@@ -112,10 +112,10 @@ class RunRecorder:
 
     def add_frame(self, row: Row, delta_minus: Floats, delta_plus: Floats) -> None:
         """Add an image update: its `frame_row`, and the contact offsets (3,) after it."""
-        known = dict(zip(FRAME_COLUMNS.names or (), row, strict=True))
-        self._estimate = tuple(known[f"estimate_{dof.label}"] for dof in Dof)
+        fields = dict(zip(FRAME_COLUMNS.names or (), row, strict=True))
+        self._estimate = tuple(fields[f"estimate_{dof.label}"] for dof in Dof)
         self._deltas = (*delta_minus, *delta_plus)
-        self._status = str(known["status"])
+        self._status = str(fields["status"])
         self._frames.append(row)
 
     def tables(self) -> tuple[Table, Table]:

@@ -66,7 +66,7 @@ def hysteretic_variable(
     While the command rises, w obeys dw/dc = rho f(w) with f = 1 - w^n for w >= 0 and
     f = 1 + (2 sigma - 1) |w|^n below: it moves along one curve, F(w) = integral of dw / f(w),
     at the speed rho. F is tabulated over atanh(w); a falling command is a rising one with the
-    sign of w changed. A monotonic segment takes one look-up, whatever its sampling.
+    sign of w changed. A monotonic segment takes one interpolation, at any sampling.
     """
     log_power = exponent * _LOG_W
     rate = np.where(_P >= 0, -np.expm1(log_power), 1 + (2 * sigma - 1) * np.exp(log_power))

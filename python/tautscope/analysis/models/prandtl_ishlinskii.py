@@ -17,7 +17,7 @@ OPERATORS = 32
 class PrandtlIshlinskii:
     """Tip = offset + direction * sum_i weights_i * P_i(command), P_i the play of radius r_i.
 
-    Every play begins in the middle of its slack.
+    Every play starts in the middle of its backlash.
 
     Attributes:
         radii: r_i, half the widths, the first 0 [command's unit].

@@ -19,7 +19,7 @@ SWEEP = 0.9
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """A record to predict, and what is known beforehand.
+    """A record to predict, and prior knowledge of it.
 
     Attributes:
         command: (n,) actuator position, any unit.
