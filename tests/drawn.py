@@ -12,7 +12,7 @@ __all__ = ["BACKLASH", "EXAMPLES", "BadFrameRig", "DrawnRig", "short_experiment"
 
 
 class BadFrameRig(DrawnRig):
-    """Its camera is not the configured one."""
+    """A rig whose images have the wrong size."""
 
     def _draw(self):
         return super()._draw()[:-1]

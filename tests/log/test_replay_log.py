@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drawn import SLACK
+from drawn import BACKLASH
 from recorded import record
 from tautscope.config import Config
 from tautscope.log.reader import Log, Update, read_log
@@ -38,7 +38,7 @@ def test_listening_to_the_same_configuration_estimates_the_same(
     heard = listen_to_log(read_log(tmp_path / "run.mcap"), config).recording
     for group in ("estimate", "delta_minus", "delta_plus"):
         difference = per_dof(heard.trace, group) - per_dof(recording.trace, group)
-        assert np.nanmax(np.abs(difference) / SLACK) < share, group
+        assert np.nanmax(np.abs(difference) / BACKLASH) < share, group
     np.testing.assert_array_equal(
         per_dof(heard.trace, "command"), per_dof(recording.trace, "command")
     )
