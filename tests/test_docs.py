@@ -76,7 +76,7 @@ def test_commands_in_a_page_are_valid(page: Path) -> None:
         elif tool.endswith(".py") or tool == "python":
             assert (ROOT / (arguments[0] if tool == "python" else tool)).is_file(), command
         else:
-            assert tool in {"pytest", "ruff", "mypy", "stubtest"}, command
+            assert tool in {"pytest", "ruff", "mypy", "stubtest", "lint-imports"}, command
 
 
 def test_every_equation_figure_and_table_has_a_function_and_a_test() -> None:
