@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tautscope.config import Config
 from tautscope.loop.construction import build_feature_model
-from tautscope.loop.reduction import Expectation
+from tautscope.loop.state_prediction import StatePrediction
 from tautscope.loop.vision import MarkerDetector
 from tautscope.twin.camera import FRAMES_PER_BACKGROUND, RenderedImage, TwinCamera
 
@@ -220,7 +220,7 @@ def judge(job: Job) -> list[Look]:
             detector.detect(
                 picture.image,
                 None if prediction is None else prediction[0],
-                Expectation(believed, STATE_ERROR),
+                StatePrediction(believed, STATE_ERROR),
             ),
             detector.detect(picture.image),
         ]

@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tautscope import Twin, load_config
 from tautscope.config import Config
-from tautscope.loop.reduction import Expectation
+from tautscope.loop.state_prediction import StatePrediction
 from tautscope.loop.vision import MarkerDetector, Region
 from vision_peers import (
     HAS_SCIKIT_IMAGE,
@@ -47,7 +47,7 @@ SIZES = ((720, 576), (1920, 1080), (3840, 2160))
 MARGIN = 20  # px at 1920x1080: how far a window reaches beyond its band
 POSTURE = np.array([0.012, 0.0, 0.5])
 COLD = 96 << 20  # bytes: more than the caches hold
-EXPECTATION = Expectation(POSTURE, np.array([2e-3, 0.1, 0.1]))
+EXPECTATION = StatePrediction(POSTURE, np.array([2e-3, 0.1, 0.1]))
 ROOT = Path(__file__).resolve().parents[1]
 
 

@@ -1,6 +1,6 @@
-"""A marker detector of your own, here twenty lines of OpenCV, in place of ours.
+"""The loop with your own marker detector, here twenty lines of OpenCV.
 
-The loop takes two centroids in px and the time of capture; where they come from is up to you.
+The loop needs two centroids in px and the time of capture.
 Run it with ``uv run python examples/own_detector.py``.
 """
 
@@ -14,7 +14,7 @@ from tautscope import Frame, HysteresisReduction, Report, run_experiment
 from tautscope.references import SineSequence
 from tautscope.report.results import evaluate
 
-LEAST_AREA = 20
+MINIMUM_AREA = 20
 """Smaller regions are noise [px^2]."""
 
 
@@ -25,9 +25,9 @@ def find_bands(
     blue, green, red = cv2.split(image)
     mask = (cv2.subtract(green, cv2.max(blue, red)) > 40).astype(np.uint8)
     _, _, stats, centroids = cv2.connectedComponentsWithStats(mask)
-    areas = stats[1:, cv2.CC_STAT_AREA]  # the first is the background
+    areas = stats[1:, cv2.CC_STAT_AREA]  # component 0 is the background
     largest = 1 + np.argsort(areas)[:-3:-1]
-    if predicted is None or len(largest) < 2 or areas[largest - 1].min() < LEAST_AREA:
+    if predicted is None or len(largest) < 2 or areas[largest - 1].min() < MINIMUM_AREA:
         return None
     first, second = centroids[largest]
     if np.linalg.norm(first - predicted[:2]) > np.linalg.norm(second - predicted[:2]):
@@ -35,8 +35,8 @@ def find_bands(
     return np.concatenate([first, second])
 
 
-def look(loop: HysteresisReduction, frame: Frame) -> Report:
-    """The image update with it."""
+def update(loop: HysteresisReduction, frame: Frame) -> Report:
+    """Image update with the features of `find_bands`."""
     predicted = loop.predicted_features(frame.captured_at)
     return loop.on_features(find_bands(frame.image, predicted), frame.captured_at)
 
@@ -45,11 +45,11 @@ def main() -> None:
     config = short_experiment()
     reference = SineSequence(config.experiment)
     runs = [
-        run_experiment(DrawnRig(config), reference, config, compensate, look=look)
+        run_experiment(DrawnRig(config), reference, config, compensate, look=update)
         for compensate in (False, True)
     ]
     for dof, result in evaluate(*runs).items():
-        print(f"{dof.label}: {result.reduction:.0%} of the hysteresis is gone")
+        print(f"{dof.label}: hysteresis reduced by {result.reduction:.0%}")
 
 
 if __name__ == "__main__":

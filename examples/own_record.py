@@ -1,7 +1,7 @@
-"""The estimator on a record of your own: no camera, no robot, any unit.
+"""The hysteresis estimator on your own record: no camera, no robot, any unit.
 
-Here the record is simulated: a drive that moves two ways at once, a tip that lags by 3 mm, an
-encoder at the tip that is noisy. Run it with ``uv run python examples/own_record.py``.
+Here the record is simulated: a drive moves by two sines, the tip has a backlash of 3 mm, and its
+position is measured with noise. Run it with ``uv run python examples/own_record.py``.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ def main() -> None:
     measured = tip + np.random.default_rng(0).normal(0, 0.05, len(tip))
 
     estimator = Estimator(
-        update_distance=0.2,  # about 1 % of the stroke, and well above the noise
+        update_distance=0.2,  # about 1 % of the stroke, well above the noise
         contact_tolerance=0.4,
         smoothing_factor=0.25,
         delta_minus=0.0,
@@ -28,8 +28,8 @@ def main() -> None:
 
     late = slice(len(command) // 2, None)
     print(f"offsets {delta_minus[-1]:.2f} and {delta_plus[-1]:.2f} mm")
-    print(f"the tip is not where the command is: {rms((command - measured)[late]):.2f} mm RMS")
-    print(f"the tip before it is seen:           {rms((predicted - measured)[late]):.2f} mm RMS")
+    print(f"error without a model: {rms((command - measured)[late]):.2f} mm RMS")
+    print(f"error of prediction:   {rms((predicted - measured)[late]):.2f} mm RMS")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
-"""A rig of your own: the loop runs on any object with these methods.
+"""The loop on your own rig: any object with these methods.
 
-This one is three plays and a drawn picture: a stand-in for your drives and your camera.
+This one simulates drives and camera by three plays and a drawn image.
 Run it with ``uv run python examples/own_rig.py``.
 """
 
@@ -15,12 +15,12 @@ from tautscope.loop.construction import build_feature_model
 from tautscope.references import SineSequence
 from tautscope.report.results import evaluate
 
-SLACK = np.array([10e-3, 1.0, 0.5])
+BACKLASH = np.array([10e-3, 1.0, 0.5])
 """Width of each DOF's play [m, rad, rad]."""
 
 
 class DrawnRig:
-    """Tip = play of the command; picture = two green discs where the bands would be."""
+    """The tip is a play of the command; the image shows the two bands in green."""
 
     control_period = 0.01
 
@@ -34,27 +34,27 @@ class DrawnRig:
         self.reset()
 
     def reset(self) -> Sample:
-        """Home."""
+        """Go to the centre of the references."""
         self._ticks = 0
         self._tip = self._home.copy()
         return self._sample(self._home)
 
     def step(self, command: ArrayLike) -> Sample:
-        """Move, and look every eighth time."""
+        """Move; every eighth sample has an image."""
         applied = np.asarray(command, dtype=np.float64)
-        self._tip = np.clip(self._tip, applied - SLACK / 2, applied + SLACK / 2)
+        self._tip = np.clip(self._tip, applied - BACKLASH / 2, applied + BACKLASH / 2)
         self._ticks += 1
         return self._sample(applied)
 
     def close(self) -> None:
-        """Nothing to release."""
+        """Do nothing: there are no resources to release."""
 
     def _sample(self, applied: NDArray[np.float64]) -> Sample:
         time = self._ticks * self.control_period
-        frame = Frame(self._picture(), time, self._ticks) if self._ticks % 8 == 0 else None
+        frame = Frame(self._draw(), time, self._ticks) if self._ticks % 8 == 0 else None
         return Sample(time, applied, frame, self._tip.copy())
 
-    def _picture(self) -> NDArray[np.uint8]:
+    def _draw(self) -> NDArray[np.uint8]:
         image = np.full(self._shape, (60, 60, 150), np.uint8)
         for *_, outline in self._model.bands(self._tip) or ():
             corners = np.round(16 * outline).astype(np.int32)
@@ -72,7 +72,7 @@ def short_experiment() -> Config:
             rotation=Sine(centre=0.0, amplitude=1.5, period=4.0),
             bending=Sine(centre=1.2, amplitude=0.6, period=4.0),
         ),
-        # A drawn picture has no noise: it repeats itself while the slack is crossed.
+        # Drawn images have no noise: they repeat exactly while the tip rests in the backlash.
         safety=SafetyConfig(frozen_travel=1e6),
     )
 
@@ -88,7 +88,7 @@ def main() -> None:
         finally:
             rig.close()
     for dof, result in evaluate(*runs).items():
-        print(f"{dof.label}: {result.reduction:.0%} of the hysteresis is gone")
+        print(f"{dof.label}: hysteresis reduced by {result.reduction:.0%}")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What several tests share."""
+"""Shared fixtures."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tautscope.runs.recording import Recording
 def shared_data(*parts: str) -> Path:
     """A path in the shared data: TAUTSCOPE_DATA, or ../shared/data beside the repository.
 
-    Where it is missing the test is skipped, on CI it fails.
+    If it does not exist, the test is skipped, on CI it fails.
     """
     default = Path(__file__).resolve().parents[2] / "shared" / "data"
     path = Path(os.environ.get("TAUTSCOPE_DATA", default)).joinpath(*parts)
@@ -41,7 +41,7 @@ def uncompensated() -> Recording:
 
 @pytest.fixture(scope="session")
 def compensated() -> Recording:
-    """The same with it."""
+    """The article's experiment, shortened, on the drawn rig, with compensation."""
     return _run(compensate=True)
 
 

@@ -6,13 +6,13 @@ from pathlib import Path
 EXAMPLES = Path(__file__).parents[1] / "examples"
 sys.path.insert(0, str(EXAMPLES))  # spawned workers inherit the path
 
-from own_rig import SLACK, DrawnRig, short_experiment  # noqa: E402
+from own_rig import BACKLASH, DrawnRig, short_experiment  # noqa: E402
 
-__all__ = ["EXAMPLES", "SLACK", "BadFrameRig", "DrawnRig", "short_experiment"]
+__all__ = ["BACKLASH", "EXAMPLES", "BadFrameRig", "DrawnRig", "short_experiment"]
 
 
 class BadFrameRig(DrawnRig):
-    """Its camera is not the configured one."""
+    """A rig whose images have the wrong size."""
 
-    def _picture(self):
-        return super()._picture()[:-1]
+    def _draw(self):
+        return super()._draw()[:-1]

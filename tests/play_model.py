@@ -1,4 +1,4 @@
-"""The play of Eq. (1) in three lines: an independent model for tests, not the package's."""
+"""The play of Eq. (1) in three lines, independent of the package's."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray

@@ -1,4 +1,4 @@
-"""What a command says that must fail."""
+"""The message of a command that must fail."""
 
 import pytest
 from tautscope.cli import main

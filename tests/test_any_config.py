@@ -1,4 +1,4 @@
-"""Configuration that is broken in any way: an error that names the key, or one that is whole."""
+"""Arbitrary configurations either load, or raise an error that names the key."""
 
 from typing import Any
 
@@ -19,7 +19,7 @@ ANYTHING = st.recursive(
 
 
 def paths(document: dict[str, Any], above: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
-    """Every key, sections and what is in them."""
+    """The paths of all sections and keys."""
     found = []
     for key, value in document.items():
         found.append((*above, key))
@@ -28,7 +28,7 @@ def paths(document: dict[str, Any], above: tuple[str, ...] = ()) -> list[tuple[s
     return found
 
 
-def loaded_or_refused(document: dict[str, Any]) -> None:
+def assert_loads_or_names_the_key(document: dict[str, Any]) -> None:
     try:
         config = from_document(document)
     except ConfigError as error:
@@ -39,18 +39,18 @@ def loaded_or_refused(document: dict[str, Any]) -> None:
 
 @settings(max_examples=120, deadline=None, derandomize=True)
 @given(st.sampled_from(paths(GOOD)), ANYTHING)
-def test_any_value_anywhere_is_taken_or_named(path: tuple[str, ...], value: Any) -> None:
+def test_any_value_of_any_key(path: tuple[str, ...], value: Any) -> None:
     *sections, key = path
     change: dict[str, Any] = {key: value}
     for section in reversed(sections):
         change = {section: change}
-    loaded_or_refused(change)
+    assert_loads_or_names_the_key(change)
 
 
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(st.dictionaries(st.sampled_from([path[0] for path in paths(GOOD)]), ANYTHING, max_size=4))
-def test_any_document_is_taken_or_named(document: dict[str, Any]) -> None:
-    loaded_or_refused(document)
+def test_any_document(document: dict[str, Any]) -> None:
+    assert_loads_or_names_the_key(document)
 
 
 TEXT = dump_config(Config()).encode()
@@ -62,7 +62,7 @@ TEXT = dump_config(Config()).encode()
     removed=st.integers(0, 40),
     added=st.binary(max_size=20) | st.text(st.characters(codec="utf-8")).map(str.encode),
 )
-def test_any_bytes_in_the_file_are_taken_or_named(
+def test_any_bytes_in_the_file(
     tmp_path_factory: pytest.TempPathFactory, start: int, removed: int, added: bytes
 ) -> None:
     file = tmp_path_factory.mktemp("config") / "config.toml"

@@ -1,4 +1,4 @@
-"""The command as a person or a script meets it."""
+"""The command line: output, run folders, messages, exit status."""
 
 import json
 from functools import partial
@@ -53,7 +53,7 @@ def test_config_prints_what_load_config_reads(
 
 
 @pytest.mark.usefixtures("on_drawn_rig")
-def test_demo_fills_a_run_folder_and_prints_one_object(
+def test_demo_writes_a_run_folder_and_prints_one_json_object(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, config_file: str
 ) -> None:
     out = tmp_path / "run"
@@ -91,9 +91,9 @@ def test_demo_fills_a_run_folder_and_prints_one_object(
     assert Recording.load(out).compensated
     assert not Recording.load(out, "_uncompensated").compensated
     for name in ("fig5.png", "fig9.png"):
-        picture = matplotlib.image.imread(out / name)
-        assert min(picture.shape[:2]) > 600
-        assert np.ptp(picture) > 0
+        image = matplotlib.image.imread(out / name)
+        assert min(image.shape[:2]) > 600
+        assert np.ptp(image) > 0
     assert (out / "fig9.pdf").read_bytes().startswith(b"%PDF")
     header, *lines = (out / "table1.csv").read_text().splitlines()
     assert header.split(",")[4:] == [row.name for row in ROWS]
@@ -105,7 +105,7 @@ def test_demo_fills_a_run_folder_and_prints_one_object(
 
 
 @pytest.mark.usefixtures("on_drawn_rig")
-def test_demo_prints_the_article_beside_ours(
+def test_demo_prints_the_articles_values_and_both_profiles(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, config_file: str
 ) -> None:
     arguments = ["demo", "--config", config_file]
@@ -122,7 +122,7 @@ def test_demo_prints_the_article_beside_ours(
     assert "report.html" in out
 
 
-def test_a_run_that_fails_leaves_nothing(
+def test_a_failed_run_leaves_no_folder(
     capsys: pytest.CaptureFixture[str],
     tmp_path: Path,
     config_file: str,
@@ -135,7 +135,7 @@ def test_a_run_that_fails_leaves_nothing(
     assert [path.name for path in tmp_path.iterdir()] == ["short.toml"]
 
 
-def test_demo_names_what_it_cannot_use(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_demo_names_an_invalid_input(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     nowhere = str(tmp_path / "nowhere")
     assert "twin.background: got" in failed(capsys, "demo", "--background", nowhere)
     assert "config: got" in failed(capsys, "demo", "--config", nowhere)

@@ -1,4 +1,4 @@
-"""`tautscope analyze` as a person or a script meets it."""
+"""`tautscope analyze`: results, table, cleaning, messages."""
 
 import json
 import math
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from play_model import play
 from refused import failed
-from tautscope.analysis.records.models.registry import MODELS
+from tautscope.analysis.comparison.models.registry import MODELS
 from tautscope.cli import main
 
 
@@ -55,7 +55,7 @@ def test_analyze_finds_the_offsets_of_a_play(
     assert {path.name for path in out.iterdir()} == {"analysis.csv", "analyze.png"}
     samples = np.genfromtxt(out / "analysis.csv", delimiter=",", names=True)
     assert len(samples) == 2999
-    assert samples["line"][7] == 10  # the header is line 1, and line 9 was left out
+    assert samples["line"][7] == 10  # the header is line 1, and line 9 was removed
     for name, model in found["models"].items():
         late = (samples[name] - samples["measured"])[1499:]
         assert model["rmse"] == pytest.approx(np.sqrt(np.mean(late**2)), rel=1e-6), name
@@ -72,8 +72,8 @@ def test_analyze_prints_a_row_per_model(capsys: pytest.CaptureFixture[str], tmp_
     text = capsys.readouterr().out
     for model in MODELS:
         assert f"\n{model.title} " in text
-        assert model.learns in text
-    assert "2999 samples, 1500 of them scored; lines without a command, left out: 1;" in text
+        assert model.fitted_to in text
+    assert "2999 samples, 1500 of them scored; lines without a command, removed: 1;" in text
     assert "not checked without --time" in text
 
 
@@ -87,10 +87,10 @@ def test_analyze_takes_a_gain(capsys: pytest.CaptureFixture[str], tmp_path: Path
     assert np.isfinite(samples["paper"][1:]).all()
 
 
-def test_a_messy_record_gives_what_the_clean_one_gives(
+def test_cleaning_recovers_the_result_of_the_clean_record(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    """Motor steps, tip in metres from elsewhere, unevenly sampled, holes, copies, late lines."""
+    """Motor steps, tip in metres with an offset, uneven sampling, gaps, duplicates, late lines."""
     clean, messy = tmp_path / "clean.csv", tmp_path / "messy.csv"
     write_record(clean)
     rng = np.random.default_rng(1)
@@ -121,9 +121,7 @@ def test_a_messy_record_gives_what_the_clean_one_gives(
         assert 1000 * parameters["width"] == pytest.approx(8, abs=0.3)
 
 
-def test_analyze_names_what_it_cannot_use(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_analyze_names_an_invalid_input(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     file = tmp_path / "log.csv"
     file.write_text("c,m\n1,2\n1,oops\n")
     arguments = ["analyze", str(file), "--command", "c", "--measured"]

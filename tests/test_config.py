@@ -1,4 +1,4 @@
-"""Configuration: what it takes, what it refuses, and how it says so."""
+"""Configuration: defaults, files, and errors that name the key."""
 
 import math
 from pathlib import Path
@@ -25,13 +25,13 @@ def test_defaults_are_the_articles_protocol() -> None:
         assert config[dof].delta_minus == config[dof].delta_plus == 0.0
 
 
-def test_what_is_written_reads_back_equal(tmp_path: Path) -> None:
+def test_a_written_configuration_reads_back_equal(tmp_path: Path) -> None:
     config = Config().replace(**{"twin.seed": 7, "insertion.free_gain": 3.5})
     assert loaded(tmp_path, dump_config(config)) == config
 
 
 @pytest.mark.parametrize("file", sorted(CONFIGS.glob("*.toml")), ids=lambda file: file.name)
-def test_the_configurations_are_accepted(file: Path) -> None:
+def test_the_files_in_configs_are_valid(file: Path) -> None:
     config = load_config(file)
     assert config.drives is not None
     # `tautscope run` moves them through the article's references; each must fit the travel.
@@ -44,7 +44,7 @@ def test_the_configurations_are_accepted(file: Path) -> None:
     assert config.control.period == config.drives.cycle
 
 
-def test_files_are_found_from_where_the_configuration_is(tmp_path: Path) -> None:
+def test_paths_are_relative_to_the_toml_file(tmp_path: Path) -> None:
     axis = "{node = %d, counts_per_unit = 1e4, sign = 1, travel = [0, 1], speed_limit = 1, "
     axis += "following_error = 0.1, following_window = 0.05, eds = '%s'}"
     names = [(1, "drive.eds"), (2, "../other/drive.eds"), (3, "/opt/drive.eds")]
@@ -59,7 +59,7 @@ def test_files_are_found_from_where_the_configuration_is(tmp_path: Path) -> None
     assert loaded(tmp_path / "elsewhere", dump_config(config)) == config
 
 
-def test_a_file_names_only_what_it_changes(tmp_path: Path) -> None:
+def test_missing_keys_have_their_defaults(tmp_path: Path) -> None:
     config = loaded(tmp_path, "[rotation]\nfree_gain = 4\n[camera.camera_from_guide]\n")
     assert config == Config().replace(**{"rotation.free_gain": 4.0})
 
@@ -96,7 +96,7 @@ def test_a_bad_value_is_named(tmp_path: Path, text: str, field: str, value: obje
     assert error.value.allowed
 
 
-def test_a_file_that_is_not_toml_or_not_there_is_named(tmp_path: Path) -> None:
+def test_a_missing_or_invalid_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"config: got '.*config\.toml', expected TOML"):
         loaded(tmp_path, "insertion = [")
     with pytest.raises(MissingPathError, match=r"config: got '.*none\.toml'"):
@@ -105,7 +105,7 @@ def test_a_file_that_is_not_toml_or_not_there_is_named(tmp_path: Path) -> None:
         load_config(tmp_path)
 
 
-def test_changes_are_checked_and_leave_the_original() -> None:
+def test_replace_checks_and_does_not_change_the_original() -> None:
     config = Config()
     with pytest.raises(ConfigError, match=r"twin\.seeds: got 1, expected no such key"):
         config.replace(**{"twin.seeds": 1})

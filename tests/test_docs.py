@@ -1,4 +1,4 @@
-"""What the documentation names is there, and what it shows runs."""
+"""Documentation: names exist, links resolve, code and commands run."""
 
 import re
 import shlex
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import tautscope
-from drawn import SLACK, DrawnRig, short_experiment
+from drawn import BACKLASH, DrawnRig, short_experiment
 from tautscope.cli import _parser
 from tautscope.config import dump_config
 from tautscope.dof import Dof
@@ -50,7 +50,7 @@ def commands(text: str) -> list[str]:
 
 
 @pages
-def test_what_a_page_names_exists(page: Path) -> None:
+def test_names_in_a_page_exist(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     for file, name in REFERENCE.findall(text):
         assert (ROOT / file).is_file(), file
@@ -67,7 +67,7 @@ def test_links_inside_the_repository_resolve(page: Path) -> None:
 
 
 @pages
-def test_commands_are_accepted(page: Path) -> None:
+def test_commands_in_a_page_are_valid(page: Path) -> None:
     for command in commands(page.read_text(encoding="utf-8")):
         tool, *arguments = shlex.split(command)
         if tool == "tautscope":
@@ -76,7 +76,7 @@ def test_commands_are_accepted(page: Path) -> None:
         elif tool.endswith(".py") or tool == "python":
             assert (ROOT / (arguments[0] if tool == "python" else tool)).is_file(), command
         else:
-            assert tool in {"pytest", "ruff", "mypy", "stubtest"}, command
+            assert tool in {"pytest", "ruff", "mypy", "stubtest", "lint-imports"}, command
 
 
 def test_every_equation_figure_and_table_has_a_function_and_a_test() -> None:
@@ -101,26 +101,26 @@ def test_the_readme_has_the_two_commands() -> None:
     assert blocks[1].strip() == "uv run pytest"
 
 
-def test_the_readmes_loop_runs_and_finds_the_slack() -> None:
+def test_the_readmes_loop_estimates_the_backlash() -> None:
     (code,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
     assert len([line for line in code.splitlines() if line]) <= 15
     found = subprocess.run(
         [sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=False
     )
     assert found.returncode == 0, found.stderr
-    slack = float(found.stdout.split()[-1])
-    assert slack == pytest.approx(10, rel=0.25), "the twin's insertion has about 10 mm"
+    width = float(found.stdout.split()[-1])
+    assert width == pytest.approx(10, rel=0.25), "the twin's insertion has about 10 mm"
 
 
-def test_the_citation_is_of_this_version() -> None:
+def test_the_citation_has_this_version() -> None:
     text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     assert re.search(rf"^version: {re.escape(tautscope.__version__)}$", text, re.MULTILINE)
 
 
-def test_the_ros_node_takes_images_and_gives_set_points(
+def test_the_ros_node_estimates_the_backlash(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """ROS is not installed here: its parts are stand-ins that keep what they are given."""
+    """ROS is not installed here: test doubles record what they receive."""
     sent: list[list[float]] = []
     callbacks: dict[str, Callable[..., None]] = {}
     now = SimpleNamespace(nanoseconds=0)
@@ -165,7 +165,7 @@ def test_the_ros_node_takes_images_and_gives_set_points(
 
     rig, reference = DrawnRig(config), SineSequence(config.experiment)
     callbacks["timer"]()
-    assert sent == [], "no command before the hand has said anything"
+    assert sent == [], "no command before the first reference"
     sample = rig.reset()
     while sample.time < 8:
         now.nanoseconds = round(1e9 * sample.time)
@@ -187,5 +187,5 @@ def test_the_ros_node_takes_images_and_gives_set_points(
                 )
             )
         sample = rig.step(sent[-1])
-    slack = node.loop.delta_plus - node.loop.delta_minus
-    assert slack[Dof.INSERTION] == pytest.approx(SLACK[Dof.INSERTION], rel=0.2)
+    width = node.loop.delta_plus - node.loop.delta_minus
+    assert width[Dof.INSERTION] == pytest.approx(BACKLASH[Dof.INSERTION], rel=0.2)

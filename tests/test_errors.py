@@ -1,4 +1,4 @@
-"""Every error names the field, what it got and what may come, also across processes."""
+"""Errors name the field, its value and the allowed values, also across processes."""
 
 import pickle
 import subprocess
@@ -10,7 +10,7 @@ from tautscope import errors
 
 
 @pytest.mark.parametrize("kind", errors.FieldError.__subclasses__(), ids=lambda kind: kind.__name__)
-def test_an_error_says_where_what_and_what_may_come(kind: type[errors.FieldError]) -> None:
+def test_an_error_names_field_value_and_allowed_values(kind: type[errors.FieldError]) -> None:
     error = kind("insertion.free_gain", 0.5, "at least 1")
     assert str(error) == "insertion.free_gain: got 0.5, expected at least 1"
     assert isinstance(error, errors.TautscopeError)
@@ -31,12 +31,12 @@ def test_importing_the_package_is_light() -> None:
 
 
 @pytest.mark.parametrize("name", [name for name in tautscope.__all__ if name != "Twin"])
-def test_every_public_name_is_there_and_documented(name: str) -> None:
+def test_every_public_name_exists_and_is_documented(name: str) -> None:
     assert name in dir(tautscope)
     value = getattr(tautscope, name)
     assert value.__doc__
 
 
-def test_no_other_names_appear() -> None:
+def test_an_unknown_name_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match="'tautscope' has no attribute 'twn'"):
         tautscope.twn  # noqa: B018

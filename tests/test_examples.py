@@ -1,4 +1,4 @@
-"""The examples run and say what their texts promise."""
+"""The examples run, and their results are as described."""
 
 import re
 import subprocess
@@ -30,13 +30,13 @@ def numbers(example: str) -> list[float]:
 
 
 @pytest.mark.parametrize("example", ["own_rig.py", "own_detector.py"])
-def test_your_own_rig_loses_its_slack(example: str) -> None:
+def test_hysteresis_of_your_own_rig_is_reduced(example: str) -> None:
     reductions = numbers(example)
     assert len(reductions) == 3
     assert all(70 <= reduction <= 82 for reduction in reductions)
 
 
-def test_your_own_record_gives_its_offsets() -> None:
+def test_offsets_of_your_own_record_are_estimated() -> None:
     minus, plus, without, with_model = numbers("own_record.py")
     assert minus == pytest.approx(-1, abs=0.15)
     assert plus == pytest.approx(2, abs=0.15)

@@ -1,4 +1,4 @@
-"""The loop on a rig that is not the twin: three plays and a drawn picture."""
+"""The loop on a rig other than the twin: three plays and a drawn image."""
 
 from concurrent.futures import Executor, Future
 from dataclasses import replace
@@ -6,13 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from drawn import SLACK, BadFrameRig, DrawnRig, short_experiment
+from drawn import BACKLASH, BadFrameRig, DrawnRig, short_experiment
 from numpy.typing import ArrayLike, NDArray
 from tautscope.dof import Dof
-from tautscope.errors import (
-    FrameError,
-    SignalError,
-)
+from tautscope.errors import FrameError, SignalError
 from tautscope.loop.reduction import HysteresisReduction, Report
 from tautscope.loop.references import SineSequence
 from tautscope.loop.rig import Frame, Rig, Sample
@@ -25,7 +22,7 @@ REFERENCE = SineSequence(CONFIG.experiment)
 
 
 class Constant:
-    """Holds still for a moment; `value` may be anything."""
+    """A constant reference; `value` may be invalid."""
 
     duration = 0.3
     segments = ()
@@ -38,14 +35,14 @@ class Constant:
 
 
 class BlindToTruth(DrawnRig):
-    """As hardware: nobody knows where the tip is."""
+    """A rig without a true state, like hardware."""
 
     def _sample(self, applied: NDArray[np.float64]) -> Sample:
         return replace(super()._sample(applied), true_state=None)
 
 
 class SlowCamera(DrawnRig):
-    """Its images are 0.05 s old, the first from before the start."""
+    """A rig with images 0.05 s old, the first captured before the start."""
 
     def _sample(self, applied: NDArray[np.float64]) -> Sample:
         sample = super()._sample(applied)
@@ -54,7 +51,7 @@ class SlowCamera(DrawnRig):
         return replace(sample, frame=replace(sample.frame, captured_at=sample.time - 0.05))
 
 
-class StandingClock(DrawnRig):
+class StoppedClock(DrawnRig):
     def step(self, command: ArrayLike) -> Sample:
         return replace(super().step(command), time=0.0)
 
@@ -63,30 +60,30 @@ def run(rig: Rig, compensate: bool = True) -> Recording:
     return run_experiment(rig, REFERENCE, CONFIG, compensate)
 
 
-def test_a_rig_of_forty_lines_is_a_rig() -> None:
+def test_the_drawn_rig_has_the_rig_protocol() -> None:
     assert isinstance(DrawnRig(CONFIG), Rig)
 
 
 @pytest.mark.parametrize("dof", Dof, ids=lambda dof: dof.label)
-def test_the_slack_goes_down_to_what_the_gain_leaves(
+def test_the_reduction_is_that_of_the_gain(
     uncompensated: Recording, compensated: Recording, dof: Dof
 ) -> None:
     result = evaluate(uncompensated, compensated)[dof]
-    slack = SLACK[dof]
+    width = BACKLASH[dof]
     sine = CONFIG.experiment[dof]
     per_tick = 2 * np.pi * sine.amplitude / sine.period * DrawnRig.control_period
-    # The rig's tip is where the command of the tick before has put it.
-    assert slack < result.uncompensated < slack + 2 * per_tick
+    # The tip follows the command of the previous tick.
+    assert width < result.uncompensated < width + 2 * per_tick
     ideal = 1 - 1 / CONFIG[dof].free_gain
     assert 0.9 * ideal < result.reduction < 1.02 * ideal
-    assert result.uncompensated_estimate == pytest.approx(slack, rel=0.1)
+    assert result.uncompensated_estimate == pytest.approx(width, rel=0.1)
     assert result.actuator_gain == pytest.approx(CONFIG[dof].free_gain, rel=1e-6)
-    assert result.state_rms < 0.05 * slack
+    assert result.state_rms < 0.05 * width
     assert result.frames_used > 0.9
 
 
-def test_a_detector_of_ones_own_takes_the_place_of_ours(compensated: Recording) -> None:
-    """The features that ours found, fed in from outside, give the same run; none give another."""
+def test_your_own_detector_replaces_the_package_detector(compensated: Recording) -> None:
+    """The same features give the same run; without features there is no compensation."""
     found = {
         row["captured_at"]: features
         for row, features in zip(
@@ -141,7 +138,7 @@ def test_the_trace_has_every_tick(compensated: Recording) -> None:
     assert np.all(per_dof(trace, "delta_minus") <= per_dof(trace, "delta_plus"))
 
 
-def test_frames_carry_the_truth_at_their_capture_time(compensated: Recording) -> None:
+def test_frames_have_the_true_state_at_their_capture_time(compensated: Recording) -> None:
     frames = compensated.frames
     assert np.all(np.diff(frames["sequence"]) == 8)
     rows = np.searchsorted(compensated.trace["time"], frames["captured_at"][:-1] - 1e-9)
@@ -180,13 +177,13 @@ def test_a_camera_of_another_size_is_named() -> None:
         run(BadFrameRig(CONFIG))
 
 
-def test_a_clock_that_stands_still_is_named() -> None:
+def test_a_stopped_clock_is_named() -> None:
     with pytest.raises(SignalError, match=r"sample\.time: got 0\.0, expected later"):
-        run(StandingClock(CONFIG))
+        run(StoppedClock(CONFIG))
 
 
 def test_progress_reaches_the_end() -> None:
-    told: list[tuple[float, float]] = []
+    reported: list[tuple[float, float]] = []
 
     class TwoSeconds(Constant):
         duration = 2.0
@@ -195,42 +192,42 @@ def test_progress_reaches_the_end() -> None:
         DrawnRig(CONFIG),
         TwoSeconds([25e-3, 0, 1.2]),
         CONFIG,
-        progress=lambda elapsed, duration: told.append((elapsed, duration)),
+        progress=lambda elapsed, duration: reported.append((elapsed, duration)),
     )
-    np.testing.assert_allclose(told, [(1.0, 2.0), (2.0, 2.0)])
+    np.testing.assert_allclose(reported, [(1.0, 2.0), (2.0, 2.0)])
 
 
-class Answering(Executor):
-    """Runs what it is asked at once, or `late` calls of `done` later."""
+class DelayedExecutor(Executor):
+    """Runs each task at once; its future is done after `late` calls of `done`."""
 
     def __init__(self, late: int) -> None:
         self.late = late
-        self.asked = 0
+        self.tasks = 0
 
     def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Any:
-        self.asked += 1
-        answer, left = fn(), self.late
+        self.tasks += 1
+        result, left = fn(), self.late
 
-        class Later(Future[Any]):
+        class DelayedFuture(Future[Any]):
             def done(self) -> bool:
                 nonlocal left
                 left -= 1
                 return left < 0
 
-        later = Later()
-        later.set_result(answer)
-        return later
+        future = DelayedFuture()
+        future.set_result(result)
+        return future
 
 
 @pytest.mark.parametrize("late", [0, 3, 9])
-def test_images_looked_at_aside_hold_up_no_tick(late: int, compensated: Recording) -> None:
-    """Every tick is made; with slow eyes fewer frames are seen, each later and as it would be."""
-    eyes = Answering(late)
-    aside = run_experiment(DrawnRig(CONFIG), REFERENCE, CONFIG, aside=eyes)
-    np.testing.assert_array_equal(aside.trace["time"], compensated.trace["time"])
-    assert eyes.asked >= len(aside.frames) > 0
-    assert (np.diff(aside.frames["captured_at"]) > 0).all()
-    assert set(aside.frames["captured_at"]) <= set(compensated.frames["captured_at"])
-    waited = aside.frames["arrived_at"] - aside.frames["captured_at"]
+def test_detection_in_the_background_delays_no_tick(late: int, compensated: Recording) -> None:
+    """The run has every tick; a slow detector uses fewer frames, and each later."""
+    executor = DelayedExecutor(late)
+    found = run_experiment(DrawnRig(CONFIG), REFERENCE, CONFIG, executor=executor)
+    np.testing.assert_array_equal(found.trace["time"], compensated.trace["time"])
+    assert executor.tasks >= len(found.frames) > 0
+    assert (np.diff(found.frames["captured_at"]) > 0).all()
+    assert set(found.frames["captured_at"]) <= set(compensated.frames["captured_at"])
+    waited = found.frames["arrived_at"] - found.frames["captured_at"]
     assert waited.min() >= (late + 1) * DrawnRig.control_period - 1e-9
-    assert evaluate(aside, aside)[Dof.INSERTION].frames_used > 0.9
+    assert evaluate(found, found)[Dof.INSERTION].frames_used > 0.9

@@ -1,4 +1,4 @@
-"""The figures' definitions, checked on signals whose answer is known beforehand."""
+"""Figures of merit, on signals with a known result."""
 
 import math
 
@@ -94,20 +94,20 @@ def test_uneven_width_shows_as_maximum() -> None:
     ],
     ids=["still", "one way", "unknown", "empty"],
 )
-def test_what_is_no_loop_has_no_width(x: ArrayLike, y: ArrayLike) -> None:
+def test_a_signal_without_a_loop_has_no_width(x: ArrayLike, y: ArrayLike) -> None:
     loop = metrics.loop_width(x, y)
     assert math.isnan(loop.mean)
     assert math.isnan(loop.max)
 
 
-def test_signals_of_different_length_are_refused() -> None:
+def test_signals_of_different_length_are_an_error() -> None:
     with pytest.raises(SignalError, match="y: got '3 samples', expected as many as x: 2"):
         metrics.loop_width([0, 1], [0, 1, 2])
     with pytest.raises(SignalError, match="x: got"):
         metrics.loop_width([[0, 1]], [0, 1])
 
 
-def test_reduction_is_the_share_that_is_gone() -> None:
+def test_reduction_is_the_share_removed() -> None:
     assert metrics.reduction(10.0, 2.5) == pytest.approx(0.75)
     assert math.isnan(metrics.reduction(0.0, 1.0))
     loop = metrics.loop_width(*settled_loop(1.0, -0.2, 0.2))
@@ -137,7 +137,7 @@ def test_start_of_an_unknown_end_is_unknown() -> None:
     assert math.isnan(metrics.start_periods([]))
 
 
-def test_widths_per_period_see_a_play_that_shrinks() -> None:
+def test_widths_per_period_follow_a_shrinking_play() -> None:
     time = np.arange(5001) * 1e-3
     x = np.sin(2 * np.pi * time)
     y = np.empty_like(x)
@@ -168,10 +168,10 @@ def test_overspeed_is_the_ratio_of_speeds() -> None:
 @given(slack=st.floats(0.05, 0.9), gain=st.floats(1.0, 1.5))
 @settings(max_examples=40, deadline=None)
 def test_a_lagging_tip_never_overshoots(slack: float, gain: float) -> None:
-    """Right after a reversal it is on the far side of the reference, and still lags."""
+    """After a reversal it is ahead of the reference, but lags in its own motion."""
     reference, tip = settled_loop(1.0, -slack, slack)
     assert metrics.overshoot(reference, tip) == pytest.approx(0, abs=1e-9)
-    # A stroke's own motion beyond the reference counts in full.
+    # Motion beyond the reference within a stroke counts in full.
     assert metrics.overshoot(reference, gain * reference) == pytest.approx(gain - 1, abs=1e-9)
 
 
@@ -183,7 +183,7 @@ def test_overshoot_is_the_largest_lead(ahead: float) -> None:
     assert metrics.overshoot(-tip, -reference) == pytest.approx(ahead, rel=1e-3)
 
 
-def test_overshoot_of_what_stands_still_or_is_unknown() -> None:
+def test_overshoot_without_motion_or_of_unknown_values() -> None:
     assert math.isnan(metrics.overshoot([1.0, 1.0], [0.0, 1.0]))
     assert math.isnan(metrics.overshoot([], []))
     assert math.isnan(metrics.overshoot([0.0, 1.0, 2.0], [0.0, np.nan, 2.0]))
@@ -195,7 +195,7 @@ def test_overshoot_of_what_stands_still_or_is_unknown() -> None:
     ("values", "expected"),
     [([10, 10], 0), ([2, 8, 9.5, 10.5], 2), ([10, 2, 10], 2), ([10, math.nan, 10], 2)],
 )
-def test_until_within_counts_what_comes_before(values: list[float], expected: float) -> None:
+def test_until_within_counts_the_values_before(values: list[float], expected: float) -> None:
     assert metrics.until_within(values, 10.0, 1.0) == expected
 
 

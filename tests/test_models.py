@@ -1,4 +1,4 @@
-"""Models of hysteresis: laws, independent oracles, and parameters found again."""
+"""Models of hysteresis: properties, independent oracles, recovered parameters."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -10,16 +10,16 @@ from drawn import EXAMPLES
 from numpy.typing import NDArray
 from play_model import play
 from scipy.integrate import solve_ivp
-from tautscope.analysis.records import analyze
-from tautscope.analysis.records.models import bouc_wen, constant_play, prandtl_ishlinskii
-from tautscope.analysis.records.models.bouc_wen import BoucWen, hysteretic_variable
-from tautscope.analysis.records.models.prandtl_ishlinskii import PrandtlIshlinskii
-from tautscope.analysis.records.models.registry import MODELS, Model
-from tautscope.analysis.records.models.task import Task
+from tautscope.analysis.comparison import analyze
+from tautscope.analysis.models import bouc_wen, constant_play, prandtl_ishlinskii
+from tautscope.analysis.models.bouc_wen import BoucWen, hysteretic_variable
+from tautscope.analysis.models.prandtl_ishlinskii import PrandtlIshlinskii
+from tautscope.analysis.models.registry import MODELS, Model
+from tautscope.analysis.models.task import Task
 from tautscope.config import load_config
 from tautscope.dof import Dof
 from tautscope.report.metrics import rms
-from tautscope.runs.replay import Cleaning, Record
+from tautscope.runs.records import Cleaning, Record
 
 Floats = NDArray[np.float64]
 
@@ -32,20 +32,20 @@ BOUC_WEN = BoucWen(
 models = pytest.mark.parametrize("model", MODELS, ids=lambda model: model.name)
 
 
-def wander(n: int = 2400) -> Floats:
+def two_sines(n: int = 2400) -> Floats:
     time = np.linspace(0, 60, n)
     return 12 * np.sin(2 * np.pi * time / 10) + 4 * np.sin(2 * np.pi * time / 3.7)
 
 
-def finer(command: Floats) -> tuple[Floats, NDArray[np.intp]]:
-    """The same way, unevenly sampled more often, and where the old samples are."""
+def resample(command: Floats) -> tuple[Floats, NDArray[np.intp]]:
+    """The command with more, uneven samples, and the indices of the old samples."""
     rng = np.random.default_rng(5)
     extra = np.sort(rng.uniform(0, len(command) - 1, 3 * len(command)))
     at = np.unique(np.concatenate([np.arange(len(command)), extra]))
     return np.interp(at, np.arange(len(command)), command), np.flatnonzero(at == np.floor(at))
 
 
-def forgotten(command: Floats) -> int:
+def sweep_end(command: Floats) -> int:
     """First sample at which the command has crossed nine tenths of its range."""
     span = 0.9 * (command.max() - command.min())
     return next(k for k in range(len(command)) if np.ptp(command[: k + 1]) >= span)
@@ -61,20 +61,20 @@ def task(command: Floats, measured: Floats, gain: float | None = None) -> Task:
     ids=["prandtl_ishlinskii", "bouc_wen", "play"],
 )
 def test_sampling_does_not_matter(predict) -> None:
-    command = wander(300)
-    more, at = finer(command)
+    command = two_sines(300)
+    more, at = resample(command)
     np.testing.assert_allclose(predict(more)[at], predict(command), atol=2e-5)
-    twice = np.repeat(command, 2)  # standing still changes nothing
+    twice = np.repeat(command, 2)  # a constant command changes nothing
     np.testing.assert_array_equal(predict(twice)[1::2], predict(twice)[::2])
 
 
 def test_prandtl_ishlinskii_is_odd() -> None:
-    command = wander()
+    command = two_sines()
     np.testing.assert_allclose(PI.predict(-command), -PI.predict(command), atol=1e-12)
 
 
 def test_prandtl_ishlinskii_with_one_operator_is_a_play() -> None:
-    command = wander()
+    command = two_sines()
     one = PrandtlIshlinskii((2.5,), (1.0,), 1.0, 0.0)
     expected = play(command, -2.5, 2.5, start=command[0])
     np.testing.assert_allclose(one.predict(command), expected, atol=1e-12)
@@ -101,8 +101,8 @@ def test_bouc_wen_agrees_with_an_integrator(rho: float, sigma: float, exponent: 
             power = np.abs(w) ** exponent
             return rho * (1 - sigma * side * power * np.sign(w) + (sigma - 1) * power)
 
-        way = solve_ivp(slope, (begin, end), [expected[-1]], rtol=1e-9, atol=1e-11)
-        expected.append(way.y[0, -1])
+        solution = solve_ivp(slope, (begin, end), [expected[-1]], rtol=1e-9, atol=1e-11)
+        expected.append(solution.y[0, -1])
     np.testing.assert_allclose(found, expected, atol=3e-5)
 
 
@@ -126,8 +126,8 @@ def test_bouc_wen_has_a_limit_loop(sigma: float) -> None:
     np.testing.assert_array_equal(mirrored, -from_below)
 
 
-def test_bouc_wen_becomes_a_play_when_its_corner_is_sharp() -> None:
-    command, radius = wander(), 3.0
+def test_bouc_wen_with_a_sharp_corner_is_a_play() -> None:
+    command, radius = two_sines(), 3.0
     sharp = BoucWen(1.0, -radius, 0.0, 1 / radius, 0.5, 400.0, 0.0)
     expected = play(command, -radius, radius, start=command[0])
     np.testing.assert_allclose(sharp.predict(command), expected, atol=0.02 * radius)
@@ -135,8 +135,8 @@ def test_bouc_wen_becomes_a_play_when_its_corner_is_sharp() -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("gain", [1.0, -0.02, 700.0])
-def test_a_plays_gain_and_offsets_are_found_again(seed: int, gain: float) -> None:
-    command = wander()[100:]
+def test_gain_and_offsets_of_a_play_are_recovered(seed: int, gain: float) -> None:
+    command = two_sines()[100:]
     tip = gain * play(command, -5.0, 3.0) + 40 * gain
     noise = np.random.default_rng(seed).normal(0, 0.1 * abs(gain), len(tip))
     found = constant_play.fit(command, tip + noise)
@@ -145,15 +145,15 @@ def test_a_plays_gain_and_offsets_are_found_again(seed: int, gain: float) -> Non
     low, high = sorted([-5.0 * gain, 3.0 * gain])
     assert found.delta_minus == pytest.approx(low - 40 * gain, rel=0.01), f"seed {seed}"
     assert found.delta_plus == pytest.approx(high - 40 * gain, rel=0.01), f"seed {seed}"
-    late = slice(400, None)  # one sweep; what was before it is not told
+    late = slice(400, None)  # after one sweep the start is forgotten
     assert rms((found.predict(command) - tip)[late]) < 0.02 * abs(gain), f"seed {seed}"
 
 
 @pytest.mark.parametrize("fit", [constant_play.fit, prandtl_ishlinskii.fit, bouc_wen.fit])
-def test_what_was_before_the_record_does_not_show_in_a_fit(fit) -> None:
-    command = wander()
+def test_motion_before_the_record_does_not_affect_a_fit(fit) -> None:
+    command = two_sines()
     measured = play(command, -5.0, 3.0)
-    late = forgotten(command)
+    late = sweep_end(command)
     other = measured.copy()
     other[:late] += 2
     assert fit(command, other) == fit(command, measured)
@@ -169,13 +169,13 @@ def test_a_record_of_one_stroke_is_fitted_whole() -> None:
 
 
 def test_a_plays_given_gain_is_kept() -> None:
-    command = wander()
+    command = two_sines()
     assert constant_play.fit(command, play(command, -5.0, 3.0), gain=0.9).gain == 0.9
 
 
 @pytest.mark.parametrize("direction", [1.0, -1.0])
-def test_prandtl_ishlinskiis_weights_are_found_again(direction: float) -> None:
-    command = wander()
+def test_weights_of_prandtl_ishlinskii_are_recovered(direction: float) -> None:
+    command = two_sines()
     truth = replace(PI, direction=direction, offset=-7.0)
     noise = np.random.default_rng(1).normal(0, 0.05, len(command))
     found = prandtl_ishlinskii.fit(command, truth.predict(command) + noise, radii=PI.radii)
@@ -185,29 +185,29 @@ def test_prandtl_ishlinskiis_weights_are_found_again(direction: float) -> None:
     assert min(found.weights) >= 0
 
 
-def test_prandtl_ishlinskiis_offset_is_that_of_plain_least_squares() -> None:
-    command = wander()
+def test_offset_of_prandtl_ishlinskii_is_that_of_least_squares() -> None:
+    command = two_sines()
     radii = (0.0, 4.0, 6.0)
     noise = np.random.default_rng(1).normal(0, 0.05, len(command))
     measured = PI.predict(command) + noise + 2.0
     found = prandtl_ishlinskii.fit(command, measured, radii=radii)
     plays = [play(command, -r, r, start=command[0]) for r in radii]
     columns = np.column_stack([*plays, np.ones(len(command))])
-    late = forgotten(command)
+    late = sweep_end(command)
     expected = np.linalg.lstsq(columns[late:], measured[late:])[0]
-    assert min(expected[:3]) > 0, "else the bound would matter"
+    assert min(expected[:3]) > 0, "a bound is active"
     np.testing.assert_allclose([*found.weights, found.offset], expected, atol=1e-9)
 
 
-def test_bouc_wens_parameters_are_found_again() -> None:
-    command = wander()
+def test_parameters_of_bouc_wen_are_recovered() -> None:
+    command = two_sines()
     found = bouc_wen.fit(command, BOUC_WEN.predict(command))
     for name in ("gain", "hysteresis", "offset", "rho", "sigma", "exponent"):
         assert getattr(found, name) == pytest.approx(getattr(BOUC_WEN, name), rel=0.02), name
 
 
-def test_bouc_wen_predicts_what_it_was_not_fitted_to() -> None:
-    command = wander()
+def test_bouc_wen_predicts_the_second_half() -> None:
+    command = two_sines()
     truth = BOUC_WEN.predict(command)
     noisy = truth + np.random.default_rng(2).normal(0, 0.2, len(truth))
     prediction = bouc_wen.run(task(command, noisy))
@@ -216,8 +216,8 @@ def test_bouc_wen_predicts_what_it_was_not_fitted_to() -> None:
 
 @models
 def test_units_zero_and_direction_do_not_matter(model: Model) -> None:
-    """With the command in motor steps run backwards and the tip in others: the same error."""
-    command = wander()
+    """Command in motor steps, reversed, and tip in another unit give the same error."""
+    command = two_sines()
     measured = play(command, -5.0, 3.0) + np.random.default_rng(3).normal(0, 0.1, len(command))
     plain = model.run(task(command, measured)).tip
     other = model.run(task(-200 * command + 3e4, 0.05 * measured - 8)).tip
@@ -225,29 +225,29 @@ def test_units_zero_and_direction_do_not_matter(model: Model) -> None:
 
 
 @models
-def test_what_a_model_may_see(model: Model) -> None:
-    command = wander()
+def test_a_model_uses_only_the_samples_it_may(model: Model) -> None:
+    command = two_sines()
     measured = play(command, -5.0, 3.0) + 0.1 * np.sin(np.arange(len(command)))
     at = 1800
     changed = measured.copy()
     changed[at:] += 5
     before = model.run(task(command, measured)).tip
     after = model.run(task(command, changed)).tip
-    if model.learns == "whole record":
+    if model.fitted_to == "whole record":
         assert not np.array_equal(before, after)
     else:
         np.testing.assert_array_equal(after[: at + 1], before[: at + 1])
-    if model.learns == "first half":
+    if model.fitted_to == "first half":
         np.testing.assert_array_equal(after, before)
-    if model.learns == "on-line":
+    if model.fitted_to == "on-line":
         assert not np.array_equal(before[at + 1 :], after[at + 1 :])
         assert np.isnan(before[:1200]).all()
         assert np.isfinite(before[1200:]).all()
 
 
-def test_an_on_line_model_with_a_given_gain_predicts_from_the_first_tip_seen() -> None:
+def test_an_on_line_model_with_a_given_gain_predicts_from_the_first_measured_tip() -> None:
     (model,) = (model for model in MODELS if model.name == "paper")
-    command = wander()
+    command = two_sines()
     measured = 2 * play(command, -5.0, 3.0) - 30
     measured[:4] = np.nan
     found = model.run(task(command, measured, gain=2.0))
@@ -258,9 +258,9 @@ def test_an_on_line_model_with_a_given_gain_predicts_from_the_first_tip_seen() -
 
 
 @models
-def test_a_tip_seen_now_and_then_is_enough(model: Model) -> None:
-    """A motor logged at ten times the camera's rate: the command between two images counts."""
-    command = wander()
+def test_sparse_tip_measurements_suffice(model: Model) -> None:
+    """The motor is logged at ten times the camera's rate."""
+    command = two_sines()
     truth = play(command, -5.0, 3.0)
     measured = np.where(np.arange(len(command)) % 10 == 3, truth, np.nan)
     blind, full = (model.run(task(command, tip)).tip for tip in (measured, truth))
@@ -276,11 +276,11 @@ def insertion_record() -> Record:
     return Record(motor, tip, time, np.arange(len(motor)), Cleaning())
 
 
-def test_every_model_beats_none_on_the_twin(insertion_record: Record) -> None:
+def test_every_model_beats_the_linear_fit_on_the_twin(insertion_record: Record) -> None:
     found = analyze(insertion_record, load_config())
     shares = {entry.model.name: found.share(entry) for entry in found.entries}
     assert shares.pop("none") == 1
     assert len(shares) == len(MODELS) - 1
     assert max(shares.values()) < 0.2, shares
-    # Its friction is spread along the shaft: a loop with round corners, which a play has not.
+    # Friction distributed along the shaft rounds the corners of the loop; a play has sharp ones.
     assert max(shares["prandtl_ishlinskii"], shares["bouc_wen"]) < 0.5 * shares["play"], shares

@@ -1,4 +1,4 @@
-"""What a run leaves behind reads back equal, from a file or from another process."""
+"""Recordings read back equal, from files and from worker processes."""
 
 from pathlib import Path
 
@@ -46,14 +46,14 @@ def test_a_recording_reads_back_equal(compensated: Recording, tmp_path: Path) ->
     assert again.compensated
 
 
-def test_a_folder_in_use_is_left_alone(compensated: Recording, tmp_path: Path) -> None:
+def test_a_folder_in_use_is_not_changed(compensated: Recording, tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("mine")
     with pytest.raises(OutputError, match=r"out: got '.*', expected a folder that is empty"):
         compensated.save(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
 
 
-def test_a_failed_save_leaves_nothing(
+def test_a_failed_save_leaves_no_folder(
     compensated: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(*_: object) -> str:
@@ -80,7 +80,7 @@ def test_a_damaged_recording_is_named(compensated: Recording, tmp_path: Path) ->
         Recording.load(folder)
 
 
-def test_runs_in_processes_are_the_same_runs(
+def test_runs_in_worker_processes_are_identical(
     uncompensated: Recording, compensated: Recording
 ) -> None:
     shares: list[float] = []
@@ -91,7 +91,7 @@ def test_runs_in_processes_are_the_same_runs(
     assert shares == sorted(shares)
 
 
-def test_an_error_in_a_process_arrives_with_its_facts() -> None:
+def test_an_error_in_a_worker_process_keeps_its_facts() -> None:
     with pytest.raises(FrameError) as error:
         run_trials([Trial(CONFIG, True)] * 2, lambda share: None, BadFrameRig, workers=2)
     assert error.value.allowed

@@ -1,4 +1,4 @@
-"""The article's protocol: one sine after the other, no jump anywhere."""
+"""The article's protocol: one sine after the other, without a jump."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def test_segments_follow_each_other_in_the_order_of_the_dof() -> None:
 
 
 @pytest.mark.parametrize("segment", REFERENCE.segments, ids=lambda segment: segment.dof.label)
-def test_in_a_segment_one_dof_draws_its_sine_and_the_others_wait(segment: Segment) -> None:
+def test_in_a_segment_one_dof_moves_and_the_others_rest(segment: Segment) -> None:
     sine = EXPERIMENT[segment.dof]
     inside = (segment.start <= TIMES) & (segment.end > TIMES)
     moving = POSITIONS[inside, segment.dof]
@@ -39,7 +39,7 @@ def test_the_position_never_jumps() -> None:
     assert np.all(steps <= np.array(speed) * 0.005 * (1 + 1e-6))
 
 
-def test_outside_its_time_it_rests_at_the_centres() -> None:
+def test_before_and_after_it_rests_at_the_centres() -> None:
     centres = [EXPERIMENT[dof].centre for dof in Dof]
     for time in (-1.0, 0.0, REFERENCE.duration, REFERENCE.duration + 1):
         np.testing.assert_array_equal(REFERENCE(time), centres)

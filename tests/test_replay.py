@@ -1,4 +1,4 @@
-"""The estimator on records: causal, better than no model, clear about bad files."""
+"""Records: causal prediction, cleaning, and errors of invalid files."""
 
 from pathlib import Path
 
@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from play_model import play
+from tautscope import replay
 from tautscope._core import Estimator
 from tautscope.errors import MissingPathError, RecordError, SignalError
-from tautscope.runs import replay
 
 WIDTH = 10.0
 
@@ -31,18 +31,18 @@ def record(seed: int, noise: float = 0.05) -> tuple[NDArray[np.float64], NDArray
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_it_learns_a_play_and_beats_no_model(seed: int) -> None:
+def test_the_width_of_a_play_is_estimated_and_the_error_reduced(seed: int) -> None:
     command, measured = record(seed)
     predicted, delta_minus, delta_plus = replay.predict_tip(command, measured, estimator())
     assert delta_plus[-1] - delta_minus[-1] == pytest.approx(WIDTH, rel=0.05), f"seed {seed}"
     late = slice(len(command) // 2, None)
     error = np.sqrt(np.mean((predicted - measured)[late] ** 2))
-    no_model = np.std((command - measured)[late])
-    assert error < 0.1 * no_model, f"seed {seed}"
+    without_model = np.std((command - measured)[late])
+    assert error < 0.1 * without_model, f"seed {seed}"
 
 
 @pytest.mark.parametrize("at", [1, 700, 2999])
-def test_a_prediction_knows_nothing_of_its_own_time_or_later(at: int) -> None:
+def test_a_prediction_is_causal(at: int) -> None:
     command, measured = record(0)
     predicted, minus, plus = replay.predict_tip(command, measured, estimator())
     other = measured.copy()
@@ -101,7 +101,7 @@ def assert_same_signals(found: replay.Record, lines: list[Line]) -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_late_and_repeated_lines_are_put_right_and_counted(tmp_path: Path, seed: int) -> None:
+def test_late_lines_are_sorted_and_duplicates_removed(tmp_path: Path, seed: int) -> None:
     lines = clean_lines(seed)
     messy = lines.copy()
     for at in (200, 900, 2500):
@@ -114,7 +114,7 @@ def test_late_and_repeated_lines_are_put_right_and_counted(tmp_path: Path, seed:
     np.testing.assert_array_equal(np.array(messy)[found.rows - 2], lines)
 
 
-def test_repeated_lines_without_a_tip_are_repeated_lines(tmp_path: Path) -> None:
+def test_duplicate_lines_without_a_tip_are_removed(tmp_path: Path) -> None:
     nan = float("nan")
     found = read_lines(tmp_path, [(0, 1, 2), (1, 2, nan), (1, 2, nan), (2, 3, 4)])
     assert found.cleaning == replay.Cleaning(duplicates=1, unseen=1)
@@ -139,7 +139,7 @@ def test_gaps_are_counted(tmp_path: Path) -> None:
     assert found.cleaning.longest_gap == pytest.approx(200 * 0.02, rel=0.1)
 
 
-def test_without_time_the_order_stays(tmp_path: Path) -> None:
+def test_without_time_the_order_is_kept(tmp_path: Path) -> None:
     file = tmp_path / "log.csv"
     file.write_text("t,c,m\n1,1,1\n1,1,1\n0,2,2\n")
     found = replay.read_record(file, "c", "m")

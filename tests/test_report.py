@@ -1,4 +1,4 @@
-"""The report stands alone; the figures are drawn without anyone's global state."""
+"""Report and figures: self-contained page, no global state."""
 
 import base64
 import re
@@ -11,8 +11,8 @@ import pytest
 from matplotlib.figure import Figure
 from tautscope.dof import Dof
 from tautscope.report import figures, tables
-from tautscope.report.demo import Demo
-from tautscope.report.report import Picture, demo_report, run_report
+from tautscope.report.demo import Demo, demo_report
+from tautscope.report.report import CaptionedFigure, run_report
 from tautscope.report.results import DofResult, evaluate
 from tautscope.report.tables import ROWS, article_cell, cell
 from tautscope.runs.recording import Recording
@@ -21,7 +21,7 @@ VOID = {"meta", "img", "br"}
 
 
 class Page(HTMLParser):
-    """What a page is made of; complains if a tag is not closed."""
+    """Tags, links and text of a page; every tag must be closed."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -57,19 +57,20 @@ def demo(runs: tuple[Recording, Recording]) -> Demo:
     return Demo(config, (3, 4), (result, result), uncompensated, compensated, 144.0, 12.0)
 
 
-def test_the_report_needs_nothing_else(demo: Demo) -> None:
-    page_text = demo_report(demo, [Picture(Figure(figsize=(2, 1)), "A <figure> of nothing.")])
+def test_the_report_is_self_contained(demo: Demo) -> None:
+    figure = CaptionedFigure(Figure(figsize=(2, 1)), "A <figure> of nothing.")
+    page_text = demo_report(demo, [figure])
     page = Page(page_text)
     assert page.open == []
     assert {"script", "link", "iframe"}.isdisjoint(page.tags)
     assert all(link.startswith("data:image/jpeg;base64,") for link in page.links)
     assert len(page.links) == 1
-    picture = base64.b64decode(page.links[0].partition(",")[2])
-    assert picture.startswith(b"\xff\xd8\xff")
+    image = base64.b64decode(page.links[0].partition(",")[2])
+    assert image.startswith(b"\xff\xd8\xff")
     assert not re.search(r"url\(|@import|https?:", page_text)
 
 
-def test_the_report_says_what_was_found(demo: Demo) -> None:
+def test_the_report_contains_the_results(demo: Demo) -> None:
     page = Page(demo_report(demo, []))
     for row in ROWS:
         assert row.title in page.text
@@ -97,8 +98,8 @@ def test_the_report_has_a_column_for_each_profile_that_was_run(demo: Demo) -> No
     assert "in 4 runs" in demo_report(demo, [])
 
 
-def test_the_report_of_one_run_shows_what_one_run_can(runs: tuple[Recording, Recording]) -> None:
-    """On a rig: no truth, no run without compensation; the camera's figures stand there."""
+def test_the_report_of_one_run_without_a_true_state(runs: tuple[Recording, Recording]) -> None:
+    """Only the rows measured by the camera are left."""
     recording = runs[1]
     blind = replace(recording, trace=recording.trace.copy(), frames=recording.frames.copy())
     for dof in Dof:
@@ -118,16 +119,16 @@ def test_the_report_of_one_run_shows_what_one_run_can(runs: tuple[Recording, Rec
     assert '<td class="first">78 %</td>' in both  # the article's rotation
 
 
-def test_what_the_camera_sees_of_tracking_is_what_the_truth_says(
+def test_tracking_error_by_camera_agrees_with_the_true_one(
     runs: tuple[Recording, Recording],
 ) -> None:
-    """The drawn rig's estimate is good, so both errors agree."""
+    """The estimate on the drawn rig is accurate."""
     for dof, found in evaluate(None, runs[1]).items():
         assert found.tracking_estimate == pytest.approx(found.tracking_rms, rel=0.2), dof
         assert np.isnan(found.uncompensated) and np.isnan(found.reduction_estimate)
 
 
-def test_figures_leave_no_trace_in_global_state(runs: tuple[Recording, Recording]) -> None:
+def test_figures_do_not_change_global_state(runs: tuple[Recording, Recording]) -> None:
     before = dict(matplotlib.rcParams)
     figure = figures.figure9(*runs)
     assert dict(matplotlib.rcParams) == before
@@ -142,17 +143,17 @@ def test_the_uncompensated_loop_is_drawn_wider(runs: tuple[Recording, Recording]
     axis = figures.figure9(*runs).axes[4]
     before, after, first = (np.ptp(line.get_xdata() - line.get_ydata()) for line in axis.lines[:3])
     assert before > after > 0
-    assert first > after, "the first period, in which it learns, is the wider one"
+    assert first > after, "the first period, before the offsets are estimated, is wider"
 
 
-def test_a_loop_that_was_never_seen_is_said(runs: tuple[Recording, Recording]) -> None:
+def test_a_loop_without_measurements_is_labelled(runs: tuple[Recording, Recording]) -> None:
     recording = replace(runs[1], frames=runs[1].frames.copy())
     recording.frames["observable_rotation"] = False
     for index, axis in enumerate(figures.figure9(None, recording).axes[3:]):
-        assert [text.get_text() for text in axis.texts] == ["not seen"] * (index == 1)
+        assert [text.get_text() for text in axis.texts] == ["not measured"] * (index == 1)
 
 
-def test_figure5_names_the_markers_where_they_are(runs: tuple[Recording, Recording]) -> None:
+def test_figure5_labels_the_markers_at_their_features(runs: tuple[Recording, Recording]) -> None:
     snapshot = runs[1].snapshot
     assert snapshot is not None
     figure = figures.figure5(snapshot, runs[1].config)
@@ -173,12 +174,12 @@ def test_figure5_names_the_markers_where_they_are(runs: tuple[Recording, Recordi
         ("marker_rms_px", float("nan"), "-"),
     ],
 )
-def test_figures_are_rounded_for_people(name: str, value: float, text: str) -> None:
+def test_figures_are_rounded(name: str, value: float, text: str) -> None:
     row = next(row for row in ROWS if row.name == name)
     assert cell(row, Dof.INSERTION, value) == text
 
 
-def test_the_articles_table_is_its_table() -> None:
+def test_the_articles_values_are_those_of_its_table() -> None:
     columns = [
         [article_cell(row, dof) for row in ROWS if row.name in tables.ARTICLE] for dof in Dof
     ]
@@ -189,7 +190,7 @@ def test_every_figure_has_a_row() -> None:
     assert {row.name for row in ROWS} == set(DofResult.__dataclass_fields__)
 
 
-def test_what_is_not_known_is_null_in_json(demo: Demo) -> None:
+def test_an_unknown_figure_is_null_in_json(demo: Demo) -> None:
     unknown = {
         dof: replace(result, tracking_rms=float("nan")) for dof, result in demo.results[0].items()
     }

@@ -1,4 +1,4 @@
-"""Table 1 from two made-up runs of which every figure is known."""
+"""Table 1 from two synthetic runs with known figures."""
 
 import numpy as np
 import pytest
@@ -66,7 +66,7 @@ def test_widths_are_of_the_last_two_periods(result: DofResult) -> None:
     assert result.reduction_max == pytest.approx(0.8, rel=1e-2)
 
 
-def test_the_cameras_widths_are_of_the_estimates(result: DofResult) -> None:
+def test_widths_by_camera_are_of_the_estimates(result: DofResult) -> None:
     assert result.uncompensated_estimate == pytest.approx(0.8, rel=2e-2)
     assert result.compensated_estimate == pytest.approx(0.2, rel=2e-2)
     expected = 1 - result.compensated_estimate / result.uncompensated_estimate
@@ -94,7 +94,7 @@ def test_speeds_are_of_the_whole_segment(result: DofResult) -> None:
     assert result.actuator_gain == pytest.approx(3.0)
 
 
-def test_medians_and_worst_leave_out_what_is_not_known() -> None:
+def test_medians_and_worst_values_skip_unknown_figures() -> None:
     def result(value: float) -> dict[Dof, DofResult]:
         return {Dof.BENDING: DofResult(*[value] * len(DofResult.__dataclass_fields__))}
 

@@ -1,7 +1,7 @@
 """Image-based hysteresis reduction for flexible endoscopic instruments.
 
-Reilink, Stramigioli, Misra, Mechatronics 23 (2013) 652-658. Names below are loaded when first
-used: importing the package imports neither the physics nor OpenCV nor matplotlib nor MCAP.
+Reilink, Stramigioli, Misra, Mechatronics 23 (2013) 652-658. The names below are loaded
+when first used: importing the package imports neither MuJoCo nor OpenCV nor matplotlib nor MCAP.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from tautscope._core import __version__
 
 if TYPE_CHECKING:
+    from tautscope import metrics, replay
     from tautscope._core import Camera, Compensator, Estimator, Instrument, Play
     from tautscope.config import Config, load_config
     from tautscope.dof import Dof
@@ -19,13 +20,11 @@ if TYPE_CHECKING:
     from tautscope.loop.reduction import HysteresisReduction, Report
     from tautscope.loop.rig import Frame, Rig, Sample
     from tautscope.loop.vision import Detection, MarkerDetector
-    from tautscope.report import metrics
-    from tautscope.runs import replay
     from tautscope.runs.experiment import run_experiment
     from tautscope.runs.recording import Recording
     from tautscope.twin import Twin
 
-_HOMES = {
+_LOCATIONS = {
     "Camera": "_core",
     "Compensator": "_core",
     "Config": "config",
@@ -77,9 +76,9 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name in _MODULES:
         return import_module(f"tautscope.{name}")
-    if name not in _HOMES:
+    if name not in _LOCATIONS:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(f"tautscope.{_HOMES[name]}"), name)
+    value = getattr(import_module(f"tautscope.{_LOCATIONS[name]}"), name)
     globals()[name] = value
     return value
 

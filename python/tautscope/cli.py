@@ -7,20 +7,15 @@ import sys
 from collections.abc import Sequence
 
 from tautscope._core import __version__
-from tautscope.bench import commands as bench
-from tautscope.commands import analyze, arguments, demo
+from tautscope.commands import analyze, arguments, bench, demo, doctor, hardware, log
 from tautscope.config import dump_config, load_config
 from tautscope.errors import TautscopeError
-from tautscope.hardware import commands as hardware
-from tautscope.hardware.doctor import commands as doctor
-from tautscope.log import commands as log
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; 0 on success, 2 on an error a person can mend, 130 when interrupted.
+    """Run the command. Exit status: 0 success, 2 an error of the user, 130 interrupted.
 
-    `replay` returns 1 if the outputs were others than those recorded, `doctor` if something is
-    missing.
+    `replay` returns 1 if an output differs from the recorded one, `doctor` if something is missing.
     """
     options = _parser().parse_args(arguments)
     try:
@@ -36,7 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="tautscope",
-        description="Takes the slack out of robotic flexible endoscopic instruments, using the "
+        description="Hysteresis compensation for robotic flexible endoscopic instruments, from the "
         "endoscope's own images. Research software, not a medical device.",
         allow_abbrev=False,
     )
@@ -57,7 +52,7 @@ def _add_config_parser(verbs: arguments.Verbs) -> None:
         "config",
         allow_abbrev=False,
         help="print the configuration",
-        description="Print the configuration as TOML, every default written out.",
+        description="Print the configuration as TOML, with all defaults.",
     )
     arguments.add_config(config)
     config.set_defaults(run=_config)

@@ -14,15 +14,15 @@ class Dof(IntEnum):
 
     @property
     def label(self) -> str:
-        """The name in configurations, column names and tables."""
+        """The name in configurations, columns and tables."""
         return self.name.lower()
 
     @property
     def display_unit(self) -> str:
-        """The unit a person reads: mm for insertion, rad otherwise. Inside it is m and rad."""
+        """The unit in tables and figures: mm for insertion, else rad. Arrays are in m and rad."""
         return "mm" if self is Dof.INSERTION else "rad"
 
     @property
     def display_scale(self) -> float:
-        """Factor from the unit inside (m, rad) to `display_unit`."""
+        """Factor from m or rad to `display_unit`."""
         return 1e3 if self is Dof.INSERTION else 1.0

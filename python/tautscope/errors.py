@@ -1,30 +1,29 @@
-"""What can go wrong: one base class, one subclass per cause, each carrying the facts."""
+"""Errors: one base class, one subclass per cause; each has the facts as attributes."""
 
 from __future__ import annotations
 
 
 class TautscopeError(Exception):
-    """Base of every error this package raises on purpose."""
+    """Base class of all errors of this package."""
 
 
 class FieldError(TautscopeError, ValueError):
-    """A named input holds what it may not.
+    """An input has a value that is not allowed.
 
     Args:
-        field: Where, as a path the user can find (``insertion.free_gain``, ``reference``).
-        value: What came.
-        allowed: What may come, in words.
+        field: Name of the input, as the user knows it (``insertion.free_gain``, ``reference``).
+        value: Its value.
+        allowed: Allowed values, in words.
     """
 
     def __init__(self, field: str, value: object, allowed: str) -> None:
         self.field = field
         self.value = value
         self.allowed = allowed
-        super().__init__(f"{field}: got {value!r}, expected {allowed}")
+        super().__init__(field, value, allowed)
 
-    def __reduce__(self) -> tuple[type[FieldError], tuple[str, object, str]]:
-        """Pickle by the facts, so that the error survives the way back from a worker process."""
-        return type(self), (self.field, self.value, self.allowed)
+    def __str__(self) -> str:
+        return f"{self.field}: got {self.value!r}, expected {self.allowed}"
 
 
 class ConfigError(FieldError):
@@ -32,23 +31,23 @@ class ConfigError(FieldError):
 
 
 class FrameError(FieldError):
-    """An image is not what a camera of this configuration gives."""
+    """An image does not have the shape or type of the configured camera."""
 
 
 class SignalError(FieldError):
-    """A reference or command is not three finite numbers."""
+    """A signal has the wrong shape, or a value that is not a finite number."""
 
 
 class RecordError(FieldError):
-    """A recorded file lacks a column or holds what is not a number."""
+    """A recorded file lacks a column, or a cell is not a number."""
 
 
 class MissingPathError(FieldError):
-    """A file or folder that was asked for is not there, or holds nothing usable."""
+    """A file or folder does not exist, or has no usable content."""
 
 
 class OutputError(FieldError):
-    """A result cannot be written where it was asked for."""
+    """A result cannot be written to the given place."""
 
 
 class DriveError(TautscopeError):
@@ -64,11 +63,10 @@ class DriveError(TautscopeError):
         self.node = node
         self.what = what
         self.remedy = remedy
-        super().__init__(f"{node}: {what}. {remedy}")
+        super().__init__(node, what, remedy)
 
-    def __reduce__(self) -> tuple[type[DriveError], tuple[str, str, str]]:
-        """Pickle by the facts, so that the error survives the way back from a worker process."""
-        return type(self), (self.node, self.what, self.remedy)
+    def __str__(self) -> str:
+        return f"{self.node}: {self.what}. {self.remedy}"
 
 
 class BusError(DriveError):

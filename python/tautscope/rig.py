@@ -1,13 +1,5 @@
 """Users import the rig's interface from here; the code is in `tautscope.loop.rig`."""
 
-from tautscope.loop.rig import (
-    Frame,
-    Rig,
-    Sample,
-)
+from tautscope.loop.rig import Frame, Rig, Sample
 
-__all__ = [
-    "Frame",
-    "Rig",
-    "Sample",
-]
+__all__ = ["Frame", "Rig", "Sample"]

@@ -15,37 +15,39 @@ from tautscope.errors import SignalError
 from tautscope.loop.construction import build_feature_model
 from tautscope.loop.reduction import HysteresisReduction, Status
 from tautscope.loop.rig import Frame
+from tautscope.loop.state_prediction import StatePrediction
 
 
 class FakeDetector:
-    """Sees what it is told; keeps where it was told to look."""
+    """Returns a fixed detection; records the state predictions it is given."""
 
     def __init__(self, config: Config) -> None:
-        self.looked: list[Floats | None] = []
+        self.predictions: list[StatePrediction] = []
         self.found = SimpleNamespace(
             features=np.zeros(4), covariance=np.eye(4), valid=False, found=(False, False)
         )
 
     def detect(
-        self, image: object, predicted_features: Floats | None, expectation: object
+        self, image: object, predicted_features: None, prediction: StatePrediction
     ) -> SimpleNamespace:
-        self.looked.append(predicted_features)
+        self.predictions.append(prediction)
         return self.found
 
 
-def test_a_frame_is_looked_at_where_it_was_captured(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_markers_are_sought_around_the_predicted_state(monkeypatch: pytest.MonkeyPatch) -> None:
     vision = SimpleNamespace(MarkerDetector=FakeDetector)
     monkeypatch.setitem(sys.modules, "tautscope.loop.vision", vision)
     loop = started()
-    predicted = loop.predicted_features(0.2)
-    assert predicted is not None
+    predicted, prior = loop.predicted_features(0.2), loop.predict_state(0.2)
+    assert predicted is not None and prior is not None
     frame = Frame(np.zeros((576, 720, 3), np.uint8), captured_at=0.2, sequence=0)
 
     lost = loop.on_frame(frame)
     assert lost.status is Status.NO_MARKERS and lost.captured_at == 0.2
     detector = loop._detector
     assert isinstance(detector, FakeDetector) and lost.detection is detector.found
-    np.testing.assert_array_equal(detector.looked[0], predicted)
+    np.testing.assert_array_equal(detector.predictions[0].state, prior.state)
+    np.testing.assert_array_equal(detector.predictions[0].std, prior.std)
 
     detector.found = SimpleNamespace(
         features=predicted + 1.0, covariance=np.eye(4), valid=True, found=(True, True)
@@ -59,27 +61,27 @@ def test_a_frame_is_looked_at_where_it_was_captured(monkeypatch: pytest.MonkeyPa
 
 def test_where_to_look_follows_the_images_and_widens_with_travel() -> None:
     loop = started()
-    before = loop.expectation(0.3)
+    before = loop.predict_state(0.3)
     assert before is not None
     np.testing.assert_array_equal(before.state, REST)
     start = [CONFIG[dof].start_deviation for dof in Dof]
-    np.testing.assert_array_equal(before.deviation, start)
+    np.testing.assert_array_equal(before.std, start)
 
     off = REST + np.array([1e-3, 0.05, -0.03])
     seen = build_feature_model(CONFIG).predict(off)
     assert seen is not None
     report = loop.on_features(seen[0], 0.3)
-    after = loop.expectation(0.3)
+    after = loop.predict_state(0.3)
     assert after is not None
     np.testing.assert_allclose(after.state, report.state_estimate)
-    assert (after.deviation < before.deviation).all()
+    assert (after.std < before.std).all()
 
     for tick in range(20):
         loop.step(REST + np.array([1e-4 * (tick + 1), 0.0, 0.0]))
-    later = loop.expectation(0.55)
+    later = loop.predict_state(0.55)
     assert later is not None
-    assert later.deviation[0] > 1.5 * after.deviation[0]
-    np.testing.assert_allclose(later.deviation[1:], after.deviation[1:])
+    assert later.std[0] > 1.5 * after.std[0]
+    np.testing.assert_allclose(later.std[1:], after.std[1:])
 
 
 def test_a_search_that_finds_nothing_widens_and_one_that_finds_narrows() -> None:
@@ -87,26 +89,26 @@ def test_a_search_that_finds_nothing_widens_and_one_that_finds_narrows() -> None
     seen = build_feature_model(CONFIG).predict(REST)
     assert seen is not None
     loop.on_features(seen[0], 0.3)
-    sure = loop.expectation(0.3)
+    sure = loop.predict_state(0.3)
     assert sure is not None
-    last = sure.deviation
+    last = sure.std
     for missed in range(20):
         loop.step(REST)
         now = 0.31 + 0.01 * missed
         assert loop.on_features(None, now).status is Status.NO_MARKERS
-        belief = loop.expectation(now)
+        belief = loop.predict_state(now)
         assert belief is not None
         np.testing.assert_array_equal(belief.state, sure.state)
-        assert (belief.deviation >= last).all()
-        last = belief.deviation
+        assert (belief.std >= last).all()
+        last = belief.std
     start = np.array([CONFIG[dof].start_deviation for dof in Dof])
     assert (last >= 0.14 * start).all()
     assert (last < 0.5 * start).all()
-    assert (last > 2 * sure.deviation).any()
+    assert (last > 2 * sure.std).any()
     loop.on_features(seen[0], 0.51)
-    again = loop.expectation(0.51)
+    again = loop.predict_state(0.51)
     assert again is not None
-    np.testing.assert_allclose(again.deviation, sure.deviation, rtol=0.1)
+    np.testing.assert_allclose(again.std, sure.std, rtol=0.1)
 
 
 @pytest.mark.parametrize("lost", [0, 1])
@@ -132,7 +134,7 @@ def test_the_states_deviation_is_the_covariance_through_the_pseudo_inverse() -> 
     features, matrix = prediction
     root = np.random.default_rng(0).normal(size=(4, 4))
     covariance = root @ root.T
-    report = loop._report(features, 0.3, None, covariance)
+    report = loop._update(features, covariance, 0.3)
     inverse = np.linalg.pinv(matrix, rcond=1e-15)
     expected = np.sqrt(np.diag(inverse @ covariance @ inverse.T))
     np.testing.assert_allclose(report.state_deviation, expected, rtol=1e-8)
@@ -150,10 +152,10 @@ def deviations(stop_after: float, until: float) -> Floats:
         moved = min(tick * period, stop_after) * np.array([5e-3, 0.5, 0.2])
         loop.step(np.asarray(REST) + moved, tick * period)
         if tick % 8 == 7:
-            expectation = loop.expectation(tick * period)
+            expectation = loop.predict_state(tick * period)
             seen = model.predict(loop.predicted_state)
             assert expectation is not None and seen is not None
-            found.append(expectation.deviation)
+            found.append(expectation.std)
             loop.on_features(seen[0], tick * period)
     return np.array(found)
 

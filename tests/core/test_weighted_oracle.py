@@ -255,7 +255,7 @@ def test_a_correction_is_not_added_twice() -> None:
         if tick >= latency and tick % 8 == 0:
             captured_at = (tick - latency) * period
             if tick > 3 * latency:
-                belief = loop.expectation(captured_at)
+                belief = loop.predict_state(captured_at)
                 assert belief is not None
                 assert np.all(np.abs(belief.state - truth) < [0.1e-3, 0.01, 0.005]), tick
             loop.on_features(prediction[0], captured_at)

@@ -37,7 +37,7 @@ def rotation(**changes: Any) -> dict[str, Any]:
         (rotation(counts_per_unit=float("inf")), "drives.rotation.counts_per_unit", "finite"),
         (rotation(counts_per_unit=1e9), "drives.rotation.counts_per_unit", "less than 2^31"),
         (rotation(counts_per_unit=1.0), "drives.rotation.counts_per_unit", "not mm or deg"),
-        (rotation(travel=[1.0, -1.0]), "drives.rotation.travel", "lesser end"),
+        (rotation(travel=[1.0, -1.0]), "drives.rotation.travel", "lower limit"),
         (rotation(speed_limit=-1.0), "drives.rotation.speed_limit", "> 0"),
         (rotation(following_window=0.31), "drives.rotation.following_window", "at most"),
         (rotation(following_window=0.0), "drives.rotation.following_window", "> 0"),

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drawn import SLACK
+from drawn import BACKLASH
 from recorded import record
 from tautscope.config import Config
 from tautscope.log.reader import Log, Update, read_log
@@ -38,7 +38,7 @@ def test_estimates_with_the_same_configuration_are_the_same(
     replayed, _ = estimate_from_log(read_log(tmp_path / "run.mcap"), config)
     for group in ("estimate", "delta_minus", "delta_plus"):
         difference = per_dof(replayed.trace, group) - per_dof(recording.trace, group)
-        assert np.nanmax(np.abs(difference) / SLACK) < share, group
+        assert np.nanmax(np.abs(difference) / BACKLASH) < share, group
     np.testing.assert_array_equal(
         per_dof(replayed.trace, "command"), per_dof(recording.trace, "command")
     )

@@ -173,7 +173,7 @@ def test_a_replay_is_identical_where_the_supervisor_acted(
     path = tmp_path / "run.mcap"
     with ThreadPoolExecutor(1) as executor, LogWriter(path, config, wait=True) as log:
         aside = executor if is_background else None
-        run = run_experiment(FaultyCameraRig(config), reference, config, log=log, aside=aside)
+        run = run_experiment(FaultyCameraRig(config), reference, config, log=log, executor=aside)
     if not is_background:  # which frames are processed in the background depends on timing
         assert flags(run) >= EXPECTED_FLAGS
     assert flags(run) >= {"reference_jump", "reference_late"}

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tautscope.config import Config
 from tautscope.loop.construction import build_feature_model
-from tautscope.loop.reduction import Expectation
+from tautscope.loop.state_prediction import StatePrediction
 from tautscope.twin.camera import TwinCamera
 
 CONFIG = Config()
@@ -22,10 +22,10 @@ class Scene:
     image: NDArray[np.uint8]
     truth: NDArray[np.float64]
 
-    def expectation(self, seed: int | None = None) -> Expectation:
+    def expectation(self, seed: int | None = None) -> StatePrediction:
         """Of the posture; with a seed, off by as much as it says it may be."""
         off = 0.0 if seed is None else np.random.default_rng(seed).normal(0.0, DEVIATION)
-        return Expectation(self.state + off, DEVIATION)
+        return StatePrediction(self.state + off, DEVIATION)
 
     def outline(self, band: int) -> NDArray[np.float64]:
         """Of the band in the picture, by the model (n, 2) [px]."""

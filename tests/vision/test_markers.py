@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scenes import CONFIG, DEVIATION, MODEL, Scene, cut_scenes, scenes
-from tautscope.loop.reduction import Expectation
+from tautscope.loop.state_prediction import StatePrediction
 from tautscope.loop.vision import Detection, MarkerDetector
 
 Image = NDArray[np.uint8]
@@ -79,7 +79,7 @@ def test_a_band_cut_by_the_border_is_found_whole(number: int) -> None:
 def test_one_band_alone_is_partial_and_says_why(number: int, band: int) -> None:
     scene = SCENES[number]
     image = wipe(scene, band)
-    tight = Expectation(scene.state, DEVIATION / 4)
+    tight = StatePrediction(scene.state, DEVIATION / 4)
     detection = DETECTOR.detect(image, expectation=tight)
     assert not detection.valid
     assert detection.reasons[band] and not detection.reasons[1 - band], detection.reason
@@ -179,5 +179,5 @@ def test_exposure_and_white_balance(seed: int) -> None:
 
 def test_what_is_believed_elsewhere_is_not_found_there() -> None:
     for scene in (scene for scene in SCENES if scene.state[2] > 0.5):
-        elsewhere = Expectation(scene.state + np.array([0.0, 1.5, 0.0]), DEVIATION / 3)
+        elsewhere = StatePrediction(scene.state + np.array([0.0, 1.5, 0.0]), DEVIATION / 3)
         assert not DETECTOR.detect(scene.image, expectation=elsewhere).valid

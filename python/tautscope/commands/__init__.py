@@ -1,1 +1,1 @@
-"""Commands; those of logs, hardware, bench and ``doctor`` are in their packages."""
+"""The verbs of the command line, and what they share: options, printing, progress."""

@@ -1,4 +1,4 @@
-"""Options and kinds of numbers that several verbs have."""
+"""Options and number types that several verbs share."""
 
 from __future__ import annotations
 
@@ -14,11 +14,13 @@ Verbs: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 def add_config(parser: argparse.ArgumentParser) -> None:
     """``--config``."""
-    parser.add_argument("--config", metavar="FILE", help="TOML file; what it leaves out is default")
+    parser.add_argument(
+        "--config", metavar="FILE", help="TOML file; missing keys have their defaults"
+    )
 
 
 def add_profile(parser: argparse.ArgumentParser, what: str, default: str | None = None) -> None:
-    """``--profile``: `what` it changes."""
+    """``--profile``; `what` describes its effect."""
     shown = "the configuration's" if default is None else default
     parser.add_argument(
         "--profile", choices=get_args(Profile), default=default, help=f"{what} [{shown}]"
@@ -28,13 +30,16 @@ def add_profile(parser: argparse.ArgumentParser, what: str, default: str | None 
 def add_out(parser: argparse.ArgumentParser, verb: str) -> None:
     """``--out``, by default `tautscope.runs.output_folder.default_folder` of the verb."""
     parser.add_argument(
-        "--out", type=Path, metavar="DIR", help=f"folder, new or empty [runs/<date-time>-{verb}]"
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help=f"output folder, new or empty [runs/<date-time>-{verb}]",
     )
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:
     """``--json``."""
-    parser.add_argument("--json", action="store_true", help="print one JSON object and no more")
+    parser.add_argument("--json", action="store_true", help="print one JSON object only")
 
 
 def natural(text: str) -> int:

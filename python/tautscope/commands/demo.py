@@ -16,18 +16,16 @@ if TYPE_CHECKING:
 
 
 def add_parser(verbs: arguments.Verbs) -> None:
-    """Add the verb to the command's."""
+    """Add the verb ``demo``."""
     demo = verbs.add_parser(
         "demo",
         allow_abbrev=False,
         help="run the article's experiment on the simulated instrument",
         description="Run the article's experiment on the simulated instrument, with and without "
-        "compensation, camera images the only feedback. Prints Table 1, the article beside ours, "
-        "and writes a run folder with tables, traces, figures and a report.",
+        "compensation, with camera images as the only feedback. Prints Table 1 with the article's "
+        "values, and writes a run folder with tables, traces, figures and a report.",
     )
-    arguments.add_profile(
-        demo, "how slack is compensated: as in the article, or ours beside it", "best"
-    )
+    arguments.add_profile(demo, "compensation scheme: the article's, or also our own", "best")
     demo.add_argument(
         "--seed",
         type=arguments.natural,
@@ -47,7 +45,7 @@ def add_parser(verbs: arguments.Verbs) -> None:
     demo.add_argument(
         "--disturb",
         metavar="NAME[,NAME]",
-        help=f"disturb the pictures: {', '.join(DISTURBANCES)} [twin.disturb of the configuration]",
+        help=f"image disturbances: {', '.join(DISTURBANCES)} [twin.disturb of the configuration]",
     )
     arguments.add_out(demo, "demo")
     arguments.add_config(demo)
@@ -60,7 +58,7 @@ def _run(options: argparse.Namespace) -> None:
     from tautscope.report import demo, tables  # noqa: PLC0415
     from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
 
-    config = _configured(options)
+    config = _load(options)
     folder = check_free(options.out or default_folder("demo"))
     first = config.twin.seed
     seeds = range(first, first + options.seeds)
@@ -83,7 +81,7 @@ def _run(options: argparse.Namespace) -> None:
         _print_table1(found, folder)
 
 
-def _configured(options: argparse.Namespace) -> Config:
+def _load(options: argparse.Namespace) -> Config:
     config = load_config(options.config, options.profile)
     changes: dict[str, Any] = {}
     if options.seed is not None:
@@ -133,8 +131,8 @@ def _print_table1(demo: Demo, folder: Path) -> None:
     screen.print(table)
     screen.print(
         f"\n{demo.sim_seconds:.0f} s simulated in {demo.wall_seconds:.0f} s. "
-        f"Widths in the last two periods, of the true tip unless said."
+        f"Widths in the last two periods, of the true tip unless stated otherwise."
     )
     for line in demo.compensated.warnings:
-        screen.print(f"Noticed: {line}.", soft_wrap=True)
+        screen.print(f"Warning: {line}.", soft_wrap=True)
     screen.print(f"Report, figures and traces: {folder / 'report.html'}", soft_wrap=True)

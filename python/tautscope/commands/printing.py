@@ -1,4 +1,4 @@
-"""What several verbs print with."""
+"""Printing of JSON and tables."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ if TYPE_CHECKING:
 
 
 def print_json(document: dict[str, Any]) -> None:
-    """Print one line; NaN has no place in it."""
+    """Print a document in one line; it must not contain NaN."""
     print(json.dumps(document, allow_nan=False))
 
 
 def console() -> Console:
-    """Prints tables; without a terminal wide enough for all of them."""
+    """A console for tables; outside a terminal it is 200 columns wide."""
     from rich.console import Console  # noqa: PLC0415
 
     width = None if sys.stdout.isatty() else 200

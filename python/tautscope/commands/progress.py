@@ -1,4 +1,4 @@
-"""Progress on stderr: a bar in a terminal, plain lines elsewhere."""
+"""Progress on stderr: a bar in a terminal, else lines of text."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 
 @contextmanager
 def progress_bar(title: str) -> Iterator[Callable[[float], None]]:
-    """Yields a function to tell the share of the work that is done, 0 to 1."""
+    """Yield a function to call with the share of work done, 0 to 1."""
     if not sys.stderr.isatty():
         yield _lines(title)
         return
@@ -28,14 +28,14 @@ def progress_bar(title: str) -> Iterator[Callable[[float], None]]:
 
 
 def _lines(title: str) -> Callable[[float], None]:
-    """One line at the start and at every tenth of the way."""
-    told = -1
+    """Print a line at the start and at every 10 %."""
+    printed = -1
 
-    def tell(share: float) -> None:
-        nonlocal told
+    def report(share: float) -> None:
+        nonlocal printed
         tenth = int(share * 10 + 1e-9)
-        if tenth > told:
-            told = tenth
+        if tenth > printed:
+            printed = tenth
             print(f"{title}: {10 * tenth} %", file=sys.stderr, flush=True)
 
-    return tell
+    return report

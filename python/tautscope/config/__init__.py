@@ -1,8 +1,8 @@
-"""Configuration: TOML in, frozen structures out. The single source of every default.
+"""Configuration: frozen structures read from TOML; the only place of a default.
 
-Each default carries its unit and, in brackets, its origin: [paper] is Reilink et al. 2013,
-[ours] is chosen here, [geometry] is a plausible instrument (shared by no publication).
-SI units throughout: m, rad, s; px for images.
+Each key has its unit and, in brackets, the origin of its default: [paper] is Reilink et al. 2013,
+[ours] is chosen here, [geometry] is a plausible instrument that no publication describes.
+Units are SI: m, rad, s; px for images.
 """
 
 from tautscope.config.adaptive import AdaptiveConfig

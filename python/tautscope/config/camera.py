@@ -15,13 +15,13 @@ Vector8 = tuple[float, float, float, float, float, float, float, float]
 
 
 class PoseConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Pose of the guide (where the instrument leaves the scope) in the camera's frame."""
+    """Pose of the guide, where the instrument leaves the scope, in the camera frame."""
 
     translation: Vector3 = (13.5e-3, 14e-3, 15e-3)
-    """Guide's origin in the camera's frame: x right, y down, z forward [m] [ours]."""
+    """Origin of the guide in the camera frame: x right, y down, z forward [m] [ours]."""
     rotation: Vector3 = (0.32, -0.26, 0.0)
-    """Rotation vector, axis times angle [rad], that turns guide axes into camera axes; the
-    guide's z axis is the channel's axis, outwards [ours]."""
+    """Rotation vector, axis times angle [rad], from guide to camera coordinates; the guide's z axis
+    is the axis of the channel, outwards [ours]."""
 
 
 class SourceConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -32,7 +32,7 @@ class SourceConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     format: str | None = "v4l2"
     """FFmpeg's input format: v4l2, dv, mpegts, lavfi, ...; None lets FFmpeg detect it."""
     options: dict[str, str] = field(default_factory=dict)
-    """FFmpeg's options of that format: ``video_size``, ``framerate``, ``input_format``, ..."""
+    """FFmpeg's options of the format: ``video_size``, ``framerate``, ``input_format``, ..."""
     deinterlace: Deinterlace = "bwdif"
     """Deinterlacing: ``bwdif`` makes each field a frame, with a delay of one frame."""
     clock: CameraClock = "stream"
@@ -75,6 +75,6 @@ class CameraConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     cy: float = 285.0
     """Principal point [px]."""
     distortion: Vector8 = (-0.18, 0.05, 0.0, 0.0, -0.005, 0.0, 0.0, 0.0)
-    """k1, k2, p1, p2, k3, k4, k5, k6 in OpenCV's order and meaning [ours]."""
+    """k1, k2, p1, p2, k3, k4, k5, k6, as in OpenCV [ours]."""
     source: SourceConfig = field(default_factory=SourceConfig)
     camera_from_guide: PoseConfig = field(default_factory=PoseConfig)

@@ -1,36 +1,39 @@
-"""What is refused, and how it is named."""
+"""Checks of a configuration beyond the type and range of each key."""
 
 from __future__ import annotations
 
 import math
 import re
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import msgspec
 
 from tautscope._core import DETECTORS
-from tautscope.config.twin import DISTURBANCES
+from tautscope.config.adaptive import AdaptiveConfig
+from tautscope.config.control import ControlConfig
+from tautscope.config.dof import DofConfig
+from tautscope.config.drives import DrivesConfig
+from tautscope.config.experiment import ExperimentConfig
+from tautscope.config.instrument import InstrumentConfig
+from tautscope.config.safety import SafetyConfig
+from tautscope.config.twin import DISTURBANCES, TwinConfig
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError
 
-if TYPE_CHECKING:
-    from tautscope.config.drives import DrivesConfig
-    from tautscope.config.root import Config
+_RANGE = "the lower limit, then the upper"
 
 
-def refusal(error: msgspec.ValidationError, document: dict[str, Any]) -> ConfigError:
-    """The library's error as ours.
-
-    It says what and where; the value that came is looked up in the document.
-    """
+def config_error(error: msgspec.ValidationError, document: dict[str, Any]) -> ConfigError:
+    """Translate an error of msgspec, which names the key but not its value."""
     message = str(error)
     expected, _, path = message.partition(" - at `$")
     path = path.rstrip("`").lstrip(".")
     unknown = re.search(r"unknown field `([^`]*)`", expected)
     missing = re.search(r"missing required field `([^`]*)`", expected)
-    for named in (unknown, missing):
-        if named:
-            path = f"{path}.{named[1]}".lstrip(".")
+    for match in (unknown, missing):
+        if match:
+            path = f"{path}.{match[1]}".lstrip(".")
     value: Any = document
     for key in re.findall(r"[^.\[\]]+", path):
         try:
@@ -39,7 +42,7 @@ def refusal(error: msgspec.ValidationError, document: dict[str, Any]) -> ConfigE
             value = None
             break
     if unknown:
-        allowed = "no such key; `tautscope config` prints those there are"
+        allowed = "no such key; `tautscope config` prints all keys"
     elif missing:
         allowed = "a value: it has no default"
     else:
@@ -48,7 +51,7 @@ def refusal(error: msgspec.ValidationError, document: dict[str, Any]) -> ConfigE
 
 
 def check_finite(value: Any, path: str) -> None:
-    """TOML has nan and inf, which ranges let pass; here no number may be either.
+    """Reject nan and inf, which TOML allows and ranges do not exclude.
 
     Raises:
         ConfigError: Names the number by its dotted path.
@@ -63,126 +66,92 @@ def check_finite(value: Any, path: str) -> None:
         raise ConfigError(path, value, "a finite number")
 
 
-def check_relations(config: Config) -> None:
-    """What no single field can check.
-
-    Raises:
-        ConfigError: Names the first field that does not go with another.
-    """
-    for dof in Dof:
-        settings = config[dof]
-        if settings.free_gain > settings.gain_limit:
-            raise ConfigError(
-                f"{dof.label}.free_gain",
-                settings.free_gain,
-                f"at most {dof.label}.gain_limit = {settings.gain_limit}",
-            )
-        if settings.delta_minus > settings.delta_plus:
-            raise ConfigError(
-                f"{dof.label}.delta_minus",
-                settings.delta_minus,
-                f"at most {dof.label}.delta_plus = {settings.delta_plus}",
-            )
-    adaptive = config.adaptive
-    if adaptive.cautious_gain > adaptive.contact_gain:
-        raise ConfigError(
-            "adaptive.cautious_gain",
-            adaptive.cautious_gain,
-            f"at most adaptive.contact_gain = {adaptive.contact_gain}",
-        )
-    instrument = config.instrument
-    half = instrument.band_length / 2
-    if not half <= instrument.marker_a <= instrument.marker_b - 2 * half:
-        raise ConfigError(
-            "instrument.marker_a",
-            instrument.marker_a,
-            "a band on the tip, wholly proximal of marker_b's band",
-        )
-    if instrument.marker_b + half > instrument.tip_length:
-        raise ConfigError(
-            "instrument.marker_b", instrument.marker_b, "a band that ends before the tip does"
-        )
-    twin = config.twin
-    if twin.latency_jitter > twin.latency:
-        raise ConfigError(
-            "twin.latency_jitter", twin.latency_jitter, f"at most twin.latency = {twin.latency}"
-        )
-    for index, name in enumerate(twin.disturb):
-        if name not in DISTURBANCES:
-            raise ConfigError(f"twin.disturb[{index}]", name, "one of " + ", ".join(DISTURBANCES))
-    ticks = config.control.history / config.control.period
-    if not 1 <= ticks <= 1024:
-        raise ConfigError(
-            "control.history",
-            config.control.history,
-            f"1 to 1024 ticks of control.period = {config.control.period}",
-        )
-    _check_safety(config)
-    if config.drives is not None:
-        _check_drives(config.drives)
+def check_dof(dof: Dof, settings: DofConfig) -> None:
+    """The relations in a DOF's block. This and all below raise `ConfigError` with the key."""
+    _require_at_most(dof.label, settings, "free_gain", "gain_limit")
+    _require_at_most(dof.label, settings, "delta_minus", "delta_plus")
 
 
-def _check_safety(config: Config) -> None:
-    safety = config.safety
-    for index, name in enumerate(safety.off):
-        if name not in DETECTORS:
-            raise ConfigError(f"safety.off[{index}]", name, "one of " + ", ".join(DETECTORS))
-    for index, (least, largest) in enumerate(safety.command_travel):
-        if least >= largest:
-            raise ConfigError(
-                f"safety.command_travel[{index}]",
-                (least, largest),
-                "the lesser end, then the larger",
-            )
+def check_adaptive(adaptive: AdaptiveConfig) -> None:
+    """The relations in block ``adaptive``."""
+    _require_at_most("adaptive", adaptive, "cautious_gain", "contact_gain")
+
+
+def check_instrument(instrument: InstrumentConfig) -> None:
+    """Both bands are on the tip, one behind the other."""
+    a, b, half = instrument.marker_a, instrument.marker_b, instrument.band_length / 2
+    proximal = "a band on the tip, proximal of marker_b's band and not overlapping it"
+    _require(half <= a <= b - 2 * half, "instrument.marker_a", a, proximal)
+    _require(
+        b + half <= instrument.tip_length, "instrument.marker_b", b, "a band within tip_length"
+    )
+
+
+def check_twin(twin: TwinConfig) -> None:
+    """The relations in block ``twin``."""
+    _require_at_most("twin", twin, "latency_jitter", "latency")
+    _require_names("twin.disturb", twin.disturb, DISTURBANCES)
+
+
+def check_control(control: ControlConfig) -> None:
+    """The history has 1 to 1024 ticks."""
+    _require(
+        1 <= control.history / control.period <= 1024,
+        "control.history",
+        control.history,
+        f"1 to 1024 ticks of control.period = {control.period}",
+    )
+
+
+def check_safety(
+    safety: SafetyConfig, experiment: ExperimentConfig, dofs: Mapping[Dof, DofConfig]
+) -> None:
+    """The relations in block ``safety``, and with the references and estimators."""
+    _require_names("safety.off", safety.off, DETECTORS)
+    for index, limits in enumerate(safety.command_travel):
+        _require(limits[0] < limits[1], f"safety.command_travel[{index}]", limits, _RANGE)
     for dof, speed in zip(Dof, safety.reference_speed, strict=True):
-        sine = config.experiment[dof]
+        sine = experiment[dof]
         least_period = 2 * math.pi * sine.amplitude / speed
-        if sine.period < least_period and "reference_jump" not in safety.off:
-            raise ConfigError(
-                f"experiment.{dof.label}.period",
-                sine.period,
-                f"at least {least_period:.3g}; a faster hand is stopped, safety.reference_speed",
-            )
+        _require(
+            sine.period >= least_period or "reference_jump" in safety.off,
+            f"experiment.{dof.label}.period",
+            sine.period,
+            f"at least {least_period:.3g}: safety.reference_speed stops faster references",
+        )
     for dof, noise in zip(Dof, safety.state_noise, strict=True):
-        tolerated = config[dof].contact_tolerance * config[dof].update_distance
-        if not 0 <= 3 * noise < tolerated:
-            raise ConfigError(
-                f"safety.state_noise[{dof}]",
-                noise,
-                f"three of it below {dof.label}.contact_tolerance times "
-                f"{dof.label}.update_distance = {tolerated:.3g}",
-            )
+        tolerance = dofs[dof].contact_tolerance * dofs[dof].update_distance
+        _require(
+            0 <= 3 * noise < tolerance,
+            f"safety.state_noise[{dof}]",
+            noise,
+            f"less than a third of {dof.label}.contact_tolerance times "
+            f"{dof.label}.update_distance = {tolerance:.3g}",
+        )
 
 
-def _check_drives(drives: DrivesConfig) -> None:
+def check_drives(drives: DrivesConfig) -> None:
+    """The relations in block ``drives``, and the ranges that CANopen can express."""
     taken = {drives.master_node: "master_node"}
     for dof in Dof:
         axis, path = drives[dof], f"drives.{dof.label}"
-        if axis.node in taken:
-            raise ConfigError(f"{path}.node", axis.node, f"not that of drives.{taken[axis.node]}")
+        owner = taken.get(axis.node)
+        _require(owner is None, f"{path}.node", axis.node, f"not that of drives.{owner}")
         taken[axis.node] = dof.label
-        lower, upper = axis.travel
-        if lower >= upper:
-            raise ConfigError(f"{path}.travel", axis.travel, "the lesser end, then the larger")
-        if max(abs(end - axis.home) for end in axis.travel) * axis.counts_per_unit >= 2**31:
-            raise ConfigError(
-                f"{path}.counts_per_unit",
-                axis.counts_per_unit,
-                f"less than 2^31 counts over the travel {axis.travel}",
-            )
-        if axis.following_window > axis.following_error:
-            raise ConfigError(
-                f"{path}.following_window",
-                axis.following_window,
-                f"at most {path}.following_error = {axis.following_error}",
-            )
-        step = axis.speed_limit * drives.cycle * axis.counts_per_unit
-        if step < 1:
-            raise ConfigError(
-                f"{path}.counts_per_unit",
-                axis.counts_per_unit,
-                "a count or more per cycle at the speed limit: counts per m or rad, not mm or deg",
-            )
+        _require(axis.travel[0] < axis.travel[1], f"{path}.travel", axis.travel, _RANGE)
+        _require(
+            max(abs(end - axis.home) for end in axis.travel) * axis.counts_per_unit < 2**31,
+            f"{path}.counts_per_unit",
+            axis.counts_per_unit,
+            f"less than 2^31 counts over the travel {axis.travel}",
+        )
+        _require_at_most(path, axis, "following_window", "following_error")
+        _require(
+            axis.speed_limit * drives.cycle * axis.counts_per_unit >= 1,
+            f"{path}.counts_per_unit",
+            axis.counts_per_unit,
+            "at least one count per cycle at the speed limit; per m or rad, not mm or deg",
+        )
     for name, most in (
         ("cycle", 0.255),
         ("heartbeat_period", 65.535),
@@ -190,16 +159,30 @@ def _check_drives(drives: DrivesConfig) -> None:
         ("following_timeout", 65.535),
     ):
         value = getattr(drives, name)
-        if not (0.001 <= value <= most and math.isclose(value * 1e3, round(value * 1e3))):
-            raise ConfigError(f"drives.{name}", value, f"whole milliseconds, 0.001 to {most}")
-    if drives.reply_timeout >= drives.cycle:
-        raise ConfigError(
-            "drives.reply_timeout", drives.reply_timeout, f"less than drives.cycle = {drives.cycle}"
-        )
-    least = 2 * max(drives.heartbeat_period, drives.cycle)
-    if drives.heartbeat_timeout < least:
-        raise ConfigError(
-            "drives.heartbeat_timeout",
-            drives.heartbeat_timeout,
-            f"at least {least}: two heartbeats and two cycles",
-        )
+        is_whole = math.isclose(value * 1e3, round(value * 1e3))
+        allowed = f"whole milliseconds, 0.001 to {most}"
+        _require(0.001 <= value <= most and is_whole, f"drives.{name}", value, allowed)
+    reply, cycle = drives.reply_timeout, drives.cycle
+    _require(reply < cycle, "drives.reply_timeout", reply, f"less than drives.cycle = {cycle}")
+    least = 2 * max(drives.heartbeat_period, cycle)
+    _require(
+        drives.heartbeat_timeout >= least,
+        "drives.heartbeat_timeout",
+        drives.heartbeat_timeout,
+        f"at least {least}: two heartbeats and two cycles",
+    )
+
+
+def _require(is_valid: bool, field: str, value: object, allowed: str) -> None:
+    if not is_valid:
+        raise ConfigError(field, value, allowed)
+
+
+def _require_names(field: str, names: Sequence[str], allowed: Sequence[str]) -> None:
+    for index, name in enumerate(names):
+        _require(name in allowed, f"{field}[{index}]", name, "one of " + ", ".join(allowed))
+
+
+def _require_at_most(path: str, block: object, name: str, limit_name: str) -> None:
+    value, limit = getattr(block, name), getattr(block, limit_name)
+    _require(value <= limit, f"{path}.{name}", value, f"at most {path}.{limit_name} = {limit}")

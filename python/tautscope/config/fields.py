@@ -1,4 +1,4 @@
-"""Kinds of numbers that several blocks use."""
+"""Types of numbers that several blocks share."""
 
 from typing import Annotated
 
@@ -10,4 +10,4 @@ Fraction = Annotated[float, Meta(gt=0, lt=1)]
 Gain = Annotated[float, Meta(ge=1)]
 Vector3 = tuple[float, float, float]
 PerDof = tuple[Positive, Positive, Positive]
-"""Of insertion, rotation and bending."""
+"""One each for insertion, rotation and bending."""

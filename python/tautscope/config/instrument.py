@@ -8,7 +8,7 @@ from tautscope.config.fields import NonNegative, Positive
 
 
 class InstrumentConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Geometry of the instrument, Fig. 4. All [geometry]."""
+    """Dimensions of the instrument, Fig. 4. All [geometry]."""
 
     diameter: Positive = 3.5e-3
     """Outer diameter of shaft, section and tip [m]."""

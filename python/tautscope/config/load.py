@@ -1,4 +1,4 @@
-"""TOML in and out."""
+"""Reading and writing of TOML."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from tautscope.errors import ConfigError, MissingPathError
 
 
 def load_config(path: str | PathLike[str] | None = None, profile: Profile | None = None) -> Config:
-    """Read a TOML configuration; keys that are not named keep their defaults.
+    """Read a TOML configuration; missing keys have their defaults.
 
     Args:
-        path: TOML file; without it, the article's experiment.
-        profile: ``"paper"`` or ``"best"``; without it, what the file says, else ``"paper"``.
+        path: TOML file; by default the article's experiment.
+        profile: ``"paper"`` or ``"best"``; by default that of the file, else ``"paper"``.
 
     Raises:
-        MissingPathError: The file is not there.
+        MissingPathError: The file does not exist.
         ConfigError: It is not TOML, or a key is unknown, of the wrong type or out of range; the
-            error names the key, what came and what may come.
+            error names the key, its value and the allowed values.
     """
     changes = {} if profile is None else {"profile": profile}
     if path is None:
@@ -32,20 +32,20 @@ def load_config(path: str | PathLike[str] | None = None, profile: Profile | None
     try:
         document = tomllib.loads(file.read_text(encoding="utf-8"))
     except (FileNotFoundError, IsADirectoryError):
-        raise MissingPathError("config", str(file), "a TOML file that is there") from None
+        raise MissingPathError("config", str(file), "an existing TOML file") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ConfigError("config", str(file), f"TOML ({error})") from None
-    _place_files(document, file.absolute().parent)
+    _resolve_paths(document, file.absolute().parent)
     return from_document(document | changes)
 
 
 def dump_config(config: Config) -> str:
-    """The configuration as TOML, every key written out; `load_config` reads it back equal."""
+    """The configuration as TOML with every key; `load_config` reads it back equal."""
     return tomli_w.dumps(to_document(config))
 
 
-def _place_files(document: dict[str, Any], folder: Path) -> None:
-    """Files that a TOML file names are beside it, wherever the program runs."""
+def _resolve_paths(document: dict[str, Any], folder: Path) -> None:
+    """Make paths in the document relative to the folder of the TOML file."""
     drives = document.get("drives")
     for axis in drives.values() if isinstance(drives, dict) else ():
         if isinstance(axis, dict) and isinstance(axis.get("eds"), str):

@@ -12,7 +12,7 @@ ImageFormat = Literal["png", "jpeg"]
 
 
 class RecordingConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The log of a run. All [ours]."""
+    """Image format and buffers of the log. All [ours]."""
 
     image_format: ImageFormat = "png"
     """``png`` is lossless, so that replays are identical; ``jpeg`` takes a fifth of the space and

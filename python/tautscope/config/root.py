@@ -1,4 +1,4 @@
-"""The whole configuration, as a structure and as the nested dictionary that TOML is."""
+"""The whole configuration, as a structure and as a nested dictionary for TOML."""
 
 from __future__ import annotations
 
@@ -9,7 +9,17 @@ from msgspec import Struct, field
 
 from tautscope.config.adaptive import AdaptiveConfig
 from tautscope.config.camera import CameraConfig
-from tautscope.config.checks import check_finite, check_relations, refusal
+from tautscope.config.checks import (
+    check_adaptive,
+    check_control,
+    check_dof,
+    check_drives,
+    check_finite,
+    check_instrument,
+    check_safety,
+    check_twin,
+    config_error,
+)
 from tautscope.config.control import ControlConfig
 from tautscope.config.dof import DofConfig
 from tautscope.config.drives import DrivesConfig
@@ -26,11 +36,11 @@ Profile = Literal["paper", "best"]
 
 
 class Config(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Everything a run depends on. The defaults are the article's experiment."""
+    """All settings of a run. The defaults are the article's experiment."""
 
     profile: Profile = "paper"
-    """How slack is compensated and learnt, and the state estimated: ``paper`` as in the article,
-    ``best`` as in `AdaptiveConfig` and `StateEstimationConfig`."""
+    """Scheme of compensation and estimation: ``paper`` is the article's, ``best`` that of
+    `AdaptiveConfig` and `StateEstimationConfig`."""
     adaptive: AdaptiveConfig = field(default_factory=AdaptiveConfig)
     state_estimation: StateEstimationConfig = field(default_factory=StateEstimationConfig)
     insertion: DofConfig = field(
@@ -57,7 +67,7 @@ class Config(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     experiment: ExperimentConfig = field(default_factory=ExperimentConfig)
     twin: TwinConfig = field(default_factory=TwinConfig)
     drives: DrivesConfig | None = None
-    """Motors of a rig; nothing about them can be guessed, so there is no default."""
+    """Motors of a rig; they have no default."""
 
     def __getitem__(self, dof: Dof) -> DofConfig:
         """The settings of one DOF."""
@@ -65,7 +75,7 @@ class Config(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
         return settings
 
     def replace(self, **changes: Any) -> Config:
-        """A copy with changes by dotted path, checked: ``replace(**{"twin.seed": 3})``.
+        """A checked copy with changes by dotted path: ``replace(**{"twin.seed": 3})``.
 
         Raises:
             ConfigError: As `load_config`.
@@ -81,7 +91,7 @@ class Config(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 def from_document(document: dict[str, Any]) -> Config:
-    """Check a nested dictionary and make it a `Config`; what it does not name keeps its default.
+    """Make a checked `Config` of a nested dictionary; keys not in it keep their defaults.
 
     Raises:
         ConfigError: As `load_config`.
@@ -90,9 +100,17 @@ def from_document(document: dict[str, Any]) -> Config:
     try:
         config = msgspec.convert(document, Config)
     except msgspec.ValidationError as error:
-        raise refusal(error, document) from None
+        raise config_error(error, document) from None
     check_finite(msgspec.to_builtins(config), "")
-    check_relations(config)
+    for dof in Dof:
+        check_dof(dof, config[dof])
+    check_adaptive(config.adaptive)
+    check_instrument(config.instrument)
+    check_twin(config.twin)
+    check_control(config.control)
+    check_safety(config.safety, config.experiment, {dof: config[dof] for dof in Dof})
+    if config.drives is not None:
+        check_drives(config.drives)
     return config
 
 

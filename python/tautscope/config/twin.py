@@ -32,6 +32,7 @@ class ShaftConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """
 
     segments: Annotated[int, Meta(ge=8, le=64)] = 8
+    """Rigid segments of the shaft."""
     axial_stiffness: Positive = 4.0e3
     """Of each coupling, including that from the motor to the first segment [N/m]."""
     axial_damping: NonNegative = 40.0
@@ -66,7 +67,7 @@ class CableConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     joints: Annotated[int, Meta(ge=10, le=64)] = 12
     """Number of joints of the bending section."""
     joint_stiffness: Positive = 0.003
-    """[N m/rad]."""
+    """Stiffness of a joint [N m/rad]."""
     joint_friction: NonNegative = 1.5e-3
     """Coulomb friction torque [N m]."""
     joint_spread: Annotated[float, Meta(ge=0, le=0.3)] = 0.03
@@ -90,7 +91,7 @@ class DriveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """The simulated position servos. All [ours]."""
 
     speed_limit: tuple[Positive, Positive, Positive] = (0.15, 20.0, 10.0)
-    """[m/s, rad/s, rad/s]."""
+    """Speed limit [m/s, rad/s, rad/s]."""
     encoder_step: tuple[Positive, Positive, Positive] = (1e-6, 1e-4, 1e-4)
     """Travel per encoder count at the instrument [m, rad, rad]."""
 

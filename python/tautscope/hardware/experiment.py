@@ -138,21 +138,22 @@ def run_on_hardware(
 
 def write_run_folder(run: HardwareRun, folder: Path) -> None:
     """Write tables, timing, figures and report into the folder of the logs."""
+    from tautscope.hardware.timing_figure import timing_figure  # noqa: PLC0415  matplotlib
     from tautscope.report import figures, report, tables  # noqa: PLC0415  matplotlib takes half a second
 
     first, results = run.compensated, run.results
     first.recording.write(folder)
-    picture = figures.timing_figure(first.timing)
+    picture = timing_figure(first.timing)
     plain = None if run.uncompensated is None else run.uncompensated.recording
     loops = figures.figure9(plain, first.recording)
     pictures = [
-        report.Picture(
+        report.CaptionedFigure(
             loops,
             "Fig. 9. (a)-(c) with compensation: reference, command, estimate and both contact "
             "offsets. (d)-(f) loops of the estimate; the first period, in which the slack is "
             "estimated, is thin. The dashed line is an ideal tip.",
         ),
-        report.Picture(
+        report.CaptionedFigure(
             picture,
             "Timing of the run. (a), (b) delay of each set-point after its due time; "
             "(c), (d) age of each frame when the loop took it.",
@@ -199,7 +200,7 @@ def _run(
                 compensate,
                 lambda elapsed, duration: progress(min(elapsed / duration, 1.0)),
                 log=_MonitoredLog(log, config),
-                aside=executor,
+                executor=executor,
                 watch=lambda supervision: _apply_reaction(rig, supervision),
             )
         except BaseException as error:

@@ -20,7 +20,7 @@ from tautscope.log.mcap_records import Damage, read_messages, read_records
 from tautscope.loop.references import Segment
 from tautscope.loop.rig import Sample
 from tautscope.runs.recording import Recording
-from tautscope.runs.run_recorder import Row, Tables
+from tautscope.runs.run_recorder import Row, RunRecorder
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,13 +111,13 @@ class Log:
 
     def recording(self) -> Recording:
         """Trace and frames as `run_experiment` returned them; the snapshot is None."""
-        tables = Tables(self.config)
+        recorder = RunRecorder(self.config)
         for event in self.events.values():
             if isinstance(event, Tick):
-                tables.tick(event.sample, event.reference, event.command)
+                recorder.add_tick(event.sample, event.reference, event.command)
             elif isinstance(event, Update):
-                tables.frame(event.row, event.delta_minus, event.delta_plus)
-        return Recording(*tables.tables(), self.config, self.compensated, self.segments)
+                recorder.add_frame(event.row, event.delta_minus, event.delta_plus)
+        return Recording(*recorder.tables(), self.config, self.compensated, self.segments)
 
 
 def read_log(path: str | PathLike[str]) -> Log:

@@ -23,8 +23,8 @@ from tautscope.loop.reduction import HysteresisReduction
 from tautscope.loop.rig import Frame, Sample
 from tautscope.loop.safety import DETECTORS
 from tautscope.runs.recording import FEATURES, FRAME_COLUMNS, Recording
-from tautscope.runs.replay import read_motors
-from tautscope.runs.run_recorder import Tables, frame_row
+from tautscope.runs.records import read_motors
+from tautscope.runs.run_recorder import RunRecorder, frame_row
 
 Floats = NDArray[np.float64]
 Inputs = Iterator[Tick | tuple[float, Frame]]
@@ -69,14 +69,14 @@ def replay_same(log: Log) -> tuple[Comparison, Recording]:
         RecordError: The log has no tick, or a request that this version does not know.
     """
     loop = HysteresisReduction(log.config, log.compensated)
-    comparison, tables = Comparison(), Tables(log.config)
+    comparison, recorder = Comparison(), RunRecorder(log.config)
     clock = _clock(log)
     for index in range(1, max(log.events, default=0) + 1):
         event = log.events.get(index)
         if isinstance(event, Tick):
             sample, reference = event.sample, event.reference
             command = loop.step(reference, sample.time, event.made_at)
-            tables.tick(sample, reference, command)
+            recorder.add_tick(sample, reference, command)
             replayed = msg.tick_messages(clock, sample, reference, command, event.made_at)
             comparison.ticks += 1
             where = f"tick at {sample.time:g} s"
@@ -86,7 +86,7 @@ def replay_same(log: Log) -> tuple[Comparison, Recording]:
         elif event is not None and log.has_image(index):
             now, frame = _frame(log, index, event)
             report = loop.on_frame(frame)
-            tables.frame(frame_row(now, frame, report), report.delta_minus, report.delta_plus)
+            recorder.add_frame(frame_row(now, frame, report), report.delta_minus, report.delta_plus)
             replayed = msg.update_messages(clock, now, frame, report)
             comparison.updates += 1
             where = f"image {frame.sequence}"
@@ -95,7 +95,7 @@ def replay_same(log: Log) -> tuple[Comparison, Recording]:
             missing = "image" if event is not None else "tick, image update or request"
             comparison.ended = f"{missing} {index} of {max(log.events)} is not in the log"
             break
-    return comparison, Recording(*tables.tables(), log.config, log.compensated, log.segments)
+    return comparison, Recording(*recorder.tables(), log.config, log.compensated, log.segments)
 
 
 def _send_request(loop: HysteresisReduction, request: str) -> None:
@@ -210,14 +210,14 @@ def _estimate(inputs: Inputs, config: Config, compensated: bool) -> Recording:
     ignored = ("reference_jump", "reference_late", "late_tick", "monitor", "frozen")
     off = {"safety.off": [*config.safety.off, *ignored]}
     loop = HysteresisReduction(config.replace(**off), compensate=False)
-    tables = Tables(config)
+    recorder = RunRecorder(config)
     for each in inputs:
         if isinstance(each, Tick):
             loop.step(each.command, each.sample.time)
-            tables.tick(each.sample, each.reference, each.command)
+            recorder.add_tick(each.sample, each.reference, each.command)
         else:
             arrived_at, frame = each
             report = loop.on_frame(frame)
             row = frame_row(arrived_at, frame, report)
-            tables.frame(row, report.delta_minus, report.delta_plus)
-    return Recording(*tables.tables(), config, compensated, ())
+            recorder.add_frame(row, report.delta_minus, report.delta_plus)
+    return Recording(*recorder.tables(), config, compensated, ())

@@ -1,1 +1,1 @@
-"""The loop of Fig. 6 with what it meets: rig, references, vision, safety."""
+"""The loop of Fig. 6, and its interfaces: rig, references, vision, safety."""

@@ -1,11 +1,11 @@
-"""The loop of Fig. 6: reference in, command out; images teach it the slack."""
+"""The loop of Fig. 6: reference in, command out, contact offsets estimated from the images."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,8 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 from tautscope.config import Config
 from tautscope.loop.construction import build_loop
 from tautscope.loop.rig import Frame
-from tautscope.loop.safety import Reaction, Supervision, checksum, switched_off
-from tautscope.loop.signal_checks import features_of, finite, seconds
+from tautscope.loop.safety import Reaction, Supervision, checksum, disabled_monitors
+from tautscope.loop.signal_checks import check_features, check_signal, check_time
+from tautscope.loop.state_prediction import StatePrediction
 
 if TYPE_CHECKING:
     from tautscope.loop.vision import Detection, MarkerDetector
@@ -24,50 +25,37 @@ Triggers = tuple[str | None, str | None]
 
 
 class Status(StrEnum):
-    """What became of a frame."""
+    """Result of an image update."""
 
     OK = "ok"
     """Every DOF was measured."""
     HELD = "held"
-    """Some DOF could not be observed and was held at its prediction."""
+    """A DOF was not observable and was held at its prediction."""
     PARTIAL = "partial"
-    """Only one marker was found; what it does not determine was held."""
+    """Only one marker was found; the DOFs it does not determine were held."""
     NO_MARKERS = "no_markers"
-    """The markers were not found."""
+    """Neither marker was found."""
     STALE = "stale"
-    """Captured at a time the command history does not reach."""
+    """The frame was captured before the start of the command history."""
     DUPLICATE = "duplicate"
-    """Captured no later than a frame already used."""
+    """The frame was captured no later than one already used."""
     REFUSED = "refused"
-    """A guard did not believe it: it taught nothing. `Report.warnings` has which."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Expectation:
-    """Where the instrument is believed to be when a frame was captured.
-
-    Attributes:
-        state: (3,) [m, rad, rad].
-        deviation: (3,) standard deviations [m, rad, rad], each DOF by itself.
-    """
-
-    state: NDArray[np.float64]
-    deviation: NDArray[np.float64]
+    """A monitor rejected the frame, and no estimate was updated; `Report.warnings` names it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """What the loop made of a frame. Every (3,) array is [m, rad, rad]; NaN is not known.
+    """Result of an image update. Every (3,) array is [m, rad, rad]; NaN is not known.
 
     Attributes:
-        detection: What the vision saw, if it was asked.
-        captured_at: When the frame was taken [s].
-        status: What became of it.
-        state_estimate: q_hat (3,), with profile ``paper`` by Eq. (16), the prediction where a DOF
-            is not observable; with ``best`` the most probable state, decision 0018.
+        detection: What the marker detector found, if it was used.
+        captured_at: When the frame was captured [s].
+        status: Result of the update.
+        state_estimate: q_hat (3,). Profile ``paper``: Eq. (16), the prediction where a DOF is not
+            observable. Profile ``best``: the most probable state, decision 0018.
         predicted_state: q (3,) at the capture time.
-        predicted_features: h (4,) [px], Eq. (9), of the state the estimate started from: q; with
-            one band alone, or profile ``best``, what the last images said.
+        predicted_features: h (4,) [px], Eq. (9), of the state the estimation started from: q, or
+            with one band alone or profile ``best`` the state prediction of `predict_state`.
         innovation: Measured minus predicted features (4,) [px]; NaN for a band not found.
         observable: (3,) which DOFs the image determined.
         deviation: (3,) standard deviation per px of marker noise [m/px, rad/px].
@@ -78,9 +66,9 @@ class Report:
             "violation", Eq. (5), or None.
         delta_minus: (3,) contact offsets after this frame, input minus output.
         delta_plus: (3,) contact offsets after this frame, input minus output.
-        reaction: What is in force after this frame.
-        warnings: Why, by the names of `tautscope.loop.safety.DETECTORS`; and a line for every guard
-            that ``safety.off`` names.
+        reaction: The reaction in force after this frame.
+        warnings: The flags in force, by the names of `tautscope.loop.safety.DETECTORS`, and a line
+            for every monitor that ``safety.off`` disables.
     """
 
     detection: Detection | None
@@ -104,20 +92,20 @@ class HysteresisReduction:
     """Image-based hysteresis reduction, Fig. 6: `step` at the control rate, `on_frame` per image.
 
     Args:
-        config: Everything the loop depends on.
-        compensate: Without it every gain is 1 (Table 1, "uncompensated"); the estimation goes on.
+        config: All settings of the loop.
+        compensate: If false, every gain is 1 (Table 1, "uncompensated"); the estimators still run.
 
     Attributes:
-        updates: Image updates up to now.
-        on_event: Told of every call of `engage`, `acknowledge`, `raise_flag`, with the call's name
-            (and the flag's): what a replay needs beside references and images.
+        updates: Number of image updates so far.
+        on_event: Called at every `engage`, `acknowledge` and `raise_flag` with the name of the call
+            (and of the flag): a replay needs these beside references and images.
     """
 
     def __init__(self, config: Config, compensate: bool = True) -> None:
         self._config = config
         self._ticks = self.updates = 0
         self.on_event: Callable[[str], None] | None = None
-        self._off = switched_off(config)
+        self._disabled = disabled_monitors(config)
         self._loop = build_loop(config, compensate)
 
     def step(
@@ -127,114 +115,116 @@ class HysteresisReduction:
 
         Args:
             reference: u (3,) [m, rad, rad].
-            time: The rig's clock [s]; without it, ticks of `control.period` from 0 on.
-            made_at: When the reference was made [s, the same clock], if that is known: one older
-                than ``safety.reference_age`` moves nothing.
+            time: The rig's clock [s]; if not given, ticks of `control.period` from 0 on.
+            made_at: When the reference was made [s, the same clock], if known. A reference older
+                than ``safety.reference_age`` causes no motion.
 
         Returns:
             c (3,) [m, rad, rad]. The first reference is passed through. While motion is held, the
             last command.
 
         Raises:
-            SignalError: The reference is not three finite numbers, or the time is not finite;
-                the loop is left as it was.
+            SignalError: The reference is not three finite numbers, or a time is not finite;
+                the loop is unchanged.
         """
-        values = finite("reference", reference, (3,))
-        at = self._ticks * self._config.control.period if time is None else seconds("time", time)
+        values = check_signal("reference", reference, (3,))
+        if time is None:
+            time = self._ticks * self._config.control.period
+        time = check_time("time", time)
         self._ticks += 1
-        return self._loop.step(values, at, None if made_at is None else seconds("made_at", made_at))
+        return self._loop.step(
+            values, time, None if made_at is None else check_time("made_at", made_at)
+        )
 
     def on_frame(self, frame: Frame) -> Report:
-        """Image update: find the markers, estimate the state, learn the slack, Eqs. (4)-(16).
+        """Image update: find the markers, estimate the state and the offsets, Eqs. (4)-(16).
 
         Raises:
             FrameError: The image is not what the configured camera gives.
             SignalError: The capture time is not finite.
         """
-        return self.on_detection(frame, self.question(frame)())
+        return self.on_detection(frame, self.prepare_detection(frame)())
 
-    def question(self, frame: Frame) -> Callable[[], Detection]:
-        """What the vision is asked about a frame, to be called here or in another thread.
+    def prepare_detection(self, frame: Frame) -> Callable[[], Detection]:
+        """First part of `on_frame`: a function that finds the markers, for any thread to call.
 
-        It does not touch the loop: ticks may go on meanwhile. One frame after the other, each
-        answer to `on_detection` before the next question.
+        The function does not use the loop, so `step` may be called meanwhile. Pass its result to
+        `on_detection` before preparing the next frame.
 
         Raises:
             SignalError: The capture time is not finite.
         """
-        captured_at = seconds("captured_at", frame.captured_at)
-        predicted, expected = (
-            self._loop.predicted_features(captured_at),
-            self.expectation(captured_at),
-        )
-        detector = self._detector
-        return lambda: detector.detect(frame.image, predicted, expected)
+        prediction = self.predict_state(check_time("captured_at", frame.captured_at))
+        return partial(self._detector.detect, frame.image, None, prediction)
 
     def on_detection(self, frame: Frame, detection: Detection) -> Report:
-        """The rest of `on_frame`, with the answer to `question`."""
-        captured_at = seconds("captured_at", frame.captured_at)
-        picture = checksum(frame.image)
-        if not any(detection.found):
-            return self._report(None, captured_at, detection, None, picture)
-        return self._report(
-            detection.features, captured_at, detection, detection.covariance, picture
+        """Second part of `on_frame`: the update with the result of `prepare_detection`."""
+        captured_at = check_time("captured_at", frame.captured_at)
+        found = any(detection.found)
+        return self._update(
+            detection.features if found else None,
+            detection.covariance if found else None,
+            captured_at,
+            detection,
+            checksum(frame.image),
         )
 
     def on_features(self, features: ArrayLike | None, captured_at: float) -> Report:
-        """Image update from a marker detector of your own.
+        """Image update with the features of your own marker detector.
 
         Args:
             features: u and v of band A, u and v of band B (4,) [px]; NaN for both of a band that
                 was not found, None if neither was.
-            captured_at: When the frame was taken [s, the clock of `step`].
+            captured_at: When the frame was captured [s, the clock of `step`].
 
         Raises:
             SignalError: The features are not four numbers, finite for each band but for one that
                 was not found, or the time is not finite.
         """
-        values = None if features is None else features_of(features)
-        return self._report(values, seconds("captured_at", captured_at), None)
+        values = None if features is None else check_features(features)
+        return self._update(values, None, check_time("captured_at", captured_at))
 
     @property
     def supervision(self) -> Supervision:
-        """How the loop stands now."""
+        """Reaction and flags in force now."""
         reaction, flags, latched, lead = self._loop.supervision
         return Supervision(Reaction(reaction), tuple(flags), tuple(latched), lead)
 
     def engage(self) -> None:
-        """The operator re-engages: held motion goes on, its first increment zero.
+        """Re-engage: resume held motion, without a jump of the command.
 
-        What is still wrong stops it again at once; what only a restart clears stays.
+        A cause that persists stops the motion again at once; a flag that needs a restart remains.
         """
         self._loop.engage()
-        self._told("engage")
+        self._notify("engage")
 
     def acknowledge(self) -> None:
-        """The operator has seen the warnings; faded compensation may come back, with motion."""
+        """Acknowledge the warnings: compensation that was faded out returns with motion."""
         self._loop.acknowledge()
-        self._told("acknowledge")
+        self._notify("acknowledge")
 
     def raise_flag(self, name: str) -> None:
-        """Something only the rig can see: ``drive_fault``, ``following_error``.
+        """Raise a flag that only the rig can detect: ``drive_fault``, ``following_error``.
 
         Raises:
-            ConfigError: It is none of `tautscope.loop.safety.DETECTORS`.
+            ConfigError: The name is none of `tautscope.loop.safety.DETECTORS`.
         """
         self._loop.raise_flag(name)
-        self._told(f"raise_flag {name}")
+        self._notify(f"raise_flag {name}")
 
-    def expectation(self, captured_at: float) -> Expectation | None:
-        """Where the instrument should be in a frame captured at this time, to the best knowledge.
+    def predict_state(self, captured_at: float) -> StatePrediction | None:
+        """State at a capture time: the model's, corrected by the last images, with its std.
 
-        The model's state with the correction of the last images and its standard deviation
-        (crates/core/src/estimation/whereabouts.rs). It says where to look, never what to learn.
-        None if not known.
+        `MarkerDetector.detect` searches around it. None if the history does not reach that time.
         """
-        belief = self._loop.expectation(captured_at)
-        return None if belief is None else Expectation(*belief)
+        prediction = self._loop.expectation(captured_at)
+        return None if prediction is None else StatePrediction(*prediction)
 
     def predicted_features(self, captured_at: float) -> NDArray[np.float64] | None:
-        """Where to look in a frame captured at this time: h(q) (4,) [px], None if not known."""
+        """h(q) (4,) [px] at a capture time, Eq. (9), for a marker detector of your own.
+
+        None if the history does not reach that time, or a marker is behind the camera.
+        """
         return self._loop.predicted_features(captured_at)
 
     @property
@@ -254,25 +244,27 @@ class HysteresisReduction:
 
     @cached_property
     def _detector(self) -> MarkerDetector:
-        # Not every user of the loop has this package look at the images.
+        # Users with their own detector do not need this one.
         from tautscope.loop.vision import MarkerDetector  # noqa: PLC0415
 
         return MarkerDetector(self._config)
 
-    def _told(self, what: str) -> None:
+    def _notify(self, what: str) -> None:
         if self.on_event is not None:
             self.on_event(what)
 
-    def _report(
+    def _update(
         self,
         features: NDArray[np.float64] | None,
+        covariance: NDArray[np.float64] | None,
         captured_at: float,
-        detection: Detection | None,
-        covariance: NDArray[np.float64] | None = None,
-        picture: int | None = None,
+        detection: Detection | None = None,
+        image_checksum: int | None = None,
     ) -> Report:
-        facts = self._loop.on_features(features, captured_at, covariance, picture)
+        result = self._loop.on_features(features, captured_at, covariance, image_checksum)
         self.updates += 1
         now = self.supervision
-        warnings = (*self._off, *now.flags)
-        return Report(detection, captured_at, Status(facts[0]), *facts[1:], now.reaction, warnings)
+        warnings = (*self._disabled, *now.flags)
+        return Report(
+            detection, captured_at, Status(result[0]), *result[1:], now.reaction, warnings
+        )

@@ -1,4 +1,4 @@
-"""What the surgeon asks for: reference trajectories, and which DOF moves when."""
+"""Reference trajectories: where the tip should be, and which DOF moves when."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from tautscope.dof import Dof
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """A stretch of a reference in which one DOF repeats a motion.
+    """A part of a reference in which one DOF repeats a motion.
 
     Attributes:
-        dof: Which one moves.
+        dof: The DOF that moves.
         start: When it begins [s from the start of the reference].
-        period: Of the motion [s].
-        periods: How many there are.
+        period: Period of the motion [s].
+        periods: Number of periods.
     """
 
     dof: Dof
@@ -40,7 +40,7 @@ class Reference(Protocol):
 
     @property
     def duration(self) -> float:
-        """How long it takes [s]."""
+        """Duration [s]."""
         ...
 
     @property
@@ -55,14 +55,14 @@ class Reference(Protocol):
 
 @runtime_checkable
 class DatedReference(Reference, Protocol):
-    """A reference that comes from elsewhere, a hand for one, and may be late or stay away.
+    """A reference from an input device, which may arrive late or not at all, with its time.
 
-    One that is made when it is asked for needs no date.
+    A reference computed when it is called needs none.
     """
 
     @property
     def made_at(self) -> float:
-        """When what was returned last was made [s from the start of the reference]."""
+        """Time at which the last returned value was made [s from the start of the reference]."""
         ...
 
 
@@ -70,8 +70,8 @@ class SineSequence:
     """The article's protocol (Section 5): a sine on each DOF in succession.
 
     Insertion, rotation, bending, in this order: centre + amplitude sin(2 pi t / period) for the
-    moving DOF with t from the start of its segment, the centre for the others. The position has
-    no jump; before the start and after the end every DOF is at its centre.
+    moving DOF, t from the start of its segment; the centre for the others, before the start and
+    after the end. The position has no jump.
 
     Args:
         experiment: Centre, amplitude and period per DOF; number of periods.

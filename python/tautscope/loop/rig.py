@@ -1,6 +1,6 @@
-"""The seam between the loop and whatever moves and sees: a twin, hardware, a recording, your own.
+"""The interface between the loop and a rig: the twin, hardware, a recording, or your own.
 
-A rig takes commands and gives samples; nothing else is known about it. It owns the clock.
+A rig takes commands and returns samples. It owns the clock.
 """
 
 from __future__ import annotations
@@ -20,9 +20,10 @@ class Frame:
         image: Pixels, uint8 (height, width, 3), BGR.
         captured_at: When it was taken [s, the rig's clock], not when it arrived.
         sequence: Counts the camera's frames; a gap is a dropped frame.
-        true_features: (4,) [px] what an ideal segmentation would measure were each band wholly
-            visible, twin only; the loop never reads it.
-        true_visible: (2,) visible share of bands A and B, 0 to 1, twin only; likewise.
+        true_features: (4,) [px] what an ideal segmentation would measure if each band were wholly
+            visible; twin only, the loop never reads it.
+        true_visible: (2,) visible share of bands A and B, 0 to 1; twin only, the loop never reads
+            it.
     """
 
     image: NDArray[np.uint8]
@@ -40,7 +41,7 @@ class Sample:
         time: [s, the rig's clock].
         applied: (3,) [m, rad, rad] what the drives report.
         frame: The newest image that arrived in this period, if any.
-        true_state: (3,) [m, rad, rad] where the tip is, twin only; the loop never reads it.
+        true_state: (3,) [m, rad, rad] of the tip; twin only, the loop never reads it.
     """
 
     time: float
@@ -51,7 +52,7 @@ class Sample:
 
 @runtime_checkable
 class Rig(Protocol):
-    """Anything that can be commanded and looked at."""
+    """An instrument with drives and a camera."""
 
     @property
     def control_period(self) -> float:
@@ -59,13 +60,13 @@ class Rig(Protocol):
         ...
 
     def reset(self) -> Sample:
-        """Go to the start, with the clock at the time the returned sample names."""
+        """Go to the start; the returned sample has the time of the clock then."""
         ...
 
     def step(self, command: ArrayLike) -> Sample:
-        """Send command (3,) [m, rad, rad] and let one control period pass."""
+        """Send a command (3,) [m, rad, rad] and let one control period pass."""
         ...
 
     def close(self) -> None:
-        """Release what the rig holds; motors come to rest. May be called twice."""
+        """Stop the motors and release all resources; a second call does nothing."""
         ...

@@ -64,9 +64,9 @@ class Supervision:
     lead: float
 
 
-def switched_off(config: Config) -> tuple[str, ...]:
-    """A line for every detector that is switched off."""
-    return tuple(f"safety.off = {name}: the detector is switched off" for name in config.safety.off)
+def disabled_monitors(config: Config) -> tuple[str, ...]:
+    """A line for every detector that ``safety.off`` disables; logs contain these very words."""
+    return tuple(f"safety.off = {name}: nobody looks for it" for name in config.safety.off)
 
 
 def checksum(image: NDArray[np.uint8]) -> int:

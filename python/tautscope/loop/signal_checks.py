@@ -1,4 +1,4 @@
-"""What may go into the loop: finite numbers, as many as it takes."""
+"""Checks of the numbers that go into the loop."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ from numpy.typing import ArrayLike, NDArray
 from tautscope.errors import SignalError
 
 
-def features_of(values: ArrayLike) -> NDArray[np.float64]:
-    """Four numbers (4,) [px], both of a band NaN or both finite, and not all NaN.
+def check_features(values: ArrayLike) -> NDArray[np.float64]:
+    """Features (4,) [px] as an array: each band finite, or NaN if not found; not both NaN.
 
     Raises:
-        SignalError: It is something else.
+        SignalError: They are anything else.
     """
     features = np.asarray(values, dtype=np.float64) if np.shape(values) == (4,) else np.empty(0)
     lost = np.isnan(features).reshape(-1, 2).all(axis=1).repeat(2)
     if features.shape != (4,) or lost.all():
-        return finite("features", values, (4,))
-    finite("features", np.where(lost, 0.0, features), (4,))
+        return check_signal("features", values, (4,))
+    check_signal("features", np.where(lost, 0.0, features), (4,))
     return features
 
 
-def finite(field: str, values: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """As an array of this shape; `field` is what an error names.
+def check_signal(field: str, values: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Finite numbers as an array of this shape; the error names `field`.
 
     Raises:
-        SignalError: It has another shape, or is not finite.
+        SignalError: The shape is different, or a number is not finite.
     """
     allowed = f"{shape[0]} finite numbers"
     try:
@@ -40,11 +40,11 @@ def finite(field: str, values: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.
     return array
 
 
-def seconds(field: str, value: float) -> float:
-    """A time [s]; `field` is what an error names.
+def check_time(field: str, value: float) -> float:
+    """A finite time [s]; the error names `field`.
 
     Raises:
-        SignalError: It is no finite number.
+        SignalError: It is not a finite number.
     """
     if not isinstance(value, float | int | np.floating) or not math.isfinite(value):
         raise SignalError(field, value, "a finite number of seconds")

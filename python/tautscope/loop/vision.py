@@ -20,7 +20,7 @@ from tautscope.dof import Dof
 from tautscope.errors import FieldError
 from tautscope.loop.construction import build_feature_model
 from tautscope.loop.frame_layout import FrameLayout
-from tautscope.loop.reduction import Expectation
+from tautscope.loop.state_prediction import StatePrediction
 
 
 class Region(NamedTuple):
@@ -166,7 +166,7 @@ class MarkerDetector:
         self,
         image: NDArray[np.uint8],
         predicted_features: ArrayLike | None = None,
-        expectation: Expectation | None = None,
+        expectation: StatePrediction | None = None,
     ) -> Detection:
         """Detect the markers in one image.
 
@@ -197,11 +197,11 @@ class MarkerDetector:
         return Detection(features, covariance, reasons, (a, b), found, discriminant)
 
     def _prior(
-        self, predicted: NDArray[np.float64] | None, expectation: Expectation | None
+        self, predicted: NDArray[np.float64] | None, expectation: StatePrediction | None
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """States the instrument may have (n, 3), and their common standard deviations (3,)."""
         if expectation is not None:
-            return np.asarray(expectation.state)[None], np.asarray(expectation.deviation)
+            return np.asarray(expectation.state)[None], np.asarray(expectation.std)
         starts, broad = self._starts
         if predicted is None or not np.isfinite(predicted).all():
             return starts, broad

@@ -1,33 +1,60 @@
-"""The article's experiment, end to end: runs, Table 1, figures, run folder."""
+"""The article's experiment on the twin: runs, Table 1, figures, run folder, report."""
 
 from __future__ import annotations
 
+import importlib.metadata
+import platform
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from os import PathLike
 
+from tautscope._core import __version__
 from tautscope.config import Config
-from tautscope.report import tables
+from tautscope.report import report, tables
+from tautscope.report.report import CaptionedFigure
 from tautscope.report.results import Results, evaluate
 from tautscope.runs.output_folder import new_folder
 from tautscope.runs.recording import Recording
 from tautscope.runs.trials import RigMaker, Trial, make_twin, run_trials
 
+_CAVEATS = """
+<ul class="note">
+<li>Everything here is simulated. The plant is a rigid-body model with friction and elasticity, not
+an instrument; the figures say how the method works on that plant. This is research software, not a
+medical device.</li>
+<li>The article measured its figures on its own rig, with the camera. The widths of the twin are of
+its true tip; compare the article with the rows &ldquo;by camera&rdquo;.</li>
+<li>The article does not give the instrument&rsquo;s geometry, the camera&rsquo;s pose, the
+reference amplitudes and the estimator&rsquo;s parameters; the configuration below has the values
+used. The twin&rsquo;s friction is chosen such that the uncompensated widths resemble the
+article&rsquo;s, so only the compensated rows are a result.</li>
+<li>With gap-crossing gain K and exactly known width, the reduction is 1 &minus; 1/K: 80&nbsp;% for
+K = 5. A width estimated too large gives more, one too small less. This holds for profile
+&ldquo;paper&rdquo;; in &ldquo;best&rdquo; the command continues in contact until the whole offset
+is compensated.</li>
+</ul>
+"""
+
+_PROFILES = {
+    "paper": "&ldquo;Paper&rdquo; is the article&rsquo;s scheme on the twin.",
+    "best": "&ldquo;Best&rdquo; is this project&rsquo;s own scheme on the same twin.",
+}
+
 
 @dataclass(frozen=True)
 class Demo:
-    """What ``tautscope demo`` found.
+    """Results of ``tautscope demo``.
 
     Attributes:
-        config: As used for the first seed.
-        seeds: One per result.
+        config: Configuration of the first seed.
+        seeds: The seed of each result.
         results: Table 1 of each seed.
         uncompensated: The first seed's run without compensation.
         compensated: The first seed's run with it.
-        sim_seconds: Simulated time of all runs.
-        wall_seconds: How long they took.
-        article_results: Table 1 of each seed under profile ``paper``, when `config` has another.
+        sim_seconds: Simulated time of all runs [s].
+        wall_seconds: Computing time [s].
+        article_results: Table 1 of each seed with profile ``paper``, if `config` has another one.
     """
 
     config: Config
@@ -41,7 +68,7 @@ class Demo:
 
     @property
     def by_profile(self) -> dict[str, tuple[Results, ...]]:
-        """Table 1 of each seed under each profile that was run, the configuration's own last."""
+        """Table 1 of each seed by profile; the configuration's own profile is the last."""
         article = {"paper": self.article_results} if self.article_results else {}
         return {**article, self.config.profile: self.results}
 
@@ -52,14 +79,14 @@ def run_demo(
     progress: Callable[[float], None],
     make_rig: RigMaker = make_twin,
 ) -> Demo:
-    """The article's protocol with and without compensation, once per seed.
+    """Run the article's protocol with and without compensation, for every seed.
 
-    With another profile than ``paper``, once more as the article compensates.
+    If the profile is not ``paper``, a third run per seed uses it for comparison.
 
     Raises:
-        TautscopeError: What a run raised.
+        TautscopeError: The first error of a run.
     """
-    begun = time.perf_counter()
+    started = time.perf_counter()
     configs = [config.replace(**{"twin.seed": seed}) for seed in seeds]
     kinds = [Trial(configs[0], False), Trial(configs[0], True)]
     if config.profile != "paper":
@@ -79,40 +106,40 @@ def run_demo(
         uncompensated=runs[0][0],
         compensated=runs[1][0],
         sim_seconds=sum(float(run.trace["time"][-1] - run.trace["time"][0]) for run in recordings),
-        wall_seconds=time.perf_counter() - begun,
+        wall_seconds=time.perf_counter() - started,
         article_results=results[1] if len(results) > 1 else (),
     )
 
 
 def write_run_folder(demo: Demo, folder: str | PathLike[str]) -> None:
-    """Make the run folder with everything a person or a program wants later, or nothing.
+    """Make the run folder, complete or not at all.
 
-    config.toml, table1.csv, trace.csv and frames.csv (first seed, compensated), the same with
-    _uncompensated, fig9.png, fig9.pdf, fig5.png, report.html.
+    Files: config.toml, table1.csv, trace.csv and frames.csv (first seed, compensated), the same
+    with _uncompensated, fig9.png, fig9.pdf, fig5.png, report.html.
 
     Raises:
-        OutputError: The folder holds something already, or cannot be written.
+        OutputError: The folder is not empty, or cannot be written.
     """
-    from tautscope.report import figures, report  # noqa: PLC0415  matplotlib takes half a second
+    from tautscope.report import figures  # noqa: PLC0415  matplotlib takes half a second
 
     figure9 = figures.figure9(demo.uncompensated, demo.compensated)
-    pictures = [
-        report.Picture(
+    captioned = [
+        CaptionedFigure(
             figure9,
             f"Fig. 9, seed {demo.seeds[0]}. (a)-(c) with compensation, each degree of freedom "
             "while it moves: reference, command, estimate and both contact offsets. (d)-(f) loops: "
             "the estimate over the command without, over the reference with compensation; the "
-            "first period, in which the slack is learnt, is thin. The dashed line is a perfect "
-            "tip.",
+            "first period, in which the offsets are estimated, is thin. The dashed line is an "
+            "ideal tip.",
         )
     ]
     if demo.compensated.snapshot is not None:
-        pictures.append(
-            report.Picture(
+        captioned.append(
+            CaptionedFigure(
                 figures.figure5(demo.compensated.snapshot, demo.config),
-                "Fig. 5. One frame of the compensated run: as the camera gave it, the pixels above "
-                "the discriminant's threshold, the regions with markers A and B, and measured "
-                "beside predicted features.",
+                "Fig. 5. One frame of the compensated run: the image, the pixels above the "
+                "discriminant's threshold, the regions with markers A and B, and measured and "
+                "predicted features.",
             )
         )
     with new_folder(folder) as place:
@@ -122,7 +149,47 @@ def write_run_folder(demo: Demo, folder: str | PathLike[str]) -> None:
         with figures.style():
             figure9.savefig(place / "fig9.png")
             figure9.savefig(place / "fig9.pdf", metadata={"CreationDate": None})
-            for picture in pictures[1:]:
-                picture.figure.savefig(place / "fig5.png")
-            page = report.demo_report(demo, pictures)
+            for each in captioned[1:]:
+                each.figure.savefig(place / "fig5.png")
+            page = demo_report(demo, captioned)
         (place / "report.html").write_text(page, encoding="utf-8")
+
+
+def demo_report(demo: Demo, figures: Sequence[CaptionedFigure]) -> str:
+    """The page of ``tautscope demo``."""
+    seeds, profiles = demo.seeds, demo.by_profile
+    several = len(seeds) > 1
+    count = f"{len(seeds)} seeds" if several else "one seed"
+    facts = {
+        "tautscope": __version__,
+        "Python": platform.python_version(),
+        **{name: _version(name) for name in ("numpy", "mujoco", "opencv-python-headless")},
+        "machine": f"{platform.system()} {platform.machine()}",
+        "seeds": ", ".join(map(str, seeds)),
+        "simulated": f"{demo.sim_seconds:.0f} s in {(1 + len(profiles)) * len(seeds)} runs",
+        "took": f"{demo.wall_seconds:.0f} s",
+    }
+    return report.page(
+        f"on a simulated instrument, camera images the only feedback; {count}",
+        f"""<h2>Table 1</h2>
+<div class="wide">{report.results_table(profiles)}</div>
+<p class="note">{"Median over the seeds, the worst seed in brackets. " if several else ""}{
+            " ".join(_PROFILES[name] for name in profiles)
+        }
+Widths over the last two periods of each degree of freedom: mean over 41 levels across the central
+80&nbsp;% of the tip&rsquo;s range, of the true tip unless stated otherwise.</p>
+{report.warning_list(demo.compensated.warnings)}
+<h2>Figures{f", profile {demo.config.profile}" if len(profiles) > 1 else ""}</h2>
+{report.figure_list(figures)}
+<h2>Limits of these results</h2>
+{_CAVEATS}""",
+        facts,
+        demo.config,
+    )
+
+
+def _version(package: str) -> str:
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return "not installed"

@@ -1,6 +1,6 @@
-"""Figures, in one style: colours that colour-blind readers tell apart, readable in a column.
+"""Figures in one style, with colours that colour-blind readers can distinguish.
 
-Figure objects only: nothing here touches pyplot's global state, a display or a file.
+They do not use pyplot's global state, a display or a file.
 """
 
 from __future__ import annotations
@@ -24,8 +24,6 @@ from tautscope.runs.recording import Recording, Snapshot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from tautscope.hardware.timing import Timing
 
 BLACK, GREY = "#222222", "#8a8a8a"
 BLUE, ORANGE, GREEN, PURPLE = "#0072b2", "#d55e00", "#009e73", "#aa4499"
@@ -59,7 +57,7 @@ _STYLE: dict[str, Any] = {
 
 @contextmanager
 def style() -> Iterator[None]:
-    """Within it, figures are made and saved in the house style."""
+    """Context in which figures are made and saved in the package's style."""
     with matplotlib.rc_context(_STYLE):  # type: ignore[arg-type]  # its stub lists every key
         yield
 
@@ -68,8 +66,8 @@ def figure9(uncompensated: Recording | None, compensated: Recording) -> Figure:
     """The article's Fig. 9: one column per DOF.
 
     (a)-(c): reference, command, estimate and both contact offsets over time, with compensation.
-    (d)-(f): estimate over command without, if there was such a run, and over reference with
-    compensation, the first period thin.
+    (d)-(f): estimate over command without (if run) and over reference with compensation, the first
+    period thin.
     """
     segments = compensated.segments
     with style():
@@ -131,7 +129,7 @@ def _loops(
             x, y = x[shown], y[shown]
         axes.plot(x * scale, y * scale, color=colour, linewidth=width, label=label)
     if not any(np.size(line.get_xydata()) for line in axes.lines):
-        axes.text(0.25, 0.75, "not seen", transform=axes.transAxes, ha="center")
+        axes.text(0.25, 0.75, "not measured", transform=axes.transAxes, ha="center")
         axes.set(xticks=[], yticks=[])
     low, high = zip(axes.get_xlim(), axes.get_ylim(), strict=True)
     axes.axline((0, 0), slope=1, color=BLACK, linewidth=0.5, linestyle=(0, (4, 4)), zorder=0)
@@ -143,38 +141,38 @@ def _loops(
 
 
 def figure5(snapshot: Snapshot, config: Config) -> Figure:
-    """The article's Fig. 5: what the vision made of one frame.
+    """The article's Fig. 5: marker detection in one frame.
 
     (a) the frame, (b) the pixels above the discriminant's threshold, (c) the regions, the markers
-    among them named, (d) measured beside predicted features, magnified.
+    labelled, (d) measured and predicted features, magnified.
     """
     detector = MarkerDetector(config)
     regions = detector.detect(snapshot.image, snapshot.predicted_features).regions
-    picture = np.ascontiguousarray(snapshot.image[:, :, ::-1])
+    image = np.ascontiguousarray(snapshot.image[:, :, ::-1])
     measured, predicted = snapshot.features.reshape(2, 2), snapshot.predicted_features.reshape(2, 2)
     with style():
         figure = Figure(figsize=(PAGE, 6.1), layout="constrained")
         axes = figure.subplots(2, 2).ravel()
-        axes[0].imshow(picture)
+        axes[0].imshow(image)
         axes[1].imshow(detector.mask(snapshot.image), cmap="gray", interpolation="nearest")
-        axes[2].imshow(picture // 2 + 96)
+        axes[2].imshow(image // 2 + 96)
         for region in regions:
             left, top, width, height = region.box
             outline = Rectangle(
                 (left - 0.5, top - 0.5), width, height, fill=False, color=ORANGE, linewidth=1.0
             )
             axes[2].add_patch(outline)
-        away = (measured[1] - measured[0]) / np.hypot(*(measured[1] - measured[0]))
-        _name_marker(axes[2], "A", measured[0], -away)
-        _name_marker(axes[2], "B", measured[1], away)
-        axes[3].imshow(picture)
+        axis_direction = (measured[1] - measured[0]) / np.hypot(*(measured[1] - measured[0]))
+        _label_marker(axes[2], "A", measured[0], -axis_direction)
+        _label_marker(axes[2], "B", measured[1], axis_direction)
+        axes[3].imshow(image)
         axes[3].plot(*predicted.T, "x", color="white", markersize=9, label="predicted s")
         axes[3].plot(
             *measured.T, "o", color=ORANGE, fillstyle="none", markersize=9, label="measured s*"
         )
         for begin, end in zip(predicted, measured, strict=True):
             axes[3].plot(*np.array([begin, end]).T, color="white", linewidth=1.0)
-        _magnify(axes[3], np.concatenate([measured, predicted]), picture.shape)
+        _magnify(axes[3], np.concatenate([measured, predicted]), image.shape)
         axes[3].legend(loc="lower right", frameon=True, facecolor="#555555", labelcolor="white")
         titles = ("frame", "mask", "regions and markers", "features, magnified")
         for axis, letter, title in zip(axes, "abcd", titles, strict=True):
@@ -183,49 +181,9 @@ def figure5(snapshot: Snapshot, config: Config) -> Figure:
     return figure
 
 
-def timing_figure(timing: Timing) -> Figure:
-    """How punctual a run on hardware was.
-
-    (a) how much later than due each set-point was sent, over the run; (b) its distribution;
-    (c) from capture until the loop was given the frame; (d) its distribution.
-    """
-    cycles, frames = timing.cycles, timing.frames
-    begin = cycles[0, 0] if len(cycles) else 0.0
-    held = cycles[:, 3] == 0
-    with style():
-        figure = Figure(figsize=(PAGE, 4.2), layout="constrained")
-        axes = figure.subplots(2, 2, width_ratios=(2.2, 1))
-        for row, at, values, what in (
-            (axes[0], cycles[:, 0] - begin, 1e3 * timing.jitter, "set-point late by"),
-            (axes[1], frames[:, 2] - begin, 1e3 * timing.frame_age, "age of frame"),
-        ):
-            row[0].plot(at, values, ".", color=BLUE, markersize=1.5, rasterized=True)
-            row[0].set_xlabel("time [s]")
-            row[0].set_ylabel(f"{what} [ms]")
-            row[0].set_ylim(bottom=0)
-            row[1].hist(values, bins=100, color=BLUE, log=True)
-            row[1].set_xlabel(f"{what} [ms]")
-            row[1].set_ylabel("number")
-        if held.any():
-            axes[0, 0].plot(
-                cycles[held, 0] - begin,
-                np.zeros(held.sum()),
-                "|",
-                color=ORANGE,
-                markersize=12,
-                clip_on=False,
-                zorder=3,
-                label="held",
-            )
-            axes[0, 0].legend(loc="upper right")
-        axes[0, 0].set_title(f"(a) set-points: {len(cycles)} cycles, {timing.lost} lost")
-        axes[1, 0].set_title(f"(c) frames: {len(frames)}")
-        axes[0, 1].set_title("(b)")
-        axes[1, 1].set_title("(d)")
-    return figure
-
-
-def _name_marker(axes: Axes, name: str, at: NDArray[np.float64], away: NDArray[np.float64]) -> None:
+def _label_marker(
+    axes: Axes, name: str, at: NDArray[np.float64], away: NDArray[np.float64]
+) -> None:
     """A cross at a marker [px], its name 26 points off in the direction `away` [px]."""
     axes.plot(*at, "+", color=BLACK, markersize=8)
     axes.annotate(
@@ -244,7 +202,7 @@ def _name_marker(axes: Axes, name: str, at: NDArray[np.float64], away: NDArray[n
 
 
 def _magnify(axes: Axes, points: NDArray[np.float64], shape: tuple[int, ...]) -> None:
-    """Show the points with room around them, in the proportions of the picture."""
+    """Zoom to the points with a margin, in the aspect ratio of the image."""
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     span = np.ptp(points, axis=0) + 80
     height = max(span[1], span[0] * shape[0] / shape[1])

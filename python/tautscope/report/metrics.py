@@ -1,7 +1,6 @@
-"""How good a run is: loop width, reduction, start, overshoot, tracking, state and marker errors.
+"""Figures of merit: loop width, reduction, start, overshoot; tracking, state and marker errors.
 
-The one implementation of the project's definitions. Plain arrays in, plain numbers out; nothing
-here draws or knows a file. A figure that its data do not carry is NaN, never a guess.
+Arrays in, numbers out. A figure that the data do not determine is NaN.
 """
 
 from __future__ import annotations
@@ -15,13 +14,13 @@ from numpy.typing import ArrayLike, NDArray
 from tautscope.errors import SignalError
 
 LEVELS = 41
-"""Levels of y at which a loop's width is read."""
+"""Number of levels of y at which the width of a loop is measured."""
 CENTRAL = 0.8
-"""Share of y's range the levels span, about its middle."""
+"""Share of y's range that the levels span, about its middle."""
 DEADBAND = 0.05
-"""Share of y's range that y must go beyond a level for a crossing to count as a passage."""
+"""Share of y's range by which y must exceed a level for a crossing to count as a passage."""
 COVERAGE = 0.5
-"""Share of the levels that must be passed both ways for a loop to have a width."""
+"""Share of the levels that y must pass both ways for a loop to have a width."""
 SETTLED = 1.2
 """A period is settled when its width is at most this times the final one."""
 
@@ -34,8 +33,8 @@ class LoopWidth:
 
     Attributes:
         mean: Mean over the levels that y passes both ways.
-        max: Largest over these levels.
-        levels: (41,) values of y at which the width was read.
+        max: Largest width over these levels.
+        levels: (41,) values of y at which the width was measured.
         widths: (41,) width at each level; NaN where y does not pass both ways.
     """
 
@@ -51,20 +50,20 @@ class LoopWidth:
 def loop_width(
     x: ArrayLike, y: ArrayLike, *, levels: int = LEVELS, central: float = CENTRAL
 ) -> LoopWidth:
-    """Horizontal width of the loop that output y draws over input x.
+    """Horizontal width of the hysteresis loop of output y over input x.
 
     At each level: x where y passes it rising, minus x where y passes it falling, each averaged
-    over all passages and interpolated between samples. Of a play, Eq. (1), this is exactly
-    ``delta_plus - delta_minus``, and its sign says the same: positive when the output lags.
+    over all passages and interpolated between samples. For a play, Eq. (1), this is exactly
+    ``delta_plus - delta_minus``: positive when the output lags.
 
-    Noise makes y cross a level several times in one passage. A passage therefore ends only when y
-    is more than 5 % of its range beyond the level, and stands at the mean of its crossings.
+    Noise makes y cross a level several times in one passage. A passage therefore ends when y is
+    more than 5 % of its range beyond the level; its position is the mean of its crossings.
 
     Args:
-        x: (n,) input in order of time; pairs with a number that is not finite are left out.
+        x: (n,) input in order of time; pairs with a non-finite number are skipped.
         y: (n,) output, same length.
-        levels: How many levels.
-        central: Share of y's range they span.
+        levels: Number of levels.
+        central: Share of y's range that they span.
 
     Returns:
         Mean and largest width; both NaN if y passes fewer than half of the levels both ways.
@@ -76,8 +75,8 @@ def loop_width(
     finite = np.isfinite(x) & np.isfinite(y)
     x, y = x[finite], y[finite]
     if len(y) < 2 or np.ptp(y) == 0:
-        nothing = np.full(levels, np.nan)
-        return LoopWidth(np.nan, np.nan, nothing, nothing)
+        unknown = np.full(levels, np.nan)
+        return LoopWidth(np.nan, np.nan, unknown, unknown)
     middle, half = (y.max() + y.min()) / 2, np.ptp(y) / 2
     at = np.linspace(middle - central * half, middle + central * half, levels)
     widths = np.array([_width_at(x, y - level, 2 * half * DEADBAND) for level in at])
@@ -88,7 +87,7 @@ def loop_width(
 
 
 def _width_at(x: Floats, height: Floats, deadband: float) -> float:
-    """Mean x of the rising less that of the falling passages of height through zero."""
+    """Mean x of the rising minus that of the falling passages of height through zero."""
     above = height >= 0
     before = np.flatnonzero(above[1:] != above[:-1])
     if len(before) < 2:
@@ -96,7 +95,7 @@ def _width_at(x: Floats, height: Floats, deadband: float) -> float:
     share = height[before] / (height[before] - height[before + 1])
     crossings = x[before] + share * (x[before + 1] - x[before])
     excursions = np.maximum.reduceat(np.abs(height), before + 1)
-    excursions[-1] = np.inf  # what follows the last crossing is not seen: it counts
+    excursions[-1] = np.inf  # the last crossing always counts
     passages: dict[bool, list[float]] = {True: [], False: []}
     side, first = bool(above[0]), 0
     for index in np.flatnonzero(excursions > deadband):
@@ -110,10 +109,10 @@ def _width_at(x: Floats, height: Floats, deadband: float) -> float:
 
 
 def reduction(uncompensated: float | LoopWidth, compensated: float | LoopWidth) -> float:
-    """Share of the hysteresis that is gone: 1 - compensated / uncompensated.
+    """Reduction of hysteresis: 1 - compensated / uncompensated.
 
-    Mean widths, or any two widths of one kind. The ideal of Eq. (2) is 1 - 1 / free_gain. NaN if
-    the uncompensated width is not positive: there was nothing to reduce.
+    Both are mean widths, or both maxima. The ideal of Eq. (2) is 1 - 1 / free_gain. NaN if the
+    uncompensated width is not positive.
     """
     before, after = float(uncompensated), float(compensated)
     return 1.0 - after / before if before > 0 else np.nan
@@ -123,12 +122,11 @@ def start_periods(widths: ArrayLike) -> float:
     """Number of periods until the mean width stays within 1.2 times its final value.
 
     Args:
-        widths: (periods,) mean width of each whole period, see `period_widths`; of one that runs
-            the other way the size counts.
+        widths: (periods,) mean width of each whole period, see `period_widths`; their absolute
+            values count.
 
     Returns:
-        How many periods come before the settled ones: 0 if the first is settled already; NaN if
-        the final width is not known.
+        Number of periods before the settled ones; NaN if the final width is not known.
     """
     values = np.asarray(widths, dtype=np.float64)
     if values.size == 0 or not np.isfinite(values[-1]):
@@ -144,20 +142,20 @@ def period_widths(
     time = np.asarray(time, dtype=np.float64)
     x, y = _pair("x", x, "y", y)
     edges = np.searchsorted(time, start + period * np.arange(periods + 1))
-    # One sample more than the period: the loop closes.
+    # One sample more than the period closes the loop.
     windows = (slice(first, last + 1) for first, last in pairwise(edges))
     return np.array([loop_width(x[window], y[window]).mean for window in windows])
 
 
 def rms(errors: ArrayLike) -> float:
-    """Root of the mean square of those errors that are finite; NaN if there is none."""
+    """Root mean square of the finite errors; NaN if there is none."""
     values = np.asarray(errors, dtype=np.float64)
     values = values[np.isfinite(values)]
     return float(np.sqrt(np.mean(values**2))) if values.size else np.nan
 
 
 def tracking_rms(reference: ArrayLike, tip: ArrayLike) -> float:
-    """RMS of (tip - reference), in their unit; over whatever samples are passed."""
+    """RMS of (tip - reference), in their unit."""
     return rms(np.subtract(*_pair("reference", reference, "tip", tip)))
 
 
@@ -167,7 +165,7 @@ def state_rms(estimate: ArrayLike, truth: ArrayLike) -> float:
 
 
 def tip_overspeed(time: ArrayLike, reference: ArrayLike, tip: ArrayLike) -> float:
-    """99.9th percentile of |tip speed| over the peak of |reference speed|; 1 is faithful."""
+    """99.9th percentile of |tip speed| over the peak of |reference speed|; 1 is ideal."""
     reference, tip = _pair("reference", reference, "tip", tip)
     steps = np.diff(np.asarray(time, dtype=np.float64))
     if len(steps) == 0 or not np.all(steps > 0):
@@ -181,34 +179,34 @@ def tip_overspeed(time: ArrayLike, reference: ArrayLike, tip: ArrayLike) -> floa
 def actuator_gain(reference: ArrayLike, command: ArrayLike) -> float:
     """Largest |change of command| over |change of reference| in one tick.
 
-    Infinite if the command moves in a tick in which the reference stands still. Ticks whose
-    reference moves less than 1e-9 of its largest step are left out: they are rounding.
+    Infinite if the command moves while the reference is constant. Ticks whose reference moves less
+    than 1e-9 of its largest step are skipped: they are rounding errors.
     """
     reference, command = _pair("reference", reference, "command", command)
-    asked, given = np.abs(np.diff(reference)), np.abs(np.diff(command))
-    if np.any((asked == 0) & (given > 0)):
+    desired, actual = np.abs(np.diff(reference)), np.abs(np.diff(command))
+    if np.any((desired == 0) & (actual > 0)):
         return np.inf
-    moving = asked > 1e-9 * asked.max(initial=0.0)
-    return float(np.max(given[moving] / asked[moving])) if moving.any() else np.nan
+    moving = desired > 1e-9 * desired.max(initial=0.0)
+    return float(np.max(actual[moving] / desired[moving])) if moving.any() else np.nan
 
 
 def overshoot(reference: ArrayLike, tip: ArrayLike) -> float:
-    """How far the tip runs ahead of the reference by its own motion, in their unit; 0 if never.
+    """Largest overshoot of the tip over the reference in any stroke, in their unit.
 
-    A stroke lasts from one reversal of the reference to the next. In it, with the direction
-    s = +-1 of the reference and the tip's place y0 at its start,
+    A stroke lasts from one reversal of the reference to the next. With the direction s = +-1 of
+    the reference in it, and the tip position y0 at its start,
 
         overshoot = max over the stroke of min(s (y - u), s (y - y0))
 
-    so a tip that still lags from the stroke before, and is therefore ahead as soon as the
-    reference turns, does not count until it moves on in the new direction.
+    so a tip that is ahead only because it lagged in the stroke before does not count until it
+    moves in the new direction.
 
     Args:
-        reference: u (n,); where it stands still the stroke goes on.
+        reference: u (n,); a constant reference does not end the stroke.
         tip: y (n,).
 
     Returns:
-        The largest over all strokes; NaN if nothing moves or something is not known.
+        0 if the tip never overshoots; NaN if nothing moves or a value is not known.
     """
     reference, tip = _pair("reference", reference, "tip", tip)
     largest = np.nan
@@ -221,7 +219,7 @@ def overshoot(reference: ArrayLike, tip: ArrayLike) -> float:
 
 
 def _reversals(signal: Floats) -> list[int]:
-    """Where a signal turns, with its two ends; empty if it never moves."""
+    """Indices of the reversals of a signal and of its two ends; empty if it never moves."""
     moving = np.flatnonzero(np.diff(signal))
     if len(moving) == 0:
         return []
@@ -231,25 +229,25 @@ def _reversals(signal: Floats) -> list[int]:
 
 
 def until_within(values: ArrayLike, target: float, tolerance: float) -> float:
-    """Number of values, one per stroke or period, before they stay near a target.
+    """Number of values, one per stroke or period, before they stay within a tolerance of a target.
 
     Args:
         values: (n,).
-        target: What they should be.
-        tolerance: |value - target| that is near, in their unit.
+        target: In their unit.
+        tolerance: Largest |value - target|, in their unit.
 
     Returns:
-        0 if all are near; NaN if the last is not, since then it is not known.
+        0 if all are within it; NaN if the last is not, because the number is then not known.
     """
     errors = np.abs(np.asarray(values, dtype=np.float64) - target)
-    wrong = np.flatnonzero(~(errors <= tolerance))
-    if errors.size == 0 or errors.size - 1 in wrong:
+    outside = np.flatnonzero(~(errors <= tolerance))
+    if errors.size == 0 or errors.size - 1 in outside:
         return np.nan
-    return float(wrong[-1] + 1) if wrong.size else 0.0
+    return float(outside[-1] + 1) if outside.size else 0.0
 
 
 def peak_to_peak(signal: ArrayLike) -> float:
-    """Largest less smallest value; NaN if one is not known or there is none."""
+    """Largest minus smallest value; NaN if one is not known or there is none."""
     values = np.asarray(signal, dtype=np.float64)
     return float(np.ptp(values)) if values.size else np.nan
 
@@ -268,7 +266,7 @@ def marker_errors(measured: ArrayLike, truth: ArrayLike) -> Floats:
 def marker_rms(measured: ArrayLike, truth: ArrayLike) -> float:
     """RMS over frames and both markers of the distance from measured to true feature [px].
 
-    Frames whose features or truth are not known (NaN) are left out.
+    Frames whose features or truth are not known (NaN) are skipped.
     """
     errors = marker_errors(measured, truth)
     return rms(errors[np.isfinite(errors).all(axis=1)].ravel())

@@ -1,12 +1,10 @@
-"""A run as one HTML page that stands alone: no network, no script, prints well."""
+"""The report of a run: one self-contained HTML page without scripts or network access."""
 
 from __future__ import annotations
 
 import base64
-import importlib.metadata
 import io
 import math
-import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -19,8 +17,6 @@ from tautscope.report.results import Results
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from tautscope.report.demo import Demo
 
 _STYLE = """
 :root { color-scheme: light; }
@@ -48,94 +44,40 @@ dt { color: #555; } dd { margin: 0; }
   h2 { break-after: avoid; } figure, tr { break-inside: avoid; } pre { white-space: pre-wrap; } }
 """
 
-_CAVEATS = """
-<ul class="note">
-<li>Everything here is a simulation. The plant is a rigid-body model with friction and elasticity,
-not an instrument; the figures say how the method works on that plant. This is research software,
-not a medical device.</li>
-<li>The article's figures were measured on its own rig with the tip as its camera saw it; the
-twin's widths are of its true tip. The rows &ldquo;by camera&rdquo; compare like with like.</li>
-<li>The instrument's geometry, the camera's pose, the reference's amplitudes and the estimator's
-parameters are not in the article; the configuration below has the ones used. The twin's friction
-is set so that the uncompensated widths resemble the article's: agreement of those rows is by
-construction, agreement of the compensated ones is not.</li>
-<li>With a gain of K while slack is crossed and the width known exactly, 1 &minus; 1/K of it goes:
-80&nbsp;% at 5. A width estimated a little too wide removes more, one too narrow less. That is
-profile &ldquo;paper&rdquo;; in &ldquo;best&rdquo; the command goes on in contact until the whole
-offset is made up for.</li>
-</ul>
-"""
-
-_PROFILES = {
-    "paper": "&ldquo;Paper&rdquo; is the article&rsquo;s scheme on the twin.",
-    "best": "&ldquo;Best&rdquo; is this project&rsquo;s own scheme on the same twin.",
-}
-
 
 @dataclass(frozen=True)
-class Picture:
-    """A figure and what it shows."""
+class CaptionedFigure:
+    """A figure and its caption."""
 
     figure: Figure
     caption: str
-
-
-def demo_report(demo: Demo, pictures: Sequence[Picture]) -> str:
-    """The page of ``tautscope demo``, with the pictures in the order given."""
-    seeds, profiles = demo.seeds, demo.by_profile
-    several = len(seeds) > 1
-    count = f"{len(seeds)} seeds" if several else "one seed"
-    facts = {
-        "tautscope": __version__,
-        "Python": platform.python_version(),
-        **{name: _version(name) for name in ("numpy", "mujoco", "opencv-python-headless")},
-        "machine": f"{platform.system()} {platform.machine()}",
-        "seeds": ", ".join(map(str, seeds)),
-        "simulated": f"{demo.sim_seconds:.0f} s in {(1 + len(profiles)) * len(seeds)} runs",
-        "took": f"{demo.wall_seconds:.0f} s",
-    }
-    return _page(
-        f"on a simulated instrument, camera images the only feedback; {count}",
-        f"""<h2>Table 1</h2>
-<div class="wide">{_table(profiles)}</div>
-<p class="note">{"Median over the seeds, the worst seed in brackets. " if several else ""}{
-            " ".join(_PROFILES[name] for name in profiles)
-        }
-Widths over the last two periods of each degree of freedom: mean over 41 levels across the central
-80&nbsp;% of the tip&rsquo;s range, of the true tip unless said otherwise.</p>
-{_noticed(demo.compensated.warnings)}
-<h2>Figures{f", profile {demo.config.profile}" if len(profiles) > 1 else ""}</h2>
-{_figures(pictures)}
-<h2>What this shows, and what it does not</h2>
-{_CAVEATS}""",
-        facts,
-        demo.config,
-    )
 
 
 def run_report(
     config: Config,
     facts: dict[str, str],
     results: Results,
-    pictures: Sequence[Picture],
-    noticed: Sequence[str],
+    figures: Sequence[CaptionedFigure],
+    warnings: Sequence[str],
 ) -> str:
-    """The page of ``tautscope run``: what the camera saw, of one run or of two."""
-    return _page(
+    """The page of ``tautscope run``: one or two runs on hardware, as measured by the camera."""
+    return page(
         "on the drives and the camera named below",
         f"""<h2>Table 1</h2>
-<div class="wide">{_table({"rig": [results]}, by_camera=True)}</div>
-<p class="note">As the camera sees it; no rig knows its true tip. The tracking error includes
-the first period, in which the slack is learnt. The article&rsquo;s figures are of its own rig.</p>
-{_noticed(noticed)}
+<div class="wide">{results_table({"rig": [results]}, by_camera=True)}</div>
+<p class="note">Measured by the camera: the true state of the tip is not known on hardware. The
+tracking error includes the first period, in which the contact offsets are estimated. The
+article&rsquo;s figures are of its own rig.</p>
+{warning_list(warnings)}
 <h2>Figures</h2>
-{_figures(pictures)}""",
+{figure_list(figures)}""",
         {"tautscope": __version__, **facts},
         config,
     )
 
 
-def _page(where: str, body: str, facts: dict[str, str], config: Config) -> str:
+def page(where: str, body: str, facts: dict[str, str], config: Config) -> str:
+    """The page around a body, with the facts of the run and its configuration."""
     facts_list = "".join(f"<dt>{escape(k)}</dt><dd>{escape(v)}</dd>" for k, v in facts.items())
     return f"""<!doctype html>
 <html lang="en"><head><meta charset="utf-8">
@@ -145,7 +87,7 @@ def _page(where: str, body: str, facts: dict[str, str], config: Config) -> str:
 <p class="lead">The experiment of Reilink, Stramigioli and Misra (Mechatronics 23, 2013, 652, doi
 10.1016/j.mechatronics.2013.06.006) {where}.</p>
 {body}
-<h2>Made with</h2>
+<h2>Run</h2>
 <dl>{facts_list}</dl>
 <h2>Configuration</h2>
 <pre>{escape(dump_config(config))}</pre>
@@ -153,37 +95,40 @@ def _page(where: str, body: str, facts: dict[str, str], config: Config) -> str:
 """
 
 
-def _figures(pictures: Sequence[Picture]) -> str:
-    return "".join(_figure(picture) for picture in pictures)
+def figure_list(figures: Sequence[CaptionedFigure]) -> str:
+    """The figures with their captions, one below the other."""
+    return "".join(_figure(each) for each in figures)
 
 
-def _noticed(lines: Sequence[str]) -> str:
-    """What the guards noticed in the compensated run, of the first seed if there are several."""
-    said = "".join(f"<li>{escape(line)}</li>" for line in lines) or "<li>nothing</li>"
-    return f'<h2>Noticed by the guards</h2><ul class="note">{said}</ul>'
+def warning_list(warnings: Sequence[str]) -> str:
+    """The section of warnings: flags raised in a run, and disabled monitors."""
+    items = "".join(f"<li>{escape(line)}</li>" for line in warnings) or "<li>none</li>"
+    return f'<h2>Warnings</h2><ul class="note">{items}</ul>'
 
 
-def _table(columns: Mapping[str, Sequence[Results]], by_camera: bool = False) -> str:
-    """The article beside each column, a result per seed; the last one stands out.
+def results_table(columns: Mapping[str, Sequence[Results]], by_camera: bool = False) -> str:
+    """Table 1: per DOF the article, then each column with a result per seed; the last in bold.
 
-    By camera, the article stands beside what the camera saw, and rows of which nothing is known
-    are left out.
+    Args:
+        columns: Results per seed, by the column's title.
+        by_camera: Compare the article with the figures measured by the camera, and leave out rows
+            without a value.
     """
-    figures = [(each, tables.median(each), tables.worst(each)) for each in columns.values()]
-    *_, (last, dofs, _) = figures
+    sources = [(each, tables.median(each), tables.worst(each)) for each in columns.values()]
+    *_, (last, dofs, _) = sources
     span = 1 + len(columns)
     heads = "".join(f'<th colspan="{span}">{tables.heading(dof)}</th>' for dof in dofs)
     names = "".join(f"<th>{escape(name)}</th>" for name in columns)
     names = f'<th class="first">article</th>{names}' * len(dofs)
     lines = []
     for row in tables.ROWS:
-        if by_camera and all(math.isnan(getattr(found, row.name)) for found in dofs.values()):
+        if by_camera and all(math.isnan(getattr(result, row.name)) for result in dofs.values()):
             continue
         cells = []
         for dof in dofs:
             article = tables.article_cell(row, dof, by_camera)
             cells.append(f'<td class="first">{article}</td>')
-            for results, middle, bad in figures:
+            for results, middle, bad in sources:
                 value = tables.cell(row, dof, getattr(middle[dof], row.name))
                 worst = tables.cell(row, dof, getattr(bad[dof], row.name))
                 note = f"<small>({worst})</small>" if len(results) > 1 else ""
@@ -196,19 +141,12 @@ def _table(columns: Mapping[str, Sequence[Results]], by_camera: bool = False) ->
     )
 
 
-def _figure(picture: Picture) -> str:
+def _figure(captioned: CaptionedFigure) -> str:
     data = io.BytesIO()
-    picture.figure.savefig(data, format="jpg", dpi=170, pil_kwargs={"quality": 88})
+    captioned.figure.savefig(data, format="jpg", dpi=170, pil_kwargs={"quality": 88})
     code = base64.b64encode(data.getvalue()).decode()
-    caption = escape(picture.caption)
+    caption = escape(captioned.caption)
     return (
         f'<figure><img alt="{caption}" src="data:image/jpeg;base64,{code}">'
         f"<figcaption>{caption}</figcaption></figure>"
     )
-
-
-def _version(package: str) -> str:
-    try:
-        return importlib.metadata.version(package)
-    except importlib.metadata.PackageNotFoundError:
-        return "not installed"

@@ -1,4 +1,4 @@
-"""Two runs to one Table 1: the figures per DOF and seed, their medians and the worst."""
+"""Table 1 of a run: the figures of merit per DOF; their median and worst value over seeds."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from tautscope.report import metrics
 from tautscope.runs.recording import Recording, Table, per_feature
 
 LAST_PERIODS = 2
-"""Loop widths are read over this many periods at the end of a segment."""
+"""Number of periods at the end of a segment over which loop widths are measured."""
 
 
 @dataclass(frozen=True, slots=True)
 class DofResult:
-    """What a run with compensation, and one without, say about one DOF [m or rad].
+    """Figures of one DOF from a run with compensation and one without [m or rad].
 
-    Widths are of y over x in the last two periods of the DOF's segment; x is the command without
-    and the reference with compensation; y is the true tip, or the estimate where the name says so.
-    NaN where the rig has no truth, or there was no run without compensation.
+    Widths are of y over x in the last two periods of the DOF's segment: x is the command without
+    and the reference with compensation; y is the true tip, or the estimate where the name says so
+    ("by camera"). NaN if the true tip is not known, or without an uncompensated run.
 
     Attributes:
         uncompensated: Mean width without compensation.
@@ -31,14 +31,14 @@ class DofResult:
         compensated: Mean width with compensation.
         compensated_max: Largest width with compensation.
         reduction: 1 - compensated / uncompensated, of the mean widths.
-        reduction_max: The same of the largest widths.
-        uncompensated_estimate: Mean width without compensation, as the camera sees it.
-        compensated_estimate: Mean width with compensation, as the camera sees it.
-        reduction_estimate: The reduction, as the camera sees it; this is the article's.
+        reduction_max: 1 - compensated_max / uncompensated_max.
+        uncompensated_estimate: Mean width without compensation, by camera.
+        compensated_estimate: Mean width with compensation, by camera.
+        reduction_estimate: Reduction by camera; this is the article's.
         start_periods: Periods until the compensated mean width stays within 1.2 times its last.
         tracking_rms: RMS of (true tip - reference) after the start, with compensation.
-        tracking_estimate: The same of the estimate, as the camera sees it; of the whole segment
-            where the rig has no truth to tell the start.
+        tracking_estimate: RMS of (estimate - reference) after the start, by camera; over the whole
+            segment if the true tip, and so the start, is not known.
         state_rms: RMS of (state_estimate - true_state at the capture time) over all frames of the
             whole compensated run that measured this DOF.
         marker_rms_px: RMS distance of measured from true features in the DOF's segment [px].
@@ -70,7 +70,7 @@ Results = dict[Dof, DofResult]
 
 
 def evaluate(uncompensated: Recording | None, compensated: Recording) -> Results:
-    """The figures of every DOF that has a segment of its own; without the first run, of one run."""
+    """The figures of every DOF with a segment; the uncompensated run is optional."""
     return {
         segment.dof: _dof_result(segment, uncompensated, compensated)
         for segment in compensated.segments
@@ -78,9 +78,9 @@ def evaluate(uncompensated: Recording | None, compensated: Recording) -> Results
 
 
 def combine(results: Sequence[Results], how: dict[str, str] | str) -> Results:
-    """One figure from several seeds: ``"median"``, or per name ``"min"``, ``"max"``, ``"median"``.
+    """Combine seeds: ``"median"``, or per name of a figure ``"min"``, ``"max"`` or ``"median"``.
 
-    Seeds for which a figure is not known do not count.
+    Seeds with an unknown figure are skipped.
     """
     names = DofResult.__dataclass_fields__
     return {
@@ -109,7 +109,7 @@ def _combined(values: list[float], how: str) -> float:
 def true_loop(
     recording: Recording, segment: Segment, x: str
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """X (``"command"`` or ``"reference"``) and the true tip over a segment's last two periods."""
+    """X (``"command"`` or ``"reference"``) and the true tip in a segment's last two periods."""
     rows = recording.during(segment, segment.periods - LAST_PERIODS, segment.periods)
     label = segment.dof.label
     return recording.trace[f"{x}_{label}"][rows], recording.trace[f"true_{label}"][rows]
@@ -120,7 +120,7 @@ def estimated_loop(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """X and the estimate at the capture times of the frames that measured the DOF.
 
-    From period `first` of the segment to its end; without it, its last two periods.
+    From period `first` of the segment, by default from the last but one, to its end.
     """
     begin = segment.periods - LAST_PERIODS if first is None else first
     frames = used_frames(recording, segment, begin)
@@ -140,14 +140,12 @@ def _dof_result(
     segment: Segment, uncompensated: Recording | None, compensated: Recording
 ) -> DofResult:
     label = segment.dof.label
-    nothing = np.empty(0)
-    plain, seen_plain = (nothing, nothing), (nothing, nothing)
+    before = before_estimate = metrics.loop_width([], [])
     if uncompensated is not None:
-        plain = true_loop(uncompensated, segment, "command")
-        seen_plain = estimated_loop(uncompensated, segment, "command")
-    before, seen_before = metrics.loop_width(*plain), metrics.loop_width(*seen_plain)
+        before = metrics.loop_width(*true_loop(uncompensated, segment, "command"))
+        before_estimate = metrics.loop_width(*estimated_loop(uncompensated, segment, "command"))
     after = metrics.loop_width(*true_loop(compensated, segment, "reference"))
-    seen_after = metrics.loop_width(*estimated_loop(compensated, segment, "reference"))
+    after_estimate = metrics.loop_width(*estimated_loop(compensated, segment, "reference"))
 
     rows = compensated.trace[compensated.during(segment, 0, segment.periods)]
     time, reference, truth = rows["time"], rows[f"reference_{label}"], rows[f"true_{label}"]
@@ -173,9 +171,9 @@ def _dof_result(
         compensated_max=after.max,
         reduction=metrics.reduction(before.mean, after.mean),
         reduction_max=metrics.reduction(before.max, after.max),
-        uncompensated_estimate=seen_before.mean,
-        compensated_estimate=seen_after.mean,
-        reduction_estimate=metrics.reduction(seen_before.mean, seen_after.mean),
+        uncompensated_estimate=before_estimate.mean,
+        compensated_estimate=after_estimate.mean,
+        reduction_estimate=metrics.reduction(before_estimate.mean, after_estimate.mean),
         start_periods=start,
         tracking_rms=metrics.tracking_rms(settled[f"reference_{label}"], settled[f"true_{label}"]),
         tracking_estimate=metrics.tracking_rms(

@@ -1,4 +1,4 @@
-"""Table 1 as people and programs read it: text, CSV, JSON. The article beside ours."""
+"""Table 1 as text, CSV and JSON, with the article's values."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ Worst = Literal["min", "max"]
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One line of the table.
+    """One row of the table.
 
     Attributes:
         name: Field of `DofResult`.
-        title: For people.
+        title: Title in printed tables.
         kind: ``length`` is in the DOF's unit, ``share`` is printed in percent, ``number`` and
-            ``count`` are as they are.
-        worst: Which end is the bad one.
-        in_summary: Whether ``--json`` names it.
+            ``count`` have no conversion.
+        worst: Whether the worst value is the smallest or the largest.
+        in_summary: Whether ``--json`` contains it.
     """
 
     name: str
@@ -64,17 +64,17 @@ ARTICLE: dict[str, dict[Dof, float]] = {
 
 
 def median(results: Sequence[Results]) -> Results:
-    """The median over seeds of every figure."""
+    """Median of every figure over the seeds."""
     return combine(results, "median")
 
 
 def worst(results: Sequence[Results]) -> Results:
-    """The worst seed of every figure, each figure for itself."""
+    """Worst value of every figure over the seeds."""
     return combine(results, {row.name: row.worst for row in ROWS})
 
 
 def in_display_unit(row: Row, dof: Dof, value: float) -> float:
-    """A figure [m or rad] in the unit people read."""
+    """A figure [m or rad] in the display unit."""
     return value * dof.display_scale if row.kind == "length" else value
 
 
@@ -84,7 +84,7 @@ def heading(dof: Dof) -> str:
 
 
 def cell(row: Row, dof: Dof, value: float) -> str:
-    """A figure as text, in the unit of the column or the row; a dash if it is not known."""
+    """A figure as text in its display unit; a dash if it is not known."""
     if math.isnan(value):
         return "-"
     if row.kind == "share":
@@ -96,9 +96,9 @@ def cell(row: Row, dof: Dof, value: float) -> str:
 
 
 def article_cell(row: Row, dof: Dof, by_camera: bool = False) -> str:
-    """The article's figure as its Table 1 prints it, or nothing.
+    """The figure as the article's Table 1 prints it, or nothing.
 
-    Its figures are the camera's: on a rig without truth they stand beside what the camera saw.
+    The article measured by camera: with `by_camera` its figures stand in the rows "by camera".
     """
     name = row.name.removesuffix("_estimate") if by_camera else row.name
     value = ARTICLE.get(name, {}).get(dof)
@@ -108,7 +108,7 @@ def article_cell(row: Row, dof: Dof, by_camera: bool = False) -> str:
 def write_csv(
     path: Path, seeds: Sequence[int], by_profile: Mapping[str, Sequence[Results]]
 ) -> None:
-    """table1.csv in display units: per DOF the article, per profile all seeds, median and worst."""
+    """Write table1.csv in display units: per DOF the article, per profile seeds, median, worst."""
     lines: list[tuple[str, str, Results]] = [
         (profile, source, found)
         for profile, results in by_profile.items()
@@ -139,10 +139,10 @@ def to_json(
     *,
     article_results: Sequence[Results] = (),
 ) -> dict[str, Any]:
-    """What ``tautscope demo --json`` prints; a figure that is not known is None.
+    """The output of ``tautscope demo --json``; an unknown figure is None.
 
-    Medians over the seeds; under ``worst`` the worst seed of each figure. Insertion in mm.
-    Under ``paper`` the same for the article's scheme, if it was run beside another.
+    Medians over the seeds, and under ``worst`` the worst values; insertion in mm. Under ``paper``
+    the results of the article's scheme, if it was run beside another one.
     """
     return {
         "profile": profile,
@@ -176,7 +176,7 @@ def _summary(dof: Dof, result: DofResult) -> dict[str, float | None]:
 
 
 def finite_or_none(value: float) -> float | None:
-    """The value, or None where JSON has no word for it."""
+    """The value, or None if it is not finite, which JSON cannot express."""
     return value if math.isfinite(value) else None
 
 

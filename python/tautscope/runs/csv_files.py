@@ -1,4 +1,4 @@
-"""Structured arrays as CSV files that read back equal, to the last bit."""
+"""Structured arrays as CSV files, without loss of precision."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tautscope.errors import MissingPathError, RecordError
 
 
 def write_csv(path: Path, table: NDArray[np.void]) -> None:
-    """A structured array as CSV with a header; numbers in full, so that they read back equal."""
+    """Write a structured array as CSV with a header; every number is written in full."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(table.dtype.names or ())
@@ -20,11 +20,11 @@ def write_csv(path: Path, table: NDArray[np.void]) -> None:
 
 
 def read_csv(path: Path, dtype: np.dtype[np.void]) -> NDArray[np.void]:
-    """Read back what `write_csv` wrote.
+    """Read a file of `write_csv`; equal to what was written, to the last bit.
 
     Raises:
-        MissingPathError: There is no such file.
-        RecordError: Its columns or cells are others.
+        MissingPathError: The file does not exist.
+        RecordError: A column or a cell is not as `write_csv` writes it.
     """
     if not path.is_file():
         raise MissingPathError("recording", str(path), "a file of a saved recording")

@@ -1,4 +1,4 @@
-"""The only place with a loop and a clock."""
+"""Runs of a reference on a rig: the only place with a loop and a clock."""
 
 from __future__ import annotations
 
@@ -14,35 +14,36 @@ from tautscope.errors import SignalError
 from tautscope.loop.reduction import HysteresisReduction, Report
 from tautscope.loop.references import DatedReference, Reference
 from tautscope.loop.rig import Frame, Rig, Sample
-from tautscope.loop.safety import Supervision, switched_off
-from tautscope.runs.flag_summary import Noticed
+from tautscope.loop.safety import Supervision, disabled_monitors
+from tautscope.runs.flag_summary import FlagSummary
 from tautscope.runs.recording import Floats, Recording, Snapshot
-from tautscope.runs.run_recorder import Tables, frame_row
+from tautscope.runs.run_recorder import RunRecorder, frame_row
 
 if TYPE_CHECKING:
     from tautscope.loop.vision import Detection
 
 Progress = Callable[[float, float], None]
 """Called about once per second of the rig's clock with (elapsed, duration) [s]."""
-Look = Callable[[HysteresisReduction, Frame], Report]
-"""An image update: frame in, what became of it out."""
+ImageUpdate = Callable[[HysteresisReduction, Frame], Report]
+"""Updates the loop with a frame."""
+_Reports = Iterator[tuple[Frame, Report]]
 
 
 class Log(Protocol):
-    """Told everything as it happens; `tautscope.log.writer.LogWriter` for one."""
+    """Receives every event of a run as it happens, e.g. `tautscope.log.writer.LogWriter`."""
 
     def tick(
         self, sample: Sample, reference: Floats, command: Floats, made_at: float | None = None
     ) -> None:
-        """A control tick; when its reference was made [s, the rig's clock], if that is known."""
+        """A control tick; `made_at` is when its reference was made [s, the rig's clock]."""
         ...
 
     def frame(self, now: float, frame: Frame, report: Report) -> None:
-        """An image update, at a time of the rig's clock [s]."""
+        """An image update at time `now` [s, the rig's clock]."""
         ...
 
     def event(self, now: float, what: str) -> None:
-        """What the operator or the rig told the loop, `HysteresisReduction.on_event`, likewise."""
+        """A call of the operator or the rig, as `HysteresisReduction.on_event`, at time `now`."""
         ...
 
 
@@ -53,40 +54,42 @@ def run_experiment(
     compensate: bool = True,
     progress: Progress | None = None,
     *,
-    look: Look = HysteresisReduction.on_frame,
+    look: ImageUpdate = HysteresisReduction.on_frame,
     log: Log | None = None,
-    aside: Executor | None = None,
+    executor: Executor | None = None,
     watch: Callable[[Supervision], None] | None = None,
 ) -> Recording:
     """Run a reference on a rig, with the camera as the only feedback.
 
-    Every control period: reference to command, command to the rig; every image that arrived goes
-    to the state estimate and the hysteresis estimators. The rig's truth, if it has one, is
-    recorded and never read by the loop.
+    In every control period the loop turns the reference into a command for the rig. Every image
+    that arrives updates the state estimate and the hysteresis estimators. The rig's true state, if
+    it has one, is recorded; the loop never reads it.
 
     Args:
-        rig: Any object with the methods of `tautscope.rig.Rig`. It is reset first and left open:
-            whoever made it closes it.
-        reference: (time [s]) -> (3,) [m, rad, rad], with `duration` and `segments`; with `made_at`
-            too, one that is old moves nothing (`tautscope.loop.references.DatedReference`).
-        config: Of the loop.
-        compensate: Without, the command is the reference, and the estimators only listen.
-        progress: Told how far the run is.
-        look: What the loop does with a frame; one that calls `HysteresisReduction.on_features`
-            brings a marker detector of your own.
-        log: Written while the run goes on, so that it survives whatever ends it; left open.
-        aside: Looks at the images, in place of `look`, while ticks go on; of frames that come
-            meanwhile, the newest is next. For a rig whose time does not wait.
-        watch: Told how the loop stands before each command is sent; what it raises ends the run.
+        rig: Any object with the methods of `tautscope.rig.Rig`. It is reset first; the caller
+            closes it.
+        reference: (time [s]) -> (3,) [m, rad, rad], with `duration` and `segments`; optionally with
+            `made_at` (`tautscope.references.DatedReference`), then an old one causes no motion.
+        config: Settings of the loop.
+        compensate: If false, the command is the reference; the estimators still run.
+        progress: Called with the progress of the run.
+        look: The image update; one that calls `HysteresisReduction.on_features` brings your own
+            marker detector.
+        log: Receives every event at once, so that a crash loses nothing; the caller closes it.
+        executor: Runs the marker detection in the background, in place of `look`, while control
+            ticks continue; of the frames that arrive meanwhile only the newest is used. For a rig
+            that runs in real time.
+        watch: Called with the state of the supervisor before each command is sent; an exception
+            from it ends the run.
 
     Raises:
-        SignalError: The reference is not three finite numbers, or the rig's clock does not run.
+        SignalError: The reference is not three finite numbers, or the rig's clock does not advance.
         FrameError: An image is not what the configured camera gives.
     """
     reduction = HysteresisReduction(config, compensate=compensate)
-    recorder = _Recorder(config, reference.duration / 2)
-    eyes = _Ahead(look) if aside is None else _Aside(aside)
-    events = None if log is None else _Events(reduction, log)
+    recorder = _ExperimentRecorder(config, reference.duration / 2)
+    updater = _InlineUpdater(look) if executor is None else _BackgroundUpdater(executor)
+    events = None if log is None else _EventLog(reduction, log)
     sample = rig.reset()
     start = sample.time
     while (elapsed := sample.time - start) < reference.duration:
@@ -95,12 +98,12 @@ def run_experiment(
         if events is not None:
             events.write(sample.time)
         command = reduction.step(desired, time=sample.time, made_at=made_at)
-        recorder.tick(sample, desired, command)
+        recorder.add_tick(sample, desired, command)
         if log is not None:
             log.tick(sample, desired, command, made_at)
         # After the command, which never waits for an image.
-        for frame, report in eyes.see(reduction, sample.frame):
-            recorder.seen(sample.time, frame, report, elapsed)
+        for frame, report in updater.update(reduction, sample.frame):
+            recorder.add_report(sample.time, frame, report, elapsed)
             if log is not None and events is not None:
                 events.write(sample.time, reduction.updates)
                 log.frame(sample.time, frame, report)
@@ -115,73 +118,73 @@ def run_experiment(
         events.write(sample.time)
     trace, frames = recorder.tables()
     segments = tuple(reference.segments)
-    warnings = (*switched_off(config), *recorder.noticed.lines(reduction.supervision.latched))
+    warnings = (
+        *disabled_monitors(config),
+        *recorder.flags.lines(reduction.supervision.latched),
+    )
     return Recording(trace, frames, config, compensate, segments, recorder.snapshot, warnings)
 
 
-Seen = Iterator[tuple[Frame, Report]]
+class _InlineUpdater:
+    """Updates the loop with each frame at once."""
 
+    def __init__(self, image_update: ImageUpdate) -> None:
+        self._image_update = image_update
 
-class _Ahead:
-    """Looks at a frame before anything else happens."""
-
-    def __init__(self, look: Look) -> None:
-        self._look = look
-
-    def see(self, reduction: HysteresisReduction, frame: Frame | None) -> Seen:
+    def update(self, reduction: HysteresisReduction, frame: Frame | None) -> _Reports:
         if frame is not None:
-            yield frame, self._look(reduction, frame)
+            yield frame, self._image_update(reduction, frame)
 
 
-class _Aside:
-    """Has one frame looked at by another thread; its answer is taken in when it is there."""
+class _BackgroundUpdater:
+    """Detects the markers of one frame at a time in a background thread."""
 
     def __init__(self, executor: Executor) -> None:
         self._executor = executor
         self._next: Frame | None = None
-        self._asked: tuple[Frame, Future[Detection]] | None = None
+        self._running: tuple[Frame, Future[Detection]] | None = None
 
-    def see(self, reduction: HysteresisReduction, frame: Frame | None) -> Seen:
-        if self._asked is not None and self._asked[1].done():
-            (seen, answer), self._asked = self._asked, None
-            yield seen, reduction.on_detection(seen, answer.result())
+    def update(self, reduction: HysteresisReduction, frame: Frame | None) -> _Reports:
+        if self._running is not None and self._running[1].done():
+            (detected, result), self._running = self._running, None
+            yield detected, reduction.on_detection(detected, result.result())
         self._next = frame or self._next
-        if self._next is not None and self._asked is None:
-            question = reduction.question(self._next)
-            self._asked, self._next = (self._next, self._executor.submit(question)), None
+        if self._next is not None and self._running is None:
+            detect = reduction.prepare_detection(self._next)
+            self._running, self._next = (self._next, self._executor.submit(detect)), None
 
 
-class _Events:
-    """What the loop is told beside references and images, for the log, in the order it was told."""
+class _EventLog:
+    """Writes the events of `HysteresisReduction.on_event` to the log, in their order."""
 
     def __init__(self, loop: HysteresisReduction, log: Log) -> None:
         self._loop, self._log = loop, log
-        self._waiting: list[tuple[int, str]] = []
-        loop.on_event = self._note
+        self._pending: list[tuple[int, str]] = []
+        loop.on_event = self._add
 
     def write(self, now: float, update: float = math.inf) -> None:
-        """Those before an image update, or all."""
-        while self._waiting and self._waiting[0][0] < update:
-            self._log.event(now, self._waiting.pop(0)[1])
+        """Write the events before an image update, or all."""
+        while self._pending and self._pending[0][0] < update:
+            self._log.event(now, self._pending.pop(0)[1])
 
-    def _note(self, what: str) -> None:
-        # `look` may tell it something before and after its image: one is written with its report.
-        self._waiting.append((self._loop.updates, what))
+    def _add(self, what: str) -> None:
+        # `look` may cause events before and after its update; each is written with its report.
+        self._pending.append((self._loop.updates, what))
 
 
-class _Recorder(Tables):
-    """Keeps one frame of about the middle too."""
+class _ExperimentRecorder(RunRecorder):
+    """A run recorder with the flag summary and one valid frame from about the middle."""
 
     def __init__(self, config: Config, snapshot_after: float) -> None:
         super().__init__(config)
         self.snapshot: Snapshot | None = None
-        self.noticed = Noticed()
+        self.flags = FlagSummary()
         self._snapshot_after = snapshot_after
         self._is_late = False
 
-    def seen(self, now: float, frame: Frame, report: Report, elapsed: float) -> None:
-        self.frame(frame_row(now, frame, report), report.delta_minus, report.delta_plus)
-        self.noticed.image(elapsed, report)
+    def add_report(self, now: float, frame: Frame, report: Report, elapsed: float) -> None:
+        self.add_frame(frame_row(now, frame, report), report.delta_minus, report.delta_plus)
+        self.flags.add(elapsed, report)
         detection = report.detection
         is_late = elapsed >= self._snapshot_after
         if (

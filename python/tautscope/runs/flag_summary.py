@@ -1,4 +1,4 @@
-"""What the guards noticed in a run, for a person: what, how often, and what was done about it."""
+"""Summary of the flags raised in a run, as sentences: meaning, number of images, reaction."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from tautscope.loop.reduction import Report
 from tautscope.loop.safety import MEANINGS, Reaction
 
-_DONE = {
-    Reaction.NONE: "the loop went on",
-    Reaction.WARN: "the loop went on",
-    Reaction.HOLD_ESTIMATE: "meanwhile nothing was learnt",
-    Reaction.FADE: "meanwhile the compensation faded",
-    Reaction.PASS_THROUGH: "meanwhile the command moved as the reference did",
+_CONSEQUENCES = {
+    Reaction.NONE: "the loop continued",
+    Reaction.WARN: "the loop continued",
+    Reaction.HOLD_ESTIMATE: "the estimates were held meanwhile",
+    Reaction.FADE: "the compensation faded out meanwhile",
+    Reaction.PASS_THROUGH: "the command moved with the reference, uncompensated, meanwhile",
     Reaction.HOLD_MOTION: "motion was held",
     Reaction.QUICK_STOP: "the drives were stopped",
     Reaction.DISABLE: "the drives were disabled",
@@ -27,15 +27,15 @@ class _Count:
     reaction: Reaction = Reaction.NONE
 
 
-class Noticed:
-    """Counts the images at which each flag was in force, and the strongest reaction then."""
+class FlagSummary:
+    """Counts the images at which each flag was in force, and keeps the strongest reaction."""
 
     def __init__(self) -> None:
         self._images = 0
         self._counts: dict[str, _Count] = {}
 
-    def image(self, elapsed: float, report: Report) -> None:
-        """An image update, so long after the run began [s]."""
+    def add(self, elapsed: float, report: Report) -> None:
+        """Add an image update; `elapsed` is the time since the start of the run [s]."""
         self._images += 1
         for name in report.warnings:
             if name in MEANINGS:
@@ -44,19 +44,19 @@ class Noticed:
                 count.reaction = max(count.reaction, report.reaction, key=lambda each: each.rank)
 
     def lines(self, latched: Sequence[str]) -> tuple[str, ...]:
-        """A line for each flag of a run, by the names of `tautscope.loop.safety.DETECTORS`.
+        """A line for each latched flag, by the names of `tautscope.loop.safety.DETECTORS`.
 
-        One that no image met came and went between two of them.
+        A flag that was in force at no image was raised and cleared between two images.
         """
         return tuple(self._line(name) for name in latched)
 
     def _line(self, name: str) -> str:
         meaning = MEANINGS[name].rstrip(".").replace("`", "")
-        what = f"{name} ({meaning[0].lower()}{meaning[1:]})"
+        flag = f"{name} ({meaning[0].lower()}{meaning[1:]})"
         count = self._counts.get(name)
         if count is None:
-            return f"{what} between two images"
+            return f"{flag} between two images"
         return (
-            f"{what} at {count.images} of {self._images} images, first {count.first:.1f} s into "
-            f"the run; {_DONE[count.reaction]}"
+            f"{flag} at {count.images} of {self._images} images, first {count.first:.1f} s into "
+            f"the run; {_CONSEQUENCES[count.reaction]}"
         )

@@ -1,4 +1,4 @@
-"""Results appear whole or not at all."""
+"""Output folders that appear complete or not at all."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from tautscope.errors import OutputError
 
 
 def check_free(path: str | PathLike[str]) -> Path:
-    """The path as one where a new folder may be made: nothing there, or an empty folder.
+    """Return the path if a new folder can be made there: nothing exists, or an empty folder.
 
     Raises:
-        OutputError: Something is there already.
+        OutputError: The path is taken.
     """
     target = Path(path)
     if target.exists() and not (target.is_dir() and not any(target.iterdir())):
@@ -32,13 +32,13 @@ def default_folder(verb: str) -> Path:
 
 @contextmanager
 def new_folder(path: str | PathLike[str]) -> Iterator[Path]:
-    """Make a folder that appears under its name only when the block has ended well.
+    """Make a folder that gets its name only when the block has ended without an error.
 
     Yields:
-        A temporary folder beside it to write into; renamed at the end, removed on any error.
+        A temporary folder beside it to write into: renamed at the end, removed on an error.
 
     Raises:
-        OutputError: Something is there already, or the place cannot be written.
+        OutputError: The path is taken, or cannot be written.
     """
     target = check_free(path).absolute()
     partial = target.with_name(f".{target.name}.{os.getpid()}.partial")

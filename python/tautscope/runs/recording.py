@@ -1,4 +1,4 @@
-"""What a run leaves behind: every tick, every frame, and the configuration they came from."""
+"""The recording of a run: every tick, every frame, and the configuration."""
 
 from __future__ import annotations
 
@@ -57,12 +57,12 @@ FRAME_COLUMNS = np.dtype(
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """One frame of a run and what the vision measured in it, for a figure.
+    """One frame of a run and the features measured in it, for a figure.
 
     Attributes:
         image: uint8 (height, width, 3), BGR.
         captured_at: [s, the rig's clock].
-        features: (4,) measured features [px]; NaN if they were not found.
+        features: (4,) measured features [px]; NaN for a band not found.
         predicted_features: (4,) [px].
     """
 
@@ -74,7 +74,7 @@ class Snapshot:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """A run.
+    """The recording of a run.
 
     Attributes:
         trace: Structured array, one row per control tick: `time` [s, the rig's clock]; per DOF
@@ -85,12 +85,12 @@ class Recording:
             `status`, `valid`; per DOF `estimate_*`, `predicted_*`, `true_*` (at the capture time,
             interpolated), `observable_*`; per feature [px] `features_*`, `predicted_features_*`,
             `innovation_*`, `true_features_*`.
-        config: As used.
-        compensated: Whether the compensator was on.
+        config: The configuration of the run.
+        compensated: Whether compensation was on.
         segments: Which DOF moved when.
         snapshot: One frame from about the middle; not saved.
-        warnings: A line for each flag raised, `tautscope.runs.flag_summary`, and for each detector
-            that is off; not saved.
+        warnings: A line for each disabled monitor, and for each flag raised
+            (`tautscope.runs.flag_summary`); not saved.
     """
 
     trace: Table
@@ -102,27 +102,27 @@ class Recording:
     warnings: tuple[str, ...] = ()
 
     def during(self, segment: Segment, first: float, last: float) -> NDArray[np.bool_]:
-        """(ticks,) which rows of the trace lie in periods `first` to `last` of a segment."""
-        return _between(self.trace["time"], self._clock(segment), segment, first, last)
+        """(ticks,) rows of the trace in periods `first` to `last` of a segment."""
+        return _between(self.trace["time"], self._start_of(segment), segment, first, last)
 
     def frames_during(self, segment: Segment, first: float, last: float) -> NDArray[np.bool_]:
-        """(frames,) which frames were captured in periods `first` to `last` of a segment."""
-        return _between(self.frames["captured_at"], self._clock(segment), segment, first, last)
+        """(frames,) frames captured in periods `first` to `last` of a segment."""
+        return _between(self.frames["captured_at"], self._start_of(segment), segment, first, last)
 
-    def _clock(self, segment: Segment) -> float:
+    def _start_of(self, segment: Segment) -> float:
         return float(self.trace["time"][0]) + segment.start
 
     def save(self, folder: str | PathLike[str]) -> None:
-        """Make `folder` with trace.csv, frames.csv, recording.toml and config.toml, or nothing.
+        """Make `folder` with trace.csv, frames.csv, recording.toml and config.toml.
 
         Raises:
-            OutputError: The folder holds something already, or cannot be written.
+            OutputError: The folder is not empty, or cannot be written.
         """
         with new_folder(folder) as place:
             self.write(place)
 
     def write(self, folder: Path, suffix: str = "") -> None:
-        """Write the files of `save` into a folder that is there; `suffix` goes on their names."""
+        """Write the files of `save` into an existing folder, with a suffix to their names."""
         write_csv(folder / f"trace{suffix}.csv", self.trace)
         write_csv(folder / f"frames{suffix}.csv", self.frames)
         segments = [
@@ -140,10 +140,10 @@ class Recording:
 
     @classmethod
     def load(cls, folder: str | PathLike[str], suffix: str = "") -> Recording:
-        """Read what `save` wrote; equal to the last bit, but without the snapshot.
+        """Read what `save` wrote; equal to the last bit, without snapshot and warnings.
 
         Raises:
-            MissingPathError: A file is not there.
+            MissingPathError: A file does not exist.
             RecordError: A file is not as `save` writes it.
         """
         place = Path(folder)
@@ -170,12 +170,12 @@ class Recording:
 
 
 def per_dof(table: Table, group: str) -> Floats:
-    """(n, 3) the columns ``<group>_insertion``, ``_rotation``, ``_bending`` of a table."""
+    """(n, 3) columns ``<group>_insertion``, ``_rotation``, ``_bending`` of a table."""
     return np.stack([table[f"{group}_{dof.label}"] for dof in Dof], axis=1)
 
 
 def per_feature(table: Table, group: str) -> Floats:
-    """(n, 4) the columns ``<group>_a_x`` to ``<group>_b_y`` of a table [px]."""
+    """(n, 4) columns ``<group>_a_x`` to ``<group>_b_y`` of a table [px]."""
     return np.stack([table[f"{group}_{name}"] for name in FEATURES], axis=1)
 
 

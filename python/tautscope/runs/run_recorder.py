@@ -1,4 +1,4 @@
-"""The rows of a run, collected while it goes on."""
+"""Recorder of a run: one row per control tick, one row per image."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ if TYPE_CHECKING:
 Row = tuple[object, ...]
 _UNKNOWN = (np.nan, np.nan, np.nan)
 _BLOCK = 500
-"""Rows packed at once: a millisecond."""
+"""Rows converted to an array at a time, which takes a millisecond."""
 _NO_FEATURES = (np.nan, np.nan, np.nan, np.nan)
 
 
 def frame_row(now: float, frame: Frame, report: Report) -> Row:
-    """What became of a frame, in the order of `FRAME_COLUMNS`; the true state is filled in later.
+    """Result of an image update in the order of `FRAME_COLUMNS`; the true state comes later.
 
     Args:
-        now: When the frame arrived [s, the rig's clock].
-        frame: As it arrived.
-        report: What the loop made of it.
+        now: Time of the frame's arrival [s, the rig's clock].
+        frame: The frame.
+        report: Its image update.
     """
     detection = report.detection
     valid = detection is not None and bool(detection.valid)
@@ -50,8 +50,8 @@ def frame_row(now: float, frame: Frame, report: Report) -> Row:
     )
 
 
-class _Rows:
-    """Rows as they come, packed a few at a time: all at once would hold up every thread."""
+class _RowBuffer:
+    """Rows, converted to arrays in small blocks: one large conversion would block all threads."""
 
     def __init__(self, columns: np.dtype[np.void]) -> None:
         self._columns = columns
@@ -77,16 +77,16 @@ class _Rows:
         self._rows = []
 
 
-class Tables:
-    """The rows of a `Recording`, collected in the order in which things happened.
+class RunRecorder:
+    """Collects the rows of a `Recording` in the order of events.
 
     Args:
-        config: Its contact offsets are those before the first frame.
+        config: Its contact offsets are recorded until the first frame.
     """
 
     def __init__(self, config: Config) -> None:
-        self._trace = _Rows(TRACE_COLUMNS)
-        self._frames = _Rows(FRAME_COLUMNS)
+        self._trace = _RowBuffer(TRACE_COLUMNS)
+        self._frames = _RowBuffer(FRAME_COLUMNS)
         self._estimate: Row = _UNKNOWN
         self._deltas: Row = (
             *(config[dof].delta_minus for dof in Dof),
@@ -94,8 +94,8 @@ class Tables:
         )
         self._status = "none"
 
-    def tick(self, sample: Sample, reference: Floats, command: Floats) -> None:
-        """One control tick: what the rig said, and what was asked of it then."""
+    def add_tick(self, sample: Sample, reference: Floats, command: Floats) -> None:
+        """Add a control tick: the rig's sample, the reference and the command given then."""
         truth = _UNKNOWN if sample.true_state is None else sample.true_state
         self._trace.append(
             (
@@ -110,16 +110,16 @@ class Tables:
             )
         )
 
-    def frame(self, row: Row, delta_minus: Floats, delta_plus: Floats) -> None:
-        """One image: its `frame_row`, and the offsets (3,) after it."""
-        known = dict(zip(FRAME_COLUMNS.names or (), row, strict=True))
-        self._estimate = tuple(known[f"estimate_{dof.label}"] for dof in Dof)
+    def add_frame(self, row: Row, delta_minus: Floats, delta_plus: Floats) -> None:
+        """Add an image update: its `frame_row`, and the contact offsets (3,) after it."""
+        fields = dict(zip(FRAME_COLUMNS.names or (), row, strict=True))
+        self._estimate = tuple(fields[f"estimate_{dof.label}"] for dof in Dof)
         self._deltas = (*delta_minus, *delta_plus)
-        self._status = str(known["status"])
+        self._status = str(fields["status"])
         self._frames.append(row)
 
     def tables(self) -> tuple[Table, Table]:
-        """Trace and frames, with the true state at the time of capture."""
+        """Trace and frames; the frames with the true state at their capture times."""
         trace, frames = self._trace.table(), self._frames.table()
         if len(trace):
             for dof, truth in zip(Dof, per_dof(trace, "true").T, strict=True):

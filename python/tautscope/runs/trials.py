@@ -1,4 +1,4 @@
-"""Many runs at once, each in a process of its own."""
+"""Parallel runs, each in its own process."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ class Trial:
 
 
 class _StoppedError(Exception):
-    """Another run failed, or the person does not want to wait any longer."""
+    """Another run failed, or the user interrupted."""
 
 
 def make_twin(config: Config) -> Rig:
     """The twin of a configuration."""
-    from tautscope.twin import Twin  # noqa: PLC0415  MuJoCo is loaded by those who use it
+    from tautscope.twin import Twin  # noqa: PLC0415  MuJoCo is loaded only when used
 
     return Twin(config)
 
@@ -44,33 +44,33 @@ def run_trials(
     make_rig: RigMaker = make_twin,
     workers: int | None = None,
 ) -> list[Recording]:
-    """Run every trial; recordings in the order of the trials, whatever the number of workers.
+    """Run every trial; the recordings are in the order of the trials.
 
     Args:
-        trials: What to run.
-        progress: Told the share of all work done, 0 to 1.
-        make_rig: Makes a trial's rig; a function that workers can import.
-        workers: Processes; without it one per processor.
+        trials: The runs.
+        progress: Called with the share of all work done, 0 to 1.
+        make_rig: Makes the rig of a trial; a function that workers can import.
+        workers: Number of processes; by default one per processor.
 
     Raises:
-        TautscopeError: The first one a run raises; the others are stopped.
+        TautscopeError: The first error of a run; the other runs are stopped.
     """
     context = get_context("spawn")
-    news, stop = context.SimpleQueue(), context.Event()
+    shares, stop = context.SimpleQueue(), context.Event()
     done = [0.0] * len(trials)
     with ProcessPoolExecutor(
         min(workers or os.cpu_count() or 1, len(trials)),
         mp_context=context,
         initializer=_start_worker,
-        initargs=(news, stop),
+        initargs=(shares, stop),
     ) as pool:
         try:
             runs = [pool.submit(_run, index, trial, make_rig) for index, trial in enumerate(trials)]
             pending: set[Future[Recording]] = set(runs)
             while pending:
                 finished, pending = wait(pending, timeout=0.1)
-                while not news.empty():
-                    index, share = news.get()
+                while not shares.empty():
+                    index, share = shares.get()
                     done[index] = share
                 progress(sum(done) / len(done))
                 for run in finished:
@@ -85,26 +85,26 @@ def run_trials(
 _channel: Any = None
 
 
-def _start_worker(news: Any, stop: Any) -> None:
-    import cv2  # noqa: PLC0415  only workers and those who ask for pictures load OpenCV
+def _start_worker(shares: Any, stop: Any) -> None:
+    import cv2  # noqa: PLC0415  OpenCV is loaded only when used
 
-    global _channel  # noqa: PLW0603  a worker has one channel for its life
-    _channel = (news, stop)
+    global _channel  # noqa: PLW0603  one channel per worker process
+    _channel = (shares, stop)
     cv2.setNumThreads(1)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides, and tells through `stop`
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process sets `stop`
 
 
 def _run(index: int, trial: Trial, make_rig: RigMaker) -> Recording:
-    news, stop = _channel
+    shares, stop = _channel
 
-    def tell(elapsed: float, duration: float) -> None:
+    def report(elapsed: float, duration: float) -> None:
         if stop.is_set():
             raise _StoppedError
-        news.put((index, min(elapsed / duration, 1.0)))
+        shares.put((index, min(elapsed / duration, 1.0)))
 
     rig = make_rig(trial.config)
     try:
         reference = SineSequence(trial.config.experiment)
-        return run_experiment(rig, reference, trial.config, trial.compensate, tell)
+        return run_experiment(rig, reference, trial.config, trial.compensate, report)
     finally:
         rig.close()

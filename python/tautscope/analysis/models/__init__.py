@@ -1,6 +1,5 @@
-"""Models of hysteresis that `tautscope analyze` compares on one record, and what they share.
+"""Models of hysteresis that `tautscope analyze` compares on a record.
 
-One file per model: a frozen dataclass of its parameters with `predict`, and a function that fits
-it. `docs/models.md` has every formula and its source. A model joins the comparison by one entry
-in `registry.MODELS`.
+Each file has a frozen dataclass of a model's parameters with `predict`, and a function that fits
+it. `docs/models.md` has the formulas and sources; `registry.MODELS` lists the models compared.
 """

@@ -1,4 +1,4 @@
-"""Bouc-Wen in its normalised form, rate independent, fitted by non-linear least squares."""
+"""Bouc-Wen model in normalised, rate-independent form, fitted by nonlinear least squares."""
 
 from __future__ import annotations
 
@@ -6,41 +6,41 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from tautscope.analysis.models.task import Floats, Prediction, Task, fitted, seen
+from tautscope.analysis.models.task import Floats, Prediction, Task, fit_samples
 
-_REACH = 18.0
-"""atanh of the largest |w| told from 1 in double precision."""
-_P = np.linspace(-_REACH, _REACH, 8193)
+_LIMIT = 18.0
+"""atanh of the largest |w| below 1 in double precision."""
+_P = np.linspace(-_LIMIT, _LIMIT, 8193)
 _W = np.tanh(_P)
-_SQUEEZE = 1 / np.cosh(_P) ** 2
-_AWAY = np.maximum(np.abs(_P), 1e-12)
-_LOG_W = np.log(-np.expm1(-2 * _AWAY)) - np.log1p(np.exp(-2 * _AWAY))
+_SLOPE = 1 / np.cosh(_P) ** 2
+_ABS_P = np.maximum(np.abs(_P), 1e-12)
+_LOG_W = np.log(-np.expm1(-2 * _ABS_P)) - np.log1p(np.exp(-2 * _ABS_P))
 
 _SIGMA, _EXPONENT, _TRAVEL = (0.5, 5.0), (1.0, 20.0), (1.0, 200.0)
-"""Bounds of the fit: sigma, n, and rho times the command's range."""
+"""Bounds of sigma, n, and rho times the command's range."""
 _SAMPLES = 5000
-"""A longer record is fitted at this many of its samples, evenly chosen."""
+"""Largest number of samples in a fit; a longer record is decimated."""
 _STARTS = (5.0, 15.0, 50.0)
-"""rho times the command's range at which the fit begins; the best end is taken."""
+"""Initial values of rho times the command's range; the best fit is taken."""
 
 
 @dataclass(frozen=True)
 class BoucWen:
-    """A line and a hysteretic variable w, both of the command c.
+    """A line plus a hysteretic variable w of the command c.
 
         tip = gain c + hysteresis w + offset
 
         dw/dc = rho (1 - s sigma |w|^(n-1) w + (sigma - 1) |w|^n),   s = sign(dc), |w| <= 1
 
-    No time anywhere: with respect to the command the equation is the same at any speed.
+    The equation does not contain time: the model is rate independent.
 
     Attributes:
         gain: [tip's unit per command's unit].
-        hysteresis: Tip displaced by w = 1; negative where the tip lags [tip's unit].
+        hysteresis: Displacement of the tip at w = 1; negative if the tip lags [tip's unit].
         offset: [tip's unit].
-        rho: Above 0; 1 / rho is the travel over which w turns round [1 / command's unit].
+        rho: Above 0; 1 / rho is the travel over which w reverses [1 / command's unit].
         sigma: At least 0.5; 1 is symmetric loading and unloading (Dahl's model if n = 1).
-        exponent: n, at least 1; the larger, the sharper the corner.
+        exponent: n, at least 1; a larger one makes a sharper corner.
         start: w before the first command.
     """
 
@@ -61,22 +61,22 @@ class BoucWen:
 def hysteretic_variable(
     command: Floats, rho: float, sigma: float, exponent: float, start: float
 ) -> Floats:
-    """The w (n,) of `BoucWen` for a command (n,), at its samples and exact between them.
+    """The w (n,) of `BoucWen` for a command (n,), integrated exactly between its samples.
 
     While the command rises, w obeys dw/dc = rho f(w) with f = 1 - w^n for w >= 0 and
     f = 1 + (2 sigma - 1) |w|^n below: it moves along one curve, F(w) = integral of dw / f(w),
     at the speed rho. F is tabulated over atanh(w); a falling command is a rising one with the
-    sign of w changed. So a monotonic stretch takes one look-up, whatever its sampling.
+    sign of w changed. A monotonic segment takes one interpolation, at any sampling.
     """
     log_power = exponent * _LOG_W
     rate = np.where(_P >= 0, -np.expm1(log_power), 1 + (2 * sigma - 1) * np.exp(log_power))
-    slope = _SQUEEZE / rate
+    slope = _SLOPE / rate
     curve = np.concatenate([[0.0], np.cumsum((slope[1:] + slope[:-1]) * (_P[1] - _P[0]) / 2)])
     at = float(np.arctanh(np.clip(start, _W[0], _W[-1])))
     places = np.empty_like(command)
     places[0] = at
     begin = 0
-    for end, direction in _stretches(command):
+    for end, direction in _monotonic_segments(command):
         travelled = rho * np.abs(command[begin + 1 : end + 1] - command[begin])
         along = np.interp(direction * at, _P, curve) + travelled
         places[begin + 1 : end + 1] = direction * np.interp(along, curve, _P)
@@ -84,8 +84,8 @@ def hysteretic_variable(
     return np.tanh(places)
 
 
-def _stretches(command: Floats) -> list[tuple[int, float]]:
-    """Last sample and direction of each stretch in which the command does not turn."""
+def _monotonic_segments(command: Floats) -> list[tuple[int, float]]:
+    """Last sample and direction of each segment in which the command does not turn."""
     steps = np.sign(np.diff(command))
     moving = np.flatnonzero(steps)
     turns = moving[1:][np.diff(steps[moving]) != 0]
@@ -95,23 +95,24 @@ def _stretches(command: Floats) -> list[tuple[int, float]]:
 
 
 def fit(command: Floats, measured: Floats) -> BoucWen:
-    """The model of least squares.
+    """Fit by least squares.
 
-    Gain, hysteresis and offset are linear and solved for inside; `scipy.optimize.least_squares`
-    moves rho, sigma, n and the start, from several rho, because the error has local minima.
-    It never reaches an ideal play (n without bound), and under a command that trembles w drifts.
+    `scipy.optimize.least_squares` searches rho, sigma, n and start, from several rho because the
+    error has local minima; gain, hysteresis and offset are a linear problem inside.
+
+    Wrong for an ideal play (n without bound), and under tremor of the command, where w drifts.
 
     Args:
         command: (n,), not constant.
-        measured: (n,), NaN where not seen.
+        measured: (n,), NaN where not measured.
     """
     from scipy.optimize import least_squares  # noqa: PLC0415  takes a third of a second
 
     if len(command) > _SAMPLES:
-        some = np.flatnonzero(seen(measured))
-        some = some[:: -(-len(some) // _SAMPLES)]
-        command, measured = command[some], measured[some]
-    where = fitted(command, measured)
+        kept = np.flatnonzero(np.isfinite(measured))
+        kept = kept[:: -(-len(kept) // _SAMPLES)]
+        command, measured = command[kept], measured[kept]
+    where = fit_samples(command, measured)
     target = measured[where]
     extent = float(np.ptp(command))
 
@@ -127,7 +128,7 @@ def fit(command: Floats, measured: Floats) -> BoucWen:
         return weights, error
 
     low, high = np.array([np.log(_TRAVEL), _SIGMA, _EXPONENT, (-1.0, 1.0)]).T
-    ends = [
+    fits = [
         least_squares(
             lambda parameters: solved(parameters)[1],
             np.array([np.log(travel), 1.0, 1.5, 0.0]),
@@ -136,12 +137,12 @@ def fit(command: Floats, measured: Floats) -> BoucWen:
         )
         for travel in _STARTS
     ]
-    best = min(ends, key=lambda end: float(end.cost)).x
+    best = min(fits, key=lambda fit: float(fit.cost)).x
     gain, hysteresis, offset = solved(best)[0].tolist()
     return BoucWen(gain, hysteresis, offset, *shape(best))
 
 
 def run(task: Task) -> Prediction:
-    """Fitted to the first half; its gain is its own, so a given one is not used."""
+    """Fit to the first half, and predict; a given gain is not used."""
     found = fit(*task.first_half)
     return Prediction(found.predict(task.command), asdict(found))

@@ -7,24 +7,24 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from tautscope._core import Play
-from tautscope.analysis.models.task import SWEEP, Floats, Prediction, Task, fitted, line
+from tautscope.analysis.models.task import SWEEP, Floats, Prediction, Task, fit_line, fit_samples
 
 _LARGEST = SWEEP / 2
-"""Largest radius tried, as a share of the command's range; at 0.5 the play never moves."""
+"""Largest radius, as a share of the command's range; at 0.5 the play never moves."""
 _GRID = 32
-"""Radii tried before the best of them is refined."""
+"""Radii in the grid search."""
 
 
 @dataclass(frozen=True)
 class ConstantPlay:
-    """Play of Eq. (1) with input gain * command and the tip as output.
+    """Play of Eq. (1) with input gain * command; its output is the tip.
 
         gain c - delta_plus <= y <= gain c - delta_minus
 
-    An unknown zero between command and tip is part of both offsets.
+    Both offsets contain the unknown offset between the zeros of command and tip.
 
     Attributes:
-        gain: Tip travel per command travel in contact; negative if they run against each other.
+        gain: Tip travel per command travel in contact; negative for opposite directions.
         delta_minus: Contact offset, input minus output [tip's unit].
         delta_plus: Contact offset [tip's unit].
         start: Output before the first command [tip's unit].
@@ -52,54 +52,54 @@ def operator(command: Floats, radius: float, start: float) -> Floats:
     Args:
         command: (n,).
         radius: Half the width.
-        start: In [-1, 1], where the output is before the first command: at command + start *
-            radius. -1 is after a long increase, 1 after a long decrease.
+        start: In [-1, 1]; the output before the first command is command + start * radius: -1
+            after a long increase, 1 after a long decrease.
     """
     begin = float(command[0]) + start * radius
     return Play(delta_minus=-radius, delta_plus=radius, output=begin).run(command)
 
 
 def fit(command: Floats, measured: Floats, gain: float | None = None) -> ConstantPlay:
-    """The play of least squares.
+    """Fit by least squares.
 
-    Gain and offset are linear in a play of given radius, so the search is over radius and start
-    only: a grid first, because the error has flat places, then `scipy.optimize.least_squares`.
+    For a given radius and start, gain and offset are a linear problem. So the search is over radius
+    and start: first a grid, because the error has plateaus, then `scipy.optimize.least_squares`.
 
     Args:
         command: (n,), not constant.
-        measured: (n,), NaN where not seen.
-        gain: Taken as it is if given.
+        measured: (n,), NaN where not measured.
+        gain: Held fixed if given.
     """
     from scipy.optimize import least_squares  # noqa: PLC0415  takes a third of a second
 
-    where = fitted(command, measured)
+    where = fit_samples(command, measured)
     target = measured[where]
     extent = float(np.ptp(command))
 
     def scaled(radius: float, start: float) -> tuple[float, float, Floats]:
         output = operator(command, radius, start)[where]
-        slope, offset = line(output, target, gain)
+        slope, offset = fit_line(output, target, gain)
         return slope, offset, slope * output + offset - target
 
     def residual(parameters: Floats) -> Floats:
         return scaled(extent * parameters[0], parameters[1])[2]
 
-    tried = [
+    grid = [
         np.array([share, start])
         for share in np.linspace(0, _LARGEST, _GRID)
-        for start in (0.0, -1.0, 1.0)  # the first if the record does not tell
+        for start in (0.0, -1.0, 1.0)  # 0 if the start has no effect on the error
     ]
-    best = min(tried, key=lambda parameters: float(np.sum(residual(parameters) ** 2)))
+    best = min(grid, key=lambda parameters: float(np.sum(residual(parameters) ** 2)))
     bounds = (np.array([0.0, -1.0]), np.array([_LARGEST, 1.0]))
     inside = np.clip(best, bounds[0] + 1e-6, bounds[1] - 1e-6)
     share, start = least_squares(residual, inside, bounds=bounds, diff_step=1e-4).x.tolist()
     slope, offset, _ = scaled(extent * share, start)
-    reach = abs(slope) * extent * share
+    radius = abs(slope) * extent * share
     begin = slope * (command[0] + start * extent * share) + offset
-    return ConstantPlay(slope, -reach - offset, reach - offset, float(begin))
+    return ConstantPlay(slope, -radius - offset, radius - offset, float(begin))
 
 
 def run(task: Task) -> Prediction:
-    """Fitted to the whole record: the best any constant play can do, with hindsight."""
+    """Fit to the whole record: the lower bound of the error of any constant play."""
     found = fit(task.command, task.measured, task.gain)
     return Prediction(found.predict(task.command), asdict(found) | {"width": found.width})

@@ -1,4 +1,4 @@
-"""Estimators that learn while the record goes by, Eqs. (4)-(6) among them."""
+"""On-line estimators: the article's, Eqs. (4)-(6), and that of profile ``best``."""
 
 from __future__ import annotations
 
@@ -10,38 +10,38 @@ import numpy as np
 
 from tautscope._core import AdaptiveAxis, Estimator
 from tautscope.analysis.models import constant_play
-from tautscope.analysis.models.task import Floats, Prediction, Task, seen
+from tautscope.analysis.models.task import Floats, Prediction, Task
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.loop.construction import build_adaptive_axis
 
 UPDATE_SHARE = 0.01
-"""Update distance, as a share of the command's range in the first half, if none is given."""
+"""Default update distance, as a share of the command's range in the first half."""
 
 
 class OnlineEstimator(Protocol):
-    """What `predict` needs: an estimator whose input has the tip's unit and direction."""
+    """An estimator whose input has the tip's unit and direction."""
 
     def run(self, commands: Floats, measured: Floats) -> tuple[Floats, Floats, Floats]:
-        """Predicted tip, delta_minus and delta_plus, (n,) each, without a look ahead.
+        """Predicted tip, delta_minus and delta_plus, (n,) each; causal.
 
         `predicted[k]` uses `commands[:k + 1]` and `measured[:k]`; the offsets are those after
-        sample k. A NaN in `measured` teaches nothing.
+        sample k. A NaN in `measured` is skipped.
         """
 
 
 Make = Callable[[Config, float], OnlineEstimator]
-"""From a configuration and update distance [tip's unit] to a fresh estimator."""
+"""Makes an estimator of a configuration and an update distance [tip's unit]."""
 
 
 @dataclass(frozen=True)
 class InputScale:
-    """Puts the command into the tip's unit: gain * command + offset.
+    """Conversion of the command into the tip's unit: gain * command + offset.
 
     Attributes:
         gain: Tip's unit per command's unit.
         offset: [tip's unit].
-        used: Samples it was found from; nothing is predicted for them.
+        used: Number of samples it was fitted to; they get no prediction.
     """
 
     gain: float
@@ -50,23 +50,23 @@ class InputScale:
 
 
 def input_scale(task: Task) -> InputScale:
-    """Gain and offset an on-line estimator starts with.
+    """Gain and offset for an on-line estimator.
 
-    A given gain needs the first tip seen, for the offset. Without one, gain and offset are those
-    of a constant play fitted to the first half: the calibration stretch, which does not count.
+    If the gain is given, the first measured tip gives the offset. Otherwise both are those of a
+    constant play fitted to the first half, which is not scored.
     """
     if task.gain is None:
         play = constant_play.fit(*task.first_half)
         return InputScale(play.gain, -(play.delta_minus + play.delta_plus) / 2, task.half)
-    first = int(np.flatnonzero(seen(task.measured))[0])
+    first = int(np.flatnonzero(np.isfinite(task.measured))[0])
     offset = float(task.measured[first] - task.gain * task.command[first])
     return InputScale(task.gain, offset, first + 1)
 
 
 def predict(task: Task, make: Make) -> Prediction:
-    """Run an estimator over the record; it goes through the calibration stretch as well.
+    """Run an estimator over the whole record.
 
-    Offsets are reported against gain * command, whose zero is the command's own.
+    The contact offsets are relative to gain * command.
     """
     scale = input_scale(task)
     distance = task.update_distance
@@ -88,7 +88,7 @@ def predict(task: Task, make: Make) -> Prediction:
 
 
 def paper(config: Config, update_distance: float) -> OnlineEstimator:
-    """The article's estimator, offsets 0 at the start."""
+    """The article's estimator; the offsets start at 0."""
     settings = config.insertion
     return Estimator(
         update_distance=update_distance,
@@ -100,25 +100,25 @@ def paper(config: Config, update_distance: float) -> OnlineEstimator:
 
 
 def best(config: Config, update_distance: float) -> OnlineEstimator:
-    """That of profile ``best``: offsets over position, and a play state corrected by the tip."""
-    unit = config.replace(**{"insertion.update_distance": update_distance})
-    return _Adaptive(build_adaptive_axis(unit, Dof.INSERTION, compensate=False))
+    """The estimator of profile ``best``: offsets over position, play state corrected by the tip."""
+    scaled = config.replace(**{"insertion.update_distance": update_distance})
+    return _Adaptive(build_adaptive_axis(scaled, Dof.INSERTION, compensate=False))
 
 
 @dataclass(frozen=True)
 class _Adaptive:
-    """An axis of profile ``best`` that follows the commands of a record and leads none of them."""
+    """An axis of profile ``best`` without compensation, which follows recorded commands."""
 
     axis: AdaptiveAxis
 
     def run(self, commands: Floats, measured: Floats) -> tuple[Floats, Floats, Floats]:
-        """As `OnlineEstimator.run`; what is measured has `adaptive.model_deviation`."""
+        """`OnlineEstimator.run`; a measured tip has the std `adaptive.model_deviation`."""
         found = np.empty((3, len(commands)))
-        axis, nothing = self.axis, np.empty(0)
+        axis, no_features = self.axis, np.empty(0)
         for k, (command, tip) in enumerate(zip(commands.tolist(), measured.tolist(), strict=True)):
             axis.step(command)
             found[0, k] = axis.predicted_state
-            axis.learn(command, tip, 0.0, nothing)
+            axis.learn(command, tip, 0.0, no_features)
             found[1:, k] = axis.delta_minus, axis.delta_plus
         predicted, delta_minus, delta_plus = found
         return predicted, delta_minus, delta_plus

@@ -7,22 +7,22 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from tautscope.analysis.models.constant_play import operator
-from tautscope.analysis.models.task import Floats, Prediction, Task, fitted
+from tautscope.analysis.models.task import Floats, Prediction, Task, fit_samples
 
 OPERATORS = 32
-"""Plays superposed; radii evenly from 0 to just below half the command's range."""
+"""Number of plays; their radii go evenly from 0 to just below half the command's range."""
 
 
 @dataclass(frozen=True)
 class PrandtlIshlinskii:
     """Tip = offset + direction * sum_i weights_i * P_i(command), P_i the play of radius r_i.
 
-    Every play begins in the middle of its slack.
+    Every play starts in the middle of its backlash.
 
     Attributes:
         radii: r_i, half the widths, the first 0 [command's unit].
-        weights: Not below 0 [tip's unit per command's unit].
-        direction: 1, or -1 where command and tip run against each other.
+        weights: At least 0 [tip's unit per command's unit].
+        direction: 1, or -1 if the tip moves against the command.
         offset: [tip's unit].
     """
 
@@ -41,29 +41,29 @@ class PrandtlIshlinskii:
 def fit(
     command: Floats, measured: Floats, radii: tuple[float, ...] | None = None
 ) -> PrandtlIshlinskii:
-    """Weights and offset of least squares, weights not below 0, for the better direction.
+    """Weights and offset by non-negative least squares, for the better direction.
 
-    The offset is taken out by removing means, which is exact; a QR decomposition then makes the
-    problem as small as the number of plays without changing its solution.
+    Removing the means eliminates the offset exactly; a QR decomposition then reduces the problem to
+    the number of plays without changing its solution.
 
     Args:
         command: (n,), not constant.
-        measured: (n,), NaN where not seen.
-        radii: [command's unit]; without it `OPERATORS` of them.
+        measured: (n,), NaN where not measured.
+        radii: [command's unit]; by default `OPERATORS` of them.
     """
     from scipy.optimize import nnls  # noqa: PLC0415  takes a third of a second
 
     if radii is None:
         largest = float(np.ptp(command)) / 2
         radii = tuple(largest * i / OPERATORS for i in range(OPERATORS))
-    where = fitted(command, measured)
+    where = fit_samples(command, measured)
     target = measured[where]
     outputs = _operators(command, radii)[where]
     means = outputs.mean(axis=0)
     centred = np.column_stack([outputs - means, target - target.mean()])
     small = np.asarray(np.linalg.qr(centred, mode="r"))
-    ways = [(nnls(way * small[:, :-1], small[:, -1]), way) for way in (1.0, -1.0)]
-    (weights, _), direction = min(ways, key=lambda found: float(found[0][1]))
+    fits = [(nnls(sign * small[:, :-1], small[:, -1]), sign) for sign in (1.0, -1.0)]
+    (weights, _), direction = min(fits, key=lambda fit: float(fit[0][1]))
     offset = float(target.mean() - direction * (means @ weights))
     return PrandtlIshlinskii(radii, tuple(weights.tolist()), direction, offset)
 
@@ -73,6 +73,6 @@ def _operators(command: Floats, radii: tuple[float, ...]) -> Floats:
 
 
 def run(task: Task) -> Prediction:
-    """Fitted to the first half; the weights hold the gain, so a given one is not used."""
+    """Fit to the first half, and predict; a given gain is not used, the weights contain it."""
     found = fit(*task.first_half)
     return Prediction(found.predict(task.command), asdict(found))

@@ -1,4 +1,4 @@
-"""The models `tautscope analyze` compares, in the order of its table."""
+"""The models that `tautscope analyze` compares, in the order of its table."""
 
 from __future__ import annotations
 
@@ -10,34 +10,34 @@ from typing import Literal
 from tautscope.analysis.models import (
     bouc_wen,
     constant_play,
+    linear_fit,
     online,
     prandtl_ishlinskii,
-    straight_line,
 )
 from tautscope.analysis.models.task import Prediction, Task
 
 
 @dataclass(frozen=True)
 class Model:
-    """One entry.
+    """A model of the comparison.
 
     Attributes:
-        name: In files and JSON.
-        title: In tables and figures.
-        learns: What of the record it sees before the second half is scored. "on-line" sees each
-            sample of the second half after it has predicted it, the others' parameters are fixed.
-        run: The work.
+        name: Name in files and JSON.
+        title: Name in tables and figures.
+        fitted_to: The part of the record its parameters are from. "on-line": they are updated with
+            each sample after that sample has been predicted.
+        run: Fits the model and predicts the record.
     """
 
     name: str
     title: str
-    learns: Literal["whole record", "first half", "on-line"]
+    fitted_to: Literal["whole record", "first half", "on-line"]
     run: Callable[[Task], Prediction]
 
 
-NO_MODEL = Model("none", "no model", "first half", straight_line.run)
+LINEAR_FIT = Model("none", "linear fit", "first half", linear_fit.run)
 MODELS = (
-    NO_MODEL,
+    LINEAR_FIT,
     Model("play", "constant play", "whole record", constant_play.run),
     Model("prandtl_ishlinskii", "Prandtl-Ishlinskii", "first half", prandtl_ishlinskii.run),
     Model("bouc_wen", "Bouc-Wen", "first half", bouc_wen.run),

@@ -1,4 +1,4 @@
-"""What a model is given and what it gives back."""
+"""Input and output of a model, and the least squares that several models share."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from tautscope.config import Config
 Floats = NDArray[np.float64]
 
 SWEEP = 0.9
-"""Share of the command's range after which the start of a record counts as forgotten."""
+"""Share of its range that the command must have swept before a fit begins."""
 
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """One record, and what may be known of it beforehand.
+    """A record to predict, and prior knowledge of it.
 
     Attributes:
         command: (n,) actuator position, any unit.
-        measured: (n,) tip position, any unit; NaN where the tip was not seen.
-        half: First sample of the second half, which is the one that counts.
-        gain: Tip travel per command travel in contact, if it is known.
-        update_distance: tau of Eqs. (4)-(6) in the tip's unit, if it is given.
-        config: Of the on-line estimators; they are set as those of insertion.
+        measured: (n,) tip position, any unit; NaN where it was not measured.
+        half: First sample of the second half, over which the error is computed.
+        gain: Tip travel per command travel in contact, if known.
+        update_distance: tau of Eqs. (4)-(6) in the tip's unit, if given.
+        config: Its insertion has the settings of the on-line estimators.
     """
 
     command: Floats
@@ -39,18 +39,18 @@ class Task:
 
     @property
     def first_half(self) -> tuple[Floats, Floats]:
-        """Command and measured, what an off-line fit may see."""
+        """Command and measured tip of the first half, for an off-line fit."""
         return self.command[: self.half], self.measured[: self.half]
 
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """What a model says about a record.
+    """Prediction of a model for a record.
 
     Attributes:
-        tip: (n,) predicted tip, the tip's unit; NaN where the model says nothing.
-        parameters: Of the model as fitted, or as they are at the end, in words and numbers.
-        traces: Further signals (n,), by name: what an on-line model knew after each sample.
+        tip: (n,) predicted tip [tip's unit]; NaN where there is no prediction.
+        parameters: Parameters by name, as fitted or as they are at the end of the record.
+        traces: Further signals (n,) by name: estimates of an on-line model after each sample.
     """
 
     tip: Floats
@@ -58,32 +58,27 @@ class Prediction:
     traces: Mapping[str, Floats] = field(default_factory=dict)
 
 
-def seen(measured: Floats) -> NDArray[np.bool_]:
-    """(n,) where the tip was seen."""
-    return np.isfinite(measured)
+def fit_samples(command: Floats, measured: Floats) -> NDArray[np.bool_]:
+    """(n,) the samples for an off-line fit of hysteresis: tip measured, start forgotten.
 
-
-def fitted(command: Floats, measured: Floats) -> NDArray[np.bool_]:
-    """(n,) samples an off-line fit of hysteresis goes by: tip seen, start forgotten.
-
-    What the instrument did before the record still shows until the command has crossed its range
-    once: a play of radius r has forgotten it after a sweep of 2 r. So the samples before the
-    command has swept `SWEEP` of its range are left out, unless more than half would be.
+    Motion before the record affects the tip until the command has swept its range once: a play of
+    radius r has forgotten it after a sweep of 2 r. The samples before a sweep of `SWEEP` of the
+    range are therefore left out, unless these are more than half.
     """
     swept = np.maximum.accumulate(command) - np.minimum.accumulate(command)
-    where = seen(measured)
+    where = np.isfinite(measured)
     after = where & (swept >= SWEEP * np.ptp(command))
     return after if 2 * np.count_nonzero(after) >= np.count_nonzero(where) else where
 
 
-def line(x: Floats, y: Floats, gain: float | None = None) -> tuple[float, float]:
-    """Gain and offset of y = gain x + offset by least squares; of the offset only if gain is given.
+def fit_line(x: Floats, y: Floats, gain: float | None = None) -> tuple[float, float]:
+    """Gain and offset of y = gain x + offset by least squares; only the offset if gain is given.
 
     Without movement in x the gain is 0.
     """
-    middle_x, middle_y = float(x.mean()), float(y.mean())
+    mean_x, mean_y = float(x.mean()), float(y.mean())
     if gain is None:
-        away = x - middle_x
-        power = float(away @ away)
-        gain = float(away @ (y - middle_y)) / power if power > 0 else 0.0
-    return gain, middle_y - gain * middle_x
+        centred = x - mean_x
+        power = float(centred @ centred)
+        gain = float(centred @ (y - mean_y)) / power if power > 0 else 0.0
+    return gain, mean_y - gain * mean_x

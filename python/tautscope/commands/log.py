@@ -157,7 +157,7 @@ def _replay_same(options: argparse.Namespace, log: Log) -> int:
 
 
 def _estimate_from_log(options: argparse.Namespace, log: Log) -> int:
-    from tautscope.log.estimate_report import write_estimates  # noqa: PLC0415
+    from tautscope.commands.estimate_report import write_estimates  # noqa: PLC0415
     from tautscope.log.replay import estimate_from_log  # noqa: PLC0415
 
     if options.config is None:
@@ -175,8 +175,8 @@ def _estimate_from_log(options: argparse.Namespace, log: Log) -> int:
 
 
 def _estimate_from_video(options: argparse.Namespace) -> int:
+    from tautscope.commands.estimate_report import write_estimates  # noqa: PLC0415
     from tautscope.hardware.video import read_video  # noqa: PLC0415
-    from tautscope.log.estimate_report import write_estimates  # noqa: PLC0415
     from tautscope.log.replay import estimate_from_video  # noqa: PLC0415
 
     config: Config = load_config(options.config, options.profile)

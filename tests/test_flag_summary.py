@@ -1,4 +1,4 @@
-"""What the guards noticed is told with how often, when, and what was done about it."""
+"""The summary of flags: how many images, since when, and the reaction."""
 
 from types import SimpleNamespace
 
@@ -7,44 +7,46 @@ from drawn import DrawnRig, short_experiment
 from tautscope.loop.references import SineSequence
 from tautscope.loop.safety import DETECTORS, MEANINGS, Reaction
 from tautscope.runs.experiment import run_experiment
-from tautscope.runs.flag_summary import Noticed
+from tautscope.runs.flag_summary import FlagSummary
 from tautscope.runs.recording import Recording
 
 
-def told(seen: list[tuple[Reaction, tuple[str, ...]]], latched: tuple[str, ...]) -> list[str]:
-    noticed = Noticed()
-    for index, (reaction, warnings) in enumerate(seen):
-        noticed.image(0.04 * index, SimpleNamespace(reaction=reaction, warnings=warnings))
-    return list(noticed.lines(latched))
+def summarise(
+    images: list[tuple[Reaction, tuple[str, ...]]], latched: tuple[str, ...]
+) -> list[str]:
+    flags = FlagSummary()
+    for index, (reaction, warnings) in enumerate(images):
+        flags.add(0.04 * index, SimpleNamespace(reaction=reaction, warnings=warnings))
+    return list(flags.lines(latched))
 
 
 def test_a_line_says_how_often_when_and_the_strongest_reaction() -> None:
-    seen = [
+    images = [
         (Reaction.NONE, ()),
         (Reaction.WARN, ("lost",)),
         (Reaction.FADE, ("lost", "late")),
-        (Reaction.HOLD_ESTIMATE, ("late", "safety.off = frozen: the detector is switched off")),
+        (Reaction.HOLD_ESTIMATE, ("late", "safety.off = frozen: nobody looks for it")),
     ]
-    lost, late = told(seen, ("lost", "late"))
+    lost, late = summarise(images, ("lost", "late"))
     assert lost.startswith(
         "lost (no marker was found, or none that agrees with the prediction) at 2 of 4 images"
     )
-    assert "first 0.0 s into the run; meanwhile the compensation faded" in lost
+    assert "first 0.0 s into the run; the compensation faded out meanwhile" in lost
     assert late.startswith("late (") and "at 2 of 4 images, first 0.1 s" in late
 
 
-def test_what_comes_and_goes_between_images_is_told_too() -> None:
-    (line,) = told([(Reaction.NONE, ())], ("reference_jump",))
+def test_a_flag_between_two_images_is_listed() -> None:
+    (line,) = summarise([(Reaction.NONE, ())], ("reference_jump",))
     assert line.startswith("reference_jump (the reference was faster")
     assert line.endswith("between two images")
 
 
 @pytest.mark.parametrize("reaction", Reaction)
-def test_every_reaction_has_words(reaction: Reaction) -> None:
-    assert told([(reaction, ("lost",))], ("lost",))[0].partition("; ")[2]
+def test_every_reaction_has_a_consequence(reaction: Reaction) -> None:
+    assert summarise([(reaction, ("lost",))], ("lost",))[0].partition("; ")[2]
 
 
-def test_every_flag_says_what_it_is() -> None:
+def test_every_flag_has_a_meaning() -> None:
     assert list(MEANINGS) == list(DETECTORS)
     for name, meaning in MEANINGS.items():
         assert meaning.endswith("."), name
@@ -52,7 +54,7 @@ def test_every_flag_says_what_it_is() -> None:
 
 
 class Blinded(DrawnRig):
-    """Pictures without an instrument from 4 to 5 s."""
+    """Images without an instrument from 4 to 5 s."""
 
     def step(self, command):
         sample = super().step(command)
@@ -61,7 +63,7 @@ class Blinded(DrawnRig):
         return sample
 
 
-def test_a_run_tells_what_it_noticed(compensated: Recording) -> None:
+def test_a_recording_has_the_flags_of_its_run(compensated: Recording) -> None:
     config = short_experiment()
     rig = Blinded(config)
     found = run_experiment(rig, SineSequence(config.experiment), config)
@@ -70,6 +72,6 @@ def test_a_run_tells_what_it_noticed(compensated: Recording) -> None:
     assert lost >= 10
     count, total = (int(word) for word in line.split(" at ")[1].split(" images")[0].split(" of "))
     assert total == len(found.frames)
-    # It stands a few good images longer.
+    # A flag stays in force for a few good images.
     assert lost <= count <= lost + 2 * config.safety.good_frames
     assert not any(line.startswith("lost (") for line in compensated.warnings)

@@ -1,0 +1,99 @@
+"""The files of an analysis: every sample as CSV, every model's error and loop as a figure."""
+
+from __future__ import annotations
+
+from os import PathLike
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from tautscope.analysis.comparison import Analysis
+from tautscope.analysis.models.registry import LINEAR_FIT
+from tautscope.analysis.models.task import Floats
+from tautscope.report.figures import BLUE, GREY, PAGE, style
+from tautscope.runs.output_folder import new_folder
+
+
+def write_analysis(analysis: Analysis, folder: str | PathLike[str]) -> None:
+    """Make a folder with analysis.csv (every sample) and analyze.png, complete or not at all.
+
+    Raises:
+        OutputError: The folder is not empty, or cannot be written.
+    """
+    columns = _columns(analysis)
+    figure = analysis_figure(analysis)
+    with new_folder(folder) as place, style():
+        np.savetxt(
+            place / "analysis.csv",
+            np.column_stack(list(columns.values())),
+            delimiter=",",
+            header=",".join(columns),
+            comments="",
+            fmt=["%d", *["%.9g"] * (len(columns) - 1)],
+        )
+        figure.savefig(place / "analyze.png")
+
+
+def _columns(analysis: Analysis) -> dict[str, Floats | NDArray[np.int64]]:
+    """Line of the file, time if it was read, signals, then predictions and traces of each model."""
+    record = analysis.record
+    columns: dict[str, Floats | NDArray[np.int64]] = {"line": record.rows}
+    if record.time is not None:
+        columns["time"] = record.time
+    columns |= {"command": record.command, "measured": record.measured}
+    for entry in analysis.entries:
+        columns[entry.model.name] = entry.prediction.tip
+        for name, trace in entry.prediction.traces.items():
+            columns[f"{entry.model.name}_{name}"] = trace
+    return columns
+
+
+def analysis_figure(analysis: Analysis) -> Figure:
+    """A row per model: its error over the record, and its loop over the measured one.
+
+    The horizontal axis is the record's time if it was read, else the sample number. Loops are of
+    the second half. All errors have one scale, set by their 99th percentiles; only the linear fit,
+    whose error is usually far larger, has its own.
+    """
+    record = analysis.record
+    at = np.arange(len(record.rows)) if record.time is None else record.time
+    measured = np.isfinite(record.measured)
+    errors = [entry.prediction.tip - record.measured for entry in analysis.entries]
+    limits = [1.1 * float(np.quantile(np.abs(error[analysis.scored]), 0.99)) for error in errors]
+    is_linear = [entry.model is LINEAR_FIT for entry in analysis.entries]
+    common = max(
+        (limit for limit, own in zip(limits, is_linear, strict=True) if not own), default=0.0
+    )
+    with style():
+        count = len(analysis.entries)
+        figure = Figure(figsize=(PAGE, 1.15 * count + 0.5), layout="constrained")
+        axes = figure.subplots(count, 2, sharex="col", squeeze=False, width_ratios=(3.2, 1))
+        for row, entry in enumerate(analysis.entries):
+            strip, loop = axes[row]
+            strip.axvspan(at[0], at[analysis.half], color="#f0f0f0", linewidth=0)
+            strip.axhline(0, color=GREY, linewidth=0.5)
+            strip.plot(at[measured], errors[row][measured], color=BLUE, linewidth=0.7)
+            if not np.isfinite(errors[row][: analysis.half]).any():
+                middle = (at[0] + at[analysis.half]) / 2
+                strip.text(middle, 0, "calibration: no prediction", ha="center", va="bottom")
+            strip.set_title(f"{entry.model.title}: {entry.rmse:.3g}")
+            strip.set_ylabel("error")
+            limit = limits[row] if is_linear[row] else common
+            if limit > 0:
+                strip.set_ylim(-limit, limit)
+            command = record.command[analysis.scored]
+            for values, colour, width in (
+                (record.measured, GREY, 1.6),
+                (entry.prediction.tip, BLUE, 0.7),
+            ):
+                loop.plot(command, values[analysis.scored], color=colour, linewidth=width)
+            loop.set_ylabel("tip")
+            loop.locator_params(axis="x", nbins=3)
+        axes[0, 0].set_xlim(at[0], at[-1])
+        axes[-1, 0].set_xlabel("sample" if record.time is None else "time [s]")
+        axes[-1, 1].set_xlabel("command")
+        axes[0, 0].set_title("RMS over the second half (white)", loc="right", fontweight="normal")
+        axes[0, 1].set_title("measured", color=GREY, loc="left")
+        axes[0, 1].set_title("model", color=BLUE, loc="right", fontweight="bold")
+    return figure

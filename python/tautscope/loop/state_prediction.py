@@ -1,0 +1,21 @@
+"""The state of the instrument predicted for the time an image was captured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StatePrediction:
+    """Predicted state (prior) of the instrument at one time, with its standard deviations.
+
+    Attributes:
+        state: (3,) [m, rad, rad].
+        std: (3,) standard deviation of each DOF by itself [m, rad, rad].
+    """
+
+    state: NDArray[np.float64]
+    std: NDArray[np.float64]
