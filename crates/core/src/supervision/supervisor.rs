@@ -12,7 +12,7 @@ pub struct Event {
     pub source: Source,
     /// Time of the control tick, in s.
     pub time: f64,
-    /// Travel of the reference since the last event [`width_limit`].
+    /// Travel of the reference since the last event [in `width_limit`].
     pub travel: f64,
     /// The flags that are raised.
     pub raised: Flags,
