@@ -53,18 +53,11 @@ pub struct FrameArrival {
 /// command, `jump` and two `deviation`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrameGate {
-    frame_age: f64,
-    frame_gap: f64,
-    clock_jump: f64,
-    /// [m, rad, rad], as all below.
+    settings: SafetySettings,
+    /// [m, rad, rad], as all lengths below.
     frozen_travel: PerDof<f64>,
-    innovation_limit: f64,
-    innovation_growth: f64,
-    innovation_decay: f64,
     start_std: PerDof<f64>,
     least_std: PerDof<f64>,
-    jump: PerDof<f64>,
-    blind_growth: f64,
     captured_at: Option<f64>,
     arrived_at: Option<f64>,
     /// The image that frames since then repeat, and the path length of the command then.
@@ -118,17 +111,10 @@ impl FrameGate {
             }
         }
         Ok(Self {
-            frame_age: safety.frame_age,
-            frame_gap: safety.frame_gap,
-            clock_jump: safety.clock_jump,
+            settings: *safety,
             frozen_travel,
-            innovation_limit: safety.innovation_limit,
-            innovation_growth: safety.innovation_growth,
-            innovation_decay: safety.innovation_decay,
             start_std,
             least_std,
-            jump: safety.jump,
-            blind_growth: safety.blind_growth,
             captured_at: None,
             arrived_at: None,
             repeated: None,
@@ -142,7 +128,7 @@ impl FrameGate {
     /// Check at a control tick that frames arrive. None is missing before the first.
     pub fn check_gap(&self, time: f64) -> Flags {
         let gap = self.arrived_at.map_or(0.0, |last| time - last);
-        Flags::when(gap > self.frame_gap, Flag::Dropped)
+        Flags::when(gap > self.settings.frame_gap, Flag::Dropped)
     }
 
     /// Check the times and the image of a frame, before its features.
@@ -155,14 +141,14 @@ impl FrameGate {
         }
         let since = self.captured_at.map(|last| captured_at - last);
         let is_ahead = captured_at > now && arrival.travel.is_none();
-        let has_jumped = since.is_some_and(|since| since < -self.clock_jump);
+        let has_jumped = since.is_some_and(|since| since < -self.settings.clock_jump);
         if !captured_at.is_finite() || is_ahead || has_jumped {
             // The next frame is compared with the new time.
             self.captured_at = Some(captured_at).filter(|_| has_jumped);
             return Flags::of(Flag::Clock);
         }
         self.captured_at = Some(captured_at);
-        Flags::when(now - captured_at > self.frame_age, Flag::Late)
+        Flags::when(now - captured_at > self.settings.frame_age, Flag::Late)
             .union(Flags::when(self.is_frozen(arrival), Flag::Frozen))
     }
 
@@ -191,7 +177,7 @@ impl FrameGate {
         moved: PerDof<f64>,
         measured: &PerDof<Sighting>,
     ) -> Flags {
-        let reach = moved.iter().zip(self.jump).zip(self.jump_margin);
+        let reach = moved.iter().zip(self.settings.jump).zip(self.jump_margin);
         let stds = prediction.state.into_iter().zip(self.innovation_std);
         let mut flags = Flags::NONE;
         for (((seen, (predicted, std)), ((moved, jump), margin)), grip) in
@@ -201,7 +187,7 @@ impl FrameGate {
             if !(innovation.is_finite() && deviation.is_finite()) {
                 continue;
             }
-            let limit = square(self.innovation_limit);
+            let limit = square(self.settings.innovation_limit);
             let fits = square(innovation) <= limit * (square(std) + square(deviation));
             let is_reachable = innovation <= moved + jump + margin + COVERAGE * deviation;
             flags = flags
@@ -223,10 +209,10 @@ impl FrameGate {
             if variance.is_finite() {
                 let change = variance - square(*std);
                 let factor = if change > 0.0 {
-                    self.innovation_growth
+                    self.settings.innovation_growth
                 } else {
                     // At rest an innovation does not show how well motion is predicted.
-                    self.innovation_decay * ((seen.travel - then) / least).min(1.0)
+                    self.settings.innovation_decay * ((seen.travel - then) / least).min(1.0)
                 };
                 *std = libm::sqrt(square(*std) + factor * change).max(least);
             }
@@ -242,7 +228,7 @@ impl FrameGate {
         let axes = self.innovation_std.iter_mut().zip(&mut self.jump_margin);
         let axes = axes.zip(self.start_std);
         for (((std, margin), most), (now, then)) in axes.zip(moved) {
-            let growth = self.blind_growth * (now - then).max(0.0);
+            let growth = self.settings.blind_growth * (now - then).max(0.0);
             *std = (*std + growth).min(most).max(*std);
             *margin = (*margin + growth).min(most);
         }

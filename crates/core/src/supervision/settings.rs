@@ -19,7 +19,7 @@ pub struct SafetySettings {
     pub offset_limit: PerDof<f64>,
     /// Largest speed of the reference over `reference_time` [m/s, rad/s, rad/s].
     pub reference_speed: PerDof<f64>,
-    /// Time constant of the mean of the reference's speed [s].
+    /// Time constant of the mean of the reference's speed, in s.
     pub reference_time: f64,
     /// Largest speed of the command [m/s, rad/s, rad/s].
     pub command_speed: PerDof<f64>,
@@ -27,23 +27,23 @@ pub struct SafetySettings {
     pub command_travel: PerDof<(f64, f64)>,
     /// Resolution of the input device, or its largest step from rest [m, rad, rad].
     pub reference_count: PerDof<f64>,
-    /// Largest age of a reference, and longest time for which a moving input device repeats its value [s].
+    /// Largest age of a reference, and longest time for which a moving input device repeats its value, in s.
     pub reference_age: f64,
-    /// Longest time between two control ticks whose motion is followed [control periods].
+    /// Longest time between two control ticks whose motion is followed, in control periods.
     pub late_tick: f64,
-    /// Longest time between two control ticks after which motion goes on by itself [s].
+    /// Longest time between two control ticks after which motion goes on by itself, in s.
     pub stall: f64,
-    /// Largest age of a frame on arrival [s].
+    /// Largest age of a frame on arrival, in s.
     pub frame_age: f64,
-    /// Longest time without a frame [s].
+    /// Longest time without a frame, in s.
     pub frame_gap: f64,
-    /// Difference of two capture times by which the clock was set back; a smaller one is a frame out of order [s].
+    /// Difference of two capture times by which the clock was set back; a smaller one is a frame out of order, in s.
     pub clock_jump: f64,
-    /// Travel of the command over which no two images are identical [`update_distance`].
+    /// Travel of the command over which no two images are identical [in `update_distance`].
     pub frozen_travel: f64,
-    /// Largest innovation [standard deviations].
+    /// Largest innovation, in standard deviations.
     pub innovation_limit: f64,
-    /// Least standard deviation of the innovation [`start_deviation`].
+    /// Least standard deviation of the innovation [in `start_deviation`].
     pub innovation_floor: f64,
     /// Smoothing factor of the innovation variance for an innovation above it.
     pub innovation_growth: f64,
@@ -53,37 +53,37 @@ pub struct SafetySettings {
     pub jump: PerDof<f64>,
     /// Largest deviation of a tip in contact from the motion of its command [m, rad, rad].
     pub slip: PerDof<f64>,
-    /// Travel of the command over which a tip that moves with it is found in contact [`update_distance`].
+    /// Travel of the command over which a tip that moves with it is found in contact [in `update_distance`].
     pub grip_distance: f64,
     /// Growth of the innovation's standard deviation and of `jump` per travel of the command without a marker.
     pub blind_growth: f64,
-    /// Least swing of a tremor [`update_distance`].
+    /// Least swing of a tremor [in `update_distance`].
     pub tremor_swing: f64,
-    /// Reversals per second that are a tremor [1/s].
+    /// Reversals per second that are a tremor, in 1/s.
     pub tremor_rate: f64,
-    /// Largest lead of the tip over the reference within a stroke [`width_limit`].
+    /// Largest lead of the tip over the reference within a stroke [in `width_limit`].
     pub ahead_limit: f64,
     /// Travel of the tip over that of the reference in a stroke above which the tip overtakes.
     pub ahead_ratio: f64,
-    /// Largest decrease of a contact offset within a stroke [`ahead_limit`].
+    /// Largest decrease of a contact offset within a stroke [in `ahead_limit`].
     pub offset_decrease: f64,
     /// Growing swings in a row that are a limit cycle.
     pub cycle_swings: u32,
     /// Least ratio of a swing to the one before it in a limit cycle.
     pub cycle_growth: f64,
-    /// Longest swing of a limit cycle, one way [s].
+    /// Longest swing of a limit cycle, one way, in s.
     pub cycle_time: f64,
     /// Largest change of a contact offset that had settled [m, rad, rad].
     pub change_limit: PerDof<f64>,
-    /// Travel of the command over which changes of a contact offset add up [`width_limit`].
+    /// Travel of the command over which changes of a contact offset add up [in `width_limit`].
     pub change_travel: f64,
-    /// Time until a reaction escalates [s].
+    /// Time until a reaction escalates, in s.
     pub hold_time: f64,
-    /// Travel of the reference until a reaction escalates, summed over the DOFs [`width_limit`].
+    /// Travel of the reference until a reaction escalates, summed over the DOFs [in `width_limit`].
     pub hold_travel: f64,
-    /// Travel over which the compensation fades to nothing [`width_limit`].
+    /// Travel over which the compensation fades to nothing [in `width_limit`].
     pub fade_travel: f64,
-    /// Travel over which the compensation returns after warnings have been acknowledged [`width_limit`].
+    /// Travel over which the compensation returns after warnings have been acknowledged [in `width_limit`].
     pub restore_travel: f64,
     /// Good frames in a row that clear a flag of frames.
     pub good_frames: u32,

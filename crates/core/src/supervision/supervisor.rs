@@ -12,7 +12,7 @@ pub struct Event {
     pub source: Source,
     /// Time of the control tick, in s.
     pub time: f64,
-    /// Travel of the reference since the last event [`width_limit`].
+    /// Travel of the reference since the last event [in `width_limit`].
     pub travel: f64,
     /// The flags that are raised.
     pub raised: Flags,
@@ -34,7 +34,7 @@ pub struct Event {
 /// itself.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Supervisor {
-    settings: Settings,
+    settings: SafetySettings,
     active: [Option<ActiveFlag>; TABLE.len()],
     reaction: Reaction,
     flags: Flags,
@@ -42,17 +42,6 @@ pub struct Supervisor {
     gain_share: f64,
     time: f64,
     travel: f64,
-}
-
-/// The settings that escalate and clear flags.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Settings {
-    hold_time: f64,
-    hold_travel: f64,
-    fade_travel: f64,
-    restore_travel: f64,
-    good_frames: u32,
-    good_ticks: u32,
 }
 
 /// The level of a flag's reaction, since when, and the good events in a row since the flag was raised last.
@@ -69,15 +58,7 @@ impl Supervisor {
     ///
     /// # Errors
     /// A travel is not above 0, a time or the travel of a hold negative, a count 0, or one not finite.
-    pub fn new(safety: &SafetySettings) -> Result<Self, ConfigError> {
-        let settings = Settings {
-            hold_time: safety.hold_time,
-            hold_travel: safety.hold_travel,
-            fade_travel: safety.fade_travel,
-            restore_travel: safety.restore_travel,
-            good_frames: safety.good_frames,
-            good_ticks: safety.good_ticks,
-        };
+    pub fn new(settings: &SafetySettings) -> Result<Self, ConfigError> {
         require_non_negative("hold_time", settings.hold_time)?;
         require_non_negative("hold_travel", settings.hold_travel)?;
         require_positive("fade_travel", settings.fade_travel)?;
@@ -89,7 +70,7 @@ impl Supervisor {
             require(count > 0, field, f64::from(count), "1 or above")?;
         }
         Ok(Self {
-            settings,
+            settings: *settings,
             active: [None; TABLE.len()],
             reaction: Reaction::None,
             flags: Flags::NONE,
@@ -194,7 +175,7 @@ impl Supervisor {
 fn update_flag(
     active: &mut Option<ActiveFlag>,
     rule: &Rule,
-    settings: &Settings,
+    settings: &SafetySettings,
     event: &Event,
     (time, travel): (f64, f64),
 ) -> bool {
@@ -237,7 +218,7 @@ fn update_flag(
 
 impl ActiveFlag {
     /// The level of a flag that is raised again.
-    fn next_level(&self, rule: &Rule, settings: &Settings, time: f64, travel: f64) -> usize {
+    fn next_level(&self, rule: &Rule, settings: &SafetySettings, time: f64, travel: f64) -> usize {
         let is_over = time - self.since >= settings.hold_time
             || travel - self.since_travel >= settings.hold_travel;
         if rule.escalates && is_over {
