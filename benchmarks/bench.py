@@ -25,7 +25,7 @@ import bench_tables
 import numpy as np
 from bench_processes import PATIENCE, bench_config, rig, run
 from numpy.typing import ArrayLike
-from tautscope.bench.truth import read_truth
+from tautscope.bench.ground_truth import read_ground_truth
 from tautscope.config import dump_config
 from tautscope.dof import Dof
 from tautscope.hardware.timing import read_sent
@@ -47,33 +47,33 @@ FAULTS = {
     "a drive answers 0.3 s late": ("delay rotation", "rotation, node 2: no "),
     "heartbeat of a drive lost": ("heartbeat rotation", "rotation, node 2: no heartbeat"),
     "a drive leaves its mode": ("refuse rotation", "rotation, node 2: it changed from mode"),
-    "a motor stands still": ("freeze insertion", "insertion, node 1: it is at"),
-    "camera unplugged": ("fault camera", "camera.source: got 'no picture"),
-    "camera frozen": ("freeze camera", "camera.source: got 'the same picture"),
+    "a motor stands still": ("freeze insertion", "insertion, node 1: following error"),
+    "camera unplugged": ("fault camera", "camera.source: got 'no image"),
+    "camera frozen": ("freeze camera", "camera.source: got 'only repetitions"),
 }
 """What -> request, and how the error that ends the run begins."""
 LIMITS = {"a drive's emergency": 100.0, "heartbeat of a drive lost": 100.0, "a drive silent": 100.0}
 """What -> to quick stop at most [ms]."""
 WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "wrong node id": ({"drives.rotation.node": 9}, "rotation, node 9: no answer"),
-    "wrong sign, insertion": ({"drives.insertion.sign": -1}, "insertion, node 1: it stands at"),
+    "wrong sign, insertion": ({"drives.insertion.sign": -1}, "insertion, node 1: position"),
     "wrong sign, rotation": ({"drives.rotation.sign": 1}, "drives.rotation"),
-    "wrong sign, bending": ({"drives.bending.sign": -1}, "bending, node 3: it stands at"),
+    "wrong sign, bending": ({"drives.bending.sign": -1}, "bending, node 3: position"),
     "counts per mm, insertion": (
         {"drives.insertion.counts_per_unit": 1e3},
-        "insertion, node 1: it stands at",
+        "insertion, node 1: position",
     ),
     "counts per degree, rotation": (
         {"drives.rotation.counts_per_unit": 1e4 * np.pi / 180},
-        "rotation, node 2: it is at",
+        "rotation, node 2: following error",
     ),
     "degrees for counts per rad, rotation": (
         {"drives.rotation.counts_per_unit": 1e4 * 180 / np.pi},
-        "rotation, node 2: it is at",
+        "rotation, node 2: following error",
     ),
     "counts per degree, bending": (
         {"drives.bending.counts_per_unit": 1e4 * np.pi / 180},
-        "bending, node 3: it stands at",
+        "bending, node 3: position",
     ),
 }
 """What -> a change of the configuration, and how the error that ends the run begins."""
@@ -110,7 +110,7 @@ def with_truth(folder: Path, suffix: str, truth: Path) -> Recording:
     """A run with the true tip at its ticks and captures, as the in-process twin would have it."""
     recording = Recording.load(folder, suffix)
     sent = read_sent(folder / f"timing_cycles{suffix}.csv")
-    instants, states = read_truth(truth)
+    instants, states = read_ground_truth(truth)
     trace, frames = recording.trace.copy(), recording.frames.copy()
     count = min(len(sent), len(trace))
     trace = trace[:count]

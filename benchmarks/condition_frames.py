@@ -15,7 +15,7 @@ from tautscope.config import Config
 from tautscope.loop.construction import build_feature_model
 from tautscope.loop.reduction import Expectation
 from tautscope.loop.vision import MarkerDetector
-from tautscope.twin.camera import FRAMES_PER_BACKGROUND, Picture, TwinCamera
+from tautscope.twin.camera import FRAMES_PER_BACKGROUND, RenderedImage, TwinCamera
 
 Floats = NDArray[np.float64]
 
@@ -146,7 +146,7 @@ def camera_for(disturb: tuple[str, ...], seed: int, real: bool) -> tuple[Config,
     return config, TwinCamera(config)
 
 
-def shots(job: Job) -> Iterator[tuple[Config, Floats, int, Picture]]:
+def shots(job: Job) -> Iterator[tuple[Config, Floats, int, RenderedImage]]:
     """State, sequence number and picture of each frame of a job."""
     condition = CONDITIONS[job.condition]
     rng = np.random.default_rng([job.seed, job.real, list(CONDITIONS).index(job.condition)])
@@ -192,7 +192,7 @@ def promising(config: Config, poses: str, features: Floats) -> bool:
     return bool(-45 < room.min() < 45)
 
 
-def bands_touch(picture: Picture) -> bool:
+def bands_touch(picture: RenderedImage) -> bool:
     """Whether less than `TOUCH` lies between the green of one band and that of the other."""
     a, b = picture.true_features.reshape(2, 2)
     left, top = np.maximum(0, np.rint((a + b) / 2).astype(int) - 60)

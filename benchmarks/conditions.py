@@ -144,34 +144,32 @@ def to_rows(looks: Sequence[Look]) -> list[dict[str, Any]]:
 
 
 DEFINITIONS = f"""\
-Each frame is a picture of the twin at a pose of its own, drawn uniformly: insertion
+Each frame is an image of the twin at a random pose with constant curvature, uniform in insertion
 {WORKSPACE[0, 0] * 1e3:.0f} to {WORKSPACE[1, 0] * 1e3:.0f} mm, rotation {WORKSPACE[0, 1]:g} to \
-{WORKSPACE[1, 1]:g} rad, bending {WORKSPACE[0, 2]:g} to {WORKSPACE[1, 2]:g} rad, constant curvature.
-Half of the frames have real colon frames behind the instrument, half procedural mucosa. The
-sequence number, which decides the moment of a disturbance and the background, is drawn at random.
+{WORKSPACE[1, 1]:g} rad, bending {WORKSPACE[0, 2]:g} to {WORKSPACE[1, 2]:g} rad. The background of
+half of the frames is a real colon image, of the others procedural mucosa. The frame number, which
+selects the background and the state of the disturbances, is random.
 
-- **n**: frames; **visible**: those with at least half of each band visible.
-- **valid**: share of the visible frames in which the detection says it can be trusted.
-- **wrong accepted**: share of all frames in which it says so and a marker is more than
-  {WRONG:g} px from the truth, or there is no such marker in the picture.
-- **error**: RMS distance of measured and true features over all valid frames, wrong ones
-  included. Markers that are not there have no distance and count as wrong accepted only.
-- **with prediction**: as the loop asks, with the features by `FeatureModel` of a believed state and
-  how sure it is: the true state plus a normal error of standard deviation
-  {STATE_ERROR[0] * 1e3:g} mm, {STATE_ERROR[1]:g} rad, {STATE_ERROR[2]:g} rad.
-- **without**: the image alone.
+- **n**: number of frames; **visible**: those with at least half of each band visible.
+- **valid**: share of the visible frames whose detection is valid.
+- **wrong accepted**: share of all frames whose detection is valid although a marker is more than
+  {WRONG:g} px from the truth or is not in the image.
+- **error**: RMS distance of measured and true features over all valid frames, including wrong
+  ones, except markers that are not in the image.
+- **with prediction**: as in the loop, the detector gets the features predicted by `FeatureModel`
+  for the true state plus a normal error with standard deviations
+  {STATE_ERROR[0] * 1e3:g} mm, {STATE_ERROR[1]:g} rad, {STATE_ERROR[2]:g} rad, and this uncertainty.
+- **without**: the detector gets the image only.
 
-The true feature is the centroid of the *whole* near side of a band, also where debris, a
-highlight, text, the field stop, the picture's border or the instrument hides a part of it: that is
-what the loop's model predicts. The centroid of the piece that is left counts as error. The visible
-share is that of the same side, by area in the picture, that is inside it and not hidden; a
-saturated highlight hides; smoke, blur and exposure do not.
+The true feature is the centroid of the *whole* side of a band that faces the camera, also where
+it is occluded or outside the image, as in the loop's model; the centroid of the visible part counts
+as error. The visible share is the share of that side, by area in the image, that is inside the
+image and not occluded. Saturated highlights occlude; smoke, blur and exposure do not.
 
-The disturbances are those of `python/tautscope/twin/disturbances.py`. They come and go over
-frames, so their strength varies here, from nothing to the limits: debris up to 40 % of a band,
-smoke up to 65 % of the light, exposure 0.25 to 4 times the grey levels, white balance 0.8 to 1.25
-per channel, motion blur up to 8 px, defocus up to 5 px, the black field stop over up to 45 % of a
-band. Exposure is harder here than in a camera, whose grey levels are a compressed measure of light.
+The disturbances (`python/tautscope/twin/disturbances.py`) vary over the frames from none to their
+limits: debris over 40 % of a band, smoke with 65 % opacity, exposure 0.25 to 4, white balance 0.8
+to 1.25 per channel, motion blur of 8 px, defocus of 5 px, the field stop over 45 % of a band.
+Exposure is harder here than with a camera, whose gamma compresses the grey levels.
 "Outside the picture" and "touching" are chosen by pose: a band cut by the border with at least half
 of it left; less than {TOUCH} px between the bands.
 """
@@ -231,11 +229,11 @@ def write(rows: Sequence[dict[str, Any]], command: str) -> Path:
     path = ROOT / "docs" / "conditions.md"
     seeds = max(row["seeds"] for row in rows)
     text = (
-        "# Conditions\n\nHow well the markers are found, condition by condition. Made by\n\n"
-        f"    {command}\n\n(seeds 0 to {seeds - 1}). (!) marks what misses its goal: valid at "
+        "# Vision robustness\n\nDetection of the markers under image disturbances. Made by\n\n"
+        f"    {command}\n\n(seeds 0 to {seeds - 1}). (!) marks a missed goal. Goals: valid at "
         "least 99 %, wrong accepted\nat most 0.1 % (none without an instrument), error at most "
         f"0.15 px clean\nand 0.5 px elsewhere.\n\n{table(rows)}\n\n"
-        f"## What is counted\n\n{DEFINITIONS}"
+        f"## Definitions\n\n{DEFINITIONS}"
     )
     path.write_text(text, encoding="utf-8")
     return path

@@ -162,7 +162,7 @@ def streaming_rows(seconds: float) -> list[dict[str, Any]]:
         open_drives(settings(file)) as drives,
     ):
         took = stream(drives, seconds, drives.start())
-        traffic = drives.traffic
+        traffic = drives.statistics
     answers = 3 * traffic.cycles
     return [
         row("set-points to answers, 100 Hz", "ms", took, None),

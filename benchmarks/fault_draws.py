@@ -7,7 +7,7 @@ import math
 import numpy as np
 from tautscope.config import Config, Profile, load_config
 from tautscope.dof import Dof
-from tautscope.twin.fault_motion import RATE
+from tautscope.twin.fault_motion import EVENT_RATE
 from tautscope.twin.faults import KINDS, PER_MM, Fault, Target
 
 PERIODS = {Dof.INSERTION: 7.5, Dof.ROTATION: 10.0, Dof.BENDING: 10.0}
@@ -52,7 +52,7 @@ def drawn(kind: str, seed: int, start: float) -> Fault:
     """The fault of this kind and seed."""
     row = KINDS[kind]
     chance = np.random.default_rng([seed, 7, *kind.encode()])
-    passes = row.lasts and chance.uniform() < SHARE_PASSING
+    passes = row.has_duration and chance.uniform() < SHARE_PASSING
     duration = float(chance.uniform(*PASSES)) if passes else math.inf
     dof = Dof(int(chance.choice(moving(seed))))
     low, high = row.severity
@@ -75,7 +75,7 @@ def pauses(fault: Fault) -> list[tuple[float, float]]:
         return [(fault.start, fault.start + fault.size)]
     end = fault.start + min(fault.duration, WATCHED_FOR_GOOD)
     if fault.kind == "stalls":
-        begins = np.arange(fault.start, end, 1 / RATE)
+        begins = np.arange(fault.start, end, 1 / EVENT_RATE)
         return [(float(begin), float(begin) + fault.size) for begin in begins]
     return [(fault.start, end)]
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.loop.references import Segment
-from tautscope.twin.faults import FaultyHand
+from tautscope.twin.faults import FaultyReference
 
 Floats = NDArray[np.float64]
 
@@ -85,7 +85,7 @@ class Device:
 
     hand: Hand
     watch: Watch
-    faulty: FaultyHand | None = None
+    faulty: FaultyReference | None = None
     segments: tuple[Segment, ...] = ()
     duration: float = math.inf
     meant: list[Floats] = field(default_factory=list)

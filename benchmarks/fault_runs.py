@@ -37,7 +37,7 @@ from tautscope.config import Config, Profile
 from tautscope.errors import ConfigError, TautscopeError
 from tautscope.loop.safety import DETECTORS, Reaction
 from tautscope.runs.experiment import run_experiment
-from tautscope.twin.faults import Fault, FaultyHand, FaultyRig, Target
+from tautscope.twin.faults import Fault, FaultyReference, FaultyRig, Target
 
 
 def study(
@@ -212,7 +212,7 @@ class Instrument:
 
     def _fail(self, fault: Fault) -> None:
         self._driven.rig = FaultyRig(self._twin, (fault,), self._seed)
-        self._device.faulty = FaultyHand(self._hand, (fault,), self._seed)
+        self._device.faulty = FaultyReference(self._hand, (fault,), self._seed)
         self._hand.end = self._since + watched(fault)
 
     def _pause(self, fault: Fault) -> None:

@@ -12,8 +12,8 @@ from doc_pages import ROOT
 from hysteresis_runs import FeatureCamera
 from numpy.typing import ArrayLike, NDArray
 from tautscope.config import Config, load_config
-from tautscope.hardware.following import Following
-from tautscope.hardware.rig import rig_drives
+from tautscope.hardware.following_error import FollowingErrorMonitor
+from tautscope.hardware.rig import require_drives
 from tautscope.loop.reduction import HysteresisReduction, Report
 from tautscope.loop.rig import Frame, Sample
 from tautscope.loop.safety import Reaction, Supervision
@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 
 STILL = 1.0
 """How long a motion that was stopped is watched [s]."""
-DRIVES = rig_drives(load_config(ROOT / "configs" / "bench.toml"))
+DRIVES = require_drives(load_config(ROOT / "configs" / "bench.toml"))
 """How they are watched: the bench's."""
 RANKS = {reaction: reaction.rank for reaction in Reaction}
 HOLD_ESTIMATE = RANKS[Reaction.HOLD_ESTIMATE]
@@ -199,7 +199,7 @@ class Driven:
     ) -> None:
         self.rig, self._watch, self._watching = rig, watch, watching
         self._at, self._then = at, then
-        self._following = Following(DRIVES, rig.control_period)
+        self._following = FollowingErrorMonitor(DRIVES, rig.control_period)
         self._stopped = False
 
     @property
@@ -210,7 +210,7 @@ class Driven:
     def reset(self) -> Sample:
         """As the rig."""
         sample = self.rig.reset()
-        self._following.begin(sample.applied)
+        self._following.reset(sample.applied)
         return sample
 
     def step(self, command: ArrayLike) -> Sample:
@@ -236,7 +236,7 @@ class Driven:
         self.rig.brake()
 
     def _check(self, said: Floats, applied: Floats) -> None:
-        strays = self._following.strays(said, applied).any()
+        strays = self._following.update(said, applied).any()
         if "drive_fault" in self._watching and self.rig.drive_fault:
             self._give_up("drive_fault")
         elif "following_error" in self._watching and strays:

@@ -118,7 +118,7 @@ def _run(fails: int | None, slow: float) -> _Told:
         stack.enter_context(patch.object(journal, "_open", opened))
         stack.enter_context(patch.object(journal.os, "fsync", stores))
         path = Path(folder) / "run.mcap"
-        log = LogWriter(path, config, say=lambda _: said.append(time.monotonic()))
+        log = LogWriter(path, config, on_warning=lambda _: said.append(time.monotonic()))
         loop, missed, made_at = HysteresisReduction(config), 0, []
         for tick in range(round(SECONDS / period)):
             reference = [0.025 + 1e-5 * tick, 0.0, 0.9]

@@ -1,4 +1,4 @@
-"""Move one motor a little way and back, slowly, while you watch the instrument.
+"""Jog one motor slowly out and back, while you watch the instrument.
 
 ``uv run python examples/jog.py rig.toml insertion 0.001`` moves 1 mm out and back [m, rad] in 4 s.
 THE MOTOR MOVES; have the emergency stop within reach. Without arguments, simulated drives.
@@ -21,13 +21,13 @@ from tautscope.hardware.drives import open_drives
 from tautscope.hardware.signals import exit_on_signals
 
 DURATION = 4.0
-"""There and back [s]."""
+"""Duration of the motion out and back [s]."""
 LARGEST = (2e-3, 0.2, 0.2)
-"""No further than this at a first try [m, rad, rad]."""
+"""Largest distance of a first test [m, rad, rad]."""
 
 
 def jog(config: DrivesConfig, dof: Dof, distance: float) -> None:
-    """Along half a cosine there, and half a cosine back."""
+    """Move along a raised cosine by `distance` [m or rad] and back."""
     steps = round(DURATION / config.cycle)
     with exit_on_signals(), open_drives(config) as drives:
         begin = drives.start()
@@ -39,13 +39,13 @@ def jog(config: DrivesConfig, dof: Dof, distance: float) -> None:
             due += config.cycle
             time.sleep(max(0.0, due - time.monotonic()))
     moved = np.array(applied)[:, dof] - begin[dof]
-    farthest, end = moved[np.abs(moved).argmax()], moved[-1]
+    largest, end = moved[np.abs(moved).argmax()], moved[-1]
     scale, unit = dof.display_scale, dof.display_unit
-    print(f"{dof.label}: went {scale * farthest:.4f} {unit}, ended at {scale * end:.4f} {unit}")
+    print(f"{dof.label}: moved {scale * largest:.4f} {unit}, ended at {scale * end:.4f} {unit}")
 
 
 def simulated(folder: str) -> DrivesConfig:
-    """Three axes alike, with times for a busy computer."""
+    """Three equal axes, with long timeouts for a busy computer."""
     axes = {
         dof.label: AxisConfig(
             node=dof + 1,
@@ -84,9 +84,9 @@ def main() -> None:
     file, label, text = sys.argv[1:]
     drives, dof, distance = load_config(file).drives, Dof[label.upper()], float(text)
     if drives is None or not abs(distance) <= LARGEST[dof]:
-        raise SystemExit(f"a section [drives], and at most {LARGEST[dof]:g} m or rad, are needed")
+        raise SystemExit(f"[drives] is missing, or the distance exceeds {LARGEST[dof]:g} m or rad")
     input(
-        f"The {label} motor will move by {distance:g} and back. Enter to go on, Ctrl-C to leave: "
+        f"The {label} motor will move by {distance:g} and back. Enter to start, Ctrl-C to abort: "
     )
     jog(drives, dof, distance)
 

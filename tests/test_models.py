@@ -10,12 +10,12 @@ from drawn import EXAMPLES
 from numpy.typing import NDArray
 from play_model import play
 from scipy.integrate import solve_ivp
-from tautscope.analysis.models import bouc_wen, constant_play, prandtl_ishlinskii
-from tautscope.analysis.models.bouc_wen import BoucWen, hysteretic_variable
-from tautscope.analysis.models.prandtl_ishlinskii import PrandtlIshlinskii
-from tautscope.analysis.models.registry import MODELS, Model
-from tautscope.analysis.models.task import Task
 from tautscope.analysis.records import analyze
+from tautscope.analysis.records.models import bouc_wen, constant_play, prandtl_ishlinskii
+from tautscope.analysis.records.models.bouc_wen import BoucWen, hysteretic_variable
+from tautscope.analysis.records.models.prandtl_ishlinskii import PrandtlIshlinskii
+from tautscope.analysis.records.models.registry import MODELS, Model
+from tautscope.analysis.records.models.task import Task
 from tautscope.config import load_config
 from tautscope.dof import Dof
 from tautscope.report.metrics import rms
@@ -271,7 +271,7 @@ def test_a_tip_seen_now_and_then_is_enough(model: Model) -> None:
 @pytest.fixture(scope="module")
 def insertion_record() -> Record:
     """Motor and true tip of the twin's insertion, four periods, no images."""
-    lines = run_path(str(EXAMPLES / "twin_record.py"))["lines"]
+    lines = run_path(str(EXAMPLES / "twin_record.py"))["samples"]
     time, motor, tip = np.array(list(lines(Dof.INSERTION, 4))).T
     return Record(motor, tip, time, np.arange(len(motor)), Cleaning())
 

@@ -1,14 +1,18 @@
-//! Any bytes as a frame of any format, any prediction, any windows: an answer, never a panic.
+//! The detector never panics: any bytes as a frame of any format, any prediction, any thresholds, any windows.
 
 #![no_main]
+
+#[path = "../../crates/vision/tests/support/settings.rs"]
+mod settings;
 
 use std::f64::consts::{PI, TAU};
 
 use arbitrary::Arbitrary;
 use libfuzzer_sys::fuzz_target;
+use settings::SETTINGS;
 use tautscope_vision::{
-    ColorDiscriminant, Demands, Detector, Expect, Expectation, Image, OUTLINE, Outline,
-    PixelFormat, Settings, Window,
+    BandPrediction, BandPredictor, Detector, Image, OUTLINE_CORNERS, Outline, PixelFormat,
+    Settings, Window,
 };
 
 #[derive(Arbitrary, Debug)]
@@ -21,21 +25,22 @@ struct Input<'a> {
     smoothing: u8,
     minimum_area: u8,
     predicted: [f32; 4],
-    deviation: f32,
+    std: f32,
     radii: [f32; 2],
-    demands: [u8; 7],
+    thresholds: [u8; 7],
+    is_located: bool,
     windows: [[u16; 4]; 2],
     data: &'a [u8],
 }
 
-impl Expect for Input<'_> {
-    fn expect(&self, _seen: [f64; 4], _deviation: [f64; 4]) -> Option<Expectation> {
+impl BandPredictor for Input<'_> {
+    fn predict(&self, _observed: [f64; 4], _std: [f64; 4]) -> Option<BandPrediction> {
         let features = self.predicted.map(f64::from);
         let [ua, va, ub, vb] = features;
         let [radius_a, radius_b] = self.radii.map(f64::from);
         let outline = |[u, v]: [f64; 2], radius: f64| Outline {
             corners: std::array::from_fn(|index| {
-                let angle = TAU * index as f64 / OUTLINE as f64;
+                let angle = TAU * index as f64 / OUTLINE_CORNERS as f64;
                 [u + radius * angle.cos(), v + radius * angle.sin()]
             }),
             centroid: [u, v],
@@ -43,13 +48,17 @@ impl Expect for Input<'_> {
         };
         let mut covariance = [[0.0; 4]; 4];
         for (index, row) in covariance.iter_mut().enumerate() {
-            row[index] = f64::from(self.deviation).powi(2);
+            row[index] = f64::from(self.std).powi(2);
         }
-        Some(Expectation {
+        Some(BandPrediction {
             features,
             covariance,
-            bands: [outline([ua, va], radius_a), outline([ub, vb], radius_b)],
+            outlines: [outline([ua, va], radius_a), outline([ub, vb], radius_b)],
         })
+    }
+
+    fn is_located(&self) -> bool {
+        self.is_located
     }
 }
 
@@ -57,7 +66,7 @@ fuzz_target!(|input: Input<'_>| {
     let format = PixelFormat::ALL[usize::from(input.format) % PixelFormat::ALL.len()];
     let [width, height] = input.sides.map(|side| usize::from(side % 65));
     let stride = format.line_bytes(width) + usize::from(input.padding % 8);
-    // Bytes that are not there repeat those that are, so that small inputs make whole frames.
+    // The input is repeated, so that small inputs make whole frames.
     let length = stride * format.lines(height);
     let data: Vec<u8> = if input.padding < 250 {
         input.data.iter().copied().cycle().take(length).collect()
@@ -67,14 +76,22 @@ fuzz_target!(|input: Input<'_>| {
     let Ok(frame) = Image::new(&data, format, [width, height], stride) else {
         return;
     };
-    let weights = input.weights.map(f64::from);
-    let Ok(discriminant) = ColorDiscriminant::new(weights, f64::from(input.threshold)) else {
-        return;
-    };
+    let [inside, coverage, spill, edges, average, alone, surprise] = input
+        .thresholds
+        .map(|threshold| f64::from(threshold) / 128.0);
     let Ok(mut detector) = Detector::new(Settings {
-        discriminant,
+        weights: input.weights.map(f64::from),
+        threshold: f64::from(input.threshold),
         smoothing: usize::from(input.smoothing % 9),
         minimum_area: u64::from(input.minimum_area),
+        least_inside: inside,
+        least_coverage: coverage,
+        largest_spill: spill,
+        least_edges: edges,
+        least_edges_on_average: average,
+        least_edges_alone: alone,
+        largest_surprise: surprise,
+        ..SETTINGS
     }) else {
         return;
     };
@@ -90,7 +107,6 @@ fuzz_target!(|input: Input<'_>| {
         .map(|region| region.area)
         .sum();
     assert!(whole <= (width * height) as u64);
-    let demands = Demands::from(input.demands.map(|demand| f64::from(demand) / 128.0));
-    detector.recognise(&frame, &input, &demands);
+    detector.recognise(&frame, &input);
     detector.regions_in(&frame, &windows);
 });

@@ -233,27 +233,20 @@ class MarkerDetector:
     def __new__(
         cls,
         model: FeatureModel,
-        *,
         pixel_format: str,
-        weights: Sequence[float],
-        threshold: float,
-        smoothing: int,
-        minimum_area: int,
-        model_deviation: float,
-        demands: tuple[float, float, float, float, float, float, float],
-        alternatives: Sequence[tuple[_Vector3, float]],
+        settings: Mapping[str, object],
     ) -> Self: ...
     def detect(
-        self, image: NDArray[np.uint8], states: NDArray[np.float64], deviation: NDArray[np.float64]
+        self, image: NDArray[np.uint8], states: NDArray[np.float64], std: NDArray[np.float64]
     ) -> tuple[_Floats, _Floats, _Floats, tuple[str, str], list[_Region], int]: ...
     def regions_in(
         self, image: NDArray[np.uint8], windows: Sequence[tuple[int, int, int, int]]
     ) -> list[_Region]: ...
     def mask(self, image: NDArray[np.uint8]) -> NDArray[np.bool_]: ...
 
-def label_regions(mask: NDArray[np.bool_]) -> NDArray[np.float64]: ...
+def label_regions(mask: NDArray[np.bool_]) -> list[_Region]: ...
 
-# The pictures of the twin: crates/render.
+# Images of the twin: crates/render.
 
 @final
 class Renderer:

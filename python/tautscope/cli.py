@@ -7,6 +7,7 @@ import sys
 from collections.abc import Sequence
 
 from tautscope._core import __version__
+from tautscope.bench import commands as bench
 from tautscope.commands import analyze, arguments, demo
 from tautscope.config import dump_config, load_config
 from tautscope.errors import TautscopeError
@@ -45,7 +46,8 @@ def _parser() -> argparse.ArgumentParser:
     _add_config_parser(verbs)
     analyze.add_parser(verbs)
     log.add_parsers(verbs)
-    hardware.add_parsers(verbs)
+    hardware.add_parser(verbs)
+    bench.add_parser(verbs)
     doctor.add_parser(verbs)
     return parser
 

@@ -52,11 +52,11 @@ class OutputError(FieldError):
 
 
 class DriveError(TautscopeError):
-    """A drive or its bus did what must stop the run.
+    """A failure of a drive or its bus that must stop the run.
 
     Args:
-        node: Which drive, as a person finds it (``rotation, node 2``), or the bus.
-        what: What came, against what was asked.
+        node: The drive (``rotation, node 2``) or the bus.
+        what: What happened.
         remedy: What to do.
     """
 
@@ -72,23 +72,23 @@ class DriveError(TautscopeError):
 
 
 class BusError(DriveError):
-    """The bus cannot be opened, was unplugged, or no longer takes or gives frames."""
+    """The bus cannot be opened, or the connection to it is lost."""
 
 
 class SecondMasterError(DriveError):
-    """Somebody else commands drives on the same bus."""
+    """Another master commands drives on the same bus."""
 
 
 class SettingRefusedError(DriveError):
-    """A drive refused a setting, or reads back another value than was written."""
+    """A drive refused a setting, or the value read back differs."""
 
 
 class ModeRefusedError(DriveError):
-    """A drive has no mode that follows streamed positions, or did not enter it."""
+    """A drive has no mode that follows a stream of positions, or did not enter it."""
 
 
 class StateError(DriveError):
-    """A drive did not reach a state, or left the one it should be in."""
+    """A drive did not reach a state, or left it unexpectedly."""
 
 
 class EmergencyError(DriveError):
@@ -96,20 +96,20 @@ class EmergencyError(DriveError):
 
 
 class HeartbeatError(DriveError):
-    """A drive's heartbeat stayed away."""
+    """A drive's heartbeat is missing."""
 
 
 class SilentDriveError(DriveError):
-    """A drive stopped answering set-points or requests."""
+    """A drive does not answer set-points or SDO requests."""
 
 
 class FollowingError(DriveError):
-    """A drive is not where it was told to be, or its position jumped."""
+    """The following error is too large, or a position jumped or is outside the travel."""
 
 
 class CameraError(FieldError):
-    """A camera is not there, or does not give the pictures it should."""
+    """A camera is missing, or does not deliver usable images."""
 
 
 class CameraMismatchError(CameraError):
-    """What is there cannot be used as configured; to wait for it is no use."""
+    """A source that differs from its configuration; reopening it does not help."""

@@ -1,4 +1,4 @@
-"""A CAN bus with simulated drives, unplugged and powered off at the end."""
+"""Fixtures: a CAN bus with simulated drives."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ def hub(tmp_path: Path) -> Iterator[Hub]:
 
 @pytest.fixture
 def station(hub: Hub) -> Iterator[Callable[[], LocalBus]]:
-    """Makes stations on the bus, unplugged at the end."""
+    """Make stations on the bus; they are disconnected at the end."""
     with ExitStack() as stack:
         yield lambda: stack.enter_context(LocalBus(str(hub.path)))
 
 
 @pytest.fixture
 def bench(station: Callable[[], LocalBus]) -> Iterator[Callable[..., SimulatedDrives]]:
-    """Makes simulated drives on the bus, powered off at the end."""
+    """Make simulated drives on the bus; they are powered off at the end."""
     with ExitStack() as stack:
 
         def make(config: DrivesConfig, *arguments: Any, **options: Any) -> SimulatedDrives:

@@ -1,4 +1,4 @@
-"""A rig on motors and a camera that are made of Python."""
+"""A hardware rig with fake motors and a fake camera."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any, Self
 
 import numpy as np
-from drive_rig import drives_document
+from drive_settings import drives_document
 from numpy.typing import ArrayLike, NDArray
 from tautscope.config import Config, from_document
 from tautscope.hardware.cameras import CameraState, Capture
@@ -19,10 +19,10 @@ CYCLE = 0.01
 
 
 class FakeMotors:
-    """Motors that are where they are told to be, and remember it."""
+    """Motors that follow ideally and record their commands."""
 
     def __init__(self) -> None:
-        self.told: list[NDArray[np.float64]] = []
+        self.commands: list[NDArray[np.float64]] = []
         self.threads: set[str] = set()
         self.stopped = self.disabled = 0
         self.meanwhile: Callable[[], object] = lambda: None
@@ -33,7 +33,7 @@ class FakeMotors:
     def exchange(self, command: ArrayLike) -> NDArray[np.float64]:
         self.meanwhile()
         self.threads.add(threading.current_thread().name)
-        self.told.append(np.array(command))
+        self.commands.append(np.array(command))
         return np.array(command)
 
     def disable(self) -> None:
@@ -46,15 +46,15 @@ class FakeMotors:
         self.stopped += 1
 
 
-class FakeEye:
-    """A camera that has one frame to give whenever it is told to."""
+class FakeCamera:
+    """A camera that delivers one frame after each call of `provide`."""
 
     def __init__(self) -> None:
         self.next: Capture | None = None
         self.trouble = ""
         self.closed = 0
 
-    def see(self, captured_at: float, value: int, sequence: int = 0) -> None:
+    def provide(self, captured_at: float, value: int, sequence: int = 0) -> None:
         image = np.full((4, 4, 3), value, np.uint8)
         self.next = Capture(Frame(image, captured_at, sequence), captured_at)
 
@@ -74,16 +74,16 @@ class FakeEye:
 
 
 class Setup:
-    """A rig with what it moves and sees."""
+    """A rig with its fake motors and camera."""
 
     def __init__(self, **changes: Any) -> None:
-        self.motors, self.eye, self.said = FakeMotors(), FakeEye(), list[str]()
+        self.motors, self.camera, self.warnings = FakeMotors(), FakeCamera(), list[str]()
         self.config = rig_config(**changes)
         self.rig = HardwareRig(
             self.config,
             motors=lambda _: self.motors,
-            eye=lambda _: self.eye,
-            say=self.said.append,
+            camera=lambda _: self.camera,
+            warn=self.warnings.append,
         )
 
 
@@ -92,12 +92,12 @@ def rig_config(
     source: dict[str, Any] | None = None,
     period: float = CYCLE,
 ) -> Config:
-    known = {"cycle": CYCLE, "reply_timeout": 0.009, "command_timeout": 60.0, "start_speed": 0.9}
+    defaults = {"cycle": CYCLE, "reply_timeout": 0.009, "command_timeout": 60.0, "start_speed": 0.9}
     patient = {"timeout": 60.0, "lost_timeout": 60.0}
     return from_document(
         {
             "control": {"period": period},
-            "drives": drives_document(**(known | (drives or {}))),
+            "drives": drives_document(**(defaults | (drives or {}))),
             "camera": {"source": patient | (source or {})},
         }
     )

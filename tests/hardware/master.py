@@ -1,4 +1,4 @@
-"""A process that drives motors until something ends it; started by test_processes.py."""
+"""A process that moves the motors until it is ended; started by test_processes.py."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ STEP = np.array([1e-4, 0.01, 0.01])
 
 
 class Panic(BaseException):
-    """As a panic in Rust comes to Python: no `Exception`, so that nobody takes it for an error."""
+    """A panic in Rust reaches Python as a `BaseException` like this one."""
 
 
 def main() -> None:

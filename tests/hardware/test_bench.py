@@ -1,4 +1,4 @@
-"""The bench: the twin behind a bus and a camera stream, here and in a process of its own."""
+"""The bench: the twin behind a CAN bus and a camera stream, in this process and in its own."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from drive_rig import drives_document
+from drive_settings import drives_document
+from tautscope.bench.ground_truth import GroundTruthWriter, read_ground_truth
 from tautscope.bench.rig import Bench
-from tautscope.bench.truth import TruthFile, read_truth
 from tautscope.config import Config, dump_config, from_document
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError, OutputError
@@ -25,13 +25,14 @@ from tautscope.hardware.timing import read_sent
 from tautscope.log.reader import read_log
 from tautscope.runs.recording import Recording, per_dof
 from test_processes import Lines, process
+from waiting import TIMEOUT, until
 
-CYCLE, PATIENCE = 0.02, 60.0
+CYCLE = 0.02
 RUN = "from tautscope.cli import main; raise SystemExit(main())"
 
 
 def bench_config(folder: Path, **changes: Any) -> Config:
-    """A rig for a machine that may be busy: slow cycles, and patience."""
+    """Slow cycles and long timeouts, for a busy computer."""
     document = {
         "control": {"period": CYCLE},
         "camera": {
@@ -39,14 +40,14 @@ def bench_config(folder: Path, **changes: Any) -> Config:
                 "url": f"unix:{folder / 'video'}",
                 "format": "nut",
                 "clock": "device",
-                "timeout": PATIENCE,
-                "start_timeout": PATIENCE,
-                "lost_timeout": PATIENCE,
+                "timeout": TIMEOUT,
+                "start_timeout": TIMEOUT,
+                "lost_timeout": TIMEOUT,
                 "reconnect_period": 0.05,
             }
         },
         "drives": drives_document(
-            channel=str(folder / "can"), cycle=CYCLE, command_timeout=PATIENCE, start_speed=0.5
+            channel=str(folder / "can"), cycle=CYCLE, command_timeout=TIMEOUT, start_speed=0.5
         ),
         "experiment": {
             "periods": 3,
@@ -61,22 +62,15 @@ def bench_config(folder: Path, **changes: Any) -> Config:
 
 
 def next_capture(camera: Camera) -> Capture:
-    end = time.monotonic() + PATIENCE
+    end = time.monotonic() + TIMEOUT
     while (capture := camera.newest()) is None:
         assert time.monotonic() < end, camera.state
         time.sleep(0.005)
     return capture
 
 
-def until(condition: Callable[[], bool]) -> None:
-    end = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.005)
-
-
-def test_the_camera_is_seen_as_it_is_and_its_faults(tmp_path: Path) -> None:
-    """Without a master: the instrument stands, and is seen."""
+def test_camera_stream_and_its_faults(tmp_path: Path) -> None:
+    """Without a master the instrument rests and is visible."""
     config = bench_config(tmp_path)
     before = time.monotonic()
     with Bench(config) as bench, Camera(config.camera, time.monotonic) as camera:
@@ -116,14 +110,14 @@ def _is_still(camera: Camera, last: Capture) -> bool:
         ({"camera.pixel_format": "nv12"}, "camera.pixel_format"),
     ],
 )
-def test_a_configuration_of_hardware_is_no_bench(
+def test_bench_refuses_a_hardware_configuration(
     tmp_path: Path, changes: dict[str, Any], where: str
 ) -> None:
     with pytest.raises(ConfigError, match=where):
         Bench(bench_config(tmp_path, **changes))
 
 
-def test_sockets_that_cannot_be_made_are_named(tmp_path: Path) -> None:
+def test_error_names_a_socket_that_cannot_be_made(tmp_path: Path) -> None:
     config = bench_config(tmp_path)
     with (
         Bench(config),
@@ -137,29 +131,29 @@ def test_sockets_that_cannot_be_made_are_named(tmp_path: Path) -> None:
         Bench(config, tmp_path / "none" / "truth.csv")
 
 
-def test_a_fault_that_is_none_is_refused(tmp_path: Path) -> None:
+def test_unknown_fault_requests_are_refused(tmp_path: Path) -> None:
     with Bench(bench_config(tmp_path)) as bench:
         for line in ("explode camera", "freeze", "freeze tail", "explode rotation"):
             with pytest.raises(ConfigError, match="fault"):
                 bench.request(line)
 
 
-def test_a_disk_that_stalls_holds_no_drive_up(tmp_path: Path) -> None:
-    """A pipe that nobody reads is a disk that takes nothing; what waits is written in the end."""
+def test_stalled_disk_does_not_delay_the_drives(tmp_path: Path) -> None:
+    """A pipe without a reader simulates the disk; all data are written in the end."""
     pipe = tmp_path / "truth.csv"
     os.mkfifo(pipe)
     reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
-    told = np.arange(4 * 5000, dtype=float).reshape(-1, 4)
-    with TruthFile(pipe) as truth:
-        for now, *state in told:
+    rows = np.arange(4 * 5000, dtype=float).reshape(-1, 4)
+    with GroundTruthWriter(pipe) as truth:
+        for now, *state in rows:
             truth.add(now, np.array(state))  # 100 kB: more than a pipe holds
         time.sleep(0.3)
         os.set_blocking(reader, True)
         drain = threading.Thread(target=lambda: _copy(reader, tmp_path / "copy.csv"))
         drain.start()
     drain.join()
-    instants, states = read_truth(tmp_path / "copy.csv")
-    np.testing.assert_array_equal(np.column_stack([instants, states]), told)
+    instants, states = read_ground_truth(tmp_path / "copy.csv")
+    np.testing.assert_array_equal(np.column_stack([instants, states]), rows)
 
 
 def _copy(reader: int, file: Path) -> None:
@@ -169,7 +163,7 @@ def _copy(reader: int, file: Path) -> None:
 
 @pytest.fixture
 def rig(tmp_path: Path) -> Iterator[tuple[Config, Path, Lines]]:
-    """A bench in a process of its own: configuration, its file, what it says."""
+    """A bench in its own process: configuration, its file, its output."""
     config = bench_config(tmp_path)
     file = tmp_path / "rig.toml"
     file.write_text(dump_config(config), encoding="utf-8")
@@ -179,9 +173,7 @@ def rig(tmp_path: Path) -> Iterator[tuple[Config, Path, Lines]]:
         yield config, file, lines
 
 
-def test_the_protocol_runs_over_bus_and_stream(
-    rig: tuple[Config, Path, Lines], tmp_path: Path
-) -> None:
+def test_protocol_runs_over_bus_and_stream(rig: tuple[Config, Path, Lines], tmp_path: Path) -> None:
     config, _, lines = rig
     out = tmp_path / "run"
     found = run_on_hardware(config, out, lambda share: None)
@@ -194,18 +186,18 @@ def test_the_protocol_runs_over_bus_and_stream(
     np.testing.assert_allclose(np.diff(trace["time"]), CYCLE, rtol=1e-6)
     assert len(frames) > 0
     assert (frames["captured_at"] < frames["arrived_at"]).all()
-    # The motors do what they are told, a cycle or two later.
+    # The motors follow the commands with a lag of two cycles.
     late = np.abs(per_dof(trace, "applied")[2:] - per_dof(trace, "command")[:-2])
     assert (late.max(axis=0) < [2e-3, 0.2, 0.1]).all()
 
     sent = read_sent(out / "timing_cycles.csv")
-    instants, states = read_truth(tmp_path / "truth.csv")
+    instants, states = read_ground_truth(tmp_path / "truth.csv")
     assert len(sent) == len(trace)
     truth = np.interp(sent, instants, states[:, Dof.INSERTION])
-    seen = frames[frames["observable_insertion"] & (frames["captured_at"] > 0)]
-    if len(seen) > 5:  # a machine so busy that no frame arrives shows nothing of this
-        tip = np.interp(seen["captured_at"], trace["time"], truth)
-        assert np.median(np.abs(seen["estimate_insertion"] - tip)) < 2e-3
+    measured = frames[frames["observable_insertion"] & (frames["captured_at"] > 0)]
+    if len(measured) > 5:  # a busy computer may deliver too few frames
+        tip = np.interp(measured["captured_at"], trace["time"], truth)
+        assert np.median(np.abs(measured["estimate_insertion"] - tip)) < 2e-3
 
     facts = json.loads((out / "run.json").read_text(encoding="utf-8"))
     assert facts["runs"]["compensated"]["ticks"] == len(trace)
@@ -214,7 +206,7 @@ def test_the_protocol_runs_over_bus_and_stream(
         assert (out / name).stat().st_size > 0
 
 
-def test_a_run_that_is_told_to_end_stops_the_motors_and_leaves_its_log(
+def test_sigterm_stops_the_motors_and_keeps_the_log(
     rig: tuple[Config, Path, Lines], tmp_path: Path
 ) -> None:
     _, file, lines = rig
@@ -225,11 +217,11 @@ def test_a_run_that_is_told_to_end_stops_the_motors_and_leaves_its_log(
         until(lambda: log.is_file() and log.stat().st_size > 10_000)
         running.send_signal(signal.SIGTERM)
         lines.until("quick stop active", 3)
-        assert running.wait(PATIENCE) == 128 + signal.SIGTERM
+        assert running.wait(TIMEOUT) == 128 + signal.SIGTERM
     assert len(read_log(log).recording().trace) > 0
 
 
-def test_a_wrong_node_is_said_and_nothing_moves(
+def test_error_names_a_wrong_node_before_any_motion(
     rig: tuple[Config, Path, Lines], tmp_path: Path
 ) -> None:
     _, file, _ = rig
@@ -237,9 +229,9 @@ def test_a_wrong_node_is_said_and_nothing_moves(
     text = file.read_text(encoding="utf-8").replace("node = 2", "node = 9")
     wrong.write_text(text.replace("request_timeout = 5.0", "request_timeout = 0.5"))
     with process("-c", RUN, "run", str(wrong), "--out", str(tmp_path / "run")) as (running, _):
-        assert running.wait(PATIENCE) == 2
+        assert running.wait(TIMEOUT) == 2
         assert running.stderr is not None
-        said = running.stderr.read()
-    assert "error: rotation, node 9: no answer to a request" in said
-    assert "Check drives.rotation.node" in said
-    assert "The log up to then is" in said
+        errors = running.stderr.read()
+    assert "error: rotation, node 9: no answer to an SDO request" in errors
+    assert "Check drives.rotation.node" in errors
+    assert "The log of the run is" in errors

@@ -1,4 +1,4 @@
-"""Live cameras on FFmpeg's own test sources; DV as the article's rig gave it."""
+"""Live cameras with FFmpeg's test sources, and with DV as in the article's rig."""
 
 import os
 import threading
@@ -7,38 +7,39 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sources import PATIENCE, camera, pattern, until, write_dv
 from tautscope.config import CameraConfig, SourceConfig
 from tautscope.errors import CameraError
 from tautscope.hardware.cameras import Camera, Capture
+from video_sources import camera, pattern, write_dv
+from waiting import TIMEOUT, until
 
 
-def test_a_live_camera_gives_its_newest_frame_once() -> None:
+def test_each_newest_frame_is_returned_once() -> None:
     with Camera(camera(pattern())) as live:
-        seen: list[Capture] = []
+        captures: list[Capture] = []
 
         def take() -> bool:
             capture = live.newest()
             if capture is not None:
-                seen.append(capture)
-            return len(seen) >= 5
+                captures.append(capture)
+            return len(captures) >= 5
 
         until(take)
-        until(lambda: live.state.received >= seen[-1].frame.sequence + 4)
+        until(lambda: live.state.received >= captures[-1].frame.sequence + 4)
         state = live.state
-    sequences = [capture.frame.sequence for capture in seen]
+    sequences = [capture.frame.sequence for capture in captures]
     assert sequences == sorted(set(sequences))
     assert state.skipped > 0
     assert state.is_interlaced is False
     assert state.trouble == ""
-    for capture in seen:
+    for capture in captures:
         assert capture.frame.captured_at <= capture.arrived_at
         assert capture.frame.image.shape == (48, 64, 3)
-    spacing = np.diff([capture.frame.captured_at for capture in seen]) / np.diff(sequences)
+    spacing = np.diff([capture.frame.captured_at for capture in captures]) / np.diff(sequences)
     assert np.median(spacing) == pytest.approx(0.02, rel=0.5)
 
 
-def test_a_source_that_ends_is_opened_again_and_counts_on() -> None:
+def test_source_that_ends_is_reopened() -> None:
     config = camera(pattern(":duration=0.3"))
     with Camera(config) as live:
         until(lambda: live.state.reconnects >= 2 and live.state.received >= 40)
@@ -47,12 +48,12 @@ def test_a_source_that_ends_is_opened_again_and_counts_on() -> None:
         until(lambda: live.newest() is not None)
 
 
-def test_a_camera_that_comes_later_is_found(tmp_path: Path) -> None:
-    """Unplugged at first: a file that is not there yet."""
+def test_camera_connected_later_is_found(tmp_path: Path) -> None:
+    """A file that does not exist yet simulates an unplugged camera."""
     path = tmp_path / "late.avi"
     config = CameraConfig(
         source=SourceConfig(
-            url=str(path), format=None, reconnect_period=0.01, start_timeout=PATIENCE
+            url=str(path), format=None, reconnect_period=0.01, start_timeout=TIMEOUT
         )
     )
     live = Camera(config)
@@ -73,11 +74,11 @@ def test_a_camera_that_comes_later_is_found(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("url", "what", "todo"),
     [
-        ("color=black:size=64x48:rate=50,realtime", "black pictures", "is the light on"),
-        ("color=red:size=64x48:rate=50,realtime", "the same picture", "frozen"),
+        ("color=black:size=64x48:rate=50,realtime", "black images", "is the light on"),
+        ("color=red:size=64x48:rate=50,realtime", "equal images", "frozen"),
     ],
 )
-def test_the_self_test_says_what_came_and_what_to_do(url: str, what: str, todo: str) -> None:
+def test_self_test_reports_cause_and_remedy(url: str, what: str, todo: str) -> None:
     with pytest.raises(CameraError, match=f"{what}.*{todo}"):
         Camera(camera(url)).open()
 
@@ -90,7 +91,7 @@ def test_the_self_test_says_what_came_and_what_to_do(url: str, what: str, todo: 
     ],
     ids=["missing", "source"],
 )
-def test_a_camera_that_does_not_open_is_named(config: CameraConfig, what: str) -> None:
+def test_error_names_a_camera_that_does_not_open(config: CameraConfig, what: str) -> None:
     with pytest.raises(CameraError, match=what):
         Camera(config).open()
 
@@ -103,7 +104,7 @@ def test_a_camera_that_does_not_open_is_named(config: CameraConfig, what: str) -
     ],
     ids=["size", "sound"],
 )
-def test_what_waiting_does_not_mend_is_said_at_once(
+def test_permanent_errors_are_raised_without_waiting(
     config: CameraConfig, what: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     live = Camera(config)
@@ -114,10 +115,10 @@ def test_what_waiting_does_not_mend_is_said_at_once(
     )
     with pytest.raises(CameraError, match=what):
         live.open()
-    assert waited == [True]  # told, not timed out
+    assert waited == [True]  # set by the error, not timed out
 
 
-def test_dv_from_a_pipe_that_pauses_is_said_and_goes_on(tmp_path: Path) -> None:
+def test_dv_from_a_stalled_pipe_recovers(tmp_path: Path) -> None:
     """As `ffmpeg -f iec61883 -i auto -c copy -f dv -` writes it, by a process that stalls."""
     write_dv(tmp_path / "clip.dv", 25)
     data, pipe = (tmp_path / "clip.dv").read_bytes(), tmp_path / "pipe"
@@ -126,7 +127,7 @@ def test_dv_from_a_pipe_that_pauses_is_said_and_goes_on(tmp_path: Path) -> None:
         url=str(pipe),
         format="dv",
         timeout=0.3,
-        start_timeout=PATIENCE,
+        start_timeout=TIMEOUT,
         options={"probesize": "500000"},
     )
     go_on = threading.Event()
@@ -135,7 +136,7 @@ def test_dv_from_a_pipe_that_pauses_is_said_and_goes_on(tmp_path: Path) -> None:
         with suppress(BrokenPipeError), pipe.open("wb", buffering=0) as file:
             file.write(data)
             go_on.wait()
-            while True:  # until nobody reads any more
+            while True:  # until the reader closes the pipe
                 file.write(data)
 
     writer = threading.Thread(target=write, daemon=True)

@@ -1,4 +1,4 @@
-"""Drives that are not there, or not as they should be, are refused before a motor is enabled."""
+"""Missing and unsuitable drives are refused before a motor is enabled."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from drive_rig import drives_config
+from drive_settings import AXES, drives_config
 from tautscope.bench.can_bus import Hub
 from tautscope.bench.canopen_node import CanopenNode
 from tautscope.bench.drives import SimulatedDrives
@@ -20,7 +20,7 @@ from tautscope.errors import (
 )
 from tautscope.hardware.cia402 import State
 from tautscope.hardware.drives import open_drives
-from test_faults import wait_for
+from waiting import until
 
 Bench = Callable[..., SimulatedDrives]
 
@@ -29,38 +29,31 @@ def hex_of(key: tuple[int, int]) -> str:
     return f"{key[0]:04X}:{key[1]}"
 
 
-def test_a_mode_that_is_refused(hub: Hub, bench: Bench) -> None:
+def test_mode_refused_by_the_drive(hub: Hub, bench: Bench) -> None:
     config = drives_config(channel=str(hub.path), state_timeout=0.2)
     rig = bench(config, modes=(7,))
     rig.inject("refuse", Dof.BENDING)
-    wait_for(lambda: any(event.what == "fault: refuse" for event in rig.events))
-    with pytest.raises(ModeRefusedError, match=r"bending, node 3: mode 7.*says 0"):
+    until(lambda: any(event.what == "fault: refuse" for event in rig.events))
+    with pytest.raises(ModeRefusedError, match=r"bending, node 3: it did not enter mode 7.*is 0"):
         open_drives(config)
 
 
-def test_a_drive_without_a_streaming_mode(hub: Hub, bench: Bench) -> None:
+def test_drive_without_position_streaming_mode(hub: Hub, bench: Bench) -> None:
     config = drives_config(channel=str(hub.path))
     bench(config, modes=(1, 3, 6))
     with pytest.raises(ModeRefusedError, match="0x00000025: neither"):
         open_drives(config)
 
 
-def test_a_drive_that_is_not_there(hub: Hub, bench: Bench) -> None:
-    config = drives_config(channel=str(hub.path), request_timeout=0.3)
+def test_missing_drive(hub: Hub, bench: Bench) -> None:
     bench(drives_config())
-    axis = {name: getattr(config.rotation, name) for name in config.rotation.__struct_fields__}
-    other = drives_config(
-        channel=str(hub.path), request_timeout=0.3, rotation=without_none(axis) | {"node": 9}
-    )
+    rotation = AXES["rotation"] | {"node": 9}
+    other = drives_config(channel=str(hub.path), request_timeout=0.3, rotation=rotation)
     with pytest.raises(SilentDriveError, match=r"rotation, node 9.*Check drives.rotation.node"):
         open_drives(other)
 
 
-def without_none(values: dict[str, object]) -> dict[str, object]:
-    return {name: value for name, value in values.items() if value is not None}
-
-
-def test_a_protection_the_drive_lacks_must_be_waived(hub: Hub, bench: Bench) -> None:
+def test_missing_protection_must_be_waived(hub: Hub, bench: Bench) -> None:
     config = drives_config(channel=str(hub.path))
     bench(config, absent=(0x6007, 0x6080))
     with pytest.raises(SettingRefusedError, match=r"add 6007 to drives\.waive"):
@@ -71,7 +64,7 @@ def test_a_protection_the_drive_lacks_must_be_waived(hub: Hub, bench: Bench) -> 
 
 
 @pytest.mark.parametrize("index", [0x6502, 0x6064, 0x1401, 0x1016])
-def test_an_object_that_cannot_be_missed(hub: Hub, bench: Bench, index: int) -> None:
+def test_missing_mandatory_object(hub: Hub, bench: Bench, index: int) -> None:
     config = drives_config(channel=str(hub.path))
     bench(config, absent=(index,))
     with pytest.raises(SettingRefusedError, match=r"insertion, node 1"):
@@ -79,7 +72,7 @@ def test_an_object_that_cannot_be_missed(hub: Hub, bench: Bench, index: int) -> 
 
 
 @pytest.mark.parametrize("key", [(0x605A, 0), (0x607D, 2), (0x1017, 0), (0x1401, 2)], ids=hex_of)
-def test_a_setting_that_reads_back_differently(
+def test_setting_that_reads_back_differently(
     hub: Hub, bench: Bench, monkeypatch: pytest.MonkeyPatch, key: tuple[int, int]
 ) -> None:
     store = CanopenNode._store
@@ -94,8 +87,8 @@ def test_a_setting_that_reads_back_differently(
         open_drives(config)
 
 
-def test_protections_and_limits_are_in_the_drive(hub: Hub, bench: Bench) -> None:
-    """In counts, with the rotation's sign -1 and home 0.25 rad worked out by hand."""
+def test_protections_and_limits_are_written_to_the_drive(hub: Hub, bench: Bench) -> None:
+    """In counts, with the rotation's sign -1 and home 0.25 rad calculated by hand."""
     config = drives_config(channel=str(hub.path))
     rig = bench(config)
     with open_drives(config):
@@ -110,7 +103,7 @@ def test_protections_and_limits_are_in_the_drive(hub: Hub, bench: Bench) -> None
         assert values[0x1016, 1] == 127 << 16 | 3000
 
 
-def test_a_motor_outside_its_travel_is_not_enabled(hub: Hub, bench: Bench) -> None:
+def test_motor_outside_its_travel_is_not_enabled(hub: Hub, bench: Bench) -> None:
     config = drives_config(channel=str(hub.path))
     rig = bench(config, start=np.array([0.0, 0.0, 2.5]))
     with (
@@ -121,7 +114,7 @@ def test_a_motor_outside_its_travel_is_not_enabled(hub: Hub, bench: Bench) -> No
     assert not any(event.what == State.OPERATION_ENABLED for event in rig.events)
 
 
-def test_there_is_no_bus() -> None:
+def test_missing_bus() -> None:
     with pytest.raises(BusError, match=r"tautscope /nowhere cannot be opened.*drives.interface"):
         open_drives(drives_config(channel="/nowhere"))
     with pytest.raises(BusError, match="sudo ip link set can7 up type can bitrate 1000000"):
@@ -130,8 +123,8 @@ def test_there_is_no_bus() -> None:
         open_drives(drives_config(interface="no_such_interface"))
 
 
-def test_a_drive_stops_by_itself_only_where_we_would(hub: Hub, bench: Bench) -> None:
-    """It compares with its present set-point, so that the way of a lag comes on top."""
+def test_drive_following_error_window_includes_the_lag(hub: Hub, bench: Bench) -> None:
+    """The drive compares with its present set-point, so the travel during the lag is added."""
     config = drives_config(channel=str(hub.path), lag=0.03, following_timeout=0.07)
     bench(config)
     with open_drives(config) as drives:

@@ -1,4 +1,4 @@
-"""`tautscope doctor` with a rig, with a wrong one, and with none; nothing is ever enabled."""
+"""`tautscope doctor` with a rig, a wrong one, and none; no drive is ever enabled."""
 
 from __future__ import annotations
 
@@ -10,17 +10,18 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from drive_rig import AXES, drives_document
+from drive_settings import AXES, drives_document
 from tautscope.bench.can_bus import Hub
 from tautscope.bench.drives import SimulatedDrives
 from tautscope.cli import main
 from tautscope.config import DrivesConfig, dump_config, from_document
 from tautscope.dof import Dof
 from tautscope.hardware.cia402 import State
+from tautscope.hardware.doctor.check_result import CheckResult
 from tautscope.hardware.doctor.computer import check_disk
 from tautscope.hardware.doctor.drives import check_drives
-from tautscope.hardware.doctor.finding import Finding
-from test_cameras import PATIENCE, until, write_dv
+from video_sources import write_dv
+from waiting import TIMEOUT, until
 
 Bench = Callable[..., SimulatedDrives]
 CAMERA = {
@@ -29,8 +30,8 @@ CAMERA = {
     "source": {
         "url": "testsrc2=size=64x48:rate=50,realtime",
         "format": "lavfi",
-        "start_timeout": PATIENCE,
-        "timeout": PATIENCE,
+        "start_timeout": TIMEOUT,
+        "timeout": TIMEOUT,
     },
 }
 
@@ -56,9 +57,9 @@ def doctor(
         file.write_text(dump_config(from_document(found)), encoding="utf-8")
         arguments.append(str(file))
     status = main(arguments)
-    said = json.loads(capsys.readouterr().out)
-    assert said["complete"] == (status == 0)
-    return status, {one["what"]: one for one in said["findings"]}
+    output = json.loads(capsys.readouterr().out)
+    assert output["complete"] == (status == 0)
+    return status, {one["what"]: one for one in output["findings"]}
 
 
 def was_never_enabled(drives: SimulatedDrives) -> bool:
@@ -68,22 +69,22 @@ def was_never_enabled(drives: SimulatedDrives) -> bool:
     return State.OPERATION_ENABLED.value not in seen
 
 
-def put(drives: SimulatedDrives, dof: Dof, state: State) -> None:
-    """As somebody else left it; a drive that boots would forget."""
+def set_state(drives: SimulatedDrives, dof: Dof, state: State) -> None:
+    """Set the state of a drive that has booted."""
     until(lambda: State.NOT_READY not in drives.states.values())
-    drives._drives[dof]._go(state, time.monotonic())
+    drives._drives[dof]._enter(state, time.monotonic())
 
 
 @pytest.fixture
 def permitted(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """The policies that were asked for; the tests' own process keeps its own."""
+    """Record the requested scheduling policies; the process of the tests keeps its own."""
     asked: list[int] = []
     monkeypatch.setattr(os, "sched_setscheduler", lambda pid, policy, of: asked.append(policy))
     return asked
 
 
 @pytest.mark.parametrize("modes", [(7, 8), (1, 7)], ids=["csp", "article"])
-def test_a_rig_that_is_all_there(
+def test_complete_rig(
     hub: Hub,
     bench: Bench,
     tmp_path: Path,
@@ -114,18 +115,18 @@ def test_a_rig_that_is_all_there(
     assert was_never_enabled(drives)
 
 
-def test_a_quick_stopped_motor_stays_held(hub: Hub, bench: Bench) -> None:
+def test_motor_in_quick_stop_stays_held(hub: Hub, bench: Bench) -> None:
     config = drives_of(document(hub.path))
     drives = bench(config)
     for dof in Dof:
-        put(drives, dof, State.QUICK_STOP_ACTIVE)
+        set_state(drives, dof, State.QUICK_STOP_ACTIVE)
     findings = check_drives(config)
     assert {one.status for one in findings} <= {"ok", "note"}, findings
     assert set(drives.states.values()) == {State.QUICK_STOP_ACTIVE}
     assert was_never_enabled(drives)
 
 
-def test_interlaced_dv_is_told_as_fields(
+def test_interlaced_dv_is_reported_as_fields(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     write_dv(tmp_path / "clip.avi", 40)
@@ -139,7 +140,7 @@ def test_interlaced_dv_is_told_as_fields(
     assert "configs/article_rig.toml" in found["configuration"]["todo"]
 
 
-def test_nothing_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_missing_camera_and_bus(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     config = document(tmp_path / "nobody")
     config["camera"] = {**CAMERA, "source": {"url": "/dev/video99"}}
     config["control"]["period"] = 0.005
@@ -160,7 +161,7 @@ def test_without_a_configuration_nothing_is_opened(
     assert not any(what.startswith(("source", "bus")) for what in found)
 
 
-def test_text_says_what_to_type(
+def test_text_output_contains_the_remedy(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(pid: int, policy: int, of: object) -> None:
@@ -170,41 +171,41 @@ def test_text_says_what_to_type(
     file = tmp_path / "rig.toml"
     file.write_text("[camera.source]\nurl = '/dev/video99'\n")
     assert main(["doctor", str(file)]) == 1
-    said = capsys.readouterr().out
-    assert "MISSING real-time priority: SCHED_FIFO is not permitted" in said
-    assert "rtprio 60" in said
-    assert "memlock unlimited" in said
-    assert said.endswith("3 missing. No motor was enabled.\n")
+    output = capsys.readouterr().out
+    assert "MISSING real-time priority: SCHED_FIFO is not permitted" in output
+    assert "rtprio 60" in output
+    assert "memlock unlimited" in output
+    assert output.endswith("3 missing. No motor was enabled.\n")
     assert main(["doctor", str(tmp_path / "none.toml")]) == 2
 
 
-def missing(findings: list[Finding]) -> dict[str, Finding]:
+def missing(findings: list[CheckResult]) -> dict[str, CheckResult]:
     return {one.what: one for one in findings if one.status == "missing"}
 
 
 @pytest.mark.parametrize(
-    ("options", "changes", "where", "says"),
+    ("options", "changes", "where", "message"),
     [
-        ({"modes": (1, 3)}, {}, "rotation, node 2", "streamed positions"),
+        ({"modes": (1, 3)}, {}, "rotation, node 2", "stream of positions"),
         ({"absent": (0x6007,)}, {}, "rotation, node 2: settings", "add 6007 to drives.waive"),
         ({"start": [0, 3.4, 0]}, {"home": 2.0}, "rotation, node 2", "drives.rotation.travel"),
         ({}, {"node": 9}, "rotation, node 9", "drives.rotation.node"),
     ],
     ids=["modes", "protection", "travel", "node"],
 )
-def test_a_wrong_drive_is_named_and_the_others_are_seen(
+def test_wrong_drive_is_named_and_the_others_are_checked(
     hub: Hub,
     bench: Bench,
     *,
     options: dict[str, Any],
     changes: dict[str, Any],
     where: str,
-    says: str,
+    message: str,
 ) -> None:
     drives = bench(drives_of(document(hub.path)), **options)
     wrong = {"rotation": {**AXES["rotation"], **changes}, "request_timeout": 1.0}
     found = check_drives(drives_of(document(hub.path, **wrong)))
-    assert says in missing(found)[where].todo, missing(found)
+    assert message in missing(found)[where].todo, missing(found)
     assert any(one.what == "bending, node 3" for one in found)
     assert was_never_enabled(drives)
 
@@ -213,12 +214,12 @@ def test_a_wrong_drive_is_named_and_the_others_are_seen(
     ("state", "todo"),
     [(State.FAULT, "Find the cause"), (State.OPERATION_ENABLED, "end the program")],
 )
-def test_a_drive_that_is_not_at_rest_is_told_nothing(
+def test_nothing_is_written_to_an_enabled_or_faulty_drive(
     hub: Hub, bench: Bench, state: State, todo: str
 ) -> None:
     config = drives_of(document(hub.path))
     drives = bench(config)
-    put(drives, Dof.ROTATION, state)
+    set_state(drives, Dof.ROTATION, state)
     before = [dict(drive.values) for drive in drives._drives]
     found = missing(check_drives(config))
     assert found.keys() == {"rotation, node 2"}
@@ -226,7 +227,7 @@ def test_a_drive_that_is_not_at_rest_is_told_nothing(
     assert [drive.values for drive in drives._drives] == before
 
 
-def test_a_heartbeat_that_stays_away_is_missing(hub: Hub, bench: Bench) -> None:
+def test_missing_heartbeat_is_reported(hub: Hub, bench: Bench) -> None:
     config = drives_of(document(hub.path))
     drives = bench(config)
     drives.inject("heartbeat", Dof.BENDING)
@@ -235,7 +236,7 @@ def test_a_heartbeat_that_stays_away_is_missing(hub: Hub, bench: Bench) -> None:
     assert "bending, node 3: no heartbeat" in found["heartbeats and answers"].found
 
 
-def test_a_full_or_slow_disk_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_full_or_slow_disk_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     config = from_document({})
     where = "tautscope.hardware.doctor.computer"
     monkeypatch.setattr(f"{where}._speed", lambda folder, size: 1e9)
@@ -243,10 +244,10 @@ def test_a_full_or_slow_disk_is_missing(tmp_path: Path, monkeypatch: pytest.Monk
     # 720 x 576 x 3 bytes, 50 a second, 55 % of it: 34 MB/s, or 20 GB in ten minutes.
     monkeypatch.setattr(f"{where}._speed", lambda folder, size: 30e6)
     slow = check_disk(config, tmp_path)
-    assert (slow.status, "quicker disk" in slow.todo) == ("missing", True)
+    assert (slow.status, "faster disk" in slow.todo) == ("missing", True)
     assert slow.data["needed_per_second"] == pytest.approx(34.2e6, rel=0.01)
     used = type("Usage", (), {"free": 20e9})
     monkeypatch.setattr(f"{where}.shutil.disk_usage", lambda folder: used)
-    assert "more room" in check_disk(config, tmp_path).todo
+    assert "more space" in check_disk(config, tmp_path).todo
     monkeypatch.undo()
     assert "ls -ld" in check_disk(config, tmp_path / "none").todo

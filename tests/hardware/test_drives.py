@@ -1,4 +1,4 @@
-"""Drives over the bus: they start, follow, and stop on every way out."""
+"""Drives on the bus start, follow commands, and stop."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from drive_rig import drives_config
+from drive_settings import drives_config
 from tautscope.bench.can_bus import Hub
 from tautscope.bench.drives import SimulatedDrives
 from tautscope.hardware.cia402 import Mode, State
@@ -19,11 +19,11 @@ START = np.array([0.01, -0.5, 0.2])
 def test_motors_follow_in_si_units(
     hub: Hub, bench: Callable[..., SimulatedDrives], mode: int
 ) -> None:
-    """The plant is told in SI, by its own truth, what was commanded in SI."""
-    told: list[np.ndarray] = []
+    """The plant receives the commands in SI units."""
+    demands: list[np.ndarray] = []
 
     def plant(targets: np.ndarray) -> np.ndarray:
-        told.append(targets.copy())
+        demands.append(targets.copy())
         return targets
 
     config = drives_config(channel=str(hub.path))
@@ -39,7 +39,7 @@ def test_motors_follow_in_si_units(
         for _ in range(5):
             applied = drives.exchange(command)
         np.testing.assert_allclose(applied, command, atol=1e-4)
-        np.testing.assert_allclose(told[-1], command, atol=1e-4)
+        np.testing.assert_allclose(demands[-1], command, atol=1e-4)
     assert set(rig.states.values()) == {State.QUICK_STOP_ACTIVE}
     assert all(state is not State.OPERATION_ENABLED for state in rig.states.values())
     assert [one.name for one in drives.commissioned] == [

@@ -1,4 +1,4 @@
-"""What a configuration of drives refuses, and how it says so."""
+"""Validation of the section [drives], and conversion of units."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from drive_rig import AXES, drives_config, drives_document
+from drive_settings import AXES, drives_config, drives_document
 from tautscope.config import Config, dump_config, from_document, load_config
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError
 from tautscope.hardware.cia402 import Scale
 from tautscope.hardware.drives import open_drives
-from tautscope.hardware.object_dictionary import eds_text, load_eds, profile
+from tautscope.hardware.object_dictionary import device_profile, eds_text, load_eds
 
 
 def rotation(**changes: Any) -> dict[str, Any]:
@@ -25,7 +25,7 @@ def rotation(**changes: Any) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize(
-    ("changes", "field", "says"),
+    ("changes", "field", "message"),
     [
         (rotation(node=0), "drives.rotation.node", ">= 1"),
         (rotation(node=128), "drives.rotation.node", "<= 127"),
@@ -52,14 +52,14 @@ def rotation(**changes: Any) -> dict[str, Any]:
         ({"waive": ["6040"]}, "drives.waive[0]", "enum"),
     ],
 )
-def test_a_mistake_is_named(changes: dict[str, Any], field: str, says: str) -> None:
+def test_error_names_the_invalid_field(changes: dict[str, Any], field: str, message: str) -> None:
     with pytest.raises(ConfigError) as found:
         from_document({"drives": drives_document(**changes)})
     assert found.value.field == field
-    assert says in found.value.allowed
+    assert message in found.value.allowed
 
 
-def test_drives_are_read_back_equal_and_are_not_there_by_default(tmp_path: Path) -> None:
+def test_drives_section_is_optional_and_survives_a_round_trip(tmp_path: Path) -> None:
     assert Config().drives is None
     config = from_document({"drives": drives_document()})
     file = tmp_path / "rig.toml"
@@ -68,7 +68,7 @@ def test_drives_are_read_back_equal_and_are_not_there_by_default(tmp_path: Path)
 
 
 @pytest.mark.parametrize("text", [None, "no EDS\n", "[6040]\nParameterName=x\nObjectType=7\n"])
-def test_an_eds_file_that_cannot_be_used(tmp_path: Path, text: str | None) -> None:
+def test_unusable_eds_file(tmp_path: Path, text: str | None) -> None:
     file = tmp_path / "drive.eds"
     if text is not None:
         file.write_text(text, encoding="utf-8")
@@ -78,12 +78,12 @@ def test_an_eds_file_that_cannot_be_used(tmp_path: Path, text: str | None) -> No
     assert found.value.value == str(file)
 
 
-def test_the_eds_file_says_what_the_table_says(tmp_path: Path) -> None:
+def test_generated_eds_file_matches_the_table(tmp_path: Path) -> None:
     """Read by the `canopen` library."""
     file = tmp_path / "drive.eds"
     file.write_text(eds_text(5), encoding="utf-8")
     dictionary = load_eds(str(file), 5)
-    for entry in profile(5):
+    for entry in device_profile(5):
         found = dictionary.get_variable(entry.index, entry.subindex)
         assert found is not None, str(entry)
         assert (found.data_type, len(found)) == (entry.data_type, 8 * entry.size), str(entry)
@@ -102,13 +102,13 @@ def test_the_eds_file_says_what_the_table_says(tmp_path: Path) -> None:
     ],
 )
 def test_units_and_signs(dof: Dof, position: float, counts: int) -> None:
-    """Worked out by hand from the axes' figures."""
+    """Calculated by hand from the axes' settings."""
     scale = Scale(drives_config()[dof], dof.label)
     assert scale.to_counts(position) == counts
     assert scale.to_position(counts) == pytest.approx(position, abs=1e-6)
 
 
-def test_importing_the_package_loads_no_bus() -> None:
+def test_import_loads_no_bus_library() -> None:
     code = (
         "import sys, tautscope, tautscope.hardware.drives, tautscope.config\n"
         "assert not {'can', 'canopen', 'pysoem', 'serial'} & set(sys.modules)"
@@ -117,10 +117,10 @@ def test_importing_the_package_loads_no_bus() -> None:
     assert done.returncode == 0, done.stderr
 
 
-def test_the_documented_configuration_is_accepted() -> None:
+def test_documented_configuration_is_valid() -> None:
     page = Path(__file__).resolve().parents[2] / "docs" / "hardware.md"
     (block,) = re.findall(r"```toml\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
     drives = from_document(tomllib.loads(block)).drives
     assert drives is not None
-    # The comment beside the figure: 4096 counts a turn, 20:1, over 2 pi.
+    # 4096 counts per turn, gear ratio 20:1, divided by 2 pi.
     assert drives.rotation.counts_per_unit == pytest.approx(4096 * 20 / (2 * math.pi), rel=1e-5)

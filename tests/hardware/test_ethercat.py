@@ -1,7 +1,7 @@
-"""The EtherCAT link, against a fake of `pysoem` with simulated drives behind it.
+"""The EtherCAT fieldbus with a fake of `pysoem` and simulated drives.
 
-A contract test: the same `Drives` over another link. The fake's drives are those of the CAN bench,
-reached as EtherCAT reaches them: SDO by mailbox, process data as PDO 0x1600 and 0x1A00.
+`Drives` runs on another fieldbus with the drives of the CAN bench: SDO by mailbox, process data as
+PDO 0x1600 and 0x1A00.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from drive_rig import drives_config
+from drive_settings import drives_config
 from tautscope.bench.drives import SimulatedDrive
 from tautscope.config import DrivesConfig
 from tautscope.dof import Dof
@@ -24,9 +24,9 @@ from tautscope.errors import (
     SilentDriveError,
     StateError,
 )
-from tautscope.hardware.cia402 import AT_REST, Mode, State
+from tautscope.hardware.cia402 import STOPPED_STATES, Mode, State
 from tautscope.hardware.drives import Drives
-from tautscope.hardware.ethercat_drives import EthercatLink
+from tautscope.hardware.ethercat_fieldbus import EthercatFieldbus
 
 INIT, PREOP, SAFEOP, OP = 1, 2, 4, 8
 
@@ -42,11 +42,16 @@ class WkcError(Exception):
 
 
 class Slave:
-    """A simulated drive as pysoem shows one."""
+    """A simulated drive with the interface of a pysoem slave."""
 
     def __init__(self, dof: Dof, config: DrivesConfig, modes: frozenset[int]) -> None:
         self.drive = SimulatedDrive(
-            dof, config, self._said, lambda now, what: None, modes=modes, absent=frozenset({0x6007})
+            dof,
+            config,
+            self._receive,
+            lambda now, what: None,
+            modes=modes,
+            absent=frozenset({0x6007}),
         )
         self.answers: list[bytes] = []
         self.drive.boot(0.0)
@@ -56,19 +61,19 @@ class Slave:
         self.state = PREOP
         self.al_status = 0x001B
         self.watchdog: tuple[str, float] | None = None
-        self.deaf = False
+        self.is_silent = False
 
-    def _said(self, identifier: int, data: bytes) -> None:
+    def _receive(self, identifier: int, data: bytes) -> None:
         if identifier >> 7 == 0x580 >> 7:
             self.answers.append(data)
 
     def _ask(self, request: bytes) -> bytes:
-        if self.deaf:
+        if self.is_silent:
             raise WkcError
         if struct.unpack_from("<H", request, 1)[0] in (0x1600, 0x1A00):
             base = struct.unpack_from("<H", request, 1)[0] - 0x200
             self.drive.values[base, 1] |= 1 << 31  # there is no COB-ID on EtherCAT
-        self.drive.take(0x600 + self.drive.node, request, 0.0)
+        self.drive.receive(0x600 + self.drive.node, request, 0.0)
         answer = self.answers.pop()
         if answer[0] == 0x80:
             raise SdoError(struct.unpack_from("<I", answer, 4)[0])
@@ -99,21 +104,21 @@ class Slave:
             self.drive._store(key, value, 0.0)
             start += size
         self.drive.on_sync(0.0)
-        self.drive.set_actual(self.drive.demand)
+        self.drive.set_position(self.drive.demand)
         self.input = b"".join(
             self.drive.entries[key].encode(values[key]) for key in self.drive._mapped(0x1A00)
         )
 
 
 class Master:
-    """A line of slaves as pysoem's Master."""
+    """A line of slaves with the interface of pysoem's Master."""
 
     def __init__(self, slaves: list[Slave], *, stuck_in: int | None = None) -> None:
         self.slaves = slaves
         self.state = PREOP
         self.expected_wkc = 3 * len(slaves)
         self.open_on: str | None = None
-        self.unplugged = False
+        self.is_unplugged = False
         self._stuck_in = stuck_in
 
     def open(self, adapter: str) -> None:
@@ -141,13 +146,13 @@ class Master:
         return self.read_state()
 
     def send_processdata(self) -> None:
-        if self.unplugged:
-            raise ConnectionError("adapter is gone")
+        if self.is_unplugged:
+            raise ConnectionError("adapter is lost")
 
     def receive_processdata(self, timeout: int) -> int:
         counter = 0
         for slave in self.slaves:
-            if not slave.deaf and slave.state >= SAFEOP:
+            if not slave.is_silent and slave.state >= SAFEOP:
                 slave.cycle()
                 counter += 3
         return counter
@@ -188,7 +193,7 @@ def states(master: Master) -> set[State]:
 @pytest.mark.parametrize("mode", [8, 7])
 def test_motors_follow_and_stop(mode: int) -> None:
     soem, master, config = line((mode,))
-    with Drives(config, EthercatLink(config, soem)) as drives:
+    with Drives(config, EthercatFieldbus(config, soem)) as drives:
         assert {one.mode for one in drives.commissioned} == {Mode(mode)}
         assert {slave.watchdog for slave in master.slaves} == {("processdata", 20.0)}
         command = drives.start()
@@ -208,67 +213,67 @@ def test_motors_follow_and_stop(mode: int) -> None:
 
 
 def running(soem: Any, config: DrivesConfig) -> Drives:
-    drives = Drives(config, EthercatLink(config, soem))
+    drives = Drives(config, EthercatFieldbus(config, soem))
     drives.start()
     return drives
 
 
-def test_a_fault_stops_all() -> None:
+def test_fault_stops_all_drives() -> None:
     soem, master, config = line()
     with running(soem, config) as drives:
         master.slaves[1].drive.fail(0.0)
         with pytest.raises(EmergencyError, match=r"rotation, device 2.*0x4310"):
             drives.exchange(drives.last_command)
-        assert states(master) <= AT_REST
+        assert states(master) <= STOPPED_STATES
 
 
-def test_a_line_that_breaks_stops_all() -> None:
+def test_broken_line_stops_all_drives() -> None:
     soem, master, config = line()
     with running(soem, config) as drives:
-        master.slaves[2].deaf = True
+        master.slaves[2].is_silent = True
         with pytest.raises(SilentDriveError) as found:
             for _ in range(10_000):
                 drives.exchange(drives.last_command)
         assert "quick stop is not confirmed" in str(found.value.__notes__)
-        assert master.state == SAFEOP  # the watchdogs do the rest
+        assert master.state == SAFEOP  # the watchdogs stop the motors
         assert {slave.drive.status for slave in master.slaves[:2]} == {State.QUICK_STOP_ACTIVE}
 
 
-def test_an_adapter_that_is_gone() -> None:
+def test_lost_adapter() -> None:
     soem, master, config = line()
     with running(soem, config) as drives:
-        master.unplugged = True
-        with pytest.raises(BusError, match="adapter is gone"):
+        master.is_unplugged = True
+        with pytest.raises(BusError, match="adapter is lost"):
             drives.exchange(drives.last_command)
 
 
-def test_what_cannot_be_opened() -> None:
+def test_missing_adapter_and_devices() -> None:
     soem, master, config = line()
     with pytest.raises(BusError, match="CAP_NET_RAW"):
-        EthercatLink(drives_config(**QUICK | {"channel": "eth0"}), soem)
+        EthercatFieldbus(drives_config(**QUICK | {"channel": "eth0"}), soem)
     master.slaves.pop()
     with pytest.raises(BusError, match="2 devices on eth7, 3 needed"):
-        EthercatLink(config, soem)
+        EthercatFieldbus(config, soem)
     assert master.open_on is None
 
 
-def test_what_a_drive_refuses() -> None:
+def test_refused_settings_and_states() -> None:
     soem, master, config = line((1, 3))
     with pytest.raises(ModeRefusedError, match="neither"):
-        Drives(config, EthercatLink(config, soem))
+        Drives(config, EthercatFieldbus(config, soem))
     assert master.open_on is None
 
     soem, master, config = line()
     for slave in master.slaves:
         del slave.drive.entries[0x607D, 1]
     with pytest.raises(SettingRefusedError, match="add 607D"):
-        Drives(config, EthercatLink(config, soem))
+        Drives(config, EthercatFieldbus(config, soem))
 
     soem, master, config = line()
-    master.slaves[0].deaf = True
+    master.slaves[0].is_silent = True
     with pytest.raises(SilentDriveError, match="insertion, device 1"):
-        Drives(config, EthercatLink(config, soem))
+        Drives(config, EthercatFieldbus(config, soem))
 
     soem, master, config = line(stuck_in=PREOP)
     with pytest.raises(StateError, match=r"safe-operational is not reached.*AL status 0x001B"):
-        Drives(config, EthercatLink(config, soem))
+        Drives(config, EthercatFieldbus(config, soem))

@@ -1,4 +1,4 @@
-"""The rig on motors and a camera that are made of Python; no asserted times."""
+"""The hardware rig with fake motors and a fake camera; no test asserts real times."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from tautscope.loop.rig import Rig
 
 @pytest.fixture
 def setup() -> Iterator[Callable[..., Setup]]:
-    """Makes rigs that are closed at the end."""
+    """Make rigs that are closed at the end."""
     made: list[Setup] = []
 
     def make(**changes: Any) -> Setup:
@@ -44,69 +44,69 @@ def setup() -> Iterator[Callable[..., Setup]]:
         one.rig.close()
 
 
-def test_it_is_a_rig(setup: Callable[..., Setup]) -> None:
+def test_hardware_rig_implements_rig(setup: Callable[..., Setup]) -> None:
     rig = setup().rig
     assert isinstance(rig, Rig)
     assert rig.control_period == CYCLE
 
 
-def test_the_motors_go_to_the_start_within_the_speed_asked_for(
+def test_move_to_start_respects_the_start_speed(
     setup: Callable[..., Setup],
 ) -> None:
     one = setup(drives={"start_speed": 0.5})
     sample = one.rig.reset()
-    told = np.array(one.motors.told)
+    sent = np.array(one.motors.commands)
     centres = [one.config.experiment[dof].centre for dof in Dof]
-    np.testing.assert_allclose(told[0], HOME)
+    np.testing.assert_allclose(sent[0], HOME)
     np.testing.assert_allclose(sample.applied, centres)
     assert one.config.drives is not None
-    fastest = np.abs(np.diff(told, axis=0)).max(axis=0) / CYCLE
+    fastest = np.abs(np.diff(sent, axis=0)).max(axis=0) / CYCLE
     limits = [one.config.drives[dof].speed_limit for dof in Dof]
     assert (fastest <= 0.5 * np.array(limits) * (1 + 1e-9)).all()
-    assert (fastest / limits).max() > 0.2  # and not for ever
+    assert (fastest / limits).max() > 0.2  # but does not take for ever
     assert sample.time == 0.0
 
 
-def test_a_motor_outside_its_travel_is_not_moved(setup: Callable[..., Setup]) -> None:
+def test_motor_outside_its_travel_is_not_moved(setup: Callable[..., Setup]) -> None:
     one = setup()
     one.motors.start = lambda: np.array([0.01, 3.6, 0.2])  # type: ignore[method-assign]
-    with pytest.raises(FollowingError, match=r"rotation, node 2: it stands at 3.6, outside"):
+    with pytest.raises(FollowingError, match=r"rotation, node 2: position 3.6 is outside"):
         one.rig.reset()
-    assert not one.motors.told
-    assert one.motors.stopped == one.eye.closed == 1
+    assert not one.motors.commands
+    assert one.motors.stopped == one.camera.closed == 1
 
 
-def test_every_command_is_sent_once_in_order_by_one_thread(setup: Callable[..., Setup]) -> None:
+def test_each_command_is_sent_once_in_order_by_one_thread(setup: Callable[..., Setup]) -> None:
     one = setup()
     start = one.rig.reset().applied
     commands = [start + step * np.array([1e-4, 1e-3, 1e-3]) for step in range(30)]
-    before = len(one.motors.told)
+    before = len(one.motors.commands)
     times = [one.rig.step(command).time for command in commands]
     np.testing.assert_allclose(times, CYCLE * np.arange(1, 31))
-    told = one.motors.told[before:]
-    changes = [told[0]] + [b for a, b in pairwise(told) if not np.array_equal(a, b)]
+    sent = one.motors.commands[before:]
+    changes = [sent[0]] + [b for a, b in pairwise(sent) if not np.array_equal(a, b)]
     np.testing.assert_array_equal(changes, commands)
     assert one.motors.threads == {"set-points"}
     assert len(one.rig.timing.sent) == 30
 
 
-def test_a_loop_that_is_late_is_held_and_not_made_up_for(setup: Callable[..., Setup]) -> None:
+def test_late_loop_holds_the_set_point(setup: Callable[..., Setup]) -> None:
     one = setup()
     start = one.rig.reset().applied
     one.rig.step(start)
     before = one.rig.step(start + 1e-4)
-    count = len(one.motors.told)
-    while len(one.motors.told) < count + 8:
+    count = len(one.motors.commands)
+    while len(one.motors.commands) < count + 8:
         time.sleep(CYCLE)
     after = one.rig.step(start + 2e-4)
     assert after.time == pytest.approx(before.time + CYCLE)
-    for held in one.motors.told[count : count + 8]:
+    for held in one.motors.commands[count : count + 8]:
         np.testing.assert_array_equal(held, start + 1e-4)
     assert one.rig.timing.held >= 8
     assert one.rig.timing.lost >= 8
 
 
-def test_a_thread_that_wakes_late_leaves_cycles_out(setup: Callable[..., Setup]) -> None:
+def test_late_set_point_thread_skips_cycles(setup: Callable[..., Setup]) -> None:
     one = setup()
     start = one.rig.reset().applied
     one.rig.step(start)
@@ -124,17 +124,17 @@ def test_a_thread_that_wakes_late_leaves_cycles_out(setup: Callable[..., Setup])
     assert (one.rig.timing.jitter >= 0).all()
 
 
-def test_frames_are_stamped_by_the_set_point_in_force(setup: Callable[..., Setup]) -> None:
+def test_capture_times_follow_the_set_point_in_force(setup: Callable[..., Setup]) -> None:
     one = setup()
     start = one.rig.reset().applied
     for _ in range(6):
         one.rig.step(start)
     sent = one.rig.timing.sent
-    assert one.rig.on_clock(sent[2]) == pytest.approx(2 * CYCLE, abs=1e-9)
-    assert one.rig.on_clock(sent[3] + 0.4 * CYCLE) == pytest.approx(3.4 * CYCLE, abs=1e-9)
-    assert one.rig.on_clock(sent[5] + 20 * CYCLE) == pytest.approx(6 * CYCLE, abs=1e-9)
-    assert one.rig.on_clock(sent[0] - 1.0) == pytest.approx(-1.0, abs=1e-9)
-    one.eye.see(sent[4] + 0.5 * CYCLE, 7, sequence=3)
+    assert one.rig.to_rig_time(sent[2]) == pytest.approx(2 * CYCLE, abs=1e-9)
+    assert one.rig.to_rig_time(sent[3] + 0.4 * CYCLE) == pytest.approx(3.4 * CYCLE, abs=1e-9)
+    assert one.rig.to_rig_time(sent[5] + 20 * CYCLE) == pytest.approx(6 * CYCLE, abs=1e-9)
+    assert one.rig.to_rig_time(sent[0] - 1.0) == pytest.approx(-1.0, abs=1e-9)
+    one.camera.provide(sent[4] + 0.5 * CYCLE, 7, sequence=3)
     frame = one.rig.step(start).frame
     assert frame is not None
     assert frame.captured_at == pytest.approx(4.5 * CYCLE, abs=1e-9)
@@ -144,41 +144,41 @@ def test_frames_are_stamped_by_the_set_point_in_force(setup: Callable[..., Setup
     assert ages[0] > 0
 
 
-def test_the_same_picture_again_is_no_news(setup: Callable[..., Setup]) -> None:
+def test_repeated_image_is_not_a_new_frame(setup: Callable[..., Setup]) -> None:
     one = setup()
     start = one.rig.reset().applied
-    seen = []
+    is_new = []
     for value in (1, 2, 2, 2, 3):
-        one.eye.see(time.monotonic(), value)
-        seen.append(one.rig.step(start).frame is not None)
-    assert seen == [True, True, False, False, True]
+        one.camera.provide(time.monotonic(), value)
+        is_new.append(one.rig.step(start).frame is not None)
+    assert is_new == [True, True, False, False, True]
 
 
 @pytest.mark.parametrize("how", ["nothing", "frozen"])
-def test_without_news_of_the_camera_the_run_ends(setup: Callable[..., Setup], how: str) -> None:
+def test_lost_camera_ends_the_run(setup: Callable[..., Setup], how: str) -> None:
     one = setup(source={"timeout": 0.05, "lost_timeout": 0.2})
     start = one.rig.reset().applied
-    what = "the same picture" if how == "frozen" else "no picture"
+    what = "only repetitions of one image" if how == "frozen" else "no image"
     with pytest.raises(CameraError, match=f"{what}.*the motors are stopped"):
         for _ in range(1000):
             if how == "frozen":
-                one.eye.see(time.monotonic(), 1)
+                one.camera.provide(time.monotonic(), 1)
             one.rig.step(start)
-    assert one.motors.stopped == one.eye.closed == 1
+    assert one.motors.stopped == one.camera.closed == 1
 
 
-def test_trouble_with_the_camera_is_said_once_and_its_end_too(setup: Callable[..., Setup]) -> None:
+def test_camera_problem_is_reported_at_its_begin_and_end(setup: Callable[..., Setup]) -> None:
     one = setup()
     start = one.rig.reset().applied
-    one.said.clear()
+    one.warnings.clear()
     for value, trouble in enumerate(["", "unplugged", "unplugged", "", ""]):
-        one.eye.trouble = trouble
-        one.eye.see(time.monotonic(), value)
+        one.camera.trouble = trouble
+        one.camera.provide(time.monotonic(), value)
         one.rig.step(start)
-    assert one.said == ["camera: unplugged", "camera: frames again"]
+    assert one.warnings == ["camera: unplugged", "camera: new frames again"]
 
 
-def test_what_the_drives_raise_comes_out_and_the_motors_are_stopped(
+def test_drive_errors_stop_the_motors_and_propagate(
     setup: Callable[..., Setup],
 ) -> None:
     one = setup()
@@ -191,12 +191,12 @@ def test_what_the_drives_raise_comes_out_and_the_motors_are_stopped(
     with pytest.raises(FollowingError, match="it is stuck"):
         for _ in range(100):
             one.rig.step(start)
-    assert one.motors.stopped == one.eye.closed == 1
+    assert one.motors.stopped == one.camera.closed == 1
     with pytest.raises(SignalError, match="closed"):
         one.rig.step(start)
 
 
-def test_a_loop_that_gives_no_commands_ends_in_quick_stop(setup: Callable[..., Setup]) -> None:
+def test_missing_commands_end_in_quick_stop(setup: Callable[..., Setup]) -> None:
     one = setup(drives={"command_timeout": 0.05})
     start = one.rig.reset().applied
     end = time.monotonic() + 60
@@ -207,7 +207,7 @@ def test_a_loop_that_gives_no_commands_ends_in_quick_stop(setup: Callable[..., S
         one.rig.step(start)
 
 
-def test_a_run_that_is_over_may_be_closed_late(setup: Callable[..., Setup]) -> None:
+def test_late_close_after_a_run_is_not_an_error(setup: Callable[..., Setup]) -> None:
     one = setup(drives={"command_timeout": 0.05})
     one.rig.step(one.rig.reset().applied)
     end = time.monotonic() + 60
@@ -218,13 +218,13 @@ def test_a_run_that_is_over_may_be_closed_late(setup: Callable[..., Setup]) -> N
     assert one.rig.timing.lost == 0
 
 
-def test_close_stops_the_motors_and_the_rig_can_start_again(setup: Callable[..., Setup]) -> None:
+def test_rig_can_restart_after_close(setup: Callable[..., Setup]) -> None:
     one = setup()
     one.rig.close()
     one.rig.step(one.rig.reset().applied)
     one.rig.close()
     one.rig.close()
-    assert one.motors.stopped == one.eye.closed == 1
+    assert one.motors.stopped == one.camera.closed == 1
     assert not [t for t in threading.enumerate() if t.name == "set-points"]
     sample = one.rig.step(one.rig.reset().applied)
     assert sample.time == CYCLE
@@ -232,36 +232,36 @@ def test_close_stops_the_motors_and_the_rig_can_start_again(setup: Callable[...,
 
 
 @pytest.mark.parametrize(("raised", "disabled"), [(1, 0), (2, 1)], ids=["quick_stop", "disable"])
-def test_what_the_guards_say_is_done_to_the_drives_in_that_tick(
+def test_supervisor_reaction_reaches_the_drives_in_the_same_tick(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, raised: int, disabled: int
 ) -> None:
-    """No frame comes: it is the tick that tells. A drive fault raised again climbs to disable."""
+    """No frame arrives: the tick reacts. A second drive fault escalates to disable."""
     one = Setup()
     config = one.config.replace(**{"safety.hold_time": 0.0, "safety.hold_travel": 0.0})
     step, ticks = HysteresisReduction.step, itertools.count(1)
 
-    def guarded(loop: HysteresisReduction, *values: Any, **more: Any) -> Any:
+    def step_with_fault(loop: HysteresisReduction, *values: Any, **more: Any) -> Any:
         if next(ticks) == 20:
             for _ in range(raised):
                 loop.raise_flag("drive_fault")
         return step(loop, *values, **more)
 
-    monkeypatch.setattr(HysteresisReduction, "step", guarded)
-    says = r"loop: disable \(drive_fault\).*without power" if disabled else r"loop: quick_stop"
-    with pytest.raises(DriveError, match=says):
+    monkeypatch.setattr(HysteresisReduction, "step", step_with_fault)
+    message = r"loop: disable \(drive_fault\).*without power" if disabled else r"loop: quick_stop"
+    with pytest.raises(DriveError, match=message):
         run_on_hardware(config, tmp_path / "run", lambda share: None, make_rig=lambda _: one.rig)
-    assert (one.motors.stopped, one.motors.disabled, one.eye.closed) == (1, disabled, 1)
-    assert next(ticks) == 21  # not one more
+    assert (one.motors.stopped, one.motors.disabled, one.camera.closed) == (1, disabled, 1)
+    assert next(ticks) == 21  # no further tick
 
 
-def test_a_configuration_that_cannot_be_driven_is_refused() -> None:
+def test_configuration_without_matching_drives_is_refused() -> None:
     with pytest.raises(ConfigError, match=r"drives: .*a section \[drives\]"):
         HardwareRig(Config())
     with pytest.raises(ConfigError, match=r"control.period: got 0.005, expected drives.cycle"):
         HardwareRig(rig_config(period=0.005))
 
 
-def test_timing_is_written_and_read_back(tmp_path: Any) -> None:
+def test_timing_round_trip(tmp_path: Any) -> None:
     timing = Timing(CYCLE)
     for place, is_new in ((0, True), (1, False), (4, True), (5, False)):
         due = place * CYCLE

@@ -1,4 +1,4 @@
-"""A tip behind a play passes; one that a wrong configuration moves does not."""
+"""A tip behind backlash passes; the tip of a wrongly configured motor does not."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError
-from tautscope.hardware.plausibility import Plausibility
+from tautscope.hardware.plausibility import PlausibilityMonitor
 
 CONFIG = Config()
 START = np.array([CONFIG.experiment[dof].centre for dof in Dof])
@@ -21,33 +21,33 @@ SLACK = np.array([10e-3, 1.84, 1.1])
 dofs = pytest.mark.parametrize("dof", Dof, ids=lambda dof: dof.label)
 
 
-def watch(
+def run_sine(
     dof: Dof,
     tip_of: Callable[[float, float], float],
     *,
-    seen: bool = True,
+    is_measured: bool = True,
     noise: float = 0.0,
     config: Config = CONFIG,
     delay: int = 0,
 ) -> None:
-    """Five periods of a sine; the tip from where it was and where the motor is.
+    """Run five periods of a sine; `tip_of` computes the tip from its last position and the motor.
 
-    What the loop makes of a frame is known ``delay`` frames of 0.04 s after it was captured.
+    The report on a frame comes ``delay`` frames of 0.04 s after its capture.
     """
     sine, random = config.experiment[dof], np.random.default_rng(0)
-    plausibility, tip = Plausibility(CONFIG, START), float(START[dof])
-    under_way: deque[tuple[float, Any]] = deque()
+    monitor, tip = PlausibilityMonitor(CONFIG, START), float(START[dof])
+    pending: deque[tuple[float, Any]] = deque()
     for time in np.arange(0, 5 * sine.period, 0.04):
         motor = START.copy()
         motor[dof] += sine.amplitude * np.sin(2 * np.pi * time / sine.period)
-        plausibility.tick(float(time), motor)
+        monitor.add_sample(float(time), motor)
         tip = tip_of(tip, motor[dof])
         estimate = START.copy()
         estimate[dof] = tip + noise * random.standard_normal()
-        report: Any = SimpleNamespace(state_estimate=estimate, observable=np.full(3, seen))
-        under_way.append((float(time), report))
-        if len(under_way) > delay:
-            plausibility.frame(*under_way.popleft())
+        report: Any = SimpleNamespace(state_estimate=estimate, observable=np.full(3, is_measured))
+        pending.append((float(time), report))
+        if len(pending) > delay:
+            monitor.check_frame(*pending.popleft())
 
 
 def play(width: float) -> Callable[[float, float], float]:
@@ -55,49 +55,49 @@ def play(width: float) -> Callable[[float, float], float]:
 
 
 @dofs
-@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
-def test_a_tip_behind_slack_passes(dof: Dof, share: float) -> None:
-    watch(dof, play(share * SLACK[dof]), noise=0.05 * CONFIG[dof].update_distance)
+@pytest.mark.parametrize("fraction", [0.0, 0.5, 1.0])
+def test_tip_behind_slack_passes(dof: Dof, fraction: float) -> None:
+    run_sine(dof, play(fraction * SLACK[dof]), noise=0.05 * CONFIG[dof].update_distance)
 
 
 @dofs
-def test_a_quick_motor_seen_late_passes(dof: Dof) -> None:
-    """The motor is compared with the tip of the same moment, not with where it has gone since."""
+def test_fast_motor_with_delayed_frames_passes(dof: Dof) -> None:
+    """The tip is compared with the motor position at capture."""
     faster = {"safety.reference_speed": [0.1, 10.0, 10.0]}
     quick = CONFIG.replace(**faster, **{f"experiment.{dof.label}.period": 2.0})
-    watch(dof, play(SLACK[dof]), config=quick, delay=5)
+    run_sine(dof, play(SLACK[dof]), config=quick, delay=5)
 
 
 @dofs
-def test_strokes_inside_the_slack_show_nothing(dof: Dof) -> None:
-    """A tip that stands still in them is as it should be."""
+def test_strokes_inside_the_slack_pass(dof: Dof) -> None:
+    """A tip behind larger slack does not move."""
     small = CONFIG.replace(**{f"experiment.{dof.label}.amplitude": float(0.4 * SLACK[dof])})
-    watch(dof, play(SLACK[dof]), config=small, noise=0.5 * CONFIG[dof].update_distance)
+    run_sine(dof, play(SLACK[dof]), config=small, noise=0.5 * CONFIG[dof].update_distance)
 
 
 @dofs
-def test_a_tip_that_goes_against_its_motor(dof: Dof) -> None:
+def test_tip_that_moves_against_its_motor(dof: Dof) -> None:
     follow = play(SLACK[dof])
     with pytest.raises(ConfigError, match=f"drives.{dof.label}.sign"):
-        watch(dof, lambda tip, motor: follow(tip, 2 * START[dof] - motor))
+        run_sine(dof, lambda tip, motor: follow(tip, 2 * START[dof] - motor))
 
 
 @dofs
-def test_a_tip_that_outruns_its_motor(dof: Dof) -> None:
+def test_tip_that_moves_too_far(dof: Dof) -> None:
     with pytest.raises(ConfigError, match=f"drives.{dof.label}.counts_per_unit.*too large"):
-        watch(dof, lambda tip, motor: START[dof] + 57.3 * (motor - START[dof]))
+        run_sine(dof, lambda tip, motor: START[dof] + 57.3 * (motor - START[dof]))
 
 
 @dofs
-def test_a_tip_that_stands_still(dof: Dof) -> None:
+def test_tip_that_does_not_move(dof: Dof) -> None:
     far = CONFIG.replace(
         **{f"experiment.{dof.label}.amplitude": 1.5 * CONFIG.experiment[dof].amplitude}
     )
     with pytest.raises(ConfigError, match=f"drives.{dof.label}.counts_per_unit.*too small"):
-        watch(dof, lambda tip, motor: tip, config=far)
+        run_sine(dof, lambda tip, motor: tip, config=far)
 
 
 @dofs
-def test_a_tip_that_is_never_seen(dof: Dof) -> None:
+def test_tip_that_is_never_measured(dof: Dof) -> None:
     with pytest.raises(ConfigError, match=f"drives.{dof.label}: .*no frame measured it"):
-        watch(dof, play(0.0), seen=False)
+        run_sine(dof, play(0.0), is_measured=False)

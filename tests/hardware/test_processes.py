@@ -1,4 +1,4 @@
-"""Drives in one process, what commands them in another: however either ends, motors stop."""
+"""Drives and master in two processes: the motors stop however either ends."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from queue import Empty, Queue
 from typing import Any
 
 import pytest
-from drive_rig import drives_document
+from drive_settings import drives_document
 from tautscope.config import dump_config, from_document
+from waiting import TIMEOUT
 
-PATIENCE = 60.0
 DOFS = {"insertion", "rotation", "bending"}
 
 
 class Lines:
-    """What a process writes, line by line, with patience."""
+    """Lines of JSON that a process writes."""
 
     def __init__(self, process: subprocess.Popen[str]) -> None:
         self._queue: Queue[str] = Queue()
@@ -36,17 +36,17 @@ class Lines:
             self._queue.put(line)
 
     def until(self, what: str, times: int = 1) -> list[dict[str, Any]]:
-        """The lines up to the last of some of which `what` is the event."""
+        """Lines up to the last of `times` events `what`."""
         lines: list[dict[str, Any]] = []
         while sum(line.get("what") == what for line in lines) < times:
             try:
-                lines.append(json.loads(self._queue.get(timeout=PATIENCE)))
+                lines.append(json.loads(self._queue.get(timeout=TIMEOUT)))
             except Empty:
                 pytest.fail(f"no {what!r} after {lines}")
         return lines
 
     def join(self) -> None:
-        self._thread.join(PATIENCE)
+        self._thread.join(TIMEOUT)
         assert self._stream is not None
         self._stream.close()
 
@@ -68,7 +68,7 @@ def process(*arguments: str) -> Iterator[tuple[subprocess.Popen[str], Lines]]:
         assert running.stderr is not None
         running.stdin.close()
         try:
-            running.wait(PATIENCE)
+            running.wait(TIMEOUT)
         finally:
             running.kill()
             running.wait()
@@ -78,7 +78,7 @@ def process(*arguments: str) -> Iterator[tuple[subprocess.Popen[str], Lines]]:
 
 @pytest.fixture
 def rig(tmp_path: Path) -> Iterator[tuple[Path, subprocess.Popen[str], Lines]]:
-    """The configuration's file and the process of drives."""
+    """The configuration file and the process of the drives."""
     socket = tmp_path / "can"
     config = from_document({"drives": drives_document(channel=str(socket))})
     file = tmp_path / "rig.toml"
@@ -90,6 +90,14 @@ def rig(tmp_path: Path) -> Iterator[tuple[Path, subprocess.Popen[str], Lines]]:
 
 
 MASTER = str(Path(__file__).with_name("master.py"))
+
+
+@contextmanager
+def running_master(file: Path, lines: Lines) -> Iterator[subprocess.Popen[str]]:
+    with process(MASTER, str(file), "signal") as (master, output):
+        lines.until("operation enabled", 3)
+        output._queue.get(timeout=TIMEOUT)
+        yield master
 
 
 @pytest.mark.parametrize(
@@ -108,44 +116,42 @@ MASTER = str(Path(__file__).with_name("master.py"))
 def test_motors_stop_however_the_master_ends(
     rig: tuple[Path, subprocess.Popen[str], Lines], ending: str | signal.Signals, status: int
 ) -> None:
-    """After SIGKILL by the drives' own watch of our heartbeat, else by our command."""
+    """After SIGKILL the drives miss the heartbeat; otherwise the master commands a quick stop."""
     file, _, lines = rig
     how = ending if isinstance(ending, str) else "signal"
-    with process(MASTER, str(file), how) as (master, said):
+    with process(MASTER, str(file), how) as (master, output):
         lines.until("operation enabled", 3)
         if isinstance(ending, signal.Signals):
-            said._queue.get(timeout=PATIENCE)
+            output._queue.get(timeout=TIMEOUT)
             master.send_signal(ending)
         stopped = lines.until("quick stop active", 3)
         assert {line["dof"] for line in stopped if line["what"] == "quick stop active"} == DOFS
-        assert master.wait(PATIENCE) == status
+        assert master.wait(TIMEOUT) == status
     assert not any(line["what"] == "fault" for line in stopped)
 
 
-def test_the_master_says_that_the_rig_is_gone(
+def test_master_reports_lost_drives(
     rig: tuple[Path, subprocess.Popen[str], Lines],
 ) -> None:
     file, bench, lines = rig
-    with process(MASTER, str(file), "signal") as (master, said):
-        lines.until("operation enabled", 3)
-        said._queue.get(timeout=PATIENCE)
+    with running_master(file, lines) as master:
         bench.kill()
-        assert master.wait(PATIENCE) == 1
+        assert master.wait(TIMEOUT) == 1
         assert master.stderr is not None
         text = master.stderr.read()
-    assert "BusError: CAN bus: it is gone" in text
+    assert "BusError: CAN bus: the connection is lost" in text
     assert "Use the emergency stop" in text
 
 
-def test_a_fault_by_request(rig: tuple[Path, subprocess.Popen[str], Lines]) -> None:
+def test_fault_injected_through_standard_input(
+    rig: tuple[Path, subprocess.Popen[str], Lines],
+) -> None:
     file, bench, lines = rig
-    with process(MASTER, str(file), "signal") as (master, said):
-        lines.until("operation enabled", 3)
-        said._queue.get(timeout=PATIENCE)
+    with running_master(file, lines) as master:
         assert bench.stdin is not None
         bench.stdin.write("fault bending\n")
         bench.stdin.flush()
         lines.until("quick stop active", 2)
-        assert master.wait(PATIENCE) == 1
+        assert master.wait(TIMEOUT) == 1
         assert master.stderr is not None
         assert "EmergencyError: bending, node 3: emergency 0x4310" in master.stderr.read()

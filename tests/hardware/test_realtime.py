@@ -1,4 +1,4 @@
-"""What keeps set-points punctual; the kernel says whether it is in force."""
+"""Real-time settings, as the kernel reports them."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from pathlib import Path
 import pytest
 from tautscope.hardware import realtime
 
-linux = pytest.mark.skipif(sys.platform != "linux", reason="asks Linux")
+linux = pytest.mark.skipif(sys.platform != "linux", reason="Linux only")
 
 
 def locked() -> int:
-    """Memory of this process that the kernel may not page out [kB]."""
+    """Locked memory of this process [kB]."""
     lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
     return next(int(line.split()[1]) for line in lines if line.startswith("VmLck"))
 
 
 @linux
-def test_memory_stays_while_the_block_lasts() -> None:
-    with realtime.memory_kept() as refusal:
+def test_memory_is_locked_for_the_block() -> None:
+    with realtime.locked_memory() as refusal:
         inside = locked()
     assert (inside > 0) == (not refusal)
     assert not refusal or "memlock unlimited" in refusal
@@ -30,19 +30,19 @@ def test_memory_stays_while_the_block_lasts() -> None:
 
 
 @linux
-def test_memory_that_may_not_be_kept_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(realtime, "_LOCK_AS_TOUCHED", 1 << 20)  # the kernel refuses such a flag
-    with realtime.memory_kept() as refusal:
+def test_refused_memory_lock_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(realtime, "_MLOCK_ON_FAULT", 1 << 20)  # the kernel refuses such a flag
+    with realtime.locked_memory() as refusal:
         assert "Invalid argument" in refusal
         assert locked() == 0
 
 
 @linux
-def test_a_thread_steps_back_from_what_it_inherited() -> None:
+def test_thread_lowers_its_inherited_priority() -> None:
     found: list[tuple[int, int]] = []
 
     def work() -> None:
-        realtime.step_back(realtime.VISION)
+        realtime.lower_realtime_priority(realtime.VISION)
         found.append((os.sched_getscheduler(0), os.sched_getparam(0).sched_priority))
 
     def run() -> None:
@@ -58,15 +58,15 @@ def test_a_thread_steps_back_from_what_it_inherited() -> None:
     assert inherited == (plain if refusal else (os.SCHED_FIFO, realtime.VISION))
 
 
-def test_collections_pass_over_what_was_there_before() -> None:
-    with realtime.little_collection():
+def test_existing_objects_are_frozen() -> None:
+    with realtime.limited_garbage_collection():
         assert gc.get_freeze_count() > 1000
     assert gc.get_freeze_count() == 0
 
 
-def test_what_a_run_keeps_is_not_searched_while_it_lasts() -> None:
+def test_no_full_garbage_collection_in_the_block() -> None:
     before = gc.get_threshold()
-    with realtime.little_collection():
+    with realtime.limited_garbage_collection():
         count = gc.get_stats()[2]["collections"]
         kept = [[index] for index in range(2_000_000)]
         assert gc.get_stats()[2]["collections"] == count

@@ -1,4 +1,4 @@
-"""Signals: a process that is told to end stops its motors first, and only then ends."""
+"""POSIX signals end a process only after its motors have stopped."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import threading
 from collections.abc import Iterator
 
 import pytest
-from tautscope.hardware.signals import exit_on_signals, signals_deferred
+from tautscope.hardware.signals import defer_signals, exit_on_signals
 
 
 @pytest.fixture(autouse=True)
 def handlers() -> Iterator[None]:
-    """What was there before is there afterwards."""
+    """Check that the handlers are restored."""
     numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
     before = [signal.getsignal(number) for number in numbers]
     yield
@@ -21,7 +21,7 @@ def handlers() -> Iterator[None]:
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
-def test_a_signal_leaves_every_with(number: int) -> None:
+def test_signal_leaves_every_with(number: int) -> None:
     left = []
     with pytest.raises(SystemExit) as found, exit_on_signals():
         try:
@@ -33,7 +33,7 @@ def test_a_signal_leaves_every_with(number: int) -> None:
     assert found.value.code == 128 + number
 
 
-def test_sigint_that_a_shell_had_ignored() -> None:
+def test_sigint_ignored_by_the_shell_is_restored() -> None:
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         with pytest.raises(KeyboardInterrupt), exit_on_signals():
@@ -42,32 +42,32 @@ def test_sigint_that_a_shell_had_ignored() -> None:
         signal.signal(signal.SIGINT, before)
 
 
-def test_a_second_ctrl_c_waits_for_the_stop() -> None:
+def test_second_ctrl_c_is_deferred_until_the_stop() -> None:
     stopped = []
     with pytest.raises(KeyboardInterrupt), exit_on_signals():
         try:
             raise KeyboardInterrupt
         finally:
-            with signals_deferred():
+            with defer_signals():
                 os.kill(os.getpid(), signal.SIGINT)
                 os.kill(os.getpid(), signal.SIGINT)
                 stopped.append(True)
     assert stopped == [True]
 
 
-def test_a_signal_during_the_stop_still_ends_the_program() -> None:
-    with pytest.raises(SystemExit), exit_on_signals(), signals_deferred():
+def test_deferred_signal_still_ends_the_program() -> None:
+    with pytest.raises(SystemExit), exit_on_signals(), defer_signals():
         os.kill(os.getpid(), signal.SIGTERM)
 
 
-def test_other_threads_are_left_alone() -> None:
-    went = []
+def test_other_threads_are_unaffected() -> None:
+    entered = []
 
     def work() -> None:
-        with exit_on_signals(), signals_deferred():
-            went.append(True)
+        with exit_on_signals(), defer_signals():
+            entered.append(True)
 
     thread = threading.Thread(target=work)
     thread.start()
     thread.join()
-    assert went == [True]
+    assert entered == [True]

@@ -1,17 +1,17 @@
-"""Video files, and how pictures are laid out; DV as the article's rig gave it."""
+"""Video files and pixel formats; DV as in the article's rig."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
-from sources import bar, camera, write_dv
 from tautscope.config import CameraConfig, SourceConfig
 from tautscope.errors import CameraError, MissingPathError
-from tautscope.hardware.video import Decoder, opened, read_video
+from tautscope.hardware.video import Decoder, open_source, read_video
+from video_sources import bar, camera, write_dv
 
 
 @pytest.mark.parametrize("suffix", ["dv", "avi"])
-def test_interlaced_video_gives_fields_each_at_its_time(tmp_path: Path, suffix: str) -> None:
+def test_interlaced_video_yields_fields_with_their_times(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"clip.{suffix}"
     write_dv(path, 10)
     frames = list(read_video(str(path), CameraConfig(), start=3.0))
@@ -29,7 +29,7 @@ def test_interlaced_video_gives_fields_each_at_its_time(tmp_path: Path, suffix: 
         assert frame.image.max() > 180
 
 
-def test_left_interlaced_both_fields_are_in_one_frame(tmp_path: Path) -> None:
+def test_without_deinterlacing_a_frame_holds_both_fields(tmp_path: Path) -> None:
     write_dv(tmp_path / "clip.dv", 3)
     config = CameraConfig(source=SourceConfig(deinterlace="none"))
     frames = list(read_video(str(tmp_path / "clip.dv"), config))
@@ -38,7 +38,7 @@ def test_left_interlaced_both_fields_are_in_one_frame(tmp_path: Path) -> None:
     assert (odd, even) == (pytest.approx(bar(2), abs=1), pytest.approx(bar(3), abs=1))
 
 
-def test_video_in_the_wrong_size_is_named(tmp_path: Path) -> None:
+def test_error_names_a_wrong_video_size(tmp_path: Path) -> None:
     write_dv(tmp_path / "clip.dv", 2)
     with pytest.raises(CameraError, match=r"720 x 576.*640 x 480.*calibrate"):
         list(read_video(str(tmp_path / "clip.dv"), CameraConfig(width=640, height=480)))
@@ -50,10 +50,10 @@ def test_video_in_the_wrong_size_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["bgr", "rgb", "bgra", "yuyv", "uyvy", "nv12", "i420"])
-def test_every_pixel_format_has_the_same_colours(name: str) -> None:
+def test_pixel_formats_have_the_same_colours(name: str) -> None:
     """Green, as BT.601 with limited range has it."""
     config = camera("color=0x30c040:size=64x48:rate=25,format=yuv420p", pixel_format=name)
-    with opened(config.source.url, "lavfi") as container:
+    with open_source(config.source.url, "lavfi") as container:
         image = next(iter(Decoder(container, config, live=True))).image
     y, u, v = (
         16

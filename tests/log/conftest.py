@@ -1,4 +1,4 @@
-"""A short run of the drawn rig, recorded once."""
+"""A short run of the drawn rig, recorded once per session."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""`tautscope recover`, `export` and `replay` as a person or a script meets them."""
+"""The commands `tautscope recover`, `export` and `replay`."""
 
 import csv
 import json
@@ -21,9 +21,9 @@ Capture = pytest.CaptureFixture[str]
 
 
 @pytest.fixture
-def torn(recorded: Recorded, tmp_path: Path) -> Path:
+def truncated(recorded: Recorded, tmp_path: Path) -> Path:
     whole = recorded[0].read_bytes()
-    file = tmp_path / "torn.mcap"
+    file = tmp_path / "truncated.mcap"
     file.write_bytes(whole[: len(whole) // 2])
     return file
 
@@ -36,48 +36,41 @@ def failed(capsys: Capture, *arguments: str) -> str:
     return err
 
 
-def test_recover_mends_a_torn_log(capsys: Capture, torn: Path) -> None:
-    before = torn.read_bytes()
-    assert main(["recover", str(torn)]) == 0
-    assert "torn-recovered.mcap:" in (said := capsys.readouterr().out)
-    assert f"{torn} is torn" in said
-    assert torn.read_bytes() == before
-    with AnyReader([torn.with_name("torn-recovered.mcap")]) as reader:
+def test_recover_repairs_a_truncated_log(capsys: Capture, truncated: Path) -> None:
+    before = truncated.read_bytes()
+    assert main(["recover", str(truncated)]) == 0
+    assert "truncated-recovered.mcap:" in (output := capsys.readouterr().out)
+    assert f"{truncated} is truncated" in output
+    assert truncated.read_bytes() == before
+    with AnyReader([truncated.with_name("truncated-recovered.mcap")]) as reader:
         assert reader.message_count > 100
-    assert "does not exist yet" in failed(capsys, "recover", str(torn))
-    assert (
-        main(
-            [
-                "recover",
-                str(torn.with_name("torn-recovered.mcap")),
-                "--out",
-                str(torn.with_name("again.mcap")),
-            ]
-        )
-        == 0
+    assert "does not exist yet" in failed(capsys, "recover", str(truncated))
+    recovered, again = (
+        str(truncated.with_name(name)) for name in ("truncated-recovered.mcap", "again.mcap")
     )
-    assert "was whole" in capsys.readouterr().out
+    assert main(["recover", recovered, "--out", again]) == 0
+    assert "was complete" in capsys.readouterr().out
 
 
-def test_export_writes_csv_and_a_bag(capsys: Capture, torn: Path, recorded: Recorded) -> None:
-    assert main(["export", str(torn), "--csv"]) == 0
-    folder = torn.with_name("torn-csv")
-    assert str(folder) in (said := capsys.readouterr().out)
-    assert f"{torn} is torn" in said
+def test_export_writes_csv_and_a_bag(capsys: Capture, truncated: Path, recorded: Recorded) -> None:
+    assert main(["export", str(truncated), "--csv"]) == 0
+    folder = truncated.with_name("truncated-csv")
+    assert str(folder) in (output := capsys.readouterr().out)
+    assert f"{truncated} is truncated" in output
     trace = Recording.load(folder).trace
     np.testing.assert_array_equal(
         per_dof(trace, "command"), per_dof(recorded[1].trace, "command")[: len(trace)]
     )
-    assert main(["export", str(torn), "--rosbag", str(torn.with_name("bag"))]) == 0
-    with AnyReader([torn.with_name("bag")]) as reader:
-        assert f"{reader.message_count} messages" in (said := capsys.readouterr().out)
-    assert f"{torn} is torn" in said
+    assert main(["export", str(truncated), "--rosbag", str(truncated.with_name("bag"))]) == 0
+    with AnyReader([truncated.with_name("bag")]) as reader:
+        assert f"{reader.message_count} messages" in (output := capsys.readouterr().out)
+    assert f"{truncated} is truncated" in output
     with pytest.raises(SystemExit):
-        main(["export", str(torn)])
+        main(["export", str(truncated)])
 
 
-def test_replay_counts_what_is_identical(
-    capsys: Capture, recorded: Recorded, torn: Path, tmp_path: Path
+def test_replay_counts_identical_outputs(
+    capsys: Capture, recorded: Recorded, truncated: Path, tmp_path: Path
 ) -> None:
     path, recording, _ = recorded
     ticks, frames = len(recording.trace), len(recording.frames)
@@ -86,7 +79,7 @@ def test_replay_counts_what_is_identical(
         f"{ticks} of {ticks} commands and {frames} of {frames} image updates identical, "
         "bit for bit.\n"
     )
-    assert main(["replay", str(torn), "--json", "--out", str(tmp_path / "out")]) == 0
+    assert main(["replay", str(truncated), "--json", "--out", str(tmp_path / "out")]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["identical"] is True
     assert 0 < found["same_ticks"] == found["ticks"] < ticks
@@ -99,12 +92,12 @@ def test_a_replay_that_differs_has_status_1(
     lossy = config.replace(**{"recording.image_format": "jpeg", "recording.jpeg_quality": 70})
     record(tmp_path / "run.mcap", lossy, 3.0)
     assert main(["replay", str(tmp_path / "run.mcap")]) == 1
-    said = capsys.readouterr().out
-    assert "First difference: image " in said
-    assert "not lossless" in said
+    output = capsys.readouterr().out
+    assert "First difference: image " in output
+    assert "not lossless" in output
 
 
-def test_replay_with_another_configuration_shows_what_it_would_estimate(
+def test_replay_with_another_configuration_shows_its_estimates(
     capsys: Capture, recorded: Recorded, tmp_path: Path
 ) -> None:
     path, recording, _ = recorded
@@ -117,24 +110,19 @@ def test_replay_with_another_configuration_shows_what_it_would_estimate(
     width = recording.trace["delta_plus_insertion"] - recording.trace["delta_minus_insertion"]
     assert found["recorded"]["width"] == pytest.approx(width[-1])
     assert found["replayed"]["width"] < 0.5 * width[-1]
-    assert {file.name for file in (tmp_path / "a").iterdir()} == {
-        "trace.csv",
-        "frames.csv",
-        "recording.toml",
-        "config.toml",
-        "replay.png",
-    }
+    written = {"trace.csv", "frames.csv", "recording.toml", "config.toml", "replay.png"}
+    assert {file.name for file in (tmp_path / "a").iterdir()} == written
     assert main([*arguments, str(tmp_path / "b")]) == 0
-    said = capsys.readouterr().out
-    assert "slack at the end" in said
-    assert "replay.png" in said
+    output = capsys.readouterr().out
+    assert "backlash width at the end" in output
+    assert "replay.png" in output
     assert main(["replay", str(path), "--profile", "best", "--out", str(tmp_path / "c")]) == 0
 
 
 def test_replay_of_a_video_and_motor_positions(
     capsys: Capture, recorded: Recorded, tmp_path: Path
 ) -> None:
-    """A lossless video of the run's frames, 1000 s later than the table says."""
+    """A lossless video of the run's frames, with a time offset of 1000 s to the table."""
     path, recording, _ = recorded
     log = read_log(path)
     with av.open(str(tmp_path / "clip.mkv"), "w") as container:
@@ -155,17 +143,9 @@ def test_replay_of_a_video_and_motor_positions(
             recording.trace["time"], per_dof(recording.trace, "command"), strict=True
         ):
             writer.writerow([float(time) - 1000, *map(float, command)])
-    arguments = [
-        "replay",
-        "--video",
-        str(tmp_path / "clip.mkv"),
-        "--motors",
-        str(tmp_path / "motors.csv"),
-        "--video-start",
-        "-1000",
-    ]
-    out = tmp_path / "out"
-    assert main([*arguments, "--out", str(out), "--json"]) == 0
+    video, motors, out = tmp_path / "clip.mkv", tmp_path / "motors.csv", tmp_path / "out"
+    arguments = ["--video", str(video), "--motors", str(motors), "--video-start", "-1000"]
+    assert main(["replay", *arguments, "--out", str(out), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["images"] == pytest.approx(len(recording.frames), abs=1)
     width = recording.trace["delta_plus_insertion"] - recording.trace["delta_minus_insertion"]
@@ -178,9 +158,7 @@ def test_replay_of_a_video_and_motor_positions(
     )
 
 
-def test_replay_names_what_it_cannot_use(
-    capsys: Capture, recorded: Recorded, tmp_path: Path
-) -> None:
+def test_replay_rejects_unusable_input(capsys: Capture, recorded: Recorded, tmp_path: Path) -> None:
     path = str(recorded[0])
     assert "got 'neither'" in failed(capsys, "replay")
     assert "got 'both'" in failed(capsys, "replay", path, "--video", "x.avi")
@@ -193,4 +171,4 @@ def test_replay_names_what_it_cannot_use(
     table.write_text("time,insertion,rotation,bending\n0,1,2,3\n0,1,2,3\n")
     assert "line 3, column time: got 0.0, expected later than 0.0" in failed(capsys, *video)
     table.write_text("time,insertion,rotation,bending\n0,1,2,3\n1,1,2,3\n")
-    assert "m.csv" in failed(capsys, *video)  # which is no video
+    assert "m.csv" in failed(capsys, *video)  # not a video

@@ -1,4 +1,4 @@
-"""A recording that is killed, as `benchmarks/recordings.py --kills` does it for the figures."""
+"""A recording process that is killed, as in `benchmarks/recordings.py --kills`."""
 
 import sys
 from pathlib import Path
@@ -16,7 +16,7 @@ def sent() -> Scene:
 
 
 @pytest.mark.parametrize("lifetime", [0.05, 0.3, 1.0])
-def test_a_killed_recording_is_readable_without_holes(
+def test_a_killed_recording_is_readable_without_gaps(
     tmp_path: Path, lifetime: float, sent: Scene
 ) -> None:
     loss = kill_one(tmp_path, lifetime, sent)

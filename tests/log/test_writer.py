@@ -1,4 +1,4 @@
-"""Disks that are full or slow, runs that fail: the run goes on and what was written is there."""
+"""Full or slow disks and failing runs: the run goes on, and what was written can be read."""
 
 import os
 import time
@@ -16,7 +16,7 @@ from tautscope.loop.reduction import HysteresisReduction
 from tautscope.loop.rig import Sample
 
 
-def test_a_log_in_the_way_is_left_alone(tmp_path: Path, config: Config) -> None:
+def test_an_existing_file_is_not_overwritten(tmp_path: Path, config: Config) -> None:
     (tmp_path / "run.mcap").write_text("mine")
     with pytest.raises(OutputError, match="a file that does not exist yet"):
         LogWriter(tmp_path / "run.mcap", config)
@@ -30,8 +30,8 @@ def test_a_full_disk_ends_the_recording_and_not_the_run(
         return Path("/dev/full").open("wb", buffering=0)
 
     monkeypatch.setattr("tautscope.log.journal._open", full)
-    said: list[str] = []
-    log = LogWriter(tmp_path / "run.mcap", config, say=said.append)
+    warned: list[str] = []
+    log = LogWriter(tmp_path / "run.mcap", config, on_warning=warned.append)
     log._journal._thread.join()
     for tick in range(5):
         log.tick(Sample(0.01 * tick, np.zeros(3)), np.zeros(3), np.zeros(3))
@@ -39,22 +39,22 @@ def test_a_full_disk_ends_the_recording_and_not_the_run(
     assert "No space left" in summary.failure
     assert summary.dropped == log.dropped == 5
     assert not summary.is_complete
-    (text,) = said
+    (text,) = warned
     assert "recording ended" in text
     assert "the run goes on" in text
 
 
-def test_a_disk_that_stands_still_drops_and_says_so(tmp_path: Path, config: Config) -> None:
-    """A pipe nobody reads takes 64 kB and then no more."""
+def test_a_blocked_disk_drops_messages_with_a_warning(tmp_path: Path, config: Config) -> None:
+    """A pipe without a reader takes 64 kB."""
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
     small = config.replace(**{"recording.queue_events": 500, "recording.close_timeout": 0.2})
-    said: list[str] = []
+    warned: list[str] = []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("tautscope.log.journal._open", lambda path: path.open("wb", buffering=0))
         patch.setattr("tautscope.log.journal.os.fsync", lambda number: None)
-        log = LogWriter(pipe, small, say=said.append)
+        log = LogWriter(pipe, small, on_warning=warned.append)
     rng = np.random.default_rng(2)
     ticks = 0
     while not log.dropped:
@@ -66,19 +66,19 @@ def test_a_disk_that_stands_still_drops_and_says_so(tmp_path: Path, config: Conf
     summary = log.close()
     assert summary.ticks == ticks
     assert summary.dropped == 1
-    assert any("the disk did not take the rest" in text for text in said)
-    os.close(reader)  # the thread's write fails, and it ends
+    assert any("the disk was too slow" in text for text in warned)
+    os.close(reader)  # the write of the thread fails, and the thread ends
     log._journal._thread.join()
 
 
 def test_images_are_dropped_before_ticks(tmp_path: Path, config: Config) -> None:
     one = config.replace(**{"recording.queue_images": 1})
-    said: list[str] = []
+    warned: list[str] = []
     rig, loop = DrawnRig(one), HysteresisReduction(one)
     sample = rig.reset()
     loop.step(sample.applied, 0.0)
     report = loop.on_frame(sample.frame)
-    with LogWriter(tmp_path / "run.mcap", one, say=said.append) as log:
+    with LogWriter(tmp_path / "run.mcap", one, on_warning=warned.append) as log:
         for _ in range(200):
             log.tick(sample, sample.applied, sample.applied)
             log.frame(sample.time, sample.frame, report)
@@ -89,14 +89,14 @@ def test_images_are_dropped_before_ticks(tmp_path: Path, config: Config) -> None
     assert len(read.events) == 400
     assert sum(map(read.has_image, read.events)) == 200 - summary.dropped_images
     assert any("dropped" in warning for warning in read.warnings)
-    assert any("dropped" in text for text in said)
+    assert any("dropped" in text for text in warned)
     updates = [index for index, event in read.events.items() if isinstance(event, Update)]
     lost = next(index for index in updates if not read.has_image(index))
     with pytest.raises(RecordError, match="an update with its image"):
         read.image(lost)
 
 
-def test_arrays_may_be_used_again(tmp_path: Path, config: Config) -> None:
+def test_logged_arrays_may_be_reused(tmp_path: Path, config: Config) -> None:
     applied, reference = np.ones(3), np.ones(3)
     with LogWriter(tmp_path / "run.mcap", config) as log:
         log.tick(Sample(0.0, applied), reference, reference)
@@ -106,7 +106,7 @@ def test_arrays_may_be_used_again(tmp_path: Path, config: Config) -> None:
     assert tick.sample.applied.tolist() == tick.reference.tolist() == [1.0, 1.0, 1.0]
 
 
-def test_a_run_that_fails_leaves_its_log_and_why(tmp_path: Path, config: Config) -> None:
+def test_a_failed_run_leaves_its_log_and_the_error(tmp_path: Path, config: Config) -> None:
     with pytest.raises(ZeroDivisionError), LogWriter(tmp_path / "run.mcap", config) as log:
         log.tick(Sample(0.0, np.zeros(3)), np.zeros(3), np.zeros(3))
         raise ZeroDivisionError("the rig fell over")

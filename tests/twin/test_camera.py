@@ -1,4 +1,4 @@
-"""Where the twin draws the bands: OpenCV's projection, numpy's integration; never itself."""
+"""Position of the rendered bands, compared with OpenCV's projection and numerical integration."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 import pytest
-from shapes import QUIET, Array, Frames, bent, make
+from shapes import QUIET, Array, Centreline, bent, make
 from tautscope.config import Config
 
 FACING = {
     "camera.camera_from_guide.translation": (0.024, 0.0, 0.040),
     "camera.camera_from_guide.rotation": (0.0, -1.0, 0.0),
 }
-"""The instrument comes from the right and is seen from the side."""
+"""The instrument comes from the right and is viewed from the side."""
 
 
 def in_camera(config: Config, vectors: Array, *, directions: bool = False) -> Array:
@@ -27,18 +27,13 @@ def opencv(config: Config, p_in_camera: Array) -> Array:
     camera = config.camera
     matrix = np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1]])
     rest = np.zeros(3)
-    pixels = cv2.projectPoints(
-        np.asarray(p_in_camera, float).reshape(-1, 3),
-        rest,
-        rest,
-        matrix,
-        np.array(camera.distortion),
-    )[0]
+    points, distortion = np.asarray(p_in_camera, float).reshape(-1, 3), np.array(camera.distortion)
+    pixels = cv2.projectPoints(points, rest, rest, matrix, distortion)[0]
     return pixels.reshape(*np.shape(p_in_camera)[:-1], 2)
 
 
-def band_centres(config: Config, points: Array, directions: Array) -> Frames:
-    """In the camera's frame: centres of both bands on the tip's axis, and the axis."""
+def band_centres(config: Config, points: Array, directions: Array) -> Centreline:
+    """Centres of both bands on the tip's axis, and the axis, in the camera's frame."""
     instrument = config.instrument
     end = in_camera(config, points)[-1]
     axis = in_camera(config, directions, directions=True)[-1]
@@ -47,7 +42,7 @@ def band_centres(config: Config, points: Array, directions: Array) -> Frames:
 
 
 def near_sides(config: Config, points: Array, directions: Array) -> list[tuple[Array, Array]]:
-    """Of each band small patches of the side that faces the camera: place, area in the picture."""
+    """Position and area in the image of small patches of each band's side towards the camera."""
     instrument = config.instrument
     centres, axis = band_centres(config, points, directions)
     across = np.cross(axis, [0.3, 0.5, 0.8])
@@ -72,7 +67,7 @@ def near_sides(config: Config, points: Array, directions: Array) -> list[tuple[A
 
 
 def integrated(config: Config, points: Array, directions: Array) -> Array:
-    """Centroids of the bands' near sides, by the area of small patches in the picture."""
+    """Centroids of the bands' sides towards the camera, by area in the image."""
     features = [
         (area[..., None] * opencv(config, patch)).sum((0, 1)) / area.sum()
         for patch, area in near_sides(config, points, directions)
@@ -80,8 +75,8 @@ def integrated(config: Config, points: Array, directions: Array) -> Array:
     return np.ravel(features)
 
 
-def visible(config: Config, frames: Frames, hidden: Callable[[Array], Array]) -> Array:
-    """Share of the bands' near sides that is not hidden, by area in the picture."""
+def visible(config: Config, frames: Centreline, hidden: Callable[[Array], Array]) -> Array:
+    """Visible share of the bands' sides towards the camera, by area in the image."""
     return np.array(
         [area[~hidden(patch)].sum() / area.sum() for patch, area in near_sides(config, *frames)]
     )
@@ -129,8 +124,8 @@ def test_bands_of_a_thick_tube_lie_at_the_centroid_of_their_visible_side(
     assert np.abs(seen - expected).max() < 0.1, (seen, expected)
 
 
-def crossing(offset: float) -> Frames:
-    """Frames, in the guide's frame, of a tip behind which its own shaft has passed to and fro."""
+def crossing(offset: float) -> Centreline:
+    """Centreline, in the guide's frame, of an instrument whose shaft passes in front of its tip."""
     level = [
         [40e-3, 0, 0],
         [0, 0, 0],
@@ -164,7 +159,7 @@ def test_half_hidden_bands_keep_their_centroid_and_show_less(offset: float) -> N
     place, along = (in_camera(config, crossing(offset)[k], directions=k == 1)[0] for k in (0, 1))
 
     def hidden(patch: Array) -> Array:
-        # The straight shaft in front: a ray meets it where it passes its axis within the radius.
+        # A ray meets the straight shaft if its distance from the shaft's axis is below the radius.
         normal = np.cross(along, patch)
         distance = np.abs(normal @ place) / np.linalg.norm(normal, axis=-1)
         return np.asarray(distance < config.instrument.diameter / 2)
@@ -186,25 +181,25 @@ def test_bands_partly_outside_keep_their_centroid_and_show_less(cut: float) -> N
     order = np.argsort(u)
     share = np.cumsum(area.ravel()[order]) / area.sum()
     edge = float(u[order][np.searchsorted(share, cut)])
-    # The camera's centre moves so that band B hangs over the left border.
+    # The principal point moves so that band B crosses the left border.
     moved, camera = make(**QUIET, **FACING, **{"camera.cx": config.camera.cx - edge - 0.5})
     seen = camera.draw(*frames, 0)
     assert seen.true_visible[1] == pytest.approx(1 - cut, abs=0.02)
     assert np.abs(seen.true_features - integrated(moved, *frames))[2:].max() < 0.1
 
 
-def test_the_drawn_green_is_where_the_features_say() -> None:
+def test_rendered_bands_match_the_true_features() -> None:
     config, camera = make(**QUIET, **FACING)
     for state in [(5e-3, 0, 0.0), (10e-3, 1, 0.7), (2e-3, -2, 1.0)]:
-        picture = camera.draw(*bent(config, *state), 0)
-        blue, green, red = np.moveaxis(picture.image.astype(float), -1, 0)
+        rendered = camera.draw(*bent(config, *state), 0)
+        blue, green, red = np.moveaxis(rendered.image.astype(float), -1, 0)
         rows, columns = np.nonzero((green > 1.35 * red) & (green > 1.35 * blue))
         pixels = np.stack([columns, rows], axis=1)
-        bands = picture.true_features.reshape(2, 2)
+        bands = rendered.true_features.reshape(2, 2)
         nearest = np.linalg.norm(pixels[:, None] - bands, axis=-1).argmin(axis=1)
         for band in range(2):
             assert (nearest == band).sum() > 100
-            # The mask is whole pixels with highlights cut out; the truth is not.
+            # The mask has whole pixels, without highlights.
             assert np.linalg.norm(pixels[nearest == band].mean(0) - bands[band]) < 1.0, state
 
 
@@ -217,8 +212,8 @@ def test_bands_stay_bright_over_the_working_depth(depth: float) -> None:
             "camera.camera_from_guide.rotation": (0.0, -np.pi / 2, 0.0),
         },
     )
-    picture = camera.draw(*bent(config, 0.0, 0.0, 0.0), 0)
-    for u, v in picture.true_features.reshape(2, 2):
-        blue, green, red = picture.image[round(v), round(u)].astype(float)
+    rendered = camera.draw(*bent(config, 0.0, 0.0, 0.0), 0)
+    for u, v in rendered.true_features.reshape(2, 2):
+        blue, green, red = rendered.image[round(v), round(u)].astype(float)
         assert 0.25 * 190 < green <= 255
         assert green > 1.3 * max(blue, red)

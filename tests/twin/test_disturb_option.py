@@ -1,8 +1,7 @@
-"""Disturbances by name: on the command line and in a configuration."""
+"""Disturbances by name, on the command line and in a configuration."""
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import pytest
@@ -11,10 +10,8 @@ from tautscope.config import DISTURBANCES, Config, dump_config, load_config
 from tautscope.errors import ConfigError
 from tautscope.report import demo
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 
-
-def test_an_unknown_name_is_refused_with_those_there_are(
+def test_an_unknown_name_is_rejected_with_the_known_names(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     with pytest.raises(ConfigError) as error:

@@ -1,4 +1,4 @@
-"""Disturbances of the twin's pictures: seeded, smooth, as strong as said, honest on truth."""
+"""Image disturbances of the twin: seeded, smooth, of the stated strength, with correct truth."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from tautscope.config import DISTURBANCES, Config
 from tautscope.loop.rig import Frame
 from tautscope.twin import Twin, obstacles, optics
-from tautscope.twin.camera import Picture, TwinCamera
-from tautscope.twin.disturbances import EMPTY, TABLE
-from tautscope.twin.drift import Bands, Drift
+from tautscope.twin.bands import Bands
+from tautscope.twin.camera import RenderedImage, TwinCamera
+from tautscope.twin.disturbances import NO_INSTRUMENT, TABLE
+from tautscope.twin.noise import TemporalNoise
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 import condition_frames as frames_of
@@ -41,8 +42,8 @@ def camera(*names: str, **changes: Any) -> TwinCamera:
     return TwinCamera(Config().replace(**{**SMALL, "twin.disturb": names, **changes}))
 
 
-def drawn(by: TwinCamera, sequence: int = 0, state: Array = STATE) -> Picture:
-    return by.draw(*frames_of.centreline(Config(), state), sequence)
+def render(twin_camera: TwinCamera, sequence: int = 0, state: Array = STATE) -> RenderedImage:
+    return twin_camera.draw(*frames_of.centreline(Config(), state), sequence)
 
 
 def level(image: Array) -> Array:
@@ -50,10 +51,10 @@ def level(image: Array) -> Array:
 
 
 def test_every_name_has_one_entry() -> None:
-    assert sorted([each.name for each in TABLE] + [EMPTY]) == sorted(DISTURBANCES)
+    assert sorted([each.name for each in TABLE] + [NO_INSTRUMENT]) == sorted(DISTURBANCES)
 
 
-def test_the_order_is_that_of_the_light() -> None:
+def test_the_table_follows_the_light_path() -> None:
     stages = [each.stage for each in TABLE]
     assert stages == sorted(stages)
 
@@ -61,113 +62,113 @@ def test_the_order_is_that_of_the_light() -> None:
 @pytest.mark.parametrize("name", DISTURBANCES)
 def test_same_seed_same_bytes_in_any_order(name: str) -> None:
     first, again = camera(name), camera(name)
-    wanted = [drawn(first, k) for k in (3, 700, 31)]
-    for k, picture in reversed(list(zip((3, 700, 31), wanted, strict=True))):
-        drawn(again, 5, STATE + 0.1)
-        repeated = drawn(again, k)
-        np.testing.assert_array_equal(repeated.image, picture.image)
-        np.testing.assert_array_equal(repeated.true_features, picture.true_features)
-        np.testing.assert_array_equal(repeated.true_visible, picture.true_visible)
+    wanted = [render(first, k) for k in (3, 700, 31)]
+    for k, rendered in reversed(list(zip((3, 700, 31), wanted, strict=True))):
+        render(again, 5, STATE + 0.1)
+        repeated = render(again, k)
+        np.testing.assert_array_equal(repeated.image, rendered.image)
+        np.testing.assert_array_equal(repeated.true_features, rendered.true_features)
+        np.testing.assert_array_equal(repeated.true_visible, rendered.true_visible)
 
 
 @pytest.mark.parametrize("name", DISTURBANCES)
-def test_it_changes_the_picture_but_not_where_the_bands_are(name: str) -> None:
+def test_disturbances_change_the_image_and_not_the_true_features(name: str) -> None:
     clean, disturbed = camera(), camera(name)
     changed = 0
     for k in range(0, 200, 40):
-        one, other = drawn(clean, k), drawn(disturbed, k)
+        one, other = render(clean, k), render(disturbed, k)
         changed += bool((one.image != other.image).any())
         assert (other.true_visible <= one.true_visible + 1e-9).all()
         there = np.repeat(other.true_visible > 0, 2)
         np.testing.assert_allclose(other.true_features[there], one.true_features[there], rtol=1e-12)
-    assert changed >= 3, f"{name} changed {changed} of 5 pictures"
+    assert changed >= 3, f"{name} changed {changed} of 5 images"
 
 
-@pytest.mark.parametrize("name", [name for name in DISTURBANCES if name != EMPTY])
-def test_another_seed_another_disturbance(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", [name for name in DISTURBANCES if name != NO_INSTRUMENT])
+def test_disturbances_depend_on_the_seed(name: str, tmp_path: Path) -> None:
     grey = np.full((288, 360, 3), 120, np.uint8)
     grey[::2, ::2] = 60
     cv2.imwrite(str(tmp_path / "same.png"), grey)
     same = {**QUIET, "twin.background": str(tmp_path)}
     one, other = (camera(name, **same, **{"twin.seed": seed}) for seed in (0, 1))
-    differ = [(drawn(one, k).image != drawn(other, k).image).any() for k in range(0, 300, 60)]
+    differ = [(render(one, k).image != render(other, k).image).any() for k in range(0, 300, 60)]
     assert sum(differ) >= 3
 
 
 @pytest.mark.parametrize("name", [each.name for each in TABLE if each.name != "text"])
-def test_it_varies_smoothly_over_frames(name: str) -> None:
-    by = camera(name, **QUIET)
-    images = [level(drawn(by, k).image) for k in range(45)]
+def test_disturbances_vary_smoothly_over_frames(name: str) -> None:
+    twin_camera = camera(name, **QUIET)
+    images = [level(render(twin_camera, k).image) for k in range(45)]
     steps = [np.abs(b - a).mean() for a, b in pairwise(images)]
     span = max(np.abs(image - images[0]).mean() for image in images)
     assert span > 0
     assert max(steps) < 0.3 * span, f"a step of {max(steps)} in a span of {span}"
 
 
-def test_chance_wanders_over_its_whole_range_without_jumps() -> None:
-    values = np.array([Drift(3, "exposure", k).wander("gain") for k in range(4000)])
+def test_temporal_noise_is_smooth_and_covers_its_range() -> None:
+    values = np.array([TemporalNoise(3, "exposure", k).scalar("gain") for k in range(4000)])
     assert values.min() == -1 and values.max() == 1
     assert np.abs(np.diff(values)).max() < 0.12
     assert abs(values.mean()) < 0.15
-    levels = np.array([Drift(3, "debris", k).episode("lump")[1] for k in range(500)])
+    levels = np.array([TemporalNoise(3, "debris", k).episode("lump")[1] for k in range(500)])
     assert levels.min() < 0.01 and levels.max() == 1
     assert np.abs(np.diff(levels)).max() < 0.12
 
 
-def test_debris_hides_no_more_than_forty_percent_of_a_band_and_gets_there() -> None:
-    by = camera("debris")
+def test_debris_hides_up_to_forty_percent_of_a_band() -> None:
+    twin_camera = camera("debris")
     shares = []
     for k in range(0, 3000, 12):
-        picture = drawn(by, k)
-        shares.append(1 - picture.true_visible)
-    assert np.max(shares) < obstacles.DEBRIS_SHARE + 0.02
+        rendered = render(twin_camera, k)
+        shares.append(1 - rendered.true_visible)
+    assert np.max(shares) < obstacles.MAX_DEBRIS_SHARE + 0.02
     assert np.max(shares) > 0.33
     assert (np.max(shares, axis=0) > 0.25).all(), "both bands are met"
 
 
-def test_hidden_pieces_are_where_the_picture_has_changed() -> None:
-    # The share of the band's green that is gone, counted in pixels, is what `true_visible` says.
-    clean, by = camera(**QUIET, **LARGE), camera("debris", **QUIET, **LARGE)
+def test_the_visible_share_matches_the_changed_pixels() -> None:
+    # `true_visible` is compared with the share of the band's green pixels that remains.
+    clean, twin_camera = camera(**QUIET, **LARGE), camera("debris", **QUIET, **LARGE)
     state = np.array([15e-3, -0.5, 0.3])
 
-    def green(image: Array) -> Array:
-        blue, grn, red = np.moveaxis(level(image), 2, 0)
-        return np.asarray((grn > 1.35 * red) & (grn > 1.35 * blue))
+    def is_green(image: Array) -> Array:
+        blue, green_level, red = np.moveaxis(level(image), 2, 0)
+        return np.asarray((green_level > 1.35 * red) & (green_level > 1.35 * blue))
 
-    whole = drawn(clean, 0, state)
-    place = whole.true_features.reshape(2, 2)
-    rows, columns = np.nonzero(green(whole.image))
-    nearest = np.linalg.norm(np.stack([columns, rows], 1)[:, None] - place, axis=-1).argmin(1)
+    undisturbed = render(clean, 0, state)
+    centroids = undisturbed.true_features.reshape(2, 2)
+    rows, columns = np.nonzero(is_green(undisturbed.image))
+    nearest = np.linalg.norm(np.stack([columns, rows], 1)[:, None] - centroids, axis=-1).argmin(1)
     compared = 0
     for k in range(5, 420, 30):
-        picture = drawn(by, k, state)
-        left = green(picture.image)[rows, columns]
+        rendered = render(twin_camera, k, state)
+        remaining = is_green(rendered.image)[rows, columns]
         for band in (0, 1):
-            share = left[nearest == band].mean()
-            assert share == pytest.approx(picture.true_visible[band], abs=0.04), (k, band)
+            share = remaining[nearest == band].mean()
+            assert share == pytest.approx(rendered.true_visible[band], abs=0.04), (k, band)
             compared += share < 0.9
     assert compared >= 3
 
 
-def test_a_band_beyond_the_field_stop_is_dark_and_counted() -> None:
-    by = camera("partial", **QUIET)
+def test_a_band_behind_the_field_stop_is_dark_and_hidden() -> None:
+    twin_camera = camera("partial", **QUIET)
     shares = []
     for k in range(0, 900, 30):
-        picture = drawn(by, k)
-        shares.append(picture.true_visible.min())
+        rendered = render(twin_camera, k)
+        shares.append(rendered.true_visible.min())
         if shares[-1] < 0.99:
-            assert (picture.image.max(axis=2) == 0).any()
-    assert 1 - min(shares) < optics.STOPPED_SHARE + 0.02
+            assert (rendered.image.max(axis=2) == 0).any()
+    assert 1 - min(shares) < optics.MAX_STOPPED_SHARE + 0.02
     assert 1 - min(shares) > 0.3
 
 
 def test_exposure_is_a_factor_between_a_quarter_and_four_and_clips() -> None:
-    clean, by = level(drawn(camera(**QUIET)).image), camera("exposure", **QUIET)
+    clean, twin_camera = level(render(camera(**QUIET)).image), camera("exposure", **QUIET)
     factors = []
     for k in range(0, 1500, 25):
-        image = level(drawn(by, k).image)
-        free = (image > 5) & (image < 250) & (clean > 20)
-        factor = np.median(image[free] / clean[free])
+        image = level(render(twin_camera, k).image)
+        unsaturated = (image > 5) & (image < 250) & (clean > 20)
+        factor = np.median(image[unsaturated] / clean[unsaturated])
         np.testing.assert_allclose(image, np.clip(factor * clean, 0, 255), atol=0.03 * 255)
         factors.append(factor)
     assert min(factors) == pytest.approx(0.25, rel=0.05)
@@ -175,13 +176,16 @@ def test_exposure_is_a_factor_between_a_quarter_and_four_and_clips() -> None:
 
 
 def test_white_balance_is_one_gain_per_channel() -> None:
-    clean, by = level(drawn(camera(**QUIET)).image), camera("white_balance", **QUIET)
+    clean, twin_camera = level(render(camera(**QUIET)).image), camera("white_balance", **QUIET)
     gains = []
     for k in range(0, 1500, 50):
-        image = level(drawn(by, k).image)
-        free = (clean > 40) & (clean < 190)
+        image = level(render(twin_camera, k).image)
+        unsaturated = (clean > 40) & (clean < 190)
         gains.append(
-            [np.median(image[..., c][free[..., c]] / clean[..., c][free[..., c]]) for c in range(3)]
+            [
+                np.median(image[..., c][unsaturated[..., c]] / clean[..., c][unsaturated[..., c]])
+                for c in range(3)
+            ]
         )
         np.testing.assert_allclose(image, np.clip(clean * gains[-1], 0, 255), atol=2.5)
     assert np.min(gains) == pytest.approx(0.8, rel=0.02)
@@ -189,7 +193,7 @@ def test_white_balance_is_one_gain_per_channel() -> None:
 
 
 @pytest.mark.parametrize("name", ["motion_blur", "touching"])
-def test_blur_moves_no_light(name: str) -> None:
+def test_blur_preserves_centroid_and_intensity(name: str) -> None:
     spot = np.zeros((61, 81, 3), np.float32)
     spot[30, 40] = 1000
     nothing = Bands.from_surface(np.empty((0, 5)))
@@ -197,7 +201,7 @@ def test_blur_moves_no_light(name: str) -> None:
     widest = 0.0
     y, x = np.mgrid[:61, :81]
     for k in range(0, 900, 10):
-        light, hidden = apply(spot.copy(), nothing, Drift(2, name, k))
+        light, hidden = apply(spot.copy(), nothing, TemporalNoise(2, name, k))
         weight = light[..., 0].astype(float)
         assert hidden is None
         assert weight.sum() == pytest.approx(1000, rel=1e-4)
@@ -206,72 +210,76 @@ def test_blur_moves_no_light(name: str) -> None:
         second = ((weight * ((x - 40) ** 2 + (y - 30) ** 2)).sum()) / 1000
         widest = max(widest, second)
     # A line of length l has the second moment l^2 / 12, a Gaussian 2 sigma^2.
-    expected = optics.LONGEST_BLUR**2 / 12 if name == "motion_blur" else 50.0
+    expected = optics.MAX_BLUR**2 / 12 if name == "motion_blur" else 50.0
     assert widest == pytest.approx(expected, rel=0.15)
 
 
-def test_smoke_takes_contrast() -> None:
-    clean, by = level(drawn(camera(**QUIET)).image), camera("smoke", **QUIET)
-    ratio = [level(drawn(by, k).image).std() / clean.std() for k in range(0, 900, 30)]
+def test_smoke_reduces_contrast() -> None:
+    clean, twin_camera = level(render(camera(**QUIET)).image), camera("smoke", **QUIET)
+    ratio = [level(render(twin_camera, k).image).std() / clean.std() for k in range(0, 900, 30)]
     assert min(ratio) < 0.6
     assert max(ratio) == pytest.approx(1, abs=0.1)
 
 
 def test_highlights_are_saturated_and_lie_on_the_bands() -> None:
-    clean, by = camera(**QUIET), camera("highlights", **QUIET)
-    before = level(drawn(clean, 0).image)
-    place = drawn(clean, 0).true_features.reshape(2, 2)
-    most = 0
+    clean, twin_camera = camera(**QUIET), camera("highlights", **QUIET)
+    before = level(render(clean, 0).image)
+    centroids = render(clean, 0).true_features.reshape(2, 2)
+    largest_count = 0
     for k in range(0, 300, 15):
-        image = level(drawn(by, k).image)
+        image = level(render(twin_camera, k).image)
         white = (image.min(axis=2) > 250) & (before.min(axis=2) < 200)
         rows, columns = np.nonzero(white)
-        far = np.linalg.norm(np.stack([columns, rows], 1)[:, None] - place, axis=-1).min(1)
-        assert far.size == 0 or far.max() < 60
-        most = max(most, white.sum())
-    assert most > 30
+        distances = np.linalg.norm(np.stack([columns, rows], 1)[:, None] - centroids, axis=-1).min(
+            1
+        )
+        assert distances.size == 0 or distances.max() < 60
+        largest_count = max(largest_count, white.sum())
+    assert largest_count > 30
 
 
 def test_overlays_have_no_noise_and_the_tissue_does() -> None:
-    one, other = (drawn(camera("inset", **{"twin.image_noise": 3.0}), k).image for k in (100, 101))
+    one, other = (render(camera("inset", **{"twin.image_noise": 3.0}), k).image for k in (100, 101))
     assert (one[230:235, 10:30] == one[230, 10]).all()
     assert (one[:100] != other[:100]).mean() > 0.5
 
 
 def test_a_band_under_the_inset_has_no_features() -> None:
-    u, v = drawn(camera()).true_features[2:].tolist()
-    # The view shifts so that band B comes to lie in the middle of the inset.
+    u, v = render(camera()).true_features[2:].tolist()
+    # The view is shifted so that band B is in the middle of the inset.
     shift = {
         "camera.cx": SMALL["camera.cx"] + 0.16 * 360 - u,
         "camera.cy": SMALL["camera.cy"] + 0.83 * 288 - v,
     }
-    assert drawn(camera(**shift)).true_visible[1] > 0.9
-    hidden = drawn(camera("inset", **shift))
+    assert render(camera(**shift)).true_visible[1] > 0.9
+    hidden = render(camera("inset", **shift))
     assert hidden.true_visible[1] == 0
     assert np.isnan(hidden.true_features[2:]).all()
 
 
 def test_no_instrument_is_empty() -> None:
-    picture = drawn(camera("no_instrument", **QUIET))
-    assert np.isnan(picture.true_features).all()
-    assert (picture.true_visible == 0).all()
+    rendered = render(camera("no_instrument", **QUIET))
+    assert np.isnan(rendered.true_features).all()
+    assert (rendered.true_visible == 0).all()
     nothing = camera(**QUIET).draw(np.full((2, 3), np.nan), np.zeros((2, 3)), 0)
-    np.testing.assert_array_equal(picture.image, nothing.image)
+    np.testing.assert_array_equal(rendered.image, nothing.image)
 
 
-def test_all_at_once_at_any_pose_and_size() -> None:
+def test_all_disturbances_together_at_any_pose_and_size() -> None:
     rng = np.random.default_rng(4)
-    names = [name for name in DISTURBANCES if name != EMPTY]
+    names = [name for name in DISTURBANCES if name != NO_INSTRUMENT]
     for size in [(720, 576), (64, 48), (1, 1)]:
-        by = camera(*names, **{"camera.width": size[0], "camera.height": size[1]})
+        twin_camera = camera(*names, **{"camera.width": size[0], "camera.height": size[1]})
         for k in range(12):
             state = rng.uniform([0, -4, -2.5], [60e-3, 4, 2.5])
-            picture = drawn(by, int(rng.integers(2**40)), state)
-            assert picture.image.shape == (size[1], size[0], 3)
-            assert picture.image.dtype == np.uint8
-            assert ((picture.true_visible >= 0) & (picture.true_visible <= 1)).all(), f"{size} {k}"
-            known = np.isfinite(picture.true_features)
-            np.testing.assert_array_equal(known, np.repeat(picture.true_visible > 0, 2))
+            rendered = render(twin_camera, int(rng.integers(2**40)), state)
+            assert rendered.image.shape == (size[1], size[0], 3)
+            assert rendered.image.dtype == np.uint8
+            assert ((rendered.true_visible >= 0) & (rendered.true_visible <= 1)).all(), (
+                f"{size} {k}"
+            )
+            known = np.isfinite(rendered.true_features)
+            np.testing.assert_array_equal(known, np.repeat(rendered.true_visible > 0, 2))
 
 
 def test_frames_of_the_twin_carry_the_visible_share() -> None:

@@ -1,4 +1,4 @@
-"""The plant obeys physics: friction makes the loops, and nothing of the loop's models is in it."""
+"""The plant: friction causes the hysteresis, and no model of the loop is used."""
 
 import ast
 import re
@@ -67,7 +67,7 @@ def test_bends_may_change_during_a_run():
 
 
 def test_hysteresis_does_not_depend_on_speed():
-    """Friction, not damping or inertia, makes the loops: half the speed, the same width."""
+    """The loops come from friction, not from damping or inertia: half the speed, the same width."""
     for dof in Dof:
         fast, slow = width(plant_for(), dof), width(plant_for(), dof, slow=2.0)
         assert slow == pytest.approx(fast, rel=0.05), dof.label
@@ -76,23 +76,19 @@ def test_hysteresis_does_not_depend_on_speed():
 def test_no_friction_no_hysteresis():
     free = {"twin.shaft.straight_load": 1e-6, "twin.shaft.load_per_bend": 0.0}
     assert width(plant_for(**free), Dof.INSERTION, slow=2.0) < 0.1 * ARTICLE[Dof.INSERTION]
-    loose = {
-        "twin.cables.friction": 0.0,
-        "twin.cables.joint_friction": 0.0,
-        "twin.cables.slack": 0.0,
-    }
+    loose = {f"twin.cables.{name}": 0.0 for name in ("friction", "joint_friction", "slack")}
     assert width(plant_for(**loose), Dof.BENDING, slow=2.0) < 0.1 * ARTICLE[Dof.BENDING]
 
 
 def test_sliding_one_way_lowers_friction_the_other_way():
-    """Elliptic cones: a shaft that is being inserted turns more easily."""
+    """Elliptic friction cones: a shaft that is being inserted rotates more easily."""
     alone = width(plant_for(), Dof.ROTATION)
     sliding = width(plant_for(), Dof.ROTATION, with_insertion=2e-3)
     assert sliding < 0.8 * alone
 
 
 def test_true_state_is_the_geometry_of_the_centreline():
-    """Insertion, rotation and bending read off the drawn curve, not off the joints."""
+    """Insertion, rotation and bending are read from the centreline, not from the joints."""
     plant = plant_for()
     sweep(plant, Dof.ROTATION, periods=1)
     plant.step(posture() + np.array([0.004, 1.5, 0.5]))
@@ -121,7 +117,7 @@ def test_drives_obey_their_speed_limit_and_report_whole_counts():
     before = plant.applied
     for _ in range(100):
         plant.step(posture() + np.array([1.0, 10.0, 10.0]))
-    # The servo may swing a little past the ramp it follows.
+    # The servo may overshoot its ramp slightly.
     travel = plant.applied - before
     assert np.all(travel <= 0.5 * np.array([0.01, 1.0, 1.0]) * 1.05)
     assert np.all(travel >= 0.5 * np.array([0.01, 1.0, 1.0]) * 0.9)

@@ -1,4 +1,4 @@
-"""The twin behind the seam: clock, frames, latency, errors; same seed, same bytes."""
+"""The simulated rig: clock, frames, latency, errors, reproducibility."""
 
 import hashlib
 
@@ -60,13 +60,13 @@ def test_frames_come_at_the_frame_rate_and_arrive_late_within_the_jitter():
     assert [frame.sequence for _, frame in arrived] == list(range(len(arrived)))
     np.testing.assert_allclose(np.diff(captured), 0.04, atol=1e-9)
     age = np.array([time for time, _ in arrived]) - captured
-    # An arrival shows at the next control tick.
+    # A frame is reported at the next control tick.
     assert age.min() >= 0.07 - 1e-9
     assert age.max() <= 0.09 + 0.005 + 1e-9
     assert np.ptp(age) > 0.005
 
 
-def test_without_latency_a_frame_shows_at_once():
+def test_without_latency_a_frame_arrives_at_once():
     arrived = frames(samples(0.2, **{"twin.latency": 0.0, "twin.latency_jitter": 0.0}))
     assert [time for time, _ in arrived] == [frame.captured_at for _, frame in arrived]
 
@@ -88,12 +88,12 @@ def test_a_frame_shows_the_state_at_its_capture_not_at_its_arrival():
     assert fit["capture"] < 0.3 * fit["arrival"], fit
 
 
-def test_without_images_no_frame_comes():
+def test_without_images_no_frame_arrives():
     assert not frames(samples(0.5, images=False))
 
 
 @pytest.mark.parametrize("command", [[0, 0], [np.nan, 0, 0], [0, np.inf, 0], [[0, 0, 0]]])
-def test_a_bad_command_is_named(command):
+def test_an_invalid_command_is_rejected(command):
     rig = Twin(load_config(), images=False)
     rig.reset()
     with pytest.raises(SignalError) as error:
@@ -101,7 +101,7 @@ def test_a_bad_command_is_named(command):
     assert error.value.field == "command"
 
 
-def test_a_closed_twin_says_so_and_closes_twice():
+def test_a_closed_twin_raises_and_may_be_closed_twice():
     rig = Twin(load_config(), images=False)
     with pytest.raises(SignalError):
         rig.step(POSTURE)
@@ -112,7 +112,7 @@ def test_a_closed_twin_says_so_and_closes_twice():
         rig.step(POSTURE)
 
 
-def test_bends_out_of_range_are_refused_and_the_old_kept():
+def test_bends_out_of_range_are_rejected_and_the_old_value_stays():
     rig = Twin(load_config(), images=False)
     rig.reset()
     rig.bends = 1.5

@@ -3,12 +3,15 @@
 from concurrent.futures import ThreadPoolExecutor
 
 import cv2
+import msgspec
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scenes import scenes
+from tautscope import _core
 from tautscope.config import Config
 from tautscope.errors import ConfigError, FieldError, FrameError
+from tautscope.loop.construction import build_feature_model
 from tautscope.loop.vision import MarkerDetector
 
 Image = NDArray[np.uint8]
@@ -144,3 +147,19 @@ def test_threads_may_share_a_detector() -> None:
         together = list(pool.map(lambda image: detector.detect(image).regions, images))
     assert together == alone
     assert len(set(alone)) > 1
+
+
+@pytest.mark.parametrize(
+    ("change", "found"),
+    [
+        ({"colour": 1.0}, "unknown field `colour`"),
+        ({"threshold": None}, "invalid type"),
+        ({"fit": {}}, "missing field `edge_deviation`"),
+    ],
+)
+def test_settings_are_exactly_those_of_the_configuration(
+    change: dict[str, object], found: str
+) -> None:
+    settings = msgspec.to_builtins(Config().vision) | change
+    with pytest.raises(ConfigError, match=rf"^vision: got .*{found}"):
+        _core.MarkerDetector(build_feature_model(Config()), "bgr", settings)

@@ -70,7 +70,7 @@ def test_a_band_cut_by_the_border_is_found_whole(number: int) -> None:
     scene = CUT[number]
     detection = DETECTOR.detect(scene.image, expectation=scene.expectation(number))
     assert detection.valid, (scene.state, detection.reason)
-    assert min(each.inside for each in detection.evidence) < 0.7
+    assert min(score.inside for score in detection.scores) < 0.7
     assert error(detection, scene) < 1.5, scene.state
 
 

@@ -20,7 +20,8 @@ pub fn length(py: Python<'_>, field: &str, length: usize, allowed: &str) -> PyEr
     raised(py, "SignalError", field, value, allowed)
 }
 
-fn raised<'py>(
+/// An error of `tautscope.errors` by its class, with its facts.
+pub fn raised<'py>(
     py: Python<'py>,
     class: &str,
     field: &str,

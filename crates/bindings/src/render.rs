@@ -4,13 +4,13 @@ use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use tautscope_render::{Error, Geometry, Lens, Piece, Pose, Truth};
 
-/// The picture, the features and the visible shares.
+/// The image, the features and the visible shares.
 type Drawing<'py> = (
     Bound<'py, PyArray3<u8>>,
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray1<f64>>,
 );
-/// The same, and the bands' surface.
+/// The image, the features, the visible shares, and the bands' surface.
 type Scene<'py> = (
     Bound<'py, PyArray3<u8>>,
     Bound<'py, PyArray1<f64>>,
@@ -71,7 +71,7 @@ impl Renderer {
             .map_err(|error| config_error(py, error))
     }
 
-    /// Returns the picture, uint8 (h, w, 3), the features, (4,) [px], and the visible shares, (2,).
+    /// Returns the image, uint8 (h, w, 3), the features, (4,) [px], and the visible shares, (2,).
     fn draw<'py>(
         &mut self,
         py: Python<'py>,
@@ -85,8 +85,8 @@ impl Renderer {
         Ok((image, features, visible))
     }
 
-    /// As `draw` without the noise. Also returns the bands' near sides, float64 (n, 5), in small
-    /// pieces: band (0 or 1), u, v [px], area [px^2], and whether it is seen (0 or 1).
+    /// As `draw`, without noise. Also returns the sides of the bands that face the camera, float64 (n, 5), in
+    /// small pieces: band (0 or 1), u, v [px], area [px^2], and whether it is visible (0 or 1).
     fn draw_scene<'py>(
         &mut self,
         py: Python<'py>,
@@ -112,7 +112,7 @@ impl Renderer {
         Ok((image, features, visible, surface))
     }
 
-    /// Adds the sensor's noise of picture `sequence` to the image, uint8 (h, w, 3), in place.
+    /// Adds the sensor's noise of image `sequence` to the image, uint8 (h, w, 3), in place.
     fn add_noise(
         &self,
         py: Python<'_>,
@@ -127,7 +127,7 @@ impl Renderer {
 }
 
 impl Renderer {
-    /// With the noise of a sequence number, or without noise and with the surface kept.
+    /// Draws with the noise of a sequence number, or without noise and keeping the surface.
     fn paint<'py>(
         &mut self,
         py: Python<'py>,

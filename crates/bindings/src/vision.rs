@@ -1,12 +1,8 @@
-//! Image to markers, for Python: arrays in, arrays out.
+//! Image to markers: `tautscope._core.MarkerDetector` and `label_regions`.
 
 #![expect(
     clippy::needless_pass_by_value,
     reason = "PyO3 hands arguments over by value"
-)]
-#![expect(
-    clippy::cast_precision_loss,
-    reason = "counts of pixels stay far below 2^53"
 )]
 
 use std::sync::{Mutex, PoisonError};
@@ -16,127 +12,108 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2, PyReadonlyArrayDy
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use tautscope_core as core;
-use tautscope_vision::frame::MAX_SIDE;
-use tautscope_vision::runs::each_run;
 use tautscope_vision::{
-    ColorDiscriminant, Demands, Detector, Error, Expect, Expectation, Frame, Labeller, Outline,
-    PixelFormat, Region, Segmenter, Settings, Window,
+    BandPrediction, BandPredictor, ColorDiscriminant, Detector, Error, Frame, Labeller, MAX_SIDE,
+    Outline, PixelFormat, Segmenter, Settings, Window, each_run,
 };
 
 use crate::arrays::table;
+use crate::errors;
 use crate::features::FeatureModel;
 use crate::frame::ArrayFrame;
 use crate::region::{Described, described};
+use crate::settings::from_mapping;
 
-/// The markers in frames; `tautscope.loop.vision.MarkerDetector` is its public face.
+/// Finds the markers in frames; `tautscope.loop.vision.MarkerDetector` is its public interface.
 #[pyclass(frozen, module = "tautscope._core")]
 pub struct MarkerDetector {
     format: PixelFormat,
     model: core::FeatureModel,
     model_deviation: f64,
-    demands: Demands,
     segmenter: Segmenter,
     detector: Mutex<Detector>,
 }
 
 #[pymethods]
 impl MarkerDetector {
+    /// `settings` is the mapping of `VisionConfig`.
     #[new]
-    #[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
-    #[pyo3(signature = (model, *, pixel_format, weights, threshold, smoothing, minimum_area, model_deviation, demands, alternatives))]
     fn new(
         py: Python<'_>,
         model: &FeatureModel,
         pixel_format: &str,
-        weights: [f64; 3],
-        threshold: f64,
-        smoothing: usize,
-        minimum_area: u64,
-        model_deviation: f64,
-        demands: [f64; 7],
-        alternatives: Vec<([f64; 3], f64)>,
+        settings: Bound<'_, PyAny>,
     ) -> PyResult<Self> {
-        let discriminant = ColorDiscriminant::new(weights, threshold).map_err(refused(py))?;
-        let detector = Detector::new(Settings {
-            discriminant,
+        let settings: Settings = from_mapping("vision", settings)?;
+        let Settings {
+            weights,
+            threshold,
             smoothing,
-            minimum_area,
-        });
-        let others: Result<Vec<_>, _> = alternatives
-            .into_iter()
-            .map(|(weights, threshold)| ColorDiscriminant::new(weights, threshold))
-            .collect();
+            model_deviation,
+            ..
+        } = settings;
+        let discriminant = ColorDiscriminant::new(weights, threshold).map_err(rejected(py))?;
         Ok(Self {
-            format: PixelFormat::named(pixel_format).map_err(refused(py))?,
+            format: PixelFormat::named(pixel_format).map_err(rejected(py))?,
             model: model.0,
             model_deviation,
-            demands: demands.into(),
             segmenter: Segmenter::new(discriminant, smoothing),
-            detector: Mutex::new(
-                detector
-                    .map_err(refused(py))?
-                    .with_alternatives(&others.map_err(refused(py))?),
-            ),
+            detector: Mutex::new(Detector::new(settings).map_err(rejected(py))?),
         })
     }
 
-    /// Features (4,), covariance (4, 4), evidence (2, 9), a reason per marker, regions.
+    /// Features (4,), covariance (4, 4), scores (2, 9), a reason per marker, regions, index of the discriminant.
     ///
-    /// `states` (n, 3): where the instrument may be, each with the standard deviations `deviation` (3,).
+    /// `states` (n, 3): where the instrument may be, each with the standard deviations `std` (3,).
     fn detect<'py>(
         &self,
         py: Python<'py>,
         image: PyReadonlyArrayDyn<'py, u8>,
         states: Vec<[f64; 3]>,
-        deviation: [f64; 3],
-    ) -> PyResult<Measured<'py>> {
+        std: [f64; 3],
+    ) -> PyResult<Detected<'py>> {
         let frame = ArrayFrame::new(&image, self.format)?;
-        let expect = Believed {
+        let predictor = Predictor {
             model: &self.model,
             beliefs: core::Beliefs {
                 states: &states,
-                deviation,
+                deviation: std,
                 model_deviation: self.model_deviation,
             },
         };
-        let demands = if states.len() > 1 {
-            self.demands.without_a_place()
-        } else {
-            self.demands
-        };
-        let (verdict, regions) = py.detach(|| {
+        let (found, regions) = py.detach(|| {
             let mut detector = self.detector.lock().unwrap_or_else(PoisonError::into_inner);
-            let (verdict, regions) = detector.recognise(&frame, &expect, &demands);
-            (verdict, described(regions))
+            let (found, regions) = detector.recognise(&frame, &predictor);
+            (found, described(regions))
         });
-        let [a, b] = verdict
-            .reasons
+        let [a, b] = found
+            .rejections
             .map(|reason| reason.map_or_else(String::new, |reason| reason.to_string()));
-        let evidence = verdict.bands.map(|band| {
-            let [u, v] = band.centroid;
+        let scores = found.scores.map(|score| {
+            let [u, v] = score.centroid;
             [
-                band.inside,
-                band.coverage,
-                band.own,
-                band.spill,
-                band.edges,
-                band.bloom,
-                band.surprise,
+                score.inside,
+                score.coverage,
+                score.exclusive,
+                score.spill,
+                score.edges,
+                score.growth,
+                score.mahalanobis_squared,
                 u,
                 v,
             ]
         });
         Ok((
-            PyArray1::from_slice(py, &verdict.features),
-            table(py, &verdict.covariance)?,
-            table(py, &evidence)?,
+            PyArray1::from_slice(py, &found.features),
+            table(py, &found.covariance)?,
+            table(py, &scores)?,
             (a, b),
             regions,
-            verdict.discriminant,
+            found.discriminant,
         ))
     }
 
-    /// The regions in windows (left, top, right, bottom), as in `detect`.
+    /// The regions in windows (left, top, right, bottom).
     fn regions_in(
         &self,
         py: Python<'_>,
@@ -151,7 +128,7 @@ impl MarkerDetector {
         }))
     }
 
-    /// What passes the threshold after the low-pass, (h, w).
+    /// The marker pixels, (h, w): those above the threshold after the low-pass.
     fn mask<'py>(
         &self,
         py: Python<'py>,
@@ -183,7 +160,7 @@ fn window([left, top, right, bottom]: [usize; 4]) -> Window {
     }
 }
 
-type Measured<'py> = (
+type Detected<'py> = (
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray2<f64>>,
     Bound<'py, PyArray2<f64>>,
@@ -192,39 +169,43 @@ type Measured<'py> = (
     usize,
 );
 
-/// What the core's model says of where the instrument may be, as the vision asks it.
-struct Believed<'a> {
+/// Predicts the bands by the core's feature model.
+struct Predictor<'a> {
     model: &'a core::FeatureModel,
     beliefs: core::Beliefs<'a>,
 }
 
-impl Expect for Believed<'_> {
-    fn expect(&self, seen: [f64; 4], deviation: [f64; 4]) -> Option<Expectation> {
-        let expected = self.model.expect(&self.beliefs, seen, deviation)?;
-        Some(Expectation {
+impl BandPredictor for Predictor<'_> {
+    fn predict(&self, observed: [f64; 4], std: [f64; 4]) -> Option<BandPrediction> {
+        let expected = self.model.expect(&self.beliefs, observed, std)?;
+        Some(BandPrediction {
             features: expected.features,
             covariance: expected.covariance,
-            bands: expected.bands.map(|band| Outline {
+            outlines: expected.bands.map(|band| Outline {
                 corners: band.outline,
                 centroid: band.centroid,
                 area: band.area,
             }),
         })
     }
+
+    fn is_located(&self) -> bool {
+        self.beliefs.states.len() <= 1
+    }
 }
 
-/// The 8-connected regions of a mask (h, w), in the order of their last rows: (n, 7).
+/// The 8-connected regions of a mask (h, w), in the order of their last rows.
 #[pyfunction]
 pub fn label_regions<'py>(
     py: Python<'py>,
     mask: PyReadonlyArray2<'py, bool>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
+) -> PyResult<Vec<Described>> {
     let mask = mask.as_array();
     let (height, width) = mask.dim();
     if height > MAX_SIDE || width > MAX_SIDE {
         return Err(PyValueError::new_err("mask: expected sides up to 65536"));
     }
-    let regions = py.detach(|| {
+    Ok(py.detach(|| {
         let mut labeller = Labeller::default();
         let mut regions = Vec::new();
         labeller.start(width);
@@ -238,36 +219,23 @@ pub fn label_regions<'py>(
             labeller.end_row(|region| regions.push(region));
         }
         labeller.end_row(|region| regions.push(region));
-        rows(regions.into_iter())
-    });
-    Ok(regions.into_pyarray(py))
+        described(&regions)
+    }))
 }
 
-/// One row per region: area, centroid u, v, then left, top, width, height of its box [px].
-fn rows(regions: impl Iterator<Item = Region>) -> Array2<f64> {
-    let rows: Vec<[f64; 7]> = regions
-        .map(|region| {
-            let [u, v] = region.centroid();
-            let sides = [region.right - region.left, region.bottom - region.top];
-            let [left, top, width, height] =
-                [region.left, region.top, sides[0], sides[1]].map(|side| side as f64);
-            [region.area as f64, u, v, left, top, width, height]
-        })
-        .collect();
-    Array2::from(rows)
-}
-
-/// A refused setting as `tautscope.errors.ConfigError` about `vision`.
-fn refused(py: Python<'_>) -> impl Fn(Error) -> PyErr {
-    move |error| {
-        let facts = (
-            format!("vision.{}", error.field),
-            error.value,
-            error.allowed,
-        );
-        py.import("tautscope.errors")
-            .and_then(|errors| errors.getattr("ConfigError"))
-            .and_then(|class| class.call1(facts))
-            .map_or_else(|failure| failure, PyErr::from_value)
+/// A rejected setting as `tautscope.errors.ConfigError` about `vision`.
+fn rejected(py: Python<'_>) -> impl Fn(Error) -> PyErr {
+    move |Error {
+              field,
+              value,
+              allowed,
+          }| {
+        errors::raised(
+            py,
+            "ConfigError",
+            &format!("vision.{field}"),
+            value,
+            allowed,
+        )
     }
 }

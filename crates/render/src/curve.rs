@@ -1,6 +1,6 @@
 use crate::vector::{Vector, ZERO, add, norm, scale, sub, unit};
 
-/// Arc length is tabulated at this many places per piece.
+/// Arc length is tabulated at this many parameters per piece.
 const KNOTS: usize = 4;
 /// Nodes and weights of Gauss and Legendre on [0, 1].
 const GAUSS: [(f64, f64); 3] = [
@@ -21,8 +21,7 @@ struct Piece {
 
 impl Piece {
     /// Between two frames, with tangents as long as the chord: straight frames give a straight
-    /// piece at constant speed, and an arc of angle φ is met to within its
-    /// radius times φ⁴/128.
+    /// piece at constant speed, and the error of an arc of angle φ is at most its radius times φ⁴/128.
     fn between(p: [Vector; 2], t: [Vector; 2], start: f64) -> Option<Self> {
         let chord = sub(p[1], p[0]);
         let length = norm(chord);
@@ -81,8 +80,8 @@ pub(crate) struct Curve {
 }
 
 impl Curve {
-    /// Joins frames (positions (m) and tangents), proximal to distal. Frames on the same spot
-    /// count once. The memory of an earlier curve is used again.
+    /// Joins frames (positions (m) and tangents), proximal to distal. Frames at the same position
+    /// count once. The memory of an earlier curve is reused.
     pub(crate) fn fit(&mut self, frames: impl Iterator<Item = (Vector, Vector)>) {
         self.pieces.clear();
         let mut last: Option<(Vector, Vector)> = None;
@@ -120,7 +119,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_arc_is_met_in_place_and_length() {
+    fn an_arc_has_the_right_positions_and_length() {
         let (radius, angle, pieces) = (10e-3, 2.0, 10);
         let frame = |a: f64| {
             (
@@ -141,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn straight_frames_give_a_straight_line_by_length() {
+    fn straight_frames_give_a_straight_line_parametrised_by_length() {
         let mut curve = Curve::default();
         let along = [0.6, 0.0, 0.8];
         curve.fit(

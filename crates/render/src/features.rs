@@ -1,38 +1,37 @@
 use crate::raster::{Samples, Vertex};
 
-/// Cells per side into which a patch is divided to see how much of it is hidden.
+/// Cells per side of a patch, each of which is hidden or visible as a whole.
 const CELLS: u8 = 6;
-/// A band that shows less than this is not visible (px²).
-const LEAST: f64 = 1.0;
+/// A band with less visible area than this is not visible (px²).
+const LEAST_AREA: f64 = 1.0;
 
-/// What a picture shows of bands A and B.
+/// Ground truth of bands A and B in an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Truth {
-    /// Centroids of the bands' near sides, u and v of each, in px; NaN where nothing of a band is
-    /// visible.
+    /// Centroids of the sides of the bands that face the camera, u and v of each, in px; NaN if nothing of a
+    /// band is visible.
     pub features: [f64; 4],
-    /// Share of each near side, by area in the picture, that is inside the picture with nothing in
-    /// front of it, 0 to 1.
+    /// Share of these sides, by area in the image, that is inside the image and not occluded, 0 to 1.
     pub visible: [f64; 2],
 }
 
-/// A small piece of a band's near side.
+/// A small piece of the side of a band that faces the camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Piece {
     /// 0 for band A, 1 for band B.
     pub band: usize,
-    /// Place (px).
+    /// Position (px).
     pub at: [f32; 2],
-    /// Area in the picture (px²).
+    /// Area in the image (px²).
     pub area: f32,
-    /// Inside the picture with nothing in front of it.
+    /// Inside the image and not occluded.
     pub seen: bool,
 }
 
-/// The bands' surface as it was drawn, patch by patch.
+/// Surface patches of the bands.
 ///
-/// Centroids come from the patches' exact outlines and not from the picture's samples, whose grid
-/// would shift them by up to 0.2 px.
+/// Centroids are computed from the exact outlines of the patches, not from the samples of the image, whose
+/// grid would shift them by up to 0.2 px.
 #[derive(Default)]
 pub(crate) struct Patches {
     patches: Vec<(usize, [Vertex; 4])>,
@@ -43,22 +42,21 @@ impl Patches {
         self.patches.clear();
     }
 
-    /// Remembers a patch of band 0 or 1 with its corners in order around it.
+    /// Adds a patch of band 0 or 1 with its corners in order.
     pub(crate) fn push(&mut self, band: usize, corners: [Vertex; 4]) {
         if corners.iter().all(|corner| corner.nearness > 0.0) {
             self.patches.push((band, corners));
         }
     }
 
-    /// Centroids by area in the picture, `sum(area of cell x place of cell) / sum(area of cell)`,
-    /// and the share of it that is seen. A cell is hidden where something is drawn nearer than it
-    /// by more than `slack` (m), or outside the picture. Hidden cells count for the centroid: the
-    /// loop's model predicts that of the whole near side, and what hides a part moves no band.
-    /// Every cell is handed to `keep`.
+    /// Centroids by area in the image, `sum(area of cell x position of cell) / sum(area of cell)`, and the
+    /// visible share of the area. A cell is hidden if it is outside the image, or if something is drawn
+    /// nearer by more than `tolerance` (m). Hidden cells count for the centroid, as in the loop's model: an
+    /// occluding object does not move a band. Calls `keep` for every cell.
     pub(crate) fn truth(
         &self,
         samples: &Samples,
-        slack: f32,
+        tolerance: f32,
         mut keep: impl FnMut(Piece),
     ) -> Truth {
         let mut sums = [[0.0_f64; 4]; 2];
@@ -69,7 +67,7 @@ impl Patches {
             for (s, t) in (0..CELLS).flat_map(|i| (0..CELLS).map(move |j| (i, j))) {
                 let [s, t] = [s, t].map(|i| (f32::from(i) + 0.5) / f32::from(CELLS));
                 let cell = Cell::of(corners, s, t);
-                let limit = cell.nearness / (1.0 - slack * cell.nearness).max(1e-3);
+                let limit = cell.nearness / (1.0 - tolerance * cell.nearness).max(1e-3);
                 let seen = !samples.hides(cell.at, limit);
                 let area = f64::from(cell.area);
                 sum[0] += area;
@@ -85,7 +83,7 @@ impl Patches {
             }
         }
         let visible = sums.map(|[area, _, _, seen]| {
-            if seen < LEAST * f64::from(CELLS).powi(2) {
+            if seen < LEAST_AREA * f64::from(CELLS).powi(2) {
                 0.0
             } else {
                 seen / area
@@ -105,7 +103,7 @@ impl Patches {
     }
 }
 
-/// A place on a patch, and how large the patch would be were it all like there.
+/// A point of a patch, and the area of the patch if all of it were like there.
 struct Cell {
     at: [f32; 2],
     nearness: f32,

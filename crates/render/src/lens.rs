@@ -3,10 +3,10 @@ use crate::error::{finite, positive};
 
 /// Nothing nearer than this to the camera is drawn (m).
 const NEAR: f32 = 2e-3;
-/// Largest tangent of the angle off the optical axis that is looked at: 80 degrees.
+/// Largest tangent of the angle off the optical axis: 80 degrees.
 const WIDEST: f32 = 5.7;
 
-/// Pinhole with distortion in the meaning `OpenCV` gives to its eight coefficients:
+/// Pinhole camera with the eight distortion coefficients of `OpenCV`:
 ///
 /// ```text
 /// x = X / Z, y = Y / Z, r² = x² + y²
@@ -15,7 +15,7 @@ const WIDEST: f32 = 5.7;
 /// v = fy (y c + p1 (r² + 2 y²) + 2 p2 x y) + cy
 /// ```
 ///
-/// Written for the twin alone: the loop under test has its own, so that a mistake in one shows.
+/// It is written for the twin alone: the loop under test has its own, so that an error in one is found.
 ///
 /// Source: `OpenCV`, "Camera Calibration and 3D Reconstruction".
 #[derive(Clone, Copy, Debug)]
@@ -67,7 +67,7 @@ impl Lens {
     }
 
     /// Pixel of a point in the camera's frame (m); `None` when it is behind the camera, nearer
-    /// than 2 mm, or so far off the axis that the distortion polynomial no longer means anything.
+    /// than 2 mm, or so far off the axis that the distortion polynomial is no longer monotonic.
     pub(crate) fn project(&self, p: [f32; 3]) -> Option<[f32; 2]> {
         if p[2] <= NEAR {
             return None;

@@ -1,7 +1,7 @@
-//! The twin's pictures: a flexible instrument as a swept tube over tissue, drawn on the CPU.
+//! Images of the twin: a flexible instrument as a swept tube over tissue, drawn on the CPU.
 //!
-//! Independent of the loop under test: it has its own projection and knows nothing of bending
-//! angles, only of frames along a centreline. Lengths in m, angles in rad, pixels with whole
+//! It is independent of the loop under test: it has its own projection, and its input is not the bending
+//! angle but frames along a centreline. Lengths in m, angles in rad, pixels with whole
 //! numbers at their centres, colours in the order blue, green, red.
 #![allow(
     clippy::cast_possible_truncation,

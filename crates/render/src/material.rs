@@ -6,7 +6,7 @@ use crate::vector::Vector;
 const LIGHTS: [[f32; 3]; 2] = [[-3.0e-3, -1.0e-3, 0.0], [3.0e-3, -1.0e-3, 0.0]];
 /// Share of the light that comes back from the tissue all around.
 const AMBIENT: f32 = 0.42;
-/// Distance over which the light falls to half (m); the exposure control takes up the rest.
+/// Distance at which the light has fallen to half (m); the exposure control compensates for the rest.
 const FALLOFF: f32 = 90e-3;
 const EXPOSURE: f32 = 1.15;
 
@@ -77,10 +77,10 @@ impl Material {
         )
     }
 
-    /// Blue, green and red of the place `p` (m) with unit normal `n`, both in the camera's frame;
-    /// `shade` is a factor on the diffuse colour. From 2 to 253, so that rounding in between
+    /// Blue, green and red of the point `p` (m) with unit normal `n`, both in the camera's frame;
+    /// `shade` is a factor on the diffuse colour. From 2 to 253, so that rounding in interpolation
     /// cannot leave 0 to 255.
-    pub(crate) fn lit(&self, p: [f32; 3], n: [f32; 3], shade: f32) -> [f32; 3] {
+    pub(crate) fn shaded(&self, p: [f32; 3], n: [f32; 3], shade: f32) -> [f32; 3] {
         let distance2 = dot(p, p);
         let view = scale(p, -1.0 / distance2.sqrt());
         let mut lambert = 0.0;

@@ -1,34 +1,34 @@
 use crate::Error;
 use crate::error::checked;
 
-/// Samples in the store; a power of two, and more than two rows of 8192 pixels.
-const STORE: usize = 1 << 16;
+/// Number of stored samples; a power of two, and more than two rows of 8192 pixels.
+const SAMPLES: usize = 1 << 16;
 
-/// Gaussian noise of whole grey levels, the same for the same seed and picture.
+/// Gaussian noise in whole grey levels, reproducible by seed and image number.
 ///
-/// A store of independent samples is drawn once. Each row of a picture reads it from a place that
-/// a counter-based hash of seed, picture and row chooses, so no picture depends on an earlier one.
+/// Independent samples are drawn once and stored. Each row of an image reads them from an offset that is a
+/// counter-based hash of seed, image and row, so no image depends on an earlier one.
 pub(crate) struct Noise {
-    /// The store twice over, so that a row never has to wrap.
-    store: Vec<i16>,
+    /// The samples twice, so that a row never has to wrap around.
+    samples: Vec<i16>,
     seed: u64,
 }
 
 impl Noise {
-    /// With standard deviation `sigma` (grey levels), after rounding to whole levels.
+    /// Noise whose standard deviation is `sigma` (grey levels) after rounding to whole levels.
     pub(crate) fn new(sigma: f64, seed: u64) -> Result<Self, Error> {
         checked("twin.image_noise", sigma, "a number from 0 to 255", |v| {
             (0.0..=255.0).contains(&v)
         })?;
-        let normal: Vec<f64> = (0..STORE as u64 / 2)
+        let normal: Vec<f64> = (0..SAMPLES as u64 / 2)
             .flat_map(|i| gaussian_pair(mix(seed, u64::MAX, i)))
             .collect();
         let rounded = |scale: f64| normal.iter().map(move |v| (v * scale).round());
-        // Rounding changes the deviation, so look for the scale that gives the one asked for.
+        // Rounding changes the standard deviation: find the scale before rounding by bisection.
         let (mut low, mut high) = (0.0, sigma + 1.0);
         for _ in 0..24 {
             let middle = 0.5 * (low + high);
-            let power = rounded(middle).map(|v| v * v).sum::<f64>() / STORE as f64;
+            let power = rounded(middle).map(|v| v * v).sum::<f64>() / SAMPLES as f64;
             if power < sigma * sigma {
                 low = middle;
             } else {
@@ -37,15 +37,15 @@ impl Noise {
         }
         let once: Vec<i16> = rounded(low).map(|v| v as i16).collect();
         Ok(Self {
-            store: once.repeat(2),
+            samples: once.repeat(2),
             seed,
         })
     }
 
     /// Adds the noise of one row, saturating at 0 and 255.
-    pub(crate) fn add(&self, picture: u64, row: u64, values: &mut [u8]) {
-        let from = mix(self.seed, picture, row) as usize % STORE;
-        for (value, noise) in values.iter_mut().zip(self.store.iter().skip(from)) {
+    pub(crate) fn add(&self, image: u64, row: u64, values: &mut [u8]) {
+        let from = mix(self.seed, image, row) as usize % SAMPLES;
+        for (value, noise) in values.iter_mut().zip(self.samples.iter().skip(from)) {
             *value = (i16::from(*value) + noise).clamp(0, 255) as u8;
         }
     }

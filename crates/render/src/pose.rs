@@ -35,9 +35,9 @@ impl Pose {
         })
     }
 
-    /// Turns a direction, by Rodrigues' formula:
+    /// Rotates a direction by Rodrigues' formula:
     /// `R v = v cos a + (k x v) sin a + k (k . v)(1 - cos a)`.
-    pub(crate) fn turn(&self, v: Vector) -> Vector {
+    pub(crate) fn rotate(&self, v: Vector) -> Vector {
         let (sin, cos) = self.angle.sin_cos();
         add(
             add(scale(v, cos), scale(cross(self.axis, v), sin)),
@@ -45,8 +45,8 @@ impl Pose {
         )
     }
 
-    /// Moves a point.
-    pub(crate) fn place(&self, p: Vector) -> Vector {
-        add(self.turn(p), self.translation)
+    /// Transforms a point.
+    pub(crate) fn transform(&self, p: Vector) -> Vector {
+        add(self.rotate(p), self.translation)
     }
 }

@@ -3,10 +3,10 @@ use core::ops::Range;
 /// Samples per pixel along x and along y.
 const FINE: usize = 2;
 
-/// A corner of the mesh in the picture.
+/// A corner of the mesh in the image.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Vertex {
-    /// Place [px, pixel centres at whole numbers].
+    /// Position (px), pixel centres at whole numbers.
     pub(crate) at: [f32; 2],
     /// 1 / depth (1/m); 0 marks a corner that cannot be drawn.
     pub(crate) nearness: f32,
@@ -14,11 +14,11 @@ pub(crate) struct Vertex {
     pub(crate) colour: [f32; 3],
 }
 
-/// The picture at 2x2 samples per pixel, with the nearest surface of each.
+/// The image at 2x2 samples per pixel, each with the nearest surface.
 ///
 /// Sample (i, j) lies at x = (i + 1/2 + s) / 2 - 1/2 and y = (j + 1/2) / 2 - 1/2 (px); the shift s
-/// is -1/4 in even rows and 1/4 in odd ones, so that upright edges get four steps. Memory outside the spans that were
-/// drawn to is never touched, neither to clear it nor to read it.
+/// is -1/4 in even rows and 1/4 in odd ones, so that vertical edges get four steps. Memory outside the spans that
+/// were drawn is neither cleared nor read.
 pub(crate) struct Samples {
     width: usize,
     height: usize,
@@ -30,7 +30,7 @@ pub(crate) struct Samples {
 }
 
 impl Samples {
-    /// For a picture of so many pixels.
+    /// For an image of this size (px).
     pub(crate) fn new(width: usize, height: usize) -> Self {
         let (width, height) = (FINE * width, FINE * height);
         Self {
@@ -118,7 +118,7 @@ impl Samples {
                     start.wrapping_add(i.wrapping_mul(hue[k].gradient[0])) as u32 & 0x00ff_0000
                 };
                 let new = DRAWN | level(red, 2) | level(green, 1) >> 8 | level(blue, 0) >> 16;
-                // By mask: a branch here would be taken at random.
+                // By mask: a branch here would be unpredictable.
                 let front = u32::from(here > *nearest).wrapping_neg();
                 *word = (new & front) | (*word & !front);
                 *nearest = if here > *nearest { here } else { *nearest };
@@ -126,7 +126,7 @@ impl Samples {
         }
     }
 
-    /// Whether `at` (px) lies outside the picture or behind something nearer than `limit` (1/m).
+    /// Whether `at` (px) is outside the image or behind something nearer than `limit` (1/m).
     pub(crate) fn hides(&self, at: [f32; 2], limit: f32) -> bool {
         let [x, y] = at.map(|x| (FINE as f32 * (x + 0.5)).floor());
         let inside = x >= 0.0 && y >= 0.0 && x < self.width as f32 && y < self.height as f32;
@@ -134,8 +134,8 @@ impl Samples {
         !inside || sample.is_none_or(|nearest| *nearest > limit)
     }
 
-    /// Lays row `y` of the drawing over the tissue in `pixels` (3 bytes each) and wipes it:
-    /// afterwards the row is empty for the next picture.
+    /// Blends row `y` of the drawing over the tissue in `pixels` (3 bytes each), and clears it for the next
+    /// image.
     pub(crate) fn resolve(&mut self, y: usize, pixels: &mut [u8]) {
         let mut touched = 0..0;
         for span in self.spans.iter_mut().skip(FINE * y).take(FINE) {
@@ -173,7 +173,7 @@ impl Samples {
         };
         let quads = even.chunks_exact(FINE).zip(odd.chunks_exact(FINE));
         for (quad, pixel) in quads.zip(pixels.chunks_exact_mut(3)) {
-            // Blue and red side by side in one word: four of them cannot run into each other.
+            // Blue and red share a word: sums of four values do not overflow into each other.
             let (mut blue_red, mut green, mut drawn) = (0, 0, 0);
             for word in quad.0.iter().chain(quad.1) {
                 blue_red += word & 0x00ff_00ff;
@@ -193,16 +193,15 @@ impl Samples {
 /// Marks a sample that shows the instrument.
 const DRAWN: u32 = 1 << 24;
 
-/// How far the samples of a row lie off the even grid (samples).
+/// Shift of the samples of a row from the regular grid (samples).
 fn shift(row: usize) -> f32 {
     if row & 1 == 0 { -0.25 } else { 0.25 }
 }
 
-/// Steepest change from sample to sample that is followed; a sliver with more is drawn in one
-/// colour.
+/// Steepest gradient that is interpolated (per sample); a narrower sliver is drawn in one colour.
 const STEEPEST: f32 = 8192.0;
 
-/// A quantity that is linear in the picture.
+/// A quantity that is linear in the image.
 #[derive(Clone, Copy)]
 struct Plane {
     from: [f32; 2],
@@ -220,11 +219,11 @@ impl Plane {
             (fb * (c[1] - a[1]) - fc * (b[1] - a[1])) * scale,
             (fc * (b[0] - a[0]) - fb * (c[0] - a[0])) * scale,
         ];
-        let gentle = gradient.iter().all(|g| g.abs() < STEEPEST);
+        let is_interpolated = gradient.iter().all(|g| g.abs() < STEEPEST);
         Self {
             from: a,
             value: values[0],
-            gradient: if gentle { gradient } else { [0.0; 2] },
+            gradient: if is_interpolated { gradient } else { [0.0; 2] },
         }
     }
 
@@ -233,7 +232,7 @@ impl Plane {
     }
 }
 
-/// A plane of grey levels in 16.16 fixed point: exact sums, modulo 2^32, wherever they start.
+/// A plane of grey levels in 16.16 fixed point: its sums are exact modulo 2^32.
 #[derive(Clone, Copy)]
 struct Fixed {
     from: [i32; 2],

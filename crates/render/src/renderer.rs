@@ -7,10 +7,10 @@ use crate::pose::Pose;
 use crate::raster::Samples;
 use crate::tube::{Geometry, Sweep};
 
-/// Longest centreline that is drawn (m); a longer one is a fault of the caller's physics.
+/// Longest centreline that is drawn (m); a longer one is an error in the caller's physics.
 const LONGEST: f64 = 10.0;
 
-/// Draws the instrument over a picture of tissue, as a camera with light guides sees it.
+/// Draws the instrument over an image of tissue, as seen by a camera with light guides.
 pub struct Renderer {
     width: usize,
     height: usize,
@@ -27,7 +27,7 @@ impl Renderer {
     /// Sets up the camera, the instrument and the sensor's noise.
     ///
     /// `size` is width and height (px), `noise` the standard deviation (grey levels) and `seed`
-    /// what decides every noise value.
+    /// the seed of the noise.
     ///
     /// # Errors
     /// A size outside 1 to 8192 px, a length that is not above zero, bands that are not on the tip, or
@@ -69,13 +69,13 @@ impl Renderer {
         [self.width, self.height]
     }
 
-    /// Draws one picture into `image` (3 width height bytes, rows of blue, green, red) over
+    /// Draws one image into `image` (3 width height bytes, rows of blue, green, red) over
     /// `background` (the same), and returns where the bands are in it.
     ///
     /// `frames` are positions (in m) and tangents along the centreline in the guide's frame, proximal
     /// to distal; the last is the distal end of the tip. Frames with a number that is not finite,
-    /// or that make a line longer than 10 m, give a picture without instrument. Slices of another
-    /// size are filled as far as they go.
+    /// or that make a line longer than 10 m, give an image without instrument. Slices of another
+    /// size are filled as far as they reach.
     pub fn draw(
         &mut self,
         background: &[u8],
@@ -86,9 +86,9 @@ impl Renderer {
         self.paint(background, frames, Some(sequence), image, |_| ())
     }
 
-    /// As [`Renderer::draw`] without the sensor's noise, for a picture to which more happens before
+    /// As [`Renderer::draw`] without the sensor's noise, for an image that is processed further before
     /// it reaches the sensor; [`Renderer::add_noise`] completes it. `surface` is filled with the
-    /// bands' near sides, piece by piece.
+    /// visible sides of the bands, piece by piece.
     pub fn draw_scene(
         &mut self,
         background: &[u8],
@@ -100,7 +100,7 @@ impl Renderer {
         self.paint(background, frames, None, image, |piece| surface.push(piece))
     }
 
-    /// Adds the sensor's noise of picture `sequence` to `image`, saturating at 0 and 255.
+    /// Adds the sensor's noise of image `sequence` to `image`, saturating at 0 and 255.
     pub fn add_noise(&self, sequence: u64, image: &mut [u8]) {
         for (y, row) in image.chunks_mut(3 * self.width).enumerate() {
             self.noise.add(sequence, y as u64, row);
@@ -116,8 +116,8 @@ impl Renderer {
         keep: impl FnMut(Piece),
     ) -> Truth {
         self.sweep(frames);
-        let slack = 0.25 * self.geometry.diameter as f32;
-        let truth = self.bands.truth(&self.samples, slack, keep);
+        let tolerance = 0.25 * self.geometry.diameter as f32;
+        let truth = self.bands.truth(&self.samples, tolerance, keep);
         let stride = 3 * self.width;
         let rows = image.chunks_mut(stride).zip(background.chunks(stride));
         for (y, (row, tissue)) in rows.take(self.height).enumerate() {
@@ -141,7 +141,9 @@ impl Renderer {
             return;
         }
         let pose = &self.camera_from_guide;
-        let moved = frames.iter().map(|&(p, t)| (pose.place(p), pose.turn(t)));
+        let moved = frames
+            .iter()
+            .map(|&(p, t)| (pose.transform(p), pose.rotate(t)));
         self.curve.fit(moved);
         if self.curve.length() < LONGEST {
             Sweep {

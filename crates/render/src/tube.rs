@@ -52,9 +52,9 @@ impl Geometry {
         Ok(())
     }
 
-    /// Distances from the distal end of the tip at which the material changes, from the section's
-    /// proximal end to the tip's end, and what lies before each.
-    fn stretches(&self) -> [(Material, f64); 7] {
+    /// Materials from the shaft to the end of the tip, each with the distance of its distal end from the end of
+    /// the tip.
+    fn materials(&self) -> [(Material, f64); 7] {
         let half = 0.5 * self.band_length;
         let [a, b] = self.markers.map(|marker| self.tip_length - marker);
         [
@@ -68,7 +68,7 @@ impl Geometry {
         ]
     }
 
-    /// The rounded end keeps clear of band B.
+    /// Height of the rounded end, which does not reach band B.
     fn cap_height(&self) -> f64 {
         let free = self.tip_length - self.markers[1] - 0.5 * self.band_length;
         (CAP_HEIGHT * 0.5 * self.diameter).min(free.max(0.0))
@@ -77,10 +77,10 @@ impl Geometry {
 
 type Ring = [Vertex; FACETS + 1];
 
-/// Sweeps the tube along its centreline and hands the side that faces the camera to the raster.
+/// Sweeps the tube along its centreline and draws the side that faces the camera.
 ///
 /// On a ring with centre C, axis T and radius ρ the outward normal is N(φ) = cos γ E(φ) + sin γ T
-/// (γ is 0 on the tube and rises to 90 degrees over the rounded end). The place C + ρ E(φ) faces
+/// (γ is 0 on the tube and rises to 90 degrees over the rounded end). The point C + ρ E(φ) faces
 /// the camera, at the origin, where N · (C + ρ E) < 0, so on the arc
 ///
 /// ```text
@@ -88,7 +88,7 @@ type Ring = [Vertex; FACETS + 1];
 /// ```
 ///
 /// with d the length of C's part across T and φ0 the angle of its negative. The facets divide that
-/// arc: the outline is where it belongs and nothing hidden behind its own side is ever set up.
+/// arc: the outline is exact, and no hidden facet is created.
 pub(crate) struct Sweep<'a> {
     pub(crate) curve: &'a Curve,
     pub(crate) lens: &'a Lens,
@@ -102,10 +102,10 @@ impl Sweep<'_> {
         let length = self.curve.length();
         let radius = 0.5 * geometry.diameter;
         let mut start = 0.0;
-        for (material, from_end) in geometry.stretches() {
+        for (material, from_end) in geometry.materials() {
             let end = length - from_end;
             if end > start {
-                self.stretch(&material, radius, start, end);
+                self.tube(&material, radius, start, end);
                 start = end;
             }
         }
@@ -114,7 +114,7 @@ impl Sweep<'_> {
         }
     }
 
-    fn stretch(&mut self, material: &Material, radius: f64, start: f64, end: f64) {
+    fn tube(&mut self, material: &Material, radius: f64, start: f64, end: f64) {
         let wanted = if material.tilt > 0.0 {
             material.pitch / RINGS_PER_RIB
         } else {
@@ -165,7 +165,7 @@ impl Sweep<'_> {
         let (sin, cos) = slope.sin_cos();
         let bound = (radius * cos + along * sin) / (d * cos).max(1e-12);
         let half = bound.clamp(-1.0, 1.0).acos() as f32;
-        // The facets' corners stand out so far that facets and circle enclose the same area.
+        // The corners are moved outwards such that facets and circle enclose the same area.
         let facet = (2.0 * half / FACETS as f32).max(1e-4);
         let radius = radius as f32 * (facet / facet.sin()).sqrt();
         let (centre, axis) = (single(centre), single(axis));
@@ -182,7 +182,7 @@ impl Sweep<'_> {
                 .map_or_else(Vertex::default, |at| Vertex {
                     at,
                     nearness: 1.0 / p[2],
-                    colour: material.lit(p, n, shade),
+                    colour: material.shaded(p, n, shade),
                 })
         })
     }

@@ -1,38 +1,32 @@
-//! Frame to markers: Fig. 5 as a whole.
+//! The marker detector: Fig. 5 as a whole.
 
-use crate::blend::{Blend, Blended};
-use crate::judge::{judge, judge_at};
-use crate::verdict::Verdict;
-use crate::{
-    ColorDiscriminant, Demands, Error, Expect, Expectation, Frame, Labeller, Region, RunMap,
-    Segmenter, Window,
-};
+use crate::blur::{BlurFit, BlurFitter};
+use crate::recognition::{BandPrediction, BandPredictor, OutlineSearch, Recognition};
+use crate::scan::{ColorDiscriminant, Frame, Region, Scanner, Window};
+use crate::{Error, Settings};
 
-/// Only so many regions, the largest, are considered: it bounds the time on a noisy frame.
-pub const CANDIDATES: usize = 16;
-
-/// What a [`Detector`] goes by.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
-    /// Which colours are marker.
-    pub discriminant: ColorDiscriminant,
-    /// Passes of the 3x3 binomial low-pass, 0 to 8.
-    pub smoothing: usize,
-    /// Regions below this are dropped (px), at least 1.
-    pub minimum_area: u64,
-}
-
-/// Finds the two markers in frames. It carries memory from frame to frame, never information.
+/// Finds the two markers in frames. It keeps memory between frames, but no information.
 #[derive(Clone, Debug)]
 pub struct Detector {
     settings: Settings,
-    segmenter: Segmenter,
-    labeller: Labeller,
-    map: RunMap,
-    regions: Vec<Region>,
-    alternatives: Vec<Segmenter>,
+    unlocated: Settings,
+    memory: Memory,
+}
+
+#[derive(Clone, Debug)]
+struct Memory {
+    scanner: Scanner,
+    /// Regions of the best result so far.
     best: Vec<Region>,
-    blend: Blend,
+    blur: BlurFitter,
+}
+
+/// Detection in one frame.
+struct Search<'a, F, P> {
+    frame: &'a F,
+    predictor: &'a P,
+    settings: &'a Settings,
+    memory: &'a mut Memory,
 }
 
 impl Detector {
@@ -41,205 +35,172 @@ impl Detector {
     /// # Errors
     /// A setting is out of its range.
     pub fn new(settings: Settings) -> Result<Self, Error> {
-        let Settings {
-            smoothing,
-            minimum_area,
-            ..
-        } = settings;
+        let (smoothing, minimum_area) = (settings.smoothing, settings.minimum_area);
         if smoothing > 8 {
             return Err(Error::new("smoothing", &smoothing, "0 to 8 passes"));
         }
         if minimum_area < 1 {
             return Err(Error::new("minimum_area", &minimum_area, "at least 1 px"));
         }
+        let mut discriminants = vec![ColorDiscriminant::new(
+            settings.weights,
+            settings.threshold,
+        )?];
+        for (weights, threshold) in &settings.alternatives {
+            discriminants.push(ColorDiscriminant::new(*weights, *threshold)?);
+        }
+        let scanner = Scanner::new(&discriminants, smoothing, minimum_area);
+        let best = Vec::with_capacity(scanner.regions.capacity());
         Ok(Self {
+            unlocated: settings.unlocated(),
             settings,
-            segmenter: Segmenter::new(settings.discriminant, smoothing),
-            labeller: Labeller::default(),
-            map: RunMap::default(),
-            regions: Vec::with_capacity(CANDIDATES),
-            alternatives: Vec::new(),
-            best: Vec::with_capacity(CANDIDATES),
-            blend: Blend::default(),
+            memory: Memory {
+                scanner,
+                best,
+                blur: BlurFitter::default(),
+            },
         })
     }
 
-    /// Discriminants to try in turn where the first does not give a clear verdict.
-    #[must_use]
-    pub fn with_alternatives(mut self, discriminants: &[ColorDiscriminant]) -> Self {
-        let segmenter = |one: &ColorDiscriminant| Segmenter::new(*one, self.settings.smoothing);
-        self.alternatives = discriminants.iter().map(segmenter).collect();
-        self
-    }
-
-    /// Recognises the markers by what `expect` says of them: in the window where they should be if
-    /// that is small, there by their light if their edges are not clear, and in the whole frame if neither is there.
+    /// Recognises the markers near their prediction: in the window around it, if that is small; there by a fit of the
+    /// intensity, if the edges give no clear result; in the whole frame, if no band was found there.
     ///
-    /// Allocates only when a frame is larger than those before.
+    /// Returns the result and the regions it is based on, the largest first, at most
+    /// [`MAX_REGIONS`](crate::MAX_REGIONS). Allocates only when a frame is larger than those before.
     pub fn recognise(
         &mut self,
         frame: &impl Frame,
-        expect: &impl Expect,
-        demands: &Demands,
-    ) -> (Verdict, &[Region]) {
-        let blind = expect.expect([0.0; 4], [f64::INFINITY; 4]);
-        let near = blind.and_then(|blind| Some((blind, blind.window(frame)?)));
-        let whole = Window::whole(frame);
-        let window = near.map_or(whole, |(_, window)| window);
-        let mut verdict = self.search(frame, window, expect, demands);
-        if verdict.is_clear() {
-            return (verdict, &self.regions);
+        predictor: &impl BandPredictor,
+    ) -> (Recognition, &[Region]) {
+        let settings = if predictor.is_located() {
+            &self.settings
+        } else {
+            &self.unlocated
+        };
+        let search = Search {
+            frame,
+            predictor,
+            settings,
+            memory: &mut self.memory,
+        };
+        (search.run(), &self.memory.scanner.regions)
+    }
+
+    /// The regions in windows, the largest first, at most [`MAX_REGIONS`](crate::MAX_REGIONS); each ends where its
+    /// window does.
+    ///
+    /// Allocates only when a frame is larger than those before.
+    pub fn regions_in(&mut self, frame: &impl Frame, windows: &[Window]) -> &[Region] {
+        let scanner = &mut self.memory.scanner;
+        scanner.find_regions(frame, windows);
+        &scanner.regions
+    }
+}
+
+impl<F: Frame, P: BandPredictor> Search<'_, F, P> {
+    fn run(mut self) -> Recognition {
+        let prior = self.predictor.predict([0.0; 4], [f64::INFINITY; 4]);
+        let margin = self.settings.search_margin;
+        let near = prior.and_then(|prior| Some((prior, prior.window(self.frame, margin)?)));
+        let whole = Window::whole(self.frame);
+        let mut found = self.by_edges(near.map_or(whole, |(_, window)| window));
+        if found.is_clear(self.settings) {
+            return found;
         }
-        // Light says less than edges: it is asked only where it is known where to look.
-        if let Some((blind, window)) = near {
-            if let Some(lit) = self.by_light(frame, expect, &blind, &verdict, demands) {
-                verdict = self.weighed(frame, window, expect, demands, &verdict, &lit);
+        // Intensity is less reliable than edges: it is used only near a known position.
+        if let Some((prior, window)) = near {
+            if let Some(fit) = self.by_intensity(&prior, &found) {
+                found = self.best_of(window, &found, &fit);
             }
-            if verdict.reasons.iter().all(Option::is_some) {
-                let anywhere = self.search(frame, whole, expect, demands);
-                if anywhere.score() > verdict.score() {
-                    verdict = anywhere;
+            if found.rejections.iter().all(Option::is_some) {
+                let anywhere = self.by_edges(whole);
+                if self.is_better(&anywhere, &found) {
+                    found = anywhere;
                 }
             }
         }
-        (verdict, &self.regions)
+        found
     }
 
-    /// The best verdict of all discriminants in a window, or the first that is clear.
-    fn search(
-        &mut self,
-        frame: &impl Frame,
-        window: Window,
-        expect: &impl Expect,
-        demands: &Demands,
-    ) -> Verdict {
-        self.find(frame, window);
-        let mut verdict = judge(&self.regions, &self.map, expect, demands);
-        for index in 0..self.alternatives.len() {
-            if verdict.is_clear() {
+    fn is_better(&self, one: &Recognition, other: &Recognition) -> bool {
+        one.quality(self.settings) > other.quality(self.settings)
+    }
+
+    /// The first clear result of the discriminants in turn, or the best.
+    fn by_edges(&mut self, window: Window) -> Recognition {
+        let mut found = self.by_discriminant(window, 0);
+        for index in 1..self.memory.scanner.discriminants() {
+            if found.is_clear(self.settings) {
                 break;
             }
-            std::mem::swap(&mut self.best, &mut self.regions);
-            self.exchange(index);
-            self.find(frame, window);
-            self.exchange(index);
-            let other = judge(&self.regions, &self.map, expect, demands);
-            if other.score() > verdict.score() {
-                verdict = Verdict {
-                    discriminant: index + 1,
+            self.swap_regions();
+            let other = self.by_discriminant(window, index);
+            if self.is_better(&other, &found) {
+                found = Recognition {
+                    discriminant: index,
                     ..other
                 };
             } else {
-                std::mem::swap(&mut self.best, &mut self.regions);
+                self.swap_regions();
             }
         }
-        verdict
+        found
     }
 
-    /// The best of a verdict that is not clear, what edges say where the light has the bands, and the light itself.
-    fn weighed(
-        &mut self,
-        frame: &impl Frame,
-        window: Window,
-        expect: &impl Expect,
-        demands: &Demands,
-        verdict: &Verdict,
-        lit: &Blended,
-    ) -> Verdict {
-        std::mem::swap(&mut self.best, &mut self.regions);
-        self.find(frame, window);
-        let again = judge_at(lit.features, [1.0; 4], &self.map, expect, demands);
-        let edges = match again {
-            Some(again) if again.score() > verdict.score() => again,
+    fn by_discriminant(&mut self, window: Window, index: usize) -> Recognition {
+        self.memory.scanner.find(self.frame, window, index);
+        self.outlines().recognise(&self.memory.scanner.regions)
+    }
+
+    /// An accepted fit of the intensity, from the outlines found so far or else from the prediction.
+    fn by_intensity(&mut self, prior: &BandPrediction, found: &Recognition) -> Option<BlurFit> {
+        let Memory { scanner, blur, .. } = &mut *self.memory;
+        let [[ua, va], [ub, vb]] = found.scores.map(|score| score.centroid);
+        let starts = [[ua, va, ub, vb], prior.features];
+        starts
+            .into_iter()
+            .filter(|start| start.iter().all(|value| value.is_finite()))
+            .filter_map(|start| {
+                let settings = &self.settings.blur;
+                blur.fit(self.frame, self.predictor, prior, start, settings)
+            })
+            .find(|fit| {
+                fit.is_accepted(self.settings) && fit.is_inside(&scanner.map, self.settings)
+            })
+    }
+
+    /// The best of a result that is not clear, the edges near the intensity fit, and that fit itself.
+    fn best_of(&mut self, window: Window, found: &Recognition, fit: &BlurFit) -> Recognition {
+        self.swap_regions();
+        self.memory.scanner.find(self.frame, window, 0);
+        // The fit is accepted with about this standard deviation (px).
+        let near = self.outlines().recognise_at(fit.features, [1.0; 4]);
+        let edges = match near {
+            Some(near) if self.is_better(&near, found) => near,
             _ => {
-                std::mem::swap(&mut self.best, &mut self.regions);
-                *verdict
+                self.swap_regions();
+                *found
             }
         };
-        if edges.reasons != [None; 2] || lit.is_blurred() && !edges.is_clear() {
-            lit.verdict()
+        if edges.rejections != [None; 2]
+            || fit.is_blurred(&self.settings.blur) && !edges.is_clear(self.settings)
+        {
+            fit.recognition()
         } else {
             edges
         }
     }
 
-    /// The bands by their light, if that is good: from where the outlines were laid, or else from where they are expected.
-    fn by_light(
-        &mut self,
-        frame: &impl Frame,
-        expect: &impl Expect,
-        blind: &Expectation,
-        verdict: &Verdict,
-        demands: &Demands,
-    ) -> Option<Blended> {
-        let [[ua, va], [ub, vb]] = verdict.bands.map(|band| band.centroid);
-        let starts = [[ua, va, ub, vb], blind.features];
-        let finite = starts
-            .into_iter()
-            .filter(|start| start.iter().all(|value| value.is_finite()));
-        finite
-            .filter_map(|start| self.blend.fit(frame, expect, blind, start))
-            .find(|found| found.is_good(demands) && found.is_inside(&self.map, demands))
-    }
-
-    /// The regions in some windows, the largest first, at most [`CANDIDATES`]; each ends where its
-    /// window does.
-    ///
-    /// Allocates only when a frame is larger than those before.
-    pub fn regions_in(&mut self, frame: &impl Frame, windows: &[Window]) -> &[Region] {
-        self.regions.clear();
-        for window in windows {
-            self.collect(frame, *window, None);
+    fn outlines(&self) -> OutlineSearch<'_, P> {
+        OutlineSearch {
+            map: &self.memory.scanner.map,
+            predictor: self.predictor,
+            settings: self.settings,
         }
-        &self.regions
     }
 
-    /// Regions and runs of one window.
-    fn find(&mut self, frame: &impl Frame, window: Window) {
-        self.regions.clear();
-        let mut map = std::mem::take(&mut self.map);
-        let window = window.within(frame);
-        map.start(frame.width(), frame.height());
-        map.end_rows(window.top);
-        self.collect(frame, window, Some(&mut map));
-        map.end_rows(frame.height());
-        self.map = map;
-    }
-
-    fn collect(&mut self, frame: &impl Frame, window: Window, mut map: Option<&mut RunMap>) {
-        let Self {
-            segmenter,
-            labeller,
-            regions,
-            settings,
-            ..
-        } = self;
-        let mut keep = |region: Region| {
-            let place = regions.partition_point(|kept| kept.area >= region.area);
-            if region.area >= settings.minimum_area && place < CANDIDATES {
-                regions.truncate(CANDIDATES - 1);
-                regions.insert(place, region);
-            }
-        };
-        labeller.start(frame.width());
-        segmenter.each_row_in(frame, window, |v, runs| {
-            if let Some(map) = &mut map {
-                map.end_rows(v);
-            }
-            runs.each(|start, end| {
-                labeller.add(v, start, end);
-                if let Some(map) = &mut map {
-                    map.add(start, end);
-                }
-            });
-            labeller.end_row(&mut keep);
-        });
-        labeller.end_row(&mut keep);
-    }
-
-    fn exchange(&mut self, index: usize) {
-        if let Some(other) = self.alternatives.get_mut(index) {
-            std::mem::swap(&mut self.segmenter, other);
-        }
+    fn swap_regions(&mut self) {
+        let Memory { scanner, best, .. } = &mut *self.memory;
+        std::mem::swap(best, &mut scanner.regions);
     }
 }

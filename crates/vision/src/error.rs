@@ -1,15 +1,15 @@
-//! What a constructor refuses.
+//! The error that constructors return.
 
 use std::fmt;
 
-/// A named input holds what it may not.
+/// An input has a value that is not allowed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Error {
-    /// Which input.
+    /// Name of the input.
     pub field: &'static str,
-    /// What came.
+    /// The value that was given.
     pub value: String,
-    /// What may come, in words.
+    /// The allowed values, in words.
     pub allowed: &'static str,
 }
 

@@ -1,53 +1,32 @@
-//! Image to markers: Eq. (12) and Fig. 5 of Reilink et al. 2013.
+//! Marker detection: camera image to marker positions, Eq. (12) and Fig. 5 of Reilink et al. 2013.
 //!
-//! One pass over the frame. Each row is projected onto the colour discriminant ([`discriminant`]),
-//! low-passed and thresholded into runs ([`segment`]); the runs join into regions
-//! ([`regions`]); what looks like a band where one is expected is a marker ([`judge`]). [`detector`] holds it together.
+//! `scan` turns a frame into runs and regions of marker pixels in one pass, `recognition` fits the outlines of both
+//! bands to them and decides whether they are the markers, and `blur` fits the image intensity where blur has
+//! left no edges. [`Detector`] runs the three. Each may use the ones named before it, never the other way round.
 //!
 //! Pixel coordinates are those of `OpenCV`: u to the right, v down, the centre of the first pixel is (0, 0).
 
 // Kernels are compiled once for each instruction set, which they are only if they are inlined.
 #![allow(clippy::inline_always)]
 
-pub mod blend;
-mod columns;
-pub mod detector;
-pub mod discriminant;
-#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-mod dot;
-pub mod error;
-pub mod evidence;
-pub mod expectation;
-pub mod fit;
-pub mod format;
-pub mod frame;
-pub mod judge;
-mod layer;
-mod linear;
-mod lowpass;
-mod numbers;
-mod pairing;
-mod pairs;
-mod patch;
-mod projection;
-pub mod regions;
-pub mod rejection;
-pub mod runmap;
-pub mod runs;
-mod samples;
-pub mod segment;
-mod triples;
-pub mod verdict;
+#[cfg(test)]
+extern crate self as tautscope_vision;
 
-pub use detector::{Detector, Settings};
-pub use discriminant::ColorDiscriminant;
+mod blur;
+mod detector;
+mod error;
+mod math;
+mod recognition;
+mod scan;
+mod settings;
+
+pub use detector::Detector;
 pub use error::Error;
-pub use evidence::{Demands, Evidence};
-pub use expectation::{Expect, Expectation, OUTLINE, Outline};
-pub use format::PixelFormat;
-pub use frame::{Frame, Image, Window};
-pub use regions::{Labeller, Region};
-pub use rejection::Rejection;
-pub use runmap::RunMap;
-pub use segment::Segmenter;
-pub use verdict::Verdict;
+pub use recognition::{
+    BandPrediction, BandPredictor, BandScore, OUTLINE_CORNERS, Outline, Recognition, Rejection,
+};
+pub use scan::{
+    ColorDiscriminant, Frame, Image, Labeller, MAX_REGIONS, MAX_SIDE, PixelFormat, Region, Runs,
+    Segmenter, Window, each_run,
+};
+pub use settings::{BlurSettings, ClearSettings, FitSettings, Settings, UnlocatedSettings};

@@ -1,21 +1,25 @@
-//! Whatever a frame holds, there is an answer, and it adds up.
+//! Property tests of the detector with any frame.
 
 mod support;
 
 use proptest::prelude::*;
-use support::{DEMANDS, Discs, memory};
-use tautscope_vision::detector::CANDIDATES;
-use tautscope_vision::{ColorDiscriminant, Detector, Frame, Image, Labeller, Segmenter, Settings};
+use support::{Discs, SETTINGS, memory};
+use tautscope_vision::{
+    ColorDiscriminant, Detector, Frame, Image, Labeller, MAX_REGIONS, Segmenter, Settings,
+};
 
 fn settings() -> impl Strategy<Value = Settings> {
     let weights = prop::array::uniform3(-2.0..2.0_f64);
     (weights, -300.0..300.0_f64, 0..9_usize, 1..50_u64).prop_filter_map(
         "weights all but zero",
         |(weights, threshold, smoothing, minimum_area)| {
+            ColorDiscriminant::new(weights, threshold).ok()?;
             Some(Settings {
-                discriminant: ColorDiscriminant::new(weights, threshold).ok()?,
+                weights,
+                threshold,
                 smoothing,
                 minimum_area,
+                ..SETTINGS
             })
         },
     )
@@ -40,7 +44,8 @@ proptest! {
         image in memory([70, 40]),
         settings in settings(),
     ) {
-        let mut segmenter = Segmenter::new(settings.discriminant, settings.smoothing);
+        let discriminant = ColorDiscriminant::new(settings.weights, settings.threshold).unwrap();
+        let mut segmenter = Segmenter::new(discriminant, settings.smoothing);
         let mut labeller = Labeller::default();
         labeller.start(image.width);
         let (mut pixels, mut next_row, mut regions) = (0, 0, Vec::new());
@@ -70,29 +75,29 @@ proptest! {
     }
 
     #[test]
-    fn a_used_detector_answers_like_a_fresh_one(
+    fn a_used_detector_gives_the_result_of_a_new_one(
         images in prop::collection::vec((memory([70, 40]), prediction()), 1..5),
         settings in settings(),
     ) {
-        let mut used = Detector::new(settings).unwrap();
+        let mut used = Detector::new(settings.clone()).unwrap();
         for (image, predicted) in &images {
             let discs = Discs::at(*predicted);
-            let mut fresh = Detector::new(settings).unwrap();
-            let (verdict, regions) = used.recognise(&image.frame(), &discs, &DEMANDS);
-            let (again, same) = fresh.recognise(&image.frame(), &discs, &DEMANDS);
-            prop_assert_eq!(format!("{verdict:?}"), format!("{again:?}"));
+            let mut fresh = Detector::new(settings.clone()).unwrap();
+            let (found, regions) = used.recognise(&image.frame(), &discs);
+            let (again, same) = fresh.recognise(&image.frame(), &discs);
+            prop_assert_eq!(format!("{found:?}"), format!("{again:?}"));
             prop_assert_eq!(regions, same);
-            prop_assert!(regions.len() <= CANDIDATES);
+            prop_assert!(regions.len() <= MAX_REGIONS);
             prop_assert!(regions.is_sorted_by(|one, next| one.area >= next.area));
             for band in 0..2 {
-                let seen = verdict.features[2 * band].is_finite();
-                prop_assert_eq!(seen, verdict.reasons[band].is_none());
+                let is_known = found.features[2 * band].is_finite();
+                prop_assert_eq!(is_known, found.rejections[band].is_none());
             }
         }
     }
 
     #[test]
-    fn a_frame_is_refused_before_it_is_read_beyond_its_end(
+    fn an_image_is_rejected_if_its_data_are_too_short(
         format in support::format(),
         length in 0..300_usize, width in 0..9_usize, height in 0..9_usize, stride in 0..40_usize,
     ) {
@@ -112,25 +117,20 @@ proptest! {
 }
 
 #[test]
-fn senseless_settings_are_refused_by_name() {
-    let good = Settings {
-        discriminant: ColorDiscriminant::new([-0.5, 1.0, -0.6], 10.0).unwrap(),
-        smoothing: 1,
-        minimum_area: 40,
-    };
-    assert!(Detector::new(good).is_ok());
-    let refused = |settings| Detector::new(settings).unwrap_err().field;
+fn invalid_settings_are_rejected_by_name() {
+    assert!(Detector::new(SETTINGS).is_ok());
+    let rejected = |settings| Detector::new(settings).unwrap_err().field;
     assert_eq!(
-        refused(Settings {
+        rejected(Settings {
             smoothing: 9,
-            ..good
+            ..SETTINGS
         }),
         "smoothing"
     );
     assert_eq!(
-        refused(Settings {
+        rejected(Settings {
             minimum_area: 0,
-            ..good
+            ..SETTINGS
         }),
         "minimum_area"
     );

@@ -1,4 +1,4 @@
-//! What is skipped, vectorised and windowed decides as the definitions do, in every format.
+//! Scanning, vectorisation and windows give the marker pixels of the definitions, in every format.
 
 mod support;
 
@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use support::{Memory, memory, weights};
 use tautscope_vision::{ColorDiscriminant, Segmenter, Window};
 
-/// By row of the window: its marker pixels. What is after a row with some is visited too.
+/// The marker pixels by row of the window; checks that the row after one with some is visited.
 fn segmented(
     segmenter: &mut Segmenter,
     memory: &Memory,
@@ -55,7 +55,7 @@ fn window() -> impl Strategy<Value = Window> {
     )
 }
 
-/// Thresholds at and around values that occur, so that ties and near misses do.
+/// A threshold at or near the value of a pixel.
 fn threshold(memory: &Memory, weights: [f64; 3], pick: usize, shift: f64) -> f64 {
     let (weights, constant) = memory.weights(weights);
     let (u, v) = (pick % memory.width, pick / memory.width % memory.height);
@@ -67,7 +67,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
 
     #[test]
-    fn as_the_definitions(
+    fn marker_pixels_are_those_of_the_definitions(
         memories in prop::collection::vec(memory([400, 50]), 1..3),
         weights in weights(),
         pick in any::<usize>(),

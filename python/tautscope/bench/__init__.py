@@ -1,1 +1,1 @@
-"""The bench: simulated drives on a CAN bus between processes, the same wire as hardware."""
+"""A simulated rig for another process: CiA 402 drives on a CAN bus, and a camera stream."""

@@ -1,7 +1,7 @@
-"""The twin's camera as a stream in real time: uncompressed pictures in NUT on a Unix socket.
+"""The twin's camera as a real-time stream: uncompressed images in NUT on a Unix socket.
 
-Time stamps are the instants of capture on the computer's monotonic clock, as V4L2 gives them, to
-the microsecond: ``camera.source`` with format ``nut`` and clock ``device`` reads them as they are.
+Time stamps are capture times of the monotonic clock in microseconds, as in V4L2; read them with
+format ``nut`` and clock ``device`` in ``camera.source``.
 """
 
 from __future__ import annotations
@@ -24,80 +24,79 @@ from numpy.typing import NDArray
 
 from tautscope.config import Config
 from tautscope.errors import ConfigError
-from tautscope.hardware.realtime import OTHERS, step_back
+from tautscope.hardware.realtime import OTHERS, lower_realtime_priority
 from tautscope.twin.camera import TwinCamera
 
 CameraFault = Literal["drop", "delay", "fault", "freeze"]
-"""drop: no frames. delay: every frame later. fault: unplugged. freeze: the same picture for ever,
-with new time stamps."""
+"""drop: no frames. delay: later frames. fault: unplugged. freeze: one image, new time stamps."""
 
 Centreline = tuple[NDArray[np.float64], NDArray[np.float64]]
 _MICROSECOND = Fraction(1, 1_000_000)
-_WAITING = 4
-"""Captures that may wait to be drawn; on a slower computer, older ones are dropped."""
-_PATIENCE = 0.5
-"""How long a client may take a picture [s] before it is disconnected."""
-_LOOK_PERIOD = 0.02
-"""How often the thread looks for clients and faults [s]."""
+_QUEUE_LENGTH = 4
+"""Captures that can wait to be rendered; further ones are dropped."""
+_SEND_TIMEOUT = 0.5
+"""How long a client may take to read an image [s] before it is disconnected."""
+_POLL_PERIOD = 0.02
+"""How often the thread checks for clients and faults [s]."""
 
 
 class CameraStream:
-    """Draws, delays and sends; a thread, one client at a time.
+    """A thread that renders, delays and sends images to one client at a time.
 
     Args:
         config: Camera, instrument, twin.
-        path: Where the socket is made.
-        look: The centreline now, for pictures while nobody calls `capture`.
-        timing: Draws the latencies.
+        path: Path of the socket.
+        centreline_now: The present centreline, for images while nobody calls `capture`.
+        timing: Random generator of the latencies.
     """
 
     def __init__(
         self,
         config: Config,
         path: str,
-        look: Callable[[], Centreline],
+        centreline_now: Callable[[], Centreline],
         timing: np.random.Generator,
     ) -> None:
         self._config = config
         self._camera = TwinCamera(config)
         self._path = Path(path)
-        self._look = look
+        self._centreline_now = centreline_now
         self._random = timing
         self._period = 1 / config.twin.frame_rate
-        self._captures: queue.Queue[tuple[float, Centreline]] = queue.Queue(_WAITING)
-        self._under_way: deque[tuple[float, float, NDArray[np.uint8]]] = deque()
+        self._captures: queue.Queue[tuple[float, Centreline]] = queue.Queue(_QUEUE_LENGTH)
+        self._pending: deque[tuple[float, float, NDArray[np.uint8]]] = deque()
         self._due = time.monotonic()
         self._sequence = 0
         self._faults: dict[CameraFault, float] = {}
-        self._still: NDArray[np.uint8] | None = None
+        self._frozen_image: NDArray[np.uint8] | None = None
         self._server: socket.socket | None = None
         self._client: _Client | None = None
-        self._ending = threading.Event()
+        self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="bench camera", daemon=True)
 
     @property
     def is_due(self) -> bool:
-        """Whether it is time for a picture."""
+        """Whether the next image is due."""
         return time.monotonic() >= self._due
 
     def capture(self, at: float, centreline: Centreline) -> None:
-        """Take a picture: the instrument as it was at an instant of the monotonic clock [s]."""
+        """Queue an image of the instrument at a time of the monotonic clock [s]."""
         self._due = max(self._due, at - self._period) + self._period
         with suppress(queue.Full):
             self._captures.put_nowait((at, centreline))
 
     def inject(self, kind: CameraFault, delay: float = 0.3) -> None:
-        """Ask for a fault; `delay` [s] is that of ``delay``.
+        """Inject a fault; `delay` [s] applies to the kind ``delay``.
 
         Raises:
-            ConfigError: No such fault.
+            ConfigError: There is no such fault.
         """
         if kind not in get_args(CameraFault):
             raise ConfigError("fault", kind, "one of " + ", ".join(get_args(CameraFault)))
         self._faults = self._faults | {kind: delay}
 
     def clear(self) -> None:
-        """End the faults."""
+        """End all faults."""
         self._faults = {}
 
     def __enter__(self) -> Self:
@@ -110,47 +109,47 @@ class CameraStream:
         return self
 
     def __exit__(self, *failure: object) -> None:
-        self._ending.set()
+        self._stopping.set()
         self._thread.join()
-        self._unplug()
+        self._disconnect()
 
     def _run(self) -> None:
-        step_back(OTHERS)  # drawing takes longer than a cycle may wait
-        while not self._ending.is_set():
+        lower_realtime_priority(OTHERS)  # rendering takes longer than a cycle
+        while not self._stopping.is_set():
             if "fault" in self._faults:
-                self._unplug()
+                self._disconnect()
             else:
                 self._accept()
             due = self._due + self._period
-            if self._under_way:
-                due = min(due, self._under_way[0][0])
-            patience = min(due - time.monotonic(), _LOOK_PERIOD)
+            if self._pending:
+                due = min(due, self._pending[0][0])
+            timeout = min(due - time.monotonic(), _POLL_PERIOD)
             try:
-                self._draw(*self._captures.get(timeout=max(patience, 0.0)))
+                self._render(*self._captures.get(timeout=max(timeout, 0.0)))
             except queue.Empty:
-                self._idle()
-            while self._under_way and self._under_way[0][0] <= time.monotonic():
-                _, at, image = self._under_way.popleft()
+                self._capture_at_rest()
+            while self._pending and self._pending[0][0] <= time.monotonic():
+                _, at, image = self._pending.popleft()
                 self._send(at, image)
 
-    def _idle(self) -> None:
-        """The motors are off, and nobody captures: the instrument is still seen."""
+    def _capture_at_rest(self) -> None:
+        """Capture the instrument at rest while the motors are off."""
         now = time.monotonic()
         if now >= self._due + self._period:
-            self.capture(now, self._look())
+            self.capture(now, self._centreline_now())
 
-    def _draw(self, at: float, centreline: Centreline) -> None:
+    def _render(self, at: float, centreline: Centreline) -> None:
         twin, faults = self._config.twin, self._faults
         image = self._camera.draw(*centreline, self._sequence).image
         self._sequence += 1
         delay = twin.latency + twin.latency_jitter * self._random.uniform(-1, 1)
         if "freeze" in faults:
-            self._still = image if self._still is None else self._still
-            image = self._still
+            self._frozen_image = image if self._frozen_image is None else self._frozen_image
+            image = self._frozen_image
         else:
-            self._still = None
+            self._frozen_image = None
         if "drop" not in faults:
-            self._under_way.append((at + delay + faults.get("delay", 0.0), at, image))
+            self._pending.append((at + delay + faults.get("delay", 0.0), at, image))
 
     def _listen(self) -> socket.socket:
         self._path.unlink(missing_ok=True)
@@ -181,11 +180,11 @@ class CameraStream:
             return
         try:
             self._client.send(at, image)
-        except (OSError, av.error.FFmpegError):  # gone, or too slow
+        except (OSError, av.error.FFmpegError):  # disconnected, or too slow
             self._client.close()
             self._client = None
 
-    def _unplug(self) -> None:
+    def _disconnect(self) -> None:
         if self._client is not None:
             self._client.close()
             self._client = None
@@ -196,12 +195,12 @@ class CameraStream:
 
 
 class _Client:
-    """One connection, with a NUT stream of its own."""
+    """A connection with its own NUT stream."""
 
     def __init__(self, connection: socket.socket, width: int, height: int, config: Config) -> None:
-        connection.settimeout(_PATIENCE)
+        connection.settimeout(_SEND_TIMEOUT)
         self._connection = connection
-        self._is_gone = False
+        self._is_lost = False
         self._container: OutputContainer = av.open(
             self, "w", format="nut", options={"fflags": "flush_packets"}
         )
@@ -216,19 +215,19 @@ class _Client:
         frame.pts, frame.time_base = round(at * 1e6), _MICROSECOND
         for packet in self._stream.encode(frame):
             self._container.mux(packet)
-        if self._is_gone:
+        if self._is_lost:
             raise ConnectionError
 
     def write(self, data: bytes) -> int:
-        """For FFmpeg, to whom an error raised here means nothing."""
-        if not self._is_gone:
+        """Called by FFmpeg, which ignores exceptions."""
+        if not self._is_lost:
             try:
                 self._connection.sendall(data)
             except OSError:
-                self._is_gone = True
+                self._is_lost = True
         return len(data)
 
     def close(self) -> None:
-        self._is_gone = True
+        self._is_lost = True
         self._container.close()
         self._connection.close()

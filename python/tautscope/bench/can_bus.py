@@ -1,11 +1,11 @@
 """A CAN bus between the processes of one computer.
 
-`Hub` is the cable: what one station sends, every other hears, in the same order; none hears itself.
-`LocalBus` is a station, an interface of python-can under the name ``tautscope``, so that every tool
-of python-can can join: ``python -m can.viewer -i tautscope -c /tmp/bench.can``.
+`Hub` forwards the frames of each station to all others, in order and without an echo. `LocalBus` is
+a station: the python-can interface ``tautscope``, for every tool of python-can, such as
+``python -m can.viewer -i tautscope -c /tmp/bench.can``.
 
-A frame on the socket is 16 bytes, as SocketCAN's ``struct can_frame``: identifier with the flags of
-Linux (u32), length (u8), three unused bytes, eight data bytes.
+A frame on the socket has the 16 bytes of SocketCAN's ``struct can_frame``: identifier with flags
+(u32), length (u8), three unused bytes, eight data bytes.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ import can
 FRAME = struct.Struct("=IB3x8s")
 EXTENDED, REMOTE, ERROR = 1 << 31, 1 << 30, 1 << 29
 BACKLOG = 1 << 20
-"""Bytes a station may leave unread before it is unplugged."""
+"""Number of unread bytes at which a station is disconnected."""
 
 
 class LocalBus(can.BusABC):
     """A station on a `Hub`.
 
     Args:
-        channel: The hub's socket.
-        timeout: How long to wait for a hub that is not there yet [s].
-        **options: As python-can's buses; ``bitrate`` is accepted and means nothing here.
+        channel: Path of the hub's socket.
+        timeout: How long to wait for the hub [s].
+        **options: Options of python-can's buses; ``bitrate`` has no effect.
 
     Raises:
         can.CanInitializationError: There is no hub.
@@ -60,10 +60,10 @@ class LocalBus(can.BusABC):
         super().__init__(channel=channel, **options)
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
-        """Put a frame on the bus.
+        """Send a frame.
 
         Raises:
-            can.CanOperationError: The hub is gone.
+            can.CanOperationError: The hub is closed.
         """
         identifier = msg.arbitration_id
         identifier |= EXTENDED if msg.is_extended_id else 0
@@ -71,7 +71,7 @@ class LocalBus(can.BusABC):
         try:
             self._socket.sendall(FRAME.pack(identifier, msg.dlc, bytes(msg.data)))
         except OSError as error:
-            raise can.CanOperationError(f"the bus is gone: {error}") from error
+            raise can.CanOperationError(f"the bus is closed: {error}") from error
 
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
         if len(self._buffer) < FRAME.size:
@@ -80,9 +80,9 @@ class LocalBus(can.BusABC):
                     return None, False
                 data = self._socket.recv(4096)
             except OSError as error:
-                raise can.CanOperationError(f"the bus is gone: {error}") from error
+                raise can.CanOperationError(f"the bus is closed: {error}") from error
             if not data:
-                raise can.CanOperationError("the bus is gone: its hub closed")
+                raise can.CanOperationError("the bus is closed: its hub ended")
             self._buffer += data
             if len(self._buffer) < FRAME.size:
                 return None, False
@@ -104,20 +104,20 @@ class LocalBus(can.BusABC):
         return self._socket.fileno()
 
     def shutdown(self) -> None:
-        """Leave the bus; may be called twice."""
+        """Leave the bus; a second call does nothing."""
         super().shutdown()
         self._poll.close()
         self._socket.close()
 
 
 class Hub:
-    """The cable between stations: a thread that forwards frames.
+    """The bus between stations: a thread that forwards frames.
 
     Args:
-        path: Where its socket is made; what a dead hub left there is replaced.
+        path: Path of its socket; the socket of a hub that has ended is replaced.
 
     Raises:
-        OSError: The socket cannot be made, or a living hub has it.
+        OSError: The socket cannot be made, or a running hub uses it.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
@@ -130,23 +130,23 @@ class Hub:
             self._server.close()
             raise
         self._stations: dict[socket.socket, bytearray] = {}
-        self._ending, self._end = socket.socketpair()
+        self._stop_receiver, self._stop_sender = socket.socketpair()
         self._selector = selectors.DefaultSelector()
-        for place in (self._server, self._ending):
-            place.setblocking(False)
-            self._selector.register(place, selectors.EVENT_READ)
+        for endpoint in (self._server, self._stop_receiver):
+            endpoint.setblocking(False)
+            self._selector.register(endpoint, selectors.EVENT_READ)
         self._thread = threading.Thread(target=self._run, name="CAN hub", daemon=True)
         self._thread.start()
 
     def close(self) -> None:
-        """Unplug every station and remove the socket; may be called twice."""
+        """Disconnect all stations and remove the socket; a second call does nothing."""
         if self._thread.is_alive():
-            self._end.send(b"!")
+            self._stop_sender.send(b"!")
             self._thread.join()
         if self._server.fileno() >= 0:
             self._selector.close()
-            for place in (self._server, self._ending, self._end, *self._stations):
-                place.close()
+            for endpoint in (self._server, self._stop_receiver, self._stop_sender, *self._stations):
+                endpoint.close()
             self._stations.clear()
             self.path.unlink(missing_ok=True)
 
@@ -168,17 +168,17 @@ class Hub:
     def _run(self) -> None:
         while True:
             for key, _ in self._selector.select():
-                place = key.fileobj
-                if place is self._ending:
+                endpoint = key.fileobj
+                if endpoint is self._stop_receiver:
                     return
-                if place is self._server:
+                if endpoint is self._server:
                     station, _ = self._server.accept()
                     station.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BACKLOG)
                     station.setblocking(False)
                     self._stations[station] = bytearray()
                     self._selector.register(station, selectors.EVENT_READ)
-                elif isinstance(place, socket.socket) and place in self._stations:
-                    self._forward(place)
+                elif isinstance(endpoint, socket.socket) and endpoint in self._stations:
+                    self._forward(endpoint)
 
     def _forward(self, station: socket.socket) -> None:
         buffer = self._stations[station]
@@ -189,7 +189,7 @@ class Hub:
         except OSError:
             data = b""
         if not data:
-            self._unplug(station)
+            self._disconnect(station)
             return
         buffer += data
         whole = len(buffer) - len(buffer) % FRAME.size
@@ -201,9 +201,9 @@ class Hub:
             except OSError:
                 taken = -1
             if taken != len(frames):
-                self._unplug(other)
+                self._disconnect(other)
 
-    def _unplug(self, station: socket.socket) -> None:
+    def _disconnect(self, station: socket.socket) -> None:
         self._selector.unregister(station)
         del self._stations[station]
         station.close()

@@ -1,7 +1,7 @@
 """A simulated CANopen device: object dictionary, SDO server, PDOs, NMT, heartbeats (CiA 301).
 
-It shares with `tautscope.hardware` the table of objects, and no code that speaks the protocol. It
-has no thread and no clock: frames and the time are given to it.
+It shares the table of objects with `tautscope.hardware`, but no protocol code. It has no thread and
+no clock: the caller passes frames and the time.
 """
 
 from __future__ import annotations
@@ -10,14 +10,13 @@ import math
 import struct
 from collections.abc import Callable
 
-from tautscope.hardware.object_dictionary import Entry, profile
+from tautscope.hardware.object_dictionary import Entry, device_profile
 
 BOOT, STOPPED, OPERATIONAL, PRE_OPERATIONAL = 0x00, 0x04, 0x05, 0x7F
 NMT_COMMANDS = {0x01: OPERATIONAL, 0x02: STOPPED, 0x80: PRE_OPERATIONAL}
 NMT_RESETS = (0x81, 0x82)
 INVALID = 1 << 31
 
-TOGGLE = 0x0503_0000
 BAD_COMMAND = 0x0504_0001
 READ_ONLY = 0x0601_0002
 NO_OBJECT = 0x0602_0000
@@ -36,94 +35,94 @@ Send = Callable[[int, bytes], None]
 
 
 class CanopenNode:
-    """One device.
+    """One CANopen device.
 
     Args:
-        node: Its id.
-        send: Takes identifier and data of what it sends.
-        absent: Objects it does not have, by index.
+        node: Node id.
+        send: Called with identifier and data of each frame it sends.
+        absent: Indices of objects it lacks.
     """
 
     def __init__(self, node: int, send: Send, absent: frozenset[int] = frozenset()) -> None:
         self.node = node
         self.entries: dict[Key, Entry] = {
             (entry.index, entry.subindex): entry
-            for entry in profile(node)
+            for entry in device_profile(node)
             if entry.index not in absent
         }
         self._send = send
         self.state = BOOT
         self.values: dict[Key, int] = {}
-        self.next_beat = math.inf
-        self.watched_until = math.inf
+        self.next_heartbeat = math.inf
+        self.heartbeat_deadline = math.inf
 
     def boot(self, now: float) -> None:
-        """Power on, or NMT reset: defaults, boot-up message, pre-operational."""
+        """Power on, or NMT reset: set defaults, send boot-up, become pre-operational."""
         self.values = {key: entry.default for key, entry in self.entries.items()}
-        self.next_beat = self.watched_until = math.inf
+        self.next_heartbeat = self.heartbeat_deadline = math.inf
         self.state = PRE_OPERATIONAL
         self._send(0x700 + self.node, bytes([BOOT]))
 
     def deadline(self) -> float:
-        """When `tick` has something to do."""
-        return min(self.next_beat, self.watched_until)
+        """The time of the next action of `tick` [s]."""
+        return min(self.next_heartbeat, self.heartbeat_deadline)
 
     def tick(self, now: float) -> None:
-        """Send what is due, notice what did not come."""
-        if now >= self.next_beat:
+        """Send the heartbeat when due, and check the heartbeat of the master."""
+        if now >= self.next_heartbeat:
             self._send(0x700 + self.node, bytes([self.state]))
             period = self.values[0x1017, 0] / 1e3
-            self.next_beat = max(self.next_beat + period, now)
-        if now >= self.watched_until:
-            self.watched_until = math.inf
+            self.next_heartbeat = max(self.next_heartbeat + period, now)
+        if now >= self.heartbeat_deadline:
+            self.heartbeat_deadline = math.inf
             self.emergency(HEARTBEAT_LOST, 0x11)
             self.on_heartbeat_lost(now)
 
-    def take(self, identifier: int, data: bytes, now: float) -> None:
-        """A frame from the bus."""
+    def receive(self, identifier: int, data: bytes, now: float) -> None:
+        """Handle a frame from the bus."""
         if identifier == 0x000 and len(data) == 2 and data[1] in (0, self.node):
             self._nmt(data[0], now)
         elif identifier == 0x080:
             if self.state == OPERATIONAL:
                 self.on_sync(now)
         elif identifier == 0x600 + self.node and len(data) == 8 and self.state != STOPPED:
-            self._send(0x580 + self.node, self._serve(data, now))
+            self._send(0x580 + self.node, self._serve_sdo(data, now))
         elif identifier >= 0x700:
-            self._beat_of(identifier - 0x700, now)
+            self._receive_heartbeat(identifier - 0x700, now)
         elif self.state == OPERATIONAL:
             for base in (0x1400, 0x1401):
-                if self._active(base) and self.values[base, 1] & 0x7FF == identifier:
+                if self._is_valid(base) and self.values[base, 1] & 0x7FF == identifier:
                     self._unpack(base, data, now)
 
     def emergency(self, code: int, register: int) -> None:
-        """Send an emergency object: code, error register, nothing from the maker."""
+        """Send an emergency object with error code and error register."""
         self.values[0x1001, 0] = register
         self.values[0x603F, 0] = code
         self._send(0x80 + self.node, struct.pack("<HB5x", code, register))
 
-    def answer(self, base: int) -> None:
-        """Send a transmit PDO, if it is on."""
-        if self.state != OPERATIONAL or not self._active(base):
+    def send_pdo(self, base: int) -> None:
+        """Send a TxPDO, if it is valid."""
+        if self.state != OPERATIONAL or not self._is_valid(base):
             return
         data = b"".join(
             self.entries[key].encode(self.values[key]) for key in self._mapped(base + 0x200)
         )
         self._send(self.values[base, 1] & 0x7FF, data)
 
-    # What a kind of device adds
+    # Overridden by device profiles
 
     def on_write(self, key: Key, value: int, now: float) -> int | None:
-        """Called before a value is stored; an abort code refuses it."""
+        """Handle a write before the value is stored; return an abort code to refuse it."""
         return None
 
     def on_sync(self, now: float) -> None:
-        """SYNC came."""
+        """Handle SYNC."""
 
     def on_heartbeat_lost(self, now: float) -> None:
-        """The watched heartbeat stayed away."""
+        """Handle a missing heartbeat of the master."""
 
     def on_stopped(self, now: float) -> None:
-        """NMT took the device out of operational."""
+        """Handle the NMT transition out of operational."""
 
     # CiA 301
 
@@ -136,12 +135,12 @@ class CanopenNode:
             if was == OPERATIONAL != self.state:
                 self.on_stopped(now)
 
-    def _beat_of(self, node: int, now: float) -> None:
-        watched = self.values[0x1016, 1]
-        if watched >> 16 & 0x7F == node and watched & 0xFFFF:
-            self.watched_until = now + (watched & 0xFFFF) / 1e3
+    def _receive_heartbeat(self, node: int, now: float) -> None:
+        consumer = self.values[0x1016, 1]
+        if consumer >> 16 & 0x7F == node and consumer & 0xFFFF:
+            self.heartbeat_deadline = now + (consumer & 0xFFFF) / 1e3
 
-    def _active(self, base: int) -> bool:
+    def _is_valid(self, base: int) -> bool:
         return not self.values[base, 1] & INVALID
 
     def _mapped(self, mapping: int) -> list[Key]:
@@ -158,8 +157,8 @@ class CanopenNode:
             if len(piece) == entry.size:
                 self._store(key, entry.decode(piece), now)
 
-    def _serve(self, request: bytes, now: float) -> bytes:
-        """An SDO server of expedited transfers: all objects here have 4 bytes or fewer."""
+    def _serve_sdo(self, request: bytes, now: float) -> bytes:
+        """Answer an expedited SDO transfer; no object is longer than 4 bytes."""
         command, index, subindex = struct.unpack_from("<BHB", request)
         key = (index, subindex)
         entry = self.entries.get(key)
@@ -181,20 +180,20 @@ class CanopenNode:
         return struct.pack("<BHB4x", 0x60, *key) if code is None else _abort(key, code)
 
     def _store(self, key: Key, value: int, now: float) -> int | None:
-        code = self._refuses(key, value) or self.on_write(key, value, now)
+        code = self._pdo_abort_code(key, value) or self.on_write(key, value, now)
         if code is None:
             self.values[key] = value
             if key == (0x1017, 0):
-                self.next_beat = now if value else math.inf
+                self.next_heartbeat = now if value else math.inf
             elif key == (0x1016, 1):
-                self.watched_until = math.inf  # until its first heartbeat
+                self.heartbeat_deadline = math.inf  # monitoring starts with the first heartbeat
         return code
 
-    def _refuses(self, key: Key, value: int) -> int | None:
-        """What CiA 301 asks of a change to a PDO: it must be off, and its mapping empty."""
+    def _pdo_abort_code(self, key: Key, value: int) -> int | None:
+        """Check a change of a PDO mapping (CiA 301): the PDO must be invalid, the mapping empty."""
         index, subindex = key
         if 0x1600 <= index < 0x1800 or 0x1A00 <= index < 0x1C00:
-            if self._active(index - 0x200) or (subindex and self.values[index, 0]):
+            if self._is_valid(index - 0x200) or (subindex and self.values[index, 0]):
                 return WRONG_STATE
             if not subindex:
                 keys = [

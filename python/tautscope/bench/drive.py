@@ -1,4 +1,4 @@
-"""A simulated CiA 402 drive: its state machine, modes 7 and 8, limits and quick stop."""
+"""A simulated CiA 402 drive."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ OVERHEATED = 0x4310
 
 
 class SimulatedDrive(CanopenNode):
-    """One drive: the state machine, modes 7 and 8, limits, quick stop.
+    """A drive with the CiA 402 state machine, modes 7 and 8, limits and quick stop.
 
     Args:
-        dof: Which motor.
-        config: The rig as it is, whatever the other side believes.
-        send: As `CanopenNode`.
-        log: Called with the time and what happened.
-        modes: The modes it supports.
-        absent: As `CanopenNode`.
+        dof: DOF of its motor.
+        config: The true rig, which may differ from the master's configuration.
+        send: See `CanopenNode`.
+        log: Called with the time and the event.
+        modes: Supported modes of operation.
+        absent: See `CanopenNode`.
     """
 
     def __init__(
@@ -51,81 +51,81 @@ class SimulatedDrive(CanopenNode):
         self.cycle = config.cycle
         self.status = State.NOT_READY
         self.demand = 0
-        self.refusing = False
+        self.refuses_mode = False
         self._log = log
         self._modes = modes
-        self._points: deque[int] = deque(maxlen=64)
-        self._interpolating = False
-        self._limited = False
-        self._armed = True  # bit 7 was 0: the next 1 resets a fault
+        self._setpoint_buffer: deque[int] = deque(maxlen=64)
+        self._is_interpolating = False
+        self._is_limited = False
+        self._is_reset_armed = True  # a rising edge of bit 7 resets a fault
 
     def boot(self, now: float) -> None:
-        """Power on: as `CanopenNode.boot`; the motor is not powered and stays where it is."""
+        """Power on; the motor stays where it is, without voltage."""
         actual = self.values.get((0x6064, 0), 0)
         super().boot(now)
         self.values[0x6502, 0] = sum(1 << (mode - 1) for mode in self._modes)
         self.values[0x6064, 0] = actual
         self.demand = actual
-        self._go(State.SWITCH_ON_DISABLED, now)
+        self._enter(State.SWITCH_ON_DISABLED, now)
 
-    def set_actual(self, counts: int) -> None:
-        """Where the motor is."""
+    def set_position(self, counts: int) -> None:
+        """Set the position actual value [counts]."""
         self.values[0x6064, 0] = counts
         if self.status not in (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE):
             self.demand = counts
 
     def fail(self, now: float) -> None:
-        """An internal fault: emergency, fault state."""
+        """Simulate an internal fault: emergency object and fault state."""
         self.emergency(OVERHEATED, 0x09)
-        self._go(State.FAULT, now)
+        self._enter(State.FAULT, now)
 
     def on_write(self, key: Key, value: int, now: float) -> int | None:
-        """Controlword and mode act at once; all else is stored."""
+        """Apply controlword and mode of operation at once."""
         if key == (0x6040, 0):
             self._control(value, now)
         elif key == (0x6060, 0):
             if value not in self._modes:
                 return OUT_OF_RANGE
-            if not self.refusing:
+            if not self.refuses_mode:
                 self.values[0x6061, 0] = value
-        elif key == (0x60C2, 1) and self._interpolating:
+        elif key == (0x60C2, 1) and self._is_interpolating:
             return OUT_OF_RANGE
         return None
 
     def on_sync(self, now: float) -> None:
-        """Say where the motor is, then take the set-point."""
+        """Send the TxPDO, then apply the set-point."""
         self._update_statusword()
-        self.answer(0x1800)
+        self.send_pdo(0x1800)
         if self.status is State.OPERATION_ENABLED:
-            self._advance()
+            self._apply_setpoint()
         elif self.status is State.QUICK_STOP_ACTIVE and self.values[0x605A, 0] == 2:
-            self._go(State.SWITCH_ON_DISABLED, now)
+            self._enter(State.SWITCH_ON_DISABLED, now)
 
     def on_heartbeat_lost(self, now: float) -> None:
-        """What 0x6007 says: 1 fault, 2 disable, 3 quick stop."""
+        """React as set in 0x6007: 1 fault, 2 disable voltage, 3 quick stop."""
         if self.status is not State.OPERATION_ENABLED:
             return
         reaction = self.values.get((0x6007, 0), 0)
         if reaction == 1:
-            self._go(State.FAULT, now)
+            self._enter(State.FAULT, now)
         elif reaction == 2:
-            self._go(State.SWITCH_ON_DISABLED, now)
+            self._enter(State.SWITCH_ON_DISABLED, now)
         elif reaction == 3:
-            self._go(State.QUICK_STOP_ACTIVE, now)
+            self._enter(State.QUICK_STOP_ACTIVE, now)
 
     def on_stopped(self, now: float) -> None:
-        """Leaving operational is a lost connection."""
+        """React to the end of operational as to a lost connection."""
         self.on_heartbeat_lost(now)
 
     def _control(self, word: int, now: float) -> None:
-        """The command table of CiA 402 for bits 7, 3, 2, 1, 0."""
+        """Apply a controlword: bits 7, 3, 2, 1, 0 of the command table of CiA 402."""
         status = self.status
-        resets = bool(word & 0x80) and self._armed
-        self._armed = not word & 0x80
+        resets = bool(word & 0x80) and self._is_reset_armed
+        self._is_reset_armed = not word & 0x80
         if status is State.FAULT:
             if resets:
                 self.emergency(0, 0)
-                self._go(State.SWITCH_ON_DISABLED, now)
+                self._enter(State.SWITCH_ON_DISABLED, now)
             return
         if not word & 0x02:
             target = State.SWITCH_ON_DISABLED
@@ -133,49 +133,49 @@ class SimulatedDrive(CanopenNode):
             enabled = status in (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)
             target = State.QUICK_STOP_ACTIVE if enabled else State.SWITCH_ON_DISABLED
         elif status is State.QUICK_STOP_ACTIVE:
-            return  # out of it only through disable voltage
+            return  # only disable voltage leaves this state
         elif not word & 0x01:
             target = State.READY
         elif status is State.SWITCH_ON_DISABLED:
-            return  # must be ready first
+            return  # shutdown must come first
         else:
             target = State.OPERATION_ENABLED if word & 0x08 else State.SWITCHED_ON
-        self._interpolating = target is State.OPERATION_ENABLED and bool(word & 0x10)
-        self._go(target, now)
+        self._is_interpolating = target is State.OPERATION_ENABLED and bool(word & 0x10)
+        self._enter(target, now)
 
-    def _go(self, target: State, now: float) -> None:
+    def _enter(self, target: State, now: float) -> None:
         if target is self.status:
             return
         self.status = target
         if target is State.OPERATION_ENABLED:
-            self._points.clear()
+            self._setpoint_buffer.clear()
             self.demand = self.values[0x6064, 0]
             self.values[0x607A, 0] = self.values[0x60C1, 1] = self.demand
         else:
-            self._interpolating = False
+            self._is_interpolating = False
         self._update_statusword()
         self._log(now, target.value)
 
-    def _advance(self) -> None:
+    def _apply_setpoint(self) -> None:
         if self.values[0x6061, 0] == Mode.CYCLIC_SYNCHRONOUS_POSITION:
             target = self.values[0x607A, 0]
         elif self.values[0x6061, 0] == Mode.INTERPOLATED_POSITION:
-            self._points.append(self.values[0x60C1, 1])
-            if not self._interpolating:
+            self._setpoint_buffer.append(self.values[0x60C1, 1])
+            if not self._is_interpolating:
                 return
-            target = self._points.popleft()
+            target = self._setpoint_buffer.popleft()
         else:
             return
         lower, upper = (self.values.get((0x607D, sub), 0) for sub in (1, 2))
-        inside = min(max(target, lower), upper) if upper > lower else target
-        reach = math.ceil(self.values.get((0x607F, 0), 0xFFFF_FFFF) * self.cycle) + 1
-        self._limited = inside != target
-        self.demand += min(max(inside - self.demand, -reach), reach)
+        limited = min(max(target, lower), upper) if upper > lower else target
+        max_step = math.ceil(self.values.get((0x607F, 0), 0xFFFF_FFFF) * self.cycle) + 1
+        self._is_limited = limited != target
+        self.demand += min(max(limited - self.demand, -max_step), max_step)
 
     def _update_statusword(self) -> None:
         word = _STATUSWORD[self.status]
         if self.status is State.OPERATION_ENABLED:
             follows = self.values[0x6061, 0] == Mode.CYCLIC_SYNCHRONOUS_POSITION
-            word |= (follows or self._interpolating) << 12
-            word |= self._limited << 11
+            word |= (follows or self._is_interpolating) << 12
+            word |= self._is_limited << 11
         self.values[0x6041, 0] = word

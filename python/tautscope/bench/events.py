@@ -1,4 +1,4 @@
-"""What happens on the bench, and how it is told."""
+"""Events of the bench, printed as JSON lines."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from tautscope.hardware.realtime import OTHERS, step_back
+from tautscope.hardware.realtime import OTHERS, lower_realtime_priority
 
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something a drive did.
+    """An event of a drive or the camera.
 
     Attributes:
-        time: [s], the computer's monotonic clock, the same in all its processes.
-        dof: Which drive, or ``camera``.
-        what: The state it went to, or ``fault: <kind>``.
+        time: [s], monotonic clock, which all processes of the computer share.
+        dof: The drive's DOF, or ``camera``.
+        what: The state entered, or ``fault: <kind>``.
     """
 
     time: float
@@ -25,31 +25,31 @@ class Event:
     what: str
 
 
-class Reporter:
-    """Writes events as they come, a JSON line each; a thread, as the main one waits for input.
+class EventPrinter:
+    """A thread that prints each event as a JSON line.
 
     Args:
-        events: All that happened so far; each is written once.
+        events: Returns all events so far.
     """
 
     def __init__(self, events: Callable[[], list[Event]]) -> None:
         self._events = events
-        self._ending = threading.Event()
+        self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
     def close(self) -> None:
-        """Write the last of them."""
-        self._ending.set()
+        """Print the remaining events and end."""
+        self._stopping.set()
         self._thread.join()
 
     def _run(self) -> None:
-        step_back(OTHERS)
-        told = 0
-        last = False
-        while not last:
-            last = self._ending.wait(0.02)
-            for event in self._events()[told:]:
-                told += 1
+        lower_realtime_priority(OTHERS)
+        count = 0
+        is_last = False
+        while not is_last:
+            is_last = self._stopping.wait(0.02)
+            for event in self._events()[count:]:
+                count += 1
                 line = {"time": event.time, "dof": event.dof, "what": event.what}
                 print(json.dumps(line), flush=True)

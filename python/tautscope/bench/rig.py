@@ -1,8 +1,8 @@
-"""The rig that `tautscope bench` is: the twin behind a CAN bus and a camera, in real time.
+"""The simulated rig of `tautscope bench`: the twin behind a CAN bus and a camera, in real time.
 
     with Bench(config) as bench: bench.request("freeze rotation")
 
-Nothing of it is shared with the process that drives it but the two sockets.
+Another process drives it through two sockets.
 """
 
 from __future__ import annotations
@@ -20,71 +20,72 @@ from tautscope.bench.camera import CameraStream, Centreline
 from tautscope.bench.can_bus import Hub, LocalBus
 from tautscope.bench.drives import SimulatedDrives
 from tautscope.bench.events import Event
-from tautscope.bench.truth import TruthFile
+from tautscope.bench.ground_truth import GroundTruthWriter
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError
-from tautscope.hardware.rig import rig_drives
+from tautscope.hardware.rig import require_drives
 from tautscope.twin.plant import Plant
 
 CAMERA = "camera"
 
 
 class Bench:
-    """Three simulated drives that move the twin's plant, and its camera.
+    """Three simulated drives that move the twin's plant, and the twin's camera.
 
-    The same ``twin.seed`` is the same instrument as `tautscope.twin.Twin`. The plant goes on by
-    one ``control.period`` with every SYNC, so it stands while nobody sends set-points.
+    A ``twin.seed`` gives the same instrument as in `tautscope.twin.Twin`. The plant advances by one
+    ``control.period`` with every SYNC.
 
     Args:
-        config: ``drives.channel`` and ``camera.source.url`` (``unix:PATH``) are where it is.
-        truth: CSV to write where the tip is at every SYNC, for evaluation alone; whoever drives
-            the bench does not see it.
-        modes: Of the drives.
+        config: ``drives.channel`` and ``camera.source.url`` (``unix:PATH``) name the sockets.
+        truth: CSV file for the true tip state at every SYNC, for evaluation only.
+        modes: Supported modes of operation of the drives.
 
     Raises:
-        ConfigError: The configuration is not one of a bench, or its sockets cannot be made.
+        ConfigError: The configuration does not describe a bench, or a socket cannot be made.
         OutputError: `truth` cannot be written.
     """
 
     def __init__(
         self, config: Config, truth: Path | None = None, *, modes: tuple[int, ...] = (7, 8)
     ) -> None:
-        drives = rig_drives(config)
+        drives = require_drives(config)
         if drives.interface != "tautscope":
-            raise ConfigError("drives.interface", drives.interface, "tautscope, for a bench")
+            raise ConfigError("drives.interface", drives.interface, "tautscope, on the bench")
         url = config.camera.source.url
         if not url.startswith("unix:"):
-            raise ConfigError("camera.source.url", url, "unix:PATH, for a bench")
+            raise ConfigError("camera.source.url", url, "unix:PATH, on the bench")
         if config.camera.pixel_format != "bgr":
-            raise ConfigError("camera.pixel_format", config.camera.pixel_format, "bgr, for a bench")
+            raise ConfigError(
+                "camera.pixel_format", config.camera.pixel_format, "bgr, on the bench"
+            )
         seed = np.random.SeedSequence(config.twin.seed)
         physics, timing = (np.random.default_rng(child) for child in seed.spawn(2))
         self._plant = Plant(config, physics)
         self._lock = threading.Lock()
         self._camera = CameraStream(config, url.removeprefix("unix:"), self._centreline, timing)
-        self._open = ExitStack()
-        self._truth: TruthFile | None = None
+        self._resources = ExitStack()
+        self._truth: GroundTruthWriter | None = None
         try:
             if truth is not None:
-                self._truth = self._open.enter_context(TruthFile(truth))
-            bus = self._plug(drives.channel)
+                self._truth = self._resources.enter_context(GroundTruthWriter(truth))
+            bus = self._open_bus(drives.channel)
             start = self._plant.applied
             self.drives = SimulatedDrives(bus, drives, self._on_sync, start=start, modes=modes)
         except BaseException:
-            self._open.close()
+            self._resources.close()
             raise
 
     def request(self, line: str) -> None:
-        """Ask for a fault: ``freeze rotation``, ``drop camera``, ``clear camera``.
+        """Inject a fault: ``freeze rotation``, ``drop camera``, ``clear camera``.
 
         Raises:
-            ConfigError: No such fault, or nothing of that name.
+            ConfigError: There is no such fault or part.
         """
         kind, _, part = line.strip().partition(" ")
         if part == CAMERA:
             self._camera.clear() if kind == "clear" else self._camera.inject(kind)  # type: ignore[arg-type]
-            self.drives.note(CAMERA, f"fault: {kind}")
+            self.drives.log_event(CAMERA, f"fault: {kind}")
             return
         names = [dof.label for dof in Dof]
         if part not in names:
@@ -94,34 +95,34 @@ class Bench:
 
     @property
     def events(self) -> list[Event]:
-        """What drives and camera did; in order."""
+        """Events of drives and camera, in order."""
         return self.drives.events
 
     def __enter__(self) -> Self:
         try:
-            self._open.enter_context(self._camera)
-            self._open.enter_context(self.drives)
+            self._resources.enter_context(self._camera)
+            self._resources.enter_context(self.drives)
         except BaseException:
-            self._open.close()
+            self._resources.close()
             raise
         return self
 
     def __exit__(self, *failure: object) -> None:
-        self._open.close()
+        self._resources.close()
 
-    def _plug(self, channel: str) -> LocalBus:
+    def _open_bus(self, channel: str) -> LocalBus:
         try:
-            self._open.enter_context(Hub(channel))
+            self._resources.enter_context(Hub(channel))
         except OSError as error:
-            allowed = f"a socket that can be made ({error}); does another bench run?"
+            allowed = f"a socket that can be made ({error}); is another bench running?"
             raise ConfigError("drives.channel", channel, allowed) from None
-        return self._open.enter_context(LocalBus(channel))
+        return self._resources.enter_context(LocalBus(channel))
 
     def _centreline(self) -> Centreline:
         with self._lock:
             return self._plant.centreline()
 
-    def _on_sync(self, told: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _on_sync(self, demand: NDArray[np.float64]) -> NDArray[np.float64]:
         now = time.monotonic()
         with self._lock:
             plant = self._plant
@@ -129,5 +130,5 @@ class Bench:
                 self._truth.add(now, plant.true_state)
             if self._camera.is_due:
                 self._camera.capture(now, plant.centreline())
-            plant.step(told)
+            plant.step(demand)
             return plant.applied

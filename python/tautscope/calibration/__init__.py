@@ -1,1 +1,1 @@
-"""From recorded data to configuration values."""
+"""Calibration: configuration values from recorded data."""

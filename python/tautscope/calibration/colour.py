@@ -1,4 +1,4 @@
-"""The markers' colour: Fisher's linear discriminant from labelled pixels, Eq. (12)."""
+"""Calibration of the marker colour: Fisher's linear discriminant of labelled pixels, Eq. (12)."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from tautscope.errors import FieldError
 
 @dataclass(frozen=True, slots=True)
 class ColorDiscriminant:
-    """Which colours are marker: those with w . x > threshold, x = (B, G, R) [grey levels].
+    """Linear classifier of marker pixels: w . x > threshold with x = (B, G, R) [grey levels].
 
     Attributes:
-        weights: Of B, G, R; `vision.weights`.
+        weights: w for B, G, R; `vision.weights`.
         threshold: `vision.threshold` [grey levels].
-        training_margin: `margin` of the marker pixels it was fitted to.
+        training_margin: `margin` of the marker pixels of the fit.
     """
 
     weights: tuple[float, float, float]
@@ -26,11 +26,11 @@ class ColorDiscriminant:
 
     @classmethod
     def fit(cls, marker: ArrayLike, background: ArrayLike) -> ColorDiscriminant:
-        """Fisher's discriminant with equal priors from labelled pixels, see `fit_discriminant`.
+        """Fit Fisher's discriminant to labelled pixels, see `fit_discriminant`.
 
         Args:
             marker: (n, 3) B, G, R of pixels on the bands.
-            background: (m, 3) B, G, R of pixels of everything else.
+            background: (m, 3) B, G, R of all other pixels.
 
         Raises:
             FieldError: As `fit_discriminant`.
@@ -40,25 +40,24 @@ class ColorDiscriminant:
         return cls(weights, threshold, unfitted.margin(marker))
 
     def is_marker(self, pixels: ArrayLike) -> NDArray[np.bool_]:
-        """Which of pixels (n, 3) are marker (n,)."""
+        """Classify pixels (n, 3): (n,), True for marker pixels."""
         values: NDArray[np.float64] = _checked("pixels", pixels) @ np.array(self.weights)
         return values > self.threshold
 
     def margin(self, marker: ArrayLike) -> float:
-        """How far pixels (n, 3) are on the markers' side: median of (w . x - threshold) / |x|.
+        """Median margin of pixels (n, 3): (w . x - threshold) / |x|; 0 is on the boundary.
 
-        The division by the pixel's brightness makes it independent of the exposure, but for the
-        threshold. 0 is on the boundary.
+        The normalization by brightness makes it nearly independent of the exposure.
         """
         pixels = _checked("marker", marker)
         brightness = np.maximum(np.linalg.norm(pixels, axis=1), 1.0)
         return float(np.median((pixels @ np.array(self.weights) - self.threshold) / brightness))
 
     def has_drifted(self, marker: ArrayLike) -> bool:
-        """Whether a scene's marker pixels have lost half of the training's margin: fit anew.
+        """Whether the margin is below half of the training margin, so that a new fit is needed.
 
         Args:
-            marker: (n, 3) pixels within the bands of a trusted detection.
+            marker: (n, 3) pixels within the bands of a valid detection.
         """
         return self.margin(marker) < 0.5 * self.training_margin
 
@@ -66,31 +65,28 @@ class ColorDiscriminant:
 def fit_discriminant(
     marker_pixels: ArrayLike, background_pixels: ArrayLike
 ) -> tuple[tuple[float, float, float], float]:
-    """The weights and the threshold that tell marker from background: marker if w . x > threshold.
+    """Fisher's discriminant with equal priors: a pixel x is marker if w . x > threshold.
 
-    Fisher's discriminant with equal priors: however few of the labelled pixels are marker, both
-    kinds count the same::
+    With mean colour mu and covariance S of marker (m) and background (b) pixels::
 
         w = (S_m + S_b)^-1 (mu_m - mu_b),    threshold = w . (mu_m + mu_b) / 2
 
-    with mu and S the mean colour and the covariance of each kind. Both are divided by the largest
-    magnitude among the weights, so that the threshold reads as grey levels. They are the values of
-    `vision.weights` and `vision.threshold`.
+    Both are divided by the largest magnitude of the weights, so that the threshold is in grey
+    levels, and are the values of `vision.weights` and `vision.threshold`.
 
-    It is the best linear rule if both kinds are normally distributed with the same covariance.
-    Shadow and highlight stretch both along the line to black or white: label pixels of the
-    brightnesses that will occur, and no saturated ones.
+    Wrong when the classes are not normally distributed with equal covariance: label pixels of all
+    brightnesses that will occur, without saturated ones.
 
     Args:
         marker_pixels: (n, 3) B, G, R of pixels on the bands.
-        background_pixels: (m, 3) B, G, R of pixels of everything else that may be in the picture.
+        background_pixels: (m, 3) B, G, R of all other pixels.
 
     Returns:
         The weights of B, G, R and the threshold.
 
     Raises:
-        FieldError: Pixels are not a (n, 3) array of finite numbers with n >= 2, they all lie on one
-            plane of the colour space, or both kinds have the same mean colour.
+        FieldError: Pixels are not a (n, 3) array of finite numbers with n >= 2, all lie on one
+            plane of the colour space, or both classes have the same mean colour.
     """
     marker = _checked("marker_pixels", marker_pixels)
     background = _checked("background_pixels", background_pixels)

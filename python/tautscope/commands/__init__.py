@@ -1,1 +1,1 @@
-"""Verbs of the command line; those of logs, of hardware and ``doctor`` are in their packages."""
+"""Commands; those of logs, hardware, bench and ``doctor`` are in their packages."""

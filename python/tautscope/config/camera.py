@@ -1,4 +1,4 @@
-"""The camera: its projection, the source of its images, the guide's pose in front of it."""
+"""Configuration of the camera: projection, image source, pose of the guide."""
 
 from __future__ import annotations
 
@@ -25,47 +25,47 @@ class PoseConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 class SourceConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Where a camera's images come from, in FFmpeg's words. All [ours]."""
+    """The source of a camera's images, in FFmpeg's terms. All [ours]."""
 
     url: str = "/dev/video0"
     """Device, file, ``pipe:0``, ``udp://...``, ``rtsp://...``, or a filter graph for lavfi."""
     format: str | None = "v4l2"
-    """FFmpeg's input format: v4l2, dv, mpegts, lavfi, ...; left empty, it is guessed."""
+    """FFmpeg's input format: v4l2, dv, mpegts, lavfi, ...; None lets FFmpeg detect it."""
     options: dict[str, str] = field(default_factory=dict)
     """FFmpeg's options of that format: ``video_size``, ``framerate``, ``input_format``, ..."""
     deinterlace: Deinterlace = "bwdif"
-    """What becomes of interlaced frames: ``bwdif`` makes each field a frame, one frame late."""
+    """Deinterlacing: ``bwdif`` makes each field a frame, with a delay of one frame."""
     clock: CameraClock = "stream"
-    """When a frame was captured: ``stream``, its time stamp put on our clock by the quickest of
-    the frames of `clock_window`; ``device``, its time stamp as it is, the system's monotonic clock
-    (V4L2); ``arrival``, when it arrived, for a source without time stamps."""
+    """Capture time of a frame: ``stream``, its time stamp, mapped to our clock by the frame with
+    the lowest latency in `clock_window`; ``device``, its time stamp on the system's monotonic clock
+    (V4L2); ``arrival``, its arrival time, for a source without time stamps."""
     clock_window: Positive = 10.0
-    """[s]."""
+    """Window of ``clock = "stream"`` [s]."""
     delay: NonNegative = 0.0
-    """From exposure to time stamp for ``device``, else of the quickest frame from exposure to
-    arrival [s]; to be measured, since none of these can tell."""
+    """Time from exposure to time stamp for ``device``, otherwise lowest time from exposure to
+    arrival [s]; it has to be measured."""
     timeout: Positive = 2.0
-    """Without a frame for so long a source is lost, and opened anew [s]."""
+    """Time without a frame after which the source is lost and opened again [s]."""
     reconnect_period: Positive = 0.5
-    """Between two attempts to open it [s]."""
+    """Time between two attempts to open the source [s]."""
     start_timeout: Positive = 10.0
-    """For the frames of the self-test at the start [s]."""
+    """Time limit of the self-test at the start [s]."""
     lost_timeout: Positive = 5.0
-    """Without a frame for so long a run on hardware ends, and the motors stop [s]."""
+    """Time without a frame after which a run on hardware ends and the motors stop [s]."""
     darkest: Annotated[int, Meta(ge=1, le=255)] = 24
-    """A picture without a pixel above this is black [grey levels]; video black is 16."""
+    """An image without a pixel above this is black [grey levels]; video black is 16."""
 
 
 class CameraConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Pinhole with OpenCV's distortion, Eq. (8)."""
+    """Pinhole camera with OpenCV's distortion model, Eq. (8)."""
 
     width: Annotated[int, Meta(ge=1, le=8192)] = 720
     """[px], PAL DV [paper]."""
     height: Annotated[int, Meta(ge=1, le=8192)] = 576
     """[px], PAL DV [paper]."""
     pixel_format: PixelFormat = "bgr"
-    """Layout of the 8-bit pixels; the YUV formats in BT.601 with limited range, the width even, in
-    nv12 and i420 the height too."""
+    """Layout of the 8-bit pixels. The YUV formats are BT.601 with limited range and need an even
+    width, nv12 and i420 also an even height."""
     fx: Positive = 424.0
     """Focal length along x [px] [public colonoscope calibration]."""
     fy: Positive = 454.0

@@ -1,4 +1,4 @@
-"""The loop's clock."""
+"""Configuration of the control loop's timing."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from tautscope.config.fields import Positive
 
 
 class ControlConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Rates and memory of the loop."""
+    """Period and history of the control loop."""
 
     period: Positive = 0.005
-    """Control tick [s] [ours; the article says hundreds of Hz]."""
+    """Control period [s] [ours; the article states hundreds of Hz]."""
     history: Positive = 2.0
-    """How long commands are remembered, so that a frame finds the one in force when it was
-    captured [s]; at most 1024 ticks. An older frame is refused."""
+    """Length of the command history, in which the command at a frame's capture time is found [s];
+    at most 1024 ticks. Older frames are rejected."""

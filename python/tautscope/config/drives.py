@@ -1,4 +1,4 @@
-"""Motors on a bus."""
+"""Configuration of the drives on a fieldbus."""
 
 from __future__ import annotations
 
@@ -11,33 +11,33 @@ from tautscope.dof import Dof
 
 
 class AxisConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """One motor and its drive. What has no default is a fact of the rig that nobody can guess."""
+    """One motor and its drive. Values without a default depend on the rig."""
 
     node: Annotated[int, Meta(ge=1, le=127)]
-    """CANopen node id; with EtherCAT, the position on the line, from 1."""
+    """CANopen node id; with EtherCAT, the position on the line, counted from 1."""
     counts_per_unit: Positive
-    """Encoder counts per m or rad of the instrument's degree of freedom, gears included."""
+    """Encoder counts per m or rad of the instrument's DOF, including gears."""
     sign: Literal[-1, 1]
-    """1 where counts grow with the degree of freedom, else -1."""
+    """1 if the counts increase with the DOF, else -1."""
     travel: tuple[float, float]
-    """Least and largest position [m or rad]; set in the drive and checked before every command."""
+    """Smallest and largest position [m or rad]; set in the drive and checked for every command."""
     speed_limit: Positive
-    """[m/s or rad/s]; likewise."""
+    """Largest speed [m/s or rad/s]; set in the drive and checked for every command."""
     following_error: Positive
-    """How far the motor may be from all that was commanded within the last `lag` [m or rad]."""
+    """Largest distance of the motor from all commands of the last `lag` [m or rad]."""
     following_window: Positive
-    """Likewise for longer than `following_timeout` [m or rad]; at most `following_error`."""
+    """Largest distance that may last longer than `following_timeout` [m or rad]; at most
+    `following_error`."""
     home: float = 0.0
-    """Where the degree of freedom is when the drive reads 0 counts [m or rad]."""
+    """Position of the DOF at 0 counts [m or rad]."""
     eds: str | None = None
-    """The drive's EDS file, seen from the TOML file's folder; without it, the objects of CiA 402
-    that are used."""
+    """The drive's EDS file, relative to the TOML file; without it, the default types of CiA 402."""
 
 
 class DrivesConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Motors on a bus. Only a rig of hardware, or the bench that stands for one, has them.
+    """Drives on a fieldbus; only a physical rig and the bench have this section.
 
-    The times are [ours].
+    The default times are [ours].
     """
 
     insertion: AxisConfig
@@ -45,48 +45,47 @@ class DrivesConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     bending: AxisConfig
     protocol: Literal["canopen", "ethercat"] = "canopen"
     interface: str = "socketcan"
-    """Any of python-can's, as it names them; not those that hear their own frames."""
+    """Name of a python-can interface that does not receive its own frames."""
     channel: str = "can0"
-    """What the interface calls the bus; with EtherCAT, the network adapter."""
+    """Channel of the interface; with EtherCAT, the network adapter."""
     bitrate: Annotated[int, Meta(ge=10_000, le=1_000_000)] = 1_000_000
-    """[bit/s]; SocketCAN takes the operating system's."""
+    """[bit/s]; SocketCAN uses the setting of the operating system."""
     options: dict[str, str | int | float | bool] = field(default_factory=dict)
-    """What else the interface wants to know."""
+    """Further options of the interface."""
     cycle: Positive = 0.01
-    """From one set-point to the next [s], whole milliseconds."""
+    """Time from one set-point to the next [s], whole milliseconds."""
     reply_timeout: Positive = 0.006
-    """How long a cycle waits for the drives' answers [s]; what comes later counts as late."""
+    """How long a cycle waits for the drives' answers [s]; later ones are counted as late."""
     lead_points: Annotated[int, Meta(ge=0, le=16)] = 2
-    """Set-points ahead in the input buffer, interpolated position mode only; each is a cycle's
-    delay, and covers a cycle's unpunctuality."""
+    """Set-points in the drive's input buffer, interpolated position mode only; each adds a delay
+    of one cycle and tolerates jitter of one cycle."""
     master_node: Annotated[int, Meta(ge=1, le=127)] = 127
-    """Node id of our own heartbeat."""
+    """Node id of the master's heartbeat."""
     heartbeat_period: Positive = 0.02
-    """[s], ours and the drives', whole milliseconds."""
+    """Period of the heartbeats of master and drives [s], whole milliseconds."""
     heartbeat_timeout: Positive = 0.08
-    """Silence after which a drive quick-stops, and after which we stop all drives [s], whole
-    milliseconds."""
+    """Time without a heartbeat after which a drive quick-stops, and the master stops all drives
+    [s], whole milliseconds."""
     state_timeout: Positive = 1.0
-    """For each state of the drive to be reached [s]."""
+    """Timeout of each state transition [s]."""
     request_timeout: Positive = 0.3
-    """For each answer to a request [s]."""
+    """Timeout of each SDO response [s]."""
     lag: Positive = 0.02
-    """How long the motors may take to follow [s]: filter and servo of the drives, and a set-point
-    that came late for its cycle."""
+    """Largest delay of the motors [s]: filters and servo loops of the drives, late set-points."""
     following_timeout: Positive = 0.05
-    """How long a motor may be beyond its `following_window` [s], whole milliseconds."""
+    """How long the following error may exceed `following_window` [s], whole milliseconds."""
     command_timeout: Positive = 0.5
-    """How long the motors are held where they are while the loop gives no command; then quick
-    stop [s]."""
+    """Time without a command of the loop after which the motors are quick-stopped [s]; they are
+    held meanwhile."""
     start_speed: Fraction = 0.1
-    """Share of `speed_limit` at which the motors go to where a run starts."""
+    """Fraction of `speed_limit` for the move to the start of a run."""
     after_quick_stop: Literal["hold", "release"] = "hold"
-    """Whether the motor is held where it stopped, or let go."""
+    """Whether the motor is held or released after a quick stop."""
     waive: tuple[Literal["6007", "605A", "607D"], ...] = ()
-    """Protections the drives do not have: what a lost connection does, what a quick stop does,
-    limits of travel. Each named here is one you go without."""
+    """Protections that the drives lack and the run does without: reaction to a lost connection
+    (6007), quick stop option (605A), position limits (607D)."""
 
     def __getitem__(self, dof: Dof) -> AxisConfig:
-        """The motor of one DOF."""
+        """Settings of one DOF."""
         axis: AxisConfig = getattr(self, dof.label)
         return axis

@@ -1,4 +1,4 @@
-"""The experiment of the article."""
+"""Configuration of the article's experiment."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Sine(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Reference of one DOF: centre + amplitude sin(2 pi t / period)."""
 
     centre: float
-    """Where the DOF is held while the others move [m or rad]."""
+    """Position of the DOF while the others move [m or rad]."""
     amplitude: Positive
     """[m or rad]."""
     period: Positive = 10.0
@@ -24,11 +24,11 @@ class Sine(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 class ExperimentConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Section 5: a sine on each DOF in succession.
 
-    Amplitudes are [ours]: the article's are in its figure only.
+    Amplitudes are [ours]: the article gives them only in a figure.
     """
 
     periods: Annotated[int, Meta(ge=3)] = 5
-    """Per DOF [paper]."""
+    """Number of periods per DOF [paper]."""
     insertion: Sine = field(default_factory=lambda: Sine(centre=25e-3, amplitude=15e-3))
     rotation: Sine = field(default_factory=lambda: Sine(centre=0.0, amplitude=2.0))
     bending: Sine = field(default_factory=lambda: Sine(centre=0.9, amplitude=0.9))

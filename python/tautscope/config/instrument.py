@@ -1,4 +1,4 @@
-"""The instrument."""
+"""Configuration of the instrument's geometry."""
 
 from __future__ import annotations
 

@@ -1,48 +1,135 @@
-"""The marker detection."""
+"""Settings of the marker detection."""
 
 from __future__ import annotations
 
 from typing import Annotated
 
-from msgspec import Meta, Struct
+from msgspec import Meta, Struct, field
 
 from tautscope.config.fields import Fraction, Positive, Vector3
 
 
+class OutlineFitConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Fit of the bands' outlines to the edges of the marker pixels [all ours]."""
+
+    edge_deviation: Positive = 0.5
+    """Standard deviation of an edge point, neighbours taken as independent [px]."""
+    edge_tolerance: Positive = 1.8
+    """An edge farther than this from the fitted outline is an outlier [px]."""
+    edge_reach: Positive = 9.0
+    """Edges are searched up to this distance from the outline [px]."""
+    growth_deviation: Positive = 1.2
+    """Standard deviation of the outlines' growth by blur and by the threshold [px]."""
+    growth_share: Positive = 0.06
+    """And by an unknown scale [per radius of a band]."""
+    growth_difference: Positive = 0.2
+    """Standard deviation of the difference in growth between the two bands, which are blurred alike
+    [px]."""
+    growth_difference_share: Positive = 0.01
+    """And by a difference in scale [per radius of a band]."""
+    missing_edge_variance: Positive = 5.0
+    """Increase of the variance of a band's position where all of its edges are missing, relative to
+    the variance with all edges; in proportion to the missing share [1]."""
+
+
+class ClearConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Scores of both bands at which the search for better candidates stops [all ours]."""
+
+    least_edges: Fraction = 0.75
+    """Share of the outline at which an edge is found. Below it, `VisionConfig.largest_surprise` is
+    multiplied by the square of the ratio."""
+    least_coverage: Fraction = 0.8
+    """Share of the area that has the markers' colour."""
+    largest_surprise: Positive = 8.0
+    """Squared Mahalanobis distance from the predicted positions."""
+
+
+class UnlocatedConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Stricter thresholds for an image of which the posture is not known [all ours]."""
+
+    least_inside: Fraction = 0.9
+    """As `VisionConfig.least_inside`."""
+    least_coverage: Fraction = 0.75
+    """As `VisionConfig.least_coverage`."""
+    least_edges: Fraction = 0.75
+    """As `VisionConfig.least_edges`."""
+    least_edges_on_average: Fraction = 0.85
+    """As `VisionConfig.least_edges_on_average`."""
+
+
+class BlurConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Fit of the image intensity where blur has left no edges [all ours]."""
+
+    sigma: Positive = 2.5
+    """Expected standard deviation of the blur kernel [px]."""
+    sigma_deviation: Positive = 2.0
+    """Standard deviation of `sigma` [px]."""
+    sharp_sigma: Positive = 1.0
+    """Largest standard deviation of the blur kernel in a sharp image [px]."""
+    margin: Positive = 14.0
+    """Pixels up to this distance from the outlines are fitted [px]."""
+    brightness_ratio_deviation: Positive = 0.2
+    """Standard deviation of the logarithm of the ratio of the bands' brightnesses [1]."""
+    unevenness: Positive = 0.015
+    """Standard deviation of a band's brightness, and the least one of the tissue's colour, relative
+    to their values [1]."""
+    model_deviation: Positive = 0.25
+    """Standard deviation of a position by what the fitted model does not describe [px]."""
+    least_explained: Fraction = 0.8
+    """A fit is rejected if it explains a smaller share of the variance that is not sensor noise."""
+    least_contrast: Positive = 8.0
+    """Or if a band's brightness is below this many standard deviations of the residuals."""
+    least_brightness_ratio: Fraction = 0.6
+    """Or if the ratio of the darker to the brighter band is below this."""
+    largest_deviation: Positive = 1.2
+    """Or if the standard deviation of a position exceeds this [px]."""
+
+
 class VisionConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Eq. (12) and Fig. 5."""
+    """Marker detection, Eq. (12) and Fig. 5."""
 
     weights: Vector3 = (-0.525, 1.0, -0.648)
-    """Fisher's discriminant: weight of blue, green, red [ours, fitted on labelled pixels]."""
+    """Fisher's discriminant: weights of blue, green, red [ours, fitted to labelled pixels]."""
     threshold: float = 5.0
-    """A pixel whose weighted sum exceeds this is marker [grey levels]."""
+    """A pixel is marker if its weighted sum exceeds this [grey levels]."""
     alternatives: tuple[tuple[Vector3, float], ...] = (
         ((-0.8, 1.0, -0.8), 5.0),
         ((-0.45, 1.0, -0.55), 8.0),
         ((-0.525, 1.0, -0.648), 40.0),
     )
-    """Weights and threshold to try in turn where the first give no clear verdict: for a white
-    balance so green that grey looks green, for light so bright that green looks white, and for
-    bands that run into each other in a blurred picture [ours]."""
+    """Weights and threshold that are tried in turn where the first give no clear result: for a
+    white balance in which grey looks green, for over-exposure in which green looks white, and for
+    bands that touch in a blurred image [ours]."""
     smoothing: Annotated[int, Meta(ge=0, le=8)] = 1
     """Passes of the 3x3 binomial low-pass over the projected channel; 0 is none [ours]."""
     minimum_area: Annotated[int, Meta(ge=1)] = 15
-    """Regions below this are dropped [px]."""
+    """Smaller regions are dropped [px]."""
     model_deviation: Positive = 2.5
-    """Of a band from where the instrument's model has it: standard deviation [px] [ours]."""
+    """Standard deviation of a band's position predicted by the instrument model [px] [ours]."""
+    search_margin: Positive = 12.0
+    """Margin around the predicted outlines that is searched, for motion and blur [px] [ours]."""
     least_inside: Fraction = 0.5
-    """A band of which less is in the image is refused [share of its area] [ours]."""
+    """A band is rejected if less of it is inside the image [share of its area] [ours]."""
     least_coverage: Fraction = 0.4
-    """A band of which less has the markers' colour is refused [share of its area] [ours]."""
+    """Or if less of it has the markers' colour [share of its area in the image] [ours]."""
+    least_exclusive: Fraction = 0.8
+    """Or if less of that colour is outside the other band's outline [share of it] [ours]."""
     largest_spill: Fraction = 0.25
-    """A band around which more has the markers' colour is refused [share of a ring, relative to its
+    """Or if more of what surrounds it has the markers' colour [share of a ring, relative to the
     coverage] [ours]."""
     least_edges: Fraction = 0.4
-    """A band at less of whose outline the colour ends is refused [share of it] [ours]."""
+    """Or if less of its outline is found as edges [share of the outline] [ours]."""
+    least_rims: Fraction = 0.2
+    """Or if less of its two rims is: its sides alone do not tell the position along them [ours]."""
     least_edges_on_average: Fraction = 0.6
-    """The same for the mean of both bands [ours]."""
+    """The weaker band is rejected if the mean edge share of both is below this [ours]."""
     least_edges_alone: Fraction = 0.85
-    """The same for a band that is found alone, and 4/3 of its coverage [ours]."""
+    """A band found alone is rejected if its edge share is below this, or its coverage below 3/4 of
+    it [ours]."""
     largest_surprise: Positive = 18.5
-    """Largest squared Mahalanobis distance of the bands from where they are expected; chi squared
+    """Largest squared Mahalanobis distance of the bands from their predicted positions; chi-squared
     with 4 degrees of freedom exceeds it once in a thousand [ours]."""
+    fit: OutlineFitConfig = field(default_factory=OutlineFitConfig)
+    clear: ClearConfig = field(default_factory=ClearConfig)
+    unlocated: UnlocatedConfig = field(default_factory=UnlocatedConfig)
+    blur: BlurConfig = field(default_factory=BlurConfig)

@@ -1,4 +1,4 @@
-"""CiA 402 in numbers: states of a drive, commands that change them, modes, units.
+"""CiA 402: drive states, statusword and controlword, modes of operation, units.
 
 Source: CiA 402-2 (IEC 61800-7-201), as reproduced in Elmo MAN-CAN402IG 1.2.
 """
@@ -14,19 +14,19 @@ from tautscope.errors import SignalError
 
 
 class Mode(IntEnum):
-    """The modes of operation (0x6060) that follow streamed positions."""
+    """The modes of operation (0x6060) that follow a stream of positions."""
 
     INTERPOLATED_POSITION = 7
     CYCLIC_SYNCHRONOUS_POSITION = 8
 
     @property
     def supported_bit(self) -> int:
-        """Its bit in the supported drive modes, 0x6502."""
+        """The mode's bit in supported drive modes, 0x6502."""
         return 1 << (self - 1)
 
 
 class State(StrEnum):
-    """State of the drive, as the statusword (0x6041) shows it."""
+    """State of a drive, coded in its statusword (0x6041)."""
 
     NOT_READY = "not ready to switch on"
     SWITCH_ON_DISABLED = "switch on disabled"
@@ -49,7 +49,7 @@ _STATUS = (
     (0x4F, 0x08, State.FAULT),
 )
 
-AT_REST = frozenset(
+STOPPED_STATES = frozenset(
     {
         State.NOT_READY,
         State.SWITCH_ON_DISABLED,
@@ -61,14 +61,12 @@ AT_REST = frozenset(
 )
 """States in which a drive follows no set-points."""
 
-UNPOWERED = frozenset({State.NOT_READY, State.SWITCH_ON_DISABLED, State.READY, State.FAULT})
-"""States in which the motor has no power."""
+POWER_OFF_STATES = frozenset({State.NOT_READY, State.SWITCH_ON_DISABLED, State.READY, State.FAULT})
+"""States in which no voltage is applied to the motor."""
 
-FOLLOWS = 1 << 12
-"""Statusword: the drive follows the set-points (mode 8), interpolation is active (mode 7)."""
-LIMIT = 1 << 11
-"""Statusword: an internal limit is active."""
-FOLLOWING_ERROR = 1 << 13
+FOLLOWS_COMMAND = 1 << 12
+"""Statusword: drive follows the command value (mode 8), interpolation is active (mode 7)."""
+FOLLOWING_ERROR_BIT = 1 << 13
 """Statusword, mode 8: following error."""
 
 DISABLE_VOLTAGE = 0x00
@@ -76,15 +74,15 @@ QUICK_STOP = 0x02
 SHUTDOWN = 0x06
 SWITCH_ON = 0x07
 ENABLE_OPERATION = 0x0F
-INTERPOLATE = 0x1F
-"""Enable operation, and bit 4: enable interpolation (mode 7)."""
+ENABLE_INTERPOLATION = 0x1F
+"""Enable operation with bit 4, enable interpolation (mode 7)."""
 FAULT_RESET = 0x80
 
 QUICK_STOP_HOLD = 6
-"""0x605A: slow down on the quick stop ramp, stay in quick stop active."""
+"""0x605A: slow down on the quick stop ramp and stay in quick stop active."""
 QUICK_STOP_RELEASE = 2
-"""0x605A: slow down on the quick stop ramp, then switch on disabled."""
-ON_LOSS_QUICK_STOP = 3
+"""0x605A: slow down on the quick stop ramp, then go to switch on disabled."""
+ABORT_CONNECTION_QUICK_STOP = 3
 """0x6007: quick stop when the connection is lost."""
 
 _NEXT = {
@@ -97,24 +95,26 @@ _NEXT = {
 
 
 def state_of(statusword: int) -> State | None:
-    """The state a statusword shows; None for a pattern the standard does not have."""
+    """Decode the state in a statusword; None for a pattern that CiA 402 does not define."""
     for mask, value, state in _STATUS:
         if statusword & mask == value:
             return state
     return None
 
 
-def towards_enabled(state: State | None) -> int | None:
-    """The controlword that brings a drive one state nearer to operation enabled.
+def next_controlword(state: State | None) -> int | None:
+    """The controlword for the next transition towards operation enabled.
 
-    None where there is none: in a fault, and while the drive is changing by itself.
+    None in a fault, and while the drive makes a transition by itself.
     """
     return _NEXT.get(state) if state is not None else None
 
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """SI positions of one DOF and counts of its drive: x = home + sign counts / counts_per_unit.
+    """Conversion of one DOF between SI units and encoder counts.
+
+        x = home + sign counts / counts_per_unit
 
     Attributes:
         axis: Units, sign, home and limits.
@@ -125,17 +125,17 @@ class Scale:
     label: str
 
     def to_counts(self, position: float) -> int:
-        """Position [m or rad] to the nearest count."""
+        """Convert a position [m or rad] to the nearest count."""
         axis = self.axis
         return round(axis.sign * (position - axis.home) * axis.counts_per_unit)
 
     def to_position(self, counts: int) -> float:
-        """Counts to position [m or rad]."""
+        """Convert counts to a position [m or rad]."""
         axis = self.axis
         return axis.home + axis.sign * counts / axis.counts_per_unit
 
     def travel_counts(self) -> tuple[int, int]:
-        """The limits of travel in counts, the lesser first."""
+        """Both ends of the travel in counts, the smaller first."""
         lower, upper = sorted(self.to_counts(end) for end in self.axis.travel)
         return lower, upper
 
@@ -143,17 +143,16 @@ class Scale:
         """The speed limit [counts/s], rounded up."""
         return math.ceil(self.axis.speed_limit * self.axis.counts_per_unit)
 
-    def checked(self, command: float, previous: float, cycle: float) -> int:
-        """Counts of a command that may be sent.
+    def checked_counts(self, command: float, previous: float, cycle: float) -> int:
+        """Convert a command to counts, after checking it against the limits.
 
         Args:
             command: [m or rad].
-            previous: The command before, or where the motor is [m or rad].
+            previous: The previous command, or the position at the start [m or rad].
             cycle: Time between the two [s].
 
         Raises:
-            SignalError: The command is not finite, leaves the travel, or is further from the one
-                before than the speed limit allows.
+            SignalError: The command is not finite, outside the travel, or exceeds the speed limit.
         """
         axis = self.axis
         field = f"command[{self.label}]"

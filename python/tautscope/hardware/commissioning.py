@@ -1,8 +1,8 @@
-"""What a drive is told once, before it is ever enabled; all of it is read back.
+"""Configuration of a drive before it is enabled; every setting is read back.
 
-Mode 8 (cyclic synchronous position) if it has it, else 7 (interpolated position); what it does when
-it loses us and on quick stop; limits of travel and speed. The units it must be set to are those of
-the standard's defaults: positions in counts, speeds in counts per second.
+Mode 8 (cyclic synchronous position) if the drive supports it, else 7 (interpolated position), the
+reaction to a lost connection, the quick stop option, position and velocity limits. The drive must
+use the default units of CiA 402: positions in counts, velocities in counts per second.
 """
 
 from __future__ import annotations
@@ -16,25 +16,25 @@ from tautscope.errors import ModeRefusedError, SettingRefusedError
 from tautscope.hardware import cia402
 from tautscope.hardware import object_dictionary as objects
 from tautscope.hardware.cia402 import Mode, Scale
-from tautscope.hardware.link import AbsentError, Link
+from tautscope.hardware.fieldbus import AbsentError, Fieldbus, verify_setting
 from tautscope.hardware.object_dictionary import Entry
 
 WAIVABLE = ("6007", "605A", "607D")
-"""What `drives.waive` may name."""
+"""Objects that `drives.waive` may name."""
 CIA_402 = 402
-"""Device profile number, the low half of 0x1000."""
+"""Device profile number, the low 16 bits of 0x1000."""
 
 
 @dataclass(frozen=True, slots=True)
-class Commissioned:
-    """What one drive is and how it was set; for whoever inspects a rig, and for recordings.
+class CommissionedDrive:
+    """A drive's identity and settings.
 
     Attributes:
-        name: The drive as a person finds it.
-        vendor, product: From its identity object, 0x1018; 0 where it has none.
-        mode: The mode it took.
+        name: Its name for messages.
+        vendor, product: From the identity object, 0x1018; 0 where it is missing.
+        mode: The mode of operation it entered.
         settings: Object and value as read back.
-        absent: Objects it does not have.
+        absent: Objects that the drive lacks.
     """
 
     name: str
@@ -45,145 +45,141 @@ class Commissioned:
     absent: tuple[str, ...]
 
 
-def commission(link: Link, config: DrivesConfig, dof: Dof) -> Commissioned:
-    """Set one drive, which stays disabled.
+def commission(bus: Fieldbus, config: DrivesConfig, dof: Dof) -> CommissionedDrive:
+    """Configure one drive, which stays disabled.
 
     Raises:
-        ModeRefusedError: It is no CiA 402 drive, has neither mode, or did not take it.
+        ModeRefusedError: It is no CiA 402 drive, has neither mode, or did not enter it.
         SettingRefusedError: A setting was refused or reads back differently, or the drive lacks a
-            protection that was not waived.
-        DriveError: As `tautscope.hardware.link.Link`.
+            protection that is not waived.
+        DriveError: As `tautscope.hardware.fieldbus.Fieldbus`.
     """
-    kind = link.read(dof, objects.DEVICE_TYPE)
-    if kind & 0xFFFF != CIA_402:
+    device_type = bus.read(dof, objects.DEVICE_TYPE)
+    if device_type & 0xFFFF != CIA_402:
         raise ModeRefusedError(
-            link.name(dof),
-            f"its device type is 0x{kind:08X}, not that of a CiA 402 drive",
+            bus.name(dof),
+            f"its device type is 0x{device_type:08X}, not that of a CiA 402 drive",
             f"Check drives.{dof.label}.node",
         )
-    visit = _Visit(link, config, dof)
-    visit.protections()
-    visit.limits()
-    mode = visit.mode()
-    return Commissioned(
-        link.name(dof),
-        visit.read_or(objects.VENDOR, 0),
-        visit.read_or(objects.PRODUCT, 0),
+    setup = _DriveSetup(bus, config, dof)
+    setup.set_protections()
+    setup.set_limits()
+    mode = setup.enter_mode()
+    return CommissionedDrive(
+        bus.name(dof),
+        setup.read_or(objects.VENDOR_ID, 0),
+        setup.read_or(objects.PRODUCT_CODE, 0),
         mode,
-        visit.settings,
-        tuple(visit.absent),
+        setup.settings,
+        tuple(setup.absent),
     )
 
 
-class _Visit:
-    """One drive while it is being set."""
+class _DriveSetup:
+    """Settings of one drive while they are written."""
 
-    def __init__(self, link: Link, config: DrivesConfig, dof: Dof) -> None:
-        self._link, self._config, self._dof = link, config, dof
+    def __init__(self, bus: Fieldbus, config: DrivesConfig, dof: Dof) -> None:
+        self._bus, self._config, self._dof = bus, config, dof
         self._scale = Scale(config[dof], dof.label)
         self.settings: dict[str, int] = {}
         self.absent: list[str] = []
 
-    def protections(self) -> None:
+    def set_protections(self) -> None:
         config = self._config
         hold = config.after_quick_stop == "hold"
         option = cia402.QUICK_STOP_HOLD if hold else cia402.QUICK_STOP_RELEASE
-        # On EtherCAT the watchdog of the process data does what 0x6007 does on CAN.
+        # On EtherCAT the process data watchdog replaces 0x6007.
         on_can = config.protocol == "canopen"
-        self._set(objects.ON_LOSS, cia402.ON_LOSS_QUICK_STOP, needed=on_can)
-        self._set(objects.QUICK_STOP_OPTION, option, needed=True)
+        self._set(
+            objects.ABORT_CONNECTION_OPTION, cia402.ABORT_CONNECTION_QUICK_STOP, required=on_can
+        )
+        self._set(objects.QUICK_STOP_OPTION_CODE, option, required=True)
 
-    def limits(self) -> None:
+    def set_limits(self) -> None:
         axis, speed = self._config[self._dof], self._scale.speed_counts()
         lower, upper = self._scale.travel_counts()
-        self._set(objects.LEAST_POSITION, lower, needed=True)
-        self._set(objects.LARGEST_POSITION, upper, needed=True)
-        self._set(objects.PROFILE_SPEED_LIMIT, speed)
-        # A drive compares with its present set-point: it must grant the way of a lag on top.
+        self._set(objects.MIN_POSITION_LIMIT, lower, required=True)
+        self._set(objects.MAX_POSITION_LIMIT, upper, required=True)
+        self._set(objects.MAX_PROFILE_VELOCITY, speed)
+        # A drive compares with its present set-point only: allow for the travel during the lag.
         window = axis.following_error + self._config.lag * axis.speed_limit
-        self._set(objects.FOLLOWING_WINDOW, max(1, round(window * axis.counts_per_unit)))
-        self._set(objects.FOLLOWING_TIME, round(self._config.following_timeout * 1e3))
-        counts = self.read_or(objects.ENCODER_COUNTS, 0)
-        turns = self.read_or(objects.ENCODER_TURNS, 0)
+        self._set(objects.FOLLOWING_ERROR_WINDOW, max(1, round(window * axis.counts_per_unit)))
+        self._set(objects.FOLLOWING_ERROR_TIMEOUT, round(self._config.following_timeout * 1e3))
+        counts = self.read_or(objects.ENCODER_INCREMENTS, 0)
+        turns = self.read_or(objects.MOTOR_REVOLUTIONS, 0)
         if counts and turns:
-            self._set(objects.MOTOR_SPEED_LIMIT, -(-speed * 60 * turns // counts))  # [1/min]
+            self._set(objects.MAX_MOTOR_SPEED, -(-speed * 60 * turns // counts))  # [1/min]
 
-    def mode(self) -> Mode:
-        link, dof = self._link, self._dof
+    def enter_mode(self) -> Mode:
+        bus, dof = self._bus, self._dof
         mode = self._supported_mode()
         if mode is Mode.INTERPOLATED_POSITION:
             self._set(objects.INTERPOLATION_SUBMODE, 0)  # linear
             self._set(objects.INTERPOLATION_EXPONENT, -3)
-            self._set(objects.INTERPOLATION_TIME, round(self._config.cycle * 1e3), needed=True)
+            self._set(objects.INTERPOLATION_TIME, round(self._config.cycle * 1e3), required=True)
             for value in (0, 1):
                 self._clear_buffer(value)
-        link.write(dof, objects.MODE, mode)
+        bus.write(dof, objects.MODES_OF_OPERATION, mode)
         deadline = time.monotonic() + self._config.state_timeout
-        while (shown := link.read(dof, objects.MODE_DISPLAY)) != mode:
+        while (shown := bus.read(dof, objects.MODE_DISPLAY)) != mode:
             if time.monotonic() > deadline:
                 raise ModeRefusedError(
-                    link.name(dof),
-                    f"mode {mode.value} was asked for, its display (0x6061) says {shown}",
-                    f"Disable it, and see its manual for what mode {mode.value} needs to be set",
+                    bus.name(dof),
+                    f"it did not enter mode {mode.value}: mode display (0x6061) is {shown}",
+                    f"Disable it, and look up in its manual what mode {mode.value} requires",
                 )
             time.sleep(self._config.cycle)
         return mode
 
     def read_or(self, entry: Entry, default: int) -> int:
         try:
-            return self._link.read(self._dof, entry)
+            return self._bus.read(self._dof, entry)
         except AbsentError:
             return default
 
     def _supported_mode(self) -> Mode:
-        supported = self._link.read(self._dof, objects.SUPPORTED_MODES)
+        supported = self._bus.read(self._dof, objects.SUPPORTED_MODES)
         for mode in (Mode.CYCLIC_SYNCHRONOUS_POSITION, Mode.INTERPOLATED_POSITION):
             if supported & mode.supported_bit:
                 return mode
         raise ModeRefusedError(
-            self._link.name(self._dof),
+            self._bus.name(self._dof),
             f"its supported modes (0x6502) are 0x{supported:08X}: neither cyclic synchronous "
             "position (8) nor interpolated position (7)",
-            "Such a drive cannot follow streamed positions; use another, or other firmware",
+            "It cannot follow a stream of positions; use another drive or firmware",
         )
 
     def _clear_buffer(self, value: int) -> None:
-        """A command rather than a value; there is nothing to read back."""
+        """Write 0x60C4:6, a command that cannot be read back."""
         try:
-            self._link.write(self._dof, objects.BUFFER_CLEAR, value)
+            self._bus.write(self._dof, objects.INTERPOLATION_BUFFER_CLEAR, value)
         except AbsentError:
-            self.absent.append(str(objects.BUFFER_CLEAR))
+            self.absent.append(str(objects.INTERPOLATION_BUFFER_CLEAR))
 
-    def _set(self, entry: Entry, value: int, *, needed: bool = False) -> None:
-        link, dof = self._link, self._dof
+    def _set(self, entry: Entry, value: int, *, required: bool = False) -> None:
+        bus, dof = self._bus, self._dof
         try:
             self._write(entry, value)
         except AbsentError:
             index = f"{entry.index:04X}"
-            if needed and index not in self._config.waive:
-                remedy = "Such a drive cannot be used"
+            if required and index not in self._config.waive:
+                remedy = "The drive cannot be used"
                 if index in WAIVABLE:
                     remedy = f"If another protection replaces it, add {index} to drives.waive"
                 raise SettingRefusedError(
-                    link.name(dof), f"it does not have {entry}", remedy
+                    bus.name(dof), f"it does not have {entry}", remedy
                 ) from None
             self.absent.append(str(entry))
             return
-        found = link.read(dof, entry)
-        if found != value:
-            raise SettingRefusedError(
-                link.name(dof),
-                f"{entry} was set to {value} and reads back {found}",
-                "See its manual for the values it takes, and when",
-            )
+        verify_setting(bus, dof, entry, value)
         self.settings[str(entry)] = value
 
     def _write(self, entry: Entry, value: int) -> None:
         try:
-            self._link.write(self._dof, entry, value)
+            self._bus.write(self._dof, entry, value)
         except AbsentError:
             raise
         except SettingRefusedError:
-            # A value that is fixed in the drive and is the right one needs no writing.
-            if self._link.read(self._dof, entry) != value:
+            # A read-only object that already holds the value is fine.
+            if self._bus.read(self._dof, entry) != value:
                 raise

@@ -1,13 +1,13 @@
-"""Three CiA 402 drives that follow streamed positions, safe on every way out.
+"""Three CiA 402 drives that follow set-points and quick-stop whenever their context is left.
 
     with open_drives(config.drives) as drives:
         position = drives.start()
         while running:
             applied = drives.exchange(command)  # once per drives.cycle, from one thread
 
-What it asks of a drive: mode 8 (cyclic synchronous position), else 7 (interpolated position). What
-the drive does when it loses us, and on quick stop, its limits of travel and speed: set, and read
-back. Anything unexpected is a `DriveError`: the motors have then been brought to quick stop.
+The drives run in mode 8 (cyclic synchronous position), else in mode 7 (interpolated position).
+Their reaction to a lost connection, their quick stop option, position and velocity limits are set
+and read back. Every failure raises a `DriveError` after the motors have been quick-stopped.
 """
 
 from __future__ import annotations
@@ -22,69 +22,69 @@ from tautscope.dof import Dof
 from tautscope.errors import BusError, DriveError, SignalError, StateError
 from tautscope.hardware.cia402 import Scale
 from tautscope.hardware.commissioning import commission
-from tautscope.hardware.cycles import Cycles
-from tautscope.hardware.link import Link
-from tautscope.hardware.signals import signals_deferred
-from tautscope.hardware.watch import Traffic, Watch
+from tautscope.hardware.drive_monitor import BusStatistics, DriveMonitor
+from tautscope.hardware.drive_state_machine import DriveStateMachine
+from tautscope.hardware.fieldbus import Fieldbus
+from tautscope.hardware.signals import defer_signals
 
 
 def open_drives(config: DrivesConfig) -> Drives:
-    """Open the bus, find the drives, set them and read back; no motor moves or is enabled.
+    """Open the bus and configure the drives; no motor is enabled.
 
     Raises:
-        ConfigError: An EDS file is missing, unreadable or of another drive.
+        ConfigError: An EDS file is missing, unreadable or describes another drive.
         DriveError: As `Drives`.
     """
-    return Drives(config, open_link(config))
+    return Drives(config, open_fieldbus(config))
 
 
-def open_link(config: DrivesConfig) -> Link:
-    """Open the bus and find the drives; they are told nothing.
+def open_fieldbus(config: DrivesConfig) -> Fieldbus:
+    """Open the bus and identify the drives; no setting is changed.
 
     Raises:
-        ConfigError: An EDS file is missing, unreadable or of another drive.
+        ConfigError: An EDS file is missing, unreadable or describes another drive.
         BusError: The bus cannot be opened.
         DriveError: A drive does not answer, or there is another master.
     """
     if config.protocol == "ethercat":
-        from tautscope.hardware.ethercat_drives import EthercatLink  # noqa: PLC0415
+        from tautscope.hardware.ethercat_fieldbus import EthercatFieldbus  # noqa: PLC0415
 
-        return EthercatLink(config)
+        return EthercatFieldbus(config)
     try:
-        from tautscope.hardware.canopen_drives import CanopenLink  # noqa: PLC0415
+        from tautscope.hardware.canopen_fieldbus import CanopenFieldbus  # noqa: PLC0415
     except ImportError as error:
         raise BusError("CAN bus", str(error), "pip install 'tautscope[hardware]'") from None
-    return CanopenLink(config)
+    return CanopenFieldbus(config)
 
 
 class Drives:
-    """Three drives, one per DOF; one thread may use them.
+    """Three drives, one per DOF; for use by one thread.
 
     Args:
-        config: What they are.
-        link: The bus they are on; it is closed with them.
+        config: Bus, drives, limits and timeouts.
+        bus: The open bus; it is closed with the drives.
 
     Raises:
-        ModeRefusedError: A drive has neither mode 8 nor 7, or did not take it.
+        ModeRefusedError: A drive has neither mode 8 nor 7, or did not enter it.
         SettingRefusedError: A setting was refused, or reads back differently.
-        DriveError: A drive does not answer, or is not one.
+        DriveError: A drive does not answer, or is no CiA 402 drive.
     """
 
-    def __init__(self, config: DrivesConfig, link: Link) -> None:
+    def __init__(self, config: DrivesConfig, bus: Fieldbus) -> None:
         self.config = config
-        self._link = link
+        self._bus = bus
         self._scales = [Scale(config[dof], dof.label) for dof in Dof]
-        self._running = False
-        self._closed = False
+        self._is_running = False
+        self._is_closed = False
         self._previous: NDArray[np.float64] = np.zeros(3)
         try:
-            self.commissioned = tuple(commission(link, config, dof) for dof in Dof)
+            self.commissioned = tuple(commission(bus, config, dof) for dof in Dof)
             modes = {dof: self.commissioned[dof].mode for dof in Dof}
-            self._watch = Watch(config, [link.name(dof) for dof in Dof], modes)
-            self._cycles = Cycles(config, link, modes, self._watch)
-            link.prepare(modes)
+            self._monitor = DriveMonitor(config, [bus.name(dof) for dof in Dof], modes)
+            self._machine = DriveStateMachine(config, bus, modes, self._monitor)
+            bus.configure(modes)
         except BaseException:
-            link.close()
+            bus.close()
             raise
 
     @property
@@ -93,122 +93,126 @@ class Drives:
         return self.config.cycle
 
     @property
-    def running(self) -> bool:
-        """Whether the motors follow commands."""
-        return self._running
+    def is_running(self) -> bool:
+        """Whether the motors are enabled and follow commands."""
+        return self._is_running
 
     @property
-    def traffic(self) -> Traffic:
-        """How punctual the bus was since `start`."""
-        return self._watch.traffic
+    def statistics(self) -> BusStatistics:
+        """Timing of the bus since `start`."""
+        return self._monitor.statistics
 
     @property
     def last_command(self) -> NDArray[np.float64]:
-        """(3,) [m, rad, rad] what was last sent, or where the motors were at the start."""
+        """(3,) [m, rad, rad] the command sent last, or the position at the start."""
         return self._previous.copy()
 
     def start(self, *, reset_faults: bool = False) -> NDArray[np.float64]:
-        """Enable the motors where they are; `exchange` must follow within `heartbeat_timeout`.
+        """Enable the motors; `exchange` must be called within `heartbeat_timeout`.
 
         Args:
-            reset_faults: Acknowledge faults the drives hold from before. Find their cause first.
+            reset_faults: Reset faults of the drives. Find their cause first.
 
         Returns:
-            (3,) where the motors are [m, rad, rad]; the first command starts from there.
+            (3,) position actual values [m, rad, rad]; the first command starts from there.
 
         Raises:
-            StateError: A drive holds a fault, or did not reach a state in `state_timeout`.
+            StateError: A drive is in fault, or did not reach a state within `state_timeout`.
             FollowingError: A motor is outside its travel.
             DriveError: As `exchange`.
         """
-        if self._running or self._closed:
-            raise StateError("drives", "started while running or closed", "Open them anew")
+        if self._is_running or self._is_closed:
+            raise StateError(
+                "drives", "start() was called while running or closed", "Open them again"
+            )
         try:
-            said = self._cycles.enable(reset_faults=reset_faults)
+            feedback = self._machine.enable(reset_faults=reset_faults)
         except BaseException as error:
-            self._stop_because(error)
+            self._stop_after(error)
             raise
-        self._previous = self._watch.begin(said)
-        self._running = True
+        self._previous = self._monitor.reset(feedback)
+        self._is_running = True
         return self._previous.copy()
 
     def exchange(self, command: ArrayLike) -> NDArray[np.float64]:
-        """Send one set-point to every drive and read where the motors are.
+        """Send one set-point to each drive and read the position actual values.
 
-        Call it every `cycle` seconds: it does not pace itself, it waits for the answers only.
+        Call it every `cycle` seconds: it waits for the answers only.
 
         Args:
             command: (3,) [m, rad, rad].
 
         Returns:
-            (3,) [m, rad, rad] what the drives report.
+            (3,) position actual values [m, rad, rad].
 
         Raises:
             SignalError: The command is not finite, leaves the travel or is too fast.
-            StateError: A drive left operation enabled, its mode, or ignores set-points.
-            FollowingError: A motor is not where it was told to be.
+            StateError: A drive left operation enabled or its mode, or ignores set-points.
+            FollowingError: The following error is too large.
             SilentDriveError: A drive has not answered for `heartbeat_timeout`.
-            HeartbeatError: A drive's heartbeat stayed away.
-            EmergencyError: A drive sent an emergency.
-            SecondMasterError: Somebody else commands the drives.
-            BusError: The bus is gone.
+            HeartbeatError: A drive's heartbeat is missing.
+            EmergencyError: A drive sent an emergency object.
+            SecondMasterError: Another master commands the drives.
+            BusError: The bus is lost.
 
-        All motors have been brought to quick stop when any of these is raised.
+        All motors are quick-stopped before any of these is raised.
         """
-        if not self._running:
-            raise StateError("drives", "a command before start or after stop", "Call start first")
+        if not self._is_running:
+            raise StateError(
+                "drives", "a command before start() or after stop()", "Call start() first"
+            )
         try:
-            wanted = _three(command)
+            setpoint = _as_vector(command)
             targets = [
-                scale.checked(wanted[dof], self._previous[dof], self.cycle)
+                scale.checked_counts(setpoint[dof], self._previous[dof], self.cycle)
                 for dof, scale in enumerate(self._scales)
             ]
-            applied = self._watch.check(wanted, self._cycles.send(targets))
+            applied = self._monitor.check(setpoint, self._machine.exchange(targets))
         except BaseException as error:
-            self._stop_because(error)
+            self._stop_after(error)
             raise
-        self._previous = wanted
+        self._previous = setpoint
         return applied
 
     def stop(self) -> None:
-        """Bring all motors to quick stop and see that they are; the bus stays open.
+        """Quick-stop all motors and wait for confirmation; the bus stays open.
 
-        Does nothing when they are. Signals wait until it is done.
+        Does nothing if they are stopped. Signals are deferred until it returns.
 
         Raises:
             StateError: A drive does not confirm; use the emergency stop.
         """
-        with signals_deferred():
+        with defer_signals():
             unconfirmed = self._quick_stop()
         if unconfirmed:
             raise _unconfirmed(unconfirmed)
 
     def disable(self) -> None:
-        """`stop`, then take the power from the motors: nothing holds them any more.
+        """`stop`, then disable voltage: nothing holds the motors any more.
 
         Raises:
             StateError: A drive does not confirm; use the emergency stop.
         """
-        with signals_deferred():
-            self._running = False
-            unconfirmed = self._cycles.disable()
+        with defer_signals():
+            self._is_running = False
+            unconfirmed = self._machine.disable()
         if unconfirmed:
             raise _unconfirmed(unconfirmed, "disabling")
 
     def close(self) -> None:
-        """`stop`, then release the bus; may be called twice.
+        """`stop`, then release the bus; a second call does nothing.
 
         Raises:
             StateError: As `stop`.
         """
-        with signals_deferred():
-            if self._closed:
+        with defer_signals():
+            if self._is_closed:
                 return
-            self._closed = True
+            self._is_closed = True
             try:
                 unconfirmed = self._quick_stop()
             finally:
-                self._link.close()
+                self._bus.close()
         if unconfirmed:
             raise _unconfirmed(unconfirmed)
 
@@ -223,28 +227,28 @@ class Drives:
                 raise
             error.add_note(str(failed))
 
-    def _stop_because(self, error: BaseException) -> None:
-        with signals_deferred():
+    def _stop_after(self, error: BaseException) -> None:
+        with defer_signals():
             unconfirmed = self._quick_stop()
         if unconfirmed:
             error.add_note(str(_unconfirmed(unconfirmed)))
-        if own_pause := self._watch.own_pause:
-            error.add_note(own_pause)
+        if note := self._monitor.pause_note:
+            error.add_note(note)
 
     def _quick_stop(self) -> list[str]:
-        """Quick-stop all drives; the names of those that do not confirm it."""
-        self._running = False
-        return self._cycles.quick_stop()
+        """Quick-stop all drives; names of those that do not confirm it."""
+        self._is_running = False
+        return self._machine.quick_stop()
 
 
-def _three(command: ArrayLike) -> NDArray[np.float64]:
+def _as_vector(command: ArrayLike) -> NDArray[np.float64]:
     try:
-        wanted = np.array(command, dtype=np.float64)
+        vector = np.array(command, dtype=np.float64)
     except (TypeError, ValueError):
-        raise SignalError("command", command, "three finite numbers [m, rad, rad]") from None
-    if wanted.shape != (3,):
+        vector = np.empty(0)
+    if vector.shape != (3,):
         raise SignalError("command", command, "three finite numbers [m, rad, rad]")
-    return wanted
+    return vector
 
 
 def _unconfirmed(names: list[str], what: str = "quick stop") -> StateError:

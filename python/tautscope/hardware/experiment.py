@@ -1,4 +1,4 @@
-"""The article's experiment on the drives and the camera of a configuration."""
+"""The article's experiment on a physical rig: ``tautscope run``."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from typing import Any
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import DriveError, OutputError, TautscopeError
-from tautscope.hardware.plausibility import Plausibility
+from tautscope.hardware.plausibility import PlausibilityMonitor
 from tautscope.hardware.realtime import (
     OTHERS,
     VISION,
-    little_collection,
-    memory_kept,
+    limited_garbage_collection,
+    locked_memory,
     realtime,
-    settle,
+    set_realtime_priority,
 )
 from tautscope.hardware.rig import HardwareRig
 from tautscope.hardware.signals import exit_on_signals
@@ -41,13 +41,13 @@ RigMaker = Callable[[Config], HardwareRig]
 
 
 @dataclass(frozen=True)
-class Part:
+class ProtocolRun:
     """One run of the protocol.
 
     Attributes:
-        recording: What the loop did.
-        timing: How punctual it was.
-        log: What is in its log.
+        recording: Traces of the loop.
+        timing: Timing of set-points and frames.
+        log: Summary of its log.
     """
 
     recording: Recording
@@ -57,32 +57,32 @@ class Part:
 
 @dataclass(frozen=True)
 class HardwareRun:
-    """What ``tautscope run`` found.
+    """Results of ``tautscope run``.
 
     Attributes:
-        config: As used.
-        compensated: The run.
-        uncompensated: The one before it, without compensation, if it was asked for.
+        config: The configuration used.
+        compensated: The run with compensation.
+        uncompensated: The run without compensation, if it was requested.
     """
 
     config: Config
-    compensated: Part
-    uncompensated: Part | None = None
+    compensated: ProtocolRun
+    uncompensated: ProtocolRun | None = None
 
     @property
     def results(self) -> Results:
-        """Table 1 as the camera sees it; half of it NaN without an uncompensated run."""
+        """Table 1 from the state estimates; NaN where it needs an uncompensated run."""
         plain = None if self.uncompensated is None else self.uncompensated.recording
         return evaluate(plain, self.compensated.recording)
 
     def to_json(self) -> dict[str, Any]:
-        """What ``tautscope run --json`` prints; widths in m or rad, None if not known."""
-        parts = {"compensated": self.compensated}
+        """The output of ``tautscope run --json``; widths in m or rad, None if unknown."""
+        runs = {"compensated": self.compensated}
         if self.uncompensated is not None:
-            parts = {"uncompensated": self.uncompensated, **parts}
+            runs = {"uncompensated": self.uncompensated, **runs}
         return {
             "profile": self.config.profile,
-            "runs": {name: _facts(part) for name, part in parts.items()},
+            "runs": {name: _summary(run) for name, run in runs.items()},
             "by_camera": {
                 dof.label: {
                     "uncompensated": finite_or_none(found.uncompensated_estimate),
@@ -103,42 +103,41 @@ def run_on_hardware(
     compare: bool = False,
     make_rig: RigMaker = HardwareRig,
 ) -> HardwareRun:
-    """The article's protocol on the hardware of a configuration, with a log of every run.
+    """Run the article's protocol on the configured drives and camera, and log every run.
 
-    However it ends, the motors have been brought to quick stop and the log is closed. SIGTERM and
-    SIGHUP end it like Ctrl-C.
+    The motors are quick-stopped and the log is closed on every exit, also after SIGTERM and SIGHUP.
 
     Args:
         config: With a section ``drives``.
-        folder: New or empty; the log is there from the first moment on.
-        progress: Told the share of the work done, 0 to 1.
-        compare: Run without compensation first, so that there is a reduction.
+        folder: New or empty; the log is written there from the start.
+        progress: Called with the fraction of the work done, 0 to 1.
+        compare: Run without compensation first, to compute the reduction.
         make_rig: Makes the rig.
 
     Raises:
-        ConfigError: The rig cannot be as configured; `Plausibility` says what was seen.
-        TautscopeError: What drives, camera or loop raised.
+        ConfigError: The rig differs from its configuration; see `PlausibilityMonitor`.
+        TautscopeError: Drives, camera or loop failed.
     """
     kinds = (False, True) if compare else (True,)
-    rig = make_rig(config)  # a configuration that cannot work leaves no folder
-    _make(check_free(folder))
-    parts = []
-    with exit_on_signals(), little_collection(), memory_kept(), realtime(OTHERS):
+    rig = make_rig(config)  # an invalid configuration must leave no folder behind
+    _make_folder(check_free(folder))
+    runs = []
+    with exit_on_signals(), limited_garbage_collection(), locked_memory(), realtime(OTHERS):
         for index, compensate in enumerate(kinds):
-            parts.append(
+            runs.append(
                 _run(
                     rig,
                     config,
                     folder / ("compensated.mcap" if compensate else "uncompensated.mcap"),
                     compensate,
-                    lambda share, done=index: progress((done + share) / len(kinds)),  # type: ignore[misc]
+                    lambda fraction, done=index: progress((done + fraction) / len(kinds)),  # type: ignore[misc]
                 )
             )
-    return HardwareRun(config, parts[-1], parts[0] if compare else None)
+    return HardwareRun(config, runs[-1], runs[0] if compare else None)
 
 
 def write_run_folder(run: HardwareRun, folder: Path) -> None:
-    """Tables, timing, figures and report, beside the logs that are there."""
+    """Write tables, timing, figures and report into the folder of the logs."""
     from tautscope.report import figures, report, tables  # noqa: PLC0415  matplotlib takes half a second
 
     first, results = run.compensated, run.results
@@ -151,12 +150,12 @@ def write_run_folder(run: HardwareRun, folder: Path) -> None:
             loops,
             "Fig. 9. (a)-(c) with compensation: reference, command, estimate and both contact "
             "offsets. (d)-(f) loops of the estimate; the first period, in which the slack is "
-            "learnt, is thin. The dashed line is a perfect tip.",
+            "estimated, is thin. The dashed line is an ideal tip.",
         ),
         report.Picture(
             picture,
-            "How punctual the run was. (a), (b) how much later than due each set-point was sent; "
-            "(c), (d) from capture until the loop was given the frame.",
+            "Timing of the run. (a), (b) delay of each set-point after its due time; "
+            "(c), (d) age of each frame when the loop took it.",
         ),
     ]
     if run.uncompensated is not None:
@@ -182,16 +181,16 @@ def _run(
     path: Path,
     compensate: bool,
     progress: Callable[[float], None],
-) -> Part:
+) -> ProtocolRun:
     reference = SineSequence(config.experiment)
     with LogWriter(path, config, compensate=compensate, segments=reference.segments) as log:
 
-        def say(text: str) -> None:
+        def warn(text: str) -> None:
             print(f"warning: {text}", file=sys.stderr, flush=True)
             log.warn(text)
 
-        rig.say = say
-        eyes = ThreadPoolExecutor(1, "vision", settle, (VISION,))
+        rig.warn = warn
+        executor = ThreadPoolExecutor(1, "vision", set_realtime_priority, (VISION,))
         try:
             recording = run_experiment(
                 rig,
@@ -199,86 +198,90 @@ def _run(
                 config,
                 compensate,
                 lambda elapsed, duration: progress(min(elapsed / duration, 1.0)),
-                log=_Watched(log, config),
-                aside=eyes,
-                watch=lambda standing: _obey(rig, standing),
+                log=_MonitoredLog(log, config),
+                aside=executor,
+                watch=lambda supervision: _apply_reaction(rig, supervision),
             )
         except BaseException as error:
             log.warn(f"{type(error).__name__}: {error}")
-            error.add_note(f"The log up to then is {path}")
+            error.add_note(f"The log of the run is {path}")
             raise
         finally:
             rig.close()
-            eyes.shutdown()
+            executor.shutdown()
     progress(1.0)
-    return Part(recording, rig.timing, log.close())
+    return ProtocolRun(recording, rig.timing, log.close())
 
 
-def _obey(rig: HardwareRig, standing: Supervision) -> None:
-    """Do with the drives what the loop's guards say, in the tick in which they say it."""
-    reaction = standing.reaction
+def _apply_reaction(rig: HardwareRig, supervision: Supervision) -> None:
+    """Apply the supervisor's reaction to the drives, in the tick in which it is decided.
+
+    Raises:
+        DriveError: The reaction is a quick stop or disable.
+    """
+    reaction = supervision.reaction
     if reaction.rank < Reaction.QUICK_STOP.rank:
         return
-    disables = reaction is Reaction.DISABLE
+    is_disabled = reaction is Reaction.DISABLE
     stop = DriveError(
         "loop",
-        f"{reaction} ({', '.join(standing.flags)})",
-        f"The motors are {'without power' if disables else 'stopped'}. See docs/safety.md for "
-        "what was noticed, and the log for what led to it",
+        f"{reaction} ({', '.join(supervision.flags)})",
+        f"The motors are {'without power' if is_disabled else 'stopped'}. docs/safety.md explains "
+        "the flags; the log shows the cause",
     )
     try:
-        rig.disable() if disables else rig.close()
-    except TautscopeError as failed:
-        stop.add_note(str(failed))
+        rig.disable() if is_disabled else rig.close()
+    except TautscopeError as error:
+        stop.add_note(str(error))
     raise stop
 
 
-class _Watched:
-    """A log, and a watch that the tip goes where the motors go."""
+class _MonitoredLog:
+    """Writes the log and checks the plausibility of every sample and frame."""
 
     def __init__(self, log: LogWriter, config: Config) -> None:
         self._log = log
         self._config = config
-        self._watch: Plausibility | None = None
+        self._monitor: PlausibilityMonitor | None = None
 
     def tick(
         self, sample: Sample, reference: Floats, command: Floats, made_at: float | None = None
     ) -> None:
         self._log.tick(sample, reference, command, made_at)
-        if self._watch is None:
-            self._watch = Plausibility(self._config, sample.applied)
-        self._watch.tick(sample.time, sample.applied)
+        if self._monitor is None:
+            self._monitor = PlausibilityMonitor(self._config, sample.applied)
+        self._monitor.add_sample(sample.time, sample.applied)
 
     def frame(self, now: float, frame: Frame, report: Report) -> None:
         self._log.frame(now, frame, report)
-        if self._watch is not None:
-            self._watch.frame(frame.captured_at, report)
+        if self._monitor is not None:
+            self._monitor.check_frame(frame.captured_at, report)
 
     def event(self, now: float, what: str) -> None:
         self._log.event(now, what)
 
 
-def _make(folder: Path) -> None:
+def _make_folder(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError("out", str(folder), f"a place that can be written ({error})") from None
 
 
-def _facts(part: Part) -> dict[str, Any]:
-    frames = part.recording.frames
+def _summary(run: ProtocolRun) -> dict[str, Any]:
+    frames = run.recording.frames
     return {
-        "log": str(part.log.path),
-        "log_complete": part.log.is_complete,
-        "ticks": len(part.recording.trace),
+        "log": str(run.log.path),
+        "log_complete": run.log.is_complete,
+        "ticks": len(run.recording.trace),
         "status": dict(Counter(frames["status"].tolist())),
-        "observable": _shares(frames),
-        "timing": part.timing.summary(),
-        "warnings": list(part.recording.warnings),
+        "observable": _observable_fractions(frames),
+        "timing": run.timing.summary(),
+        "warnings": list(run.recording.warnings),
     }
 
 
-def _shares(frames: Table) -> dict[str, float | None]:
+def _observable_fractions(frames: Table) -> dict[str, float | None]:
     return {
         dof.label: finite_or_none(float(frames[f"observable_{dof.label}"].mean()))
         if len(frames)

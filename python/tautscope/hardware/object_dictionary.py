@@ -1,6 +1,6 @@
-"""The objects of CiA 301 and 402 that are used, and an EDS file of them.
+"""Object dictionary entries of CiA 301 and CiA 402 that this package uses, and EDS files.
 
-A drive's own EDS file says which of them it has and of what type; this table stands in for it.
+The table replaces the EDS file of a drive where the configuration names none.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ UNSIGNED = {1: 0x05, 2: 0x06, 4: 0x07}
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One value in a drive's object dictionary.
+    """One value of a drive's object dictionary.
 
     Attributes:
-        index, subindex: Where.
-        name: What, as the standard calls it.
+        index, subindex: Its address.
+        name: Its name in the standard.
         size: Length [byte].
-        signed: Whether it is an integer of two's complement.
+        signed: Whether the integer is signed.
         access: ``rw``, ``ro`` or ``const``.
-        default: What a drive that just started has there.
-        mappable: Whether a PDO may carry it.
+        default: Its value after power-on.
+        mappable: Whether a PDO can carry it.
     """
 
     index: int
@@ -47,16 +47,16 @@ class Entry:
 
     @property
     def data_type(self) -> int:
-        """Its type's number in CiA 301."""
+        """Number of the data type in CiA 301."""
         return (SIGNED if self.signed else UNSIGNED)[self.size]
 
     @property
     def mapping(self) -> int:
-        """What a PDO's mapping holds to carry it: index, sub-index, length in bits."""
+        """The PDO mapping entry: index, sub-index, length in bits."""
         return self.index << 16 | self.subindex << 8 | self.size * 8
 
     def encode(self, value: int) -> bytes:
-        """Little-endian bytes.
+        """Encode a value as little-endian bytes.
 
         Raises:
             OverflowError: The value does not fit.
@@ -64,7 +64,7 @@ class Entry:
         return value.to_bytes(self.size, "little", signed=self.signed)
 
     def decode(self, data: bytes) -> int:
-        """The value of little-endian bytes; their number is the drive's choice."""
+        """Decode little-endian bytes of any length."""
         return int.from_bytes(data, "little", signed=self.signed)
 
 
@@ -72,37 +72,41 @@ DEVICE_TYPE = Entry(0x1000, 0, "Device type", 4, access="ro", default=0x0002_019
 ERROR_REGISTER = Entry(0x1001, 0, "Error register", 1, access="ro")
 CONSUMER_HEARTBEAT = Entry(0x1016, 1, "Consumer heartbeat time", 4)
 PRODUCER_HEARTBEAT = Entry(0x1017, 0, "Producer heartbeat time", 2)
-VENDOR = Entry(0x1018, 1, "Vendor id", 4, access="const")
-PRODUCT = Entry(0x1018, 2, "Product code", 4, access="const")
-ON_LOSS = Entry(0x6007, 0, "Abort connection option code", 2, signed=True, default=1)
+VENDOR_ID = Entry(0x1018, 1, "Vendor id", 4, access="const")
+PRODUCT_CODE = Entry(0x1018, 2, "Product code", 4, access="const")
+ABORT_CONNECTION_OPTION = Entry(
+    0x6007, 0, "Abort connection option code", 2, signed=True, default=1
+)
 ERROR_CODE = Entry(0x603F, 0, "Error code", 2, access="ro", mappable=True)
 CONTROLWORD = Entry(0x6040, 0, "Controlword", 2, mappable=True)
 STATUSWORD = Entry(0x6041, 0, "Statusword", 2, access="ro", mappable=True)
-QUICK_STOP_OPTION = Entry(0x605A, 0, "Quick stop option code", 2, signed=True, default=2)
-MODE = Entry(0x6060, 0, "Modes of operation", 1, signed=True, mappable=True)
+QUICK_STOP_OPTION_CODE = Entry(0x605A, 0, "Quick stop option code", 2, signed=True, default=2)
+MODES_OF_OPERATION = Entry(0x6060, 0, "Modes of operation", 1, signed=True, mappable=True)
 MODE_DISPLAY = Entry(
     0x6061, 0, "Modes of operation display", 1, signed=True, access="ro", mappable=True
 )
-POSITION = Entry(0x6064, 0, "Position actual value", 4, signed=True, access="ro", mappable=True)
-FOLLOWING_WINDOW = Entry(0x6065, 0, "Following error window", 4, default=0xFFFF_FFFF)
-FOLLOWING_TIME = Entry(0x6066, 0, "Following error time out", 2)
+POSITION_ACTUAL = Entry(
+    0x6064, 0, "Position actual value", 4, signed=True, access="ro", mappable=True
+)
+FOLLOWING_ERROR_WINDOW = Entry(0x6065, 0, "Following error window", 4, default=0xFFFF_FFFF)
+FOLLOWING_ERROR_TIMEOUT = Entry(0x6066, 0, "Following error time out", 2)
 TARGET_POSITION = Entry(0x607A, 0, "Target position", 4, signed=True, mappable=True)
-LEAST_POSITION = Entry(0x607D, 1, "Min position limit", 4, signed=True, default=-(2**31))
-LARGEST_POSITION = Entry(0x607D, 2, "Max position limit", 4, signed=True, default=2**31 - 1)
-PROFILE_SPEED_LIMIT = Entry(0x607F, 0, "Max profile velocity", 4, default=0xFFFF_FFFF)
-MOTOR_SPEED_LIMIT = Entry(0x6080, 0, "Max motor speed", 4, default=0xFFFF_FFFF)
-ENCODER_COUNTS = Entry(0x608F, 1, "Encoder increments", 4, default=4096)
-ENCODER_TURNS = Entry(0x608F, 2, "Motor revolutions", 4, default=1)
+MIN_POSITION_LIMIT = Entry(0x607D, 1, "Min position limit", 4, signed=True, default=-(2**31))
+MAX_POSITION_LIMIT = Entry(0x607D, 2, "Max position limit", 4, signed=True, default=2**31 - 1)
+MAX_PROFILE_VELOCITY = Entry(0x607F, 0, "Max profile velocity", 4, default=0xFFFF_FFFF)
+MAX_MOTOR_SPEED = Entry(0x6080, 0, "Max motor speed", 4, default=0xFFFF_FFFF)
+ENCODER_INCREMENTS = Entry(0x608F, 1, "Encoder increments", 4, default=4096)
+MOTOR_REVOLUTIONS = Entry(0x608F, 2, "Motor revolutions", 4, default=1)
 INTERPOLATION_SUBMODE = Entry(0x60C0, 0, "Interpolation sub mode select", 2, signed=True)
 INTERPOLATION_DATA = Entry(0x60C1, 1, "Interpolation data record", 4, signed=True, mappable=True)
 INTERPOLATION_TIME = Entry(0x60C2, 1, "Interpolation time units", 1, default=1)
 INTERPOLATION_EXPONENT = Entry(0x60C2, 2, "Interpolation time index", 1, signed=True, default=-3)
-BUFFER_CLEAR = Entry(0x60C4, 6, "Buffer clear", 1)
+INTERPOLATION_BUFFER_CLEAR = Entry(0x60C4, 6, "Buffer clear", 1)
 SUPPORTED_MODES = Entry(0x6502, 0, "Supported drive modes", 4, access="ro", default=0xC0)
 
 
 def pdo_entries(base: int, mapping: int, cob: int, name: str) -> tuple[Entry, ...]:
-    """Communication and mapping parameters of one PDO, two mapped objects and more."""
+    """Communication and mapping parameters of one PDO with four mapped objects."""
     return (
         Entry(base, 1, f"{name} COB-ID", 4, default=cob),
         Entry(base, 2, f"{name} transmission type", 1, default=255),
@@ -111,8 +115,8 @@ def pdo_entries(base: int, mapping: int, cob: int, name: str) -> tuple[Entry, ..
     )
 
 
-def profile(node: int) -> tuple[Entry, ...]:
-    """Every object of a drive with this node id."""
+def device_profile(node: int) -> tuple[Entry, ...]:
+    """Every object of a drive with a node id."""
     pdos = [
         (kind, number, base + number, base + 0x200 + number, cob + number * 0x100 + node)
         for kind, base, cob in (("Receive PDO", 0x1400, 0x200), ("Transmit PDO", 0x1800, 0x180))
@@ -127,8 +131,8 @@ def profile(node: int) -> tuple[Entry, ...]:
 
 
 def eds_text(node: int = 1) -> str:
-    """An EDS file (CiA 306) of `profile`, for tools that want one."""
-    entries = sorted(profile(node), key=lambda entry: (entry.index, entry.subindex))
+    """An EDS file (CiA 306) of `device_profile`."""
+    entries = sorted(device_profile(node), key=lambda entry: (entry.index, entry.subindex))
     indices = sorted({entry.index for entry in entries})
     mandatory = [index for index in indices if index in {0x1000, 0x1001, 0x1018}]
     lines = ["[FileInfo]", "FileName=tautscope.eds", "EDSVersion=4.0", ""]
@@ -158,11 +162,11 @@ def eds_text(node: int = 1) -> str:
 
 
 def load_eds(path: str, node: int) -> canopen.ObjectDictionary:
-    """The object dictionary of an EDS file; without a path, that of `profile`.
+    """Read the object dictionary of an EDS file; without a path, that of `device_profile`.
 
     Raises:
         OSError: The file cannot be read.
-        ValueError: It is not an EDS file, or one with errors; the text says which.
+        ValueError: The file is not an EDS file of a CiA 402 drive; the message says why.
     """
     import configparser  # noqa: PLC0415 -- with canopen, only where a bus is opened
     import warnings  # noqa: PLC0415
@@ -175,13 +179,13 @@ def load_eds(path: str, node: int) -> canopen.ObjectDictionary:
         source = StringIO(eds_text(node))
         source.name = "tautscope.eds"
     try:
-        with warnings.catch_warnings():  # canopen's own, of how it logs
+        with warnings.catch_warnings():  # canopen calls a deprecated logging function
             warnings.simplefilter("ignore", DeprecationWarning)
             dictionary = import_od(source, node)
     except (configparser.Error, KeyError, TypeError, AttributeError, NotImplementedError) as error:
         raise ValueError(f"{type(error).__name__}: {error}") from None
-    if MODE.index not in dictionary:
-        raise ValueError(f"it is not of a CiA 402 drive: no {MODE}")
+    if MODES_OF_OPERATION.index not in dictionary:
+        raise ValueError(f"it does not describe a CiA 402 drive: no {MODES_OF_OPERATION}")
     return dictionary
 
 

@@ -1,4 +1,4 @@
-"""Whether the tip goes where the motors go: what a wrong sign, unit or cable cannot hide from."""
+"""Plausibility of tip and motor motion: finds wrong signs, units and broken transmissions."""
 
 from __future__ import annotations
 
@@ -12,32 +12,32 @@ from tautscope.dof import Dof
 from tautscope.errors import ConfigError
 from tautscope.loop.reduction import Report
 
-UNSEEN = 8.0
-"""Travel of a motor after which its tip must have been seen [in start deviations]."""
-OPPOSITE = 1.0
-"""How far a tip may seem to go against its motor [in start deviations]."""
-LARGEST_SLACK = 4.0
-"""By how much less than its motor a tip may go [in start deviations], twice the slack expected."""
-SETTLED = 5.0
-"""Range of the motor after which a tip that went with it is believed [in start deviations]."""
-OUTRUNS = 3.0
-"""How many times as far as its motor no tip goes."""
+MAX_UNMEASURED_TRAVEL = 8.0
+"""Travel of a motor within which a frame must measure its DOF [start deviations]."""
+MAX_REVERSE_MOTION = 1.0
+"""How far a tip may move against its motor [start deviations]."""
+MAX_LOST_MOTION = 4.0
+"""By how much the tip may move less than its motor [start deviations]; twice the expected slack."""
+SUFFICIENT_RANGE = 5.0
+"""Range of the motor after which a DOF has passed [start deviations]."""
+MAX_GAIN = 3.0
+"""Largest ratio of tip motion to motor motion."""
 
 
-class Plausibility:
-    """Compares what the camera sees with what the drives report, from the start of a run on.
+class PlausibilityMonitor:
+    """Compares the state estimate with the motor positions from the start of a run on.
 
-    Per DOF, over the frames that measured it, with q the state estimate and p the motor when the
-    frame was captured,
+    Per DOF, over the frames that measured it, with q the state estimate and p the motor position at
+    capture,
 
-        R = max p - min p,    D = q(where p was largest) - q(where p was smallest).
+        R = max p - min p,    D = q(at the largest p) - q(at the smallest p).
 
-    A tip behind slack w has max(0, R - w) <= D <= R, whatever the motor did between. The scale of
-    all is ``start_deviation``, half of the slack.
+    A tip behind backlash of width w has max(0, R - w) <= D <= R. The limits are multiples of
+    ``start_deviation``, half of the expected width.
 
     Args:
         config: Of the loop.
-        applied: (3,) where the motors are at the start [m, rad, rad].
+        applied: (3,) motor positions at the start [m, rad, rad].
     """
 
     def __init__(self, config: Config, applied: NDArray[np.float64]) -> None:
@@ -45,67 +45,69 @@ class Plausibility:
         self._last = np.array(applied)
         span = round(config.control.history / config.control.period)
         self._applied: deque[tuple[float, NDArray[np.float64]]] = deque(maxlen=span)
-        self._unseen = np.zeros(3)
+        self._unmeasured_travel = np.zeros(3)
         self._ends: list[tuple[tuple[float, float], tuple[float, float]] | None] = [None] * 3
-        """Per DOF (motor, estimate) at the least and at the largest position of the motor."""
-        self._settled = [False] * 3
+        """Per DOF (motor, estimate) at the smallest and at the largest motor position."""
+        self._has_passed = [False] * 3
 
-    def tick(self, time: float, applied: NDArray[np.float64]) -> None:
-        """Where the motors are (3,) at a time of the rig's clock [s], once per control period.
+    def add_sample(self, time: float, applied: NDArray[np.float64]) -> None:
+        """Add motor positions (3,) at a time of the rig's clock [s], once per control period.
 
         Raises:
-            ConfigError: The markers have not been seen for too long a travel.
+            ConfigError: A motor travelled too far without a measurement.
         """
-        self._unseen += np.abs(applied - self._last)
+        self._unmeasured_travel += np.abs(applied - self._last)
         self._last = np.array(applied)
         self._applied.append((time, self._last))
-        for dof in np.flatnonzero(self._unseen > UNSEEN * self._scale):
+        for dof in np.flatnonzero(self._unmeasured_travel > MAX_UNMEASURED_TRAVEL * self._scale):
             label = Dof(int(dof)).label
             raise ConfigError(
                 f"drives.{label}",
-                f"a travel of {self._unseen[dof]:.3g} in which no frame measured it",
-                "markers that are seen and recognised. Look at the picture, light and focus; check "
-                f"drives.{label}.sign and counts_per_unit, and the calibration",
+                f"a travel of {self._unmeasured_travel[dof]:.3g} in which no frame measured it",
+                "recognised markers. Check light, focus and calibration, and "
+                f"drives.{label}.sign and counts_per_unit",
             )
 
-    def frame(self, captured_at: float, report: Report) -> None:
-        """What the loop made of a frame captured at a time of the rig's clock [s].
+    def check_frame(self, captured_at: float, report: Report) -> None:
+        """Check the loop's report on a frame captured at a time of the rig's clock [s].
 
         Raises:
-            ConfigError: A tip goes against its motor, further than it, or not at all.
+            ConfigError: A tip moves against its motor, too far, or not at all.
         """
-        motor = self._at(captured_at)
+        motor = self._motors_at(captured_at)
         for dof in Dof:
             if report.observable[dof]:
-                self._unseen[dof] = 0.0
-                if not self._settled[dof]:
-                    self._judge(dof, (float(motor[dof]), float(report.state_estimate[dof])))
+                self._unmeasured_travel[dof] = 0.0
+                if not self._has_passed[dof]:
+                    self._check(dof, (float(motor[dof]), float(report.state_estimate[dof])))
 
-    def _at(self, time: float) -> NDArray[np.float64]:
-        """Where the motors were; a frame is older than they are by the camera's delay."""
+    def _motors_at(self, time: float) -> NDArray[np.float64]:
+        """Motor positions (3,) [m, rad, rad] at a time in the past."""
         for at, applied in reversed(self._applied):
             if at <= time:
                 return applied
         return self._applied[0][1] if self._applied else self._last
 
-    def _judge(self, dof: Dof, now: tuple[float, float]) -> None:
+    def _check(self, dof: Dof, now: tuple[float, float]) -> None:
         least, largest = self._ends[dof] or (now, now)
         least, largest = min(least, now), max(largest, now)
         self._ends[dof] = least, largest
         motor, tip = largest[0] - least[0], largest[1] - least[1]
         scale, name = float(self._scale[dof]), f"drives.{dof.label}"
-        told = f"a tip that went {tip:.3g} while its motor went {motor:.3g}"
-        if tip < -OPPOSITE * scale:
-            raise ConfigError(f"{name}.sign", told, "one that goes with it: the sign is wrong")
-        if tip > OUTRUNS * (motor + scale):
+        moved = f"a tip that moved {tip:.3g} while its motor moved {motor:.3g}"
+        if tip < -MAX_REVERSE_MOTION * scale:
             raise ConfigError(
-                f"{name}.counts_per_unit", told, "counts per m or rad: it is too large"
+                f"{name}.sign", moved, "motion in the same direction: the sign is wrong"
             )
-        if motor - tip > LARGEST_SLACK * scale:
+        if tip > MAX_GAIN * (motor + scale):
+            raise ConfigError(
+                f"{name}.counts_per_unit", moved, "counts per m or rad: the value is too large"
+            )
+        if motor - tip > MAX_LOST_MOTION * scale:
             raise ConfigError(
                 f"{name}.counts_per_unit",
-                told,
-                f"one that follows: it is too small, {name}.sign is wrong, the transmission is "
-                f"broken, or {dof.label}.start_deviation, half of the slack, is too small",
+                moved,
+                f"a tip that follows: the value or {dof.label}.start_deviation is too small, "
+                f"{name}.sign is wrong, or the transmission is broken",
             )
-        self._settled[dof] = motor > SETTLED * scale
+        self._has_passed[dof] = motor > SUFFICIENT_RANGE * scale

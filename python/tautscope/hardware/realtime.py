@@ -1,4 +1,4 @@
-"""For what moves motors: priority over other programs, memory that stays, few pauses."""
+"""Real-time settings of a process: SCHED_FIFO priorities, locked memory, garbage collection."""
 
 from __future__ import annotations
 
@@ -10,28 +10,27 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
 SETPOINTS, LOOP, VISION, OTHERS = 60, 40, 20, 10
-"""SCHED_FIFO priorities of the thread that sends set-points, of the loop, of the thread that looks
-at images, and of what else runs in their process: a thread that holds Python's lock and is kept
-waiting by another program would keep them waiting too."""
+"""SCHED_FIFO priorities of the set-point thread, the control loop, marker detection, and all other
+threads of the process: a thread that is preempted while it holds the GIL blocks the others too."""
 REMEDY = (
     f'printf \'%s\\n\' "$USER - rtprio {SETPOINTS}" "$USER - memlock unlimited" | '
     "sudo tee /etc/security/limits.d/90-tautscope.conf, then log in again"
 )
-"""What gives the priority and keeps the memory where that is refused."""
-_LOCK_AS_TOUCHED = 1 | 2 | 4
-"""mlockall's MCL_CURRENT, MCL_FUTURE, MCL_ONFAULT on x86 and ARM: what was touched stays."""
+"""The command that permits real-time priority and locked memory."""
+_MLOCK_ON_FAULT = 1 | 2 | 4
+"""Flags of mlockall: MCL_CURRENT, MCL_FUTURE, MCL_ONFAULT on x86 and ARM."""
 _NEVER = 1_000_000
-"""Searches of the younger objects before one of all; there are a few in a second."""
+"""Threshold of the oldest generation, which is not reached in a run."""
 _SWITCH_INTERVAL = 5e-4
-"""For how long a thread may keep Python's lock when another wants it [s]; 5 ms is the default."""
+"""How long a thread may hold the GIL while another waits [s]; the default is 5 ms."""
 
 
 @contextmanager
 def realtime(priority: int) -> Iterator[str]:
-    """SCHED_FIFO for the calling thread while the block lasts; threads it starts inherit it.
+    """Run the block in SCHED_FIFO; threads that it starts inherit the priority.
 
     Yields:
-        Nothing if it was granted, else why not and what to do.
+        Empty if it was granted, else the reason and the remedy.
     """
     if not hasattr(os, "sched_setscheduler"):
         yield f"{sys.platform} has no SCHED_FIFO; set-points may be late under load"
@@ -51,21 +50,21 @@ def realtime(priority: int) -> Iterator[str]:
         os.sched_setscheduler(0, policy, parameters)
 
 
-def settle(priority: int) -> None:
-    """SCHED_FIFO for the calling thread for good, where it is permitted."""
+def set_realtime_priority(priority: int) -> None:
+    """Set SCHED_FIFO for the calling thread permanently, if it is permitted."""
     with suppress(OSError, AttributeError):
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
 
 
-def step_back(priority: int) -> None:
-    """A lower SCHED_FIFO priority for the calling thread for good, if it inherited one."""
+def lower_realtime_priority(priority: int) -> None:
+    """Lower the SCHED_FIFO priority of the calling thread permanently, if it inherited one."""
     if hasattr(os, "sched_getscheduler") and os.sched_getscheduler(0) == os.SCHED_FIFO:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
 
 
 @contextmanager
-def quick_switching() -> Iterator[None]:
-    """Python's threads wait less for each other while the block lasts."""
+def short_switch_interval() -> Iterator[None]:
+    """Shorten the switch interval of Python's threads for the block."""
     before = sys.getswitchinterval()
     sys.setswitchinterval(_SWITCH_INTERVAL)
     try:
@@ -75,10 +74,10 @@ def quick_switching() -> Iterator[None]:
 
 
 @contextmanager
-def little_collection() -> Iterator[None]:
-    """Python's search for cycles of dead objects stops all threads: only the youngest are searched.
+def limited_garbage_collection() -> Iterator[None]:
+    """Suspend garbage collection of the oldest generation for the block.
 
-    A search of all takes the longer the more a run has kept.
+    A full collection stops all threads for a time that grows with the objects a run has kept.
     """
     gc.collect()
     gc.freeze()
@@ -92,20 +91,19 @@ def little_collection() -> Iterator[None]:
 
 
 @contextmanager
-def memory_kept() -> Iterator[str]:
-    """What this process has touched stays in memory while the block lasts (mlockall).
+def locked_memory() -> Iterator[str]:
+    """Lock the pages that this process has touched in memory for the block (mlockall).
 
-    Else code that has not run for a while, that of a stop for one, is read from a disk that a
-    recording keeps busy.
+    Otherwise rarely used code, such as a quick stop, may have to be paged in from a busy disk.
 
     Yields:
-        Nothing if it was granted, else why not and what to do.
+        Empty if it was granted, else the reason and the remedy.
     """
     if sys.platform != "linux":
-        yield f"{sys.platform}: memory is not kept from being paged out"
+        yield f"{sys.platform}: memory cannot be locked"
         return
     system = ctypes.CDLL(None, use_errno=True)
-    if system.mlockall(_LOCK_AS_TOUCHED):
+    if system.mlockall(_MLOCK_ON_FAULT):
         yield f"memory may be paged out ({os.strerror(ctypes.get_errno())}). Run: {REMEDY}"
         return
     try:

@@ -1,4 +1,4 @@
-"""Drives and camera as a rig: what `run_experiment` runs on in a lab, and on the bench."""
+"""A rig of CiA 402 drives and a live camera, in a laboratory or on the bench."""
 
 from __future__ import annotations
 
@@ -18,50 +18,50 @@ from tautscope.dof import Dof
 from tautscope.errors import CameraError, ConfigError, SignalError
 from tautscope.hardware.cameras import Camera, CameraState, Capture
 from tautscope.hardware.drives import open_drives
-from tautscope.hardware.realtime import LOOP, quick_switching, realtime
-from tautscope.hardware.setpoints import Motors, Setpoints
+from tautscope.hardware.realtime import LOOP, realtime, short_switch_interval
+from tautscope.hardware.setpoint_thread import Motors, SetpointThread
 from tautscope.hardware.timing import Timing
 from tautscope.loop.rig import Frame, Sample
 
 
-class Eye(AbstractContextManager["Eye"], Protocol):
-    """What `tautscope.hardware.cameras.Camera` is to the rig."""
+class FrameSource(AbstractContextManager["FrameSource"], Protocol):
+    """The part of `tautscope.hardware.cameras.Camera` that the rig uses."""
 
     @property
     def state(self) -> CameraState:
-        """How it is doing."""
+        """State of the camera."""
         ...
 
     def newest(self) -> Capture | None:
-        """The newest frame that was not taken yet, times on the monotonic clock."""
+        """The newest frame not taken before, with times of the monotonic clock; else None."""
         ...
 
 
-def _say(text: str) -> None:
+def _print_warning(text: str) -> None:
     print(f"warning: {text}", file=sys.stderr, flush=True)
 
 
 class HardwareRig:
-    """Motors on a bus and a live camera; implements `tautscope.loop.rig.Rig`.
+    """Three drives and a live camera; implements `tautscope.loop.rig.Rig`.
 
-    The rig's clock counts set-points: tick k is at k times the cycle, from the instant its
-    set-point is sent. In a cycle that finds no new command the motors are held and the clock
-    stands, so that a loop that was late goes on where it was; nothing is made up for by a jump.
-    Frames are put on this clock by the set-point that was in force when they were captured,
+    The rig's clock counts set-points: tick k begins when its set-point is sent, at time k times the
+    cycle. A cycle without a new command repeats the last set-point and stops the clock, so that the
+    reference has no jump after a delay of the loop. The capture time of a frame is converted with
+    the set-point in force,
 
         captured_at = t_k + min(captured - sent_k, cycle),    sent_k <= captured < sent_(k+1)
 
-    so that unpunctual cycles do not read as slack. One thread may call it. Whatever it raises, the
-    motors have been brought to quick stop.
+    so that jitter of the cycles is not estimated as backlash. For use by one thread. The motors are
+    quick-stopped before any error is raised.
 
     Args:
-        config: With a section ``drives``; its centres of ``experiment`` are where a run starts.
+        config: With a section ``drives``; a run starts at the centres of ``experiment``.
         motors: Opens the drives.
-        eye: Opens the camera.
-        say: Told once of each trouble that does not stop the run, and of its end.
+        camera: Opens the camera.
+        warn: Called once when a problem begins that does not stop the run, and when it ends.
 
     Raises:
-        ConfigError: There is no section ``drives``, or ``control.period`` is not its cycle.
+        ConfigError: The section ``drives`` is missing, or ``control.period`` is not its cycle.
     """
 
     def __init__(
@@ -69,23 +69,23 @@ class HardwareRig:
         config: Config,
         *,
         motors: Callable[[DrivesConfig], Motors] = open_drives,
-        eye: Callable[[Config], Eye] | None = None,
-        say: Callable[[str], None] = _say,
+        camera: Callable[[Config], FrameSource] | None = None,
+        warn: Callable[[str], None] = _print_warning,
     ) -> None:
-        self._drives = rig_drives(config)
+        self._drives = require_drives(config)
         self._config = config
         self._open_motors = motors
-        self._open_eye = eye or (lambda known: Camera(known.camera, time.monotonic))
-        self.say = say
+        self._open_camera = camera or (lambda config: Camera(config.camera, time.monotonic))
+        self.warn = warn
         self.timing = Timing(self._drives.cycle)
-        self._held = ExitStack()
-        self._eye: Eye | None = None
-        self._setpoints: Setpoints | None = None
-        span = round(config.control.history / config.control.period)
-        self._sent: deque[tuple[float, float]] = deque(maxlen=span)
+        self._resources = ExitStack()
+        self._camera: FrameSource | None = None
+        self._setpoints: SetpointThread | None = None
+        length = round(config.control.history / config.control.period)
+        self._sent: deque[tuple[float, float]] = deque(maxlen=length)
         self._ticks = 0
-        self._last: Capture | None = None
-        self._news_at = 0.0
+        self._last_capture: Capture | None = None
+        self._new_frame_at = 0.0
         self._trouble = ""
         self._is_frozen = False
 
@@ -95,66 +95,66 @@ class HardwareRig:
         return self._drives.cycle
 
     def reset(self) -> Sample:
-        """Open the camera and test it, enable the motors, go to the start; the clock is at 0.
+        """Open and test the camera, enable the motors, move to the start; the clock is at 0.
 
         Raises:
-            CameraError: The camera is not there, or what it gives cannot be used.
-            DriveError: A drive is not there, or not as configured, or did not do as told.
+            CameraError: The camera is missing, or its frames cannot be used.
+            DriveError: A drive is missing, differs from its configuration, or failed.
         """
         self.close()
         self.timing = Timing(self._drives.cycle)
         start = np.array([self._config.experiment[dof].centre for dof in Dof])
         try:
-            self._eye = self._held.enter_context(self._open_eye(self._config))
-            self._setpoints = Setpoints(
+            self._camera = self._resources.enter_context(self._open_camera(self._config))
+            self._setpoints = SetpointThread(
                 self._drives, lambda: self._open_motors(self._drives), start, self.timing
             )
-            self._held.callback(self._setpoints.stop)
+            self._resources.callback(self._setpoints.stop)
             applied = self._setpoints.start()
-            self._held.enter_context(quick_switching())
-            self._held.enter_context(realtime(LOOP))
+            self._resources.enter_context(short_switch_interval())
+            self._resources.enter_context(realtime(LOOP))
         except BaseException:
             self.close()
             raise
         if self.timing.realtime:
-            self.say(self.timing.realtime)
+            self.warn(self.timing.realtime)
         self._sent.clear()
-        self._ticks, self._last, self._trouble, self._is_frozen = 0, None, "", False
-        self._news_at = time.monotonic()
+        self._ticks, self._last_capture, self._trouble, self._is_frozen = 0, None, "", False
+        self._new_frame_at = time.monotonic()
         return Sample(0.0, applied)
 
     def step(self, command: ArrayLike) -> Sample:
-        """Send command (3,) [m, rad, rad] with the next cycle; return when the drives answered.
+        """Send command (3,) [m, rad, rad] in the next cycle; return when the drives answer.
 
         Raises:
             SignalError: The command is not three finite numbers, or outside the limits.
-            DriveError: The drives, or the loop was away for longer than ``command_timeout``.
-            CameraError: No frame for ``camera.source.lost_timeout``.
+            DriveError: A drive failed, or no command came for ``command_timeout``.
+            CameraError: No new frame came for ``camera.source.lost_timeout``.
         """
-        if self._setpoints is None or self._eye is None:
+        if self._setpoints is None or self._camera is None:
             raise SignalError("rig", "closed", "a rig after reset() and before close()")
         try:
             target = np.array(command, dtype=np.float64)
             sent, applied = self._setpoints.send(target)
             self._sent.append((sent, self._ticks * self.control_period))
             self._ticks += 1
-            frame = self._look(self._eye)
+            frame = self._newest_frame(self._camera)
         except BaseException:
             self.close()
             raise
         return Sample(self._ticks * self.control_period, applied, frame)
 
     def close(self) -> None:
-        """Quick stop, confirmed; release bus and camera. May be called twice.
+        """Quick-stop the motors, release bus and camera; a second call does nothing.
 
         Raises:
             StateError: A drive does not confirm; use the emergency stop.
         """
-        self._setpoints = self._eye = None
-        self._held.close()
+        self._setpoints = self._camera = None
+        self._resources.close()
 
     def disable(self) -> None:
-        """`close`, and the motors are without power: nothing holds them any more.
+        """Like `close`, and disable voltage: nothing holds the motors any more.
 
         Raises:
             StateError: A drive does not confirm; use the emergency stop.
@@ -165,57 +165,58 @@ class HardwareRig:
         finally:
             self.close()
 
-    def on_clock(self, instant: float) -> float:
-        """An instant of the computer's monotonic clock on the rig's clock [s]."""
+    def to_rig_time(self, instant: float) -> float:
+        """Convert a time of the monotonic clock to the rig's clock [s]."""
         if not self._sent:
             return 0.0
         index = bisect_right(self._sent, (instant, float("inf"))) - 1
         sent, at = self._sent[max(index, 0)]
         return at + min(instant - sent, self.control_period)
 
-    def _look(self, eye: Eye) -> Frame | None:
-        """The newest frame on the rig's clock; a picture that is the last one again is no news."""
+    def _newest_frame(self, camera: FrameSource) -> Frame | None:
+        """The newest frame on the rig's clock; None if it repeats the last image."""
         now = time.monotonic()
-        capture = eye.newest()
+        capture = camera.newest()
         is_new = capture is not None and not (
-            self._last is not None and np.array_equal(capture.frame.image, self._last.frame.image)
+            self._last_capture is not None
+            and np.array_equal(capture.frame.image, self._last_capture.frame.image)
         )
         if is_new:
-            self._news_at = now
+            self._new_frame_at = now
         if capture is not None:
             self._is_frozen = not is_new
-        self._mind(eye.state, now)
+        self._check_camera(camera.state, now)
         if capture is None or not is_new:
             return None
-        self._last = capture
+        self._last_capture = capture
         self.timing.add_frame(capture.frame.captured_at, capture.arrived_at, now)
-        captured_at = self.on_clock(capture.frame.captured_at)
+        captured_at = self.to_rig_time(capture.frame.captured_at)
         return Frame(capture.frame.image, captured_at, capture.frame.sequence)
 
-    def _mind(self, state: CameraState, now: float) -> None:
+    def _check_camera(self, state: CameraState, now: float) -> None:
         source = self._config.camera.source
-        away = now - self._news_at
+        silence = now - self._new_frame_at
         trouble = state.trouble
-        what = "the same picture again and again" if self._is_frozen else "no picture"
-        if not trouble and away > source.timeout:
+        what = "only repetitions of one image" if self._is_frozen else "no image"
+        if not trouble and silence > source.timeout:
             trouble = f"{what} for {source.timeout:g} s; is the camera on and connected?"
-        if away > source.lost_timeout:
+        if silence > source.lost_timeout:
             raise CameraError(
                 "camera.source",
                 f"{what} for {source.lost_timeout:g} s",
-                "new ones; the motors are stopped. See to the camera, its cable and the video "
+                "new images; the motors are stopped. Check the camera, its cable and the video "
                 "processor, then start again",
             )
         if bool(trouble) != bool(self._trouble):
-            self.say(f"camera: {trouble}" if trouble else "camera: frames again")
+            self.warn(f"camera: {trouble}" if trouble else "camera: new frames again")
         self._trouble = trouble
 
 
-def rig_drives(config: Config) -> DrivesConfig:
-    """The section ``drives`` of a rig's configuration.
+def require_drives(config: Config) -> DrivesConfig:
+    """Return the section ``drives`` of a configuration.
 
     Raises:
-        ConfigError: There is none, or ``control.period`` is not its cycle.
+        ConfigError: The section is missing, or ``control.period`` is not its cycle.
     """
     drives = config.drives
     if drives is None:
@@ -224,6 +225,6 @@ def rig_drives(config: Config) -> DrivesConfig:
         raise ConfigError(
             "control.period",
             config.control.period,
-            f"drives.cycle = {drives.cycle}: every tick of the loop is a set-point",
+            f"drives.cycle = {drives.cycle}: every tick of the loop sends a set-point",
         )
     return drives

@@ -1,13 +1,14 @@
-"""Signals and motors: a process that is told to end stops its motors first."""
+"""POSIX signals: a process that is asked to end stops its motors first."""
 
 from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+Handler = Callable[[int, FrameType | None], object]
 TERMINATING = tuple(
     getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)
 )
@@ -16,49 +17,45 @@ DEFERRED = (signal.SIGINT, *TERMINATING)
 
 @contextmanager
 def exit_on_signals() -> Iterator[None]:
-    """SIGTERM and SIGHUP raise SystemExit in the main thread, so that every ``with`` is left.
+    """Make SIGTERM and SIGHUP raise SystemExit in the main thread, so that every ``with`` is left.
 
-    They would end the process at once, and only the drives' own watchdogs would stop the motors.
-    SIGINT raises KeyboardInterrupt, also in a process in the background, whose shell had it
-    ignored. In another thread than the main one this does nothing. What was there before comes
-    back at the end.
+    By default they end the process at once, and only the drives' watchdogs stop the motors. SIGINT
+    raises KeyboardInterrupt, also in a background process whose shell ignores it. The handlers are
+    restored at the end. Outside the main thread this does nothing.
     """
 
-    def leave(number: int, frame: FrameType | None) -> None:
+    def exit_process(number: int, frame: FrameType | None) -> None:
         raise SystemExit(128 + number)
 
-    if threading.current_thread() is not threading.main_thread():
+    handlers: dict[int, Handler] = dict.fromkeys(TERMINATING, exit_process)
+    with _installed(handlers | {signal.SIGINT: signal.default_int_handler}):
         yield
-        return
-    before = {number: signal.signal(number, leave) for number in TERMINATING}
-    before[signal.SIGINT] = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 @contextmanager
-def signals_deferred() -> Iterator[None]:
-    """Let signals that end the process wait until the block is done; then they act.
+def defer_signals() -> Iterator[None]:
+    """Defer signals that end the process until the end of the block.
 
-    A second Ctrl-C cannot interrupt a quick stop. In another thread than the main one this does
-    nothing: signals do not interrupt it.
+    A second Ctrl-C cannot interrupt a quick stop. Outside the main thread this does nothing.
     """
+    received: list[int] = []
+    try:
+        with _installed(dict.fromkeys(DEFERRED, lambda number, frame: received.append(number))):
+            yield
+    finally:
+        for number in dict.fromkeys(received):
+            signal.raise_signal(number)
+
+
+@contextmanager
+def _installed(handlers: dict[int, Handler]) -> Iterator[None]:
+    """Install signal handlers for the block, if this is the main thread."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    came: list[int] = []
-
-    def note(number: int, frame: FrameType | None) -> None:
-        came.append(number)
-
-    before = {number: signal.signal(number, note) for number in DEFERRED}
+    before = {number: signal.signal(number, handler) for number, handler in handlers.items()}
     try:
         yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-        for number in dict.fromkeys(came):
-            signal.raise_signal(number)

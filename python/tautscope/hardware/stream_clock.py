@@ -1,4 +1,4 @@
-"""When a frame was captured, from the time stamps of its source."""
+"""Capture times from the time stamps of a video source."""
 
 from __future__ import annotations
 
@@ -7,29 +7,32 @@ from collections import deque
 from tautscope.config import SourceConfig
 
 JUMP = 1.0
-"""Time stamps that go on by more, or back, are another clock [s]."""
+"""Time stamps that advance by more than this, or go back, belong to a new clock [s]."""
 
 
 class StreamClock:
-    """Time stamps of a source put on our clock.
+    """Converts time stamps of a source to the clock of the computer.
 
-    A frame can come late, never early: of all in the last `clock_window`, the one that came
-    soonest after its time stamp tells how far apart the clocks are,
-    ``captured_at = stamp + min(arrival - stamp) - delay``. A constant delay cannot be seen so and
-    is to be configured. A source that drifts by 1 s per day errs by 0.1 ms in a window of 10 s.
+    A frame can arrive late, never early. The smallest difference of arrival and stamp in the last
+    `clock_window` is therefore the best estimate of the offset between the clocks:
+
+        captured_at = stamp + min(arrival - stamp) - delay
+
+    A constant delay must be configured. A drift of 1 s per day makes an error of 0.1 ms in a window
+    of 10 s.
 
     Args:
-        source: Its `clock`, `clock_window` and `delay`.
+        source: `clock`, `clock_window` and `delay` are used.
     """
 
     def __init__(self, source: SourceConfig) -> None:
         self._source = source
         self._shortest: deque[tuple[float, float]] = deque()
-        """(arrival, arrival - stamp), the second rising: the first is the smallest."""
+        """(arrival, arrival - stamp), in increasing order of the difference."""
         self._last: float | None = None
 
     def captured_at(self, stamp: float | None, arrived_at: float) -> float:
-        """When a frame was captured [s, the clock of `arrived_at`], never after it arrived."""
+        """Capture time of a frame [s, the clock of `arrived_at`], never after its arrival."""
         source = self._source
         if stamp is None or source.clock == "arrival":
             return arrived_at - source.delay

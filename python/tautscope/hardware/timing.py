@@ -1,4 +1,4 @@
-"""How punctual a run was: every cycle of set-points, the age of every frame."""
+"""Timing of a run: set-point cycles and frame ages."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ FRAME_COLUMNS = ("captured", "arrived", "used")
 
 @dataclass
 class Timing:
-    """Grows while a run goes on, about 9 MB per hour; instants are of the monotonic clock [s].
+    """Records set-point cycles and frames, about 9 MB per hour; times on the monotonic clock [s].
 
-    A cycle without a new set-point is lost: the loop was late and the last one was *held*, or the
-    thread itself woke too late and it was *skipped*. Neither is made up for.
+    A cycle without a new set-point is lost: *held* if the loop was late and the last set-point was
+    repeated, *skipped* if the set-point thread woke too late.
 
     Attributes:
-        cycle: Time from one set-point to the next as it should be [s].
+        cycle: Nominal time from one set-point to the next [s].
         realtime: Why there is no real-time priority; empty if there is.
     """
 
@@ -34,18 +34,18 @@ class Timing:
     _frames: array[float] = field(default_factory=lambda: array("d"))
 
     def add_cycle(self, due: float, began: float, ended: float, is_new: bool) -> None:
-        """A set-point was due, was sent, and answered; `is_new`: it was not the last one again."""
+        """Record when a set-point was due, sent and answered; `is_new` unless it was repeated."""
         self._cycles.extend((due, began, ended, is_new))
 
     def add_frame(self, captured_at: float, arrived_at: float, used_at: float) -> None:
-        """A frame was captured, decoded, and given to the loop."""
+        """Record when a frame was captured, decoded, and given to the loop."""
         self._frames.extend((captured_at, arrived_at, used_at))
 
     @property
     def cycles(self) -> Floats:
-        """(n, 4) due, began, ended [s], and 1 for a new set-point, 0 for one that was held.
+        """(n, 4) due, began, ended [s], and 1 for a new set-point, 0 for a held one.
 
-        Up to the last new one: what is held when the run is over is not late.
+        Ends with the last new set-point: cycles held after the run are not lost.
         """
         cycles: Floats = np.array(self._cycles[:]).reshape(-1, 4)
         return cycles[: np.flatnonzero(cycles[:, 3])[-1] + 1] if cycles[:, 3].any() else cycles[:0]
@@ -57,41 +57,41 @@ class Timing:
 
     @property
     def sent(self) -> Floats:
-        """(ticks,) when the set-point of each control tick was sent [s]."""
+        """(ticks,) time at which the set-point of each control tick was sent [s]."""
         cycles = self.cycles
         sent: Floats = cycles[cycles[:, 3] == 1, 1]
         return sent
 
     @property
     def jitter(self) -> Floats:
-        """(n,) how much later than due each set-point was sent [s]."""
+        """(n,) delay of each set-point after its due time [s]."""
         cycles = self.cycles
         return cycles[:, 1] - cycles[:, 0]
 
     @property
     def frame_age(self) -> Floats:
-        """(n,) from capture until the loop was given the frame [s]."""
+        """(n,) time from capture until the loop took the frame [s]."""
         frames = self.frames
         return frames[:, 2] - frames[:, 0]
 
     @property
     def held(self) -> int:
-        """Cycles in which the loop had no new command, and the last one was sent again."""
+        """Number of cycles in which the last set-point was repeated."""
         return int((self.cycles[:, 3] == 0).sum())
 
     @property
     def skipped(self) -> int:
-        """Cycles for which the thread woke too late, and which were left out."""
+        """Number of cycles for which the set-point thread woke too late."""
         due = self.cycles[:, 0]
         return int((np.round(np.diff(due) / self.cycle) - 1).sum())
 
     @property
     def lost(self) -> int:
-        """Cycles without a new set-point."""
+        """Number of cycles without a new set-point."""
         return self.held + self.skipped
 
     def write(self, folder: Path, suffix: str = "") -> None:
-        """Write timing_cycles.csv and timing_frames.csv; `suffix` goes on their names."""
+        """Write timing_cycles.csv and timing_frames.csv; `suffix` is appended to their names."""
         for name, table, columns in (
             ("cycles", self.cycles, CYCLE_COLUMNS),
             ("frames", self.frames, FRAME_COLUMNS),
@@ -100,7 +100,7 @@ class Timing:
             np.savetxt(file, table, "%.6f", ",", header=",".join(columns), comments="")
 
     def summary(self) -> dict[str, Any]:
-        """For JSON; times in ms."""
+        """Statistics for JSON; times in ms."""
         cycles, frames = self.cycles, self.frames
         return {
             "cycle_ms": 1e3 * self.cycle,
@@ -118,7 +118,7 @@ class Timing:
 
 
 def read_sent(path: Path) -> Floats:
-    """(ticks,) `Timing.sent` of a file of cycles [s]."""
+    """Read `Timing.sent` (ticks,) [s] from a timing_cycles.csv."""
     cycles = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
     sent: Floats = cycles[cycles[:, 3] == 1, 1]
     return sent

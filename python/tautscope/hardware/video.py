@@ -1,6 +1,6 @@
-"""Video of any source to images, by FFmpeg through PyAV; interlaced frames become their fields.
+"""Decoding of video with FFmpeg through PyAV; fields of interlaced video become frames.
 
-OpenCV's reader gives black pictures for interlaced DV and says all is well, so it is not used.
+OpenCV's reader is not used: it decodes interlaced DV to black images without an error.
 """
 
 from __future__ import annotations
@@ -36,16 +36,16 @@ _FORMATS = {
     "nv12": "nv12",
     "i420": "yuv420p",
 }
-"""Ours -> FFmpeg's."""
+"""`camera.pixel_format` -> FFmpeg's name."""
 
 
 @dataclass(frozen=True, slots=True)
-class Picture:
-    """A decoded frame, or field made a frame.
+class DecodedFrame:
+    """A decoded frame, or a field converted to a frame.
 
     Attributes:
-        image: As `camera.pixel_format` says.
-        stamp: The source's time stamp [s]; None if it gives none.
+        image: In the format `camera.pixel_format`.
+        stamp: Time stamp of the source [s]; None if it has none.
     """
 
     image: Image
@@ -53,20 +53,20 @@ class Picture:
 
 
 @contextmanager
-def opened(
+def open_source(
     url: str,
     format_name: str | None = None,
     options: dict[str, str] | None = None,
     timeout: float | None = None,
 ) -> Iterator[InputContainer]:
-    """A source, open while the block lasts.
+    """Open a source for the block.
 
     Raises:
         CameraMismatchError: PyAV is not installed, or the source has no video.
         CameraError: The source cannot be opened or read.
     """
     try:
-        import av  # noqa: PLC0415  an extra, and 0.1 s
+        import av  # noqa: PLC0415  optional, takes 0.1 s
     except ImportError:
         raise CameraMismatchError(
             "camera.source", "no PyAV", "it installed: pip install 'tautscope[hardware]'"
@@ -79,27 +79,29 @@ def opened(
     except av.error.FFmpegError as error:
         if Path(url).is_file():
             raise CameraError("video", url, f"a video file that FFmpeg reads ({error})") from None
-        hint = "a source that opens and goes on; is it connected, and is another program using it?"
+        hint = (
+            "a source that can be opened and read; is it connected, and used by no other program?"
+        )
         raise CameraError("camera.source.url", url, f"{hint} ({error})") from None
 
 
 class Decoder:
-    """Decodes the video of an open source into pictures of the configured size and format.
+    """Decodes the video of an open source into images of the configured size and format.
 
     Args:
-        container: From `opened`.
+        container: From `open_source`.
         camera: Its size, pixel format and ``source.deinterlace`` are used.
-        live: Frames as soon as they are there; without it, as many as possible per second.
+        live: Minimise latency; otherwise maximise throughput.
 
     Attributes:
-        is_interlaced: Whether an interlaced frame has come; None before the first frame.
+        is_interlaced: Whether the source is interlaced; None before the first frame.
     """
 
     def __init__(self, container: InputContainer, camera: CameraConfig, *, live: bool) -> None:
         self.is_interlaced: bool | None = None
         self._container = container
         self._stream: VideoStream = container.streams.video[0]
-        # Threads that decode a frame each hold as many frames back as there are threads.
+        # Frame threading delays the output by one frame per thread.
         self._stream.thread_type = "SLICE" if live else "AUTO"
         self._camera = camera
         self._shape = FrameLayout(camera).shape
@@ -107,36 +109,36 @@ class Decoder:
 
     @property
     def period(self) -> float | None:
-        """Time from one picture to the next, as the source names it [s]; None if it does not."""
+        """Nominal time from one frame to the next [s]; None if the source has none."""
         rate = self._stream.average_rate or self._stream.guessed_rate
         if not rate:
             return None
         return 1 / float(rate) / (2 if self._graph is not None else 1)
 
-    def __iter__(self) -> Iterator[Picture]:
-        """Every picture, until the source ends.
+    def __iter__(self) -> Iterator[DecodedFrame]:
+        """Decode all frames until the source ends.
 
         Raises:
-            CameraMismatchError: It is not of the configured size.
+            CameraMismatchError: A frame does not have the configured size.
         """
         for frame in self._container.decode(self._stream):
-            yield from self._pictures(frame)
+            yield from self._decode(frame)
         if self._graph is not None:
             self._graph.push(None)
             yield from self._fields(self._graph)
 
-    def _pictures(self, frame: av.VideoFrame) -> Iterator[Picture]:
+    def _decode(self, frame: av.VideoFrame) -> Iterator[DecodedFrame]:
         self.is_interlaced = bool(self.is_interlaced or frame.interlaced_frame)
         self._check_size(frame)
         if not self.is_interlaced or self._camera.source.deinterlace == "none":
-            yield self._picture(frame)
+            yield self._convert(frame)
             return
         if self._graph is None:
             self._graph = _deinterlacer(self._stream)
         self._graph.push(frame)
         yield from self._fields(self._graph)
 
-    def _fields(self, graph: Graph) -> Iterator[Picture]:
+    def _fields(self, graph: Graph) -> Iterator[DecodedFrame]:
         from av.error import BlockingIOError, EOFError  # noqa: PLC0415
 
         while True:
@@ -144,43 +146,47 @@ class Decoder:
                 field = graph.pull()
             except (BlockingIOError, EOFError):
                 return
-            yield self._picture(field)  # type: ignore[arg-type]  # a video graph gives video
+            yield self._convert(field)  # type: ignore[arg-type]  # a video graph gives video
 
-    def _picture(self, frame: av.VideoFrame) -> Picture:
-        return Picture(_pixels(frame, _FORMATS[self._camera.pixel_format], self._shape), frame.time)
+    def _convert(self, frame: av.VideoFrame) -> DecodedFrame:
+        return DecodedFrame(
+            _pixels(frame, _FORMATS[self._camera.pixel_format], self._shape), frame.time
+        )
 
     def _check_size(self, frame: av.VideoFrame) -> None:
         camera = self._camera
         if (frame.width, frame.height) != (camera.width, camera.height):
             raise CameraMismatchError(
                 "camera.source",
-                f"pictures of {frame.width} x {frame.height}",
+                f"images of {frame.width} x {frame.height}",
                 f"camera.width x height = {camera.width} x {camera.height}, as calibrated; set "
                 "camera.source.options.video_size, or calibrate for this size",
             )
 
 
 def read_video(path: str, camera: CameraConfig, start: float = 0.0) -> Iterator[Frame]:
-    """The frames of a video file; fields if it is interlaced.
+    """Read the frames of a video file, or the fields if it is interlaced.
 
     Args:
         path: The file.
-        camera: Its size and pixel format, and what is done to interlaced frames.
-        start: Capture time of its first frame [s].
+        camera: Size, pixel format, and treatment of interlaced frames.
+        start: Capture time of the first frame [s].
 
     Raises:
-        MissingPathError: There is no such file.
-        CameraError: It is no video, or not of this size, or a frame has no time stamp.
+        MissingPathError: The file does not exist.
+        CameraError: It is no video, has another size, or a frame has no time stamp.
     """
     if not Path(path).is_file():
         raise MissingPathError("video", path, "a video file")
-    with opened(path) as container:
+    with open_source(path) as container:
         first: float | None = None
-        for sequence, picture in enumerate(Decoder(container, camera, live=False)):
-            if picture.stamp is None:
-                raise CameraError("video", f"frame {sequence} without a time", "a time per frame")
-            first = picture.stamp if first is None else first
-            yield Frame(picture.image, start + picture.stamp - first, sequence)
+        for sequence, decoded in enumerate(Decoder(container, camera, live=False)):
+            if decoded.stamp is None:
+                raise CameraError(
+                    "video", f"frame {sequence} without a time stamp", "a time stamp per frame"
+                )
+            first = decoded.stamp if first is None else first
+            yield Frame(decoded.image, start + decoded.stamp - first, sequence)
 
 
 def _deinterlacer(stream: VideoStream) -> Graph:
@@ -199,7 +205,7 @@ def _deinterlacer(stream: VideoStream) -> Graph:
 def _pixels(frame: av.VideoFrame, name: str, shape: tuple[int, ...]) -> Image:
     if name != "uyvy422":
         return np.ascontiguousarray(frame.to_ndarray(format=name), dtype=np.uint8)
-    # PyAV has no array for it; its only plane has lines with padding at their ends.
+    # PyAV does not convert this format; the lines of its only plane are padded at the end.
     plane = frame.reformat(format=name).planes[0]
     lines = np.frombuffer(plane, np.uint8).reshape(-1, plane.line_size)  # type: ignore[call-overload]
     rows, columns, channels = shape

@@ -1,8 +1,8 @@
-"""ROS 2 messages as bytes: the standard's definitions, and CDR both ways from those.
+"""CDR encoding and decoding of ROS 2 messages from their definitions.
 
-OMG DDSI-RTPS 2.2, section 10 (CDR, little endian): four bytes of header, then each field aligned
-to its size, counted from behind the header. Strings end in a zero that their length counts. The
-definitions are those of ROS 2 Jazzy; comments and constants are left out.
+OMG DDSI-RTPS 2.2, section 10 (CDR, little endian): a header of four bytes, then each field aligned
+to its size, relative to the end of the header. Strings end with a zero, which their length counts.
+The definitions are those of ROS 2 Jazzy without comments and constants.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ DEFINITIONS = {
     "rcl_interfaces/msg/Log": "builtin_interfaces/Time stamp\nuint8 level\nstring name\n"
     "string msg\nstring file\nstring function\nuint32 line",
 }
-"""Type -> its fields, one a line."""
+"""Type -> its fields, one per line."""
 
 _HEADER = b"\x00\x01\x00\x00"
 _CODES = {
@@ -62,7 +62,7 @@ class _Field:
     base: str
     """A primitive, ``string`` or another type of `DEFINITIONS`."""
     count: int | None
-    """None: one; 0: a sequence of any length; else an array of this length."""
+    """None: a single value; 0: a sequence of any length; otherwise an array of this length."""
 
 
 @cache
@@ -79,7 +79,7 @@ def _fields(kind: str) -> tuple[_Field, ...]:
 
 @cache
 def schema(kind: str) -> bytes:
-    """The definition with those it is made of, as MCAP's ``ros2msg`` wants them."""
+    """The definition of a type and of the types it uses, in MCAP's ``ros2msg`` format."""
     parts, queue = [DEFINITIONS[kind] + "\n"], list(_parts_of(kind))
     done: set[str] = set()
     while queue:
@@ -96,7 +96,7 @@ def _parts_of(kind: str) -> Iterable[str]:
 
 
 def encode(kind: str, message: Message) -> bytes:
-    """A message as CDR.
+    """Encode a message as CDR.
 
     Args:
         kind: A type of `DEFINITIONS`.
@@ -137,7 +137,7 @@ def _write(out: bytearray, base: str, values: Sequence[Any]) -> None:
 
 
 def decode(kind: str, data: bytes) -> dict[str, Any]:
-    """What `encode` was given.
+    """Decode a message from CDR.
 
     Raises:
         RecordError: The bytes are not little-endian CDR of this type.

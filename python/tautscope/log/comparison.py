@@ -1,4 +1,4 @@
-"""What a replay estimated beside what the run did: figures per DOF, and a picture."""
+"""Comparison of the estimates of a replay with those of the run: numbers per DOF, and a figure."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from os import PathLike
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tautscope.dof import Dof
 from tautscope.report import metrics
@@ -20,15 +21,15 @@ NAN = float("nan")
 
 
 @dataclass(frozen=True, slots=True)
-class Estimation:
-    """How one DOF was estimated in a run [m or rad]; NaN is not known.
+class EstimationQuality:
+    """Quality of the estimates of one DOF in a run [m or rad]; NaN where unknown.
 
     Attributes:
-        width: Slack at the end, delta_plus - delta_minus.
-        seen: Share of the images that determined the DOF.
-        state_rms: RMS of estimate minus truth over those, if there is a truth.
-        change_rms: RMS of this estimate minus that of the run it is compared with, over the images
-            that determined the DOF in both.
+        width: Backlash width at the end, delta_plus - delta_minus.
+        seen: Share of the images in which the DOF was observable.
+        state_rms: RMS error of the estimate over these images, if the true state is known.
+        change_rms: RMS difference from the estimate of the other run, over the images in which the
+            DOF was observable in both.
     """
 
     width: float
@@ -37,12 +38,14 @@ class Estimation:
     change_rms: float
 
 
-def estimations(run: Recording, other: Recording | None = None) -> dict[Dof, Estimation]:
-    """The figures of a run, compared with another of the same images."""
-    return {dof: _estimation(run, other, dof) for dof in Dof}
+def estimation_quality(
+    run: Recording, other: Recording | None = None
+) -> dict[Dof, EstimationQuality]:
+    """Quality of the estimates per DOF, compared with another run on the same images."""
+    return {dof: _quality(run, other, dof) for dof in Dof}
 
 
-def _estimation(run: Recording, other: Recording | None, dof: Dof) -> Estimation:
+def _quality(run: Recording, other: Recording | None, dof: Dof) -> EstimationQuality:
     frames, name = run.frames, dof.label
     seen = frames[f"observable_{name}"]
     error = (frames[f"estimate_{name}"] - frames[f"true_{name}"])[seen]
@@ -58,7 +61,7 @@ def _estimation(run: Recording, other: Recording | None, dof: Dof) -> Estimation
             for table, rows in ((frames, mine), (other.frames, theirs))
         ]
         change = values[0] - values[1]
-    return Estimation(
+    return EstimationQuality(
         width=float(_width(run.trace[-1:], name)[0]) if len(run.trace) else NAN,
         seen=float(np.mean(seen)) if len(seen) else NAN,
         state_rms=metrics.rms(error) if len(error) else NAN,
@@ -66,45 +69,38 @@ def _estimation(run: Recording, other: Recording | None, dof: Dof) -> Estimation
     )
 
 
-def _width(trace: Table, name: str) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    width: np.ndarray[tuple[int, ...], np.dtype[np.float64]] = (
-        trace[f"delta_plus_{name}"] - trace[f"delta_minus_{name}"]
-    )
-    return width
+def _width(trace: Table, name: str) -> NDArray[np.float64]:
+    return np.asarray(trace[f"delta_plus_{name}"] - trace[f"delta_minus_{name}"], np.float64)
 
 
 def replay_figure(replayed: Recording, recorded: Recording | None = None) -> Figure:
-    """A row per DOF: where the tip was estimated to be, and the slack learnt, over time."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  it takes half a second
+    """Plot state estimate and backlash width of each DOF over time."""
+    from matplotlib.figure import Figure  # noqa: PLC0415  slow import
 
     from tautscope.report.figures import BLUE, GREY, ORANGE, PAGE, style  # noqa: PLC0415
 
     runs = [(replayed, "replayed", BLUE, 0.9)]
     if recorded is not None:
         runs.insert(0, (recorded, "recorded", GREY, 1.8))
-    begin = float(replayed.trace["time"][0])
+    start = float(replayed.trace["time"][0])
     with style():
         figure = Figure(figsize=(PAGE, 5.0), layout="constrained")
         axes = figure.subplots(3, 2, sharex=True)
-        for (tip, slack), dof in zip(axes, Dof, strict=True):
+        for (state_axis, width_axis), dof in zip(axes, Dof, strict=True):
             scale, unit = dof.display_scale, dof.display_unit
-            trace = replayed.trace
-            tip.plot(
-                trace["time"] - begin,
-                trace[f"command_{dof.label}"] * scale,
-                color=ORANGE,
-                linewidth=0.6,
-                label="command",
-            )
+            times = replayed.trace["time"] - start
+            command = replayed.trace[f"command_{dof.label}"] * scale
+            state_axis.plot(times, command, color=ORANGE, linewidth=0.6, label="command")
             for run, name, colour, width in runs:
                 seen = run.frames[run.frames[f"observable_{dof.label}"]]
                 estimate = seen[f"estimate_{dof.label}"] * scale
-                since = seen["captured_at"] - begin
-                tip.plot(since, estimate, color=colour, linewidth=width, label=f"estimate, {name}")
-                at, learnt = run.trace["time"] - begin, _width(run.trace, dof.label) * scale
-                slack.plot(at, learnt, color=colour, linewidth=width, label=name)
-            tip.set_title(f"{dof.label}: tip [{unit}]")
-            slack.set_title(f"slack learnt [{unit}]")
+                times = seen["captured_at"] - start
+                label = f"estimate, {name}"
+                state_axis.plot(times, estimate, color=colour, linewidth=width, label=label)
+                times, backlash = run.trace["time"] - start, _width(run.trace, dof.label) * scale
+                width_axis.plot(times, backlash, color=colour, linewidth=width, label=name)
+            state_axis.set_title(f"{dof.label}: tip [{unit}]")
+            width_axis.set_title(f"estimated backlash width [{unit}]")
         for axis in axes[-1]:
             axis.set_xlabel("time [s]")
         lines, labels = axes[0, 0].get_legend_handles_labels()
@@ -115,14 +111,14 @@ def replay_figure(replayed: Recording, recorded: Recording | None = None) -> Fig
 def write_replay(
     folder: str | PathLike[str], replayed: Recording, recorded: Recording | None = None
 ) -> None:
-    """Make a folder with the files of `Recording.save` and replay.png, or nothing.
+    """Write a new folder with the files of `Recording.save` and replay.png.
 
     Raises:
-        OutputError: The folder holds something already, or cannot be written.
+        OutputError: The folder is not empty, or cannot be written; then nothing is written.
     """
     from tautscope.report.figures import style  # noqa: PLC0415
 
     figure = replay_figure(replayed, recorded)
-    with new_folder(folder) as place, style():
-        replayed.write(place)
-        figure.savefig(place / "replay.png")
+    with new_folder(folder) as folder_path, style():
+        replayed.write(folder_path)
+        figure.savefig(folder_path / "replay.png")

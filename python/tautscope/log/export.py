@@ -1,4 +1,4 @@
-"""A log for other hands: a torn one mended, CSV, a rosbag2 folder."""
+"""Repair of truncated logs, and export as CSV or as a rosbag2 folder."""
 
 from __future__ import annotations
 
@@ -7,22 +7,23 @@ from os import PathLike
 from pathlib import Path
 
 from tautscope.errors import OutputError
-from tautscope.log import messages as msg
+from tautscope.log import topics
 from tautscope.log.mcap_file import McapFile
-from tautscope.log.reader import Damage, messages_in, read_log
+from tautscope.log.mcap_records import Damage, read_messages
+from tautscope.log.reader import read_log
 from tautscope.runs.output_folder import new_folder
 
 
 @dataclass(frozen=True, slots=True)
 class Recovery:
-    """What was saved.
+    """Result of a repair.
 
     Attributes:
-        path: The new file, whole.
-        messages: Topic -> number.
+        path: The new, complete file.
+        messages: Topic -> number of messages.
         first: Earliest log time [ns since 1970]; 0 without messages.
-        last: Latest.
-        damage: Of the old file.
+        last: Latest log time [ns since 1970].
+        damage: Damage of the old file.
     """
 
     path: Path
@@ -33,12 +34,12 @@ class Recovery:
 
 
 def recover(path: str | PathLike[str], out: str | PathLike[str]) -> Recovery:
-    """Copy every message that can be read into a new, whole file; the old one is left as it is.
+    """Copy the undamaged messages into a new, complete file; the old file is not changed.
 
     Raises:
         MissingPathError: There is no such file.
-        RecordError: It is not MCAP.
-        OutputError: `out` is there already, or cannot be written.
+        RecordError: The file is not MCAP.
+        OutputError: `out` exists already, or cannot be written.
     """
     source, target = Path(path), Path(out)
     damage = Damage()
@@ -46,34 +47,34 @@ def recover(path: str | PathLike[str], out: str | PathLike[str]) -> Recovery:
     partial = target.with_name(f".{target.name}.partial")
     if target.exists():
         raise OutputError("out", str(target), "a file that does not exist yet")
-    messages = messages_in(source, damage)
+    messages = read_messages(source, damage)
     try:
         with partial.open("wb") as file:
-            whole = McapFile(file)
+            copy = McapFile(file)
             for _, topic, message in messages:
-                if topic not in whole:
+                if topic not in copy:
                     continue
                 at = message.log_time
-                whole.add(topic, message.data, message.sequence, at, message.publish_time)
+                copy.add(topic, message.data, message.sequence, at, message.publish_time)
                 first, last = min(first or at, at), max(last, at)
-            whole.finish()
+            copy.finish()
         partial.rename(target)
     except OSError as error:
         raise OutputError("out", str(target), f"a place that can be written ({error})") from None
     finally:
         partial.unlink(missing_ok=True)
-    return Recovery(target, dict(whole.counts), first, last, damage)
+    return Recovery(target, dict(copy.counts), first, last, damage)
 
 
 def export_csv(path: str | PathLike[str], folder: str | PathLike[str]) -> Damage:
-    """Make the folder of CSV and TOML that `Recording.save` makes.
+    """Write the CSV and TOML files of `Recording.save` into a new folder.
 
     Returns:
-        What of the log could not be read.
+        The damage of the log.
 
     Raises:
         MissingPathError, RecordError, ConfigError: As `read_log`.
-        OutputError: The folder holds something already, or cannot be written.
+        OutputError: The folder is not empty, or cannot be written.
     """
     log = read_log(path)
     log.recording().save(folder)
@@ -81,45 +82,45 @@ def export_csv(path: str | PathLike[str], folder: str | PathLike[str]) -> Damage
 
 
 def export_rosbag(path: str | PathLike[str], folder: str | PathLike[str]) -> Recovery:
-    """Make a rosbag2 folder: the messages as MCAP, and metadata.yaml (version 5).
+    """Write a rosbag2 folder: the messages as MCAP, and metadata.yaml (version 5).
 
     Raises:
         MissingPathError, RecordError: As `recover`.
-        OutputError: The folder holds something already, or cannot be written.
+        OutputError: The folder is not empty, or cannot be written.
     """
     name = f"{Path(folder).name}_0.mcap"
-    with new_folder(folder) as place:
-        found = recover(path, place / name)
-        (place / "metadata.yaml").write_text(_metadata(found, name), encoding="utf-8")
-    return found
+    with new_folder(folder) as new:
+        recovery = recover(path, new / name)
+        (new / "metadata.yaml").write_text(_metadata(recovery, name), encoding="utf-8")
+    return recovery
 
 
-def _metadata(found: Recovery, name: str) -> str:
-    topics = "".join(
+def _metadata(recovery: Recovery, name: str) -> str:
+    entries = "".join(
         f"""\
     - topic_metadata:
         name: {topic}
         type: {kind}
         serialization_format: cdr
         offered_qos_profiles: ""
-      message_count: {found.messages.get(topic, 0)}
+      message_count: {recovery.messages.get(topic, 0)}
 """
-        for topic, kind in msg.TOPICS.items()
+        for topic, kind in topics.TYPES.items()
     )
-    count, length = sum(found.messages.values()), found.last - found.first
-    span = f"""\
+    count, duration = sum(recovery.messages.values()), recovery.last - recovery.first
+    timing = f"""\
 duration:
-    nanoseconds: {length}
+    nanoseconds: {duration}
   starting_time:
-    nanoseconds_since_epoch: {found.first}
+    nanoseconds_since_epoch: {recovery.first}
   message_count: {count}"""
     return f"""\
 rosbag2_bagfile_information:
   version: 5
   storage_identifier: mcap
-  {span}
+  {timing}
   topics_with_message_count:
-{topics}\
+{entries}\
   compression_format: ""
   compression_mode: ""
   relative_file_paths:
@@ -127,8 +128,8 @@ rosbag2_bagfile_information:
   files:
     - path: "{name}"
       starting_time:
-        nanoseconds_since_epoch: {found.first}
+        nanoseconds_since_epoch: {recovery.first}
       duration:
-        nanoseconds: {length}
+        nanoseconds: {duration}
       message_count: {count}
 """

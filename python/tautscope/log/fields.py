@@ -1,4 +1,4 @@
-"""Fields that messages of several topics have, as their ROS types want them."""
+"""Message fields that several topics share, in their ROS 2 types."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ _NAMES = [dof.label for dof in Dof]
 
 
 def header_of(nanoseconds: int, frame: str) -> dict[str, Any]:
-    """std_msgs/msg/Header, of a time of the wall clock [ns]."""
+    """std_msgs/msg/Header for a wall clock time [ns]."""
     return {"stamp": stamp_of(nanoseconds), "frame_id": frame}
 
 
 def stamp_of(nanoseconds: int) -> dict[str, int]:
-    """builtin_interfaces/msg/Time, likewise."""
+    """builtin_interfaces/msg/Time for a wall clock time [ns]."""
     return {"sec": nanoseconds // 10**9, "nanosec": nanoseconds % 10**9}
 
 
@@ -30,7 +30,7 @@ def joint_state(header: Message, values: Iterable[float]) -> dict[str, Any]:
 
 
 def multi_array(axes: Mapping[str, int], data: Iterable[Any]) -> dict[str, Any]:
-    """std_msgs/msg/Float64MultiArray, with the label of each axis and its length."""
+    """std_msgs/msg/Float64MultiArray from the label and length of each axis, and the data."""
     sizes = list(axes.values())
     dim = [
         {"label": label, "size": size, "stride": int(np.prod(sizes[place:]))}

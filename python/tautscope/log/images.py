@@ -1,7 +1,7 @@
-"""Camera images as the bytes of a ``sensor_msgs/CompressedImage``, and back.
+"""Encoding of camera images for ``sensor_msgs/CompressedImage``, and decoding.
 
-PNG gives every byte back. BGR, RGB and BGRA look right in a viewer; of the YUV formats, whose
-bytes are kept as a grey picture, only the brightness can be made out.
+PNG is lossless. Viewers show BGR, RGB and BGRA correctly; images in YUV formats are stored as grey
+images of their bytes.
 """
 
 from __future__ import annotations
@@ -16,24 +16,24 @@ from tautscope.loop.frame_layout import FrameLayout
 
 Image = NDArray[np.uint8]
 
-# Differences of neighbours, stored as they are: the log's chunks are compressed, and quicker.
+# Filtered and not compressed: the log's chunks are compressed, which is faster.
 _PNG = (
     *(cv2.IMWRITE_PNG_COMPRESSION, 0),
     *(cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_SUB),
 )
-# Colour at half the resolution, JPEG's habit, would cost most of what the vision sees.
+# JPEG's default subsampling of colour would remove most of the markers' contrast.
 _JPEG = (cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444)
 
 
 class ImageCodec:
-    """Images of one camera to bytes and back.
+    """Encodes and decodes the images of one camera.
 
     Args:
-        camera: Its size and pixel format.
-        recording: Its `image_format` and `jpeg_quality`.
+        camera: Size and pixel format are used.
+        recording: `image_format` and `jpeg_quality` are used.
 
     Attributes:
-        format: What ``CompressedImage.format`` says, as ROS 2's image_transport writes it.
+        format: Value of ``CompressedImage.format``, as in ROS 2's image_transport.
     """
 
     def __init__(self, camera: CameraConfig, recording: RecordingConfig) -> None:
@@ -42,31 +42,31 @@ class ImageCodec:
         self._is_colour = camera.pixel_format in ("bgr", "rgb", "bgra")
         name = {"bgra": "bgra8"}.get(camera.pixel_format, "bgr8") if self._is_colour else "mono8"
         self.format = f"{name}; {recording.image_format} compressed {name}"
-        lossy = recording.image_format == "jpeg"
-        self._suffix = ".jpg" if lossy else ".png"
+        is_lossy = recording.image_format == "jpeg"
+        self._suffix = ".jpg" if is_lossy else ".png"
         self._options = (
-            (cv2.IMWRITE_JPEG_QUALITY, recording.jpeg_quality, *_JPEG) if lossy else _PNG
+            (cv2.IMWRITE_JPEG_QUALITY, recording.jpeg_quality, *_JPEG) if is_lossy else _PNG
         )
 
     def encode(self, image: Image) -> bytes:
-        """The bytes of an image of the configured layout."""
-        picture = image if self._is_colour else image.reshape(image.shape[0], -1)
+        """Encode an image of the configured layout."""
+        pixels = image if self._is_colour else image.reshape(image.shape[0], -1)
         if self._is_rgb:
-            picture = picture[..., ::-1]
-        _, data = cv2.imencode(self._suffix, np.ascontiguousarray(picture), self._options)
+            pixels = pixels[..., ::-1]
+        _, data = cv2.imencode(self._suffix, np.ascontiguousarray(pixels), self._options)
         return data.tobytes()
 
     def decode(self, data: bytes) -> Image:
-        """The image of some bytes, PNG or JPEG.
+        """Decode a PNG or JPEG image.
 
         Raises:
-            RecordError: They are no picture of the configured layout.
+            RecordError: The bytes are not an image of the configured layout.
         """
         kind = cv2.IMREAD_UNCHANGED if self._is_colour else cv2.IMREAD_GRAYSCALE
-        picture = cv2.imdecode(np.frombuffer(data, np.uint8), kind) if data else None
-        found = None if picture is None else np.asarray(picture, dtype=np.uint8)
-        if found is None or found.size != np.prod(self._shape):
-            came = "no picture" if found is None else f"a picture {found.shape}"
+        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), kind) if data else None
+        image = None if pixels is None else np.asarray(pixels, dtype=np.uint8)
+        if image is None or image.size != np.prod(self._shape):
+            came = "no image" if image is None else f"an image {image.shape}"
             raise RecordError("image", came, f"pixels of an array {self._shape}")
-        found = found.reshape(self._shape)
-        return np.ascontiguousarray(found[..., ::-1]) if self._is_rgb else found
+        image = image.reshape(self._shape)
+        return np.ascontiguousarray(image[..., ::-1]) if self._is_rgb else image

@@ -1,4 +1,4 @@
-"""What waits to be recorded, and the two threads that encode and write it."""
+"""Queues of what is to be recorded, and the two threads that encode and write it."""
 
 from __future__ import annotations
 
@@ -16,109 +16,110 @@ from numpy.typing import NDArray
 
 from tautscope.errors import OutputError
 from tautscope.log import messages as msg
+from tautscope.log import topics
 from tautscope.log.images import ImageCodec
 from tautscope.log.mcap_file import McapFile
 from tautscope.loop.rig import Sample
 
-LOOK_PERIOD = 0.01
-"""How often the threads look for news [s]: far below the `flush_period`."""
+POLL_PERIOD = 0.01
+"""Polling period of the threads [s], far below the `flush_period`."""
 
 
 class Journal:
-    """Queues that the loop fills, and a file that two threads write.
+    """Queues that the loop fills and two threads empty into a file.
 
-    Appending to a deque and popping from it need no lock.
+    The queues are deques, whose append and pop need no lock.
 
     Args:
-        path: The file; there may be none yet.
-        facts: What the log says of the run; `recording` of its configuration says how to record.
-        say: Told once of each trouble, by a thread.
+        path: New file.
+        info: Data of the run; its configuration has the recording settings.
+        on_warning: Called by a thread, once per kind of problem.
 
     Attributes:
         events: Index, time [s] and the arguments of `tick_messages`, `update_messages` or
-            `event_messages`.
-        images: Index, time, time of capture [s], pixels.
-        texts: Time or None, and a warning.
-        clock: From the loop's first call on.
-        dropped: Ticks, updates and events it could not take.
-        dropped_images: Images it could not take.
-        failure: Why nothing is recorded any more; empty while it is.
+            `request_messages`.
+        images: Index, time [s], capture time [s], pixels.
+        warnings: Time [s] or None, and text.
+        clock: Set at the loop's first call.
+        dropped: Number of dropped ticks, updates and requests.
+        dropped_images: Number of dropped images.
+        failure: Why recording stopped; empty while it works.
         written: Topic -> number of messages.
 
     Raises:
-        OutputError: The file is there already, or cannot be made.
+        OutputError: The file exists already, or cannot be created.
     """
 
-    def __init__(self, path: Path, facts: msg.Facts, say: Callable[[str], None]) -> None:
+    def __init__(self, path: Path, info: msg.RunInfo, on_warning: Callable[[str], None]) -> None:
         self.path = path
         self.events: deque[tuple[int, float, tuple[Any, ...]]] = deque()
         self.images: deque[tuple[int, float, float, NDArray[np.uint8]]] = deque()
-        self.texts: deque[tuple[float | None, str]] = deque()
-        self._coded: deque[tuple[int, float, float, bytes]] = deque()
+        self.warnings: deque[tuple[float | None, str]] = deque()
+        self._encoded_images: deque[tuple[int, float, float, bytes]] = deque()
         self.clock: msg.Clock | None = None
         self.dropped = self.dropped_images = 0
         self.failure = ""
         self.written: Counter[str] = Counter()
-        self._facts, self._say = facts, say
-        self._settings = facts.config.recording
-        self._codec = ImageCodec(facts.config.camera, self._settings)
+        self._info, self._on_warning = info, on_warning
+        self._settings = info.config.recording
+        self._codec = ImageCodec(info.config.camera, self._settings)
         self._is_closing, self._is_encoded, self._is_done = Event(), Event(), Event()
         self._file = _open(path)
-        self._thread = Thread(target=self._work, name="recording", daemon=True)
+        self._thread = Thread(target=self._run_writer, name="recording", daemon=True)
         self._thread.start()
-        Thread(target=self._encode, name="image encoding", daemon=True).start()
+        Thread(target=self._run_encoder, name="image encoding", daemon=True).start()
 
     @property
     def is_done(self) -> bool:
-        """Whether nothing is written any more."""
+        """Whether writing has ended."""
         return self._is_done.is_set()
 
-    def end(self, timeout: float) -> None:
-        """Have what waits written, for `timeout` [s] at most. May be called twice."""
+    def close(self, timeout: float) -> None:
+        """Wait until the queues are written, at most `timeout` [s]. May be called twice."""
         self._is_closing.set()
         self._thread.join(timeout)
         if self._thread.is_alive() and not self.failure:
-            self.failure = f"the disk did not take the rest in {timeout:g} s"
-            self._say(f"{self.path}: {self.failure}")
+            self.failure = f"the disk was too slow to write the rest within {timeout:g} s"
+            self._on_warning(f"{self.path}: {self.failure}")
 
-    def _work(self) -> None:
-        """The thread that writes."""
+    def _run_writer(self) -> None:
+        """Run the thread that writes."""
         try:
             with self._file:
-                self._write()
-        except Exception as error:  # whatever it is, the run goes on
+                self._write_log()
+        except Exception as error:  # no error of the recording may end the run
             self.failure = f"{type(error).__name__}: {error}"
             with suppress(OSError):
                 self._file.close()
         finally:
             self._is_done.set()
         if self.failure:
-            images = len(self.images) + len(self._coded)
+            images = len(self.images) + len(self._encoded_images)
             waiting = len(self.events) + images
             self.dropped += len(self.events)
             self.dropped_images += images
-            self._say(
-                f"{self.path}: recording ended, {waiting} messages are lost and nothing more is "
-                f"recorded; the run goes on ({self.failure})"
+            self._on_warning(
+                f"{self.path}: recording ended ({self.failure}); {waiting} messages are lost, "
+                "the run goes on"
             )
 
-    def _write(self) -> None:
+    def _write_log(self) -> None:
         file = McapFile(self._file)
         self.written = file.counts
         stamp = time.time_ns()
-        for topic, data in msg.head_messages(self._facts, stamp).items():
+        for topic, data in msg.header_messages(self._info, stamp).items():
             file.add(topic, data, 0, stamp)
         file.flush()
         flushed = synced = time.monotonic()
-        is_told = False
+        has_warned = False
         while True:
-            # Asked before the queues, so that nothing is missed.
+            # Read before the queues are emptied: what is queued later is written in the next pass.
             is_last = self._is_closing.is_set() and self._is_encoded.is_set()
             self._write_events(file)
             self._write_images(file)
-            if (self.dropped or self.dropped_images) and not is_told:
-                is_told = True
-                self._trouble("the disk or the encoder is too slow; ticks or images are dropped")
+            if (self.dropped or self.dropped_images) and not has_warned:
+                has_warned = True
+                self._warn("the disk or the encoder is too slow; ticks or images are dropped")
             if is_last:
                 break
             now = time.monotonic()
@@ -128,9 +129,9 @@ class Journal:
             if now - synced >= self._settings.sync_period:
                 self._sync()
                 synced = time.monotonic()
-            time.sleep(LOOK_PERIOD)
-        if is_told:
-            self._trouble(
+            time.sleep(POLL_PERIOD)
+        if has_warned:
+            self._warn(
                 f"{self.dropped} ticks, updates, events and {self.dropped_images} images were "
                 "dropped"
             )
@@ -139,68 +140,67 @@ class Journal:
         self._sync()
 
     def _sync(self) -> None:
-        """To the disk, and out of memory: gigabytes nobody reads would push out what others run."""
+        """Write to the disk and release the page cache, which would fill the memory."""
         os.fsync(self._file.fileno())
-        with suppress(OSError, AttributeError):  # advice, which not every system takes
+        with suppress(OSError, AttributeError):  # not on every system
             os.posix_fadvise(self._file.fileno(), 0, 0, os.POSIX_FADV_DONTNEED)
 
-    def _trouble(self, text: str) -> None:
-        self._say(f"{self.path}: {text}")
-        self.texts.append((None, text))
+    def _warn(self, text: str) -> None:
+        self._on_warning(f"{self.path}: {text}")
+        self.warnings.append((None, text))
 
     def _write_events(self, file: McapFile) -> None:
-        """Everything but the images, which may come later in the file."""
-        while self.texts:
-            now, text = self.texts.popleft()
+        """Write everything but the images."""
+        while self.warnings:
+            now, text = self.warnings.popleft()
             clock = self.clock
-            at = time.time_ns() if clock is None or now is None else clock.nanoseconds(now)
-            file.add(msg.WARNING, msg.warning_message(at, text), 0, at)
+            stamp = time.time_ns() if clock is None or now is None else clock.nanoseconds(now)
+            file.add(topics.WARNING, msg.warning_message(stamp, text), 0, stamp)
         while self.events:
-            index, now, facts = self.events.popleft()
+            index, now, arguments = self.events.popleft()
             clock = self.clock
             assert clock is not None
-            for topic, data in _messages(clock, facts).items():
+            for topic, data in _encode_event(clock, arguments).items():
                 file.add(topic, data, index, clock.nanoseconds(now))
 
     def _write_images(self, file: McapFile) -> None:
-        """One at a time: an image takes longer than all ticks that wait meanwhile."""
-        while self._coded:
-            index, now, captured_at, data = self._coded.popleft()
+        """Write the images, and after each one the events, which are quicker to write."""
+        while self._encoded_images:
+            index, now, captured_at, data = self._encoded_images.popleft()
             clock = self.clock
             assert clock is not None
             message = msg.image_message(clock, captured_at, self._codec.format, data)
-            file.add(msg.IMAGE, message, index, clock.nanoseconds(now))
+            file.add(topics.IMAGE, message, index, clock.nanoseconds(now))
             self._write_events(file)
 
-    def _encode(self) -> None:
-        """The thread that encodes: an image takes longer than a tick may wait."""
+    def _run_encoder(self) -> None:
+        """Run the thread that encodes images, so that ticks do not wait for the encoder."""
         limit = self._settings.queue_images
-        is_told = False
+        has_warned = False
         while not self._is_done.is_set():
-            # Asked before the queue, so that nothing is missed.
-            is_last = self._is_closing.is_set()
-            if not self.images or len(self._coded) >= limit:
+            is_last = self._is_closing.is_set()  # before the queue, as in the other thread
+            if not self.images or len(self._encoded_images) >= limit:
                 if is_last and not self.images:
                     break
-                time.sleep(LOOK_PERIOD)
+                time.sleep(POLL_PERIOD)
                 continue
             index, now, captured_at, image = self.images[0]
             try:
-                self._coded.append((index, now, captured_at, self._codec.encode(image)))
-            except Exception as error:  # an image that is none; the ticks go on
+                self._encoded_images.append((index, now, captured_at, self._codec.encode(image)))
+            except Exception as error:  # an invalid image is dropped; the recording goes on
                 self.dropped_images += 1
-                if not is_told:
-                    self._trouble(f"image {index} cannot be encoded ({error})")
-                is_told = True
+                if not has_warned:
+                    self._warn(f"image {index} cannot be encoded ({error})")
+                has_warned = True
             self.images.popleft()
         self._is_encoded.set()
 
 
-def _messages(clock: msg.Clock, facts: tuple[Any, ...]) -> msg.Messages:
-    if isinstance(facts[0], str):
-        return msg.event_messages(*facts)
-    kind = msg.tick_messages if isinstance(facts[0], Sample) else msg.update_messages
-    return kind(clock, *facts)
+def _encode_event(clock: msg.Clock, arguments: tuple[Any, ...]) -> msg.Messages:
+    if isinstance(arguments[0], str):
+        return msg.request_messages(*arguments)
+    encode = msg.tick_messages if isinstance(arguments[0], Sample) else msg.update_messages
+    return encode(clock, *arguments)
 
 
 def _open(path: Path) -> IO[bytes]:

@@ -1,7 +1,7 @@
-"""An MCAP file with our topics, written front to back.
+"""Writer of an MCAP file with the topics of a log.
 
-The records are the `mcap` library's. Its writer would compress at zstd's level 3, which takes six
-times as long for images as level 1 and makes them larger (decision 0020).
+The records are those of the `mcap` library. Its own writer compresses with zstd level 3, which for
+images takes six times as long as level 1 and gives larger files (decision 0020).
 """
 
 from __future__ import annotations
@@ -30,22 +30,22 @@ from mcap.records import (
 from mcap.writer import MCAP0_MAGIC
 
 from tautscope._core import __version__
-from tautscope.log import messages as msg
+from tautscope.log import topics
 from tautscope.log.cdr import schema
 
 CHUNK_SIZE = 1 << 20
-"""A chunk that has grown beyond this is closed [bytes]; one image of the article's size does it."""
+"""Size at which a chunk is closed [bytes]; one image of the article's size is larger."""
 _LEVEL = 1
 
 
 class McapFile:
-    """Messages into a file, by chunks; each closed chunk is the system's, with nothing kept here.
+    """Writes messages in chunks; a closed chunk goes to the operating system at once.
 
     Args:
-        file: Open for writing, and at its start.
+        file: An empty file, open for writing.
 
     Attributes:
-        counts: Topic -> how many messages were given.
+        counts: Topic -> number of messages.
     """
 
     def __init__(self, file: IO[bytes]) -> None:
@@ -54,7 +54,7 @@ class McapFile:
         self._compressor = zstandard.ZstdCompressor(level=_LEVEL)
         self._schemas = {
             kind: Schema(id=number, name=kind, encoding="ros2msg", data=schema(kind))
-            for number, kind in enumerate(sorted(set(msg.TOPICS.values())), 1)
+            for number, kind in enumerate(sorted(set(topics.TYPES.values())), 1)
         }
         self._channels = {
             topic: Channel(
@@ -64,27 +64,27 @@ class McapFile:
                 metadata={"offered_qos_profiles": ""},
                 schema_id=self._schemas[kind].id,
             )
-            for number, (topic, kind) in enumerate(msg.TOPICS.items(), 1)
+            for number, (topic, kind) in enumerate(topics.TYPES.items(), 1)
         }
         self._chunks: list[ChunkIndex] = []
         self._body, self._indices = RecordBuilder(), dict[int, MessageIndex]()
         self._spans: list[tuple[int, int]] = []
         self._put(MCAP0_MAGIC + _bytes(Header("ros2", f"tautscope {__version__}")))
         for record in (*self._schemas.values(), *self._channels.values()):
-            _write(record, self._body)
+            record.write(self._body)
 
     def __contains__(self, topic: str) -> bool:
         return topic in self._channels
 
     def add(self, topic: str, data: bytes, sequence: int, at: int, sent: int | None = None) -> None:
-        """One message.
+        """Add a message.
 
         Args:
-            topic: Of ours.
-            data: CDR.
-            sequence: Its place in the loop's order.
+            topic: A topic of `tautscope.log.topics`.
+            data: The message as CDR.
+            sequence: Position in the loop's order.
             at: Log time [ns since 1970].
-            sent: Publish time [ns since 1970]; without it, the log time.
+            sent: Publish time [ns since 1970]; by default the log time.
         """
         channel = self._channels[topic].id
         index = self._indices.setdefault(channel, MessageIndex(channel, []))
@@ -96,13 +96,13 @@ class McapFile:
             publish_time=at if sent is None else sent,
             sequence=sequence,
         )
-        _write(message, self._body)
+        message.write(self._body)
         self.counts[topic] += 1
         if self._body.count > CHUNK_SIZE:
             self.flush()
 
     def flush(self) -> None:
-        """Close the chunk, if there is anything in it."""
+        """Close and write the current chunk, if it has messages."""
         if not self._indices:
             return
         data = _ended(self._body)
@@ -120,7 +120,7 @@ class McapFile:
         length, offsets, indices = self._at - start, dict[int, int](), RecordBuilder()
         for channel, index in self._indices.items():
             offsets[channel] = self._at + indices.count
-            _write(index, indices)
+            index.write(indices)
         entry = ChunkIndex(
             chunk_length=length,
             chunk_start_offset=start,
@@ -137,7 +137,7 @@ class McapFile:
         self._indices = {}
 
     def finish(self) -> None:
-        """The last chunk, and the summary by which a reader finds what it wants."""
+        """Write the last chunk and the summary section."""
         self.flush()
         self._put(_bytes(DataEnd(0)))
         start, summary, offsets = self._at, RecordBuilder(), RecordBuilder()
@@ -150,13 +150,13 @@ class McapFile:
         for opcode, records in groups:
             begin = summary.count
             for record in records:
-                _write(record, summary)
+                record.write(summary)
             if records:
-                _write(SummaryOffset(opcode, start + begin, summary.count - begin), offsets)
+                SummaryOffset(opcode, start + begin, summary.count - begin).write(offsets)
         offset_start = start + summary.count
         body = _ended(summary) + _ended(offsets)
         footer = Footer(start, offset_start, summary_crc=0)
-        # The checksum goes over all of the summary and the footer but itself.
+        # The checksum covers the summary and the footer except the checksum itself.
         footer.summary_crc = zlib.crc32(body + _bytes(footer)[:-4])
         self._put(body + _bytes(footer) + MCAP0_MAGIC)
 
@@ -184,13 +184,9 @@ class McapFile:
         self._at += len(data)
 
 
-def _write(record: McapRecord, builder: RecordBuilder) -> None:
-    record.write(builder)
-
-
 def _bytes(record: McapRecord) -> bytes:
     builder = RecordBuilder()
-    _write(record, builder)
+    record.write(builder)
     return _ended(builder)
 
 

@@ -1,7 +1,7 @@
-"""Which topics a log has, and what of a run is in them. docs/recordings.md has the table.
+"""The messages of a log: conversion of ticks, image updates and requests to ROS 2, and back.
 
-Joint names and topics follow CRTK. Header stamps are in nanoseconds of the wall clock; what a
-replay needs to the last bit (the rig's clock) is a float64 beside them.
+Header stamps are wall clock times [ns]; times of the rig's clock, which a replay needs exactly, are
+float64 fields.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ from tautscope._core import __version__
 from tautscope.config import Config, dump_config, from_document
 from tautscope.dof import Dof
 from tautscope.errors import RecordError
-from tautscope.log.cdr import Message, decode, encode
+from tautscope.log import topics
+from tautscope.log.cdr import Message
 from tautscope.log.fields import header_of, joint_state, multi_array, stamp_of
 from tautscope.loop.reduction import Report, Status
 from tautscope.loop.references import Segment
@@ -34,51 +35,6 @@ Floats = NDArray[np.float64]
 Messages = dict[str, bytes]
 """Topic -> CDR."""
 
-CONFIG = "/tautscope/config"
-RUN = "/tautscope/run"
-VERSIONS = "/tautscope/versions"
-CAMERA_INFO = "/endoscope/camera_info"
-REFERENCE = "/instrument/servo_jp"
-COMMAND = "/instrument/actuators/setpoint_js"
-APPLIED = "/instrument/actuators/measured_js"
-TRUTH = "/twin/measured_js"
-TICK = "/tautscope/tick"
-MADE_AT = "/tautscope/made_at"
-IMAGE = "/endoscope/image_raw/compressed"
-ESTIMATE = "/instrument/measured_js"
-DELTA = "/instrument/hysteresis/delta"
-MARKERS = "/endoscope/markers"
-STATUS = "/tautscope/status"
-UPDATE = "/tautscope/image_update"
-EVENT = "/tautscope/event"
-WARNING = "/tautscope/warning"
-
-TOPICS = {
-    CONFIG: "std_msgs/msg/String",
-    RUN: "std_msgs/msg/String",
-    VERSIONS: "std_msgs/msg/String",
-    CAMERA_INFO: "sensor_msgs/msg/CameraInfo",
-    REFERENCE: "sensor_msgs/msg/JointState",
-    COMMAND: "sensor_msgs/msg/JointState",
-    APPLIED: "sensor_msgs/msg/JointState",
-    TRUTH: "sensor_msgs/msg/JointState",
-    TICK: "std_msgs/msg/Float64",
-    MADE_AT: "std_msgs/msg/Float64",
-    IMAGE: "sensor_msgs/msg/CompressedImage",
-    ESTIMATE: "sensor_msgs/msg/JointState",
-    DELTA: "std_msgs/msg/Float64MultiArray",
-    MARKERS: "std_msgs/msg/Float64MultiArray",
-    STATUS: "diagnostic_msgs/msg/DiagnosticArray",
-    UPDATE: "std_msgs/msg/Float64MultiArray",
-    EVENT: "std_msgs/msg/String",
-    WARNING: "rcl_interfaces/msg/Log",
-}
-"""Topic -> type."""
-
-OF_TICK = {REFERENCE, COMMAND, APPLIED, TICK}
-OF_UPDATE = {ESTIMATE, DELTA, MARKERS, STATUS, UPDATE}
-"""What makes a tick, and an image update, whole."""
-
 _COLUMNS = FRAME_COLUMNS.names or ()
 _NUMBERS = [name for name in _COLUMNS if FRAME_COLUMNS[name].kind != "U"]
 _WARN_LEVEL = 30  # of rcl_interfaces/msg/Log
@@ -86,38 +42,38 @@ _WARN_LEVEL = 30  # of rcl_interfaces/msg/Log
 
 @dataclass(frozen=True, slots=True)
 class Clock:
-    """The rig's clock on the wall.
+    """Conversion from the rig's clock to the wall clock.
 
     Attributes:
-        start: The rig's clock at the first tick [s].
-        epoch: The wall clock then [ns since 1970].
+        start: Rig time of the first tick [s].
+        epoch: Wall clock time of the first tick [ns since 1970].
     """
 
     start: float
     epoch: int
 
     def nanoseconds(self, time: float) -> int:
-        """A time of the rig's clock [s] as one of the wall's [ns]."""
+        """The wall clock time [ns] of a rig time [s]."""
         return self.epoch + round((time - self.start) * 1e9)
 
 
 @dataclass(frozen=True, slots=True)
-class Facts:
-    """What is said of a run before it begins: all that a replay depends on, and segments."""
+class RunInfo:
+    """The data of a run that are known before it starts."""
 
     config: Config
     compensated: bool
     segments: tuple[Segment, ...]
 
 
-def head_messages(facts: Facts, stamp: int) -> Messages:
-    """Configuration, run, versions and camera."""
-    config = facts.config
+def header_messages(info: RunInfo, stamp: int) -> Messages:
+    """The messages at the start of a log: configuration, run, versions and camera."""
+    config = info.config
     run = {
-        "compensated": facts.compensated,
+        "compensated": info.compensated,
         "segments": [
             {"dof": s.dof.label, "start": s.start, "period": s.period, "periods": s.periods}
-            for s in facts.segments
+            for s in info.segments
         ],
     }
     versions = {
@@ -126,53 +82,55 @@ def head_messages(facts: Facts, stamp: int) -> Messages:
         "machine": f"{platform.system()} {platform.machine()}",
         **{name: version(name) for name in ("numpy", "opencv-python-headless", "mcap")},
     }
-    texts = {CONFIG: dump_config(config), RUN: tomli_w.dumps(run), VERSIONS: json.dumps(versions)}
-    messages = {topic: _encoded(topic, {"data": text}) for topic, text in texts.items()}
     camera = config.camera
     intrinsics = (camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0)
     window = {"x_offset": 0, "y_offset": 0, "height": 0, "width": 0, "do_rectify": False}
-    messages[CAMERA_INFO] = _encoded(
-        CAMERA_INFO,
+    camera_info = {
+        "header": header_of(stamp, "endoscope"),
+        "height": camera.height,
+        "width": camera.width,
+        "distortion_model": "rational_polynomial",
+        "d": camera.distortion,
+        "k": intrinsics,
+        "r": (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
+        "p": (camera.fx, 0.0, camera.cx, 0.0, 0.0, camera.fy, camera.cy, *[0.0] * 3, 1.0, 0.0),
+        "binning_x": 0,
+        "binning_y": 0,
+        "roi": window,
+    }
+    return _encoded(
         {
-            "header": header_of(stamp, "endoscope"),
-            "height": camera.height,
-            "width": camera.width,
-            "distortion_model": "rational_polynomial",
-            "d": camera.distortion,
-            "k": intrinsics,
-            "r": (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
-            "p": (camera.fx, 0.0, camera.cx, 0.0, 0.0, camera.fy, camera.cy, *[0.0] * 3, 1.0, 0.0),
-            "binning_x": 0,
-            "binning_y": 0,
-            "roi": window,
-        },
+            topics.CONFIG: {"data": dump_config(config)},
+            topics.RUN: {"data": tomli_w.dumps(run)},
+            topics.VERSIONS: {"data": json.dumps(versions)},
+            topics.CAMERA_INFO: camera_info,
+        }
     )
-    return messages
 
 
-def read_head(messages: Mapping[str, bytes]) -> tuple[Facts, dict[str, str]]:
-    """Facts and versions, from the messages of `head_messages`.
+def read_header(messages: Mapping[str, bytes]) -> tuple[RunInfo, dict[str, str]]:
+    """Read run data and versions from the messages of `header_messages`.
 
     Raises:
-        RecordError: One is missing or not as written there.
+        RecordError: A message is missing or invalid.
         ConfigError: The configuration has a key that this version does not know.
     """
     try:
         texts = {
-            topic: decode(TOPICS[topic], messages[topic])["data"]
-            for topic in (CONFIG, RUN, VERSIONS)
+            topic: _decoded(messages, topic)["data"]
+            for topic in (topics.CONFIG, topics.RUN, topics.VERSIONS)
         }
-        run = tomllib.loads(texts[RUN])
+        run = tomllib.loads(texts[topics.RUN])
         segments = tuple(
             Segment(Dof[s["dof"].upper()], s["start"], s["period"], s["periods"])
             for s in run["segments"]
         )
-        document = tomllib.loads(texts[CONFIG])
-        compensated, versions = bool(run["compensated"]), json.loads(texts[VERSIONS])
+        document = tomllib.loads(texts[topics.CONFIG])
+        compensated, versions = bool(run["compensated"]), json.loads(texts[topics.VERSIONS])
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        allowed = f"a log of tautscope, with {CONFIG}, {RUN} and {VERSIONS}"
+        allowed = f"a log of tautscope, with {topics.CONFIG}, {topics.RUN} and {topics.VERSIONS}"
         raise RecordError("log", f"{type(error).__name__}: {error}", allowed) from None
-    return Facts(from_document(document), compensated, segments), versions
+    return RunInfo(from_document(document), compensated, segments), versions
 
 
 def tick_messages(
@@ -182,57 +140,54 @@ def tick_messages(
     command: Iterable[float],
     made_at: float | None = None,
 ) -> Messages:
-    """One control tick; when its reference was made [s, the rig's clock], if that is known."""
+    """The messages of a control tick; ``made_at`` is the rig time of its reference [s]."""
     header = header_of(clock.nanoseconds(sample.time), "")
-    joints = {REFERENCE: reference, COMMAND: command, APPLIED: sample.applied}
+    joints = {topics.REFERENCE: reference, topics.COMMAND: command, topics.APPLIED: sample.applied}
     if sample.true_state is not None:
-        joints[TRUTH] = sample.true_state
-    # The date first: where a torn log has the rest of a tick, it has its date.
-    messages = {} if made_at is None else {MADE_AT: _encoded(MADE_AT, {"data": made_at})}
-    messages |= {
-        topic: _encoded(topic, joint_state(header, values)) for topic, values in joints.items()
-    }
-    messages[TICK] = _encoded(TICK, {"data": sample.time})
-    return messages
+        joints[topics.TRUTH] = sample.true_state
+    # The first message, so that a truncated log never has the other ones without it.
+    messages = {} if made_at is None else {topics.MADE_AT: {"data": made_at}}
+    messages |= {topic: joint_state(header, values) for topic, values in joints.items()}
+    return _encoded(messages | {topics.TICK: {"data": sample.time}})
 
 
 def read_tick(messages: Mapping[str, bytes]) -> tuple[Sample, Floats, Floats, float | None]:
-    """Sample without its frame, reference, command, and when the reference was made."""
+    """Read sample (without frame), reference, command and the time of the reference."""
     joints = {
-        topic: np.array(decode(TOPICS[topic], messages[topic])["position"], np.float64)
-        for topic in (REFERENCE, COMMAND, APPLIED, TRUTH)
+        topic: np.array(_decoded(messages, topic)["position"], np.float64)
+        for topic in (topics.REFERENCE, topics.COMMAND, topics.APPLIED, topics.TRUTH)
         if topic in messages
     }
-    time = decode(TOPICS[TICK], messages[TICK])["data"]
-    sample = Sample(time, joints[APPLIED], None, joints.get(TRUTH))
-    made_at = decode(TOPICS[MADE_AT], messages[MADE_AT])["data"] if MADE_AT in messages else None
-    return sample, joints[REFERENCE], joints[COMMAND], made_at
+    time = _decoded(messages, topics.TICK)["data"]
+    sample = Sample(time, joints[topics.APPLIED], None, joints.get(topics.TRUTH))
+    made_at = _decoded(messages, topics.MADE_AT)["data"] if topics.MADE_AT in messages else None
+    return sample, joints[topics.REFERENCE], joints[topics.COMMAND], made_at
 
 
 def update_messages(clock: Clock, now: float, frame: Frame, report: Report) -> Messages:
-    """What the loop made of an image; the image itself is `image_message`."""
+    """The messages with the results of an image update; the image itself is `image_message`."""
     captured = header_of(clock.nanoseconds(report.captured_at), "endoscope")
     row = dict(zip(_COLUMNS, frame_row(now, frame, report), strict=True))
     numbers = [float(row[name]) for name in _NUMBERS]  # type: ignore[arg-type]
     features = [row[f"features_{name}"] for name in ("a_x", "a_y", "b_x", "b_y")]
     deltas = np.stack([report.delta_minus, report.delta_plus], axis=1).ravel()
-    return {
-        ESTIMATE: _encoded(ESTIMATE, joint_state(captured, report.state_estimate)),
-        DELTA: _encoded(
-            DELTA, multi_array({"insertion,rotation,bending": 3, "minus,plus": 2}, deltas)
-        ),
-        MARKERS: _encoded(MARKERS, multi_array({"a,b": 2, "u,v": 2}, features)),
-        STATUS: _status(captured, report),
-        UPDATE: _encoded(UPDATE, multi_array({",".join(_NUMBERS): len(_NUMBERS)}, numbers)),
-    }
+    return _encoded(
+        {
+            topics.ESTIMATE: joint_state(captured, report.state_estimate),
+            topics.DELTA: multi_array({"insertion,rotation,bending": 3, "minus,plus": 2}, deltas),
+            topics.MARKERS: multi_array({"a,b": 2, "u,v": 2}, features),
+            topics.STATUS: _status(captured, report),
+            topics.UPDATE: multi_array({",".join(_NUMBERS): len(_NUMBERS)}, numbers),
+        }
+    )
 
 
 def read_update(messages: Mapping[str, bytes]) -> tuple[Row, Floats, Floats]:
-    """A `frame_row`, and the offsets after it; NaN or 0 in columns its version had not."""
-    update = decode(TOPICS[UPDATE], messages[UPDATE])
+    """Read a `frame_row` and both offsets; columns unknown to the log's version are NaN or 0."""
+    update = _decoded(messages, topics.UPDATE)
     known = dict(zip(update["layout"]["dim"][0]["label"].split(","), update["data"], strict=True))
-    known["status"] = decode(TOPICS[STATUS], messages[STATUS])["status"][0]["message"]
-    deltas = np.array(decode(TOPICS[DELTA], messages[DELTA])["data"], np.float64).reshape(3, 2)
+    known["status"] = _decoded(messages, topics.STATUS)["status"][0]["message"]
+    deltas = np.array(_decoded(messages, topics.DELTA)["data"], np.float64).reshape(3, 2)
     row = tuple(
         kind.type(known.get(name, np.nan if kind.kind == "f" else 0)).item()
         for name, kind in ((name, FRAME_COLUMNS[name]) for name in _COLUMNS)
@@ -240,24 +195,26 @@ def read_update(messages: Mapping[str, bytes]) -> tuple[Row, Floats, Floats]:
     return row, deltas[:, 0], deltas[:, 1]
 
 
-def image_message(clock: Clock, captured_at: float, picture: str, data: bytes) -> bytes:
-    """A compressed image: its format in image_transport's words, and its bytes."""
+def image_message(clock: Clock, captured_at: float, image_format: str, data: bytes) -> bytes:
+    """The message of a compressed image; the format is that of image_transport."""
     header = header_of(clock.nanoseconds(captured_at), "endoscope")
-    return _encoded(IMAGE, {"header": header, "format": picture, "data": data})
+    return topics.encode(topics.IMAGE, {"header": header, "format": image_format, "data": data})
 
 
-def event_messages(what: str) -> Messages:
-    """What the loop was told, as `HysteresisReduction.on_event`."""
-    return {EVENT: _encoded(EVENT, {"data": what})}
+def request_messages(request: str) -> Messages:
+    """The message of a request to the loop, as for `HysteresisReduction.on_event`."""
+    return _encoded({topics.EVENT: {"data": request}})
 
 
 def warning_message(stamp: int, text: str) -> bytes:
-    """A line for the log panel of a viewer."""
+    """The message of a warning."""
     fields: dict[str, Any] = {"stamp": stamp_of(stamp), "level": _WARN_LEVEL, "msg": text}
-    return _encoded(WARNING, fields | {"name": "tautscope", "file": "", "function": "", "line": 0})
+    return topics.encode(
+        topics.WARNING, fields | {"name": "tautscope", "file": "", "function": "", "line": 0}
+    )
 
 
-def _status(header: Message, report: Report) -> bytes:
+def _status(header: Message, report: Report) -> dict[str, Any]:
     values = {
         f"trigger_{dof.label}": ",".join(each or "none" for each in triggers)
         for dof, triggers in zip(Dof, report.triggers, strict=True)
@@ -276,8 +233,12 @@ def _status(header: Message, report: Report) -> bytes:
         "hardware_id": "endoscope",
         "values": [{"key": key, "value": value} for key, value in values.items()],
     }
-    return _encoded(STATUS, {"header": header, "status": [status]})
+    return {"header": header, "status": [status]}
 
 
-def _encoded(topic: str, message: Message) -> bytes:
-    return encode(TOPICS[topic], message)
+def _encoded(messages: Mapping[str, Message]) -> Messages:
+    return {topic: topics.encode(topic, message) for topic, message in messages.items()}
+
+
+def _decoded(messages: Mapping[str, bytes], topic: str) -> dict[str, Any]:
+    return topics.decode(topic, messages[topic])

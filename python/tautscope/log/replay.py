@@ -1,14 +1,14 @@
-"""A recorded run through the loop again.
+"""Replay of a recorded run.
 
-With the configuration it was recorded with, the outputs must be the same to the bit. With another
-one the loop listens: it is given the commands that moved the motors when the images were taken,
-and says what it would have estimated. It cannot say how the instrument would have moved.
+`replay_same` repeats a run with its own configuration; the outputs must be identical to the bit.
+`estimate_from_log` and `estimate_from_video` run the estimators of another configuration on
+recorded commands and images. They cannot tell how the instrument would have moved.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from os import PathLike
 
 import numpy as np
@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from tautscope.config import Config
 from tautscope.errors import RecordError
 from tautscope.log import messages as msg
-from tautscope.log.cdr import decode
-from tautscope.log.reader import Log, Tick, Told, Update
+from tautscope.log import topics
+from tautscope.log.reader import Log, Request, Tick, Update
 from tautscope.loop.reduction import HysteresisReduction
 from tautscope.loop.rig import Frame, Sample
 from tautscope.loop.safety import DETECTORS
@@ -27,18 +27,20 @@ from tautscope.runs.replay import read_motors
 from tautscope.runs.run_recorder import Tables, frame_row
 
 Floats = NDArray[np.float64]
+Inputs = Iterator[Tick | tuple[float, Frame]]
+"""Ticks, and frames with their arrival time [s], in the order of the run."""
 
 
 @dataclass(slots=True)
-class Identity:
-    """How much of a run came out the same, bit for bit.
+class Comparison:
+    """Comparison of a replay with its log, bit for bit.
 
     Attributes:
-        ticks: Commands compared.
-        same_ticks: Equal ones.
-        updates: Image updates compared: estimate, offsets, features, status and all else.
-        same_updates: Equal ones.
-        first_difference: Where, in words; empty if there is none.
+        ticks: Number of compared commands.
+        same_ticks: Number of identical commands.
+        updates: Number of compared image updates (estimate, offsets, features, status, ...).
+        same_updates: Number of identical image updates.
+        first_difference: Where the first difference is; empty if there is none.
         ended: Why the rest of the log was not compared; empty if all was.
     """
 
@@ -51,76 +53,80 @@ class Identity:
 
     @property
     def is_identical(self) -> bool:
-        """Whether all that was compared is equal."""
+        """Whether everything compared is identical."""
         return not self.first_difference and self.ticks > 0
 
 
-def replay_same(log: Log) -> tuple[Identity, Recording]:
-    """Run the recorded references, images and events through the loop, in the recorded order.
+def replay_same(log: Log) -> tuple[Comparison, Recording]:
+    """Run the recorded references, images and requests through the loop, in the recorded order.
 
-    Ends at a hole: what comes after a tick or an image that is not in the log depends on it.
+    The replay ends at the first missing tick, image or request, because later outputs depend on it.
 
     Returns:
-        What was the same, and the run as it came out now.
+        The comparison, and the replayed run.
 
     Raises:
-        RecordError: The log has no tick, or an event that this version does not know.
+        RecordError: The log has no tick, or a request that this version does not know.
     """
     loop = HysteresisReduction(log.config, log.compensated)
-    found, tables = Identity(), Tables(log.config)
+    comparison, tables = Comparison(), Tables(log.config)
     clock = _clock(log)
     for index in range(1, max(log.events, default=0) + 1):
         event = log.events.get(index)
         if isinstance(event, Tick):
-            command = loop.step(event.reference, event.sample.time, event.made_at)
-            tables.tick(event.sample, event.reference, command)
-            inputs = event.sample, event.reference
-            again = msg.tick_messages(clock, *inputs, command, event.made_at)
-            found.ticks += 1
-            found.same_ticks += _is_same(found, event, again, f"tick at {event.sample.time:g} s")
-        elif isinstance(event, Told):
-            _tell(loop, event.what)
+            sample, reference = event.sample, event.reference
+            command = loop.step(reference, sample.time, event.made_at)
+            tables.tick(sample, reference, command)
+            replayed = msg.tick_messages(clock, sample, reference, command, event.made_at)
+            comparison.ticks += 1
+            where = f"tick at {sample.time:g} s"
+            comparison.same_ticks += _is_same(comparison, event, replayed, where)
+        elif isinstance(event, Request):
+            _send_request(loop, event.text)
         elif event is not None and log.has_image(index):
             now, frame = _frame(log, index, event)
             report = loop.on_frame(frame)
             tables.frame(frame_row(now, frame, report), report.delta_minus, report.delta_plus)
-            again = msg.update_messages(clock, now, frame, report)
-            found.updates += 1
-            found.same_updates += _is_same(found, event, again, f"image {frame.sequence}")
+            replayed = msg.update_messages(clock, now, frame, report)
+            comparison.updates += 1
+            where = f"image {frame.sequence}"
+            comparison.same_updates += _is_same(comparison, event, replayed, where)
         else:
-            what = "image" if event is not None else "tick, image update or event"
-            found.ended = f"{what} {index} of {max(log.events)} is not in the log"
+            missing = "image" if event is not None else "tick, image update or request"
+            comparison.ended = f"{missing} {index} of {max(log.events)} is not in the log"
             break
-    return found, Recording(*tables.tables(), log.config, log.compensated, log.segments)
+    return comparison, Recording(*tables.tables(), log.config, log.compensated, log.segments)
 
 
-def _tell(loop: HysteresisReduction, what: str) -> None:
-    call, _, name = what.partition(" ")
-    if what in ("engage", "acknowledge"):
-        getattr(loop, what)()
+def _send_request(loop: HysteresisReduction, request: str) -> None:
+    call, _, name = request.partition(" ")
+    if request in ("engage", "acknowledge"):
+        getattr(loop, request)()
     elif call == "raise_flag" and name in DETECTORS:
         loop.raise_flag(name)
     else:
-        raise RecordError("log", what, "engage, acknowledge, or raise_flag and a known name")
+        raise RecordError("log", request, "engage, acknowledge, or raise_flag and a known name")
 
 
-def _is_same(found: Identity, event: Tick | Update, again: msg.Messages, where: str) -> bool:
-    other = [topic for topic, data in again.items() if event.raw.get(topic) != data]
-    if other and not found.first_difference:
-        found.first_difference = f"{where}: {', '.join(other)}"
-    return not other
+def _is_same(
+    comparison: Comparison, event: Tick | Update, replayed: msg.Messages, where: str
+) -> bool:
+    different = [topic for topic, data in replayed.items() if event.raw.get(topic) != data]
+    if different and not comparison.first_difference:
+        comparison.first_difference = f"{where}: {', '.join(different)}"
+    return not different
 
 
 def _clock(log: Log) -> msg.Clock:
     ticks = [event for event in log.events.values() if isinstance(event, Tick)]
     if not ticks:
         raise RecordError("log", str(log.path), "one with at least one tick")
-    stamp = decode(msg.TOPICS[msg.COMMAND], ticks[0].raw[msg.COMMAND])["header"]["stamp"]
+    stamp = topics.decode(topics.COMMAND, ticks[0].raw[topics.COMMAND])["header"]["stamp"]
     return msg.Clock(ticks[0].sample.time, stamp["sec"] * 10**9 + stamp["nanosec"])
 
 
 def _frame(log: Log, index: int, update: Update) -> tuple[float, Frame]:
-    """When a frame arrived, and the frame as the loop was given it."""
+    """Arrival time [s] and frame of a recorded update, as the loop got them."""
     row = dict(zip(FRAME_COLUMNS.names or (), update.row, strict=True))
     truth = np.array([row[f"true_features_{name}"] for name in FEATURES], np.float64)
     frame = Frame(
@@ -132,117 +138,86 @@ def _frame(log: Log, index: int, update: Update) -> tuple[float, Frame]:
     return float(row["arrived_at"]), frame  # type: ignore[arg-type]
 
 
-@dataclass(slots=True)
-class Heard:
-    """A run the loop has only listened to.
+def estimate_from_log(log: Log, config: Config) -> tuple[Recording, int]:
+    """Estimate the states and offsets of a recorded run with another configuration.
 
-    Attributes:
-        recording: References and commands as they were, estimates and offsets of this loop.
-        skipped: Image updates whose image is not in the log.
-    """
-
-    recording: Recording
-    skipped: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class _Motion:
-    """Where the motors were told to be, and what was wanted."""
-
-    sample: Sample
-    reference: Floats
-    command: Floats
-
-
-@dataclass(frozen=True, slots=True)
-class _Sight:
-    """A frame and when it arrived."""
-
-    now: float
-    frame: Frame
-
-
-@dataclass(slots=True)
-class _Count:
-    skipped: int = field(default=0)
-
-
-def listen_to_log(log: Log, config: Config) -> Heard:
-    """What a loop with another configuration would have estimated in a recorded run.
+    Returns:
+        The recorded references and commands with the new estimates, and the number of image updates
+        that were skipped because their image is not in the log.
 
     Raises:
-        FrameError: Its camera is not the recorded one.
+        FrameError: The configured camera is not the recorded one.
     """
-    count = _Count()
-    recording = _listen(_of_log(log, count), config, log.compensated)
-    return Heard(
-        Recording(recording.trace, recording.frames, config, log.compensated, log.segments),
-        count.skipped,
+    run = _estimate(_log_inputs(log), config, log.compensated)
+    skipped = sum(
+        isinstance(event, Update) and not log.has_image(index)
+        for index, event in log.events.items()
     )
+    return Recording(run.trace, run.frames, config, log.compensated, log.segments), skipped
 
 
-def listen_to_video(frames: Iterable[Frame], motors: str | PathLike[str], config: Config) -> Heard:
-    """What the loop estimates from a plain video and a table of motor positions.
+def estimate_from_video(
+    frames: Iterable[Frame], motors: str | PathLike[str], config: Config
+) -> Recording:
+    """Estimate states and offsets from a video and a table of motor positions.
 
     Args:
-        frames: In order, captured on the clock of the table.
+        frames: Frames in order, captured on the clock of the table.
         motors: CSV file, see `tautscope.runs.replay.read_motors`.
-        config: Of instrument, camera and loop.
+        config: Configuration of instrument, camera and loop.
 
     Raises:
-        MissingPathError, RecordError: As `read_motors`; or no frame was taken while it lasts.
-        FrameError: The video is not of the configured camera.
+        MissingPathError, RecordError: As `read_motors`; or no frame is within the table's time.
+        FrameError: The video is not from the configured camera.
     """
     times, positions = read_motors(motors)
-    recording = _listen(_of_video(frames, times, positions), config, False)
-    if not len(recording.frames):
+    run = _estimate(_video_inputs(frames, times, positions), config, False)
+    if not len(run.frames):
         span = f"frames between {times[0]:g} and {times[-1]:g} s, the time of {motors}"
         raise RecordError("video", "no frame in that time", span)
-    return Heard(recording)
+    return run
 
 
-def _of_log(log: Log, count: _Count) -> Iterator[_Motion | _Sight]:
+def _log_inputs(log: Log) -> Inputs:
     for index, event in log.events.items():
         if isinstance(event, Tick):
-            yield _Motion(event.sample, event.reference, event.command)
-        elif isinstance(event, Told):
-            continue  # it listens: what held the motors then is in their commands
-        elif log.has_image(index):
-            yield _Sight(*_frame(log, index, event))
-        else:
-            count.skipped += 1
+            yield event
+        # Requests are left out: their effect on the motors is in the recorded commands.
+        elif isinstance(event, Update) and log.has_image(index):
+            yield _frame(log, index, event)
 
 
-def _of_video(
-    frames: Iterable[Frame], times: Floats, positions: Floats
-) -> Iterator[_Motion | _Sight]:
+def _video_inputs(frames: Iterable[Frame], times: Floats, positions: Floats) -> Inputs:
+    ticks = [
+        Tick(Sample(float(time), position), position, position, None, {})
+        for time, position in zip(times, positions, strict=True)
+    ]
     at = 0
     for frame in frames:
-        while at < len(times) and times[at] <= frame.captured_at:
-            yield _Motion(Sample(float(times[at]), positions[at]), positions[at], positions[at])
+        while at < len(ticks) and times[at] <= frame.captured_at:
+            yield ticks[at]
             at += 1
-        if at == len(times):
-            return  # where the motors are now, nobody has written down
+        if at == len(ticks):
+            return  # the motor positions after the end of the table are unknown
         if at:
-            yield _Sight(frame.captured_at, frame)
-    for time, position in zip(times[at:], positions[at:], strict=True):
-        yield _Motion(Sample(float(time), position), position, position)
+            yield frame.captured_at, frame
+    yield from ticks[at:]
 
 
-def _listen(inputs: Iterable[_Motion | _Sight], config: Config, compensated: bool) -> Recording:
-    # Without compensation a command is passed on as it is, and the estimators only listen. What
-    # moved the motors then is not to be refused now, commands are faster than a hand, and a codec
-    # repeats pictures.
-    deaf = ("reference_jump", "reference_late", "late_tick", "monitor", "frozen")
-    moved = {"safety.off": [*config.safety.off, *deaf]}
-    loop = HysteresisReduction(config.replace(**moved), compensate=False)
+def _estimate(inputs: Inputs, config: Config, compensated: bool) -> Recording:
+    # Without compensation the loop passes commands on and only estimates. Some detectors are off:
+    # the commands were executed already and may be faster than an operator; codecs repeat frames.
+    ignored = ("reference_jump", "reference_late", "late_tick", "monitor", "frozen")
+    off = {"safety.off": [*config.safety.off, *ignored]}
+    loop = HysteresisReduction(config.replace(**off), compensate=False)
     tables = Tables(config)
     for each in inputs:
-        if isinstance(each, _Motion):
+        if isinstance(each, Tick):
             loop.step(each.command, each.sample.time)
             tables.tick(each.sample, each.reference, each.command)
         else:
-            report = loop.on_frame(each.frame)
-            row = frame_row(each.now, each.frame, report)
+            arrived_at, frame = each
+            report = loop.on_frame(frame)
+            row = frame_row(arrived_at, frame, report)
             tables.frame(row, report.delta_minus, report.delta_plus)
     return Recording(*tables.tables(), config, compensated, ())

@@ -1,7 +1,7 @@
-"""The log of a run, written while it goes on, by threads of its own.
+"""The log of a run, written by background threads during the run.
 
-The loop only puts references into bounded queues: no encoding, no lock, no file. What does not fit
-is dropped and counted; a disk that fails ends the recording, never the run.
+The loop only appends to bounded queues: no encoding, no lock, no file access. What does not fit is
+dropped and counted. A failing disk ends the recording, not the run.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 
 from tautscope.config import Config
 from tautscope.log import messages as msg
-from tautscope.log.journal import LOOK_PERIOD, Journal
+from tautscope.log.journal import POLL_PERIOD, Journal
 from tautscope.loop.reduction import Report
 from tautscope.loop.references import Segment
 from tautscope.loop.rig import Frame, Sample
@@ -27,16 +27,16 @@ from tautscope.loop.rig import Frame, Sample
 
 @dataclass(frozen=True, slots=True)
 class LogSummary:
-    """What is in a log, and what is not.
+    """Numbers of recorded and dropped messages.
 
     Attributes:
         path: The file.
-        messages: Topic -> how many were written.
-        ticks: Control ticks given to the log.
-        updates: Image updates given to it.
-        dropped: Ticks, updates and events it could not take.
-        dropped_images: Images of other updates it could not take.
-        failure: Why it ended before its time; empty if it did not.
+        messages: Topic -> number of written messages.
+        ticks: Number of control ticks given to the log.
+        updates: Number of image updates given to the log.
+        dropped: Number of dropped ticks, updates and requests.
+        dropped_images: Number of other updates whose image was dropped.
+        failure: Why recording stopped early; empty if it did not.
     """
 
     path: Path
@@ -49,30 +49,31 @@ class LogSummary:
 
     @property
     def is_complete(self) -> bool:
-        """Whether all that was given is in the file."""
+        """Whether everything given to the log is in the file."""
         return not (self.dropped or self.dropped_images or self.failure)
 
 
-def _say(text: str) -> None:
+def _print_warning(text: str) -> None:
     print(f"warning: {text}", file=sys.stderr, flush=True)
 
 
 class LogWriter:
-    """Writes an MCAP file; a context manager.
+    """Writes the log of a run as an MCAP file; a context manager.
 
-    `tick`, `frame` and `event` are called by the loop, in the order of the loop's own calls; that
-    order is in the file as the messages' sequence number, one per tick, update or event, from 1 on.
+    Call `tick`, `frame` and `event` in the order of the loop's own calls. The messages' sequence
+    number is the position in this order, from 1 on.
 
     Args:
-        path: The file; there may be none yet.
-        config: As used by the loop; `recording` says how to record.
-        compensate: As given to the loop.
-        segments: Which DOF moves when, if that is known.
-        wait: Rather than drop, have the caller wait: for a simulated rig, whose clock can stand.
-        say: Told once of each trouble, by the thread; without it, a line on stderr.
+        path: New file.
+        config: Configuration of the loop; section `recording` has the recording settings.
+        compensate: Whether the loop compensates.
+        segments: Which DOF moves when, if known.
+        wait: Make the caller wait for a full queue instead of dropping; for simulated rigs.
+        on_warning: Called from a background thread, once per kind of problem; by default it prints
+            to stderr.
 
     Raises:
-        OutputError: The file is there already, or cannot be made.
+        OutputError: The file exists already, or cannot be created.
     """
 
     def __init__(
@@ -83,13 +84,13 @@ class LogWriter:
         compensate: bool = True,
         segments: Iterable[Segment] = (),
         wait: bool = False,
-        say: Callable[[str], None] = _say,
+        on_warning: Callable[[str], None] = _print_warning,
     ) -> None:
         self._settings = config.recording
         self._wait = wait
         self._ticks = self._updates = self._index = 0
-        facts = msg.Facts(config, compensate, tuple(segments))
-        self._journal = Journal(Path(path), facts, say)
+        info = msg.RunInfo(config, compensate, tuple(segments))
+        self._journal = Journal(Path(path), info, on_warning)
 
     def tick(
         self,
@@ -98,29 +99,31 @@ class LogWriter:
         command: Iterable[float],
         made_at: float | None = None,
     ) -> None:
-        """One control tick: the sample before it, reference u (3,) and command c (3,).
+        """Record a control tick: the sample before it, reference u (3,) and command c (3,).
 
-        With when the reference was made, if the loop was told.
+        `made_at` is the rig time of the reference [s], if the loop got it.
         """
-        self._begin(sample.time)
+        self._start_clock(sample.time)
         self._ticks += 1
-        # Copies: the caller may use its arrays again before they are written.
+        # Copies, because the caller may reuse its arrays before they are written.
         truth = None if sample.true_state is None else np.array(sample.true_state)
-        kept = Sample(sample.time, np.array(sample.applied), None, truth)
-        self._put(sample.time, (kept, np.array(reference), np.array(command), made_at))
+        copy = Sample(sample.time, np.array(sample.applied), None, truth)
+        self._enqueue(sample.time, (copy, np.array(reference), np.array(command), made_at))
 
     def frame(self, now: float, frame: Frame, report: Report) -> None:
-        """One image update, after the tick in whose sample the frame came.
+        """Record an image update, after the tick whose sample has the frame.
 
         Args:
-            now: That sample's time [s].
-            frame: The frame; its image is copied, a rig may use the memory again.
-            report: What the loop made of it.
+            now: Time of that sample [s].
+            frame: The frame; its image is copied.
+            report: Result of the update.
         """
-        self._begin(now)
+        self._start_clock(now)
         self._updates += 1
-        about = Frame(np.empty(0, np.uint8), frame.captured_at, frame.sequence, frame.true_features)
-        if not self._put(now, (now, about, report)):
+        frame_info = Frame(
+            np.empty(0, np.uint8), frame.captured_at, frame.sequence, frame.true_features
+        )
+        if not self._enqueue(now, (now, frame_info, report)):
             return
         journal = self._journal
         if not self._has_room(journal.images, self._settings.queue_images):
@@ -128,32 +131,32 @@ class LogWriter:
             return
         journal.images.append((self._index, now, frame.captured_at, frame.image.copy()))
 
-    def event(self, now: float, what: str) -> None:
-        """What the operator or the rig told the loop, at a time of the rig's clock [s].
+    def event(self, now: float, request: str) -> None:
+        """Record a request of the operator or the rig to the loop, at a rig time [s].
 
-        In a loop of your own: ``loop.on_event = lambda what: log.event(sample.time, what)``.
+        In your own loop: ``loop.on_event = lambda request: log.event(sample.time, request)``.
         """
-        self._begin(now)
-        self._put(now, (what,))
+        self._start_clock(now)
+        self._enqueue(now, (request,))
 
     def warn(self, text: str, now: float | None = None) -> None:
-        """Something a person who reads the log should know, at a time of the rig's clock [s]."""
-        self._journal.texts.append((now, text))
+        """Record a warning, at a rig time [s]."""
+        self._journal.warnings.append((now, text))
 
     @property
     def dropped(self) -> int:
-        """Ticks, updates and images that could not be taken, up to now."""
+        """Number of ticks, updates, requests and images dropped so far."""
         return self._journal.dropped + self._journal.dropped_images
 
     @property
     def failure(self) -> str:
-        """Why nothing is recorded any more; empty while it is."""
+        """Why recording stopped; empty while it works."""
         return self._journal.failure
 
     def close(self) -> LogSummary:
-        """Write what waits, end the file, and say what is in it. May be called twice."""
+        """Write the queues, finish the file and return its summary. May be called twice."""
         journal = self._journal
-        journal.end(self._settings.close_timeout)
+        journal.close(self._settings.close_timeout)
         return LogSummary(
             journal.path,
             dict(journal.written),
@@ -172,20 +175,20 @@ class LogWriter:
             self.warn(f"the run ended with {type(error).__name__}: {error}")
         self.close()
 
-    def _begin(self, now: float) -> None:
+    def _start_clock(self, now: float) -> None:
         if self._journal.clock is None:
             self._journal.clock = msg.Clock(now, time.time_ns())
 
-    def _put(self, now: float, facts: tuple[Any, ...]) -> bool:
+    def _enqueue(self, now: float, arguments: tuple[Any, ...]) -> bool:
         journal = self._journal
         self._index += 1
         if not self._has_room(journal.events, self._settings.queue_events):
             journal.dropped += 1
             return False
-        journal.events.append((self._index, now, facts))
+        journal.events.append((self._index, now, arguments))
         return True
 
     def _has_room(self, queue: deque[Any], limit: int) -> bool:
         while self._wait and len(queue) >= limit and not self._journal.is_done:
-            time.sleep(LOOK_PERIOD)
+            time.sleep(POLL_PERIOD)
         return len(queue) < limit and not self._journal.is_done

@@ -1,15 +1,15 @@
-"""Pixel formats: what shape a camera's images have as arrays, and what is refused.
+"""Pixel formats: shapes of a camera's images as arrays.
 
 | format | shape | bytes |
 |---|---|---|
 | bgr, rgb | (h, w, 3) | per pixel |
-| bgra | (h, w, 4) | per pixel; the last is not looked at |
+| bgra | (h, w, 4) | per pixel; the last is unused |
 | yuyv, uyvy | (h, w, 2) | per two pixels Y U Y V, or U Y V Y |
-| nv12 | (3 h / 2, w) | h rows of Y, then for every two rows a line U V U V ... |
-| i420 | (3 h / 2, w) | h rows of Y, then those of U, then of V, half as long, two to a line |
+| nv12 | (3 h / 2, w) | h rows of Y, then a line U V U V ... for every two rows |
+| i420 | (3 h / 2, w) | h rows of Y, then those of U, then of V, half as long, two per line |
 
-The shapes are those of OpenCV's `cvtColor` codes, so that a frame grabbed with
-``CAP_PROP_CONVERT_RGB`` off goes in as it is. Y, U, V are ITU-R BT.601 with limited range.
+The shapes are those of OpenCV's `cvtColor` codes: a frame grabbed with ``CAP_PROP_CONVERT_RGB`` off
+needs no conversion. Y, U, V are ITU-R BT.601 with limited range.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ _BYTE = np.dtype(np.uint8)
 
 
 class FrameLayout:
-    """What the images of a camera look like in memory.
+    """Memory layout of the images of a camera.
 
     Args:
         camera: The camera; its `width`, `height` and `pixel_format` are used.
 
     Attributes:
-        shape: Of the arrays.
+        shape: Shape of the arrays.
 
     Raises:
-        ConfigError: A side is odd where the format has one colour for two pixels.
+        ConfigError: A side is odd in a format in which two pixels share U and V.
     """
 
     def __init__(self, camera: CameraConfig) -> None:
@@ -53,19 +53,19 @@ class FrameLayout:
         self._in_line = (1,) if planar else (_CHANNELS[self.pixel_format], 1)
 
     def checked(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """The image, if it can be read where it lies.
+        """The image itself, if it can be read in place.
 
         Raises:
-            FrameError: It is not a uint8 array of this shape, or the bytes of a line do not lie
-                side by side from left to right, or the lines not from top to bottom.
+            FrameError: It is not a uint8 array of this shape, or the bytes of a line are not
+                contiguous from left to right, or the lines not from top to bottom.
         """
         wanted = f"uint8 array {self.shape}, {self.pixel_format}"
         if not isinstance(image, np.ndarray) or image.dtype != _BYTE or image.shape != self.shape:
             raise FrameError("image", _described(image), wanted)
         strides = image.strides
         # A side of one pixel may have any stride.
-        side_by_side = strides[1:] == self._in_line or image[0].flags.c_contiguous
-        if not side_by_side or strides[0] < 0:
+        is_contiguous = strides[1:] == self._in_line or image[0].flags.c_contiguous
+        if not is_contiguous or strides[0] < 0:
             raise FrameError(
                 "image",
                 f"{_described(image)} with strides {strides}",

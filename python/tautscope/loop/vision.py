@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -23,7 +24,7 @@ from tautscope.loop.reduction import Expectation
 
 
 class Region(NamedTuple):
-    """Pixels of the markers' colour that touch each other along edges or at corners.
+    """8-connected pixels of the markers' colour.
 
     Attributes:
         centroid: Mean of the pixels' centres, u, v [px].
@@ -37,53 +38,55 @@ class Region(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Evidence:
-    """What speaks for a band.
+class BandScore:
+    """Scores of a band.
 
-    Where the bands were placed by their light, because blur has left no edges (decision 0011),
-    there is no outline to judge: `edges` is the share of the light's variance that the two bands
-    explain, `bloom` the spread of the blur [px], and `inside`, `coverage`, `own`, `spill` are 0.
+    For bands that were recognised by the intensity because blur has left no edges (decision 0011)
+    there is no outline to score: `edges` is the share of the intensity's variance that the fit
+    explains, `growth` the standard deviation of the blur [px], and `inside`, `coverage`,
+    `exclusive`, `spill` are 0.
 
     Attributes:
-        inside: Share of its outline's area that is in the image.
-        coverage: Share of that which has the markers' colour.
-        own: Share of that which the other band's outline does not have too.
-        spill: Share of a ring around it that has the markers' colour.
-        edges: Share of its outline at which the colour ends.
-        bloom: How much the outline had to grow [px].
-        surprise: Squared Mahalanobis distance of both bands from where they were expected.
-        centroid: Where the outline was laid, u, v [px].
+        inside: Share of the outline's area inside the image.
+        coverage: Share of that part that has the markers' colour.
+        exclusive: Share of that part that has it and is not inside the other band's outline.
+        spill: Share of a ring around the outline that has the markers' colour.
+        edges: Share of the outline at which an edge was found.
+        growth: Growth of the outline along the band's axis [px].
+        mahalanobis_squared: Squared Mahalanobis distance of both bands from their predicted
+            positions.
+        centroid: Centroid of the outline, u, v [px].
     """
 
     inside: float
     coverage: float
-    own: float
+    exclusive: float
     spill: float
     edges: float
-    bloom: float
-    surprise: float
+    growth: float
+    mahalanobis_squared: float
     centroid: tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Detection:
-    """What a frame shows.
+    """Result of the marker detection in one image.
 
     Attributes:
-        features: (4,) [px] the measured features: centroids of the bands, u_A, v_A, u_B, v_B, A the
+        features: Measured features (4,) [px]: centroids of the bands, u_A, v_A, u_B, v_B. A is the
             proximal band. NaN for a band that was not found.
-        covariance: (4, 4) [px^2] of the features; NaN likewise.
-        reasons: Per band why it was not found; empty if it was.
-        evidence: Per band what speaks for it.
-        regions: What has the markers' colour, the largest first, at most 16.
-        discriminant: Which discriminant it rests on: 0 is the trained one, `vision.weights` and
+        covariance: Covariance of the features (4, 4) [px^2]; NaN likewise.
+        reasons: Why each band was not found; empty if it was.
+        scores: Scores of each band.
+        regions: Regions of the markers' colour, the largest first, at most 16.
+        discriminant: Discriminant that was used: 0 is the trained one, `vision.weights` and
             `vision.threshold`; others count `vision.alternatives` from 1.
     """
 
     features: NDArray[np.float64]
     covariance: NDArray[np.float64]
     reasons: tuple[str, str]
-    evidence: tuple[Evidence, Evidence]
+    scores: tuple[BandScore, BandScore]
     regions: tuple[Region, ...]
     discriminant: int
 
@@ -95,19 +98,21 @@ class Detection:
 
     @property
     def valid(self) -> bool:
-        """Whether both markers were found and can be trusted."""
+        """Whether both markers were found."""
         return all(self.found)
 
     @property
     def colours_drifted(self) -> bool:
-        """Whether a band was found, but not by the trained discriminant: exposure or white balance
-        have left the training, and `ColorDiscriminant.fit` should be given new pixels.
-        """  # noqa: D205
+        """Whether a band was found, but not by the trained discriminant.
+
+        Exposure or white balance then differ from the training pixels; `ColorDiscriminant.fit`
+        should be given new ones.
+        """
         return self.discriminant > 0 and any(self.found)
 
     @property
     def reason(self) -> str:
-        """Why it is not valid; empty if it is."""
+        """Why the detection is not valid; empty if it is."""
         a, b = self.reasons
         if a == b:
             return a
@@ -118,57 +123,43 @@ class Detection:
 class MarkerDetector:
     """Finds the two bands of the instrument in camera images, Eq. (12) and Fig. 5.
 
-    Each pixel is projected, w_b B + w_g G + w_r R, the projection low-passed and thresholded, the
-    pixels above the threshold joined into 8-connected regions. `config.vision` has the numbers.
+    Each pixel is projected, w_b B + w_g G + w_r R. The projection is low-passed and thresholded,
+    and pixels above the threshold are joined into 8-connected regions. The settings are in
+    `config.vision`.
 
-    What has the markers' colour is a band only if it looks like one (decision 0011): the outlines
-    of both bands, as the model of the instrument draws them, are laid over the regions, and the
-    place, the size, the outline's edges and what is around must agree. A part that is hidden,
-    split by a highlight or outside the image is no part of the measurement: the features are the
-    centroids of the whole bands. One band alone is found only where it is surely not the other.
+    The outlines of both bands, predicted by the instrument model, are fitted to the edges of the
+    regions (decision 0011). A band is recognised if its position, its area, its edges and its
+    surroundings agree with the prediction. The features are the centroids of the whole bands, even
+    where a part is hidden, split by a highlight or outside the image. One band alone is recognised
+    only if it cannot be the other one.
 
-    - With an expectation, both are sought around it.
-    - With predicted features alone, the same around the posture that explains them, with half of
-      each DOF's `start_deviation`.
-    - With neither, in the whole workspace of the experiment, and only what is all but whole counts.
+    - With an expectation, the bands are searched near it.
+    - With predicted features alone, near the posture that explains them, with half of each DOF's
+      `start_deviation`.
+    - With neither, in the whole workspace of the experiment, with stricter thresholds.
 
     The arithmetic is in fixed point. With the largest sum of weights of one sign s, a low-passed
     value is within (1.25 + smoothing) * 255 * s / 8190 of the exact one: 0.07 grey levels by
     default.
 
-    One detector may be shared between threads; calls take turns. Frames leave nothing behind in it.
+    One detector may be shared between threads; calls take turns. No result depends on earlier
+    images.
 
     Args:
         config: The configuration; `camera` and `vision` are used.
 
     Raises:
-        ConfigError: All weights of the discriminant are zero, or too small or large to be meant.
+        ConfigError: All weights of the discriminant are zero, or too small or too large for the
+            fixed-point arithmetic.
     """
 
     def __init__(self, config: Config) -> None:
-        vision = config.vision
         self._layout = FrameLayout(config.camera)
         self._model = build_feature_model(config)
         self._starts = _starts(config)
         self._start_deviation = np.array([config[dof].start_deviation for dof in Dof])
         self._core = _core.MarkerDetector(
-            self._model,
-            pixel_format=config.camera.pixel_format,
-            weights=vision.weights,
-            threshold=vision.threshold,
-            smoothing=vision.smoothing,
-            minimum_area=vision.minimum_area,
-            alternatives=[(weights, threshold) for weights, threshold in vision.alternatives],
-            model_deviation=vision.model_deviation,
-            demands=(
-                vision.least_inside,
-                vision.least_coverage,
-                vision.largest_spill,
-                vision.least_edges,
-                vision.least_edges_on_average,
-                vision.least_edges_alone,
-                vision.largest_surprise,
-            ),
+            self._model, config.camera.pixel_format, msgspec.to_builtins(config.vision)
         )
 
     def detect(
@@ -177,38 +168,38 @@ class MarkerDetector:
         predicted_features: ArrayLike | None = None,
         expectation: Expectation | None = None,
     ) -> Detection:
-        """Find the markers in one image.
+        """Detect the markers in one image.
 
         Args:
-            image: uint8, as ``camera.pixel_format`` says: (height, width, 3) B, G, R by default;
-                `tautscope.loop.frame_layout` has the shapes. A cropped view of a larger array is
+            image: uint8 array in ``camera.pixel_format``: (height, width, 3) B, G, R by default;
+                `tautscope.loop.frame_layout` lists the shapes. A cropped view of a larger array is
                 read in place.
-            predicted_features: (4,) [px] where the bands should be, u_A, v_A, u_B, v_B. Features
-                that are not finite (the model looks behind the camera, say) are no prediction.
-            expectation: Where the instrument is believed to be and how sure that is; with it the
-                predicted features are not looked at.
+            predicted_features: Predicted centroids (4,) [px], u_A, v_A, u_B, v_B. Features that are
+                not finite (the model is behind the camera, say) are ignored.
+            expectation: Prediction of the state with its standard deviations; with it the predicted
+                features are ignored.
 
         Returns:
-            The features, or the reason why there are none: never an exception for what the image
-            shows.
+            The features, or the reason why there are none. What the image shows never raises an
+            exception.
 
         Raises:
             FrameError: The image is not what the configured camera gives.
             FieldError: The prediction is not four numbers.
         """
         predicted = _checked_prediction(predicted_features)
-        states, deviation = self._beliefs(predicted, expectation)
-        features, covariance, evidence, reasons, regions, discriminant = self._core.detect(
-            self._layout.checked(image), states, deviation
+        states, std = self._prior(predicted, expectation)
+        features, covariance, scores, reasons, regions, discriminant = self._core.detect(
+            self._layout.checked(image), states, std
         )
-        a, b = (_evidence(row) for row in evidence.tolist())
+        a, b = (_band_score(row) for row in scores.tolist())
         found = tuple(map(Region._make, regions))
         return Detection(features, covariance, reasons, (a, b), found, discriminant)
 
-    def _beliefs(
+    def _prior(
         self, predicted: NDArray[np.float64] | None, expectation: Expectation | None
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Where the instrument may be: states (n, 3) and their common deviations (3,)."""
+        """States the instrument may have (n, 3), and their common standard deviations (3,)."""
         if expectation is not None:
             return np.asarray(expectation.state)[None], np.asarray(expectation.deviation)
         starts, broad = self._starts
@@ -227,15 +218,14 @@ class MarkerDetector:
     def regions_in(
         self, image: NDArray[np.uint8], windows: Sequence[tuple[int, int, int, int]]
     ) -> tuple[Region, ...]:
-        """The regions in parts of an image, the rest of which is not read.
+        """The regions in windows of an image; the rest of it is not read.
 
-        A pixel is marker here exactly if it is in the whole image; a region ends where its window
-        does.
+        A pixel is marker exactly if it is in the whole image. A region ends where its window does.
 
         Args:
             image: As `detect`.
-            windows: Left, top, and first column and row after the window [px]; what of it lies
-                outside the image is left out.
+            windows: Left, top, and the column and row after the last [px]; a part outside the image
+                is ignored.
 
         Returns:
             The regions of all windows, the largest first, at most 16.
@@ -247,7 +237,7 @@ class MarkerDetector:
         return tuple(map(Region._make, regions))
 
     def mask(self, image: NDArray[np.uint8]) -> NDArray[np.bool_]:
-        """What is above the threshold after the low-pass, for figures: bool (height, width).
+        """The marker pixels, above the threshold after the low-pass: bool (height, width).
 
         Raises:
             FrameError: As `detect`.
@@ -256,7 +246,7 @@ class MarkerDetector:
 
 
 def _starts(config: Config) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """States that cover the workspace of the experiment, and deviations that fill the gaps."""
+    """States that cover the workspace of the experiment, and standard deviations in between."""
     sines = [config.experiment[dof] for dof in Dof]
     grid = itertools.product(
         *(
@@ -281,6 +271,6 @@ def _checked_prediction(predicted: ArrayLike | None) -> NDArray[np.float64] | No
     return features
 
 
-def _evidence(row: list[float]) -> Evidence:
-    inside, coverage, own, spill, edges, bloom, surprise, u, v = row
-    return Evidence(inside, coverage, own, spill, edges, bloom, surprise, (u, v))
+def _band_score(row: list[float]) -> BandScore:
+    inside, coverage, exclusive, spill, edges, growth, mahalanobis_squared, u, v = row
+    return BandScore(inside, coverage, exclusive, spill, edges, growth, mahalanobis_squared, (u, v))

@@ -1,4 +1,4 @@
-"""The physical twin: a simulated rig that shares no code with the loop it tests."""
+"""The digital twin: a simulated rig that shares no code with the loop it tests."""
 
 from tautscope.twin.rig import Twin
 

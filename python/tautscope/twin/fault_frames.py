@@ -1,262 +1,209 @@
-"""What faults of the camera do: to what the image says, and to when it comes.
+"""Fault models of the camera: measured features, images, arrival times and time stamps.
 
-An act is given a frame on its way, when it will arrive [s], and the moment; it gives back what
-arrives when. Frames are never changed in place, and their truth is passed on as it is.
+Frames are not changed in place, and their ground truth stays.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.loop.rig import Frame
-from tautscope.twin.fault_kinds import Fault
+from tautscope.twin.fault_state import FaultState, Floats
 
-Floats = NDArray[np.float64]
 Arrivals = list[tuple[float, Frame]]
+"""Arrival time [s] and frame."""
 
 PIXEL_NOISE = 0.2
-"""Fresh noise on a frozen measurement [px]."""
+"""Standard deviation of the noise on a frozen measurement [px]."""
+_SWAPPED = [2, 3, 0, 1]
 
 
 @dataclass(frozen=True, slots=True)
 class FeatureFrame(Frame):
-    """A frame without pixels: what a detector would have said stands in for them.
+    """A frame that carries the detected features instead of pixels.
 
     Attributes:
-        features: (4,) [px] u and v of bands A and B; NaN for both of a band not found.
+        features: (4,) [px] u and v of bands A and B; NaN for a band that was not found.
     """
 
     features: Floats = field(default_factory=lambda: np.full(4, np.nan))
 
 
-@dataclass(slots=True)
-class Moment:
-    """What an act may know.
-
-    Attributes:
-        fault: The one that acts.
-        since: How long it has [s].
-        chance: Its own generator.
-        memory: Its own, kept from call to call.
-        size: (width, height) of the picture [px].
-        along: Gives (4,) [px/m] how the features move when the instrument is pushed outwards.
-        stalls: How many there were.
-    """
-
-    fault: Fault
-    since: float
-    chance: np.random.Generator
-    memory: dict[str, Any]
-    size: tuple[int, int]
-    along: Callable[[], Floats]
-    stalls: int = 0
-
-    def count(self, what: str = "count") -> int:
-        """0, 1, 2, ... from call to call."""
-        number: int = self.memory.get(what, 0)
-        self.memory[what] = number + 1
-        return number
-
-    def first(self, what: str, value: Any) -> Any:
-        """The value of the first call, at every call."""
-        return self.memory.setdefault(what, value)
-
-    def push(self, millimetres: float) -> Floats:
-        """What that many mm along the channel are in the image (4,) [px]."""
-        return 1e-3 * millimetres * self.along()
+FeatureFault = Callable[[Floats, FaultState], Floats]
+ImageFault = Callable[[NDArray[np.uint8], FaultState], NDArray[np.uint8]]
+ArrivalFault = Callable[[float, Frame, FaultState], Arrivals]
 
 
-Seen = Callable[[Floats, Moment], Floats]
-Shown = Callable[[NDArray[np.uint8], Moment], NDArray[np.uint8]]
-Timed = Callable[[float, Frame, Moment], Arrivals]
+def _shift_randomly(features: Floats, fault: FaultState) -> Floats:
+    return features + fault.channel_shift(fault.spec.size * fault.rng.uniform(-1, 1))
 
 
-def _scatter(seen: Floats, now: Moment) -> Floats:
-    return seen + now.push(now.fault.size * now.chance.uniform(-1, 1))
+def _shift_once(features: Floats, fault: FaultState) -> Floats:
+    sign = fault.sign
+    return features if fault.count() else features + fault.channel_shift(sign * fault.spec.size)
 
 
-def _outlier(seen: Floats, now: Moment) -> Floats:
-    side = now.first("side", now.chance.choice((-1, 1)))
-    return seen if now.count() else seen + now.push(side * now.fault.size)
+def _every_third(model: FeatureFault) -> FeatureFault:
+    """The model, applied to every third frame only."""
+    return lambda features, fault: features if fault.count("some") % 3 else model(features, fault)
 
 
-def _some(act: Seen) -> Seen:
-    """Every third frame only."""
-    return lambda seen, now: seen if now.count("some") % 3 else act(seen, now)
+def _random_pixels(fault: FaultState) -> Floats:
+    return fault.rng.uniform(0, np.tile(fault.image_size, 2).astype(np.float64))
 
 
-def _anywhere(now: Moment) -> Floats:
-    return now.chance.uniform(0, np.tile(now.size, 2).astype(np.float64))
+def _swap_some_bands(features: Floats, fault: FaultState) -> Floats:
+    return features if fault.count() % round(fault.spec.size) else features[_SWAPPED]
 
 
-def _swap(seen: Floats) -> Floats:
-    return seen[[2, 3, 0, 1]]
+def _fix_band_b(features: Floats, fault: FaultState) -> Floats:
+    return np.concatenate([features[:2], fault.hold("spot", _random_pixels(fault)[:2])])
 
 
-def _swap_some(seen: Floats, now: Moment) -> Floats:
-    return seen if now.count() % round(now.fault.size) else _swap(seen)
+def _mirror(features: Floats, fault: FaultState, *, vertically: bool) -> Floats:
+    width, height = fault.image_size
+    ends = np.tile((width - 1.0, height - 1.0 if vertically else 0.0), 2)
+    return np.where(ends > 0, ends - features, features)
 
 
-def _merge(seen: Floats) -> Floats:
-    return np.tile((seen[:2] + seen[2:]) / 2, 2)
+def _zoom(features: Floats, fault: FaultState) -> Floats:
+    centre = np.tile(np.array(fault.image_size) / 2, 2)
+    return centre + fault.spec.size * (features - centre)
 
 
-def _elsewhere(seen: Floats, now: Moment) -> Floats:
-    return np.concatenate([seen[:2], now.first("spot", _anywhere(now)[:2])])
+def _add_drift(features: Floats, fault: FaultState) -> Floats:
+    return features + fault.channel_shift(fault.sign * fault.spec.size * fault.elapsed)
 
 
-def _flip(seen: Floats, now: Moment, *, turn: bool) -> Floats:
-    width, height = now.size
-    ends = np.tile((width - 1.0, height - 1.0 if turn else 0.0), 2)
-    return np.where(ends > 0, ends - seen, seen)
+def _freeze_noisy(features: Floats, fault: FaultState) -> Floats:
+    held: Floats = fault.hold("held", features)
+    return held + PIXEL_NOISE * fault.rng.standard_normal(4)
 
 
-def _zoom(seen: Floats, now: Moment) -> Floats:
-    centre = np.tile(np.array(now.size) / 2, 2)
-    return centre + now.fault.size * (seen - centre)
-
-
-def _drift(seen: Floats, now: Moment) -> Floats:
-    side = now.first("side", now.chance.choice((-1, 1)))
-    return seen + now.push(side * now.fault.size * now.since)
-
-
-def _bias(seen: Floats, now: Moment) -> Floats:
-    return seen + now.push(now.first("side", now.chance.choice((-1, 1))) * now.fault.size)
-
-
-def _freeze_noisy(seen: Floats, now: Moment) -> Floats:
-    held: Floats = now.first("held", seen)
-    return held + PIXEL_NOISE * now.chance.standard_normal(4)
-
-
-def _freeze_some(seen: Floats, now: Moment) -> Floats:
-    if now.count() % round(now.fault.size) == 0:
-        now.memory["held"] = seen
-    held: Floats = now.memory["held"]
+def _freeze_some(features: Floats, fault: FaultState) -> Floats:
+    if fault.count() % round(fault.spec.size) == 0:
+        fault.memory["held"] = features
+    held: Floats = fault.memory["held"]
     return held
 
 
-def _lose(seen: Floats, *bands: int) -> Floats:
+def _drop_bands(features: Floats, *bands: int) -> Floats:
     lost = np.repeat([band in bands for band in (0, 1)], 2)
-    return np.where(lost, np.nan, seen)
+    return np.where(lost, np.nan, features)
 
 
-def _lose_some(seen: Floats, now: Moment) -> Floats:
-    return seen if int(now.since / now.fault.size) % 2 else _lose(seen, 0, 1)
+def _drop_bands_alternately(features: Floats, fault: FaultState) -> Floats:
+    return features if int(fault.elapsed / fault.spec.size) % 2 else _drop_bands(features, 0, 1)
 
 
-def _spoil(seen: Floats, now: Moment) -> Floats:
-    spoilt = seen.copy()
-    spoilt[now.chance.integers(4)] = now.chance.choice([np.nan, np.inf, -np.inf])
-    return spoilt
+def _make_non_finite(features: Floats, fault: FaultState) -> Floats:
+    changed = features.copy()
+    changed[fault.rng.integers(4)] = fault.rng.choice([np.nan, np.inf, -np.inf])
+    return changed
 
 
-FEATURES: dict[str, Seen] = {
-    "outlier": _outlier,
-    "outliers": _scatter,
-    "outliers_some": _some(_scatter),
-    "noisy": lambda seen, now: seen + now.fault.size * now.chance.standard_normal(4),
-    "random": lambda _, now: _anywhere(now),
-    "swapped": lambda seen, _: _swap(seen),
-    "swapped_some": _swap_some,
-    "merged": lambda seen, _: _merge(seen),
-    "band_elsewhere": _elsewhere,
-    "mirrored": lambda seen, now: _flip(seen, now, turn=False),
-    "turned": lambda seen, now: _flip(seen, now, turn=True),
+FEATURE_FAULTS: dict[str, FeatureFault] = {
+    "outlier": _shift_once,
+    "outliers": _shift_randomly,
+    "outliers_some": _every_third(_shift_randomly),
+    "noisy": lambda features, fault: features + fault.spec.size * fault.rng.standard_normal(4),
+    "random": lambda _, fault: _random_pixels(fault),
+    "swapped": lambda features, _: features[_SWAPPED],
+    "swapped_some": _swap_some_bands,
+    "merged": lambda features, _: np.tile((features[:2] + features[2:]) / 2, 2),
+    "band_elsewhere": _fix_band_b,
+    "mirrored": lambda features, fault: _mirror(features, fault, vertically=False),
+    "turned": lambda features, fault: _mirror(features, fault, vertically=True),
     "zoomed": _zoom,
-    "biased": _bias,
-    "drifting": _drift,
-    "frozen": lambda seen, now: now.first("held", seen),
+    "biased": lambda features, fault: features + fault.channel_shift(fault.sign * fault.spec.size),
+    "drifting": _add_drift,
+    "frozen": lambda features, fault: fault.hold("held", features),
     "frozen_noisy": _freeze_noisy,
     "frozen_some": _freeze_some,
-    "band_a_lost": lambda seen, _: _lose(seen, 0),
-    "band_b_lost": lambda seen, _: _lose(seen, 1),
-    "bands_lost": lambda seen, _: _lose(seen, 0, 1),
-    "bands_some": _lose_some,
-    "not_finite": _spoil,
+    "band_a_lost": lambda features, _: _drop_bands(features, 0),
+    "band_b_lost": lambda features, _: _drop_bands(features, 1),
+    "bands_lost": lambda features, _: _drop_bands(features, 0, 1),
+    "bands_some": _drop_bands_alternately,
+    "not_finite": _make_non_finite,
 }
-"""Measured features (4,) to what the loop is told."""
+"""Kind -> model of the measured features (4,)."""
 
-IMAGES: dict[str, Shown] = {
-    "random": lambda image, now: now.chance.integers(0, 256, image.shape, np.uint8),
+IMAGE_FAULTS: dict[str, ImageFault] = {
+    "random": lambda image, fault: fault.rng.integers(0, 256, image.shape, np.uint8),
     "mirrored": lambda image, _: np.ascontiguousarray(image[:, ::-1]),
     "turned": lambda image, _: np.ascontiguousarray(image[::-1, ::-1]),
-    "frozen": lambda image, now: now.first("held", image),
+    "frozen": lambda image, fault: fault.hold("held", image),
     "bands_lost": lambda image, _: np.zeros_like(image),
 }
-"""The same for pictures, where it can be done to them."""
+"""Kind -> model of the image, for the kinds that apply to images."""
 
 
-def _stamped(frame: Frame, captured_at: float) -> Frame:
+def _with_stamp(frame: Frame, captured_at: float) -> Frame:
     return replace(frame, captured_at=captured_at)
 
 
-def _late_unknown(due: float, frame: Frame, now: Moment) -> Arrivals:
-    return [(due + now.fault.size, _stamped(frame, frame.captured_at + now.fault.size))]
+def _delay_with_stamp(due: float, frame: Frame, fault: FaultState) -> Arrivals:
+    return [(due + fault.spec.size, _with_stamp(frame, frame.captured_at + fault.spec.size))]
 
 
-def _stamp_jitter(due: float, frame: Frame, now: Moment) -> Arrivals:
-    error = now.fault.size * now.chance.uniform(-1, 1)
-    return [(due, _stamped(frame, min(frame.captured_at + error, due)))]
+def _jitter_stamp(due: float, frame: Frame, fault: FaultState) -> Arrivals:
+    error = fault.spec.size * fault.rng.uniform(-1, 1)
+    return [(due, _with_stamp(frame, min(frame.captured_at + error, due)))]
 
 
-def _twice(due: float, frame: Frame, now: Moment) -> Arrivals:
-    return [(due, frame), (due + 0.5 * _spacing(frame, now), frame)]
+def _duplicate(due: float, frame: Frame, fault: FaultState) -> Arrivals:
+    return [(due, frame), (due + 0.5 * _frame_interval(frame, fault), frame)]
 
 
-def _spacing(frame: Frame, now: Moment) -> float:
-    """Time between the last two frames [s]."""
-    last: float = now.memory.get("last", frame.captured_at)
-    now.memory["last"] = frame.captured_at
+def _frame_interval(frame: Frame, fault: FaultState) -> float:
+    """Time since the previous frame [s]."""
+    last: float = fault.memory.get("last", frame.captured_at)
+    fault.memory["last"] = frame.captured_at
     return frame.captured_at - last
 
 
-def _reorder(due: float, frame: Frame, now: Moment) -> Arrivals:
-    if now.count() % 2 == 0:
-        now.memory["kept"] = frame
+def _reorder(due: float, frame: Frame, fault: FaultState) -> Arrivals:
+    if fault.count() % 2 == 0:
+        fault.memory["kept"] = frame
         return []
-    return [(due, frame), (due + 0.5 * _spacing(frame, now), now.memory["kept"])]
+    return [(due, frame), (due + 0.5 * _frame_interval(frame, fault), fault.memory["kept"])]
 
 
-def _drop(due: float, frame: Frame, now: Moment) -> Arrivals:
-    return [] if now.chance.uniform() < now.fault.size else [(due, frame)]
-
-
-def _slow_down(due: float, frame: Frame, now: Moment) -> Arrivals:
-    if now.since < now.memory.get("next", 0.0):
+def _limit_rate(due: float, frame: Frame, fault: FaultState) -> Arrivals:
+    if fault.elapsed < fault.memory.get("next", 0.0):
         return []
-    now.memory["next"] = now.since + 1 / now.fault.size
+    fault.memory["next"] = fault.elapsed + 1 / fault.spec.size
     return [(due, frame)]
 
 
-def _slow_clock(due: float, frame: Frame, now: Moment) -> Arrivals:
-    start = now.first("start", frame.captured_at)
-    return [(due, _stamped(frame, start + now.fault.size * (frame.captured_at - start)))]
+def _slow_stamps(due: float, frame: Frame, fault: FaultState) -> Arrivals:
+    start = fault.hold("start", frame.captured_at)
+    return [(due, _with_stamp(frame, start + fault.spec.size * (frame.captured_at - start)))]
 
 
-FRAMES: dict[str, Timed] = {
-    "late": lambda due, frame, now: [(due + now.fault.size, frame)],
-    "late_unknown": _late_unknown,
-    "jitter": lambda due, frame, now: [(due + now.fault.size * now.chance.uniform(), frame)],
-    "stamp_jitter": _stamp_jitter,
-    "duplicate": _twice,
+ARRIVAL_FAULTS: dict[str, ArrivalFault] = {
+    "late": lambda due, frame, fault: [(due + fault.spec.size, frame)],
+    "late_unknown": _delay_with_stamp,
+    "jitter": lambda due, frame, fault: [(due + fault.spec.size * fault.rng.uniform(), frame)],
+    "stamp_jitter": _jitter_stamp,
+    "duplicate": _duplicate,
     "reordered": _reorder,
-    "dropped": _drop,
-    "camera_off": lambda _due, _frame, _now: [],
-    "slow_camera": _slow_down,
-    "stamp_hour": lambda due, frame, now: [
-        (due, _stamped(frame, frame.captured_at + now.fault.size))
+    "dropped": lambda due, frame, fault: (
+        [] if fault.rng.uniform() < fault.spec.size else [(due, frame)]
+    ),
+    "camera_off": lambda _due, _frame, _fault: [],
+    "slow_camera": _limit_rate,
+    "stamp_hour": lambda due, frame, fault: [
+        (due, _with_stamp(frame, frame.captured_at + fault.spec.size))
     ],
-    "stamp_nan": lambda due, frame, _: [(due, _stamped(frame, np.nan))],
-    "stamp_stuck": lambda due, frame, now: [
-        (due, _stamped(frame, now.first("held", frame.captured_at)))
+    "stamp_nan": lambda due, frame, _: [(due, _with_stamp(frame, np.nan))],
+    "stamp_stuck": lambda due, frame, fault: [
+        (due, _with_stamp(frame, fault.hold("held", frame.captured_at)))
     ],
-    "stamp_slow": _slow_clock,
+    "stamp_slow": _slow_stamps,
 }
-"""A frame and when it is due to what arrives when."""
+"""Kind -> model of arrival time, time stamp and loss: one frame in, the arriving frames out."""

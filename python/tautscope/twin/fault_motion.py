@@ -1,201 +1,189 @@
-"""What faults of hand, drives and physics do.
+"""Fault models of the operator input, the drives, the encoders and the plant.
 
-Each act is given a value (3,) [m, rad, rad] and the moment, and gives back another.
+A model of an axis maps the value of one DOF [m or rad] to the faulty value.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tautscope.twin.fault_frames import Moment
-from tautscope.twin.fault_kinds import PER_MM
+from tautscope.twin.fault_state import FaultState, Floats
 from tautscope.twin.plant import Plant
 
-Floats = NDArray[np.float64]
-Act = Callable[[Floats, Moment], Floats]
-Physical = Callable[[Plant, Moment], None]
+AxisFault = Callable[[float, FaultState], float]
+PlantFault = Callable[[Plant, FaultState], None]
 
-RATE = 5.0
-"""Of what happens now and then [1/s]."""
-JERKS = 2.0
-"""Of tissue that comes and goes [1/s]."""
-WINDING = 5.0
-"""Time in which the scope bends further [s]."""
-STRAIGHTENING = 1.0
-"""[s]."""
-
-
-def amount(now: Moment) -> float:
-    """The severity of a fault in mm, in the unit of its DOF [m or rad]."""
-    return now.fault.size * PER_MM[now.fault.dof]
+EVENT_RATE = 5.0
+"""Rate of intermittent spikes and stalls [1/s]."""
+JERK_RATE = 2.0
+"""Rate at which an intermittent tissue force is applied [1/s]."""
+WINDING_TIME = 5.0
+"""Time in which the number of bends grows [s]."""
+STRAIGHTENING_TIME = 1.0
+"""Time in which the number of bends falls [s]."""
 
 
-def on_axis(act: Callable[[float, Moment], float]) -> Act:
-    """The act on one axis, the others as they are."""
-
-    def whole(values: Floats, now: Moment) -> Floats:
-        changed = values.copy()
-        changed[now.fault.dof] = act(float(values[now.fault.dof]), now)
-        return changed
-
-    return whole
-
-
-def _side(now: Moment) -> float:
-    return float(now.first("side", now.chance.choice((-1, 1))))
+def apply_to_axes(
+    models: dict[str, AxisFault], values: Floats, faults: Sequence[FaultState]
+) -> Floats:
+    """Values (3,) [m, rad, rad] with the faults that have one of the models, in their order."""
+    for fault in faults:
+        if (model := models.get(fault.spec.kind)) is not None:
+            values = values.copy()
+            values[fault.spec.dof] = model(float(values[fault.spec.dof]), fault)
+    return values
 
 
-def _held(value: float, now: Moment) -> float:
-    return float(now.first("held", value))
+def _hold(value: float, fault: FaultState) -> float:
+    return float(fault.hold("held", value))
 
 
-def _held_some(value: float, now: Moment) -> float:
-    if int(now.since / now.fault.size) % 2 or "held" not in now.memory:
-        now.memory["held"] = value
-    return float(now.memory["held"])
+def _hold_intermittently(value: float, fault: FaultState) -> float:
+    if int(fault.elapsed / fault.spec.size) % 2 or "held" not in fault.memory:
+        fault.memory["held"] = value
+    return float(fault.memory["held"])
 
 
-def _behind(value: float, now: Moment) -> float:
-    """What it was so long ago; before that is known, the first."""
-    past: deque[tuple[float, float]] = now.first("past", deque())
-    past.append((now.since, value))
-    while len(past) > 1 and past[1][0] <= now.since - now.fault.size:
+def _delay(value: float, fault: FaultState) -> float:
+    """The delayed value; the first one until the delay has passed."""
+    past: deque[tuple[float, float]] = fault.hold("past", deque())
+    past.append((fault.elapsed, value))
+    while len(past) > 1 and past[1][0] <= fault.elapsed - fault.spec.size:
         past.popleft()
     return past[0][1]
 
 
-def _slower(value: float, now: Moment) -> float:
-    last, at = now.memory.get("last", (value, now.since))
-    reach = amount(now) * (now.since - at)
+def _limit_speed(value: float, fault: FaultState) -> float:
+    last, at = fault.memory.get("last", (value, fault.elapsed))
+    reach = fault.amplitude * (fault.elapsed - at)
     moved = float(np.clip(value, last - reach, last + reach))
-    now.memory["last"] = moved, now.since
+    fault.memory["last"] = moved, fault.elapsed
     return moved
 
 
-def _limited(value: float, now: Moment) -> float:
-    start, room = _held(value, now), amount(now)
+def _limit_range(value: float, fault: FaultState) -> float:
+    start, room = _hold(value, fault), fault.amplitude
     return float(np.clip(value, start - room, start + room))
 
 
-def _reversed(value: float, now: Moment) -> float:
-    return 2 * _held(value, now) - value
+def _scale(value: float, fault: FaultState) -> float:
+    start = _hold(value, fault)
+    return start + fault.spec.size * (value - start)
 
 
-def _scaled(value: float, now: Moment) -> float:
-    start = _held(value, now)
-    return start + now.fault.size * (value - start)
+def _unscale(value: float, fault: FaultState) -> float:
+    """The encoder position in the wrong counts: it agrees with the command."""
+    start = fault.memory.get("held", value)
+    return float(start + (value - start) / fault.spec.size)
 
 
-def _unscaled(value: float, now: Moment) -> float:
-    """What the encoder says of it: the counts agree with the command."""
-    start = now.memory.get("held", value)
-    return float(start + (value - start) / now.fault.size)
+def _add_noise(value: float, fault: FaultState) -> float:
+    return value + fault.amplitude * fault.rng.uniform(-1, 1)
 
 
-def _shaken(value: float, now: Moment) -> float:
-    return value + amount(now) * now.chance.uniform(-1, 1)
+def _hold_and_ramp(value: float, fault: FaultState) -> float:
+    return _hold(value, fault) + fault.sign * fault.amplitude * fault.elapsed
 
 
-def _running(value: float, now: Moment) -> float:
-    return _held(value, now) + _side(now) * amount(now) * now.since
+def _add_ramp(value: float, fault: FaultState) -> float:
+    return value + fault.sign * fault.amplitude * fault.elapsed
 
 
-def _displaced(value: float, now: Moment) -> float:
-    return value + _side(now) * amount(now)
+def _add_offset(value: float, fault: FaultState) -> float:
+    return value + fault.sign * fault.amplitude
 
 
-def _replaced(value: float, now: Moment) -> float:
-    """The encoder reads the drive's belief, so that nothing shows but the jump itself."""
-    return value - _side(now) * amount(now)
+def _subtract_offset(value: float, fault: FaultState) -> float:
+    """The encoder position without the jump: only the jump itself is visible to the drive."""
+    return value - fault.sign * fault.amplitude
 
 
-DRIVES: dict[str, Act] = {
-    "axis_off": on_axis(_held),
-    "axis_stuck": on_axis(_held),
-    "axis_some": on_axis(_held_some),
-    "axis_slow": on_axis(_slower),
-    "axis_late": on_axis(_behind),
-    "axis_limited": on_axis(_limited),
-    "axis_reversed": on_axis(_reversed),
-    "axis_scaled": on_axis(_scaled),
-    "axis_shaking": on_axis(_shaken),
-    "axis_runs": on_axis(_running),
-    "encoder_jump": on_axis(_displaced),
+DRIVE_FAULTS: dict[str, AxisFault] = {
+    "axis_off": _hold,
+    "axis_stuck": _hold,
+    "axis_some": _hold_intermittently,
+    "axis_slow": _limit_speed,
+    "axis_late": _delay,
+    "axis_limited": _limit_range,
+    "axis_reversed": lambda value, fault: 2 * _hold(value, fault) - value,
+    "axis_scaled": _scale,
+    "axis_shaking": _add_noise,
+    "axis_runs": _hold_and_ramp,
+    "encoder_jump": _add_offset,
 }
-"""The command to what the motor is told."""
+"""Kind -> model from the command to the set-point of the motor."""
 
-ENCODERS: dict[str, Act] = {
-    "axis_scaled": on_axis(_unscaled),
-    "encoder_jump": on_axis(_replaced),
-    "encoder_stuck": on_axis(_held),
-    "encoder_noisy": on_axis(_shaken),
+ENCODER_FAULTS: dict[str, AxisFault] = {
+    "axis_scaled": _unscale,
+    "encoder_jump": _subtract_offset,
+    "encoder_stuck": _hold,
+    "encoder_noisy": _add_noise,
 }
-"""Where the motor is to what the drive reports."""
+"""Kind -> model from the motor position to the position the drive reports."""
 
 
-def _spike(value: float, now: Moment) -> float:
-    if int(now.since * RATE) != now.memory.get("period"):
-        now.memory["period"] = int(now.since * RATE)
-        return value + amount(now) * float(now.chance.choice((-1, 1)))
+def _add_spikes(value: float, fault: FaultState) -> float:
+    if int(fault.elapsed * EVENT_RATE) != fault.memory.get("period"):
+        fault.memory["period"] = int(fault.elapsed * EVENT_RATE)
+        return value + fault.amplitude * float(fault.rng.choice((-1, 1)))
     return value
 
 
-def _updated(value: float, now: Moment) -> float:
-    if now.since >= now.memory.get("next", 0.0):
-        now.memory["next"] = now.since + 1 / now.fault.size
-        now.memory["held"] = value
-    return float(now.memory["held"])
+def _resample(value: float, fault: FaultState) -> float:
+    if fault.elapsed >= fault.memory.get("next", 0.0):
+        fault.memory["next"] = fault.elapsed + 1 / fault.spec.size
+        fault.memory["held"] = value
+    return float(fault.memory["held"])
 
 
-def _trembling(value: float, now: Moment) -> float:
-    frequency = now.first("frequency", now.chance.uniform(6, 12))
-    return value + amount(now) * float(np.sin(2 * np.pi * frequency * now.since))
+def _add_tremor(value: float, fault: FaultState) -> float:
+    frequency = fault.hold("frequency", fault.rng.uniform(6, 12))
+    return value + fault.amplitude * float(np.sin(2 * np.pi * frequency * fault.elapsed))
 
 
-HANDS: dict[str, Act] = {
-    "hand_step": on_axis(_displaced),
-    "hand_spikes": on_axis(_spike),
-    "hand_fast": on_axis(lambda value, now: value + _side(now) * amount(now) * now.since),
-    "hand_noisy": on_axis(_shaken),
-    "hand_nan": on_axis(lambda _, now: float(now.chance.choice([np.nan, np.inf, -np.inf]))),
-    "hand_silent": on_axis(_held),
-    "hand_late": on_axis(_behind),
-    "hand_slow": on_axis(_updated),
-    "hand_tremor": on_axis(_trembling),
-    "hand_displaced": on_axis(_displaced),
+REFERENCE_FAULTS: dict[str, AxisFault] = {
+    "hand_step": _add_offset,
+    "hand_spikes": _add_spikes,
+    "hand_fast": _add_ramp,
+    "hand_noisy": _add_noise,
+    "hand_nan": lambda _, fault: float(fault.rng.choice([np.nan, np.inf, -np.inf])),
+    "hand_silent": _hold,
+    "hand_late": _delay,
+    "hand_slow": _resample,
+    "hand_tremor": _add_tremor,
+    "hand_displaced": _add_offset,
 }
-"""What the hand means to what its device says."""
+"""Kind -> model from the operator's reference to the reference of the input device."""
 
 
-def _bend(plant: Plant, now: Moment, within: float) -> None:
-    before = now.first("bends", plant.bends)
-    share = min(1.0, now.since / within) if within else 1.0
-    plant.bends = before + share * (now.fault.size - before)
+def _change_bends(plant: Plant, fault: FaultState, duration: float) -> None:
+    before = fault.hold("bends", plant.bends)
+    share = min(1.0, fault.elapsed / duration) if duration else 1.0
+    plant.bends = before + share * (fault.spec.size - before)
 
 
-def _push(plant: Plant, now: Moment) -> None:
-    plant.tip_force = now.fault.size
+def _push_tip(plant: Plant, fault: FaultState) -> None:
+    plant.tip_force = fault.spec.size
 
 
-def _jerk(plant: Plant, now: Moment) -> None:
-    plant.tip_force = now.fault.size * (int(2 * JERKS * now.since) % 2 == 0)
+def _jerk_tip(plant: Plant, fault: FaultState) -> None:
+    plant.tip_force = fault.spec.size * (int(2 * JERK_RATE * fault.elapsed) % 2 == 0)
 
 
-def _rub(plant: Plant, now: Moment) -> None:
-    plant.section_friction = now.fault.size
+def _set_section_friction(plant: Plant, fault: FaultState) -> None:
+    plant.section_friction = fault.spec.size
 
 
-PHYSICS: dict[str, Physical] = {
-    "straightens": lambda plant, now: _bend(plant, now, STRAIGHTENING),
-    "straightens_suddenly": lambda plant, now: _bend(plant, now, 0.0),
-    "winds": lambda plant, now: _bend(plant, now, WINDING),
-    "tissue_pushes": _push,
-    "tissue_jerks": _jerk,
-    "section_stiff": _rub,
-    "section_loose": _rub,
+PLANT_FAULTS: dict[str, PlantFault] = {
+    "straightens": lambda plant, fault: _change_bends(plant, fault, STRAIGHTENING_TIME),
+    "straightens_suddenly": lambda plant, fault: _change_bends(plant, fault, 0.0),
+    "winds": lambda plant, fault: _change_bends(plant, fault, WINDING_TIME),
+    "tissue_pushes": _push_tip,
+    "tissue_jerks": _jerk_tip,
+    "section_stiff": _set_section_friction,
+    "section_loose": _set_section_friction,
 }
-"""Done to the plant before each of its steps."""
+"""Kind -> model that changes the plant before each of its steps."""

@@ -1,30 +1,35 @@
-"""A twin in which something fails, for a purpose: seeded, and never anything but a twin."""
+"""Fault injection into the simulated rig and into the operator's reference, seeded."""
 
 from __future__ import annotations
 
-import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
-import cv2
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from tautscope.config import Config
 from tautscope.errors import FieldError
 from tautscope.loop.references import Reference, Segment
 from tautscope.loop.rig import Frame, Sample
-from tautscope.twin.fault_frames import FEATURES, FRAMES, IMAGES, Arrivals, FeatureFrame, Moment
+from tautscope.twin import fault_motion as motion
+from tautscope.twin.fault_frames import (
+    ARRIVAL_FAULTS,
+    FEATURE_FAULTS,
+    IMAGE_FAULTS,
+    Arrivals,
+    FeatureFrame,
+)
 from tautscope.twin.fault_kinds import KINDS, PER_MM, Fault, Kind, Mode, Target
-from tautscope.twin.fault_motion import DRIVES, ENCODERS, HANDS, PHYSICS, RATE, Act
+from tautscope.twin.fault_state import FaultState, Floats
 from tautscope.twin.plant import Plant
+from tautscope.twin.projection import channel_jacobian
 from tautscope.twin.rig import Twin
 
 __all__ = [
     "KINDS",
     "PER_MM",
     "Fault",
-    "FaultyHand",
+    "FaultyReference",
     "FaultyRig",
     "FeatureFrame",
     "Kind",
@@ -32,261 +37,211 @@ __all__ = [
     "Target",
 ]
 
-Floats = NDArray[np.float64]
-
-_TOGETHER: tuple[tuple[Target, ...], ...] = (
-    (Target.FEATURES, Target.FRAMES),
-    (Target.PHYSICS,),
-    (Target.DRIVE,),
-    (Target.TICK,),
-)
-"""What is asked for at once; only these are."""
-_PUSH = 1e-4
-"""Over which the features' way along the channel is taken [m]."""
-
 
 class FaultyRig:
-    """A twin with faults in its camera, clock, drives and physics; implements `Rig`.
+    """A simulated rig with faults in its camera, clock, drives and plant; implements `Rig`.
 
-    What fails is what the loop sees and does. The truth, `Sample.true_state` and the true features
-    and visible share of a `Frame`, stays the truth. Faults act in the order of the list. Without
-    one that is active, samples are the twin's own, bit for bit.
+    Faults change what the loop measures and commands, in the order of the list. The ground truth
+    (`Sample.true_state`, true features and visible share of a `Frame`) is not changed. Without an
+    active fault the samples are those of the twin, bit for bit.
 
-    Faults of the hand do nothing here: `FaultyHand` has them.
+    Faults of the operator input have no effect here; see `FaultyReference`.
 
     Args:
-        twin: What fails; it may be under way already. Nothing else is ever made to fail.
-        faults: What goes wrong, and when.
-        seed: Of everything random about them; the same gives the same bytes.
+        twin: The simulated rig; it may already be running.
+        faults: Kind, time and severity of each fault.
+        seed: Random seed; the same seed gives the same bytes.
 
     Raises:
-        FieldError: The rig is no twin, or a picture cannot be spoilt as asked.
+        FieldError: The rig is not a `Twin`, or a fault cannot be applied to images.
     """
 
     def __init__(self, twin: Twin, faults: Sequence[Fault], seed: int) -> None:
         if not isinstance(twin, Twin):
             raise FieldError("twin", twin, "a simulated Twin: faults are never made on hardware")
         for index, fault in enumerate(faults):
-            if twin.draws and fault.row.target is Target.FEATURES and not fault.row.on_images:
+            has_model = fault.row.on_images or fault.row.target is not Target.FEATURES
+            if twin.has_images and not has_model:
                 allowed = [kind.name for kind in KINDS.values() if kind.on_images]
                 raise FieldError(
-                    f"faults[{index}].kind", fault.kind, "on pictures: " + str(allowed)
+                    f"faults[{index}].kind", fault.kind, f"one that applies to images: {allowed}"
                 )
         self._twin = twin
         self._faults = tuple(faults)
         self._seed = seed
-        self._held: Floats | None = None
-        self._forget()
+        self._brake_position: Floats | None = None
+        self._reset_faults()
 
     @property
     def control_period(self) -> float:
-        """[s]."""
+        """Control period [s]."""
         return self._twin.control_period
 
     @property
     def true_time(self) -> float:
-        """The twin's own clock, whatever the samples say [s]."""
+        """Time of the twin's clock [s], which clock faults do not change."""
         return self._time
 
     @property
     def drive_fault(self) -> bool:
         """Whether a drive reports a fault now."""
-        return any(fault.kind == "axis_off" and fault.active(self._time) for fault in self._faults)
+        return any(
+            fault.kind == "axis_off" and fault.is_active(self._time) for fault in self._faults
+        )
 
     def reset(self) -> Sample:
-        """As `Twin.reset`."""
+        """As `Twin.reset`; every fault starts anew."""
         sample = self._twin.reset()
-        self._forget()
-        return self._seen(sample)
+        self._reset_faults()
+        return self._with_sensor_faults(sample)
 
     def step(self, command: ArrayLike) -> Sample:
-        """As `Twin.step`; a stall lets many control periods pass at once."""
-        sample = self._once(command)
+        """As `Twin.step`; during a stall several control periods pass in one call."""
+        sample = self._step_once(command)
         for _ in range(self._missed_ticks()):
             frame = sample.frame
-            sample = self._once(command)
+            sample = self._step_once(command)
             if sample.frame is None:
                 sample = replace(sample, frame=frame)
         return sample
 
     def brake(self) -> None:
-        """From now on the motors stay where they are, whatever they are told, and whatever their
-        encoders say; a motor that runs against its brake is none of the faults.
-        """  # noqa: D205
-        self._held = self._twin.plant.applied
+        """Hold the motors where they are, whatever they are commanded and the encoders read."""
+        self._brake_position = self._twin.plant.applied
 
     def close(self) -> None:
         """As `Twin.close`."""
         self._twin.close()
 
-    def _forget(self) -> None:
-        self._held = None
+    def _reset_faults(self) -> None:
+        self._brake_position = None
         self._time = self._twin.time
-        self._under_way: Arrivals = []
-        camera, instrument = self._twin.config.camera, self._twin.config.instrument
-        places = instrument.marker_a, instrument.marker_b
-        self._eye = _Eye(self._twin.config, places)
-        self._moments = [
-            _moment(fault, self._seed, index, (camera.width, camera.height), self._along)
+        self._in_transit: Arrivals = []
+        camera = self._twin.config.camera
+        self._states = [
+            FaultState.seeded(
+                fault,
+                self._seed,
+                index,
+                image_size=(camera.width, camera.height),
+                channel_jacobian=lambda: channel_jacobian(self._twin.config, self._twin.plant),
+            )
             for index, fault in enumerate(self._faults)
         ]
-        self._together = {
-            targets: [each for each in self._moments if each.fault.row.target in targets]
-            for targets in _TOGETHER
-        }
 
-    def _along(self) -> Floats:
-        return self._eye.along(self._twin.plant)
+    def _active(self, *targets: Target) -> list[FaultState]:
+        return [
+            fault
+            for fault in self._states
+            if fault.spec.row.target in targets and fault.update(self._time)
+        ]
 
-    def _active(self, *targets: Target) -> list[Moment]:
-        found = []
-        for moment in self._together[targets]:
-            if moment.fault.active(self._time):
-                moment.since = self._time - moment.fault.start
-                found.append(moment)
-        return found
+    def _step_once(self, command: ArrayLike) -> Sample:
+        target = self._brake_position
+        if target is None:
+            values = np.asarray(command, dtype=np.float64)
+            target = motion.apply_to_axes(motion.DRIVE_FAULTS, values, self._active(Target.DRIVE))
+        self._change_plant(self._twin.plant)
+        return self._with_sensor_faults(self._twin.step(target))
 
-    def _once(self, command: ArrayLike) -> Sample:
-        told = self._held
-        if told is None:
-            told = _acted(DRIVES, np.asarray(command, dtype=np.float64), self._active(Target.DRIVE))
-        self._disturb(self._twin.plant)
-        return self._seen(self._twin.step(told))
-
-    def _disturb(self, plant: Plant) -> None:
-        for moment in self._active(Target.PHYSICS):
-            moment.memory["acted"] = True
-            PHYSICS[moment.fault.kind](plant, moment)
-        for moment in self._together[(Target.PHYSICS,)]:
-            # What a fault changed, it gives back once: later it may be another's.
-            over = not moment.fault.active(self._time)
-            if over and moment.memory.pop("acted", False):
-                plant.bends = moment.memory.pop("bends", plant.bends)
+    def _change_plant(self, plant: Plant) -> None:
+        for fault in self._active(Target.PHYSICS):
+            fault.memory["acted"] = True
+            motion.PLANT_FAULTS[fault.spec.kind](plant, fault)
+        for fault in self._states:
+            # A fault that ended restores the plant once: later its values may be another fault's.
+            if not fault.spec.is_active(self._time) and fault.memory.pop("acted", False):
+                plant.bends = fault.memory.pop("bends", plant.bends)
                 plant.tip_force, plant.section_friction = 0.0, 1.0
 
-    def _seen(self, sample: Sample) -> Sample:
+    def _with_sensor_faults(self, sample: Sample) -> Sample:
         self._time = sample.time
         if not self._faults:
             return sample
-        applied = _acted(ENCODERS, sample.applied, self._active(Target.DRIVE))
-        frame = self._arrived(sample)
+        drives = self._active(Target.DRIVE)
+        applied = motion.apply_to_axes(motion.ENCODER_FAULTS, sample.applied, drives)
+        frame = self._newest_frame(sample)
         if frame is not None and (stamp := self._clock(frame.captured_at)) != frame.captured_at:
             frame = replace(frame, captured_at=stamp)
         return Sample(self._clock(sample.time), applied, frame, sample.true_state)
 
-    def _arrived(self, sample: Sample) -> Frame | None:
+    def _newest_frame(self, sample: Sample) -> Frame | None:
         if sample.frame is not None:
-            self._under_way += self._spoilt(sample.time, sample.frame)
-            self._under_way.sort(key=lambda each: each[0])
+            self._in_transit += self._with_camera_faults(sample.time, sample.frame)
+            self._in_transit.sort(key=lambda arrival: arrival[0])
         newest = None
-        while self._under_way and self._under_way[0][0] <= sample.time:
-            newest = self._under_way.pop(0)[1]
+        while self._in_transit and self._in_transit[0][0] <= sample.time:
+            newest = self._in_transit.pop(0)[1]
         return newest
 
-    def _spoilt(self, due: float, frame: Frame) -> Arrivals:
-        arrivals = [(due, frame)]
-        for moment in self._active(Target.FEATURES, Target.FRAMES):
-            timed = FRAMES.get(moment.fault.kind)
-            if timed is None:
-                arrivals = [(at, _looked(each, moment)) for at, each in arrivals]
+    def _with_camera_faults(self, time: float, frame: Frame) -> Arrivals:
+        arrivals = [(time, frame)]
+        for fault in self._active(Target.FEATURES, Target.FRAMES):
+            model = ARRIVAL_FAULTS.get(fault.spec.kind)
+            if model is None:
+                arrivals = [(due, _with_content_fault(each, fault)) for due, each in arrivals]
             else:
-                arrivals = [new for at, each in arrivals for new in timed(at, each, moment)]
+                arrivals = [new for due, each in arrivals for new in model(due, each, fault)]
         return arrivals
 
     def _clock(self, time: float) -> float:
-        """What the rig's clock shows at a time."""
-        shown = time
+        """Reading of the rig's faulty clock at a true time [s]."""
+        reading = time
         for fault in self._faults:
             if time >= fault.start and fault.kind in {"clock_ahead", "clock_back"}:
-                shown += fault.size if fault.kind == "clock_ahead" else -fault.size
+                reading += fault.size if fault.kind == "clock_ahead" else -fault.size
             elif time >= fault.start and fault.kind == "clock_slow":
-                shown -= (1 - fault.size) * min(time - fault.start, fault.duration)
-        return shown
+                reading -= (1 - fault.size) * min(time - fault.start, fault.duration)
+        return reading
 
     def _missed_ticks(self) -> int:
         missed = 0.0
-        for moment in self._active(Target.TICK):
-            again = moment.fault.kind == "stalls" and moment.since * RATE >= moment.stalls
-            if again or (moment.fault.kind == "stall" and moment.stalls == 0):
-                moment.stalls += 1
-                missed += moment.fault.size
+        for fault in self._active(Target.TICK):
+            kind, stalls = fault.spec.kind, fault.stalls
+            is_due = kind == "stalls" and fault.elapsed * motion.EVENT_RATE >= stalls
+            if is_due or (kind == "stall" and stalls == 0):
+                fault.stalls += 1
+                missed += fault.spec.size
         return round(missed / self.control_period)
 
 
-class FaultyHand:
-    """A reference that comes out of a device with faults; a `Reference`.
+class FaultyReference:
+    """The operator's reference through an input device with faults; a `Reference`.
 
-    To be called once per tick, with times that grow.
+    Call it once per tick, with rising times.
 
     Args:
-        reference: What the hand does.
-        faults: Those of the hand act, the others do not.
-        seed: As `FaultyRig`.
+        reference: The operator's reference.
+        faults: Those of the operator input are applied, others have no effect.
+        seed: As for `FaultyRig`.
     """
 
     def __init__(self, reference: Reference, faults: Sequence[Fault], seed: int) -> None:
         self._reference = reference
-        self._moments = [
-            _moment(fault, seed, index, (1, 1), lambda: np.zeros(4))
+        self._states = [
+            FaultState.seeded(fault, seed, index)
             for index, fault in enumerate(faults)
             if fault.row.target is Target.REFERENCE
         ]
 
     @property
     def duration(self) -> float:
-        """[s]."""
+        """Duration of the reference [s]."""
         return self._reference.duration
 
     @property
     def segments(self) -> Sequence[Segment]:
-        """Those of what the hand does."""
+        """Segments of the reference."""
         return self._reference.segments
 
     def __call__(self, time: float) -> Floats:
         """(3,) [m, rad, rad] at `time` [s from the start of the reference]."""
-        active = [moment for moment in self._moments if moment.fault.active(time)]
-        for moment in active:
-            moment.since = time - moment.fault.start
-        return _acted(HANDS, self._reference(time), active)
+        active = [fault for fault in self._states if fault.update(time)]
+        return motion.apply_to_axes(motion.REFERENCE_FAULTS, self._reference(time), active)
 
 
-class _Eye:
-    """Where the bands are in the picture, by the physics and OpenCV: nothing of the loop."""
-
-    def __init__(self, config: Config, places: tuple[float, float]) -> None:
-        camera = config.camera
-        self._matrix = np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1.0]])
-        self._distortion = np.array(camera.distortion)
-        self._pose = camera.camera_from_guide
-        self._places = np.array(places)[:, None]
-
-    def along(self, plant: Plant) -> Floats:
-        """(4,) [px/m] how the centres of the bands move when the instrument is pushed outwards."""
-        points, directions = plant.centreline()
-        bands = points[-2] + self._places * directions[-2]
-        ends = np.vstack([bands, bands + np.array([0.0, 0.0, _PUSH])])
-        rotation, translation = np.array(self._pose.rotation), np.array(self._pose.translation)
-        seen, _ = cv2.projectPoints(ends, rotation, translation, self._matrix, self._distortion)
-        return np.asarray(np.diff(seen.reshape(2, 4), axis=0)[0] / _PUSH, dtype=np.float64)
-
-
-def _moment(
-    fault: Fault, seed: int, index: int, size: tuple[int, int], along: Callable[[], Floats]
-) -> Moment:
-    chance = np.random.default_rng([seed, index, zlib.crc32(fault.kind.encode())])
-    return Moment(fault, 0.0, chance, {}, size, along)
-
-
-def _acted(acts: dict[str, Act], values: Floats, active: Sequence[Moment]) -> Floats:
-    for moment in active:
-        act = acts.get(moment.fault.kind)
-        if act is not None:
-            values = act(values, moment)
-    return values
-
-
-def _looked(frame: Frame, moment: Moment) -> Frame:
-    kind = moment.fault.kind
+def _with_content_fault(frame: Frame, fault: FaultState) -> Frame:
+    kind = fault.spec.kind
     if isinstance(frame, FeatureFrame):
-        return replace(frame, features=FEATURES[kind](frame.features, moment))
-    return replace(frame, image=IMAGES[kind](frame.image, moment))
+        return replace(frame, features=FEATURE_FAULTS[kind](frame.features, fault))
+    return replace(frame, image=IMAGE_FAULTS[kind](frame.image, fault))

@@ -1,15 +1,15 @@
-"""The twin's physics as a MuJoCo model: what slides, bends, rubs and stretches.
+"""The MuJoCo model (MJCF) of the simulated instrument: shaft, bending section and cables.
 
-World axes are the guide's: z along the channel outwards, origin where the instrument leaves the
-guide. SI units.
+The world frame is the guide's: z along the channel, outwards; origin where the instrument leaves
+the guide. SI units.
 
 Shaft: segments on slides and hinges along the channel, coupled by axial and torsional springs,
-each pressed on the channel's wall. One elliptic friction cone per contact holds axial and
-circumferential friction together, so that sliding one way lowers the friction the other way. The
-wall itself gives a little (liner), which rounds the loops.
+each pressed on the channel's wall. One elliptic friction cone per contact couples axial and
+circumferential friction: sliding in one direction lowers the friction in the other. The wall is
+slightly compliant (liner), which rounds the hysteresis loops.
 
-Section: a chain of hinges. Two cables, each a row of lumps with sheath friction joined by springs
-that only pull, run from a drum to the chain's far end.
+Section: a chain of hinges. Two cables run from a drum to the distal end of the chain; each is a row
+of lumped masses with sheath friction, joined by springs that only pull.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ MAX_TIMESTEP = 0.005
 """Largest physics step [s]; the inertias below are chosen for it."""
 
 SERVO_LAG = 0.01
-"""Position servo: damping over stiffness [s], the lag the drives feed forward."""
+"""Lag of the position servos [s], damping over stiffness; the drives feed it forward."""
 
-# Everything here moves slowly: friction and elasticity decide, inertia does not. The inertias are
-# larger than a real instrument's so that the stiffest spring stays below 2/MAX_TIMESTEP; in the
-# article's experiment inertial forces stay below 1 % of friction (tests/twin/test_plant.py).
+# The motion is quasi-static. Inertias are larger than a real instrument's, to keep the natural
+# frequency of the stiffest spring below 2/MAX_TIMESTEP; in the article's experiment inertial forces
+# are below 1 % of friction (tests/twin/test_plant.py).
 _SEGMENT_MASS = 0.08
 _SEGMENT_INERTIA = 1e-6
 _PRESS_MASS = 0.05
@@ -32,9 +32,9 @@ _WALL_MASS = 3.0
 _LUMP_MASS = 2.0
 _SECTION_INERTIA = 6e-4
 
-# Contacts and friction in MuJoCo are soft. These impedances keep creep below the friction limit
-# small next to the hysteresis without making the normal direction chatter; the segments are light
-# across the wall so that the load on it stays what is set, whatever the slip does.
+# Contacts and friction in MuJoCo are soft. These impedances make the creep below the friction limit
+# small compared with the hysteresis, without chatter in the normal direction. The segments are
+# light across the wall, so that the normal load does not depend on the slip.
 _CONTACT = 'solref="0.02 1" solimp="0.9 0.9 0.001 0.5 2"'
 _FRICTION = 'solreffriction="0.01 1" solimpfriction="0.9999 0.9999 0.001 0.5 2"'
 _IMPEDANCE_RATIO = 1000
@@ -42,7 +42,7 @@ _INERT = 'contype="0" conaffinity="0"'
 
 
 def build(config: Config, timestep: float) -> str:
-    """The MJCF text of the twin for one configuration."""
+    """Build the MJCF text for a configuration and a time step [s]."""
     shaft, cables = config.twin.shaft, config.twin.cables
     return f"""
 <mujoco>
@@ -90,7 +90,7 @@ def _wall(config: Config) -> str:
 
 
 def _segment(config: Config, index: int) -> str:
-    """Slides along the channel, presses on the wall, turns; the last one carries the section."""
+    """A segment slides, turns and presses on the wall; the last one carries the section."""
     shaft = config.twin.shaft
     radius = config.instrument.diameter / 2
     along, around = shaft.wall_viscosity
@@ -107,7 +107,7 @@ def _segment(config: Config, index: int) -> str:
 
 
 def _section(config: Config) -> str:
-    """A chain of hinges, half a link straight at either end, then the rigid tip."""
+    """A chain of hinges with half a rigid link at either end, then the rigid tip."""
     cables, instrument = config.twin.cables, config.instrument
     link = instrument.bending_length / cables.joints
     bodies = "".join(
@@ -145,7 +145,7 @@ def _coupling(shaft: ShaftConfig, index: int) -> str:
 
 
 def _cable(cables: CableConfig, name: str, sign: int) -> str:
-    """Drum, lumps and section in a row; each piece pulls when it is longer than its slack."""
+    """Drum, lumped masses and section in series; each spring pulls beyond its slack length."""
     drum = [f'<joint joint="motor_bending" coef="{sign * cables.arm}"/>']
     section = "".join(
         f'<joint joint="bend_{j}" coef="{-sign * cables.arm}"/>' for j in range(cables.joints)

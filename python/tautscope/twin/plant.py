@@ -1,4 +1,4 @@
-"""The moving part of the twin: drives, shaft, cables and section under MuJoCo."""
+"""The simulated plant: drives, shaft, cables and bending section in MuJoCo."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from tautscope.dof import Dof
 from tautscope.twin.mjcf import MAX_TIMESTEP, SERVO_LAG, build
 
 _SETTLING = 1.0
-"""Time the instrument is left alone in its start posture before a run [s]."""
+"""Settling time in the start posture before a run [s]."""
 
 
 class Plant:
-    """Friction and elasticity between three drives and the tip.
+    """Drives, and the friction and elasticity between them and the tip.
 
     Args:
         config: Geometry, twin and start posture (the centres of `config.experiment`).
-        generator: Source of what differs between two instruments of a kind.
+        generator: Random generator of the variation between instruments.
 
     Attributes:
-        bends: Of the scope; may be changed at any time.
-        tip_force: What pushes the end of the shaft outwards [N]; likewise.
+        bends: Number of bends of the scope; may be changed at any time.
+        tip_force: Force on the distal end of the shaft, outwards [N]; may be changed at any time.
     """
 
     def __init__(self, config: Config, generator: np.random.Generator) -> None:
@@ -58,7 +58,7 @@ class Plant:
         self._start()
 
     def step(self, command: NDArray[np.float64]) -> None:
-        """Let one control period pass while the drives follow the command (3,) [m, rad, rad]."""
+        """Simulate one control period; the drives follow the command (3,) [m, rad, rad]."""
         data, shaft = self._data, self._config.twin.shaft
         load = shaft.straight_load + shaft.load_per_bend * self.bends
         data.qfrc_applied[self._presses] = -load * self._load_share
@@ -74,7 +74,7 @@ class Plant:
 
     @property
     def section_friction(self) -> float:
-        """Friction of the section's joints over what it was at the start; may be set."""
+        """Factor on the friction of the section's joints; may be set."""
         return self._section_friction
 
     @section_friction.setter
@@ -84,54 +84,51 @@ class Plant:
 
     @property
     def applied(self) -> NDArray[np.float64]:
-        """What the encoders read (3,) [m, rad, rad], in whole counts."""
-        read = np.asarray(self._data.qpos[self._motors], dtype=np.float64)
-        return self._encoder_step * np.round(read / self._encoder_step)
+        """Position (3,) [m, rad, rad] that the encoders measure, in whole counts."""
+        position = np.asarray(self._data.qpos[self._motors], dtype=np.float64)
+        return self._encoder_step * np.round(position / self._encoder_step)
 
     @property
     def true_state(self) -> NDArray[np.float64]:
-        """Insertion and rotation where the shaft leaves the guide, and the angle between the
-        section's two ends: (3,) [m, rad, rad].
-        """  # noqa: D205
+        """(3,) [m, rad, rad]: insertion and rotation at the guide, angle across the section."""
         q = self._data.qpos
         return np.array([q[self._slides[-1]], q[self._turns[-1]], q[self._hinges].sum()])
 
     def centreline(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Points and unit tangents (n, 3) along the instrument in the guide's frame [m],
-        from the guide's mouth to the end of the tip.
+        """Points [m] and unit tangents (n, 3) of the centreline in the guide's frame.
 
-        MuJoCo's contacts are soft: under its load the last segment sinks 0.1 to 0.4 mm into the
-        wall. That carries the friction and is no displacement: the guide holds the shaft.
-        """  # noqa: D205
-        # Positions of bodies lag one step behind the joints after mj_step.
+        They go from the guide's end to the end of the tip. The last segment penetrates the wall by
+        0.1 to 0.4 mm, because MuJoCo's contacts are soft; that offset is removed.
+        """
+        # After mj_step the positions of the bodies lag one step behind the joints.
         mujoco.mj_kinematics(self._model, self._data)
-        places, turns = self._data.xpos, self._data.xmat.reshape(-1, 3, 3)
-        axes = turns[[self._base, *self._links], :, 2]
+        positions, rotations = self._data.xpos, self._data.xmat.reshape(-1, 3, 3)
+        axes = rotations[[self._base, *self._links], :, 2]
         at_joints = axes[:-1] + axes[1:]
         at_joints /= np.linalg.norm(at_joints, axis=1, keepdims=True)
         along = np.array([0.0, 0.0, 1.0])
-        ahead = turns[self._tip][:, 2]
-        end = places[self._tip] + self._config.instrument.tip_length * ahead
+        ahead = rotations[self._tip][:, 2]
+        end = positions[self._tip] + self._config.instrument.tip_length * ahead
         points = np.vstack(
-            [np.zeros(3), places[self._base], places[self._links], places[self._tip], end]
+            [np.zeros(3), positions[self._base], positions[self._links], positions[self._tip], end]
         )
         points[1:, 1] -= points[1, 1]
         return points, np.vstack([along, axes[0], at_joints, ahead, ahead])
 
     def _start(self) -> None:
-        """Unstrained in the start posture, then left to settle."""
+        """Set the unstrained start posture and let the instrument settle."""
         config, q = self._config, self._data.qpos
-        posture = self._setpoint
-        insertion, rotation, bending = posture
+        start = self._setpoint
+        insertion, rotation, bending = start
         q[self._slides], q[self._turns] = insertion, rotation
         q[self._hinges] = bending / len(self._hinges)
-        q[self._motors] = posture
+        q[self._motors] = start
         for name, sign in (("p", 1), ("n", -1)):
             lumps = self._addresses(f"cable_{name}{i}" for i in range(config.twin.cables.lumps))
             q[lumps] = sign * config.twin.cables.arm * bending
         for _ in range(round(_SETTLING / config.control.period)):
-            self.step(posture)
+            self.step(start)
 
     def _addresses(self, names: Iterable[str]) -> NDArray[np.intp]:
-        """Where the joints of these names are in every state vector (all have one coordinate)."""
+        """Indices of the named joints in the state vectors (each joint has one coordinate)."""
         return np.array([self._model.joint(name).qposadr[0] for name in names], dtype=np.intp)

@@ -1,4 +1,4 @@
-"""The twin as a rig: plant and camera behind the seam of `tautscope.loop.rig`."""
+"""The simulated rig: plant and camera behind the `Rig` interface."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from tautscope.twin.plant import Plant
 
 
 class Twin:
-    """A robotic endoscopic instrument in MuJoCo, seen by a drawn endoscope; implements `Rig`.
+    """A robotic endoscopic instrument simulated in MuJoCo, with rendered images; implements `Rig`.
 
-    Hysteresis comes out of friction and elasticity. Nothing of `Play`, `Compensator`,
-    `Instrument` or `Camera` moves or draws it. The same seed gives the same bytes.
+    Friction and elasticity cause the hysteresis. The simulation uses no model of the loop (`Play`,
+    `Compensator`, `Instrument`, `Camera`). The same seed gives the same bytes.
 
     Args:
         config: The rig's geometry and `config.twin`.
-        images: Without them no frame ever arrives, and the twin runs several times faster.
+        images: Whether frames are rendered; without frames the twin is several times faster.
 
-    Limits: quasi-static (inertias are raised for the time step, see `twin/mjcf.py`); the scope and
-    the tissue do not move; the instrument touches nothing outside the guide.
+    Wrong when inertia matters (inertias are raised for the time step, see `twin/mjcf.py`), when
+    scope or tissue move, or when the instrument touches tissue.
     """
 
     def __init__(self, config: Config, *, images: bool = True) -> None:
@@ -37,55 +37,55 @@ class Twin:
 
     @property
     def time(self) -> float:
-        """Its clock [s]."""
+        """Time of its clock [s]."""
         return self._ticks * self._period
 
     @property
     def config(self) -> Config:
-        """What it was made from."""
+        """The configuration it was made from."""
         return self._config
 
     @property
-    def draws(self) -> bool:
-        """Whether its frames are pictures."""
+    def has_images(self) -> bool:
+        """Whether frames are rendered."""
         return self._camera is not None
 
     @property
     def plant(self) -> Plant:
-        """The physics, to look into and to disturb.
+        """The simulated plant, for inspection and fault injection.
 
         Raises:
             SignalError: Before `reset` or after `close`.
         """
-        return self._running()
+        return self._require_plant()
 
     @property
     def control_period(self) -> float:
-        """Time from one command to the next [s]."""
+        """Control period [s]."""
         return self._period
 
     @property
     def bends(self) -> float:
-        """Bends of the scope; may be set during a run.
+        """Number of bends of the scope; may be set during a run.
 
         Raises:
-            ConfigError: On a value outside what `twin.bends` may be.
+            ConfigError: The value is outside the range of `twin.bends`.
         """
-        return self._running().bends
+        return self._require_plant().bends
 
     @bends.setter
     def bends(self, value: float) -> None:
-        self._running().bends = self._config.replace(**{"twin.bends": value}).twin.bends
+        self._require_plant().bends = self._config.replace(**{"twin.bends": value}).twin.bends
 
     def reset(self) -> Sample:
-        """A fresh instrument in the start posture, settled, at time 0."""
+        """Start with a new instrument, settled in the start posture, at time 0."""
         seed = np.random.SeedSequence(self._config.twin.seed)
         physics, timing = (np.random.default_rng(child) for child in seed.spawn(2))
         self._plant = Plant(self._config, physics)
         self._timing = timing
         self._ticks = 0
         self._sequence = 0
-        self._under_way: deque[tuple[float, Frame]] = deque()
+        self._in_transit: deque[tuple[float, Frame]] = deque()
         return self._sample(self._plant)
 
     def step(self, command: ArrayLike) -> Sample:
@@ -94,7 +94,7 @@ class Twin:
         Raises:
             SignalError: The command is not three finite numbers.
         """
-        plant = self._running()
+        plant = self._require_plant()
         target = np.asarray(command, dtype=np.float64)
         if target.shape != (3,) or not np.isfinite(target).all():
             raise SignalError("command", command, "three finite numbers [m, rad, rad]")
@@ -103,10 +103,10 @@ class Twin:
         return self._sample(plant)
 
     def close(self) -> None:
-        """Release the physics; `reset` starts anew."""
+        """Release the simulation; `reset` starts a new one."""
         self._plant = None
 
-    def _running(self) -> Plant:
+    def _require_plant(self) -> Plant:
         if self._plant is None:
             raise SignalError("rig", "closed", "a twin after reset() and before close()")
         return self._plant
@@ -115,22 +115,22 @@ class Twin:
         time, state = self.time, plant.true_state
         if self._camera is not None:
             self._capture(self._camera, plant, time)
-        return Sample(time, plant.applied, self._arrived(time), state)
+        return Sample(time, plant.applied, self._newest_frame(time), state)
 
     def _capture(self, camera: TwinCamera, plant: Plant, time: float) -> None:
         twin = self._config.twin
         # Half a tick of tolerance: n / frame_rate and n * period differ in the last digits.
         if time + self._period / 2 < self._sequence / twin.frame_rate:
             return
-        picture = camera.draw(*plant.centreline(), self._sequence)
-        truth = picture.true_features, picture.true_visible
-        frame = Frame(picture.image, time, self._sequence, *truth)
+        rendered = camera.draw(*plant.centreline(), self._sequence)
+        truth = rendered.true_features, rendered.true_visible
+        frame = Frame(rendered.image, time, self._sequence, *truth)
         delay = twin.latency + twin.latency_jitter * self._timing.uniform(-1, 1)
-        self._under_way.append((time + delay, frame))
+        self._in_transit.append((time + delay, frame))
         self._sequence += 1
 
-    def _arrived(self, time: float) -> Frame | None:
+    def _newest_frame(self, time: float) -> Frame | None:
         newest = None
-        while self._under_way and self._under_way[0][0] <= time:
-            newest = self._under_way.popleft()[1]
+        while self._in_transit and self._in_transit[0][0] <= time:
+            newest = self._in_transit.popleft()[1]
         return newest

@@ -1,11 +1,14 @@
-//! Frames of any format, and what they are by the definitions, pixel by pixel.
+//! Random frames of every format, and their marker pixels by the definitions.
 
-#![allow(dead_code, reason = "each test uses its part")]
+#![allow(dead_code, unused_imports, reason = "each test uses a part")]
 
-use std::f64::consts::{PI, TAU};
+mod discs;
+mod settings;
 
+pub use discs::Discs;
 use proptest::prelude::*;
-use tautscope_vision::{Demands, Expect, Expectation, Image, OUTLINE, Outline, PixelFormat};
+pub use settings::SETTINGS;
+use tautscope_vision::{Image, PixelFormat};
 
 /// An image and the memory it lies in.
 #[derive(Clone, Debug)]
@@ -62,8 +65,7 @@ impl Memory {
         ([luma, u, v], -16.0 * luma - 128.0 * (u + v))
     }
 
-    /// What the documentation of the discriminant and of the low-pass says, in the simplest way:
-    /// by row, which pixels are marker.
+    /// The marker pixels by row, by the definitions of the discriminant and of the low-pass.
     pub fn mask(&self, weights: [f64; 3], threshold: f64, passes: usize) -> Vec<Vec<bool>> {
         let (weights, constant) = self.weights(weights);
         let corner = |sign: f64| {
@@ -112,7 +114,7 @@ pub fn format() -> impl Strategy<Value = PixelFormat> {
     prop::sample::select(&PixelFormat::ALL[..])
 }
 
-/// Sides up to those given that the format can have, and bytes beyond each line.
+/// Format, width, height, and padding of each line (bytes).
 pub fn layout(sides: [usize; 2]) -> impl Strategy<Value = (PixelFormat, usize, usize, usize)> {
     (format(), 1..=sides[0], 1..=sides[1], 0..5_usize).prop_map(
         |(format, mut width, mut height, padding)| {
@@ -127,7 +129,7 @@ pub fn layout(sides: [usize; 2]) -> impl Strategy<Value = (PixelFormat, usize, u
     )
 }
 
-/// Frames: flat ones with a few rectangles of other colours, some noise, all noise.
+/// Frames of one colour with a few rectangles of others, with noise or of noise alone.
 pub fn memory(sides: [usize; 2]) -> impl Strategy<Value = Memory> {
     let patches = prop::collection::vec(any::<(u16, u16, u8, u8, [u8; 4])>(), 0..6);
     let noise = prop_oneof![Just(0_u8), 1..20_u8, Just(255)];
@@ -173,7 +175,7 @@ pub fn memory(sides: [usize; 2]) -> impl Strategy<Value = Memory> {
         )
 }
 
-/// Weights of B, G, R that can be meant.
+/// Weights of B, G, R.
 pub fn weights() -> impl Strategy<Value = [f64; 3]> {
     prop_oneof![
         Just([-0.2, 1.0, -0.8]),
@@ -181,51 +183,4 @@ pub fn weights() -> impl Strategy<Value = [f64; 3]> {
         Just([1.0, 1.0, 1.0]),
         Just([0.0, -1.0, 0.0]),
     ]
-}
-
-/// Demands a band of any size and shape can meet.
-pub const DEMANDS: Demands = Demands {
-    inside: 0.5,
-    coverage: 0.4,
-    spill: 0.6,
-    edges: 0.4,
-    edges_on_average: 0.5,
-    edges_alone: 0.7,
-    surprise: 30.0,
-};
-
-/// Two discs of 5 px where they are told to be, give or take 5 px.
-#[derive(Clone, Copy, Debug)]
-pub struct Discs([f64; 4]);
-
-impl Discs {
-    pub fn at(features: [f64; 4]) -> Self {
-        Self(features)
-    }
-}
-
-impl Expect for Discs {
-    fn expect(&self, _seen: [f64; 4], _deviation: [f64; 4]) -> Option<Expectation> {
-        let [ua, va, ub, vb] = self.0;
-        let disc = |[u, v]: [f64; 2]| Outline {
-            corners: std::array::from_fn(|index| {
-                let angle = TAU * f64::from(u8::try_from(index).unwrap())
-                    / f64::from(u8::try_from(OUTLINE).unwrap());
-                [u + 5.0 * angle.cos(), v + 5.0 * angle.sin()]
-            }),
-            centroid: [u, v],
-            area: 25.0 * PI,
-        };
-        let covariance = std::array::from_fn(|row| {
-            std::array::from_fn(|column| f64::from(u8::from(row == column)) * 25.0)
-        });
-        self.0
-            .iter()
-            .all(|value| value.is_finite())
-            .then_some(Expectation {
-                features: self.0,
-                covariance,
-                bands: [disc([ua, va]), disc([ub, vb])],
-            })
-    }
 }

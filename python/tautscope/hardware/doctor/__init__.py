@@ -1,4 +1,4 @@
-"""``tautscope doctor``: what of a rig is there, what is missing, and what to type.
+"""``tautscope doctor``: checks of a rig, and the remedy for everything that is missing.
 
-Nothing moves: no drive is ever enabled. Drives are set and read back as before a run.
+No motor moves: the drives are configured as before a run, but never enabled.
 """

@@ -1,4 +1,4 @@
-"""Cameras: the devices there are, and whether the configured one gives what was calibrated."""
+"""Checks of cameras: V4L2 devices, and the frames of the configured source."""
 
 from __future__ import annotations
 
@@ -14,78 +14,80 @@ from pathlib import Path
 from tautscope.config import CameraConfig
 from tautscope.errors import CameraError
 from tautscope.hardware.cameras import Camera, CameraState, Capture
-from tautscope.hardware.doctor.finding import Finding, absent, failed
+from tautscope.hardware.doctor.check_result import CheckResult, from_error, none_found
 
-WATCHED = 25
-"""Frames from which rate and age are told."""
+FRAMES = 25
+"""Number of frames from which rate and age are measured."""
 DV_PIPE = "ffmpeg -f iec61883 -i auto -c copy -f dv - |"
 
 
-def check_devices(*, needed: bool) -> Finding:
-    """The V4L2 devices of this computer; `needed` if there should be one."""
+def check_devices(*, needed: bool) -> CheckResult:
+    """Find the V4L2 devices of this computer; it is missing only if one is `needed`."""
     devices = sorted(Path("/dev").glob("video[0-9]*"))
     if not devices:
         todo = (
-            "Connect a camera or grabber, then: ls /dev/video*; the kernel's word: sudo dmesg | "
+            "Connect a camera or grabber, then: ls /dev/video*; kernel messages: sudo dmesg | "
             "tail. FireWire and network cameras are no V4L2 devices: set camera.source"
         )
-        return absent("camera", "V4L2 devices", todo, needed=needed)
+        return none_found("camera", "V4L2 devices", todo, needed=needed)
     names = {str(device): _name(device) for device in devices}
-    closed = [path for path in names if not os.access(path, os.R_OK | os.W_OK)]
+    forbidden = [path for path in names if not os.access(path, os.R_OK | os.W_OK)]
     found = ", ".join(f"{path} ({name})" for path, name in names.items())
     data = {"devices": names}
-    if closed:
+    if forbidden:
         todo = "sudo usermod -aG video $USER, then log in again"
-        return Finding(
-            "camera", "V4L2 devices", "missing", f"{found}; not yours: {closed}", todo, data
+        return CheckResult(
+            "camera", "V4L2 devices", "missing", f"{found}; no permission: {forbidden}", todo, data
         )
-    return Finding("camera", "V4L2 devices", "ok", found, data=data)
+    return CheckResult("camera", "V4L2 devices", "ok", found, data=data)
 
 
-def check_source(config: CameraConfig) -> list[Finding]:
-    """Open the configured source, have it tested, and watch it for a second."""
+def check_source(config: CameraConfig) -> list[CheckResult]:
+    """Open and test the configured source, and measure its frame rate and age."""
     source = config.source
     what, piped = f"source {source.url}", f"{DV_PIPE} uv run tautscope doctor CONFIG"
     if source.url.startswith("pipe:") and sys.stdin.isatty():
-        return [Finding("camera", what, "missing", "nothing is piped in", piped)]
+        return [CheckResult("camera", what, "missing", "no data on the pipe", piped)]
     if source.url.startswith("/dev/") and not Path(source.url).exists():
         todo = "Connect it, or name another in camera.source.url: ls /dev/video*"
-        return [Finding("camera", what, "missing", "no such device", todo)]
+        return [CheckResult("camera", what, "missing", "no such device", todo)]
     try:
         with Camera(config) as camera:
-            seen = _watch(camera, 2 * source.timeout)
+            captures = _collect(camera, 2 * source.timeout)
             state = camera.state
     except CameraError as error:
-        found = failed("camera", what, error)
+        found = from_error("camera", what, error)
         if source.url.startswith("pipe:"):
             found = replace(found, todo=f"{found.todo}; for DV over FireWire: {piped}")
         return [found]
-    return [_judge(what, config, seen, state), *_delay(config)]
+    return [_check_captures(what, config, captures, state), *_check_delay(config)]
 
 
-def _watch(camera: Camera, patience: float) -> list[Capture]:
-    seen: list[Capture] = []
-    deadline = time.monotonic() + patience
-    while len(seen) < WATCHED and time.monotonic() < deadline:
+def _collect(camera: Camera, timeout: float) -> list[Capture]:
+    captures: list[Capture] = []
+    deadline = time.monotonic() + timeout
+    while len(captures) < FRAMES and time.monotonic() < deadline:
         capture = camera.newest()
         if capture is None:
             time.sleep(0.002)
         else:
-            seen.append(capture)
-    return seen
+            captures.append(capture)
+    return captures
 
 
-def _judge(what: str, config: CameraConfig, seen: list[Capture], state: CameraState) -> Finding:
-    if len(seen) < 2:
-        todo = "Is the camera on and connected, and does nobody else use it?"
-        return Finding("camera", what, "missing", state.trouble or "it stopped", todo)
-    frames = [capture.frame for capture in seen]
+def _check_captures(
+    what: str, config: CameraConfig, captures: list[Capture], state: CameraState
+) -> CheckResult:
+    if len(captures) < 2:
+        todo = "Is the camera on, connected, and used by no other program?"
+        return CheckResult("camera", what, "missing", state.trouble or "it stopped", todo)
+    frames = [capture.frame for capture in captures]
     period = statistics.median(
         (two.captured_at - one.captured_at) / ((two.sequence or 0) - (one.sequence or 0))
         for one, two in pairwise(frames)
     )
     rate = 1 / period if period > 0 else math.nan
-    age = statistics.median(one.arrived_at - one.frame.captured_at for one in seen)
+    age = statistics.median(one.arrived_at - one.frame.captured_at for one in captures)
     kind = "fields of interlaced frames" if state.is_interlaced else "progressive frames"
     found = (
         f"{config.width} x {config.height}, {rate:.1f} {kind} per second, not black, not frozen; "
@@ -101,21 +103,22 @@ def _judge(what: str, config: CameraConfig, seen: list[Capture], state: CameraSt
         "lost": state.lost,
     }
     if state.lost:
-        todo = "See whether cable, hub or processor is too slow; other programs closed?"
+        todo = "Check whether cable, hub or processor is too slow; end other programs"
         lost = f"{state.lost} frame{'s' if state.lost > 1 else ''} lost"
-        return Finding("camera", what, "note", f"{found}; {lost}", todo, data)
-    return Finding("camera", what, "ok", found, data=data)
+        return CheckResult("camera", what, "note", f"{found}; {lost}", todo, data)
+    return CheckResult("camera", what, "ok", found, data=data)
 
 
-def _delay(config: CameraConfig) -> list[Finding]:
+def _check_delay(config: CameraConfig) -> list[CheckResult]:
     source = config.source
     if source.delay > 0:
         found = f"{1e3 * source.delay:.0f} ms, as configured"
-        return [Finding("camera", "constant delay", "note", found)]
+        return [CheckResult("camera", "constant delay", "note", found)]
     todo = (
-        "Film a clock on a screen, and set camera.source.delay: what is not told is read as slack"
+        "Film a clock on a screen, and set camera.source.delay: an unknown delay is estimated as "
+        "slack"
     )
-    return [Finding("camera", "constant delay", "note", "0 ms: as if it were not measured", todo)]
+    return [CheckResult("camera", "constant delay", "note", "0 ms: not measured yet", todo)]
 
 
 def _name(device: Path) -> str:

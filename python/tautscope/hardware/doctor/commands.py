@@ -1,4 +1,4 @@
-"""The verb ``doctor``."""
+"""The command ``tautscope doctor``."""
 
 from __future__ import annotations
 
@@ -14,53 +14,52 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from tautscope.config import Config
-    from tautscope.hardware.doctor.finding import Finding
+    from tautscope.hardware.doctor.check_result import CheckResult
 
 
 def add_parser(verbs: arguments.Verbs) -> None:
-    """Add the verb to the command's."""
+    """Add the command to the parser."""
     doctor = verbs.add_parser(
         "doctor",
         allow_abbrev=False,
-        help="say what of a rig is there, what is missing, and what to type",
-        description="Look at the computer, its cameras and CAN interfaces; with a configuration, "
-        "open its camera, set its drives and read them back. No motor is enabled. Exit status 0 "
-        "if all is there, 1 if something is missing.",
+        help="check a rig, and say what is missing and what to do",
+        description="Check the computer, its cameras and CAN interfaces; with a configuration, "
+        "open its camera, configure its drives and read the settings back. No motor is enabled. "
+        "Exit status 0 if nothing is missing, else 1.",
     )
     doctor.add_argument("config", nargs="?", metavar="CONFIG", help="TOML file of a rig")
     arguments.add_json(doctor)
     doctor.set_defaults(run=_doctor)
 
 
-def examine(config: Config, *, is_rig: bool, folder: Path) -> Iterator[Finding]:
-    """Everything, one after the other.
+def run_checks(config: Config, *, is_rig: bool, folder: Path) -> Iterator[CheckResult]:
+    """Run all checks.
 
     Args:
-        config: The rig's, or the default.
-        is_rig: Whether it names a rig's camera and drives, which are then opened.
-        folder: Where recordings would go.
+        config: Configuration of the rig, or the default.
+        is_rig: Whether to open the configured camera and drives.
+        folder: Folder for recordings.
     """
     from tautscope.hardware.doctor import camera, computer, drives  # noqa: PLC0415
-    from tautscope.hardware.doctor.finding import Finding  # noqa: PLC0415
+    from tautscope.hardware.doctor.check_result import CheckResult  # noqa: PLC0415
 
-    libraries = computer.check_computer(config)
-    yield from libraries
+    yield from computer.check_computer(config)
     yield computer.check_disk(config, folder)
     yield camera.check_devices(needed=not is_rig)
     yield drives.check_interfaces(needed=not is_rig)
     if not is_rig:
-        todo = "uv run tautscope doctor CONFIG; configs/article_rig.toml is one to begin with"
-        yield Finding("drives", "configuration", "note", "none: nothing was opened", todo)
+        todo = "uv run tautscope doctor CONFIG; start from configs/article_rig.toml"
+        yield CheckResult("drives", "configuration", "note", "none: no device was opened", todo)
         return
     yield from camera.check_source(config.camera)
     if config.drives is None:
-        todo = "Add a section [drives], as in configs/article_rig.toml; docs/hardware.md says how"
-        yield Finding("drives", "configuration", "missing", "no section [drives]", todo)
+        todo = "Add a section [drives] as in configs/article_rig.toml; docs/hardware.md explains it"
+        yield CheckResult("drives", "configuration", "missing", "no section [drives]", todo)
         return
     if config.control.period != config.drives.cycle:
         found = f"control.period {config.control.period} s, drives.cycle {config.drives.cycle} s"
-        todo = "Make them the same: every tick of the loop is a set-point"
-        yield Finding("drives", "pace", "missing", found, todo)
+        todo = "Make them equal: every tick of the loop sends a set-point"
+        yield CheckResult("drives", "pace", "missing", found, todo)
     yield from drives.check_drives(config.drives)
 
 
@@ -68,9 +67,9 @@ def _doctor(options: argparse.Namespace) -> int:
     from tautscope.hardware.signals import exit_on_signals  # noqa: PLC0415
 
     config = load_config(options.config)
-    findings: list[Finding] = []
+    findings: list[CheckResult] = []
     with exit_on_signals():
-        for found in examine(config, is_rig=options.config is not None, folder=Path.cwd()):
+        for found in run_checks(config, is_rig=options.config is not None, folder=Path.cwd()):
             findings.append(found)
             if not options.json:
                 _print(found)
@@ -84,7 +83,7 @@ def _doctor(options: argparse.Namespace) -> int:
     return 1 if missing else 0
 
 
-def _print(found: Finding) -> None:
+def _print(found: CheckResult) -> None:
     mark = {"ok": "ok     ", "missing": "MISSING", "note": "       "}[found.status]
     print(f"{mark} {found.what}: {found.found}", flush=True)
     if found.todo:

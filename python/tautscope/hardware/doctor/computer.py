@@ -1,4 +1,4 @@
-"""The computer a rig runs on: libraries, priority, memory, disk."""
+"""Checks of the computer: libraries, real-time priority, locked memory, disk."""
 
 from __future__ import annotations
 
@@ -12,21 +12,22 @@ from pathlib import Path
 
 from tautscope._core import __version__
 from tautscope.config import Config
-from tautscope.hardware.doctor.finding import Finding
-from tautscope.hardware.realtime import REMEDY, SETPOINTS, memory_kept, realtime
+from tautscope.hardware.doctor.check_result import CheckResult
+from tautscope.hardware.realtime import REMEDY, SETPOINTS, locked_memory, realtime
 from tautscope.loop.frame_layout import FrameLayout
 
-PACKED = {"png": 0.55, "jpeg": 0.12}
-"""Size of an image in a log, as a share of its pixels' (decision 0020)."""
+COMPRESSION = {"png": 0.55, "jpeg": 0.12}
+"""Size of a compressed image relative to its pixels (docs/decisions/0020-logs-are-mcap.md)."""
 FRAME_RATE = 50.0
-"""As many images per second as PAL's fields."""
-LEAST_RECORDING = 600.0
-"""A disk should have room for so long a run [s]."""
-_PROBE = 32 << 20
+"""Field rate of PAL [1/s]."""
+MIN_RECORDING_TIME = 600.0
+"""Length of a run that the disk must have room for [s]."""
+_PROBE_SIZE = 32 << 20
+"""Size of the file that measures the speed of the disk [byte]."""
 
 
-def check_computer(config: Config) -> list[Finding]:
-    """Libraries, priority, memory."""
+def check_computer(config: Config) -> list[CheckResult]:
+    """Check libraries, real-time priority and locked memory."""
     system = f"tautscope {__version__}, Python {platform.python_version()}, {platform.platform()}"
     try:
         load = f", load {os.getloadavg()[0]:.1f}"
@@ -35,7 +36,7 @@ def check_computer(config: Config) -> list[Finding]:
     cores = f"{os.cpu_count()} cores{load}"
     is_ethercat = config.drives is not None and config.drives.protocol == "ethercat"
     return [
-        Finding("computer", "system", "note", f"{system}, {cores}"),
+        CheckResult("computer", "system", "note", f"{system}, {cores}"),
         _extra("hardware", ("av", "can", "canopen")),
         *([_extra("ethercat", ("pysoem",))] if is_ethercat else []),
         _priority(),
@@ -43,18 +44,18 @@ def check_computer(config: Config) -> list[Finding]:
     ]
 
 
-def check_disk(config: Config, folder: Path) -> Finding:
-    """Room and speed for recordings in `folder`, against what the camera would fill."""
+def check_disk(config: Config, folder: Path) -> CheckResult:
+    """Check free space and write speed in `folder` against the data rate of the camera."""
     frame = 1
     for length in FrameLayout(config.camera).shape:
         frame *= length
-    needed = frame * FRAME_RATE * PACKED[config.recording.image_format]
+    needed = frame * FRAME_RATE * COMPRESSION[config.recording.image_format]
     try:
         free = shutil.disk_usage(folder).free
-        speed = _speed(folder, min(_PROBE, free // 4))
+        speed = _speed(folder, min(_PROBE_SIZE, free // 4))
     except OSError as error:
-        todo = f"Make it one that can be written: ls -ld {folder}"
-        return Finding("recording", "disk", "missing", f"{folder}: {error}", todo)
+        todo = f"Make it writable: ls -ld {folder}"
+        return CheckResult("recording", "disk", "missing", f"{folder}: {error}", todo)
     minutes = free / needed / 60
     found = (
         f"{free / 1e9:.0f} GB free, {speed / 1e6:.0f} MB/s to the disk; a run writes up to "
@@ -62,47 +63,47 @@ def check_disk(config: Config, folder: Path) -> Finding:
     )
     data = {"free": free, "bytes_per_second": speed, "needed_per_second": needed}
     smaller = 'or record smaller images: recording.image_format = "jpeg"'
-    if minutes * 60 < LEAST_RECORDING:
-        todo = f"Run in a folder with more room: df -h {folder}; {smaller}"
-        return Finding("recording", "disk", "missing", found, todo, data)
+    if minutes * 60 < MIN_RECORDING_TIME:
+        todo = f"Run in a folder with more space: df -h {folder}; {smaller}"
+        return CheckResult("recording", "disk", "missing", found, todo, data)
     if speed < needed:
-        todo = f"Run in a folder on a quicker disk; {smaller}"
-        return Finding("recording", "disk", "missing", found, todo, data)
-    return Finding("recording", "disk", "ok", found, data=data)
+        todo = f"Run in a folder on a faster disk; {smaller}"
+        return CheckResult("recording", "disk", "missing", found, todo, data)
+    return CheckResult("recording", "disk", "ok", found, data=data)
 
 
-def _extra(name: str, modules: tuple[str, ...]) -> Finding:
-    absent = [module for module in modules if find_spec(module) is None]
+def _extra(name: str, modules: tuple[str, ...]) -> CheckResult:
+    missing = [module for module in modules if find_spec(module) is None]
     what = f"extra '{name}'"
-    if absent:
+    if missing:
         todo = f"pip install 'tautscope[{name}]'"
-        return Finding("computer", what, "missing", f"no {', '.join(absent)}", todo)
-    return Finding("computer", what, "ok", ", ".join(modules))
+        return CheckResult("computer", what, "missing", f"no {', '.join(missing)}", todo)
+    return CheckResult("computer", what, "ok", ", ".join(modules))
 
 
-def _priority() -> Finding:
+def _priority() -> CheckResult:
     what = "real-time priority"
     with realtime(SETPOINTS) as refusal:
         if not refusal:
-            return Finding("computer", what, "ok", f"SCHED_FIFO {SETPOINTS} is permitted")
+            return CheckResult("computer", what, "ok", f"SCHED_FIFO {SETPOINTS} is permitted")
     if platform.system() != "Linux":
-        return Finding("computer", what, "note", refusal, "Use Linux for a rig")
-    return Finding("computer", what, "missing", "SCHED_FIFO is not permitted", REMEDY)
+        return CheckResult("computer", what, "note", refusal, "Use Linux for a rig")
+    return CheckResult("computer", what, "missing", "SCHED_FIFO is not permitted", REMEDY)
 
 
-def _memory() -> Finding:
+def _memory() -> CheckResult:
     what = "memory kept"
-    with memory_kept() as refusal:
+    with locked_memory() as refusal:
         if not refusal:
-            return Finding("computer", what, "ok", "what a run uses is not paged out")
+            return CheckResult("computer", what, "ok", "memory can be locked")
     if platform.system() != "Linux":
-        return Finding("computer", what, "note", refusal)
-    found = "it may be paged out, and set-points wait for the disk"
-    return Finding("computer", what, "note", found, REMEDY)
+        return CheckResult("computer", what, "note", refusal)
+    found = "memory may be paged out, and set-points may wait for the disk"
+    return CheckResult("computer", what, "note", found, REMEDY)
 
 
 def _speed(folder: Path, size: int) -> float:
-    """Bytes per second through to the disk."""
+    """Measure the write speed of the disk [byte/s]."""
     block = os.urandom(1 << 20)
     with tempfile.TemporaryFile(dir=folder) as file:
         began = time.monotonic()

@@ -1,4 +1,4 @@
-"""The bus and the drives on it: set and read back as before a run, never enabled."""
+"""Checks of the bus and the drives: configured as before a run, never enabled."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from tautscope.errors import DriveError, FieldError
 from tautscope.hardware import cia402
 from tautscope.hardware import object_dictionary as objects
 from tautscope.hardware.cia402 import Scale, State
-from tautscope.hardware.commissioning import Commissioned, commission
-from tautscope.hardware.doctor.finding import Finding, absent, failed
-from tautscope.hardware.drives import open_link
-from tautscope.hardware.link import AbsentError, Link
+from tautscope.hardware.commissioning import CommissionedDrive, commission
+from tautscope.hardware.doctor.check_result import CheckResult, from_error, none_found
+from tautscope.hardware.drives import open_fieldbus
+from tautscope.hardware.fieldbus import AbsentError, Fieldbus
 
 MODES = {
     1: "profile position",
@@ -29,23 +29,23 @@ MODES = {
     9: "cyclic synchronous velocity",
     10: "cyclic synchronous torque",
 }
-"""CiA 402, 0x6502: bit number + 1 -> mode of operation."""
-NOT_REAL = ("virtual", "udp_multicast", "tautscope")
-"""Interfaces of python-can without a bus behind them."""
-BUILT_IN = "/dev/ttyS"
-"""A serial port of the computer itself; adapters have others."""
+"""Modes of operation of CiA 402; mode n is bit n - 1 of 0x6502."""
+VIRTUAL_INTERFACES = ("virtual", "udp_multicast", "tautscope")
+"""Interfaces of python-can without a physical bus."""
+BUILT_IN_PORT = "/dev/ttyS"
+"""Prefix of serial ports that are no adapters."""
 CYCLES = 50
-"""Set-points by which the answers are judged, at least."""
+"""Minimum number of set-points in the test of the answers."""
 
 
-def check_interfaces(*, needed: bool) -> Finding:
-    """The CAN interfaces python-can finds; `needed` if there should be one."""
+def check_interfaces(*, needed: bool) -> CheckResult:
+    """Find CAN interfaces with python-can; it is missing only if one is `needed`."""
     what = "CAN interfaces"
     try:
         from can import detect_available_configs  # noqa: PLC0415
     except ImportError:
-        return Finding("drives", what, "note", "cannot be looked for without python-can")
-    logger = logging.getLogger("can")  # it lists every maker's library that is not installed
+        return CheckResult("drives", what, "note", "not searched: python-can is not installed")
+    logger = logging.getLogger("can")  # it logs every manufacturer's library that is not installed
     level = logger.level
     logger.setLevel(logging.CRITICAL)
     try:
@@ -55,69 +55,72 @@ def check_interfaces(*, needed: bool) -> Finding:
     names = {
         f"{one['interface']} {one['channel']}"
         for one in detected
-        if one["interface"] not in NOT_REAL and not str(one["channel"]).startswith(BUILT_IN)
+        if one["interface"] not in VIRTUAL_INTERFACES
+        and not str(one["channel"]).startswith(BUILT_IN_PORT)
     }
     names |= {f"socketcan {path.name}" for path in Path("/sys/class/net").glob("can*")}
     data = {"interfaces": sorted(names)}
     if names:
-        return Finding("drives", what, "ok", ", ".join(sorted(names)), data=data)
+        return CheckResult("drives", what, "ok", ", ".join(sorted(names)), data=data)
     todo = (
         "Connect an adapter; on Linux: sudo modprobe can_dev; ip -br link | grep can; sudo ip link "
         "set can0 up type can bitrate 1000000"
     )
-    return absent("drives", what, todo, needed=needed)
+    return none_found("drives", what, todo, needed=needed)
 
 
-def check_drives(config: DrivesConfig) -> list[Finding]:
-    """Bus, drives, settings, heartbeats and answers.
+def check_drives(config: DrivesConfig) -> list[CheckResult]:
+    """Check bus, drives, settings, heartbeats and answers.
 
-    A drive that is enabled or in a fault is told nothing. Motors that a quick stop holds stay held.
+    Nothing is written to a drive that is enabled or in fault. A motor in quick stop stays held.
     """
     bus = f"bus {config.interface if config.protocol == 'canopen' else 'EtherCAT'} {config.channel}"
     try:
-        link = open_link(config)
+        fieldbus = open_fieldbus(config)
     except (DriveError, FieldError) as error:
-        return [failed("drives", bus, error)]
+        return [from_error("drives", bus, error)]
     try:
-        findings = [Finding("drives", bus, "ok", "open; no other master was heard")]
-        findings += [_look(link, config, dof) for dof in Dof]
+        findings = [CheckResult("drives", bus, "ok", "open; no other master found")]
+        findings += [_check_drive(fieldbus, config, dof) for dof in Dof]
         if any(finding.status == "missing" for finding in findings):
             return findings
         settings, modes = [], {}
         for dof in Dof:
             try:
-                done = commission(link, config, dof)
+                drive = commission(fieldbus, config, dof)
             except DriveError as error:
-                settings.append(failed("drives", f"{link.name(dof)}: settings", error))
+                settings.append(from_error("drives", f"{fieldbus.name(dof)}: settings", error))
             else:
-                settings.append(_settings(done, config))
-                modes[dof] = done.mode
+                settings.append(_settings(drive, config))
+                modes[dof] = drive.mode
         findings += settings
         if len(modes) == len(Dof):
-            link.prepare(modes)
-            findings.append(_heartbeats(link, config))
+            fieldbus.configure(modes)
+            findings.append(_check_answers(fieldbus, config))
     except DriveError as error:
-        findings.append(failed("drives", "heartbeats and answers", error))
+        findings.append(from_error("drives", "heartbeats and answers", error))
     finally:
-        link.close()
+        fieldbus.close()
     return findings
 
 
-def _look(link: Link, config: DrivesConfig, dof: Dof) -> Finding:
-    """What one drive says without being told anything."""
-    what = link.name(dof)
+def _check_drive(fieldbus: Fieldbus, config: DrivesConfig, dof: Dof) -> CheckResult:
+    """Read state, position and supported modes of one drive without writing to it."""
+    what = fieldbus.name(dof)
     try:
-        supported = link.read(dof, objects.SUPPORTED_MODES)
-        state = cia402.state_of(link.read(dof, objects.STATUSWORD))
-        position = Scale(config[dof], dof.label).to_position(link.read(dof, objects.POSITION))
-        vendor = _or_zero(link, dof)
+        supported = fieldbus.read(dof, objects.SUPPORTED_MODES)
+        state = cia402.state_of(fieldbus.read(dof, objects.STATUSWORD))
+        position = Scale(config[dof], dof.label).to_position(
+            fieldbus.read(dof, objects.POSITION_ACTUAL)
+        )
+        vendor = _or_zero(fieldbus, dof)
     except DriveError as error:
-        return failed("drives", what, error)
+        return from_error("drives", what, error)
     modes = [number for number in MODES if supported >> (number - 1) & 1]
     unit, scale = dof.display_unit, dof.display_scale
-    here = f"{scale * position:.4g} {unit}"
     found = (
-        f"vendor 0x{vendor:X}; {state.value if state else 'unknown state'}; at {here}; modes "
+        f"vendor 0x{vendor:X}; {state.value if state else 'unknown state'}; "
+        f"at {scale * position:.4g} {unit}; modes "
         + ", ".join(f"{number} {MODES[number]}" for number in modes)
     )
     data = {
@@ -129,66 +132,66 @@ def _look(link: Link, config: DrivesConfig, dof: Dof) -> Finding:
     }
     lower, upper = config[dof].travel
     if state in (State.FAULT, State.FAULT_REACTION):
-        todo = "Find the cause in its manual by its emergency or 0x603F; then switch it off and on"
+        todo = "Find the cause: look its error code (0x603F) up in the manual, then power-cycle it"
     elif state is State.OPERATION_ENABLED:
-        todo = "It is enabled: end the program that drives it, or switch it off and on"
+        todo = "It is enabled: end the program that commands it, or power-cycle it"
     elif not {7, 8} & set(modes):
-        todo = "It follows no streamed positions; other firmware or another drive is needed"
+        todo = "It cannot follow a stream of positions; use another drive or firmware"
     elif not lower <= position <= upper:
         todo = (
             f"Move it by hand into drives.{dof.label}.travel, {scale * lower:.4g} to "
-            f"{scale * upper:.4g} {unit}; or mend home, sign or counts_per_unit"
+            f"{scale * upper:.4g} {unit}; or correct home, sign or counts_per_unit"
         )
     else:
-        return Finding("drives", what, "ok", found, data=data)
-    return Finding("drives", what, "missing", found, todo, data)
+        return CheckResult("drives", what, "ok", found, data=data)
+    return CheckResult("drives", what, "missing", found, todo, data)
 
 
-def _or_zero(link: Link, dof: Dof) -> int:
+def _or_zero(fieldbus: Fieldbus, dof: Dof) -> int:
     try:
-        return link.read(dof, objects.VENDOR)
+        return fieldbus.read(dof, objects.VENDOR_ID)
     except AbsentError:
         return 0
 
 
-def _settings(done: Commissioned, config: DrivesConfig) -> Finding:
-    found = f"mode {done.mode.value} taken; {len(done.settings)} settings read back as set"
-    data = {"mode": done.mode.value, "settings": done.settings, "absent": list(done.absent)}
-    what = f"{done.name}: settings"
-    if done.absent:
+def _settings(drive: CommissionedDrive, config: DrivesConfig) -> CheckResult:
+    found = f"mode {drive.mode.value}; {len(drive.settings)} settings read back correctly"
+    data = {"mode": drive.mode.value, "settings": drive.settings, "absent": list(drive.absent)}
+    what = f"{drive.name}: settings"
+    if drive.absent:
         waived = f"; waived: {', '.join(config.waive)}" if config.waive else ""
-        todo = "See that something else protects what these would"
-        found = f"{found}; it does not have {', '.join(done.absent)}{waived}"
-        return Finding("drives", what, "note", found, todo, data)
-    return Finding("drives", what, "ok", found, data=data)
+        todo = "Make sure that other protections replace these objects"
+        found = f"{found}; it does not have {', '.join(drive.absent)}{waived}"
+        return CheckResult("drives", what, "note", found, todo, data)
+    return CheckResult("drives", what, "ok", found, data=data)
 
 
-def _heartbeats(link: Link, config: DrivesConfig) -> Finding:
-    """Cycles as in a run, but all of them with a quick stop."""
-    targets = [link.read(dof, objects.POSITION) for dof in Dof]
-    link.operational()
+def _check_answers(fieldbus: Fieldbus, config: DrivesConfig) -> CheckResult:
+    """Run cycles as in an experiment, all with the controlword quick stop."""
+    targets = [fieldbus.read(dof, objects.POSITION_ACTUAL) for dof in Dof]
+    fieldbus.start()
     times: list[float] = []
     late, answers = 0, [0, 0, 0]
     end = time.monotonic() + max(CYCLES * config.cycle, 1.5 * config.heartbeat_timeout)
     while (began := time.monotonic()) < end:
-        said = link.cycle([cia402.QUICK_STOP] * 3, targets)
+        feedback = fieldbus.exchange([cia402.QUICK_STOP] * 3, targets)
         times.append(time.monotonic() - began)
-        late += sum(one.age > 0 for one in said)
-        answers = [one.answers for one in said]
+        late += sum(one.age > 0 for one in feedback)
+        answers = [one.answers for one in feedback]
         time.sleep(max(0.0, config.cycle - times[-1]))
-    silent = [link.name(dof) for dof in Dof if not answers[dof]]
+    silent = [fieldbus.name(dof) for dof in Dof if not answers[dof]]
     what = "heartbeats and answers"
     data = {"cycles": len(times), "late": late, "median": statistics.median(times)}
     if silent:
         found = f"no answer to any of {len(times)} set-points from {', '.join(silent)}"
-        todo = "Its process data (PDOs) are not as they were set; switch it off and on"
-        return Finding("drives", what, "missing", found, todo, data)
+        todo = "Its PDOs are not as configured; power-cycle it"
+        return CheckResult("drives", what, "missing", found, todo, data)
     found = (
         f"both ways every {1e3 * config.heartbeat_period:.0f} ms; {len(times)} set-points, "
         f"answered in {1e3 * data['median']:.1f} ms (median), {1e3 * max(times):.1f} ms (worst), "
         f"{late} of {3 * len(times)} late"
     )
     if late:
-        todo = "With real-time priority and nothing else running it should be none"
-        return Finding("drives", what, "note", found, todo, data)
-    return Finding("drives", what, "ok", found, data=data)
+        todo = "Expected: none, with real-time priority and no other load"
+        return CheckResult("drives", what, "note", found, todo, data)
+    return CheckResult("drives", what, "ok", found, data=data)

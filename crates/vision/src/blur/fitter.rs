@@ -1,0 +1,195 @@
+//! Least-squares fit of the intensity of both bands under blur.
+
+use std::f64::consts::PI;
+
+use super::equations::{BACKGROUND, NoiseModel, SIGMA, UNKNOWNS, normal_equations, residuals};
+use super::fit::BlurFit;
+use super::mask::Mask;
+use super::patch::{Patch, SIDE};
+use crate::math::{apply, floor, inverse, quadratic};
+use crate::recognition::{BandPrediction, BandPredictor, Outline};
+use crate::scan::Frame;
+use crate::settings::BlurSettings;
+
+/// Gauss-Newton steps; the outlines are drawn anew in each, the frame is read again after half of them.
+const STEPS: usize = 16;
+/// A fit that explains less than this share of the variance after the trial steps is given up: it bounds the time.
+const TRIAL_STEPS: usize = 4;
+const LEAST_TRIAL_EXPLAINED: f64 = 0.3;
+/// The fit has converged if no position moves by more than this (px), a fifth of its least standard deviation by default.
+const CONVERGED: f64 = 0.05;
+/// Largest step of a position (px) and of the blur (px): the linearisation holds for about one sigma.
+const LARGEST_STEP: f64 = 2.5;
+const LARGEST_SIGMA_STEP: f64 = 0.5;
+/// Bounds of sigma (px): below, samples do not resolve the kernel, above, 3 sigma exceed its array.
+const SIGMA_BOUNDS: [f64; 2] = [0.6, 8.0];
+/// Start of the tissue's unevenness, relative to its colour; each step estimates it anew.
+const TISSUE_UNEVENNESS: f64 = 0.05;
+/// Standard deviation of the positions that the outlines are drawn from (px): at the start, after half of the steps, and
+/// else.
+const START_STD: f64 = 3.0;
+const HALFWAY_STD: f64 = 1.0;
+const STEP_STD: f64 = 2.0;
+/// Bounds of a band's brightness: the largest, and the least that its ratio to the other's is computed from (grey levels).
+const LARGEST_BRIGHTNESS: f64 = 400.0;
+const LEAST_BRIGHTNESS: f64 = 5.0;
+/// Pixels nearer than this to an outline are not used for the tissue's colour (px): blur mixes them with the band's.
+const BAND_MARGIN: f64 = 4.0;
+/// Least side of the patch (px).
+const LEAST_SIDE: usize = 8;
+
+/// Fits the intensity, in memory that it keeps.
+#[derive(Clone, Debug)]
+pub struct BlurFitter {
+    patch: Patch,
+    masks: [Mask; 2],
+    buffer: Vec<f32>,
+}
+
+impl Default for BlurFitter {
+    fn default() -> Self {
+        Self {
+            patch: Patch::default(),
+            masks: [Mask::default(), Mask::default()],
+            buffer: Vec::with_capacity(SIDE * SIDE),
+        }
+    }
+}
+
+impl BlurFitter {
+    /// Fits positions, brightness and blur of both bands from positions `start` on.
+    ///
+    /// ```text
+    /// green(x) = a_A (m_A * g_sigma)(x - d_A) + a_B (m_B * g_sigma)(x - d_B) + b + noise
+    /// ```
+    ///
+    /// with m the coverage of a sample by an outline and g a normal density. Least squares by Gauss-Newton steps, with
+    /// the prediction as prior of the positions, and priors of sigma and of the ratio of both brightnesses. None if the
+    /// fit does not converge or the bands are not visible.
+    pub fn fit(
+        &mut self,
+        frame: &impl Frame,
+        predictor: &impl BandPredictor,
+        prediction: &BandPrediction,
+        start: [f64; 4],
+        settings: &BlurSettings,
+    ) -> Option<BlurFit> {
+        let prior = inverse(prediction.covariance)?;
+        let draw = |position: [f64; 4], std: f64| {
+            let drawn = predictor.predict(position, [std; 4])?;
+            let [a, b] = &drawn.outlines;
+            let [ua, va, ub, vb] = position;
+            Some([a.moved_to([ua, va]), b.moved_to([ub, vb])])
+        };
+        let mut position = start;
+        let mut outlines = draw(position, START_STD)?;
+        let mut sensor_variance = self.read(frame, &outlines, settings.margin)?;
+        let (mut brightness, mut sigma) = ([0.0; 2], settings.sigma);
+        let mut tissue_unevenness = TISSUE_UNEVENNESS;
+        let mut result = None;
+        for step in 0..STEPS {
+            if step == STEPS / 2 {
+                outlines = draw(position, HALFWAY_STD)?;
+                sensor_variance = self.read(frame, &outlines, settings.margin)?;
+            } else if step > 0 {
+                outlines = draw(position, STEP_STD)?;
+            }
+            let scaled_sigma = sigma / self.patch.step;
+            for (mask, outline) in self.masks.iter_mut().zip(&outlines) {
+                mask.draw(outline, &self.patch);
+                mask.blur(scaled_sigma, self.patch.columns, &mut self.buffer);
+            }
+            let mean = f64::midpoint(brightness[0], brightness[1]);
+            let noise = NoiseModel {
+                sensor_variance,
+                // Errors other than sensor noise are alike in neighbours: the area of the kernel counts as one sample.
+                correlated_samples: 4.0 * PI * scaled_sigma.max(1.0).powi(2),
+                band: settings.unevenness * mean,
+                tissue: tissue_unevenness,
+            };
+            let (mut normal, mut right) =
+                normal_equations(&self.patch, &self.masks, brightness, sigma, &noise);
+            let offset: [f64; 4] = std::array::from_fn(|i| prediction.features[i] - position[i]);
+            for (row, pull) in apply(&prior, offset).into_iter().enumerate() {
+                right[row] += pull;
+                for (entry, prior) in normal[row].iter_mut().zip(prior[row]) {
+                    *entry += prior;
+                }
+            }
+            let ratio = (settings.brightness_ratio_deviation * mean.max(LEAST_BRIGHTNESS)).powi(-2);
+            for (i, j) in [(4, 5), (5, 4)] {
+                normal[i][i] += ratio;
+                normal[i][j] -= ratio;
+            }
+            let sigma_weight = settings.sigma_deviation.powi(-2);
+            normal[SIGMA][SIGMA] += sigma_weight;
+            right[SIGMA] += sigma_weight * (settings.sigma - sigma);
+            // Regular even where a patch shows no tissue.
+            (BACKGROUND..UNKNOWNS).for_each(|index| normal[index][index] += 1e-9);
+            let covariance = inverse(normal)?;
+            let found = apply(&covariance, right);
+            let longest = found[..4].iter().fold(0.0_f64, |most, d| most.max(d.abs()));
+            // Without brightness, in the first step, nothing is known of positions and sigma.
+            if step > 0 {
+                let share = (LARGEST_STEP / longest).min(1.0);
+                for (value, by) in position.iter_mut().zip(found) {
+                    *value += share * by;
+                }
+                sigma += found[SIGMA].clamp(-LARGEST_SIGMA_STEP, LARGEST_SIGMA_STEP);
+            }
+            brightness =
+                [found[4], found[5]].map(|value: f64| value.clamp(0.0, LARGEST_BRIGHTNESS));
+            sigma = sigma.clamp(SIGMA_BOUNDS[0], SIGMA_BOUNDS[1]);
+            let left = residuals(
+                &self.patch,
+                &self.masks,
+                &found,
+                brightness,
+                sensor_variance,
+            );
+            tissue_unevenness = left.tissue_unevenness.max(settings.unevenness);
+            let offset: [f64; 4] = std::array::from_fn(|i| prediction.features[i] - position[i]);
+            let model_variance = settings.model_deviation * settings.model_deviation;
+            result = Some(BlurFit {
+                features: position,
+                covariance: std::array::from_fn(|i| {
+                    std::array::from_fn(|j| {
+                        covariance[i][j] + if i == j { model_variance } else { 0.0 }
+                    })
+                }),
+                brightness,
+                explained: left.explained,
+                residual: left.std,
+                sigma,
+                mahalanobis_squared: quadratic(&prior, offset),
+                outlines,
+            });
+            if step == TRIAL_STEPS && left.explained < LEAST_TRIAL_EXPLAINED {
+                return None;
+            }
+            if step > STEPS / 2 && longest < CONVERGED {
+                break;
+            }
+        }
+        result
+    }
+
+    /// Reads the pixels around the outlines; returns the variance of the sensor noise (grey levels squared).
+    fn read(&mut self, frame: &impl Frame, outlines: &[Outline; 2], margin: f64) -> Option<f64> {
+        let corners = || outlines.iter().flat_map(|outline| &outline.corners);
+        let range = |axis: usize, size: usize| {
+            let values = || corners().map(|corner| corner[axis]);
+            let first = values().fold(f64::INFINITY, f64::min) - margin;
+            let last = values().fold(f64::NEG_INFINITY, f64::max) + margin;
+            floor(first).min(size)..floor(last + 1.0).min(size)
+        };
+        let (columns, rows) = (range(0, frame.width()), range(1, frame.height()));
+        if columns.len() < LEAST_SIDE || rows.len() < LEAST_SIDE {
+            return None;
+        }
+        self.patch.read(frame, columns, rows);
+        let grown = outlines.map(|outline| outline.grown(BAND_MARGIN));
+        self.patch.remove_tissue_colour(&grown);
+        Some(self.patch.sensor_variance())
+    }
+}

@@ -1,0 +1,98 @@
+//! The blurred mask of an outline.
+
+use super::patch::{Patch, SIDE};
+use crate::math::{floor, real, single};
+use crate::recognition::Outline;
+
+/// Sub-rows in which the coverage of a sample is computed: its error is then below 1/8 at an edge, and blurred.
+const SUB_ROWS: usize = 4;
+
+/// Coverage of each sample by an outline, blurred.
+#[derive(Clone, Debug)]
+pub struct Mask {
+    /// Of each sample, row by row, 0 to 1.
+    pub coverage: Vec<f32>,
+}
+
+impl Default for Mask {
+    fn default() -> Self {
+        Self {
+            coverage: Vec::with_capacity(SIDE * SIDE),
+        }
+    }
+}
+
+impl Mask {
+    /// Computes the coverage of each sample by an outline.
+    pub fn draw(&mut self, outline: &Outline, patch: &Patch) {
+        self.coverage.clear();
+        self.coverage.resize(patch.green.len(), 0.0);
+        let columns = patch.columns.max(1);
+        let part = 1.0 / real(SUB_ROWS);
+        for (row, values) in self.coverage.chunks_mut(columns).enumerate() {
+            for sub_row in 0..SUB_ROWS {
+                let offset = (real(sub_row) + 0.5) * part - 0.5;
+                let v = patch.origin[1] + (real(row) + offset) * patch.step;
+                outline.each_crossing(v, |from, to| {
+                    let [from, to] = [from, to].map(|u| (u - patch.origin[0]) / patch.step + 0.5);
+                    let (from, to) = (from.max(0.0), to.min(real(columns)));
+                    let first = floor(from);
+                    for (value, left) in values.iter_mut().skip(first).zip(first..) {
+                        let left = real(left);
+                        if left >= to {
+                            break;
+                        }
+                        let inside = (left + 1.0).min(to) - left.max(from);
+                        *value += single(part * inside.max(0.0));
+                    }
+                });
+            }
+        }
+    }
+
+    /// Convolves the mask with a normal density of standard deviation `sigma` (samples), cut at 3 sigma.
+    pub fn blur(&mut self, sigma: f64, columns: usize, buffer: &mut Vec<f32>) {
+        let mut kernel = [0.0_f32; SIDE / 2];
+        let reach = floor((3.0 * sigma).ceil()).clamp(1, kernel.len() - 1);
+        let mut sum = 0.0;
+        for (index, weight) in kernel.iter_mut().enumerate().take(reach + 1) {
+            let distance = real(index) / sigma;
+            *weight = single((-0.5 * distance * distance).exp());
+            sum += if index == 0 { *weight } else { 2.0 * *weight };
+        }
+        for weight in &mut kernel {
+            *weight /= sum;
+        }
+        buffer.clear();
+        buffer.resize(self.coverage.len(), 0.0);
+        for (row, blurred) in self
+            .coverage
+            .chunks(columns.max(1))
+            .zip(buffer.chunks_mut(columns.max(1)))
+        {
+            for (u, value) in row.iter().enumerate().filter(|(_, value)| **value > 0.0) {
+                for (index, weight) in kernel.iter().enumerate().take(reach + 1) {
+                    if let Some(target) = blurred.get_mut(u + index) {
+                        *target += weight * value;
+                    }
+                    if index > 0
+                        && let Some(target) = u.checked_sub(index).and_then(|u| blurred.get_mut(u))
+                    {
+                        *target += weight * value;
+                    }
+                }
+            }
+        }
+        self.coverage.fill(0.0);
+        let rows = buffer.len() / columns.max(1);
+        for (v, row) in buffer.chunks(columns.max(1)).enumerate() {
+            for to in v.saturating_sub(reach)..(v + reach + 1).min(rows) {
+                let weight = kernel[v.abs_diff(to)];
+                let into = self.coverage.iter_mut().skip(to * columns);
+                for (target, value) in into.zip(row) {
+                    *target += weight * value;
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! Sample points along an outline, and the edges of the marker pixels near them.
+
+use super::outline::{OUTLINE_CORNERS, Outline};
+use crate::math::real;
+use crate::scan::RunMap;
+
+/// Sample points of an outline: about one per pixel of its length.
+const SAMPLES: usize = 96;
+/// Edges nearer than this to the border of the image are ignored (px): the low-pass of the replicated border moves them.
+const BORDER: f64 = 2.0;
+/// Samples nearer than this to where a rim meets a side are left out (px): the low-pass rounds the marker off there.
+const CORNER: f64 = 2.5;
+/// Corners of the outline at which a rim meets a side.
+const RIM_ENDS: [usize; 4] = [
+    0,
+    OUTLINE_CORNERS / 2 - 1,
+    OUTLINE_CORNERS / 2,
+    OUTLINE_CORNERS - 1,
+];
+
+/// A point on an outline.
+#[derive(Clone, Copy, Default)]
+pub struct Sample {
+    /// From the centroid (px).
+    pub offset: [f64; 2],
+    /// Outward unit normal.
+    pub normal: [f64; 2],
+    /// On a side, not on a rim.
+    pub is_side: bool,
+}
+
+/// Sample points at equal steps along an outline.
+pub struct Contour {
+    samples: [Sample; SAMPLES],
+    count: usize,
+    /// Distance up to which edges are searched (px).
+    pub reach: f64,
+}
+
+impl Contour {
+    /// Samples an outline; edges are searched up to `reach` (px).
+    pub fn of(outline: &Outline, reach: f64) -> Self {
+        let [cu, cv] = outline.centroid;
+        let corners = outline.corners.map(|[u, v]| [u - cu, v - cv]);
+        let lines = || corners.iter().zip(corners.iter().cycle().skip(1));
+        let length: f64 = lines()
+            .map(|([u0, v0], [u1, v1])| (u1 - u0).hypot(v1 - v0))
+            .sum();
+        let signed: f64 = lines().map(|([u0, v0], [u1, v1])| u0 * v1 - u1 * v0).sum();
+        let turn = signed.signum();
+        let ends = RIM_ENDS.map(|index| corners[index]);
+        let step = length / real(SAMPLES);
+        let mut contour = Self {
+            samples: [Sample::default(); SAMPLES],
+            count: 0,
+            // Farther inwards are the edges of the opposite side.
+            reach: reach.min(0.8 * outline.radius()),
+        };
+        let mut next = step / 2.0;
+        for (index, ([u0, v0], [u1, v1])) in lines().enumerate() {
+            let (du, dv) = (u1 - u0, v1 - v0);
+            let length = du.hypot(dv);
+            while next < length {
+                let offset = [u0 + du * next / length, v0 + dv * next / length];
+                next += step;
+                let square = |[u, v]: [f64; 2]| (u - offset[0]).powi(2) + (v - offset[1]).powi(2);
+                if ends.iter().any(|end| square(*end) < CORNER * CORNER) {
+                    continue;
+                }
+                if let Some(sample) = contour.samples.get_mut(contour.count) {
+                    *sample = Sample {
+                        offset,
+                        normal: [turn * dv / length, -turn * du / length],
+                        is_side: index % (OUTLINE_CORNERS / 2) == OUTLINE_CORNERS / 2 - 1,
+                    };
+                    contour.count += 1;
+                }
+            }
+            next -= length;
+        }
+        contour
+    }
+
+    /// The sample points.
+    pub fn samples(&self) -> &[Sample] {
+        self.samples.get(..self.count).unwrap_or_default()
+    }
+}
+
+/// An edge of the marker pixels on a normal of an outline.
+pub enum Edge {
+    /// The image does not show it.
+    Unknown,
+    /// There is none within reach.
+    Missing,
+    /// It is this far outwards (px).
+    At(f64),
+}
+
+/// Finds the edge of the marker pixels along `normal` within `reach` (px) of `at`.
+pub fn find_edge(map: &RunMap, at: [f64; 2], normal: [f64; 2], reach: f64) -> Edge {
+    let (width, height) = map.size();
+    let is_within = |[u, v]: [f64; 2]| {
+        (BORDER..width - 1.0 - BORDER).contains(&u) && (BORDER..height - 1.0 - BORDER).contains(&v)
+    };
+    if !is_within(at) {
+        return Edge::Unknown;
+    }
+    let offset = crossing(map, at, normal, reach);
+    // At the border of the image the colour ends whether the band does or not.
+    let end = offset.unwrap_or_default();
+    if is_within([at[0] + end * normal[0], at[1] + end * normal[1]]) {
+        offset.map_or(Edge::Missing, Edge::At)
+    } else {
+        Edge::Unknown
+    }
+}
+
+/// Distance from `at` along `normal` to the edge, within `reach` (px), in steps of half a pixel that are halved once.
+fn crossing(map: &RunMap, at: [f64; 2], [nu, nv]: [f64; 2], reach: f64) -> Option<f64> {
+    let marker = |along: f64| map.is_marker([at[0] + along * nu, at[1] + along * nv]);
+    let inside = marker(0.0);
+    let step: f64 = if inside { 0.5 } else { -0.5 };
+    let mut along = step;
+    while along.abs() <= reach {
+        if marker(along) != inside {
+            let middle = along - step / 2.0;
+            let is_beyond = marker(middle) != inside;
+            return Some(if is_beyond {
+                middle - step / 4.0
+            } else {
+                middle + step / 4.0
+            });
+        }
+        along += step;
+    }
+    None
+}

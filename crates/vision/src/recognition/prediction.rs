@@ -1,0 +1,71 @@
+//! Predicted position and outline of both bands.
+
+use super::outline::Outline;
+use crate::math::{floor, real};
+use crate::scan::{Frame, Window};
+
+/// Prediction of both bands in a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BandPrediction {
+    /// Centroids before the frame is seen: `[u_A, v_A, u_B, v_B]` (px).
+    pub features: [f64; 4],
+    /// Their covariance (4, 4) (px^2), symmetric, positive definite.
+    pub covariance: [[f64; 4]; 4],
+    /// Outlines of the bands, in the posture that the caller of [`BandPredictor::predict`] asked for.
+    pub outlines: [Outline; 2],
+}
+
+impl BandPrediction {
+    /// The part of a frame that contains both bands within 3 standard deviations and a margin (px).
+    ///
+    /// None if it is more than a quarter of the frame: reading the whole frame then takes little longer.
+    pub(crate) fn window(&self, frame: &impl Frame, margin: f64) -> Option<Window> {
+        let [size_u, size_v] = [frame.width(), frame.height()].map(real);
+        let [mut left, mut top, mut right, mut bottom] = [size_u, size_v, 0.0, 0.0];
+        for (band, outline) in self.outlines.iter().enumerate() {
+            let reach = |axis: usize| {
+                let variance = self.covariance[2 * band + axis][2 * band + axis];
+                3.0 * variance.sqrt() + margin
+            };
+            let [reach_u, reach_v] = [0, 1].map(reach);
+            let [shift_u, shift_v] =
+                [0, 1].map(|axis| self.features[2 * band + axis] - outline.centroid[axis]);
+            for [u, v] in outline.corners {
+                left = left.min(u + shift_u - reach_u);
+                right = right.max(u + shift_u + reach_u);
+                top = top.min(v + shift_v - reach_v);
+                bottom = bottom.max(v + shift_v + reach_v);
+            }
+        }
+        let pixel = |value: f64, size: f64| floor(value.clamp(0.0, size));
+        let window = Window {
+            left: pixel(left.floor(), size_u),
+            top: pixel(top.floor(), size_v),
+            right: pixel(right.ceil(), size_u),
+            bottom: pixel(bottom.ceil(), size_v),
+        };
+        let area = (right - left) * (bottom - top);
+        let is_small = 4.0 * area <= size_u * size_v;
+        (is_small && window.left < window.right && window.top < window.bottom).then_some(window)
+    }
+
+    /// Shift from the middle of the two predicted bands to `[u, v]` (px).
+    pub(crate) fn shift_to(&self, [u, v]: [f64; 2]) -> [f64; 2] {
+        let [ua, va, ub, vb] = self.features;
+        [u - f64::midpoint(ua, ub), v - f64::midpoint(va, vb)]
+    }
+}
+
+/// Predicts the bands from the instrument model and the prior of its posture.
+pub trait BandPredictor {
+    /// The prediction, with outlines in the posture that best explains the features `observed` (4,) (px)
+    /// with standard deviations `std` (4,) (px; infinite: not observed).
+    ///
+    /// None if the bands are not visible.
+    fn predict(&self, observed: [f64; 4], std: [f64; 4]) -> Option<BandPrediction>;
+
+    /// Whether the prior is of one posture, and not of several that cover the whole workspace.
+    fn is_located(&self) -> bool {
+        true
+    }
+}

@@ -1,0 +1,237 @@
+//! Search for the outlines of both bands among the marker pixels.
+
+use super::fit::{COARSE, FINE, Fit, fit};
+use super::outcome::{Recognition, UNKNOWN};
+use super::pairing::{Pair, TRIALS, likely_pairs};
+use super::prediction::{BandPrediction, BandPredictor};
+use super::rejection::Rejection;
+use crate::scan::{Region, RunMap};
+use crate::settings::Settings;
+
+/// Outlines are fitted again at most this often, until they move by less than half of the accuracy of 0.2 px.
+const REPEATS: usize = 6;
+const CONVERGED: f64 = 0.1;
+/// A band that the border cuts is moved at most this often to match the centroid of its visible part.
+const SHIFTS: usize = 10;
+/// Positions nearer than this to each other lead to the same fit (px): it is within the tolerance of the edges.
+const SAME: f64 = 0.7;
+/// Standard deviation of the centroid of a region as a feature (px): part of the band may be hidden.
+const REGION_STD: [f64; 4] = [4.0; 4];
+/// A band found alone must be nearer to its predicted position than to the other's by this squared Mahalanobis distance:
+/// 3 standard deviations.
+const AMBIGUITY: f64 = 9.0;
+
+/// Search for both bands near their prediction.
+pub struct OutlineSearch<'a, P> {
+    /// The marker pixels.
+    pub map: &'a RunMap,
+    /// The prediction.
+    pub predictor: &'a P,
+    /// Thresholds and the settings of the fit.
+    pub settings: &'a Settings,
+}
+
+impl<P: BandPredictor> OutlineSearch<'_, P> {
+    /// Recognises the bands among the regions.
+    pub fn recognise(&self, regions: &[Region]) -> Recognition {
+        let Some(prior) = self.predictor.predict(UNKNOWN, [f64::INFINITY; 4]) else {
+            return Recognition::none(Rejection::NotPredicted);
+        };
+        if regions.is_empty() {
+            return Recognition::none(Rejection::NoRegion);
+        }
+        let mut best: Option<(f64, Recognition)> = None;
+        let mut tried = [UNKNOWN; 2 * TRIALS];
+        let pairs = likely_pairs(regions, &prior);
+        let starts = pairs.into_iter().flatten().flat_map(|pair| {
+            let observed = centroids(pair, &prior, regions);
+            [Some(observed), uncut_centroids(observed, &prior, self.map)]
+        });
+        for (index, observed) in starts.flatten().enumerate() {
+            let Some((_, first)) = self.fit(observed, REGION_STD, [true; 2], COARSE) else {
+                continue;
+            };
+            // Many pairs lead to the same fit.
+            let is_same =
+                |before: &[f64; 4]| (0..4).all(|i| (before[i] - first.features[i]).abs() < SAME);
+            if tried.iter().any(is_same) {
+                continue;
+            }
+            tried[index] = first.features;
+            let Some(found) = self.refine(first) else {
+                continue;
+            };
+            let quality = found.quality(self.settings);
+            if best.is_none_or(|(most, _)| quality > most) {
+                best = Some((quality, found));
+            }
+            if found.is_clear(self.settings) {
+                break;
+            }
+        }
+        let Some((_, found)) = best else {
+            return Recognition::none(Rejection::NoRegion);
+        };
+        match found.rejections {
+            [None, Some(_)] => self.check_single(found, 0, &prior, regions),
+            [Some(_), None] => self.check_single(found, 1, &prior, regions),
+            _ => found,
+        }
+    }
+
+    /// Recognises the bands near features `observed` (4,) (px) with standard deviations `std` (4,) (px).
+    pub fn recognise_at(&self, observed: [f64; 4], std: [f64; 4]) -> Option<Recognition> {
+        let (_, first) = self.fit(observed, std, [true; 2], COARSE)?;
+        self.refine(first)
+    }
+
+    /// Rejects a band found alone if it is not complete enough, or if the same pixels fit the other band as well.
+    fn check_single(
+        &self,
+        mut found: Recognition,
+        band: usize,
+        prior: &BandPrediction,
+        regions: &[Region],
+    ) -> Recognition {
+        let score = found.scores[band];
+        let least = self.settings.least_edges_alone;
+        if score.edges < least || score.coverage < 0.75 * least {
+            found.rejections[band] = Some(Rejection::MissingEdges { share: score.edges });
+            found.erase_rejected();
+            return found;
+        }
+        let [u, v] = score.centroid;
+        let distance = |region: &Region| {
+            let [ru, rv] = region.centroid();
+            (ru - u).hypot(rv - v)
+        };
+        let nearest = (0..regions.len())
+            .min_by(|a, b| distance(&regions[*a]).total_cmp(&distance(&regions[*b])));
+        let mut pair = [None; 2];
+        pair[1 - band] = nearest;
+        let mut here = UNKNOWN;
+        [here[2 - 2 * band], here[3 - 2 * band]] = [u, v];
+        let starts = [here, centroids(pair, prior, regions)];
+        let is_ambiguous = starts.iter().any(|observed| {
+            self.recognise_at(*observed, REGION_STD)
+                .is_some_and(|other| {
+                    other.rejections[1 - band].is_none()
+                        && other.scores[1 - band].mahalanobis_squared
+                            < score.mahalanobis_squared + AMBIGUITY
+                })
+        });
+        if is_ambiguous {
+            found.rejections[band] = Some(Rejection::Ambiguous);
+            found.erase_rejected();
+        }
+        found
+    }
+
+    /// Repeats a fit with the outlines of the posture that it implies, until it converges.
+    fn refine(&self, mut found: Fit) -> Option<Recognition> {
+        let mut last = None;
+        for _ in 0..REPEATS {
+            let before = found.features;
+            let Some((prediction, next)) = self.fit(before, fit_std(&found), [true; 2], FINE)
+            else {
+                break;
+            };
+            found = next;
+            last = Some(prediction);
+            let moved = before.iter().zip(found.features);
+            if moved.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) < CONVERGED {
+                break;
+            }
+        }
+        let result = Recognition::of(&last?, &found, self.map, self.settings);
+        let rejections = result.rejections;
+        let is_used = rejections.map(|rejection| rejection.is_none());
+        if is_used[0] == is_used[1] {
+            return Some(result);
+        }
+        // A rejected band must not influence the position of the other.
+        let mut observed = found.features;
+        for band in (0..2).filter(|band| !is_used[*band]) {
+            observed[2 * band..2 * band + 2].fill(f64::NAN);
+        }
+        let (prediction, found) = self.fit(observed, fit_std(&found), is_used, FINE)?;
+        let mut single = Recognition::of(&prediction, &found, self.map, self.settings);
+        for band in (0..2).filter(|band| !is_used[*band]) {
+            single.rejections[band] = rejections[band];
+            single.scores[band] = result.scores[band];
+        }
+        single.erase_rejected();
+        Some(single)
+    }
+
+    /// Fits the outlines of the posture that explains the features `observed`, starting there.
+    fn fit(
+        &self,
+        observed: [f64; 4],
+        std: [f64; 4],
+        is_used: [bool; 2],
+        tolerances: [f64; 3],
+    ) -> Option<(BandPrediction, Fit)> {
+        let prediction = self.predictor.predict(observed, std)?;
+        let [[ua, va], [ub, vb]] = prediction.outlines.map(|outline| outline.centroid);
+        let mut start = [ua, va, ub, vb];
+        for (start, observed) in start.iter_mut().zip(observed) {
+            if observed.is_finite() {
+                *start = observed;
+            }
+        }
+        let settings = &self.settings.fit;
+        let found = fit(&prediction, start, is_used, tolerances, self.map, settings)?;
+        Some((prediction, found))
+    }
+}
+
+/// Centroids of the bands if these regions are the bands.
+fn centroids(pair: Pair, prior: &BandPrediction, regions: &[Region]) -> [f64; 4] {
+    let mut observed = UNKNOWN;
+    for (band, region) in pair.into_iter().enumerate() {
+        if let Some(region) = region.and_then(|index| regions.get(index)) {
+            [observed[2 * band], observed[2 * band + 1]] = region.centroid();
+        }
+    }
+    if let [Some(one), Some(other)] = pair
+        && one == other
+    {
+        let [u, v] = prior.shift_to(regions[one].centroid());
+        let [ua, va, ub, vb] = prior.features;
+        observed = [ua + u, va + v, ub + u, vb + v];
+    }
+    observed
+}
+
+/// Centroids of the whole bands from those of their parts inside the image; None if the border cuts neither.
+fn uncut_centroids(
+    mut observed: [f64; 4],
+    prior: &BandPrediction,
+    map: &RunMap,
+) -> Option<[f64; 4]> {
+    let mut is_cut = false;
+    for (outline, centroid) in prior.outlines.iter().zip(observed.chunks_exact_mut(2)) {
+        let part = [centroid[0], centroid[1]];
+        let mut outline = outline.moved_to(part);
+        for _ in 0..SHIFTS {
+            let Some([u, v]) = outline.centroid_within(map) else {
+                break;
+            };
+            let [du, dv] = [part[0] - u, part[1] - v];
+            if du.hypot(dv) < SAME {
+                break;
+            }
+            is_cut = true;
+            outline = outline.moved([du, dv]);
+        }
+        centroid.copy_from_slice(&outline.centroid);
+    }
+    is_cut.then_some(observed)
+}
+
+/// Standard deviations of a fit's features for the next fit: twice its own plus 0.3 px, because the outlines were those of
+/// a posture that was not yet right.
+fn fit_std(found: &Fit) -> [f64; 4] {
+    [0, 1, 2, 3].map(|index: usize| 0.3 + 2.0 * found.covariance[index][index].max(0.0).sqrt())
+}

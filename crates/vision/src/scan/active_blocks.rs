@@ -1,0 +1,176 @@
+//! Blocks of columns that may hold marker pixels, row by row.
+
+/// Columns of a block: the bits of a word.
+pub const BLOCK: usize = 64;
+
+/// Rows of a strip: enough that the work once per strip costs little, and few enough that a strip is still in
+/// the first cache when it is read again.
+pub const STRIP: usize = 16;
+
+/// The active blocks of a strip of rows: those near a pixel that may be marker. A word has a bit for each of 64
+/// blocks.
+#[derive(Clone, Debug, Default)]
+pub struct ActiveBlocks {
+    blocks: usize,
+    words: usize,
+    reach: usize,
+    /// Blocks with such a pixel, in the rows of the strip and `reach` more above and below it.
+    hits: Vec<u64>,
+    /// Active blocks, in the row above the strip and in those of the strip.
+    active: Vec<u64>,
+}
+
+impl ActiveBlocks {
+    /// Starts an image in which a hit activates its block and the two beside it, up to `reach` rows above and
+    /// below. Allocates only when `reach` or the width exceed those before.
+    pub fn start(&mut self, width: usize, reach: usize) {
+        self.blocks = width.div_ceil(BLOCK);
+        self.words = self.blocks.div_ceil(64);
+        self.reach = reach;
+        for (rows, count) in [
+            (&mut self.hits, STRIP + 2 * reach),
+            (&mut self.active, STRIP + 1),
+        ] {
+            rows.clear();
+            rows.resize(count * self.words, 0);
+        }
+    }
+
+    /// Moves down by a strip, which has no hits yet.
+    #[inline(always)]
+    pub fn next_strip(&mut self) {
+        for rows in [&mut self.hits, &mut self.active] {
+            let old = (STRIP * self.words).min(rows.len());
+            rows.copy_within(old.., 0);
+            let new = rows.len() - old;
+            rows.get_mut(new..).unwrap_or_default().fill(0);
+        }
+    }
+
+    /// Blocks with a hit in a row; row 0 is `reach` rows above the strip.
+    #[inline(always)]
+    pub fn hits(&mut self, row: usize) -> &mut [u64] {
+        let words = row * self.words..(row + 1) * self.words;
+        self.hits.get_mut(words).unwrap_or_default()
+    }
+
+    /// Finds the active blocks of the strip; returns whether there are any, there or in the row above.
+    #[inline(always)]
+    pub fn activate(&mut self) -> bool {
+        // No early exit: with one word per row all rows are combined at once.
+        let any = self.hits.iter().fold(0, |all, word| all | word) != 0;
+        if any {
+            let strip = self.active.get_mut(self.words..).unwrap_or_default();
+            for above in 0..=2 * self.reach {
+                let rows = self.hits.get(above * self.words..).unwrap_or_default();
+                for (active, hits) in strip.iter_mut().zip(rows) {
+                    *active |= hits;
+                }
+            }
+            for row in strip.chunks_exact_mut(self.words.max(1)) {
+                widen(row, self.blocks);
+            }
+        }
+        any || self.is_active(0)
+    }
+
+    /// Whether a block is active in a row of the strip or in the row above it.
+    #[inline(always)]
+    pub fn is_active(&self, row: usize) -> bool {
+        let both = row * self.words..(row + 2) * self.words;
+        let words = self.active.get(both).unwrap_or_default();
+        words.iter().fold(0, |all, word| all | word) != 0
+    }
+
+    /// Active blocks of a row of the strip.
+    #[inline(always)]
+    pub fn active(&self, row: usize) -> &[u64] {
+        self.row(row + 1)
+    }
+
+    /// Those that are not active in the row above.
+    #[inline(always)]
+    pub fn newly_active(&self, row: usize) -> impl Iterator<Item = u64> {
+        let both = self.row(row + 1).iter().zip(self.row(row));
+        both.map(|(new, old)| new & !old)
+    }
+
+    #[inline(always)]
+    fn row(&self, row: usize) -> &[u64] {
+        let words = row * self.words..(row + 1) * self.words;
+        self.active.get(words).unwrap_or_default()
+    }
+}
+
+/// Sets the neighbours of the bits that are set, within the number of blocks.
+#[inline(always)]
+fn widen(row: &mut [u64], blocks: usize) {
+    let mut before = 0;
+    for index in 0..row.len() {
+        let after = row.get(index + 1).copied().unwrap_or_default();
+        if let Some(word) = row.get_mut(index) {
+            let here = *word;
+            *word |= here << 1 | here >> 1 | before >> 63 | after << 63;
+            before = here;
+        }
+    }
+    if let Some(last) = row.last_mut() {
+        *last &= u64::MAX >> ((64 - blocks % 64) % 64);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn blocks_near_a_hit_and_their_neighbours_are_active(
+            width in prop_oneof![1..400_usize, 4000..9000_usize],
+            reach in 0..6_usize,
+            rows in prop::collection::vec(prop::collection::vec(any::<u16>(), 0..3), 1..60),
+            quiet in 0..60_usize,
+        ) {
+            let blocks = width.div_ceil(BLOCK);
+            let rows: Vec<Vec<usize>> = rows.into_iter().enumerate()
+                .map(|(n, row)| if n.abs_diff(quiet) < 25 { vec![] } else {
+                    row.into_iter().map(|b| usize::from(b) % blocks).collect()
+                })
+                .collect();
+            let active = |n: usize| -> Vec<bool> {
+                let around = n.saturating_sub(reach)..(n + reach + 1).min(rows.len());
+                let hits = rows.get(around).unwrap_or_default().concat();
+                (0..blocks).map(|block| hits.iter().any(|b| block.abs_diff(*b) <= 1)).collect()
+            };
+            let bits = |words: &[u64]| -> Vec<bool> {
+                (0..64 * words.len()).map(|b| words[b / 64] >> (b % 64) & 1 == 1).collect()
+            };
+            let mut strips = ActiveBlocks::default();
+            strips.start(width, reach);
+            let mut scanned = 0;
+            for first in (0..rows.len()).step_by(STRIP) {
+                strips.next_strip();
+                let ahead = rows.len().min(first + STRIP + reach);
+                for (n, row) in rows.iter().enumerate().take(ahead).skip(scanned) {
+                    let words = strips.hits(n + reach - first);
+                    for b in row {
+                        words[b / 64] |= 1 << (b % 64);
+                    }
+                }
+                scanned = ahead;
+                let any = strips.activate();
+                for n in first..rows.len().min(first + STRIP) {
+                    let (found, expected) = (bits(strips.active(n - first)), active(n));
+                    prop_assert_eq!(&found[..blocks], &expected[..], "row {}", n);
+                    prop_assert!(found[blocks..].iter().all(|bit| !bit));
+                    prop_assert!(any || !expected.contains(&true));
+                    let above = n.checked_sub(1).map_or(vec![false; blocks], active);
+                    let new = bits(&strips.newly_active(n - first).collect::<Vec<u64>>());
+                    let expected = expected.iter().zip(above).map(|(new, old)| *new && !old);
+                    prop_assert_eq!(&new[..blocks], &expected.collect::<Vec<bool>>()[..]);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,155 @@
+//! Projection, low-pass and threshold of the rows of a strip.
+
+use std::ops::Range;
+
+use fearless_simd::prelude::*;
+
+use super::active_blocks::{ActiveBlocks, BLOCK, STRIP};
+use super::lowpass::{Block, LowPass, RowIndex, replicate_end};
+use super::projection::Projection;
+use super::row::Row;
+use super::runs::runs_of_bits;
+
+/// Projects and filters the active blocks of rows, and keeps the marker pixels of a strip.
+#[derive(Clone, Debug)]
+pub struct Filter {
+    blocks: usize,
+    passes: Vec<LowPass>,
+    /// Input and output of a pass.
+    values: [Vec<Block>; 2],
+    /// Marker pixels, a word for each row of the strip and each block; valid in active blocks alone.
+    marker: Vec<u64>,
+}
+
+/// A step of the pass over the frame.
+#[derive(Clone, Copy)]
+pub struct Step<'a> {
+    /// The row that is read, unless all of them have been.
+    pub source: Option<Row<'a>>,
+    /// Number of the step.
+    pub index: usize,
+    /// Pixels in a row.
+    pub width: usize,
+    /// Rows that are read.
+    pub height: usize,
+}
+
+impl Filter {
+    /// With this many passes of the low-pass.
+    pub fn new(passes: usize) -> Self {
+        Self {
+            blocks: 0,
+            passes: vec![LowPass::default(); passes],
+            values: [const { Vec::new() }; 2],
+            marker: Vec::new(),
+        }
+    }
+
+    /// Number of passes.
+    pub fn passes(&self) -> usize {
+        self.passes.len()
+    }
+
+    /// Makes room for rows of this width.
+    pub fn start(&mut self, width: usize) {
+        self.blocks = width.div_ceil(BLOCK);
+        for values in &mut self.values {
+            values.resize(self.blocks, [0; BLOCK]);
+        }
+        self.marker.resize(STRIP * self.blocks, 0);
+        for pass in &mut self.passes {
+            pass.prepare(self.blocks);
+        }
+    }
+
+    /// Projects the active blocks of a row, filters them, with pass k being k rows behind, and applies the threshold.
+    #[inline(always)]
+    pub fn step<S: Simd>(
+        &mut self,
+        simd: S,
+        active: &ActiveBlocks,
+        row: usize,
+        at: Step<'_>,
+        projection: &Projection,
+    ) {
+        for blocks in runs_of_bits(active.newly_active(row)) {
+            for pass in &mut self.passes {
+                pass.reset(&blocks);
+            }
+        }
+        let mut is_active = false;
+        for blocks in runs_of_bits(active.active(row).iter().copied()) {
+            self.filter_blocks(simd, row, &blocks, at, projection);
+            is_active = true;
+        }
+        if is_active {
+            for pass in &mut self.passes {
+                pass.advance();
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn filter_blocks<S: Simd>(
+        &mut self,
+        simd: S,
+        row: usize,
+        blocks: &Range<usize>,
+        Step {
+            source,
+            index,
+            width,
+            height,
+        }: Step<'_>,
+        projection: &Projection,
+    ) {
+        let columns = blocks.start * BLOCK..width.min(blocks.end * BLOCK);
+        let [values, filtered] = self.values.each_mut();
+        let (Some(mut values), Some(mut filtered)) = (
+            values.get_mut(blocks.clone()),
+            filtered.get_mut(blocks.clone()),
+        ) else {
+            return;
+        };
+        if let (Some(source), Some(values)) =
+            (source, values.as_flattened_mut().get_mut(..columns.len()))
+        {
+            projection.project(simd, source.columns(columns.clone()), values);
+        }
+        for (n, pass) in (0..=index).rev().zip(&mut self.passes) {
+            replicate_end(values, columns.len());
+            pass.step(simd, values, filtered, blocks, RowIndex { n, height });
+            (values, filtered) = (filtered, values);
+        }
+        let words = row * self.blocks + blocks.start..row * self.blocks + blocks.end;
+        let words = self.marker.get_mut(words).unwrap_or_default();
+        for (word, values) in words.iter_mut().zip(&*values) {
+            *word = above(simd, values, projection.threshold());
+        }
+        // Bits beyond the image are no pixels.
+        let beyond = words.len() * BLOCK - columns.len();
+        if let Some(word) = words.last_mut() {
+            *word &= u64::MAX >> beyond;
+        }
+    }
+
+    /// Marker pixels of a row of the strip, by block.
+    #[inline(always)]
+    pub fn marker(&self, row: usize) -> &[u64] {
+        let words = row * self.blocks..(row + 1) * self.blocks;
+        self.marker.get(words).unwrap_or_default()
+    }
+}
+
+/// Bit i is set if value i exceeds the threshold.
+#[inline(always)]
+fn above<S: Simd>(simd: S, values: &[i16; BLOCK], threshold: i16) -> u64 {
+    let level = S::i16s::splat(simd, threshold);
+    let lanes = S::i16s::LEN;
+    let mut word = 0;
+    for (vector, start) in values.chunks_exact(lanes).zip((0..).step_by(lanes)) {
+        let above = S::i16s::from_slice(simd, vector).simd_gt(level);
+        word |= above.to_bitmask() << start;
+    }
+    word
+}

@@ -1,0 +1,206 @@
+//! The low-pass filter of Fig. 5, on a stream of rows.
+
+use std::ops::Range;
+
+use fearless_simd::prelude::*;
+
+use super::active_blocks::BLOCK;
+
+/// One pass of the separable 3x3 binomial filter, `[1 2 1] / 4` along rows and along columns, with the image's
+/// border replicated.
+///
+/// Its output is one row behind: from row `n` it computes the filtered row `n - 1`. Each direction rounds to the
+/// nearest unit, halves upwards. Several passes approach a Gaussian of
+/// variance 1/2 px^2 per pass.
+#[derive(Clone, Debug, Default)]
+pub struct LowPass {
+    above: Vec<Block>,
+    here: Vec<Block>,
+    below: Vec<Block>,
+}
+
+/// Values of a block of columns.
+pub type Block = [i16; BLOCK];
+
+/// Below every projected value, and four of it still fit an `i16`.
+const FAR_BELOW: i16 = -8191;
+
+/// Row `n` of an image of `height` rows.
+#[derive(Clone, Copy, Debug)]
+pub struct RowIndex {
+    pub n: usize,
+    pub height: usize,
+}
+
+impl LowPass {
+    /// Makes room for rows of this many blocks; allocates only when the number grows.
+    pub fn prepare(&mut self, blocks: usize) {
+        for row in [&mut self.above, &mut self.here, &mut self.below] {
+            row.resize(blocks, [FAR_BELOW; BLOCK]);
+        }
+    }
+
+    /// Resets the previous rows of these blocks to values far below any threshold.
+    pub fn reset(&mut self, blocks: &Range<usize>) {
+        for row in [&mut self.above, &mut self.here] {
+            cut(row, blocks).fill([FAR_BELOW; BLOCK]);
+        }
+    }
+
+    /// Filters these blocks of row `n` into those of row `n - 1`; their first and last values are replicated.
+    ///
+    /// Call it for `n` = 0, 1, ..., `height`, each time followed by [`advance`](Self::advance). The output for
+    /// `n` = 0 and above `height` is meaningless; from `n` = `height` on, `row` is not read.
+    #[inline(always)]
+    pub fn step<S: Simd>(
+        &mut self,
+        simd: S,
+        row: &[Block],
+        filtered: &mut [Block],
+        blocks: &Range<usize>,
+        at: RowIndex,
+    ) {
+        let [above, here, below] =
+            [&mut self.above, &mut self.here, &mut self.below].map(|row| cut(row, blocks));
+        let (Some([first, ..]), Some([.., last])) = (row.first(), row.last()) else {
+            return;
+        };
+        let (mut before, end) = (S::i16s::splat(simd, *first), S::i16s::splat(simd, *last));
+        let following = row.get(1..).unwrap_or_default().iter().map(Some);
+        let three = above.iter_mut().zip(here).zip(below);
+        let rows = row.iter().zip(following.chain([None])).zip(three);
+        for (((row, following), ((above, here), below)), filtered) in rows.zip(filtered) {
+            let after = match following {
+                Some(block) => S::i16s::from_slice(simd, &block[..S::i16s::LEN]),
+                None => end,
+            };
+            step(
+                simd,
+                [before, after],
+                row,
+                [above, here, below, filtered],
+                at,
+            );
+            before = S::i16s::from_slice(simd, &row[BLOCK - S::i16s::LEN..]);
+        }
+    }
+
+    /// Row `n` becomes row `n - 1`.
+    pub fn advance(&mut self) {
+        std::mem::swap(&mut self.above, &mut self.here);
+        std::mem::swap(&mut self.here, &mut self.below);
+    }
+}
+
+fn cut<'a>(row: &'a mut [Block], blocks: &Range<usize>) -> &'a mut [Block] {
+    row.get_mut(blocks.clone()).unwrap_or_default()
+}
+
+/// One block of a step, between the vectors before and after it; neighbours are shifted together in registers.
+#[inline(always)]
+fn step<S: Simd>(
+    simd: S,
+    [mut before, after]: [S::i16s; 2],
+    row: &Block,
+    [above, here, below, filtered]: [&mut Block; 4],
+    at: RowIndex,
+) {
+    let lanes = S::i16s::LEN;
+    let mut middle = S::i16s::from_slice(simd, &row[..lanes]);
+    for start in (0..BLOCK).step_by(lanes) {
+        let end = start + lanes;
+        let next = match row.get(end..end + lanes) {
+            Some(values) => S::i16s::from_slice(simd, values),
+            None => after,
+        };
+        let centre = S::i16s::from_slice(simd, &here[start..end]);
+        let under = if at.n < at.height {
+            mean::<S>(
+                shift_in::<S>(before, middle),
+                middle,
+                middle.slide::<1>(next),
+            )
+        } else {
+            centre
+        };
+        under.store_slice(&mut below[start..end]);
+        if at.n == 0 {
+            under.store_slice(&mut here[start..end]);
+        }
+        let over = S::i16s::from_slice(simd, &above[start..end]);
+        mean::<S>(over, centre, under).store_slice(&mut filtered[start..end]);
+        (before, middle) = (middle, next);
+    }
+}
+
+/// The last value of one vector and all but the last of the next.
+#[inline(always)]
+fn shift_in<S: Simd>(before: S::i16s, values: S::i16s) -> S::i16s {
+    match S::i16s::LEN {
+        32 => before.slide::<31>(values),
+        16 => before.slide::<15>(values),
+        _ => before.slide::<7>(values),
+    }
+}
+
+/// Replicates the last of the first `width` values to the end of the row.
+#[inline(always)]
+pub fn replicate_end(row: &mut [Block], width: usize) {
+    if !width.is_multiple_of(BLOCK)
+        && let Some([last, beyond @ ..]) = row.as_flattened_mut().get_mut(width.saturating_sub(1)..)
+    {
+        beyond.fill(*last);
+    }
+}
+
+/// `(a + 2 b + c) / 4`, rounded; the values are within +-8191, so that the sum fits an `i16`.
+#[inline(always)]
+fn mean<S: Simd>(a: S::i16s, b: S::i16s, c: S::i16s) -> S::i16s {
+    (a + b + b + c + 2) >> 2
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fearless_simd::{Level, dispatch};
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn one_pass_is_the_binomial_filter_to_within_one_unit(
+            width in 1..150_usize,
+            values in prop::collection::vec(-8191..=8191_i16, 150 * 4),
+            best in any::<bool>(),
+        ) {
+            let rows: Vec<&[i16]> = values.chunks_exact(width).collect();
+            let height = rows.len();
+            let level = if best { Level::new() } else { Level::baseline() };
+            let mut pass = LowPass::default();
+            let blocks = 0..width.div_ceil(BLOCK);
+            pass.prepare(blocks.end);
+            for n in 0..=height {
+                let mut row = vec![[0; BLOCK]; blocks.end];
+                let mut filtered = row.clone();
+                if let Some(values) = rows.get(n) {
+                    row.as_flattened_mut()[..width].copy_from_slice(values);
+                    replicate_end(&mut row, width);
+                }
+                let at = RowIndex { n, height };
+                dispatch!(level, simd => pass.step(simd, &row, &mut filtered, &blocks, at));
+                pass.advance();
+                let Some(v) = n.checked_sub(1) else { continue };
+                for (u, filtered) in filtered.as_flattened()[..width].iter().enumerate() {
+                    let mut exact = 0;
+                    for (dv, weight_v) in [(0, 1), (1, 2), (2, 1)] {
+                        for (du, weight_u) in [(0, 1), (1, 2), (2, 1)] {
+                            let v = (v + dv).clamp(1, height) - 1;
+                            let u = (u + du).clamp(1, width) - 1;
+                            exact += weight_v * weight_u * i32::from(rows[v][u]);
+                        }
+                    }
+                    prop_assert!((16 * i32::from(*filtered) - exact).abs() <= 16);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,233 @@
+//! Weighted sums of pixels of three bytes, compared with a level, by an instruction that multiplies bytes in pairs.
+//!
+//! On other processors, and for the other formats, the compiler's vectorisation of [`Group`](super::Group) is as fast.
+
+use fearless_simd::prelude::*;
+
+use super::active_blocks::BLOCK;
+use super::byte_dot::ByteDot;
+
+/// Bytes of a block of pixels.
+const BYTES: usize = 3 * BLOCK;
+
+/// Finds the blocks in which a weighted sum of a pixel's three bytes reaches a level.
+///
+/// The bytes are multiplied where they lie, in vectors of 64 or 32 bytes. The sums of pixels 2 k and 2 k + 1, bytes
+/// 6 k to 6 k + 5, appear at bytes 6 k and 6 k + 2: each is that of the pair there plus that of the pair two bytes on.
+/// The sum at 6 k + 4 belongs to no pixel and is 0.
+#[derive(Clone, Debug)]
+pub struct SimdDot {
+    weights_64: [Weights<64>; 3],
+    weights_32: [Weights<32>; 3],
+    level: i16,
+    /// Index of each byte of the vector that starts two bytes on, in this vector and the next. A field, because
+    /// with a constant the compiler takes two permutations instead of one.
+    two_on: [u8; 64],
+}
+
+/// Weights of the bytes of one of the three vectors in 3 N bytes, and of those of the vector two bytes on.
+type Weights<const N: usize> = [[i8; N]; 2];
+
+impl SimdDot {
+    /// Takes weights that fit a byte; 255 times the sum of those of one sign must be below `i16::MAX`.
+    pub fn new(weights: [i16; 3], level: i16) -> Self {
+        Self {
+            weights_64: [0, 64, 128].map(|start| byte_weights(start, weights)),
+            weights_32: [0, 32, 64].map(|start| byte_weights(start, weights)),
+            level,
+            two_on: std::array::from_fn(|index| index.to_le_bytes()[0] + 2),
+        }
+    }
+
+    /// Sets the bit of each block in which `weights . x >= level` for a pixel x, or of every block if black
+    /// reaches the level. The words must be 0. A shorter last block is extended by pixels of the one before.
+    ///
+    /// Does nothing on a processor where it [is not fast](is_fast).
+    #[inline(always)]
+    pub fn mark<S: Simd>(&self, simd: S, bytes: &[u8], active: &mut [u64]) {
+        if let Some(wide) = simd.level().as_avx512() {
+            mark(
+                wide,
+                bytes,
+                (&self.weights_64, self.level),
+                &self.two_on,
+                active,
+            );
+        } else if let Some(wide) = simd.level().as_avx2() {
+            mark(
+                wide,
+                bytes,
+                (&self.weights_32, self.level),
+                &self.two_on,
+                active,
+            );
+        }
+    }
+}
+
+/// Whether this processor has the instruction for [`SimdDot::mark`].
+#[inline(always)]
+pub fn is_fast<S: Simd>(simd: S) -> bool {
+    simd.level().as_avx2().is_some()
+}
+
+fn byte_weights<const N: usize>(start: usize, weights: [i16; 3]) -> Weights<N> {
+    #[expect(clippy::cast_possible_truncation, reason = "weights fit a byte")]
+    let [first, second, third] = weights.map(|weight| weight as i8);
+    let mut both = [[0; N]; 2];
+    let [here, two_on] = &mut both;
+    let pairs = here.as_chunks_mut().0.iter_mut();
+    let pairs = pairs.zip(two_on.as_chunks_mut().0);
+    for ((here, two_on), at) in pairs.zip((start..).step_by(2)) {
+        (*here, *two_on) = match at % 6 {
+            0 => ([first, second], [third, 0]),
+            2 => ([0, first], [second, third]),
+            _ => ([0, 0], [0, 0]),
+        };
+    }
+    both
+}
+
+#[inline(always)]
+fn mark<S: ByteDot, const N: usize>(
+    simd: S,
+    bytes: &[u8],
+    (weights, level): (&[Weights<N>; 3], i16),
+    two_on: &[u8; 64],
+    active: &mut [u64],
+) {
+    let registers = Registers::new(simd, weights, level, two_on);
+    let (blocks, rest) = bytes.as_chunks::<BYTES>();
+    for (word, blocks) in active.iter_mut().zip(blocks.chunks(64)) {
+        let mut bits = 0;
+        for (bit, block) in blocks.iter().enumerate() {
+            bits |= u64::from(registers.is_reached::<N>(simd, block)) << bit;
+        }
+        *word = bits;
+    }
+    if !rest.is_empty()
+        && let Some(last) = bytes.last_chunk()
+        && let Some(word) = active.get_mut(blocks.len() / 64)
+    {
+        *word |= u64::from(registers.is_reached::<N>(simd, last)) << (blocks.len() % 64);
+    }
+}
+
+/// Weights and level, loaded once per row: left in memory, they would be loaded more often than the bytes.
+struct Registers<S: Simd> {
+    weights: [[S::i8s; 2]; 3],
+    level: S::i16s,
+    two_on: S::u8s,
+}
+
+impl<S: ByteDot> Registers<S> {
+    #[inline(always)]
+    fn new<const N: usize>(
+        simd: S,
+        [a, b, c]: &[Weights<N>; 3],
+        level: i16,
+        two_on: &[u8; 64],
+    ) -> Self {
+        Self {
+            weights: [load(simd, a), load(simd, b), load(simd, c)],
+            level: S::i16s::splat(simd, level),
+            two_on: S::u8s::from_slice(simd, &two_on[..N]),
+        }
+    }
+
+    /// Whether a pixel of a block reaches the level.
+    #[inline(always)]
+    fn is_reached<const N: usize>(&self, simd: S, block: &[u8; BYTES]) -> bool {
+        let mut largest = S::i16s::splat(simd, i16::MIN);
+        let zero = S::u8s::splat(simd, 0);
+        for part in block.chunks_exact(3 * N) {
+            let first = S::u8s::from_slice(simd, &part[..N]);
+            let second = S::u8s::from_slice(simd, &part[N..2 * N]);
+            let third = S::u8s::from_slice(simd, &part[2 * N..]);
+            // No pixel of these extends beyond the third vector.
+            let vectors = [(first, second), (second, third), (third, zero)];
+            for ((bytes, next), [here, two_on]) in vectors.into_iter().zip(self.weights) {
+                let sum = simd.dot(bytes, here);
+                let bytes = simd.two_on(bytes, next, self.two_on);
+                largest = largest.max(sum + simd.dot(bytes, two_on));
+            }
+        }
+        largest.simd_ge(self.level).any_true()
+    }
+}
+
+#[inline(always)]
+fn load<S: ByteDot, const N: usize>(simd: S, [here, two_on]: &Weights<N>) -> [S::i8s; 2] {
+    [
+        S::i8s::from_slice(simd, here),
+        S::i8s::from_slice(simd, two_on),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::levels;
+    use super::*;
+    use fearless_simd::dispatch;
+    use proptest::prelude::*;
+
+    #[test]
+    fn one_pixel_that_reaches_the_level_activates_its_block() {
+        for pixel in 0..BLOCK {
+            let mut bytes = [0_u8; BYTES];
+            bytes[3 * pixel..3 * pixel + 3].copy_from_slice(&[10, 200, 30]);
+            let sum = -2 * 10 + 3 * 200 + 30;
+            for (simd, above) in levels().into_iter().flat_map(|simd| [(simd, 0), (simd, 1)]) {
+                let mut active = [0];
+                let can = dispatch!(simd, simd => {
+                    SimdDot::new([-2, 3, 1], sum + above).mark(simd, &bytes, &mut active);
+                    is_fast(simd)
+                });
+                assert_eq!(active[0] == 1, can && above == 0, "{simd:?}, {pixel}");
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn marks_exactly_the_blocks_with_a_pixel_that_reaches_the_level(
+            bytes in (BLOCK..5 * BLOCK, any::<bool>()).prop_flat_map(|(pixels, dark)| {
+                let most = if dark { 3_u8 } else { 255 };
+                prop::collection::vec(prop_oneof![20 => 0..=most, 1 => Just(255)], 3 * pixels)
+            }),
+            weights in prop_oneof![
+                [-42..42_i16, -42..42_i16, -42..42_i16],
+                Just([-66, 127, -61]),
+                Just([-127, 127, -1]),
+                Just([127, -127, 1]),
+            ],
+            pick in any::<prop::sample::Index>(),
+            above in 0..2_i16,
+        ) {
+            let sum = |pixel: &[u8; 3]| -> i16 {
+                pixel.iter().zip(weights).map(|(x, weight)| i16::from(*x) * weight).sum()
+            };
+            let (pixels, _) = bytes.as_chunks::<3>();
+            // The result changes at a sum that occurs.
+            let level = sum(&pixels[pick.index(pixels.len())]).saturating_add(above);
+            let reaches =
+                |pixels: &[[u8; 3]]| level <= 0 || pixels.iter().any(|pixel| sum(pixel) >= level);
+            let (whole, rest) = pixels.as_chunks::<BLOCK>();
+            let mut expected: Vec<bool> = whole.iter().map(|block| reaches(block)).collect();
+            if !rest.is_empty() {
+                expected.push(reaches(&pixels[pixels.len() - BLOCK..]));
+            }
+            for simd in levels() {
+                let mut active = [0];
+                let can = dispatch!(simd, simd => {
+                    SimdDot::new(weights, level).mark(simd, &bytes, &mut active);
+                    is_fast(simd)
+                });
+                let marked: Vec<bool> =
+                    (0..expected.len()).map(|bit| active[0] >> bit & 1 == 1).collect();
+                prop_assert!(!can || marked == expected, "{:?}: {:?}", simd, marked);
+                prop_assert!(can || active == [0]);
+            }
+        }
+    }
+}

@@ -1,0 +1,56 @@
+//! Settings whose thresholds bands of any size and shape can reach.
+
+use tautscope_vision::{BlurSettings, ClearSettings, FitSettings, Settings, UnlocatedSettings};
+
+pub const SETTINGS: Settings = Settings {
+    weights: [-0.5, 1.0, -0.6],
+    threshold: 10.0,
+    alternatives: Vec::new(),
+    smoothing: 1,
+    minimum_area: 1,
+    model_deviation: 2.5,
+    search_margin: 12.0,
+    least_inside: 0.5,
+    least_coverage: 0.4,
+    least_exclusive: 0.8,
+    largest_spill: 0.6,
+    least_edges: 0.4,
+    least_rims: 0.2,
+    least_edges_on_average: 0.5,
+    least_edges_alone: 0.7,
+    largest_surprise: 30.0,
+    fit: FitSettings {
+        edge_deviation: 0.5,
+        edge_tolerance: 1.8,
+        edge_reach: 9.0,
+        growth_deviation: 1.2,
+        growth_share: 0.06,
+        growth_difference: 0.2,
+        growth_difference_share: 0.01,
+        missing_edge_variance: 5.0,
+    },
+    clear: ClearSettings {
+        least_edges: 0.75,
+        least_coverage: 0.8,
+        largest_surprise: 8.0,
+    },
+    unlocated: UnlocatedSettings {
+        least_inside: 0.9,
+        least_coverage: 0.75,
+        least_edges: 0.75,
+        least_edges_on_average: 0.85,
+    },
+    blur: BlurSettings {
+        sigma: 2.5,
+        sigma_deviation: 2.0,
+        sharp_sigma: 1.0,
+        margin: 14.0,
+        brightness_ratio_deviation: 0.2,
+        unevenness: 0.015,
+        model_deviation: 0.25,
+        least_explained: 0.8,
+        least_contrast: 8.0,
+        least_brightness_ratio: 0.6,
+        largest_deviation: 1.2,
+    },
+};

@@ -1,0 +1,120 @@
+"""The command ``tautscope bench``."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tautscope.commands import arguments
+from tautscope.config import load_config
+from tautscope.errors import ConfigError
+
+if TYPE_CHECKING:
+    from tautscope.bench.rig import Bench
+
+BENCH = "configs/bench.toml"
+
+
+def add_parser(verbs: arguments.Verbs) -> None:
+    """Add the command to the parser."""
+    bench = verbs.add_parser(
+        "bench",
+        allow_abbrev=False,
+        help="run a simulated rig: drives and a camera for `tautscope run`",
+        description="Run a simulated rig for another process: the simulated instrument behind "
+        "three CiA 402 drives on a CAN bus and a camera stream, in real time. Ends with its input, "
+        "or Ctrl-C. A line of input injects a fault: KIND PART, with the part insertion, rotation, "
+        "bending (drop, delay, fault, freeze, heartbeat, refuse) or camera (drop, delay, fault: "
+        "unplugged, freeze); clear PART ends it. Events are written as JSON lines.",
+    )
+    bench.add_argument("--config", default=BENCH, metavar="FILE", help="TOML file [%(default)s]")
+    bench.add_argument(
+        "--faults",
+        nargs="+",
+        type=_fault,
+        default=[],
+        metavar="'S KIND PART'",
+        help="inject a fault S seconds after the motors are enabled",
+    )
+    bench.add_argument(
+        "--truth", type=Path, metavar="FILE.csv", help="write the true tip state, for evaluation"
+    )
+    bench.add_argument(
+        "--modes",
+        type=int,
+        nargs="+",
+        default=[7, 8],
+        metavar="N",
+        help="supported modes of operation [7 8]",
+    )
+    bench.set_defaults(run=_bench)
+
+
+def _fault(text: str) -> tuple[float, str]:
+    seconds, _, request = text.partition(" ")
+    try:
+        return float(seconds), request
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"got {text!r}, expected 'SECONDS KIND PART'") from None
+
+
+def _bench(options: argparse.Namespace) -> None:
+    from tautscope.bench.events import EventPrinter  # noqa: PLC0415
+    from tautscope.bench.rig import Bench  # noqa: PLC0415
+    from tautscope.hardware.realtime import (  # noqa: PLC0415
+        SETPOINTS,
+        limited_garbage_collection,
+        locked_memory,
+        realtime,
+        short_switch_interval,
+    )
+    from tautscope.hardware.signals import exit_on_signals  # noqa: PLC0415
+
+    config = load_config(options.config)
+    with (
+        exit_on_signals(),
+        short_switch_interval(),
+        limited_garbage_collection(),
+        locked_memory(),
+        realtime(SETPOINTS) as refusal,
+        Bench(config, options.truth, modes=tuple(options.modes)) as bench,
+    ):
+        if refusal:
+            print(f"warning: {refusal}", file=sys.stderr, flush=True)
+        print(json.dumps({"time": time.monotonic(), "what": "ready"}), flush=True)
+        printer = EventPrinter(lambda: bench.events)
+        stopping = threading.Event()
+        injector = threading.Thread(
+            target=_inject_faults, args=(bench, sorted(options.faults), stopping)
+        )
+        injector.start()
+        try:
+            for line in sys.stdin:
+                try:
+                    bench.request(line)
+                except ConfigError as error:
+                    print(f"error: {error}", file=sys.stderr, flush=True)
+        except KeyboardInterrupt:
+            pass
+        finally:
+            stopping.set()
+            injector.join()
+            printer.close()
+
+
+def _inject_faults(
+    bench: Bench, faults: list[tuple[float, str]], stopping: threading.Event
+) -> None:
+    """Inject each fault at its time after the motors were first enabled."""
+    enabled_at: float | None = None
+    while faults and not stopping.wait(0.01):
+        if enabled_at is None:
+            enabled = [e.time for e in bench.events if e.what == "operation enabled"]
+            enabled_at = enabled[0] if enabled else None
+        elif time.monotonic() >= enabled_at + faults[0][0]:
+            bench.request(faults.pop(0)[1])

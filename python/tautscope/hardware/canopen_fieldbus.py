@@ -1,0 +1,276 @@
+"""CiA 402 drives on a CAN bus (CANopen, CiA 301).
+
+SDO transfers and EDS files go through the `canopen` library, process data through
+`tautscope.hardware.canopen_master`.
+
+There is no thread: `exchange` sends the master's heartbeat, so that the drives detect a control
+loop that hangs. An interface that echoes its own frames cannot be used: the echo would look like a
+second master.
+"""
+
+from __future__ import annotations
+
+import struct
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+
+import can
+from canopen import Network, ObjectDictionary
+from canopen.sdo.client import SdoClient
+from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
+
+from tautscope.config import DrivesConfig
+from tautscope.dof import Dof
+from tautscope.errors import ConfigError, DriveError, SettingRefusedError, SilentDriveError
+from tautscope.hardware import object_dictionary as objects
+from tautscope.hardware.canopen_master import (
+    PRE_OPERATIONAL,
+    RX_PDO_1,
+    RX_PDO_2,
+    SDO_REQUEST,
+    SDO_RESPONSE,
+    STOP,
+    TX_PDO_1,
+    CanopenMaster,
+    bus_lost,
+    open_bus,
+)
+from tautscope.hardware.cia402 import Mode
+from tautscope.hardware.fieldbus import (
+    TX_PDO_OBJECTS,
+    AbsentError,
+    Feedback,
+    abort_error,
+    target_object,
+    verify_setting,
+)
+from tautscope.hardware.object_dictionary import Entry, load_eds
+
+EVENT_DRIVEN, AT_EVERY_SYNC = 255, 1
+"""PDO transmission types."""
+INVALID = 1 << 31
+"""Bit 31 of a PDO's COB-ID: the PDO is not valid."""
+NO_RTR = 1 << 30
+"""Bit 30 of a TxPDO's COB-ID: no remote transmission request allowed."""
+GENERAL_ERROR = 0x0800_0000
+"""SDO abort code."""
+
+
+class _Sdo(SdoClient):
+    """An SDO client that reads the bus itself while it waits for a response."""
+
+    RESPONSE_TIMEOUT = 0.0
+    timeout: float
+    receive_one: Callable[[float], object]
+
+    def read_response(self) -> bytes:
+        deadline = time.monotonic() + self.timeout
+        while self.responses.empty() and (left := deadline - time.monotonic()) > 0:
+            self.receive_one(left)
+        response: bytes = super().read_response()  # type: ignore[no-untyped-call]
+        return response
+
+    def abort(self, abort_code: int = GENERAL_ERROR) -> None:
+        """Send the abort without the library's log entry; the exception reports it."""
+        self.send_request(struct.pack("<B3xI", 0x80, abort_code))  # type: ignore[no-untyped-call]
+
+
+class CanopenFieldbus:
+    """Three drives on a CAN bus; a `tautscope.hardware.fieldbus.Fieldbus`.
+
+    Args:
+        config: Bus, nodes, timeouts.
+        bus: An open bus instead of the configured one; it is closed with this object.
+
+    Raises:
+        ConfigError: An EDS file is missing, unreadable or describes another drive.
+        BusError: The bus cannot be opened.
+        SecondMasterError: Another master sends frames.
+    """
+
+    def __init__(self, config: DrivesConfig, bus: can.BusABC | None = None) -> None:
+        self._config = config
+        dictionaries = {dof: _dictionary(config, dof) for dof in Dof}
+        self._network = Network()
+        self._network.bus = self._bus = open_bus(config) if bus is None else bus
+        self._sdo: dict[Dof, _Sdo] = {}
+        self._master = CanopenMaster(config, self._bus, self._on_sdo_response)
+        for dof, dictionary in dictionaries.items():
+            node = config[dof].node
+            sdo = _Sdo(SDO_REQUEST + node, SDO_RESPONSE + node, dictionary)  # type: ignore[no-untyped-call]
+            sdo.network, sdo.timeout = self._network, config.request_timeout
+            sdo.receive_one = self._master.receive_one
+            self._sdo[dof] = sdo
+        try:
+            self._master.detect_second_master(2 * config.heartbeat_period + 2 * config.cycle)
+            for dof in Dof:
+                self._check_identity(dof)
+        except BaseException:
+            self.close()
+            raise
+
+    def name(self, dof: Dof) -> str:
+        """See `Fieldbus.name`."""
+        return self._master.nodes[dof].name
+
+    def read(self, dof: Dof, entry: Entry) -> int:
+        """Read a value by SDO upload; see `Fieldbus.read`."""
+        data = self._request(dof, entry, lambda sdo: sdo.upload(entry.index, entry.subindex))
+        return entry.decode(data)
+
+    def write(self, dof: Dof, entry: Entry, value: int) -> None:
+        """Write a value by SDO download; see `Fieldbus.write`."""
+        known = self._sdo[dof].od.get_variable(entry.index, entry.subindex)
+        size = len(known) // 8 if known is not None and known.fixed_size else entry.size
+        try:
+            data = value.to_bytes(size, "little", signed=entry.signed)
+        except OverflowError:
+            raise SettingRefusedError(
+                self.name(dof), f"{entry} cannot hold {value}", "Check the drive's EDS file"
+            ) from None
+        what = f"{entry} = {value}"
+        self._request(dof, what, lambda sdo: sdo.download(entry.index, entry.subindex, data))
+
+    def configure(self, modes: Mapping[Dof, Mode]) -> None:
+        """Configure producer and consumer heartbeats and the PDOs, and read them back."""
+        config = self._config
+        for dof in Dof:
+            node = self._master.nodes[dof]
+            self._master.send_nmt(PRE_OPERATIONAL, node.id)
+            period = round(config.heartbeat_period * 1e3)
+            timeout = round(config.heartbeat_timeout * 1e3)
+            self._set(dof, objects.PRODUCER_HEARTBEAT, period)
+            # Some drives refuse a second consumer entry for the same producer.
+            self._set(dof, objects.CONSUMER_HEARTBEAT, 0)
+            self._set(dof, objects.CONSUMER_HEARTBEAT, config.master_node << 16 | timeout)
+            self._map(dof, 0x1400, RX_PDO_1, EVENT_DRIVEN, (objects.CONTROLWORD,))
+            self._map(dof, 0x1401, RX_PDO_2, AT_EVERY_SYNC, (target_object(modes[dof]),))
+            self._map(dof, 0x1800, TX_PDO_1, AT_EVERY_SYNC, TX_PDO_OBJECTS)
+            for base in (0x1402, 0x1403, 0x1801, 0x1802, 0x1803):
+                self._disable_pdo(dof, base)
+
+    def start(self) -> None:
+        """See `Fieldbus.start`."""
+        self._master.start()
+
+    def exchange(self, controlwords: Sequence[int], targets: Sequence[int]) -> list[Feedback]:
+        """See `Fieldbus.exchange`.
+
+        Raises:
+            EmergencyError: A drive sent an emergency object.
+            HeartbeatError: A drive's heartbeat is missing.
+            StateError: A drive restarted.
+            SecondMasterError: Another master sends frames.
+            BusError: The bus is lost.
+        """
+        self._master.receive_pending()
+        self._master.check()  # frames since the last cycle
+        feedback = self._master.exchange(controlwords, targets)
+        self._master.check()
+        return feedback
+
+    def broadcast(self, controlword: int, targets: Sequence[int]) -> list[Feedback]:
+        """See `Fieldbus.broadcast`."""
+        for node in self._master.nodes.values():
+            node.controlword = None  # send it in every cycle
+        return self._master.exchange([controlword] * 3, targets)
+
+    def stop_communication(self, dofs: Sequence[Dof]) -> None:
+        """Stop these nodes (NMT); without the master's heartbeat they quick-stop by themselves."""
+        self._master.is_monitoring = False
+        with suppress(DriveError):  # the bus may be lost
+            for dof in dofs:
+                self._master.send_nmt(STOP, self._master.nodes[dof].id)
+
+    def close(self) -> None:
+        """Switch the drives' heartbeat consumers off and release the bus."""
+        if self._network.bus is None:
+            return
+        if self._master.is_monitoring:
+            self._master.is_monitoring = False
+            for dof in Dof:
+                try:
+                    self.write(dof, objects.CONSUMER_HEARTBEAT, 0)
+                except DriveError:
+                    break  # the bus may be lost; do not wait for the other drives
+        self._network.bus = None
+        with suppress(can.CanError, OSError):  # the adapter may be unplugged
+            self._bus.shutdown()
+
+    def _on_sdo_response(self, node: int, data: bytes) -> None:
+        for sdo in self._sdo.values():
+            if sdo.tx_cobid == SDO_RESPONSE + node:
+                sdo.responses.put(data)
+
+    def _request(self, dof: Dof, what: object, transfer: Callable[[_Sdo], bytes | None]) -> bytes:
+        node = self._master.nodes[dof]
+        try:
+            data = transfer(self._sdo[dof])
+        except SdoAbortedError as error:
+            raise abort_error(node.name, what, error.code, error) from None
+        except SdoCommunicationError as error:
+            raise SilentDriveError(
+                node.name,
+                f"no answer to an SDO request for {what} ({error})",
+                f"Check drives.{dof.label}.node, its supply, the bus and the bit rate",
+            ) from None
+        except (can.CanError, OSError, RuntimeError) as error:
+            raise bus_lost(error) from error
+        return data if data is not None else b""
+
+    def _set(self, dof: Dof, entry: Entry, value: int) -> None:
+        self.write(dof, entry, value)
+        verify_setting(self, dof, entry, value)
+
+    def _map(
+        self, dof: Dof, base: int, cob: int, transmission_type: int, entries: tuple[Entry, ...]
+    ) -> None:
+        """Configure a PDO in the order of CiA 301: invalidate, change, validate."""
+        name = f"PDO 0x{base:04X}"
+        identifier, transmission, count, *mapped = objects.pdo_entries(base, base + 0x200, 0, name)
+        valid = cob + self._master.nodes[dof].id
+        if base >= 0x1800:
+            valid |= self.read(dof, identifier) & NO_RTR
+        self.write(dof, identifier, valid | INVALID)
+        self._set(dof, transmission, transmission_type)
+        self.write(dof, count, 0)
+        for slot, entry in zip(mapped, entries, strict=False):
+            self._set(dof, slot, entry.mapping)
+        self._set(dof, count, len(entries))
+        self._set(dof, identifier, valid)
+
+    def _check_identity(self, dof: Dof) -> None:
+        """Check that the EDS file describes this drive."""
+        described = self._sdo[dof].od.device_information
+        for entry, number in (
+            (objects.VENDOR_ID, described.vendor_number),
+            (objects.PRODUCT_CODE, described.product_number),
+        ):
+            if number and (found := self.read(dof, entry)) != number:
+                raise ConfigError(
+                    f"drives.{dof.label}.eds",
+                    self._config[dof].eds,
+                    f"the EDS file of node {self._config[dof].node}, whose {entry} is "
+                    f"0x{found:X}, not 0x{number:X}",
+                )
+
+    def _disable_pdo(self, dof: Dof, base: int) -> None:
+        """Invalidate an unused PDO, if the drive has it."""
+        identifier = objects.pdo_entries(base, base + 0x200, 0, f"PDO 0x{base:04X}")[0]
+        try:
+            value = self.read(dof, identifier)
+            if not value & INVALID:
+                self.write(dof, identifier, value | INVALID)
+        except AbsentError:
+            pass
+
+
+def _dictionary(config: DrivesConfig, dof: Dof) -> ObjectDictionary:
+    axis = config[dof]
+    try:
+        return load_eds(axis.eds or "", axis.node)
+    except (OSError, ValueError) as error:
+        raise ConfigError(
+            f"drives.{dof.label}.eds", axis.eds, f"a readable EDS file ({error})"
+        ) from None

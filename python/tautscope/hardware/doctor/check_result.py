@@ -1,0 +1,52 @@
+"""Results of checks, for people and for scripts."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal
+
+from tautscope.errors import DriveError, FieldError, TautscopeError
+
+Status = Literal["ok", "missing", "note"]
+
+
+@dataclass(frozen=True, slots=True)
+class CheckResult:
+    """The result of one check.
+
+    Attributes:
+        group: ``computer``, ``camera``, ``drives`` or ``recording``.
+        what: The object of the check.
+        status: ``ok``; ``missing`` if a run needs it; ``note`` for information.
+        found: The result in words.
+        todo: What to type or do; empty if nothing.
+        data: The result in numbers, for scripts.
+    """
+
+    group: str
+    what: str
+    status: Status
+    found: str
+    todo: str = ""
+    data: dict[str, Any] = field(default_factory=dict)
+
+    def to_json(self) -> dict[str, Any]:
+        """The attributes as a dictionary."""
+        return asdict(self)
+
+
+def none_found(group: str, what: str, todo: str, *, needed: bool) -> CheckResult:
+    """The result of a search without a hit, with a remedy if one is `needed`."""
+    if needed:
+        return CheckResult(group, what, "missing", "none", todo)
+    return CheckResult(group, what, "note", "none")
+
+
+def from_error(group: str, what: str, error: TautscopeError) -> CheckResult:
+    """The result of a check that raised an error."""
+    if isinstance(error, DriveError):
+        return CheckResult(group, what, "missing", f"{error.node}: {error.what}", error.remedy)
+    if isinstance(error, FieldError):
+        found = f"{error.field}: {error.value}"
+        return CheckResult(group, what, "missing", found, f"needed: {error.allowed}")
+    return CheckResult(group, what, "missing", str(error))

@@ -1,0 +1,205 @@
+"""Checks of what three drives report: state, mode, timeliness, following error."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tautscope.config import DrivesConfig
+from tautscope.dof import Dof
+from tautscope.errors import FollowingError, SilentDriveError, StateError
+from tautscope.hardware import cia402
+from tautscope.hardware.cia402 import Mode, Scale, State
+from tautscope.hardware.fieldbus import Feedback
+from tautscope.hardware.following_error import FollowingErrorMonitor
+
+
+@dataclass(slots=True)
+class BusStatistics:
+    """Timing of the bus since the motors were enabled.
+
+    Attributes:
+        cycles: Set-points sent.
+        late: Per DOF, cycles that ended before the answer of the drive came.
+        lost: Per DOF, answers that never came; a pending answer counts until it comes.
+        longest_pause: Longest time between two cycles [s].
+    """
+
+    cycles: int = 0
+    late: list[int] = field(default_factory=lambda: [0, 0, 0])
+    lost: list[int] = field(default_factory=lambda: [0, 0, 0])
+    longest_pause: float = 0.0
+
+
+def outside_travel(
+    name: str, dof: Dof, position: float, travel: tuple[float, float]
+) -> FollowingError:
+    """The error for a motor at a position [m or rad] outside its travel."""
+    return FollowingError(
+        name,
+        f"position {position:.6g} is outside its travel {travel[0]:g} to {travel[1]:g}",
+        f"Move it inside by hand, or check drives.{dof.label}.home, sign and counts_per_unit",
+    )
+
+
+class DriveMonitor:
+    """Checks the feedback of three drives in each cycle.
+
+    Args:
+        config: Limits and timeouts.
+        names: The drives' names for messages.
+        modes: Mode of operation of each drive.
+    """
+
+    def __init__(
+        self, config: DrivesConfig, names: Sequence[str], modes: Mapping[Dof, Mode]
+    ) -> None:
+        self._config = config
+        self._names = names
+        self._modes = modes
+        self._scales = [Scale(config[dof], dof.label) for dof in Dof]
+        self._feedback: list[Feedback] = []
+        self._answers = [0, 0, 0]
+        # A drive samples its position when the set-point arrives; buffered set-points act later.
+        is_buffered = Mode.INTERPOLATED_POSITION in modes.values()
+        pending = 1 + (config.lead_points if is_buffered else 0)
+        self._following = FollowingErrorMonitor(config, config.cycle, pending)
+        self.statistics = BusStatistics()
+
+    def reset(self, feedback: list[Feedback]) -> NDArray[np.float64]:
+        """Start from motors that are enabled and at rest; their positions (3,) [m, rad, rad]."""
+        self._feedback = feedback
+        self._answers = [one.answers for one in feedback]
+        self.statistics = BusStatistics()
+        start = self.positions(feedback)
+        self._following.reset(start)
+        return start
+
+    def positions(self, feedback: Sequence[Feedback]) -> NDArray[np.float64]:
+        """Position actual values (3,) [m, rad, rad]."""
+        counts = (one.position for one in feedback)
+        return np.array(
+            [scale.to_position(count) for scale, count in zip(self._scales, counts, strict=True)]
+        )
+
+    def check(self, command: NDArray[np.float64], feedback: list[Feedback]) -> NDArray[np.float64]:
+        """Check one cycle; position actual values (3,) [m, rad, rad].
+
+        Raises:
+            SilentDriveError: A drive has not answered for `heartbeat_timeout`.
+            StateError: A drive left operation enabled or its mode, or ignores set-points.
+            FollowingError: The following error is too large, or the position jumped.
+        """
+        self._count(feedback)
+        positions, fresh = self.positions(feedback), [one.age == 0 for one in feedback]
+        exceeded = self._following.update(command, positions, fresh)
+        for dof in Dof:
+            self._check_state(dof, feedback[dof])
+            if fresh[dof]:
+                self._check_position(dof, feedback[dof], positions[dof], bool(exceeded[dof]))
+        self._feedback = feedback
+        return positions
+
+    def check_start_positions(self, counts: Sequence[int]) -> None:
+        """Check, before the motors are enabled, that each is inside its travel.
+
+        Raises:
+            FollowingError: A motor is outside.
+        """
+        for dof, scale in zip(Dof, self._scales, strict=True):
+            position = scale.to_position(counts[dof])
+            lower, upper = self._config[dof].travel
+            margin = self._config[dof].following_error
+            if not lower - margin <= position <= upper + margin:
+                raise outside_travel(self._names[dof], dof, position, (lower, upper))
+
+    @property
+    def pause_note(self) -> str:
+        """A note for errors if this computer paused for longer than the drives tolerate."""
+        pause = self.statistics.longest_pause
+        if pause <= self._config.heartbeat_timeout:
+            return ""
+        return (
+            f"This computer paused for {pause * 1e3:.0f} ms between two set-points: check its load "
+            "and its real-time priority (tautscope doctor)"
+        )
+
+    def transition_error(self, dof: Dof, feedback: Feedback) -> SilentDriveError | StateError:
+        """The error for a drive that does not reach the next state."""
+        if feedback.age:
+            return SilentDriveError(
+                self._names[dof],
+                f"no answer to {feedback.age} set-points",
+                "Check its supply, and whether it supports synchronous PDOs",
+            )
+        return self.state_error(dof, feedback, "it stays in {}")
+
+    def state_error(
+        self, dof: Dof, feedback: Feedback, what: str = "it is in {}, not operation enabled"
+    ) -> StateError:
+        """The error for a drive that is in the wrong state."""
+        state = cia402.state_of(feedback.statusword)
+        shown = "a state unknown to CiA 402" if state is None else state.value
+        if state in (State.FAULT, State.FAULT_REACTION):
+            remedy = "Look its error code (0x603F) up in the manual, then start with reset_faults"
+        else:
+            remedy = "Check its supply, its enable input and its limit switches"
+        return StateError(
+            self._names[dof],
+            f"{what.format(shown)} (statusword 0x{feedback.statusword:04X})",
+            remedy,
+        )
+
+    def _count(self, feedback: list[Feedback]) -> None:
+        for dof, one in enumerate(feedback):
+            self.statistics.late[dof] += one.age > 0
+            self.statistics.lost[dof] = self.statistics.cycles - (one.answers - self._answers[dof])
+
+    def _check_state(self, dof: Dof, feedback: Feedback) -> None:
+        name, mode = self._names[dof], self._modes[dof]
+        if feedback.silence > self._config.heartbeat_timeout:
+            raise SilentDriveError(
+                name,
+                f"no answer to {feedback.age} set-points, {feedback.silence * 1e3:.0f} ms",
+                "Check its supply, the bus, and the load of this computer",
+            )
+        if cia402.state_of(feedback.statusword) is not State.OPERATION_ENABLED:
+            raise self.state_error(dof, feedback)
+        if feedback.mode != mode:
+            raise StateError(
+                name,
+                f"it changed from mode {mode.value} to {feedback.mode}",
+                "End every other program that commands it",
+            )
+        if not feedback.statusword & cia402.FOLLOWS_COMMAND:
+            raise StateError(
+                name,
+                f"it ignores set-points (statusword 0x{feedback.statusword:04X}, bit 12)",
+                "Check its limit switches and inputs; it may be halted",
+            )
+
+    def _check_position(
+        self, dof: Dof, feedback: Feedback, position: float, has_exceeded: bool
+    ) -> None:
+        axis, name, before = self._config[dof], self._names[dof], self._feedback[dof]
+        cyclic = self._modes[dof] is Mode.CYCLIC_SYNCHRONOUS_POSITION
+        is_flagged = cyclic and bool(feedback.statusword & cia402.FOLLOWING_ERROR_BIT)
+        if has_exceeded or is_flagged:
+            following = self._following
+            note = " (the drive reports it too)" if is_flagged else ""
+            raise FollowingError(
+                name,
+                f"following error: position {position:.6g}, recent commands "
+                f"{following.lower[dof]:.6g} to {following.upper[dof]:.6g}{note}",
+                "Check whether something blocks the motor, then drives."
+                f"{dof.label}.counts_per_unit, following_error, following_window and drives.lag",
+            )
+        jump = abs(position - self._scales[dof].to_position(before.position))
+        elapsed = (before.age + 2) * self._config.cycle
+        if jump > 2 * axis.speed_limit * elapsed + axis.following_error:
+            raise FollowingError(
+                name, f"its position jumped by {jump:.6g} in a cycle", "Check the encoder cable"
+            )

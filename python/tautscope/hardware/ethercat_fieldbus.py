@@ -1,0 +1,262 @@
+"""CiA 402 drives on EtherCAT (CANopen over EtherCAT), through `pysoem`.
+
+The objects are those of CANopen. The process data are controlword and target position to each
+drive, statusword, position and mode from each. The process data watchdog replaces the heartbeats.
+
+Tested against a fake of `pysoem.Master` only. The drives are synchronised by the arrival of the
+process data, not by distributed clocks.
+"""
+
+from __future__ import annotations
+
+import struct
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from tautscope.config import DrivesConfig
+from tautscope.dof import Dof
+from tautscope.errors import (
+    BusError,
+    EmergencyError,
+    SettingRefusedError,
+    SilentDriveError,
+    StateError,
+)
+from tautscope.hardware import cia402
+from tautscope.hardware import object_dictionary as objects
+from tautscope.hardware.cia402 import Mode, State
+from tautscope.hardware.fieldbus import (
+    EMPTY_TX_PDO,
+    TX_PDO_OBJECTS,
+    Feedback,
+    TxPdo,
+    abort_error,
+    target_object,
+    verify_setting,
+)
+from tautscope.hardware.object_dictionary import Entry
+
+_RX_PDO = struct.Struct("<Hi")
+
+
+@dataclass(slots=True)
+class _Slave:
+    """State of the communication with one drive."""
+
+    name: str
+    device: Any
+    tx_pdo: TxPdo = EMPTY_TX_PDO
+    is_enabled: bool = False
+
+
+class EthercatFieldbus:
+    """Three drives on an EtherCAT line; a `tautscope.hardware.fieldbus.Fieldbus`.
+
+    Args:
+        config: `channel` is the network adapter, `node` the position on the line, from 1.
+        pysoem: Replaces the library of that name in tests.
+
+    Raises:
+        BusError: The library, the adapter or a drive is missing.
+    """
+
+    def __init__(self, config: DrivesConfig, pysoem: Any = None) -> None:
+        self._config = config
+        self._soem = _load_library() if pysoem is None else pysoem
+        self._master = self._soem.Master()
+        self._age = self._answers = 0
+        self._answered_at = time.monotonic()
+        self._is_closed = False
+        try:
+            self._master.open(config.channel)
+        except (ConnectionError, OSError) as error:
+            raise BusError(
+                "EtherCAT",
+                f"{config.channel} cannot be opened: {error}",
+                "Check drives.channel; raw sockets need root or CAP_NET_RAW",
+            ) from error
+        found = self._master.config_init()
+        needed = max(config[dof].node for dof in Dof)
+        if found < needed:
+            self.close()
+            raise BusError(
+                "EtherCAT",
+                f"{max(found, 0)} devices on {config.channel}, {needed} needed",
+                "Check cables and supplies, and drives.*.node",
+            )
+        self._slaves = {
+            dof: _Slave(
+                f"{dof.label}, device {config[dof].node}", self._master.slaves[config[dof].node - 1]
+            )
+            for dof in Dof
+        }
+
+    def name(self, dof: Dof) -> str:
+        """See `Fieldbus.name`."""
+        return self._slaves[dof].name
+
+    def read(self, dof: Dof, entry: Entry) -> int:
+        """Read a value by SDO upload; see `Fieldbus.read`."""
+        device = self._slaves[dof].device
+        data = self._request(dof, entry, lambda: device.sdo_read(entry.index, entry.subindex))
+        return entry.decode(bytes(data))
+
+    def write(self, dof: Dof, entry: Entry, value: int) -> None:
+        """Write a value by SDO download; see `Fieldbus.write`."""
+        device = self._slaves[dof].device
+        self._request(
+            dof,
+            f"{entry} = {value}",
+            lambda: device.sdo_write(entry.index, entry.subindex, entry.encode(value)),
+        )
+
+    def configure(self, modes: Mapping[Dof, Mode]) -> None:
+        """Configure the mapping and the watchdog of the process data."""
+        for dof in Dof:
+            self._map(dof, 0x1C12, 0x1600, (objects.CONTROLWORD, target_object(modes[dof])))
+            self._map(dof, 0x1C13, 0x1A00, TX_PDO_OBJECTS)
+            device = self._slaves[dof].device
+            device.set_watchdog("processdata", self._config.heartbeat_timeout * 1e3)
+        try:
+            self._master.config_map()
+        except self._soem.ConfigMapError as error:
+            raise SettingRefusedError(
+                "EtherCAT", f"the process data cannot be mapped: {error}", "Check the drives' PDOs"
+            ) from error
+        self._reach(self._soem.SAFEOP_STATE, "safe-operational")
+
+    def start(self) -> None:
+        """Bring the line to operational; process data flows from here on."""
+        self._answered_at, self._age = time.monotonic(), 0
+        targets = [self._slaves[dof].tx_pdo.position for dof in Dof]
+        self._exchange([cia402.DISABLE_VOLTAGE] * 3, targets)
+        self._reach(self._soem.OP_STATE, "operational")
+
+    def exchange(self, controlwords: Sequence[int], targets: Sequence[int]) -> list[Feedback]:
+        """See `Fieldbus.exchange`.
+
+        Raises:
+            EmergencyError: A drive went from operation enabled to a fault.
+            BusError: The adapter is lost.
+        """
+        feedback = self._exchange(controlwords, targets)
+        for dof, slave in self._slaves.items():
+            state = cia402.state_of(slave.tx_pdo.statusword)
+            if slave.is_enabled and state in (State.FAULT, State.FAULT_REACTION):
+                slave.is_enabled = False
+                code = self.read(dof, objects.ERROR_CODE)
+                raise EmergencyError(
+                    slave.name,
+                    f"it went to {state}, error code 0x{code:04X}",
+                    "Look the code up in the drive's manual; start again with reset_faults",
+                )
+            slave.is_enabled = state is State.OPERATION_ENABLED
+        return feedback
+
+    def broadcast(self, controlword: int, targets: Sequence[int]) -> list[Feedback]:
+        """See `Fieldbus.broadcast`."""
+        return self._exchange([controlword] * 3, targets)
+
+    def stop_communication(self, dofs: Sequence[Dof]) -> None:
+        """End the process data of all drives: their watchdogs stop the motors."""
+        try:
+            self._master.state = self._soem.SAFEOP_STATE
+            self._master.write_state()
+        except Exception:  # nothing else can be done on a lost line
+            return
+
+    def close(self) -> None:
+        """Bring all slaves to Init and release the adapter; a second call does nothing."""
+        if self._is_closed:
+            return
+        self._is_closed = True
+        try:
+            self._master.state = self._soem.INIT_STATE
+            self._master.write_state()
+        finally:
+            self._master.close()
+
+    def _exchange(self, controlwords: Sequence[int], targets: Sequence[int]) -> list[Feedback]:
+        for dof, slave in self._slaves.items():
+            slave.device.output = _RX_PDO.pack(controlwords[dof], targets[dof])
+        try:
+            self._master.send_processdata()
+            counter = self._master.receive_processdata(round(self._config.reply_timeout * 1e6))
+        except (ConnectionError, OSError) as error:
+            raise BusError(
+                "EtherCAT", f"the connection is lost: {error}", "Check the adapter and start again"
+            ) from error
+        now = time.monotonic()
+        if counter < self._master.expected_wkc:
+            self._age += 1
+        else:
+            self._age, self._answered_at = 0, now
+            self._answers += 1
+            for slave in self._slaves.values():
+                slave.tx_pdo = TxPdo.unpack(bytes(slave.device.input))
+        return [
+            Feedback(
+                *slave.tx_pdo, age=self._age, answers=self._answers, silence=now - self._answered_at
+            )
+            for slave in self._slaves.values()
+        ]
+
+    def _reach(self, state: int, name: str) -> None:
+        """Request a state of all slaves and wait for it while process data are exchanged."""
+        self._master.state = state
+        self._master.write_state()
+        deadline = time.monotonic() + self._config.state_timeout
+        while self._master.state_check(state, 2_000) != state:
+            if time.monotonic() > deadline:
+                self._master.read_state()
+                behind = [
+                    f"{slave.name} in 0x{slave.device.state:02X}, AL status "
+                    f"0x{slave.device.al_status:04X}"
+                    for slave in self._slaves.values()
+                    if slave.device.state != state
+                ]
+                raise StateError(
+                    "EtherCAT",
+                    f"{name} is not reached: " + "; ".join(behind),
+                    "Look the AL status code up (ETG.1020)",
+                )
+            self._master.send_processdata()
+            self._master.receive_processdata(2_000)
+
+    def _map(self, dof: Dof, assignment: int, mapping: int, entries: tuple[Entry, ...]) -> None:
+        """Map one direction of the process data: invalidate, change, validate."""
+        count = Entry(mapping, 0, "number of mapped objects", 1)
+        pdos = Entry(assignment, 0, "number of assigned PDOs", 1)
+        self.write(dof, pdos, 0)
+        self.write(dof, count, 0)
+        for slot, entry in enumerate(entries, 1):
+            self.write(dof, Entry(mapping, slot, "mapped object", 4), entry.mapping)
+        self.write(dof, count, len(entries))
+        self.write(dof, Entry(assignment, 1, "assigned PDO", 2), mapping)
+        self.write(dof, pdos, 1)
+        verify_setting(self, dof, count, len(entries))
+
+    def _request(self, dof: Dof, what: object, transfer: Callable[[], Any]) -> Any:
+        name = self.name(dof)
+        try:
+            return transfer()
+        except self._soem.SdoError as error:
+            raise abort_error(name, what, error.abort_code, error.desc) from None
+        except (self._soem.WkcError, self._soem.MailboxError, self._soem.PacketError) as error:
+            raise SilentDriveError(
+                name,
+                f"no answer to an SDO request for {what} ({error})",
+                "Check its supply and cables",
+            ) from None
+
+
+def _load_library() -> Any:
+    try:
+        import pysoem  # noqa: PLC0415
+    except ImportError as error:
+        raise BusError(
+            "EtherCAT", f"pysoem is not installed ({error})", "pip install 'tautscope[ethercat]'"
+        ) from None
+    return pysoem

@@ -1,0 +1,74 @@
+"""Output of ``tautscope replay``: the estimates as a table or as JSON."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from rich.table import Table
+
+from tautscope.commands.printing import console, print_json
+from tautscope.dof import Dof
+from tautscope.log.comparison import EstimationQuality, estimation_quality, write_replay
+from tautscope.report.tables import finite_or_none
+from tautscope.runs.recording import Recording
+
+
+def write_estimates(
+    folder: Path, replayed: Recording, recorded: Recording | None, *, as_json: bool
+) -> None:
+    """Write the folder of a replay, and print its estimates beside the recorded ones."""
+    write_replay(folder, replayed, recorded)
+    after = estimation_quality(replayed, recorded)
+    before = None if recorded is None else estimation_quality(recorded)
+    if as_json:
+        document: dict[str, Any] = {"images": len(replayed.frames), "dof": {}}
+        for dof, figures in after.items():
+            entry = {"replayed": _finite(figures)}
+            if before is not None:
+                entry["recorded"] = _finite(before[dof])
+            document["dof"][dof.label] = entry
+        print_json(document)
+        return
+    _print_table(replayed, before, after)
+    print(f"\nFigure and data: {folder / 'replay.png'}")
+
+
+def _print_table(
+    replayed: Recording,
+    before: dict[Dof, EstimationQuality] | None,
+    after: dict[Dof, EstimationQuality],
+) -> None:
+    table = Table(box=None, pad_edge=False, title_justify="left", title_style="bold")
+    table.title = f"Estimates from {len(replayed.frames)} images"
+    table.add_column("", no_wrap=True)
+    for dof in after:
+        unit = f"{dof.label} [{dof.display_unit}]"
+        if before is not None:
+            table.add_column(f"{unit}\nrecorded", justify="right", style="dim", no_wrap=True)
+        table.add_column("\nreplayed" if before else unit, justify="right", no_wrap=True)
+    for title, name in (
+        ("backlash width at the end", "width"),
+        ("images with the DOF observable", "seen"),
+        ("RMS error of the estimate", "state_rms"),
+        ("RMS change of the estimate", "change_rms"),
+    ):
+        cells = []
+        for dof, figures in after.items():
+            pair = [figures] if before is None else [before[dof], figures]
+            cells += [_cell(getattr(each, name), name, dof.display_scale) for each in pair]
+        if any(cells):
+            table.add_row(title, *cells)
+    console().print(table)
+
+
+def _cell(value: float, name: str, scale: float) -> str:
+    if math.isnan(value):
+        return ""
+    return f"{100 * value:.0f} %" if name == "seen" else f"{scale * value:.3g}"
+
+
+def _finite(figures: EstimationQuality) -> dict[str, float | None]:
+    return {name: finite_or_none(value) for name, value in asdict(figures).items()}

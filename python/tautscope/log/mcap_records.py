@@ -1,0 +1,121 @@
+"""Records and messages of an MCAP file that may be truncated or damaged."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import IO
+
+import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, McapRecord, Message, Schema
+from mcap.stream_reader import breakup_chunk
+from mcap.writer import MCAP0_MAGIC
+
+from tautscope.errors import MissingPathError, RecordError
+
+_MAX_CHUNK_SIZE = 2**30
+"""Largest accepted size of an uncompressed chunk [bytes]; a damaged one could fill the memory."""
+_MESSAGE_OPCODES = (Opcode.CHUNK, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
+
+
+@dataclass(slots=True)
+class Damage:
+    """The parts of a file that could not be read.
+
+    Attributes:
+        is_truncated: Whether the end mark is missing.
+        lost_bytes: Bytes after the last complete record.
+        bad_chunks: Number of chunks with a wrong checksum or content; they are skipped.
+    """
+
+    is_truncated: bool = True
+    lost_bytes: int = 0
+    bad_chunks: int = 0
+
+    def __bool__(self) -> bool:
+        """Whether there is any damage."""
+        return self.is_truncated or self.bad_chunks > 0
+
+
+@dataclass(frozen=True, slots=True)
+class RawRecord:
+    """A record of an MCAP file: byte offset, opcode and content."""
+
+    offset: int
+    opcode: int
+    payload: bytes
+
+    def unpack(self) -> list[McapRecord]:
+        """The schemas, channels and messages of the record; damaged bytes raise any exception."""
+        stream = ReadDataStream(BytesIO(self.payload))
+        if self.opcode == Opcode.CHUNK:
+            chunk = Chunk.read(stream)
+            sizes = [chunk.uncompressed_size]
+            if chunk.compression == "zstd":
+                sizes.append(zstandard.frame_content_size(chunk.data))
+            if max(sizes) > _MAX_CHUNK_SIZE:
+                raise ValueError(f"chunk of {max(sizes)} bytes")
+            return breakup_chunk(chunk, validate_crc=True)
+        if self.opcode == Opcode.SCHEMA:
+            return [Schema.read(stream)]
+        if self.opcode == Opcode.CHANNEL:
+            return [Channel.read(stream)]
+        return [Message.read(stream, len(self.payload))]
+
+
+def read_records(file: IO[bytes], damage: Damage) -> Iterator[RawRecord]:
+    """Read the complete records that can contain messages, from the file's position on.
+
+    Args:
+        file: Seekable, positioned at the beginning of a record.
+        damage: Receives the damage at the end of the file.
+    """
+    offset = file.tell()
+    size = file.seek(0, 2)
+    while True:
+        file.seek(offset)
+        head = file.read(9)
+        length = int.from_bytes(head[1:9], "little")
+        damage.lost_bytes = size - offset
+        if len(head) < 9 or offset + 9 + length > size:
+            return
+        if head[0] in _MESSAGE_OPCODES:
+            yield RawRecord(offset, head[0], file.read(length))
+        offset += 9 + length
+        if head[0] == Opcode.FOOTER:
+            file.seek(offset)
+            damage.is_truncated = file.read() != MCAP0_MAGIC
+            damage.lost_bytes = size - offset if damage.is_truncated else 0
+            return
+
+
+def read_messages(path: Path, damage: Damage) -> Iterator[tuple[RawRecord, str, Message]]:
+    """Read the undamaged messages of an MCAP file with record and topic, in the file's order.
+
+    Raises:
+        MissingPathError: There is no such file.
+        RecordError: The file is not MCAP.
+    """
+    topic_names: dict[int, str] = {}
+    try:
+        file = path.open("rb")
+    except (FileNotFoundError, IsADirectoryError):
+        raise MissingPathError("log", str(path), "an MCAP file") from None
+    with file:
+        if file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
+            raise RecordError("log", str(path), "an MCAP file")
+        for raw in read_records(file, damage):
+            try:
+                records = raw.unpack()
+            except Exception:  # damaged bytes make the library raise exceptions of any kind
+                damage.bad_chunks += 1
+                continue
+            for record in records:
+                if isinstance(record, Channel):
+                    topic_names[record.id] = record.topic
+                elif isinstance(record, Message) and record.channel_id in topic_names:
+                    yield raw, topic_names[record.channel_id], record

@@ -1,0 +1,75 @@
+"""The state of one injected fault during a run, common to all fault models."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tautscope.twin.fault_kinds import PER_MM, Fault
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(slots=True)
+class FaultState:
+    """One injected fault with its state; the input of its fault model.
+
+    Attributes:
+        spec: Kind, time, severity and DOF.
+        rng: Random generator of this fault.
+        image_size: (width, height) [px].
+        channel_jacobian: Returns (4,) [px/m], motion of the features per insertion.
+        elapsed: Time since the start of the fault [s].
+        memory: State that the fault model keeps between calls.
+        stalls: Number of stalls so far.
+    """
+
+    spec: Fault
+    rng: np.random.Generator
+    image_size: tuple[int, int] = (1, 1)
+    channel_jacobian: Callable[[], Floats] = lambda: np.zeros(4)
+    elapsed: float = 0.0
+    memory: dict[str, Any] = field(default_factory=dict)
+    stalls: int = 0
+
+    @classmethod
+    def seeded(cls, spec: Fault, seed: int, index: int, **context: Any) -> FaultState:
+        """The fault at place ``index`` of a list, with the random generator of a seed."""
+        rng = np.random.default_rng([seed, index, zlib.crc32(spec.kind.encode())])
+        return cls(spec, rng, **context)
+
+    def update(self, time: float) -> bool:
+        """Set the elapsed time; returns whether the fault is active at a time [s]."""
+        is_active = self.spec.is_active(time)
+        if is_active:
+            self.elapsed = time - self.spec.start
+        return is_active
+
+    @property
+    def amplitude(self) -> float:
+        """The severity, given in mm, in the unit of the fault's DOF [m or rad]."""
+        return self.spec.size * PER_MM[self.spec.dof]
+
+    @property
+    def sign(self) -> float:
+        """-1 or 1, drawn once."""
+        return float(self.hold("side", self.rng.choice((-1, 1))))
+
+    def count(self, key: str = "count") -> int:
+        """Number of earlier calls with this key."""
+        number: int = self.memory.get(key, 0)
+        self.memory[key] = number + 1
+        return number
+
+    def hold(self, key: str, value: Any) -> Any:
+        """The value of the first call with this key."""
+        return self.memory.setdefault(key, value)
+
+    def channel_shift(self, millimetres: float) -> Floats:
+        """Motion of the features (4,) [px] for an insertion by this distance [mm]."""
+        return 1e-3 * millimetres * self.channel_jacobian()

@@ -1,0 +1,15 @@
+"""Wait for conditions in tests."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+TIMEOUT = 60.0  # s; long, for a busy computer
+
+
+def until(condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + TIMEOUT
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.005)
