@@ -74,7 +74,8 @@ def test_commands_are_accepted(page: Path) -> None:
             if "--help" not in arguments:
                 _parser().parse_args(arguments)
         elif tool.endswith(".py") or tool == "python":
-            assert (ROOT / (arguments[0] if tool == "python" else tool)).is_file(), command
+            target = ROOT / (arguments[0] if tool == "python" else tool)
+            assert target.is_file() or (target / "__main__.py").is_file(), command
         else:
             assert tool in {"pytest", "ruff", "mypy", "stubtest"}, command
 

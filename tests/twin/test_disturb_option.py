@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import pytest
@@ -10,8 +9,6 @@ from tautscope.cli import main
 from tautscope.config import DISTURBANCES, Config, dump_config, load_config
 from tautscope.errors import ConfigError
 from tautscope.report import demo
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 
 
 def test_an_unknown_name_is_refused_with_those_there_are(

@@ -19,7 +19,7 @@ from tautscope.twin.disturbances import EMPTY, TABLE
 from tautscope.twin.drift import Bands, Drift
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
-import condition_frames as frames_of
+from conditions import frames as frames_of
 
 Array = NDArray[Any]
 
