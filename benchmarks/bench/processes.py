@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from common.doc_pages import ROOT
+from common.paths import ROOT
 from tautscope.config import Config, dump_config, load_config
 from tautscope.dof import Dof
 

@@ -5,9 +5,6 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
-"""Root of the repository."""
-
 
 def insert(page: Path, name: str, text: str) -> None:
     """Replace the text between the markers ``<!-- name: begin -->`` and ``<!-- name: end -->``.

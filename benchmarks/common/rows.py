@@ -1,4 +1,4 @@
-"""Rows of the JSON output: one quantity with its goal."""
+"""Rows of the output: one quantity with its goal."""
 
 from __future__ import annotations
 
@@ -43,3 +43,13 @@ def goal_row(
         "sense": sense,
         "holds": bool(middle <= goal if sense == "max" else middle >= goal),
     }
+
+
+def print_rows(rows: Sequence[dict[str, Any]]) -> None:
+    """Print rows as a table for a terminal."""
+    print(f"{'what':<34}{'profile':<18}{'median':>10}{'worst':>10}  unit         goal")
+    for row in rows:
+        name, values = row["profile"] or "", f"{row['median']:>10.5g}{row['worst']:>10.5g}"
+        bound = "<=" if row["sense"] == "max" else ">="
+        goal = f"{bound} {row['goal']:g}: {'holds' if row['holds'] else 'missed'}"
+        print(f"{row['what']:<34}{name:<18}{values}  {row['unit']:<12} {goal}")

@@ -2,7 +2,7 @@
 
 Images of the twin at random poses of the workspace, before real colon frames and procedural mucosa,
 one condition at a time. Each is evaluated twice: with a prediction as in the loop, and without.
-`--write` updates docs/conditions.md, which defines the quantities.
+`--write` updates the table of docs/conditions.md, which defines the quantities.
 """
 
 from __future__ import annotations
@@ -19,9 +19,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import cv2
 import numpy as np
+from common.doc_pages import insert
+from common.paths import ROOT
 from common.processes import run_parallel
 from conditions.frames import CONDITIONS, Evaluation, Job, evaluate, render
-from conditions.page import write
 from conditions.rows import table, to_rows
 from tautscope.commands.progress import progress_bar
 
@@ -82,7 +83,9 @@ def main() -> None:
     )
     parser.add_argument("--workers", type=int, default=os.cpu_count(), help="[all cores]")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.add_argument("--write", action="store_true", help="update docs/conditions.md")
+    parser.add_argument(
+        "--write", action="store_true", help="update the table of docs/conditions.md"
+    )
     parser.add_argument("--montage", type=Path, metavar="FILE", help="only draw examples, to FILE")
     options = parser.parse_args()
     if options.montage is not None:
@@ -92,8 +95,8 @@ def main() -> None:
     with progress_bar(f"{sum(job.frames for job in work)} frames") as show_progress:
         rows = to_rows(run(work, options.workers, show_progress))
     if options.write:
-        path = write(rows, f"uv run python benchmarks/conditions --frames {options.frames} --write")
-        print(f"wrote {path}", file=sys.stderr)
+        seeds = f"Seeds {options.first_seed} to {options.first_seed + options.seeds - 1}."
+        insert(ROOT / "docs" / "conditions.md", "conditions", f"{seeds}\n\n{table(rows)}")
     print(json.dumps({"rows": rows}, allow_nan=False) if options.json else table(rows))
 
 

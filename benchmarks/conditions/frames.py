@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from pathlib import Path
 
 import cv2
 import numpy as np
+from common.paths import DATA
 from numpy.typing import NDArray
 from tautscope.config import Config
 from tautscope.loop.construction import build_feature_model
@@ -18,10 +17,6 @@ from tautscope.loop.vision import MarkerDetector
 from tautscope.twin.camera import FRAMES_PER_BACKGROUND, Picture, TwinCamera
 
 Floats = NDArray[np.float64]
-
-DATA = Path(
-    os.environ.get("TAUTSCOPE_DATA", Path(__file__).resolve().parents[2] / "shared" / "data")
-)
 
 WORKSPACE = np.array([[10e-3, -2.0, -0.2], [40e-3, 2.0, 1.8]])
 """Lowest and highest insertion [m], rotation [rad], bending [rad]."""

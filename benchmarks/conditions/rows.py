@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from common.rows import goal_row
 from conditions.frames import CONDITIONS, MIN_VISIBLE, MODES, Evaluation
 
 
@@ -20,7 +21,7 @@ class Quantity:
     sense: str
     measure: Callable[[Sequence[Evaluation], int], float | None]
 
-    def holds(self, value: float) -> bool:
+    def is_reached(self, value: float) -> bool:
         """Return whether the value reaches the goal."""
         return value <= self.goal if self.sense == "max" else value >= self.goal
 
@@ -75,24 +76,18 @@ def to_rows(frames: Sequence[Evaluation]) -> list[dict[str, Any]]:
                     for seed in seeds
                 ]
                 values = [part for part in parts if part is not None]
-                worst = max(values) if quantity.sense == "max" else min(values)
-                rows.append(
-                    {
-                        "what": f"{quantity.what}, {label}",
-                        "dof": None,
-                        "profile": profile,
-                        "unit": quantity.unit,
-                        "median": float(np.median(values)),
-                        "worst": worst,
-                        "pooled": pooled,
-                        "n": len(own),
-                        "n_visible": sum(each.visible >= MIN_VISIBLE for each in own),
-                        "seeds": len(seeds),
-                        "goal": quantity.goal,
-                        "sense": quantity.sense,
-                        "holds": quantity.holds(pooled),
-                    }
+                row = goal_row(
+                    f"{quantity.what}, {label}",
+                    quantity.unit,
+                    values,
+                    quantity.goal,
+                    quantity.sense,
+                    profile=profile,
+                    n=len(own),
                 )
+                visible = sum(each.visible >= MIN_VISIBLE for each in own)
+                row |= {"pooled": pooled, "n_visible": visible, "seeds": len(seeds)}
+                rows.append(row | {"holds": quantity.is_reached(pooled)})
     return rows
 
 

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from functools import partial
 from pathlib import Path
 
-from common.doc_pages import ROOT
+from common.paths import ROOT
 from common.processes import run_parallel
 from faults import tables
 from faults.runs import run_seed, run_with_each_off

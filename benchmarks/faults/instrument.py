@@ -16,35 +16,12 @@ from collections.abc import Callable, Generator, Sequence
 from functools import partial
 
 import numpy as np
-from faults.envelopes import (
-    Floats,
-    delay_envelope,
-    input_envelope,
-    open_loop_envelope,
-    union,
-    with_input_error,
-)
-from faults.evaluation import (
-    INPUT_PAUSED,
-    MOVES_TIP,
-    TRANSIENT_GOAL,
-    Outcome,
-    Traces,
-    evaluate_run,
-    excursion,
-)
+from faults import envelopes, evaluation, scenarios
+from faults.envelopes import Floats
+from faults.evaluation import Outcome, Traces
 from faults.operator_input import OBSERVED_STOPPED, InputDevice, OperatorInput, RunFinished
 from faults.recorder import RunRecorder
 from faults.rigs import FeatureTwin, ProtectedRig
-from faults.scenarios import (
-    OBSERVED_PERMANENT,
-    PERIODS,
-    draw_fault,
-    fault_start,
-    input_pauses,
-    moving_dofs,
-    observation_time,
-)
 from tautscope.config import Config
 from tautscope.errors import TautscopeError
 from tautscope.loop.safety import Reaction
@@ -66,11 +43,11 @@ class Instrument:
         self, config: Config, seed: int, off: tuple[str, ...] = (), is_cold: bool = False
     ) -> None:
         self._config, self._seed = config, seed
-        self._start = 0.0 if is_cold else fault_start(config, seed)
+        self._start = 0.0 if is_cold else scenarios.fault_start(config, seed)
         self._twin = FeatureTwin(config)
         self._recorder = RunRecorder(self._clock, self._start, config.control.period)
-        periods = {dof: PERIODS[dof] for dof in moving_dofs(seed)}
-        end = self._start + OBSERVED_PERMANENT
+        periods = {dof: scenarios.PERIODS[dof] for dof in scenarios.moving_dofs(seed)}
+        end = self._start + scenarios.OBSERVED_PERMANENT
         self._operator = OperatorInput(config, periods, self._clock, end)
         self._device = InputDevice(self._operator, self._recorder)
         self._rig = ProtectedRig(
@@ -133,29 +110,40 @@ class Instrument:
         """Yield what each fork does first, and receive its traces."""
         nominal = yield lambda: None
         for kind in kinds:
-            fault = draw_fault(kind, self._seed, self._start)
+            fault = scenarios.draw_fault(kind, self._seed, self._start)
             base, envelope, reported = nominal, None, None
-            if kind in INPUT_PAUSED:
+            if kind in evaluation.INPUT_PAUSED:
                 base = yield partial(self._pause, fault)
             run = yield partial(self._inject, fault)
             stop = run.summary["stop_tick"]
-            distance = excursion(run.truth, base.truth, stop)
-            if kind in MOVES_TIP and (distance > TRANSIENT_GOAL).any():
-                ticks = round(observation_time(fault) / self._config.control.period)
+            distance = evaluation.excursion(run.truth, base.truth, stop)
+            if kind in evaluation.MOVES_TIP and (distance > evaluation.TRANSIENT_GOAL).any():
+                ticks = round(scenarios.observation_time(fault) / self._config.control.period)
                 open_loop = yield partial(self._replay, fault, nominal.commands[:ticks])
-                envelope = open_loop_envelope(open_loop.truth, base.truth)
-            elif fault.row.target is Target.REFERENCE and kind not in INPUT_PAUSED:
-                reported = input_envelope(kind, run.intended, run.reported, self._max_motion)
+                envelope = envelopes.open_loop_envelope(open_loop.truth, base.truth)
+            elif fault.row.target is Target.REFERENCE and kind not in evaluation.INPUT_PAUSED:
+                reported = envelopes.input_envelope(
+                    kind, run.intended, run.reported, self._max_motion
+                )
                 if kind == "hand_late":
-                    delayed = delay_envelope(fault, base.truth, self._config.control.period)
-                    reported = union(reported, delayed)
+                    delayed = envelopes.delay_envelope(
+                        fault, base.truth, self._config.control.period
+                    )
+                    reported = envelopes.union(reported, delayed)
                 envelope = reported
-                if (excursion(run.truth, base.truth, stop, reported) > TRANSIENT_GOAL).any():
-                    commands = with_input_error(nominal.commands, run.intended, run.reported, stop)
+                if (
+                    evaluation.excursion(run.truth, base.truth, stop, reported)
+                    > evaluation.TRANSIENT_GOAL
+                ).any():
+                    commands = envelopes.with_input_error(
+                        nominal.commands, run.intended, run.reported, stop
+                    )
                     open_loop = yield partial(self._replay, Fault("ok"), commands)
-                    envelope = union(reported, open_loop_envelope(open_loop.truth, base.truth))
+                    envelope = envelopes.union(
+                        reported, envelopes.open_loop_envelope(open_loop.truth, base.truth)
+                    )
             outcomes.append(
-                evaluate_run(
+                evaluation.evaluate_run(
                     self._seed,
                     fault,
                     run,
@@ -204,13 +192,13 @@ class Instrument:
     def _inject(self, fault: Fault) -> None:
         self._rig.rig = FaultyRig(self._twin, (fault,), self._seed)
         self._device.faulty = FaultyHand(self._operator, (fault,), self._seed)
-        self._operator.end = self._start + observation_time(fault)
+        self._operator.end = self._start + scenarios.observation_time(fault)
 
     def _pause(self, fault: Fault) -> None:
-        self._operator.pauses = input_pauses(fault)
+        self._operator.pauses = scenarios.input_pauses(fault)
         if fault.row.target is Target.REFERENCE:
             self._operator.paused = [fault.dof]
-        self._operator.end = self._start + observation_time(fault)
+        self._operator.end = self._start + scenarios.observation_time(fault)
 
     def _replay(self, fault: Fault, commands: Floats) -> None:
         """Send recorded commands to the physics with a fault."""

@@ -7,8 +7,8 @@ from collections.abc import Callable, Collection
 from dataclasses import replace
 
 import numpy as np
-from common.doc_pages import ROOT
 from common.features import FeatureCamera
+from common.paths import ROOT
 from faults.recorder import QUICK_STOP, Floats, RunRecorder
 from numpy.typing import ArrayLike
 from tautscope.config import Config, load_config

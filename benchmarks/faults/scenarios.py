@@ -87,15 +87,14 @@ def with_start_values(config: Config, fault: Fault) -> Config:
     Raises:
         ConfigError: The start values are invalid.
     """
-    width, shift = 1.0, 0.0
-    if fault.kind in {"start_wide", "start_narrow"}:
-        width = fault.size
-    elif fault.kind == "start_shifted":
-        shift = fault.size
-    elif fault.kind == "start_negative":
-        width = -1.0
-    elif fault.kind == "start_nan":
-        width = math.nan
+    widths = {
+        "start_wide": fault.size,
+        "start_narrow": fault.size,
+        "start_negative": -1.0,
+        "start_nan": math.nan,
+    }
+    width = widths.get(fault.kind, 1.0)
+    shift = fault.size if fault.kind == "start_shifted" else 0.0
     changes: dict[str, float] = {}
     for dof in Dof:
         middle, half = shift * PER_MM[dof], width * float(SLACK[dof]) / 2

@@ -20,10 +20,10 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from common.doc_pages import ROOT
+from common.paths import ROOT
 from faults.campaign import read
-from guarantees import campaign, external, goals, logs, loop, mutants, repeats, timeouts
-from guarantees.measurement import Measurement
+from guarantees import campaign, external, goals, logs, loop, mutants, timeouts
+from guarantees.goals import Measurement
 
 
 @dataclass(frozen=True)
@@ -112,10 +112,10 @@ MEASURE: dict[str, Callable[[Any], dict[str, Measurement]]] = {
     "steps": lambda count: external.run_core_test("laws", "guarantees", TAUTSCOPE_STEPS=count),
     "ticks": lambda count: external.run_core_test("no_alloc", "allocate", TAUTSCOPE_TICKS=count),
     "hours": lambda hours: external.run_core_test("soak", "", TAUTSCOPE_HOURS=hours),
-    "stalls": lambda count: {"G14": repeats.stalls(count)},
+    "stalls": lambda count: {"G14": loop.stalls(count)},
     "silences": lambda count: {"G10c": timeouts.input_silent(count)},
     "heartbeats": lambda count: {"G10d": timeouts.heartbeat_lost(count)},
-    "replays": lambda count: {"G19": repeats.replays(count)},
+    "replays": lambda count: {"G19": loop.replays(count)},
     "kills": lambda count: {"G16": external.kills(count)},
     "cuts": lambda every: {"G18": logs.cuts(every)},
     "disks": lambda _: {"G17": logs.disks()},

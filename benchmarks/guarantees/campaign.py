@@ -9,7 +9,7 @@ from faults.evaluation import TRANSIENT_GOAL
 from faults.scenarios import OBSERVED_AFTER, OBSERVED_PERMANENT
 from faults.tables import DETECTOR_OFF_GOAL, Row, by_duration
 from faults.tables import seeds as format_seeds
-from guarantees.measurement import Measurement
+from guarantees.goals import Measurement
 
 MAX_WIDTH = 12e-3
 """Largest estimated slack [m]."""

@@ -8,8 +8,8 @@ import re
 import subprocess
 import sys
 
-from common.doc_pages import ROOT
-from guarantees.measurement import Measurement
+from common.paths import ROOT
+from guarantees.goals import Measurement
 
 UNITS = {
     "G1": "{:.2g} last places over",

@@ -17,7 +17,7 @@ from unittest.mock import patch
 import numpy as np
 from faults.operator_input import OperatorInput
 from faults.scenarios import build_config
-from guarantees.measurement import Measurement
+from guarantees.goals import Measurement
 from tautscope import HysteresisReduction, Twin
 from tautscope.dof import Dof
 from tautscope.errors import RecordError

@@ -12,8 +12,8 @@ import time
 from collections import Counter
 from pathlib import Path
 
-from common.doc_pages import ROOT
-from guarantees.measurement import Measurement
+from common.paths import ROOT
+from guarantees.goals import Measurement
 
 STEPS = "50000"
 """Random steps of each property test; enough to detect a mutant, and quick."""

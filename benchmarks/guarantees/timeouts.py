@@ -7,9 +7,9 @@ import time
 from pathlib import Path
 
 import numpy as np
-from common.doc_pages import ROOT
+from common.paths import ROOT
 from faults.scenarios import build_config
-from guarantees.measurement import Measurement
+from guarantees.goals import Measurement
 from tautscope import HysteresisReduction
 from tautscope.bench.can_bus import Hub, LocalBus
 from tautscope.bench.drives import SimulatedDrives

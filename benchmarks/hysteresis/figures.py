@@ -5,18 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 from pathlib import Path
 
+from hysteresis import loop_figures as shared
 from hysteresis.goals import LATENCIES
-from hysteresis.loop_figures import (
-    COLOURS,
-    Finished,
-    add_legend,
-    levels,
-    loops,
-    make_panels,
-    share_limits,
-    speeds,
-    starts,
-)
+from hysteresis.loop_figures import COLOURS, Finished
 from hysteresis.measures import fold_reduction, uncompensated_width
 from hysteresis.scenarios import CHANGING_PERIODS, REST_FOR, STRAIGHT
 from matplotlib.figure import Figure
@@ -29,7 +20,7 @@ DOF_COLOURS = (BLUE, ORANGE, GREEN)
 
 def widening(finished: Finished) -> Figure:
     """Estimated slack, and tip minus reference, while the endoscope straightens and bends."""
-    figure, (above, below) = make_panels(3.6, 2, 1)
+    figure, (above, below) = shared.make_panels(3.6, 2, 1)
     for name, runs in finished.first.items():
         trace = runs["run"].trace
         estimate = trace["delta_plus_insertion"] - trace["delta_minus_insertion"]
@@ -56,7 +47,7 @@ def widening(finished: Finished) -> Figure:
 
 def overestimated(finished: Finished) -> Figure:
     """Reference and tip, and their difference, from a start value 50 % too wide."""
-    figure, (signals, errors) = make_panels(2.4, 1, 2)
+    figure, (signals, errors) = shared.make_panels(2.4, 1, 2)
     for name, runs in finished.first.items():
         trace, period = runs["run"].trace, runs["run"].segments[0].period
         time = trace["time"] / period
@@ -68,13 +59,13 @@ def overestimated(finished: Finished) -> Figure:
     errors.set_ylabel("tip minus reference [mm]")
     for axes in (signals, errors):
         axes.set_xlabel("period")
-    add_legend(figure, signals)
+    shared.add_legend(figure, signals)
     return figure
 
 
 def shaking(finished: Finished) -> Figure:
     """Reference, command and tip around the time at which the intended motion stops."""
-    figure, panels = make_panels(2.6, 1, len(finished.first))
+    figure, panels = shared.make_panels(2.6, 1, len(finished.first))
     for (name, runs), axes in zip(finished.first.items(), panels, strict=True):
         trace = runs["1 mm"].trace
         rest = trace["time"][-1] - REST_FOR
@@ -91,14 +82,14 @@ def shaking(finished: Finished) -> Figure:
         axes.set_title(name)
         axes.set_xlabel("time since the intended motion stopped [s]")
         axes.set_ylabel("insertion [mm]")
-    share_limits(panels)
-    add_legend(figure, panels[0])
+    shared.share_limits(panels)
+    shared.add_legend(figure, panels[0])
     return figure
 
 
 def delays(finished: Finished) -> Figure:
     """Reduction over latency, every seed."""
-    figure, panels = make_panels(2.3)
+    figure, panels = shared.make_panels(2.3)
     config = next(iter(finished.first.values()))["run"].config
     places = {"run": 1e3 * config.twin.latency} | {
         name: 1e3 * value for name, value in LATENCIES.items()
@@ -112,18 +103,18 @@ def delays(finished: Finished) -> Figure:
     for dof, axes in zip(Dof, panels, strict=True):
         axes.set_title(dof.label)
         axes.set_xlabel("latency [ms]")
-    share_limits(panels)
+    shared.share_limits(panels)
     panels[0].set_ylabel("reduction [%]")
     for name in finished.first:
         panels[0].plot([], [], "o-", color=COLOURS[name], markersize=2.5, label=name)
-    add_legend(figure, panels[0])
+    shared.add_legend(figure, panels[0])
     return figure
 
 
 def disturbed(finished: Finished) -> Figure:
     """Reduction under each image condition, every seed."""
     names = [key for key in finished.first["best"] if key != "free"]
-    figure, (axes,) = make_panels(0.23 * len(names) + 0.8, 1, 1)
+    figure, (axes,) = shared.make_panels(0.23 * len(names) + 0.8, 1, 1)
     for _, runs in finished.every():
         for row, name in enumerate(names):
             for dof, result in evaluate(runs["free"], runs[name]).items():
@@ -141,7 +132,7 @@ def disturbed(finished: Finished) -> Figure:
     axes.invert_yaxis()
     axes.grid(axis="y", linewidth=0.3)
     axes.set_xlabel("reduction [%]")
-    add_legend(figure, axes)
+    shared.add_legend(figure, axes)
     return figure
 
 
@@ -149,17 +140,17 @@ FIGURES: dict[str, tuple[str, str, Callable[[Finished], Figure]]] = {
     "reduction": (
         "alone",
         "Reduction of the mean width: tip over reference, last two periods",
-        loops,
+        shared.loops,
     ),
     "max-width": (
         "alone",
         "Reduction of the largest width: loop width over tip position; dashed, a tenth of the "
         "largest without compensation",
-        levels,
+        shared.levels,
     ),
-    "overspeed": ("alone", "Tip overspeed: last two periods; dashed, the goal", speeds),
-    "start": ("alone", "Start: width of each period; dashed, a reduction of 95 %", starts),
-    "together": ("together", "Three DOFs at once: tip over reference", loops),
+    "overspeed": ("alone", "Tip overspeed: last two periods; dashed, the goal", shared.speeds),
+    "start": ("alone", "Start: width of each period; dashed, a reduction of 95 %", shared.starts),
+    "together": ("together", "Three DOFs at once: tip over reference", shared.loops),
     "width-change": ("changing", "Width 10-2-10 mm", widening),
     "too-wide": ("too wide", "Start value 50 % too wide", overestimated),
     "latency": ("latency", "Latency, timestamps exact", delays),

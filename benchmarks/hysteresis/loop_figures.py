@@ -124,15 +124,10 @@ def starts(finished: Finished) -> Figure:
     figure, panels = make_panels(2.3)
     for name, runs in finished.every():
         for dof, result in evaluate(runs["free"], runs["run"]).items():
-            remaining = (
-                100
-                * np.abs(period_widths(runs["run"], segment_of(runs["run"], dof)))
-                / result.uncompensated
-            )
-            at = np.arange(1, len(remaining) + 1)
-            panels[dof].semilogy(
-                at, remaining, "o-", color=COLOURS[name], markersize=2.5, label=name
-            )
+            widths = np.abs(period_widths(runs["run"], segment_of(runs["run"], dof)))
+            share, colour = 100 * widths / result.uncompensated, COLOURS[name]
+            at = np.arange(1, len(share) + 1)
+            panels[dof].semilogy(at, share, "o-", color=colour, markersize=2.5, label=name)
     for dof, axes in zip(Dof, panels, strict=True):
         axes.axhline(5, color=BLACK, linewidth=0.5, linestyle="--")
         axes.set_yticks(ticks := [0.1, 0.3, 1, 3, 10, 30, 100], [f"{tick:g}" for tick in ticks])

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from common.doc_pages import ROOT, insert
+from common.doc_pages import insert
+from common.paths import ROOT
 from hysteresis.figures import FIGURES
 from hysteresis.tables import Row, full, short
 

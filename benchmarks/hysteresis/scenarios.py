@@ -161,7 +161,7 @@ def too_wide(recordings: Recordings) -> Found:
     periods = metrics.until_within(each, 0.0, NEGLIGIBLE * NOMINAL_WIDTH)
     return [
         ("start 50 % too wide: overshoot", Dof.INSERTION, max(each)),
-        ("start 50 % too wide: periods until fold_reduction", Dof.INSERTION, periods),
+        ("start 50 % too wide: periods until gone", Dof.INSERTION, periods),
     ]
 
 

@@ -15,6 +15,7 @@ from tautscope.loop.references import Segment, SineSequence
 from tautscope.loop.rig import Sample
 from tautscope.runs.experiment import run_experiment
 from tautscope.runs.recording import Recording
+from tautscope.twin import Twin
 
 Floats = NDArray[np.float64]
 
@@ -119,43 +120,30 @@ def uncompensated(config: Config, motion: Sines | None = None) -> Simulation:
     return Simulation(bare, motion, compensate=False)
 
 
-class BenchTwin:
+class BenchTwin(Twin):
     """Twin whose endoscope bends during the run; optionally with features instead of images."""
 
-    def __init__(self, simulation: Simulation) -> None:
-        # Processes that only plan runs do not load MuJoCo.
-        from tautscope.twin import Twin  # noqa: PLC0415
-
-        config = simulation.config
-        self._knots = np.array(simulation.bends).reshape(-1, 2)
-        self._twin = Twin(config, images=simulation.compensate and simulation.images)
-        needs_features = simulation.compensate and not simulation.images
-        self._features = FeatureCamera(config) if needs_features else None
-        self._time = 0.0
-
-    @property
-    def control_period(self) -> float:
-        """Control period [s]."""
-        return self._twin.control_period
+    def __init__(self, run: Simulation) -> None:
+        super().__init__(run.config, images=run.compensate and run.images)
+        needs_features = run.compensate and not run.images
+        self._feature_camera = FeatureCamera(run.config) if needs_features else None
+        self._knots = np.array(run.bends).reshape(-1, 2)
+        self._time_of_sample = 0.0
 
     def reset(self) -> Sample:
         """See `Twin.reset`."""
-        return self._with_frame(self._twin.reset())
+        return self._with_frame(super().reset())
 
     def step(self, command: ArrayLike) -> Sample:
         """See `Twin.step`."""
         if len(self._knots):
-            bends = float(np.interp(self._time, *self._knots.T))
-            if bends != self._twin.bends:
-                self._twin.bends = bends
-        return self._with_frame(self._twin.step(command))
-
-    def close(self) -> None:
-        """See `Twin.close`."""
-        self._twin.close()
+            bends = float(np.interp(self._time_of_sample, *self._knots.T))
+            if bends != self.bends:
+                self.bends = bends
+        return self._with_frame(super().step(command))
 
     def _with_frame(self, sample: Sample) -> Sample:
-        self._time = sample.time
-        if self._features is None:
+        self._time_of_sample = sample.time
+        if self._feature_camera is None:
             return sample
-        return replace(sample, frame=self._features.capture(sample))
+        return replace(sample, frame=self._feature_camera.capture(sample))

@@ -8,7 +8,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from common.doc_pages import ROOT, insert
+from common.doc_pages import insert
+from common.paths import ROOT
 
 PAGE = ROOT / "docs" / "safety.md"
 SOURCE = ROOT / "crates" / "core" / "src" / "reactions.rs"

@@ -5,38 +5,21 @@ from __future__ import annotations
 import sys
 import tempfile
 import time
-from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
 import numpy as np
 import zstandard
-from numpy.typing import NDArray
-from tautscope import Config, Frame, MarkerDetector, Twin, load_config
+from hysteresis.simulation import Sines
+from tautscope import Frame, MarkerDetector, Twin, load_config
 from tautscope.dof import Dof
 from tautscope.log.reader import read_log
 from tautscope.log.replay import replay_same
 from tautscope.log.writer import LogWriter
 from tautscope.runs.experiment import run_experiment
 
-
-@dataclass(frozen=True)
-class FastSines:
-    """Sines on all three DOFs at once, five times as fast as in the article; a `Reference`."""
-
-    config: Config
-    duration: float
-    segments: tuple[()] = ()
-
-    def __call__(self, time: float) -> NDArray[np.float64]:
-        """Return the reference (3,) [m, rad, rad]."""
-        sines = [self.config.experiment[dof] for dof in Dof]
-        return np.array(
-            [
-                sine.centre + sine.amplitude * np.sin(2 * np.pi * time / period)
-                for sine, period in zip(sines, (2.0, 3.1, 2.3), strict=True)
-            ]
-        )
+PERIODS = tuple(zip(Dof, (2.0, 3.1, 2.3), strict=True))
+"""Periods of the reference, a fifth of those in the article [s]."""
 
 
 def replays(count: int, seconds: float) -> dict[str, object]:
@@ -49,7 +32,9 @@ def replays(count: int, seconds: float) -> dict[str, object]:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "run.mcap"
             with LogWriter(path, config, wait=True) as writer:
-                run_experiment(Twin(config), FastSines(config, seconds), config, log=writer)
+                run_experiment(
+                    Twin(config), Sines(config.experiment, PERIODS, seconds), config, log=writer
+                )
             found, _ = replay_same(read_log(path))
         identical += found.is_identical and not found.ended
         ticks, updates = ticks + found.ticks, updates + found.updates
@@ -61,7 +46,7 @@ def replays(count: int, seconds: float) -> dict[str, object]:
 def images(count: int) -> list[dict[str, object]]:
     """Compare image formats on frames of the twin: size, time, and change of the detection."""
     config = load_config()
-    twin, motion = Twin(config), FastSines(config, 1e9)
+    twin, motion = Twin(config), Sines(config.experiment, PERIODS, np.inf)
     frames: list[Frame] = []
     sample = twin.reset()
     while len(frames) < count:

@@ -18,7 +18,7 @@ from time import perf_counter_ns
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np
-from common.rows import goal_row
+from common.rows import goal_row, print_rows
 from tautscope.config import Config
 from tautscope.loop.construction import (
     build_feature_model,
@@ -102,14 +102,7 @@ def main() -> None:
     if arguments.json:
         print(json.dumps({"rows": rows, "numpy_pinv_ns": statistics.median(numpy_times)}))
         return
-    print(f"{'what':<34}{'median':>10}{'worst':>10}  unit   goal")
-    for line in rows:
-        bound = "<=" if line["sense"] == "max" else ">="
-        verdict = "holds" if line["holds"] else "missed"
-        print(
-            f"{line['what']:<34}{line['median']:>10.1f}{line['worst']:>10.1f}  {line['unit']:<6}"
-            f" {bound} {line['goal']:g}: {verdict}"
-        )
+    print_rows(rows)
     print(f"NumPy's pinv alone: {statistics.median(numpy_times):.0f} ns; {REPEATS} repeats each")
 
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from hysteresis.scenarios import INCOMMENSURATE
+from hysteresis.simulation import Sines
 from numpy.typing import NDArray
 from tautscope import _core
 from tautscope.config import Config
-from tautscope.dof import Dof
 from tautscope.loop.construction import (
     build_feature_model,
     build_state_estimator,
@@ -20,8 +21,6 @@ from tautscope.twin.plant import Plant
 Floats = NDArray[np.float64]
 TRACKING = (0.5e-3, 0.05, 0.03)
 """Standard deviation of the prediction in operation [m, rad, rad]."""
-PERIODS = (10.0, 7.3, 8.9)
-"""Period of each DOF [s]."""
 POSE_TICKS = 23
 """Control periods between two poses."""
 DELAY_TICKS = 4
@@ -82,15 +81,10 @@ def draw_poses(config: Config, count: int) -> Poses:
     """Move the twin, and return its states and features."""
     plant = Plant(config, np.random.default_rng(config.twin.seed))
     camera = TwinCamera(config)
-    sines = [config.experiment[dof] for dof in Dof]
+    reference = Sines(config.experiment, INCOMMENSURATE, np.inf)
     states, found = [plant.true_state], []
     for tick in range(1, count * POSE_TICKS + 1):
-        time = tick * config.control.period
-        command = [
-            sine.centre + sine.amplitude * np.sin(2 * np.pi * time / period)
-            for sine, period in zip(sines, PERIODS, strict=True)
-        ]
-        plant.step(np.array(command))
+        plant.step(reference(tick * config.control.period))
         states.append(plant.true_state)
         if tick % POSE_TICKS == 0:
             image = camera.draw(*plant.centreline(), tick)

@@ -16,7 +16,7 @@ os.environ["OMP_NUM_THREADS"] = "1"
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import cv2
-from common.rows import goal_row
+from common.rows import goal_row, print_rows
 from tautscope import HysteresisReduction, Twin, load_config
 from tautscope.loop.references import SineSequence
 
@@ -59,11 +59,7 @@ def main() -> None:
     if arguments.json:
         print(json.dumps({"rows": rows, "frames_per_second": rows[0]["median"] * 25}))
         return
-    for row in rows:
-        print(
-            f"{row['what']:34} {row['median']:6.1f} x real time (worst {row['worst']:.1f} of "
-            f"{row['n']}; goal {row['goal']:.0f}: {'holds' if row['holds'] else 'MISSED'})"
-        )
+    print_rows(rows)
     print(f"frames per second, rendered and processed: {rows[0]['median'] * 25:.0f}")
 
 

@@ -26,7 +26,7 @@ os.environ["OMP_NUM_THREADS"] = "1"
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import cv2
-from common.rows import goal_row
+from common.rows import goal_row, print_rows
 from vision.peers import HAS_SCIKIT_IMAGE, Visp
 from vision.timing import SIZES, colon_image, time_all, time_worst_frames, twin_image
 
@@ -102,12 +102,7 @@ def main() -> None:
         print(f"{name:26} {milliseconds:8.2f} ms at 1920x1080")
     for name, why in left_out.items():
         print(f"left out: {name}: {why}")
-    for row in rows:
-        verdict = "holds" if row["holds"] else "MISSED"
-        print(
-            f"{row['what']:28} {row['profile']:18} {row['median']:7.2f} {row['unit']:6} "
-            f"(goal {row['goal']:.0f}: {verdict})"
-        )
+    print_rows(rows)
 
 
 if __name__ == "__main__":

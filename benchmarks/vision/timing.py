@@ -2,29 +2,19 @@
 
 from __future__ import annotations
 
-import os
 import statistics
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 import cv2
 import numpy as np
-from common.doc_pages import ROOT
+from common.paths import DATA
 from numpy.typing import NDArray
 from tautscope import Twin, load_config
 from tautscope.config import Config
 from tautscope.loop.reduction import Expectation
 from tautscope.loop.vision import MarkerDetector, Region
-from vision.peers import (
-    HAS_SCIKIT_IMAGE,
-    Visp,
-    opencv_components,
-    opencv_contours,
-    opencv_planes,
-    opencv_textbook,
-    scikit_image,
-)
+from vision import peers
 
 Image = NDArray[np.uint8]
 SIZES = ((720, 576), (1920, 1080), (3840, 2160))
@@ -47,8 +37,7 @@ def twin_image() -> Image:
 
 def colon_image(rendered: Image) -> Image | None:
     """Return the instrument before a real colon frame, if the shared data exist."""
-    folder = Path(os.environ.get("TAUTSCOPE_DATA", ROOT.parent / "shared" / "data"))
-    files = sorted((folder / "colon_frames").glob("*.jpg"))
+    files = sorted((DATA / "colon_frames").glob("*.jpg"))
     if not files:
         return None
     real = cv2.resize(cv2.imread(str(files[1])), (rendered.shape[1], rendered.shape[0]))
@@ -92,7 +81,7 @@ def cache_warmer(image: Image) -> Callable[[], object]:
     return lambda: [image.max() for _ in range(4)]
 
 
-def time_all(image: Image, repeats: int, visp: Visp) -> dict[str, float]:
+def time_all(image: Image, repeats: int, visp: peers.Visp) -> dict[str, float]:
     """Return the median time of each detector [ms; windows and ViSP: us]."""
     size = (image.shape[1], image.shape[0])
     config, detector = Config(), detector_for(size)
@@ -107,13 +96,13 @@ def time_all(image: Image, repeats: int, visp: Visp) -> dict[str, float]:
         "read max": flat.max,
         "read sum": words.sum,
         "read xor": lambda: np.bitwise_xor.reduce(words),
-        "opencv_textbook_ms": lambda: opencv_textbook(image, config),
-        "contours": lambda: opencv_contours(image, config),
-        "components": lambda: opencv_components(image, config),
-        "planes": lambda: opencv_planes(image, config),
+        "opencv_textbook_ms": lambda: peers.opencv_textbook(image, config),
+        "contours": lambda: peers.opencv_contours(image, config),
+        "components": lambda: peers.opencv_components(image, config),
+        "planes": lambda: peers.opencv_planes(image, config),
     }
-    if HAS_SCIKIT_IMAGE:
-        calls["scikit_image_ms"] = lambda: scikit_image(image, config)
+    if peers.HAS_SCIKIT_IMAGE:
+        calls["scikit_image_ms"] = lambda: peers.scikit_image(image, config)
     if size == SIZES[0]:
         # Only this is the image size of the configured camera.
         calls["recognised_ms"] = lambda: detector.detect(image, expectation=EXPECTATION)
@@ -145,7 +134,7 @@ def time_all(image: Image, repeats: int, visp: Visp) -> dict[str, float]:
     }
     if "recognised_ms" in middle:
         figures["recognised_ms"] = middle["recognised_ms"]
-    if HAS_SCIKIT_IMAGE:
+    if peers.HAS_SCIKIT_IMAGE:
         figures["scikit_image_ms"] = middle["scikit_image_ms"]
     one_blob = visp.microseconds(image, regions, repeats)
     if one_blob is not None:
