@@ -46,7 +46,7 @@ GOALS = {
     **{f"latency {name}: change of reduction": Goal("share", 0.02) for name in LATENCIES},
     "tremor at rest: motor": Goal("tip", 4.0),
     "tremor at rest: tip": Goal("tip", 2.0),
-    "tremor: motor travel over hand's": Goal("ratio"),
+    "tremor: motor travel over reference's": Goal("ratio"),
     **{f"{name}: change of reduction": Goal("share", 0.03) for name in CONDITIONS},
     "tracking error": Goal("tip"),
     "state error": Goal("tip"),

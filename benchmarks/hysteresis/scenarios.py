@@ -6,14 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from hysteresis import measures
 from hysteresis.goals import CONDITIONS, LATENCIES
-from hysteresis.measures import (
-    fold_reduction,
-    period_widths,
-    segment_of,
-    stroke_widths,
-    uncompensated_width,
-)
 from hysteresis.simulation import Simulation, Sines, uncompensated
 from hysteresis.store import Recordings
 from tautscope.config import Config
@@ -68,17 +62,17 @@ def alone(recordings: Recordings) -> Found:
     free, run = recordings["free"], recordings["run"]
     found: Found = []
     for dof, result in evaluate(free, run).items():
-        segment = segment_of(run, dof)
+        segment = measures.segment_of(run, dof)
         found += [
-            ("reduction of mean width", dof, fold_reduction(result.reduction)),
-            ("reduction of max width", dof, fold_reduction(result.reduction_max)),
+            ("reduction of mean width", dof, measures.fold_reduction(result.reduction)),
+            ("reduction of max width", dof, measures.fold_reduction(result.reduction_max)),
             ("actuator gain", dof, result.actuator_gain),
             ("tip overspeed", dof, result.tip_overspeed),
             ("start", dof, result.start_periods),
             (
                 "second period's width left",
                 dof,
-                abs(period_widths(run, segment)[1]) / result.uncompensated,
+                abs(measures.period_widths(run, segment)[1]) / result.uncompensated,
             ),
             ("tracking error", dof, result.tracking_rms),
             ("state error", dof, result.state_rms),
@@ -97,7 +91,7 @@ def together(recordings: Recordings) -> Found:
     found: Found = []
     for dof, result in evaluate(recordings["free"], recordings["run"]).items():
         found += [
-            ("three DOFs at once: reduction", dof, fold_reduction(result.reduction)),
+            ("three DOFs at once: reduction", dof, measures.fold_reduction(result.reduction)),
             ("three DOFs at once: tracking error", dof, result.tracking_rms),
             ("three DOFs at once: state error", dof, result.state_rms),
             ("three DOFs at once: frames used", dof, result.frames_used),
@@ -131,8 +125,8 @@ def changing(recordings: Recordings) -> Found:
         ("straight", STRAIGHT[1], STRAIGHT[2]),
         ("bent", STRAIGHT[3], CHANGING_PERIODS),
     ):
-        true = uncompensated_width(recordings[name])
-        means = stroke_widths(recordings["run"], first - 0.25, last)
+        true = measures.uncompensated_width(recordings[name])
+        means = measures.stroke_widths(recordings["run"], first - 0.25, last)
         strokes.append(metrics.until_within(means, true, 0.1 * true))
     return [
         (
@@ -184,7 +178,10 @@ def changes(recordings: Recordings) -> Found:
                 (
                     f"{name}: change of reduction",
                     dof,
-                    abs(fold_reduction(after.reduction) - fold_reduction(before[dof].reduction)),
+                    abs(
+                        measures.fold_reduction(after.reduction)
+                        - measures.fold_reduction(before[dof].reduction)
+                    ),
                 )
                 for dof, after in evaluate(free, recording).items()
             ]
@@ -230,7 +227,7 @@ def tremor(recordings: Recordings) -> Found:
     return [
         ("tremor at rest: motor", Dof.INSERTION, motor),
         ("tremor at rest: tip", Dof.INSERTION, tip),
-        ("tremor: motor travel over hand's", Dof.INSERTION, motor_travel / reference_travel),
+        ("tremor: motor travel over reference's", Dof.INSERTION, motor_travel / reference_travel),
     ]
 
 

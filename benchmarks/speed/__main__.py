@@ -20,12 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np
 from common.rows import goal_row, print_rows
 from tautscope.config import Config
-from tautscope.loop.construction import (
-    build_feature_model,
-    build_loop,
-    build_state_estimator,
-    build_weighted_estimator,
-)
+from tautscope.loop import construction
 
 REPEATS = 60
 
@@ -46,14 +41,17 @@ def control_tick(config: Config) -> list[float]:
     phase = np.linspace(0.0, 40 * np.pi, ticks)
     references = np.stack([s.centre + s.amplitude * np.sin(phase) for s in sines], axis=1)
     times = np.arange(ticks) * config.control.period
-    loop = build_loop(config)
+    loop = construction.build_loop(config)
     return nanoseconds(lambda: loop.run(references, times), ticks)
 
 
 def state_estimation(config: Config) -> tuple[list[float], list[float]]:
     count, pinv_count = 5_000, 200
     rng = np.random.default_rng(0)
-    model, estimator = build_feature_model(config), build_state_estimator(config)
+    model, estimator = (
+        construction.build_feature_model(config),
+        construction.build_state_estimator(config),
+    )
     states = rng.uniform([0.015, -1.0, 0.3], [0.035, 1.0, 1.2], (count, 3))
     predictions = [model.predict(state) for state in states]
     features, matrices = zip(*(p for p in predictions if p is not None), strict=True)
@@ -74,7 +72,10 @@ def weighted_estimation(config: Config) -> list[float]:
     """Time the estimator of profile `best`, with prediction errors as in operation."""
     count = 5_000
     rng = np.random.default_rng(0)
-    model, estimator = build_feature_model(config), build_weighted_estimator(config)
+    model, estimator = (
+        construction.build_feature_model(config),
+        construction.build_weighted_estimator(config),
+    )
     states = rng.uniform([0.015, -1.0, 0.3], [0.035, 1.0, 1.2], (count, 3))
     visible = [(state, p[0]) for state in states if (p := model.predict(state)) is not None]
     truth, features = (np.array(column) for column in zip(*visible, strict=True))

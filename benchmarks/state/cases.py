@@ -10,11 +10,7 @@ from hysteresis.simulation import Sines
 from numpy.typing import NDArray
 from tautscope import _core
 from tautscope.config import Config
-from tautscope.loop.construction import (
-    build_feature_model,
-    build_state_estimator,
-    build_weighted_estimator,
-)
+from tautscope.loop import construction
 from tautscope.twin.camera import TwinCamera
 from tautscope.twin.plant import Plant
 
@@ -118,12 +114,12 @@ def estimate(config: Config, case: Case, poses: Poses) -> dict[str, Errors]:
     predicted = poses.states + np.array(case.prediction_std) * rng.standard_normal((count, 3))
     if case.is_late:
         predicted = poses.earlier
-    model = build_feature_model(config)
+    model = construction.build_feature_model(config)
     found = {}
-    states, observable = build_state_estimator(config).run(model, predicted, measured)
+    states, observable = construction.build_state_estimator(config).run(model, predicted, measured)
     found[ARTICLE] = Errors(states - poses.states, None, observable)
     for name, changes in VARIANTS.items():
-        estimator: _core.WeightedEstimator = build_weighted_estimator(
+        estimator: _core.WeightedEstimator = construction.build_weighted_estimator(
             config.replace(**{f"state_estimation.{key}": value for key, value in changes.items()})
         )
         states, std, observable = estimator.run(
