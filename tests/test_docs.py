@@ -74,7 +74,8 @@ def test_commands_in_a_page_are_valid(page: Path) -> None:
             if "--help" not in arguments:
                 _parser().parse_args(arguments)
         elif tool.endswith(".py") or tool == "python":
-            assert (ROOT / (arguments[0] if tool == "python" else tool)).is_file(), command
+            target = ROOT / (arguments[0] if tool == "python" else tool)
+            assert target.is_file() or (target / "__main__.py").is_file(), command
         else:
             assert tool in {"pytest", "ruff", "mypy", "stubtest", "lint-imports"}, command
 

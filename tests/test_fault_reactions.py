@@ -1,4 +1,4 @@
-"""What fails is noticed: the whole loop with its guards, row by row of the hazard table."""
+"""Faults are detected by the whole loop with its monitors, row by row of the hazard table."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SEEDS = (200, 201)
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the campaign forks")
 
-NOTICED = {
+EXPECTED_FLAGS = {
     "V1": (("band_a_lost", "band_b_lost"), {"merged"}),
     "V2": (("swapped",), {"swapped"}),
     "V3": (("merged",), {"innovation", "merged"}),
@@ -44,9 +44,11 @@ NOTICED = {
 @pytest.fixture(scope="module")
 def rows(tmp_path_factory):
     file = tmp_path_factory.mktemp("campaign") / "rows.json"
-    kinds = [word for names, _ in NOTICED.values() for name in names for word in ("--kind", name)]
+    kinds = [
+        word for names, _ in EXPECTED_FLAGS.values() for name in names for word in ("--kind", name)
+    ]
     runs = str(len(SEEDS) * len(kinds) // 2)
-    command = [sys.executable, "benchmarks/faults.py", *kinds, "--runs", runs, "--workers", "1"]
+    command = [sys.executable, "benchmarks/faults", *kinds, "--runs", runs, "--workers", "1"]
     subprocess.run(
         [*command, "--first-seed", str(SEEDS[0]), "--json", str(file)], cwd=ROOT, check=True
     )
@@ -55,9 +57,9 @@ def rows(tmp_path_factory):
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-@pytest.mark.parametrize("hazard", NOTICED)
-def test_what_fails_is_noticed(rows, hazard, seed):
-    kinds, flags = NOTICED[hazard]
+@pytest.mark.parametrize("hazard", EXPECTED_FLAGS)
+def test_faults_are_detected(rows, hazard, seed):
+    kinds, flags = EXPECTED_FLAGS[hazard]
     for kind in kinds:
         row = rows[kind, seed]
         assert row["ending"] in {"warned", "stopped"}, (kind, seed, row["excursion"])

@@ -1,4 +1,4 @@
-"""The benchmark's harness: what it runs, and how seeds become rows."""
+"""The hysteresis benchmark: its runs, and its rows from the values of all seeds."""
 
 import json
 import math
@@ -13,23 +13,23 @@ from tautscope.dof import Dof
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
 
-import hysteresis_ablation as ablation
-import hysteresis_pages as pages
-import hysteresis_table as tables
-from hysteresis_goals import GOALS
-from hysteresis_rows import SCENARIOS, gone
-from hysteresis_runs import Sines, uncompensated
+from common.doc_pages import insert
+from hysteresis import ablation, tables
+from hysteresis.goals import GOALS
+from hysteresis.measures import fold_reduction
+from hysteresis.scenarios import SCENARIOS
+from hysteresis.simulation import Sines, uncompensated
 
 NAME = "reduction of mean width"
 
 
-def rows(figures: dict[tuple[str, Dof, str], list[float]]) -> list[dict[str, Any]]:
+def rows(values_by_seed: dict[tuple[str, Dof, str], list[float]]) -> list[dict[str, Any]]:
     return tables.to_rows(
-        tables.pair({key: dict(enumerate(values)) for key, values in figures.items()})
+        tables.pair({key: dict(enumerate(values)) for key, values in values_by_seed.items()})
     )
 
 
-def test_a_row_is_median_and_worst_against_the_goal() -> None:
+def test_a_row_compares_the_median_with_the_goal() -> None:
     (row,) = rows({(NAME, Dof.ROTATION, "best"): [0.96, 0.99, 0.97]})
     assert (row["median"], row["worst"], row["n"]) == (0.97, 0.96, 3)
     assert (row["goal"], row["sense"], row["holds"], row["steady"]) == (0.95, "min", True, True)
@@ -39,7 +39,7 @@ def test_a_row_is_median_and_worst_against_the_goal() -> None:
     assert not wide["steady"]
 
 
-def test_a_seed_without_a_figure_is_the_worst() -> None:
+def test_a_seed_without_a_value_is_the_worst() -> None:
     (lost,) = rows({(NAME, Dof.BENDING, "paper"): [math.nan, 0.99, 0.98]})
     assert (lost["median"], lost["worst"], lost["steady"]) == (0.98, None, False)
     (none,) = rows({("start", Dof.BENDING, "paper"): [math.nan, math.nan, 0.0]})
@@ -48,9 +48,9 @@ def test_a_seed_without_a_figure_is_the_worst() -> None:
     json.loads(tables.to_json([lost, none]))
 
 
-def test_a_loop_that_runs_the_other_way_is_no_gain() -> None:
-    assert gone(1.84) == pytest.approx(0.16)
-    assert gone(0.8) == pytest.approx(0.8)
+def test_a_loop_in_the_opposite_direction_is_no_gain() -> None:
+    assert fold_reduction(1.84) == pytest.approx(0.16)
+    assert fold_reduction(0.8) == pytest.approx(0.8)
 
 
 def test_overspeed_is_compared_seed_by_seed() -> None:
@@ -65,28 +65,28 @@ def test_overspeed_is_compared_seed_by_seed() -> None:
 
 
 @pytest.mark.parametrize("group", SCENARIOS)
-def test_runs_without_compensation_are_shared_by_both_profiles(group: str) -> None:
+def test_uncompensated_runs_are_shared_by_both_profiles(group: str) -> None:
     plans = [SCENARIOS[group].plan(load_config(None, name)) for name in ("paper", "best")]
     free = [[run for run in plan.values() if not run.compensate] for plan in plans]
     assert free[0] == free[1]
     assert all(run.compensate for plan in plans for run in plan.values() if run not in free[0])
 
 
-def test_a_run_without_compensation_keeps_the_instrument() -> None:
+def test_an_uncompensated_run_keeps_the_instrument() -> None:
     config = load_config(None, "best").replace(
         **{"twin.seed": 7, "twin.shaft.friction": 0.4, "twin.disturb": ["smoke"]}
     )
-    bare = uncompensated(config).config.twin
-    assert (bare.seed, bare.shaft.friction, bare.disturb) == (7, 0.4, ())
+    twin = uncompensated(config).config.twin
+    assert (twin.seed, twin.shaft.friction, twin.disturb) == (7, 0.4, ())
 
 
 @pytest.mark.parametrize("idea", ablation.IDEAS)
-def test_every_idea_can_be_taken_away(idea: str) -> None:
+def test_every_idea_can_be_disabled(idea: str) -> None:
     best = load_config(None, "best")
     assert best.replace(**ablation.IDEAS[idea]) != best
 
 
-def test_an_ablation_tells_what_gets_worse() -> None:
+def test_an_ablation_shows_what_gets_worse() -> None:
     idea = next(iter(ablation.IDEAS))
     found = rows(
         {
@@ -98,7 +98,7 @@ def test_an_ablation_tells_what_gets_worse() -> None:
     )
     losses = ablation.compare(found)
     assert [row["worse"] for row in losses] == pytest.approx([0.19, 0.0])
-    assert [ablation.matters(row) for row in losses] == [True, False]
+    assert [ablation.is_notable(row) for row in losses] == [True, False]
     assert "99.0 % | 80.0 % (goal lost)" in ablation.table(losses)
 
 
@@ -108,7 +108,7 @@ def test_whole_periods_end_with_the_reference() -> None:
     assert (segment.periods, segment.end) == (8, pytest.approx(60.0))
 
 
-def test_a_hand_at_rest_still_trembles() -> None:
+def test_tremor_continues_at_rest() -> None:
     sine = load_config().experiment.insertion
     periods = ((Dof.INSERTION, sine.period),)
     motion = Sines(load_config().experiment, periods, 30.0, tremor=1e-3, rest_at=12.5)
@@ -117,13 +117,13 @@ def test_a_hand_at_rest_still_trembles() -> None:
     assert rest.mean() == pytest.approx(sine.centre + sine.amplitude, abs=1e-5)
 
 
-def test_text_goes_between_the_markers(tmp_path: Path) -> None:
+def test_text_is_inserted_between_the_markers(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text("a\n<!-- x: begin -->\nold\n<!-- x: end -->\nb\n", encoding="utf-8")
-    pages.insert(page, "x", r"new \1")
+    insert(page, "x", r"new \1")
     assert page.read_text() == "a\n<!-- x: begin -->\nnew \\1\n<!-- x: end -->\nb\n"
     with pytest.raises(ValueError, match="y: begin"):
-        pages.insert(page, "y", "new")
+        insert(page, "y", "new")
 
 
 def test_every_short_row_has_one_goal() -> None:

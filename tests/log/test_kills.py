@@ -1,4 +1,4 @@
-"""A recording process that is killed, as in `benchmarks/recordings.py --kills`."""
+"""A recording whose process is killed, as in `benchmarks/recordings --kills`."""
 
 import sys
 from pathlib import Path
@@ -7,19 +7,19 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 
-from recordings import Scene, kill_one, scene
+from recordings.kills import Scene, kill_one, make_scene
 
 
 @pytest.fixture(scope="module")
-def sent() -> Scene:
-    return scene()
+def scene() -> Scene:
+    return make_scene()
 
 
 @pytest.mark.parametrize("lifetime", [0.05, 0.3, 1.0])
 def test_a_killed_recording_is_readable_without_gaps(
-    tmp_path: Path, lifetime: float, sent: Scene
+    tmp_path: Path, lifetime: float, scene: Scene
 ) -> None:
-    loss = kill_one(tmp_path, lifetime, sent)
+    loss = kill_one(tmp_path, lifetime, scene)
     assert loss.is_readable
     assert loss.holes == 0
     assert loss.ticks >= 0

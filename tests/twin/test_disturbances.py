@@ -20,7 +20,7 @@ from tautscope.twin.disturbances import NO_INSTRUMENT, TABLE
 from tautscope.twin.noise import TemporalNoise
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
-import condition_frames as frames_of
+from conditions import frames as frames_of
 
 Array = NDArray[Any]
 

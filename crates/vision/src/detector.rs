@@ -1,9 +1,10 @@
 //! The marker detector: Fig. 5 as a whole.
 
 use crate::blur::{BlurFit, BlurFitter};
+use crate::error::Error;
 use crate::recognition::{BandPrediction, BandPredictor, OutlineSearch, Recognition};
 use crate::scan::{ColorDiscriminant, Frame, Region, Scanner, Window};
-use crate::{Error, Settings};
+use crate::settings::Settings;
 
 /// Finds the two markers in frames. It keeps memory between frames, but no information.
 #[derive(Clone, Debug)]

@@ -1,6 +1,6 @@
 //! What the control law guarantees, over as many random steps as `TAUTSCOPE_STEPS` says; a million without it.
 //!
-//! `benchmarks/guarantees.py` runs these over 1e9 and reads what they print.
+//! `benchmarks/guarantees` runs these over 1e9 and reads what they print.
 
 use crate::adaptive::axis::AdaptiveAxis;
 use crate::article::compensator::{Compensator, CompensatorState};

@@ -1,0 +1,59 @@
+"""The fault campaign: how far faults move the tip, and whether they are detected.
+
+Every run is compared with the fault-free run: same instrument, noise and motion. 10 mm of slack,
+estimated before the fault; K_b = 5; a reference of up to 12.6 mm/s. `--kind K --seed S` repeats one
+run.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from common.doc_pages import insert
+from faults import tables
+from faults.campaign import PAGE, Options, arguments, measure, read
+
+
+def main() -> None:
+    options = arguments()
+    found = read(options.read) if options.read else measure(options)
+    if options.json:
+        options.json.write_text(json.dumps(found), encoding="utf-8")
+    each_off = {name.removeprefix("-"): rows for name, rows in found.items() if name[:1] == "-"}
+    for name, rows in found.items():
+        if name[:1] == "-":
+            continue
+        text = f"{tables.summary(rows)} {tables.goals(options.profile)}\n\n{tables.table(rows)}"
+        print(f"{name or 'guarded'}: {text}\n")
+        if options.write:
+            title = f"faults {name or 'guarded'}"
+            insert(PAGE, title, f"{conditions(options, name)}\n\n{text}")
+    if each_off:
+        text = tables.off_table(each_off)
+        print(text)
+        if options.write:
+            insert(PAGE, "faults each", f"{conditions(options, 'each')}\n\n{text}")
+    if options.write:
+        insert(PAGE, "kinds", tables.kinds_table())
+    if options.kind and options.seed is not None:
+        print(json.dumps(next(iter(found.values())), indent=1))
+
+
+def conditions(options: Options, name: str) -> str:
+    """Return the conditions and the date of a table."""
+    today = datetime.now(UTC).date().isoformat()
+    monitors = {
+        "": "All detectors on",
+        "unguarded": "All detectors off",
+        "each": "One detector off in turn",
+    }
+    return f"{monitors.get(name, name + ' off')}, profile `{options.profile}`, {today}."
+
+
+if __name__ == "__main__":
+    main()

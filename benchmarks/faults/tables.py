@@ -1,0 +1,154 @@
+"""Rows and Markdown tables of the fault campaign."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from faults.evaluation import HAS_ENVELOPE, TRANSIENT_GOAL, Outcome, classify, permanent_goal
+from faults.scenarios import SLACK
+from tautscope.twin.faults import KINDS
+
+Row = dict[str, Any]
+
+ENDINGS = ("masked", "warned", "stopped", "unnoticed", "SILENT")
+DETECTOR_OFF_GOAL = 0.3 * SLACK[0]
+"""Largest excursion for a transient fault with one detector off [m]."""
+
+
+def to_row(outcome: Outcome, profile: str = "best") -> Row:
+    """Return an outcome as numbers and words; None for NaN and infinity."""
+    row = asdict(outcome) | {"passing": outcome.is_transient, "profile": profile}
+    row["fault"]["dof"] = outcome.fault.dof.label
+    row["fault"]["duration"] = _finite(outcome.fault.duration)
+    row["detected"] = _finite(outcome.detected)
+    return with_verdict(row)
+
+
+def with_verdict(row: Row) -> Row:
+    """Return a row with its verdict by the present goals."""
+    is_detected = row["detected"] is not None
+    goal = TRANSIENT_GOAL if row["passing"] else permanent_goal(row["profile"])
+    return row | classify(row["excursion"], row["tip"], goal, is_detected, row["stopped"])
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def summary(rows: Sequence[Row]) -> str:
+    """Summarise the campaign in a few sentences."""
+    ended = Counter(row["ending"] for row in rows)
+    transient, permanent = by_duration(rows)
+    counts = ", ".join(f"{ended[name]} {name}" for name in ENDINGS)
+    return (
+        f"N = {len(rows)} runs of {len({row['kind'] for row in rows})} kinds, seeds {seeds(rows)}: "
+        f"{counts}. k = {sum(row['beyond'] for row in rows)} beyond the goal. Insertion, worst "
+        f"excursion: {_worst(transient):.2f} mm for transient faults, {_worst(permanent):.2f} mm "
+        "for permanent ones."
+    )
+
+
+def by_duration(rows: Iterable[Row]) -> tuple[list[Row], list[Row]]:
+    """Return the rows of transient faults and those of permanent ones."""
+    parts: tuple[list[Row], list[Row]] = [], []
+    for row in rows:
+        parts[0 if row["passing"] else 1].append(row)
+    return parts
+
+
+def seeds(rows: Sequence[Row]) -> str:
+    """Return the seeds as a range, or one by one if some are missing."""
+    used = sorted({row["seed"] for row in rows})
+    if len(used) > 1 and used == list(range(used[0], used[-1] + 1)):
+        return f"{used[0]} to {used[-1]}"
+    return ", ".join(str(seed) for seed in used)
+
+
+def table(rows: Sequence[Row]) -> str:
+    """Return the table of kinds, transient and permanent faults apart."""
+    lines = [
+        "| fault | hazard | permanent | N | k | worst excursion [mm, rad, rad] | tip [mm] "
+        f"| detection time, median (worst) [s] | detected | {' | '.join(ENDINGS)} "
+        "| highest reactions |",
+        "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for name, kind in KINDS.items():
+        for own, permanent in zip(
+            by_duration(row for row in rows if row["kind"] == name), ("", "yes"), strict=True
+        ):
+            if own:
+                lines.append(f"| {name} | {kind.hazard} | {permanent} | {_cells(own)} |")
+    return "\n".join(lines)
+
+
+def _cells(own: Sequence[Row]) -> str:
+    excursion = np.array([row["excursion"] for row in own]).max(axis=0)
+    times = [row["detected"] for row in own if row["detected"] is not None]
+    ended = Counter(row["ending"] for row in own)
+    reached = Counter(row["reaction"] for row in own if row["reaction"] != "none")
+    cells = [
+        len(own),
+        sum(row["beyond"] for row in own),
+        f"{1e3 * excursion[0]:.2f}, {excursion[1]:.3f}, {excursion[2]:.3f}",
+        f"{1e3 * max(row['tip'][0] for row in own):.2f}" if own[0]["kind"] in HAS_ENVELOPE else "",
+        f"{np.median(times):.2f} ({max(times):.2f})" if times else "",
+        len(times),
+        *(ended[name] or "" for name in ENDINGS),
+        ", ".join(f"{name} {count}" for name, count in reached.most_common(3)),
+    ]
+    return " | ".join(str(cell) for cell in cells)
+
+
+def kinds_table() -> str:
+    """Return the table that describes each kind."""
+    lines = ["| fault | target | mode | severity | description |", "|---|---|---|---|---|"]
+    for kind in KINDS.values():
+        low, high = kind.severity
+        size = f"{low:g} to {high:g} {kind.unit}" if kind.unit else ""
+        lines.append(f"| {kind.name} | {kind.target} | {kind.mode} | {size} | {kind.what} |")
+    return "\n".join(lines)
+
+
+def off_table(found: dict[str, Sequence[Row]]) -> str:
+    """Return the table of detectors that were switched off."""
+    lines = [
+        "| detector off | N | runs repeated | worst, transient [mm] | worst, permanent [mm] "
+        "| k beyond 3 mm, transient | SILENT | worst kinds |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for name, rows in found.items():
+        transient, permanent = by_duration(rows)
+        worst = sorted(transient, key=lambda row: -row["excursion"][0])
+        cells = [
+            name,
+            len(rows),
+            sum(name in row["raised"] for row in rows),
+            f"{_worst(transient):.2f}",
+            f"{_worst(permanent):.2f}",
+            sum(row["excursion"][0] > DETECTOR_OFF_GOAL for row in transient),
+            sum(row["ending"] == "SILENT" for row in rows),
+            ", ".join(list(dict.fromkeys(row["kind"] for row in worst[:10]))[:3]),
+        ]
+        lines.append("| " + " | ".join(str(cell) for cell in cells) + " |")
+    return "\n".join(lines)
+
+
+def _worst(rows: Iterable[Row]) -> float:
+    return 1e3 * max((row["excursion"][0] for row in rows), default=0.0)
+
+
+def goals(profile: str) -> str:
+    """Describe the goals."""
+    transient, permanent = (
+        f"{1e3 * goal[0]:.3g} mm, {goal[1]:.3g} rad, {goal[2]:.3g} rad"
+        for goal in (TRANSIENT_GOAL, permanent_goal(profile))
+    )
+    return (
+        f"Goal: at most {transient} for a transient fault, {permanent} for a permanent one: the "
+        "slack that the profile compensates, and a margin."
+    )

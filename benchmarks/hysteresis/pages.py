@@ -1,0 +1,30 @@
+"""Tables and figures of the hysteresis benchmark in the documentation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from common.doc_pages import insert
+from common.paths import ROOT
+from hysteresis.figures import FIGURES
+from hysteresis.tables import Row, full, short
+
+PAGE = ROOT / "docs" / "hysteresis.md"
+README = ROOT / "README.md"
+FOLDER = ROOT / "docs" / "figures" / "hysteresis"
+
+
+def write_tables(rows: Sequence[Row], drawn: Sequence[str], conditions: str) -> None:
+    """Write the table of the README, that of the page, and the page's figures."""
+    insert(README, "hysteresis", f"{short(rows)}\n\n{conditions}".replace(" (worst)", ""))
+    insert(PAGE, "hysteresis", f"{conditions}\n\n{full(rows)}")
+    folder = FOLDER.relative_to(PAGE.parent).as_posix()
+    images = [f"![{FIGURES[name][1]}]({folder}/{name}.png)" for name in drawn]
+    captions = [f"*{FIGURES[name][1]}.*" for name in drawn]
+    parts = [text for pair in zip(images, captions, strict=True) for text in pair]
+    insert(PAGE, "figures", "\n\n".join(parts))
+
+
+def write_ablation(table: str, conditions: str) -> None:
+    """Write the table of the ablation."""
+    insert(PAGE, "ablation", f"{conditions.removesuffix(' (worst).')}.\n\n{table}")

@@ -1,0 +1,202 @@
+"""Rows of the hysteresis benchmark from the values of every seed, and tables from rows."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from statistics import median
+from typing import Any
+
+import numpy as np
+from hysteresis.goals import CONDITIONS, GOALS, LATENCIES, Goal
+from tautscope.dof import Dof
+
+Row = dict[str, Any]
+Values = Mapping[tuple[str, Dof, str], Mapping[int, float]]
+"""Quantity, DOF, name of the configuration: value per seed, as displayed; NaN if unknown."""
+
+POINTS = 0.03
+"""Largest distance of the worst seed from the median for a share to count as steady."""
+
+SHORT: dict[str, tuple[str, ...]] = {
+    "reduction of mean width": ("reduction of mean width",),
+    "reduction of max width": ("reduction of max width",),
+    "tip overspeed, times the reference's": ("tip overspeed",),
+    "start [periods]": ("start",),
+    "three DOFs at once: reduction": ("three DOFs at once: reduction",),
+    "width 10-2-10 mm: overshoot [mm]": ("width 10-2-10 mm: overshoot",),
+    "strokes until within 10 %": ("width 10-2-10 mm: strokes until within 10 %",),
+    "start value 50 % too wide: overshoot [mm]": ("start 50 % too wide: overshoot",),
+    "latency 0 or 200 ms: change": tuple(
+        f"latency {name}: change of reduction" for name in LATENCIES
+    ),
+    "tremor 2 mm at rest: motor [mm]": ("tremor at rest: motor",),
+    "tremor 2 mm at rest: tip [mm]": ("tremor at rest: tip",),
+    f"worst of {len(CONDITIONS)} image conditions: change": tuple(
+        f"{name}: change of reduction" for name in CONDITIONS
+    ),
+}
+"""Rows of the README, and the quantities of which each shows the worst."""
+
+
+def pair(by_seed: Values) -> Values:
+    """Add the ratios of profile `best` to profile `paper`, seed by seed."""
+    ratios = {}
+    for what, goal in GOALS.items():
+        for dof in Dof:
+            best = by_seed.get((goal.paired or "", dof, "best"), {})
+            paper = by_seed.get((goal.paired or "", dof, "paper"), {})
+            if common := best.keys() & paper.keys():
+                ratios[what, dof, "best"] = {seed: best[seed] / paper[seed] for seed in common}
+    return {**by_seed, **ratios}
+
+
+def to_rows(by_seed: Values) -> list[Row]:
+    """Return a row per quantity, DOF and configuration, in the order of `GOALS`.
+
+    An unknown value counts as worse than any other and is shown as None. `holds`: the median
+    reaches the goal. `steady`: the worst seed is within 3 points of the median.
+    """
+    order = list(GOALS)
+    rows = []
+    for what, dof, name in sorted(by_seed, key=lambda key: (order.index(key[0]), key[1])):
+        goal = GOALS[what]
+        unknown = np.inf if goal.sense == "max" else -np.inf
+        values = [unknown if np.isnan(each) else each for each in by_seed[what, dof, name].values()]
+        middle, worst = median(values), max(values) if goal.sense == "max" else min(values)
+        rows.append(
+            {
+                "what": what,
+                "dof": dof.label,
+                "profile": name,
+                "unit": dof.display_unit if goal.unit == "tip" else goal.unit,
+                "median": middle if np.isfinite(middle) else None,
+                "worst": worst if np.isfinite(worst) else None,
+                "n": len(values),
+                "goal": goal.value,
+                "sense": goal.sense,
+                "holds": _holds(goal, middle),
+                "steady": bool(abs(worst - middle) <= POINTS) if goal.unit == "share" else None,
+            }
+        )
+    return rows
+
+
+def _holds(goal: Goal, value: float) -> bool | None:
+    if goal.value is None:
+        return None
+    rounding = 1e-9 * abs(goal.value)
+    return bool(
+        value <= goal.value + rounding if goal.sense == "max" else value >= goal.value - rounding
+    )
+
+
+def to_json(rows: Sequence[Row], **facts: Any) -> str:
+    """Return JSON: rows with a goal in `rows`, the others in `without_goal`."""
+    document = {
+        "rows": [row for row in rows if row["goal"] is not None],
+        "without_goal": [row for row in rows if row["goal"] is None],
+    }
+    return json.dumps(document | facts, allow_nan=False)
+
+
+def show(value: float | None, unit: str) -> str:
+    """Format a value for a table."""
+    if value is None:
+        return "none"
+    if unit == "share":
+        return f"{100 * value:.1f} %"
+    return f"{value:.0f}" if unit in ("periods", "strokes") else f"{value:.3g}"
+
+
+def goal(row: Row) -> str:
+    """Format the goal of a row and whether it is reached."""
+    if row["goal"] is None:
+        return ""
+    bound = "at least" if row["sense"] == "min" else "at most"
+    verdict = "holds" if row["holds"] else "missed"
+    return f"{bound} {show(row['goal'], row['unit']).replace('.0 %', ' %')}, {verdict}"
+
+
+def plain(rows: Sequence[Row]) -> str:
+    """Return a line per row, for a terminal."""
+    head = f"{'what':<54}{'dof':<11}{'profile':<9}{'median':>9}{'worst':>9}  {'unit':<9}goal"
+    lines = [head]
+    for row in rows:
+        median_, worst = (show(row[key], row["unit"]) for key in ("median", "worst"))
+        wide = ", worst more than 3 points off" if row["steady"] is False else ""
+        lines.append(
+            f"{row['what']:<54}{row['dof']:<11}{row['profile']:<9}{median_:>9}{worst:>9}  "
+            f"{row['unit']:<9}{goal(row)}{wide}"
+        )
+    return "\n".join(lines)
+
+
+def full(rows: Sequence[Row]) -> str:
+    """Return a Markdown table of every row, both profiles side by side."""
+    lines = ["| what | DOF | `paper` | `best` | goal |", "|---|---|---|---|---|"]
+    cells: dict[tuple[str, str], dict[str, Row]] = {}
+    for row in rows:
+        cells.setdefault((row["what"], row["dof"]), {})[row["profile"]] = row
+    for (what, dof), mine in cells.items():
+        shown = []
+        for name in ("paper", "best"):
+            if name in mine:
+                unit, steady = mine[name]["unit"], mine[name]["steady"]
+                values = (show(mine[name][key], unit) for key in ("median", "worst"))
+                shown.append("{} ({})".format(*values) + (" (!)" if steady is False else ""))
+            else:
+                shown.append("")
+        last = mine.get("best") or mine["paper"]
+        unit = "" if last["unit"] == "share" else f" [{last['unit']}]"
+        lines.append(f"| {what}{unit} | {dof} | {shown[0]} | {shown[1]} | {goal(last)} |")
+    return "\n".join(lines)
+
+
+def short(rows: Sequence[Row]) -> str:
+    """Return the Markdown table of the README: medians, of each DOF where there are three."""
+    lines = ["| | `paper` | `best` | goal |", "|---|---|---|---|"]
+    for label, whats in SHORT.items():
+        cells = {name: _worst_rows(rows, whats, name) for name in ("paper", "best")}
+        some = cells["best"] or cells["paper"]
+        if not some:
+            continue
+        bound = "at least" if some[0]["sense"] == "min" else "at most"
+        target = show(some[0]["goal"], some[0]["unit"]).replace(".0 %", " %")
+        lines.append(
+            f"| {label} | {_cell(cells['paper'])} | {_cell(cells['best'])} "
+            f"| {bound} {target}{_missed(cells['best'])} |"
+        )
+    return "\n".join(lines)
+
+
+def _missed(rows: Sequence[Row]) -> str:
+    """Name the DOFs whose goal is not reached."""
+    names = [row["dof"] for row in rows if not row["holds"]]
+    return f"; missed in {', '.join(names)}" if names else ""
+
+
+def _worst_rows(rows: Sequence[Row], whats: Sequence[str], name: str) -> list[Row]:
+    """Return for each DOF the row with the worst median."""
+    found = []
+    for dof in Dof:
+        mine = [
+            row
+            for row in rows
+            if row["what"] in whats and row["dof"] == dof.label and row["profile"] == name
+        ]
+        if mine:
+            bad = [np.inf if row["median"] is None else _badness(row) for row in mine]
+            found.append(mine[int(np.argmax(bad))])
+    return found
+
+
+def _badness(row: Row) -> float:
+    return float(row["median"] if row["sense"] == "max" else -row["median"])
+
+
+def _cell(rows: Sequence[Row]) -> str:
+    texts = [show(row["median"], row["unit"]) for row in rows]
+    if all(text.endswith(" %") for text in texts) and texts:
+        return ", ".join(text.removesuffix(" %") for text in texts) + " %"
+    return ", ".join(texts)

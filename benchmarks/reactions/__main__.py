@@ -1,0 +1,44 @@
+"""Write the table of reactions of crates/core/src/supervision/reactions.rs to docs/safety.md."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from common.doc_pages import insert
+from common.paths import ROOT
+
+PAGE = ROOT / "docs" / "safety.md"
+SOURCE = ROOT / "crates" / "core" / "src" / "supervision" / "reactions.rs"
+
+_LADDER = re.compile(r"const (\w+): &\[\(Reaction, Clear\)\] = &(\[.*?\]);")
+_RULE = re.compile(r"rule\(Flag::(\w+),\s*(\w+),\s*(&\[.*?\]|\w+),\s*(true|false)\s*\)", re.DOTALL)
+_RUNG = re.compile(r"\((\w+), (\w+)\)")
+
+
+def table() -> str:
+    """Return the table, a line per flag."""
+    source = SOURCE.read_text(encoding="utf-8")
+    ladders = dict(_LADDER.findall(source))
+    lines = [
+        "| flag | detected at | reactions, and what ends each | escalates |",
+        "|---|---|---|---|",
+    ]
+    for flag, source_tick, ladder, climbs in _RULE.findall(source):
+        rungs = _RUNG.findall(ladders.get(ladder, ladder))
+        steps = ", then ".join(f"{snake(what)} ({snake(end)})" for what, end in rungs)
+        again = "yes" if climbs == "true" else ""
+        lines.append(f"| {snake(flag)} | {snake(source_tick)} | {steps} | {again} |")
+    return "\n".join(lines)
+
+
+def snake(name: str) -> str:
+    """Convert HoldEstimate to hold_estimate."""
+    return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
+
+
+if __name__ == "__main__":
+    insert(PAGE, "reactions", table())

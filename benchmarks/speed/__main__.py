@@ -1,0 +1,111 @@
+"""Computing time of the control tick and of the state estimation, compared with NumPy's pinv.
+
+One thread. The tick has three DOFs: play model, compensator, command history. The state estimation
+is h(q), its interaction matrix, the step and the rank check; NumPy only computes
+``pinv(matrix) @ innovation`` for a given matrix.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import statistics
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from time import perf_counter_ns
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+import numpy as np
+from common.rows import goal_row, print_rows
+from tautscope.config import Config
+from tautscope.loop import construction
+
+REPEATS = 60
+
+
+def nanoseconds(work: Callable[[], object], per: int) -> list[float]:
+    """Return the time per item of work on `per` items, once per repeat."""
+    times = []
+    for _ in range(REPEATS):
+        start = perf_counter_ns()
+        work()
+        times.append((perf_counter_ns() - start) / per)
+    return times
+
+
+def control_tick(config: Config) -> list[float]:
+    ticks = 20_000
+    sines = [config.experiment.insertion, config.experiment.rotation, config.experiment.bending]
+    phase = np.linspace(0.0, 40 * np.pi, ticks)
+    references = np.stack([s.centre + s.amplitude * np.sin(phase) for s in sines], axis=1)
+    times = np.arange(ticks) * config.control.period
+    loop = construction.build_loop(config)
+    return nanoseconds(lambda: loop.run(references, times), ticks)
+
+
+def state_estimation(config: Config) -> tuple[list[float], list[float]]:
+    count, pinv_count = 5_000, 200
+    rng = np.random.default_rng(0)
+    model, estimator = (
+        construction.build_feature_model(config),
+        construction.build_state_estimator(config),
+    )
+    states = rng.uniform([0.015, -1.0, 0.3], [0.035, 1.0, 1.2], (count, 3))
+    predictions = [model.predict(state) for state in states]
+    features, matrices = zip(*(p for p in predictions if p is not None), strict=True)
+    measured = np.array(features) + rng.normal(0.0, 1.0, (len(features), 4))
+    innovations = measured - np.array(features)
+    states = states[[p is not None for p in predictions]]
+    samples = list(zip(matrices, innovations, strict=True))[:pinv_count]
+
+    def use_numpy() -> None:
+        for matrix, innovation in samples:
+            np.matmul(np.linalg.pinv(matrix), innovation)
+
+    ours = nanoseconds(lambda: estimator.run(model, states, measured), len(states))
+    return ours, nanoseconds(use_numpy, len(samples))
+
+
+def weighted_estimation(config: Config) -> list[float]:
+    """Time the estimator of profile `best`, with prediction errors as in operation."""
+    count = 5_000
+    rng = np.random.default_rng(0)
+    model, estimator = (
+        construction.build_feature_model(config),
+        construction.build_weighted_estimator(config),
+    )
+    states = rng.uniform([0.015, -1.0, 0.3], [0.035, 1.0, 1.2], (count, 3))
+    visible = [(state, p[0]) for state in states if (p := model.predict(state)) is not None]
+    truth, features = (np.array(column) for column in zip(*visible, strict=True))
+    std = np.array([0.5e-3, 0.05, 0.03])
+    predicted = truth + std * rng.standard_normal(truth.shape)
+    measured = features + rng.normal(0.0, 0.3, features.shape)
+    return nanoseconds(lambda: estimator.run(model, predicted, std, measured), len(measured))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    arguments = parser.parse_args()
+
+    config = Config()
+    tick = control_tick(config)
+    ours, numpy_times = state_estimation(config)
+    ratio = [theirs / own for theirs, own in zip(numpy_times, ours, strict=True)]
+    rows = [
+        goal_row("control tick", "ns", tick, 1000.0),
+        goal_row("state estimation", "ns", ours, 2000.0),
+        goal_row("state estimation, profile best", "ns", weighted_estimation(config), 20_000.0),
+        goal_row("NumPy pinv over state estimation", "ratio", ratio, 10.0, "min"),
+    ]
+    if arguments.json:
+        print(json.dumps({"rows": rows, "numpy_pinv_ns": statistics.median(numpy_times)}))
+        return
+    print_rows(rows)
+    print(f"NumPy's pinv alone: {statistics.median(numpy_times):.0f} ns; {REPEATS} repeats each")
+
+
+if __name__ == "__main__":
+    main()
