@@ -2,7 +2,7 @@
 
 use super::format::PixelFormat;
 use super::projection::{Projection, RANGE};
-use crate::Error;
+use crate::error::Error;
 
 /// Classifies colours: marker are those with `w_b B + w_g G + w_r R > threshold`, Eq. (12).
 ///

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::Error;
+use crate::error::Error;
 
 /// The longest side of a frame (px), so that counts and sums over it are exact.
 pub const MAX_SIDE: usize = 1 << 16;

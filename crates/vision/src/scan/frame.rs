@@ -1,7 +1,7 @@
 //! Frames and windows of frames.
 
 use super::format::PixelFormat;
-use crate::Error;
+use crate::error::Error;
 
 /// A camera image, read by lines of memory.
 ///
