@@ -2,32 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any
 
 import msgspec
 
 from tautscope import _core
 from tautscope.config import Config, DofConfig
 from tautscope.dof import Dof
-
-T = TypeVar("T")
-
-
-def each_dof(of: Callable[[Dof], T]) -> tuple[T, T, T]:
-    """One thing per degree of freedom, in their order."""
-    return of(Dof.INSERTION), of(Dof.ROTATION), of(Dof.BENDING)
-
-
-def build_compensator(dof: DofConfig, compensate: bool = True) -> _core.Compensator:
-    """The compensator of one DOF, Eqs. (2)-(3); without compensation its gain is 1."""
-    return _core.Compensator(
-        free_gain=dof.free_gain if compensate else 1.0,
-        gain_limit=dof.gain_limit,
-        delta_minus=dof.delta_minus,
-        delta_plus=dof.delta_plus,
-        recovery=dof.recovery,
-    )
 
 
 def core_settings(config: Config, compensate: bool = True) -> dict[str, Any]:
@@ -87,10 +68,9 @@ def build_feature_model(config: Config) -> _core.FeatureModel:
 
 
 def build_state_estimator(config: Config) -> _core.StateEstimator:
-    """The state estimation with its rank watch, Eqs. (13)-(16)."""
-    return _core.StateEstimator(
-        observable_deviation=each_dof(lambda dof: config[dof].observable_deviation)
-    )
+    """The state estimation with its rank monitored, Eqs. (13)-(16)."""
+    insertion, rotation, bending = (config[dof].observable_deviation for dof in Dof)
+    return _core.StateEstimator(observable_deviation=(insertion, rotation, bending))
 
 
 def build_weighted_estimator(config: Config) -> _core.WeightedEstimator:
