@@ -14,57 +14,57 @@ use crate::settings::{ControlSettings, DofSettings};
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Deserialize))]
 pub struct AdaptiveSettings {
-    /// See [`LeadLaw::contact_gain`].
+    /// See `LeadLaw::contact_gain`.
     pub contact_gain: f64,
-    /// See [`AxisParameters::cautious_gain`].
+    /// See `AxisParameters::cautious_gain`.
     pub cautious_gain: f64,
-    /// See [`AxisParameters::cautious_deviation`].
+    /// See `AxisParameters::cautious_deviation`.
     pub cautious_deviation: f64,
-    /// See [`LeadLaw::taper`].
+    /// See `LeadLaw::taper`.
     pub taper: f64,
-    /// See [`LeadLaw::settling`].
+    /// See `LeadLaw::settling`.
     pub settling: f64,
-    /// See [`AxisParameters::tremor_time`].
+    /// See `AxisParameters::tremor_time`.
     pub tremor_time: f64,
-    /// See [`OffsetPrior::spacing`].
+    /// See `OffsetPrior::spacing`.
     pub node_spacing: f64,
-    /// See [`OffsetPrior::level`].
+    /// See `OffsetPrior::level`.
     pub level_deviation: f64,
-    /// See [`OffsetPrior::tilt`].
+    /// See `OffsetPrior::tilt`.
     pub gain_deviation: f64,
-    /// See [`OffsetPrior::local`].
+    /// See `OffsetPrior::local`.
     pub local_deviation: f64,
-    /// See [`OffsetPrior::correlation`].
+    /// See `OffsetPrior::correlation`.
     pub correlation: f64,
-    /// See [`OffsetPrior::level_drift`].
+    /// See `OffsetPrior::level_drift`.
     pub level_drift: f64,
-    /// See [`OffsetPrior::tilt_drift`].
+    /// See `OffsetPrior::tilt_drift`.
     pub gain_drift: f64,
-    /// See [`OffsetPrior::local_drift`].
+    /// See `OffsetPrior::local_drift`.
     pub local_drift: f64,
-    /// See [`OffsetPrior::symmetry`].
+    /// See `OffsetPrior::symmetry`.
     pub symmetry: f64,
-    /// See [`ChangeLimit::rate`].
+    /// See `ChangeLimit::rate`.
     pub change_rate: PerDof<f64>,
-    /// See [`ChangeLimit::spare`].
+    /// See `ChangeLimit::spare`.
     pub change_spare: f64,
-    /// See [`ChangeLimit::known`].
+    /// See `ChangeLimit::known`.
     pub known_travel: f64,
-    /// See [`ContactTest::distance`].
+    /// See `ContactTest::distance`.
     pub contact_distance: f64,
-    /// See [`ContactTest::moved`].
+    /// See `ContactTest::moved`.
     pub contact_moved: f64,
-    /// See [`ContactTest::tolerance`].
+    /// See `ContactTest::tolerance`.
     pub slope_tolerance: f64,
-    /// See [`AxisParameters::model_deviation`].
+    /// See `AxisParameters::model_deviation`.
     pub model_deviation: f64,
-    /// See [`AxisParameters::correction`].
+    /// See `AxisParameters::correction`.
     pub state_correction: f64,
     /// Whether insertion and rotation share the friction of the shaft.
     pub one_friction: bool,
-    /// See [`FrictionSettings::memory`]; in `update_distance` of insertion.
+    /// See `FrictionSettings::memory`; in `update_distance` of insertion.
     pub friction_memory: f64,
-    /// See [`FrictionSettings::deviation`].
+    /// See `FrictionSettings::deviation`.
     pub friction_deviation: f64,
 }
 

@@ -38,28 +38,29 @@ pub enum Rejection {
     },
 }
 
+/// Logs contain these words, and a replay compares them.
 impl fmt::Display for Rejection {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let percent = |share: &f64| 100.0 * share;
         match self {
             Self::NoRegion => f.write_str("no region"),
-            Self::NotPredicted => f.write_str("not visible at its predicted position"),
-            Self::Outside { share } => write!(f, "{:.0} % outside the image", 100.0 * share),
-            Self::Hidden { share } => {
-                write!(f, "only {:.0} % has the markers' colour", 100.0 * share)
+            Self::NotPredicted => f.write_str("cannot be seen where it is expected"),
+            Self::Outside { share } => write!(f, "{:.0} % outside the image", percent(share)),
+            Self::Hidden { share } => write!(f, "only {:.0} % has its colour", percent(share)),
+            Self::Spill { share } => {
+                write!(
+                    f,
+                    "its colour goes on around it over {:.0} %",
+                    percent(share)
+                )
             }
-            Self::Spill { share } => write!(
-                f,
-                "{:.0} % of a ring around it has the markers' colour",
-                100.0 * share
-            ),
             Self::MissingEdges { share } => {
-                write!(f, "only {:.0} % of its outline was found", 100.0 * share)
+                write!(f, "only {:.0} % of its outline is there", percent(share))
             }
-            Self::Ambiguous => f.write_str("it may be either band"),
-            Self::Elsewhere { distance } => write!(
-                f,
-                "{distance:.1} standard deviations from its predicted position"
-            ),
+            Self::Ambiguous => f.write_str("what could be it could be the other one"),
+            Self::Elsewhere { distance } => {
+                write!(f, "{distance:.1} deviations from where it is expected")
+            }
         }
     }
 }
