@@ -30,8 +30,8 @@ pub struct DofSettings {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Deserialize))]
 pub struct ControlSettings {
-    /// Control period [s].
+    /// Control period in s.
     pub period: f64,
-    /// How long control ticks are remembered [s].
+    /// How long control ticks are remembered, in s.
     pub history: f64,
 }

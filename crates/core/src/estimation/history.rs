@@ -22,7 +22,7 @@ pub struct Entry {
 }
 
 impl Entry {
-    /// A place in the storage of a [`History`].
+    /// An empty place in the storage of the history.
     pub const BLANK: Self = Self {
         time: 0.0,
         reference: [0.0; 3],

@@ -15,7 +15,7 @@ use crate::math::linear::{Matrix, Vector, add, rotate, sinc};
 /// for a point (X, Y, Z) in m in the camera frame (x right, y down, z forward); u, v in px.
 ///
 /// Wrong far outside the calibrated field, where the polynomial folds back into the image:
-/// [`Projection::is_folded`].
+/// `Projection::is_folded`.
 /// Source: `OpenCV`, `calib3d` module, "Camera Calibration and 3D Reconstruction".
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Camera {
