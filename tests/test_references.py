@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from tautscope.config import Config
 from tautscope.dof import Dof
-from tautscope.loop.references import Segment, SineSequence
+from tautscope.loop.references import OperatorMotion, Segment, SineSequence
 
 EXPERIMENT = Config().experiment
 REFERENCE = SineSequence(EXPERIMENT)
@@ -43,3 +43,59 @@ def test_before_and_after_it_rests_at_the_centres() -> None:
     centres = [EXPERIMENT[dof].centre for dof in Dof]
     for time in (-1.0, 0.0, REFERENCE.duration, REFERENCE.duration + 1):
         np.testing.assert_array_equal(REFERENCE(time), centres)
+
+
+SEEDS = pytest.mark.parametrize("seed", [0, 1, 2])
+TICKS = np.arange(0, 120, 0.005)
+
+
+def sampled(seed: int, *, is_disturbed: bool = False) -> np.ndarray:
+    motion = OperatorMotion(EXPERIMENT, seed, is_disturbed=is_disturbed)
+    return np.array([motion(time) for time in TICKS])
+
+
+@SEEDS
+def test_an_operator_stays_in_the_range_and_below_the_speed(seed: int) -> None:
+    positions = sampled(seed)
+    amplitudes = np.array([EXPERIMENT[dof].amplitude for dof in Dof])
+    centres = np.array([EXPERIMENT[dof].centre for dof in Dof])
+    assert np.all(np.abs(positions - centres) <= amplitudes * (1 + 1e-12))
+    speeds = np.abs(np.diff(positions, axis=0)).max(axis=0) / 0.005
+    assert np.all(speeds <= 1.2 * amplitudes * (1 + 1e-9))
+    assert np.all(speeds >= 0.8 * amplitudes), "some move is as quick as it may be"
+
+
+@SEEDS
+def test_an_operator_moves_all_dofs_at_once_and_rests(seed: int) -> None:
+    is_moving = np.diff(sampled(seed), axis=0) != 0
+    assert 0.5 < is_moving.mean() < 0.95
+    assert np.mean(is_moving.all(axis=1)) > 0.3
+    correlations = np.corrcoef(sampled(seed).T)
+    assert np.abs(correlations[np.triu_indices(3, 1)]).max() < 0.6
+
+
+@SEEDS
+def test_a_move_has_the_least_jerk(seed: int) -> None:
+    """Of the polynomial of fifth order alone, the sixth difference is zero within a move."""
+    position = sampled(seed)[:, 0] / EXPERIMENT.insertion.amplitude
+    sixth = np.diff(position[::20], n=6)
+    assert np.mean(np.abs(sixth) < 1e-9) > 0.3
+
+
+def test_a_seed_gives_the_same_motion_and_another_another() -> None:
+    np.testing.assert_array_equal(sampled(0), sampled(0))
+    assert np.any(sampled(0) != sampled(1))
+
+
+@SEEDS
+def test_disturbances_are_tremor_flicks_and_pauses(seed: int) -> None:
+    positions = sampled(seed, is_disturbed=True)
+    amplitudes = np.array([EXPERIMENT[dof].amplitude for dof in Dof])
+    speeds = np.abs(np.diff(positions, axis=0)).max(axis=0) / 0.005
+    tremor = 2 * np.pi * 8 * np.array([0.1e-3, 0.01, 0.01])
+    assert np.all(speeds <= 3 * amplitudes + tremor)
+    assert np.all(speeds >= 2 * amplitudes), "some flick"
+    spectrum = np.abs(np.fft.rfft(np.diff(positions[:, 1])))
+    frequencies = np.fft.rfftfreq(len(TICKS) - 1, 0.005)
+    high = frequencies > 4
+    assert frequencies[high][np.argmax(spectrum[high])] == pytest.approx(8, abs=0.02)

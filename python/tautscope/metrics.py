@@ -3,6 +3,7 @@
 from tautscope.report.metrics import (
     LoopWidth,
     actuator_gain,
+    creep,
     loop_width,
     marker_errors,
     marker_rms,
@@ -21,6 +22,7 @@ from tautscope.report.metrics import (
 __all__ = [
     "LoopWidth",
     "actuator_gain",
+    "creep",
     "loop_width",
     "marker_errors",
     "marker_rms",

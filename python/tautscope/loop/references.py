@@ -9,7 +9,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope.config import ExperimentConfig
+from tautscope.config import ExperimentConfig, Sine
 from tautscope.dof import Dof
 
 
@@ -95,4 +95,79 @@ class SineSequence:
             if segment.start <= time < segment.end:
                 phase = 2 * np.pi * (time - segment.start) / sine.period
                 position[segment.dof] += sine.amplitude * np.sin(phase)
+        return position
+
+
+MINIMUM_JERK_PEAK = 15 / 8
+"""Peak speed of a minimum-jerk move over its mean speed."""
+
+
+class OperatorMotion:
+    """Random moves of all DOFs at once, as an operator makes them; seeded.
+
+    Each DOF by itself: a minimum-jerk move (Flash and Hogan 1985) from a to a target b, drawn
+    uniformly from centre +- amplitude,
+
+        u = a + (b - a) (10 x^3 - 15 x^4 + 6 x^5),    x = elapsed / D
+
+    with D = max(U(1, 4) s, 15/8 |b - a| / speed limit) and a speed limit of 1.2 amplitudes per
+    second; then a rest of U(0, 1.5) s. With `is_disturbed` there is a tremor of 8 Hz, every fifth
+    move on average is a flick at 3 amplitudes per second, and every tenth rest a pause of 5 s.
+
+    Args:
+        experiment: Centre and amplitude per DOF.
+        seed: Of all that is random.
+        duration: [s].
+        is_disturbed: Whether tremor, flicks and pauses are added.
+    """
+
+    TREMOR = (0.1e-3, 0.01, 0.01)
+    """Amplitude [m, rad, rad]."""
+    TREMOR_FREQUENCY = 8.0
+    """[Hz]."""
+
+    def __init__(
+        self,
+        experiment: ExperimentConfig,
+        seed: int,
+        duration: float = 120.0,
+        *,
+        is_disturbed: bool = False,
+    ) -> None:
+        self.duration = duration
+        self.segments: tuple[Segment, ...] = ()
+        rng = np.random.default_rng(seed)
+        self._moves = [
+            self._draw_moves(experiment[dof], duration, rng, is_disturbed) for dof in Dof
+        ]
+        self._tremor = np.array(self.TREMOR) if is_disturbed else np.zeros(3)
+
+    @staticmethod
+    def _draw_moves(
+        sine: Sine, duration: float, rng: np.random.Generator, is_disturbed: bool
+    ) -> NDArray[np.float64]:
+        """Moves (n, 4): start [s], D [s], a, b."""
+        time, position, moves = 0.0, sine.centre, []
+        while time < duration:
+            least = rng.uniform(1.0, 4.0)
+            target = sine.centre + sine.amplitude * rng.uniform(-1, 1)
+            rest, speed = rng.uniform(0.0, 1.5), 1.2 * sine.amplitude
+            if is_disturbed and rng.uniform() < 0.2:
+                least, speed = 0.0, 3 * sine.amplitude
+            if is_disturbed and rng.uniform() < 0.1:
+                rest = 5.0
+            lasts = max(least, MINIMUM_JERK_PEAK * abs(target - position) / speed)
+            moves.append((time, lasts, position, target))
+            time, position = time + lasts + rest, target
+        return np.array(moves)
+
+    def __call__(self, time: float) -> NDArray[np.float64]:
+        """(3,) [m, rad, rad] at `time` [s from the start of the reference]."""
+        position = np.empty(3)
+        for dof, moves in enumerate(self._moves):
+            index = max(int(np.searchsorted(moves[:, 0], time, side="right")) - 1, 0)
+            start, lasts, a, b = moves[index]
+            x = min(max((time - start) / lasts, 0.0), 1.0)
+            position[dof] = a + (b - a) * x**3 * (10 - 15 * x + 6 * x**2)
+        position += self._tremor * np.sin(2 * np.pi * self.TREMOR_FREQUENCY * time)
         return position

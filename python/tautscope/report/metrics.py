@@ -159,6 +159,18 @@ def tracking_rms(reference: ArrayLike, tip: ArrayLike) -> float:
     return rms(np.subtract(*_pair("reference", reference, "tip", tip)))
 
 
+def creep(references: ArrayLike, tip: ArrayLike) -> float:
+    """Travel of the tip (n,) while every reference of (n, 3) rests, in the unit of the tip.
+
+    A sample counts if no reference changed since the one before it.
+    """
+    desired, actual = np.asarray(references, dtype=np.float64), np.asarray(tip, dtype=np.float64)
+    if desired.ndim != 2 or desired.shape[0] != actual.shape[0]:
+        raise SignalError("references", desired.shape, f"one row for each of {len(actual)} samples")
+    rests = np.all(np.diff(desired, axis=0) == 0, axis=1)
+    return float(np.nansum(np.abs(np.diff(actual))[rests]))
+
+
 def state_rms(estimate: ArrayLike, truth: ArrayLike) -> float:
     """RMS of (state_estimate - true_state at the capture time), one DOF, in its unit."""
     return rms(np.subtract(*_pair("estimate", estimate, "truth", truth)))
