@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from tautscope.config import DISTURBANCES
 
+OPERATORS = ("operator", "disturbed operator")
 LATENCIES = {"0 ms": 0.0, "200 ms": 0.2}
 SEVERAL = ("highlights", "debris", "smoke", "inset")
 CONDITIONS: dict[str, tuple[str, ...]] = {
@@ -31,6 +32,17 @@ class Goal:
 
 
 GOALS = {
+    **{
+        f"{name}: {what}": goal
+        for name in OPERATORS
+        for what, goal in {
+            "reduction of tracking error": Goal("share", None, "min"),
+            "tracking error": Goal("tip"),
+            "largest error": Goal("tip"),
+            "tip overspeed": Goal("ratio", 2.0),
+            "creep": Goal("tip"),
+        }.items()
+    },
     "reduction of mean width": Goal("share", 0.95, "min"),
     "reduction of max width": Goal("share", 0.90, "min"),
     "actuator gain": Goal("ratio", 5.0),

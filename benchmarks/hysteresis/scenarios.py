@@ -7,14 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from hysteresis import measures
-from hysteresis.goals import CONDITIONS, LATENCIES
+from hysteresis.goals import CONDITIONS, LATENCIES, OPERATORS
 from hysteresis.simulation import Simulation, Sines, uncompensated
 from hysteresis.store import Recordings
 from tautscope.config import Config
 from tautscope.dof import Dof
+from tautscope.loop.references import OperatorMotion
 from tautscope.report import metrics
 from tautscope.report.results import evaluate
-from tautscope.runs.recording import Recording, Table
+from tautscope.runs.recording import Recording, Table, per_dof
 
 Plan = dict[str, Simulation]
 Found = list[tuple[str, Dof, float]]
@@ -34,6 +35,10 @@ TREMOR = 1e-3
 """Amplitude of the tremor: 2 mm peak to peak [m]."""
 RESTS = (0.0, 1e-3, 2e-3)
 """How far beyond a reversal the reference stops [m]."""
+FIRST_OPERATOR = 40
+"""Seed of the operator's motion on the twin of seed 0."""
+ESTIMATED = 40.0
+"""When the figures of the operator's motion begin [s]."""
 REST_AFTER, REST_FOR = 20.0, 5.0
 """The reference stops after the reversal that follows the first time, for the second [s]."""
 
@@ -51,6 +56,39 @@ class Scenario:
     plan: Callable[[Config], Plan]
     measure: Callable[[Recordings], Found]
     profiles: tuple[str, ...] = ("paper", "best")
+
+
+def operator_plan(config: Config) -> Plan:
+    runs: Plan = {}
+    for name in OPERATORS:
+        seed = FIRST_OPERATOR + config.twin.seed
+        motion = OperatorMotion(config.experiment, seed, is_disturbed=name != "operator")
+        runs |= {f"{name}, free": uncompensated(config, motion), name: Simulation(config, motion)}
+    return runs
+
+
+def operator(recordings: Recordings) -> Found:
+    """Measure the motion of an operator, after its first 40 s."""
+    found: Found = []
+    for name in OPERATORS:
+        free, run = (
+            each.trace[each.trace["time"] >= ESTIMATED]
+            for each in (recordings[f"{name}, free"], recordings[name])
+        )
+        references = per_dof(run, "reference")
+        for dof in Dof:
+            tip, reference = run[f"true_{dof.label}"], references[:, dof]
+            before = metrics.tracking_rms(reference, free[f"true_{dof.label}"])
+            after = metrics.tracking_rms(reference, tip)
+            found += [
+                (f"{name}: reduction of tracking error", dof, 1 - after / before),
+                (f"{name}: tracking error", dof, after),
+                (f"{name}: largest error", dof, float(np.abs(tip - reference).max())),
+                (f"{name}: tip overspeed", dof, metrics.tip_overspeed(run["time"], reference, tip)),
+            ]
+            if name == "operator":
+                found.append((f"{name}: creep", dof, metrics.creep(references, tip)))
+    return found
 
 
 def alone_plan(config: Config) -> Plan:
@@ -239,6 +277,7 @@ def resting(recording: Recording) -> Table:
 
 
 SCENARIOS = {
+    "operator": Scenario(operator_plan, operator),
     "alone": Scenario(alone_plan, alone),
     "together": Scenario(together_plan, together),
     "changing": Scenario(changing_plan, changing),

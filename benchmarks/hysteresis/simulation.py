@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from tautscope.config import Config, ExperimentConfig
 from tautscope.dof import Dof
 from tautscope.loop.reduction import HysteresisReduction
-from tautscope.loop.references import Segment, SineSequence
+from tautscope.loop.references import OperatorMotion, Segment, SineSequence
 from tautscope.loop.rig import Sample
 from tautscope.runs.experiment import run_experiment
 from tautscope.runs.recording import Recording
@@ -60,6 +60,9 @@ class Sines:
         return position
 
 
+Motion = Sines | OperatorMotion
+
+
 @dataclass(frozen=True)
 class Simulation:
     """Complete description of a run.
@@ -73,13 +76,13 @@ class Simulation:
     """
 
     config: Config
-    motion: Sines | None = None
+    motion: Motion | None = None
     compensate: bool = True
     bends: tuple[tuple[float, float], ...] = ()
     images: bool = True
 
     @property
-    def reference(self) -> Sines | SineSequence:
+    def reference(self) -> Motion | SineSequence:
         """Reference of the run."""
         return self.motion or SineSequence(self.config.experiment)
 
@@ -103,7 +106,7 @@ class Simulation:
             rig.close()
 
 
-def uncompensated(config: Config, motion: Sines | None = None) -> Simulation:
+def uncompensated(config: Config, motion: Motion | None = None) -> Simulation:
     """Describe a run of the same instrument without compensation, shared by all configurations."""
     plain, twin = Config(), Config().twin
     twin = msgspec.structs.replace(

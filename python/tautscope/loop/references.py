@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from functools import cached_property
+from typing import ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,8 +101,13 @@ class SineSequence:
 
 MINIMUM_JERK_PEAK = 15 / 8
 """Peak speed of a minimum-jerk move over its mean speed."""
+TREMOR, TREMOR_FREQUENCY = (0.1e-3, 0.01, 0.01), 8.0
+"""Amplitude [m, rad, rad], and frequency [Hz]."""
+FLICKS, PAUSES = 0.2, 0.1
+"""Share of the moves that are flicks, and of the rests that are pauses."""
 
 
+@dataclass(frozen=True)
 class OperatorMotion:
     """Random moves of all DOFs at once, as an operator makes them; seeded.
 
@@ -111,51 +117,40 @@ class OperatorMotion:
         u = a + (b - a) (10 x^3 - 15 x^4 + 6 x^5),    x = elapsed / D
 
     with D = max(U(1, 4) s, 15/8 |b - a| / speed limit) and a speed limit of 1.2 amplitudes per
-    second; then a rest of U(0, 1.5) s. With `is_disturbed` there is a tremor of 8 Hz, every fifth
-    move on average is a flick at 3 amplitudes per second, and every tenth rest a pause of 5 s.
+    second; then a rest of U(0, 1.5) s. With `is_disturbed` there is a tremor of 8 Hz and 0.1 mm or
+    0.01 rad, every fifth move on average is a flick at 3 amplitudes per second, and every tenth
+    rest a pause of 5 s.
 
-    Args:
+    Attributes:
         experiment: Centre and amplitude per DOF.
         seed: Of all that is random.
         duration: [s].
         is_disturbed: Whether tremor, flicks and pauses are added.
     """
 
-    TREMOR = (0.1e-3, 0.01, 0.01)
-    """Amplitude [m, rad, rad]."""
-    TREMOR_FREQUENCY = 8.0
-    """[Hz]."""
+    experiment: ExperimentConfig
+    seed: int
+    duration: float = 120.0
+    is_disturbed: bool = False
+    segments: ClassVar[tuple[Segment, ...]] = ()
 
-    def __init__(
-        self,
-        experiment: ExperimentConfig,
-        seed: int,
-        duration: float = 120.0,
-        *,
-        is_disturbed: bool = False,
-    ) -> None:
-        self.duration = duration
-        self.segments: tuple[Segment, ...] = ()
-        rng = np.random.default_rng(seed)
-        self._moves = [
-            self._draw_moves(experiment[dof], duration, rng, is_disturbed) for dof in Dof
-        ]
-        self._tremor = np.array(self.TREMOR) if is_disturbed else np.zeros(3)
+    @cached_property
+    def _moves(self) -> list[NDArray[np.float64]]:
+        rng = np.random.default_rng(self.seed)
+        return [self._draw_moves(self.experiment[dof], rng) for dof in Dof]
 
-    @staticmethod
-    def _draw_moves(
-        sine: Sine, duration: float, rng: np.random.Generator, is_disturbed: bool
-    ) -> NDArray[np.float64]:
+    def _draw_moves(self, sine: Sine, rng: np.random.Generator) -> NDArray[np.float64]:
         """Moves (n, 4): start [s], D [s], a, b."""
         time, position, moves = 0.0, sine.centre, []
-        while time < duration:
+        while time < self.duration:
             least = rng.uniform(1.0, 4.0)
             target = sine.centre + sine.amplitude * rng.uniform(-1, 1)
             rest, speed = rng.uniform(0.0, 1.5), 1.2 * sine.amplitude
-            if is_disturbed and rng.uniform() < 0.2:
-                least, speed = 0.0, 3 * sine.amplitude
-            if is_disturbed and rng.uniform() < 0.1:
-                rest = 5.0
+            if self.is_disturbed:
+                if rng.uniform() < FLICKS:
+                    least, speed = 0.0, 3 * sine.amplitude
+                if rng.uniform() < PAUSES:
+                    rest = 5.0
             lasts = max(least, MINIMUM_JERK_PEAK * abs(target - position) / speed)
             moves.append((time, lasts, position, target))
             time, position = time + lasts + rest, target
@@ -169,5 +164,6 @@ class OperatorMotion:
             start, lasts, a, b = moves[index]
             x = min(max((time - start) / lasts, 0.0), 1.0)
             position[dof] = a + (b - a) * x**3 * (10 - 15 * x + 6 * x**2)
-        position += self._tremor * np.sin(2 * np.pi * self.TREMOR_FREQUENCY * time)
+        if self.is_disturbed:
+            position += np.array(TREMOR) * np.sin(2 * np.pi * TREMOR_FREQUENCY * time)
         return position
