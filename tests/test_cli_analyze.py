@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from play_model import play
 from refused import failed
-from tautscope.analysis.comparison.models.registry import MODELS
+from tautscope.analysis.models.registry import MODELS
 from tautscope.cli import main
 
 
