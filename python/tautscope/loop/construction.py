@@ -1,4 +1,4 @@
-"""Blocks of the core from a configuration."""
+"""Construction of the blocks of the core from a configuration."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from tautscope.dof import Dof
 T = TypeVar("T")
 
 
-def each_dof(of: Callable[[Dof], T]) -> tuple[T, T, T]:
-    """One thing per degree of freedom, in their order."""
-    return of(Dof.INSERTION), of(Dof.ROTATION), of(Dof.BENDING)
+def each_dof(function: Callable[[Dof], T]) -> tuple[T, T, T]:
+    """The results of a function for insertion, rotation and bending."""
+    return function(Dof.INSERTION), function(Dof.ROTATION), function(Dof.BENDING)
 
 
 def build_compensator(dof: DofConfig, compensate: bool = True) -> _core.Compensator:
@@ -87,7 +87,7 @@ def build_feature_model(config: Config) -> _core.FeatureModel:
 
 
 def build_state_estimator(config: Config) -> _core.StateEstimator:
-    """The state estimation with its rank watch, Eqs. (13)-(16)."""
+    """The state estimation with its rank check, Eqs. (13)-(16)."""
     return _core.StateEstimator(
         observable_deviation=each_dof(lambda dof: config[dof].observable_deviation)
     )
@@ -99,5 +99,5 @@ def build_weighted_estimator(config: Config) -> _core.WeightedEstimator:
 
 
 def build_loop(config: Config, compensate: bool = True) -> _core.Reduction:
-    """The whole loop, Fig. 6, without checks of what goes in: `HysteresisReduction` has those."""
+    """The whole loop, Fig. 6, without the input checks of `HysteresisReduction`."""
     return _core.Reduction(core_settings(config, compensate), config.profile)

@@ -33,7 +33,7 @@ impl Profile for Best {
 
     const UNCHECKED: Flags = Flags::NONE;
 
-    // Without an allocator the axes have nowhere else to be.
+    // Without an allocator the axes are on the stack.
     #[allow(clippy::large_stack_arrays)]
     fn new(settings: &Settings) -> Result<Self, ConfigError> {
         let diameter = settings.instrument.diameter;

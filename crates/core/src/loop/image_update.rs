@@ -1,4 +1,4 @@
-//! The image update of the loop: from features to estimates, through the monitors.
+//! The image update of the loop: checks of the monitors, state estimate, offset estimates.
 
 use crate::article::estimator::Triggers;
 use crate::article::state::{StateEstimate, found};
@@ -16,8 +16,8 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
     /// Image update: the features (4,) in px measured in a frame captured at `captured_at` in s, and their
     /// covariance (4, 4) in px^2; None is 1 px^2 for each, or `marker_deviation` of profile `best`.
     ///
-    /// Two NaN for a band say that it was not found; None, or features that are not finite otherwise, that neither
-    /// was. A `checksum` of the pixels identifies a frozen image; without it, equal features do.
+    /// Two NaN mark a band that was not found; None, or any other value that is not finite, means that no band was. A
+    /// `checksum` of the pixels identifies a frozen image; without it, equal features do.
     pub fn on_features(
         &mut self,
         measured: Option<[f64; 4]>,
@@ -133,7 +133,7 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
         }
     }
 
-    /// Take in a measurement that has passed the checks.
+    /// Updates the estimates from a measurement that has passed the checks.
     fn accept(
         &mut self,
         past: &Entry,
@@ -153,7 +153,7 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
             _ => Status::Held,
         };
         let is_used = measurement.used != [false; 2];
-        // Two markers of which one is an outlier: the other may be as wrong.
+        // Of two markers with an outlier, the other one may be wrong, too.
         let has_outlier = is_used && measurement.used != found(measured);
         let outlier = self
             .monitors
@@ -184,7 +184,7 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
         }
     }
 
-    /// Update the offsets of the observable DOFs; flags of what the update shows are raised.
+    /// Updates the offsets of the observable DOFs and raises flags for conspicuous changes.
     fn update_offsets(
         &mut self,
         past: &Entry,

@@ -1,14 +1,14 @@
-//! What one image says of the state.
+//! The state estimate from one image, as both profiles provide it.
 
 use crate::article::state::{StateEstimate, found};
 use crate::dof::{PerDof, all_finite};
 use crate::estimation::history::Entry;
 use crate::supervision::grip::Sighting;
 
-/// The state estimate from one image.
+/// A state estimate with the outputs for the offset estimation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measurement {
-    /// `q_hat`, innovation and what could be observed.
+    /// `q_hat`, innovation and which DOFs are observable.
     pub estimate: StateEstimate,
     /// Which markers were used.
     pub used: [bool; 2],

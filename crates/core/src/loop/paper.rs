@@ -71,8 +71,8 @@ impl Profile for Paper {
         false
     }
 
-    /// One linear step from the prediction, Eqs. (13)-(16). With one band it starts from where the last images had the
-    /// tip: what is held must be as right as is known.
+    /// One linear step from the prediction, Eqs. (13)-(16). With one band the step starts from the state prediction of the
+    /// last images, because the DOFs that are held keep its error.
     fn measure(
         &self,
         model: &FeatureModel,
@@ -122,7 +122,7 @@ pub fn state_estimator(settings: &Settings) -> Result<StateEstimator, ConfigErro
 /// Compensator and estimator of one DOF, each with its state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ArticleAxis {
-    /// As configured; `compensator` has the share of its free gain in use.
+    /// The compensator of the configuration; `compensator` uses a share of its free gain.
     configured: Compensator,
     compensator: Compensator,
     estimator: Estimator,
