@@ -96,19 +96,22 @@ impl WeightedEstimator {
         let states: Vec<[f64; 3]> = rows("predicted_states", &predicted_states)?;
         let measured: Vec<[f64; 4]> = rows("measured_features", &measured_features)?;
         same_length(py, "measured_features", measured.len(), states.len())?;
-        let deviation = fixed("std", &std)?;
+        let std = fixed("std", &std)?;
         let mut found = (Vec::new(), Vec::new(), Vec::new());
         for (state, measured) in states.into_iter().zip(measured) {
-            let prior = core::Belief { state, deviation };
+            let prior = core::Belief {
+                state,
+                deviation: std,
+            };
             let one = self
                 .0
                 .estimate(&model.0, &prior, measured, covariance.as_ref());
-            let unchanged = (state, deviation, [false; 3]);
-            let (state, deviation, observable) = one.map_or(unchanged, |one| {
+            let unchanged = (state, std, [false; 3]);
+            let (state, std, observable) = one.map_or(unchanged, |one| {
                 (one.estimate.state, one.deviation, one.estimate.observable)
             });
             found.0.push(state);
-            found.1.push(deviation);
+            found.1.push(std);
             found.2.push(observable);
         }
         Ok((

@@ -1,6 +1,6 @@
 //! Settings that several blocks share.
 
-/// One degree of freedom; the same names, units and meaning as in `python/tautscope/config/dof.py`.
+/// One degree of freedom. Names, units and meaning are those of `python/tautscope/config/dof.py`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Deserialize))]
 pub struct DofSettings {
@@ -26,7 +26,7 @@ pub struct DofSettings {
     pub delta_plus: f64,
 }
 
-/// The loop's clock; the same names, units and meaning as in `python/tautscope/config/control.py`.
+/// The loop's clock. Names, units and meaning are those of `python/tautscope/config/control.py`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Deserialize))]
 pub struct ControlSettings {

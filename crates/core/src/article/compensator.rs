@@ -135,12 +135,12 @@ impl Compensator {
     /// The command for the next reference.
     ///
     /// The first reference is passed through. A reference that has not changed, or is not
-    /// finite, gives the same command again, bit for bit.
+    /// finite, repeats the last command, bit for bit.
     pub fn step(&self, state: &mut CompensatorState, reference: f64) -> f64 {
         self.step_within(state, reference, |command| command)
     }
 
-    /// [`Compensator::step`] whose command `limit` may change before the state goes on from it.
+    /// [`Compensator::step`] whose command `limit` may change before the state is updated with it.
     ///
     /// `limit` is called exactly once, with the command of the law.
     pub(crate) fn step_within(
@@ -149,16 +149,16 @@ impl Compensator {
         reference: f64,
         limit: impl FnOnce(f64) -> f64,
     ) -> f64 {
-        let (lawful, is_anchored) = self
+        let (proposed, is_anchored) = self
             .propose(state, reference)
             .unwrap_or((state.command, true));
-        let command = limit(lawful);
+        let command = limit(proposed);
         state.command = command;
         if state.tip.output.is_nan() {
             state.tip.output = command - state.play.clamp(0.0);
         }
         state.play.step(&mut state.tip, command);
-        if !is_anchored || (command - lawful).abs() > 0.0 {
+        if !is_anchored || (command - proposed).abs() > 0.0 {
             self.hold(state);
         }
         command

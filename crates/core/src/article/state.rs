@@ -92,10 +92,10 @@ impl StateEstimator {
     ) -> StateEstimate {
         let innovation = subtract(measured_features, prediction.features);
         let found = found(measured_features);
-        let seen = |column: Column| only(found, column);
-        let [insertion, rotation, bending] = prediction.columns.map(seen);
+        let masked = |column: Column| mask(found, column);
+        let [insertion, rotation, bending] = prediction.columns.map(masked);
         let [insertion_unit, rotation_unit, bending_unit] = self.observable_deviation;
-        let step = seen(innovation);
+        let step = masked(innovation);
         let finite = all_finite(step)
             && all_finite(predicted_state)
             && prediction.columns.iter().all(|column| all_finite(*column));
@@ -134,7 +134,7 @@ pub fn found([ua, va, ub, vb]: [f64; 4]) -> [bool; 2] {
 }
 
 /// Replaces the entries of a band that was not found by zeros.
-fn only([a, b]: [bool; 2], [ua, va, ub, vb]: Column) -> Column {
+fn mask([a, b]: [bool; 2], [ua, va, ub, vb]: Column) -> Column {
     let part = |found: bool, u: f64, v: f64| if found { (u, v) } else { (0.0, 0.0) };
     let ((ua, va), (ub, vb)) = (part(a, ua, va), part(b, ub, vb));
     [ua, va, ub, vb]

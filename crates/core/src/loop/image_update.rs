@@ -5,7 +5,7 @@ use crate::article::state::{StateEstimate, found};
 use crate::dof::PerDof;
 use crate::estimation::history::Entry;
 use crate::r#loop::axis::Axis;
-use crate::r#loop::measurement::{Measurement, reversed, usable};
+use crate::r#loop::measurement::{Measurement, is_reversed, is_usable};
 use crate::r#loop::profile::Profile;
 use crate::r#loop::reduction::HysteresisReduction;
 use crate::r#loop::report::{Report, Status};
@@ -53,27 +53,27 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
             *raised = self
                 .monitors
                 .enabled(raised.union(Flags::of(Flag::Duplicate)));
-            return self.unused(Status::Duplicate, None);
+            return self.report_unused(Status::Duplicate, None);
         }
         let Some(past) = past else {
-            return self.unused(Status::Stale, None);
+            return self.report_unused(Status::Stale, None);
         };
         if !raised.is_empty() {
-            return self.unused(Status::Refused, Some(past));
+            return self.report_unused(Status::Refused, Some(past));
         }
-        let Some(measured) = measured.filter(|features| usable(*features)) else {
+        let Some(measured) = measured.filter(|features| is_usable(*features)) else {
             self.whereabouts.miss(&past);
             self.monitors.frames.miss(past.travel);
             *raised = self.monitors.enabled(Flags::of(Flag::Lost));
-            return self.unused(Status::NoMarkers, Some(past));
+            return self.report_unused(Status::NoMarkers, Some(past));
         };
         let Some(measurement) = self.measure(&past, measured, covariance) else {
-            return self.unused(Status::Held, Some(past));
+            return self.report_unused(Status::Held, Some(past));
         };
         *raised = self.check_innovation(&past, &measurement, measured, covariance);
         if !raised.is_empty() {
             self.whereabouts.miss(&past);
-            return self.unused(Status::Refused, Some(past));
+            return self.report_unused(Status::Refused, Some(past));
         }
         self.last_used = captured_at;
         self.accept(&past, &measurement, measured, raised)
@@ -102,26 +102,27 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
         measured: [f64; 4],
         covariance: Option<&[[f64; 4]; 4]>,
     ) -> Flags {
-        let belief = self.whereabouts.at(past);
+        let prior = self.whereabouts.at(past);
         let moved = self.whereabouts.moved(past);
         let offsets = self.offsets();
         let check = |measurement: &Measurement| {
             let sightings = measurement.sightings(past, offsets);
             let frames = &self.monitors.frames;
             frames
-                .check_innovation(&belief, moved, &sightings)
+                .check_innovation(&prior, moved, &sightings)
                 .difference(P::UNCHECKED)
         };
         let flags = check(measurement);
         let is_used = measurement.used != [false; 2];
-        let expected = self.feature_model.predict(belief.state);
-        let is_reversed = expected.is_some_and(|expected| reversed(expected.features, measured));
-        if !is_reversed && is_used && flags.is_empty() {
+        let expected = self.feature_model.predict(prior.state);
+        let is_exchanged =
+            expected.is_some_and(|expected| is_reversed(expected.features, measured));
+        if !is_exchanged && is_used && flags.is_empty() {
             return Flags::NONE;
         }
         let [ua, va, ub, vb] = measured;
         let exchanged = self.measure(past, [ub, vb, ua, va], covariance);
-        let is_swapped = is_reversed
+        let is_swapped = is_exchanged
             || exchanged.is_some_and(|other| other.used == [true; 2] && check(&other).is_empty());
         let swapped = self
             .monitors
@@ -141,11 +142,11 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
         measured: [f64; 4],
         raised: &mut Flags,
     ) -> Report {
-        let belief = self.whereabouts.at(past);
+        let prior = self.whereabouts.at(past);
         let sightings = measurement.sightings(past, self.offsets());
-        self.monitors.frames.accept(&belief, &sightings);
+        self.monitors.frames.accept(&prior, &sightings);
         self.profile
-            .settle(&mut self.whereabouts, past, measurement, measured);
+            .update_prediction(&mut self.whereabouts, past, measurement, measured);
         let estimate = measurement.estimate;
         let status = match (measurement.used, estimate.observable) {
             ([true, false] | [false, true], _) => Status::Partial,
@@ -233,7 +234,7 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
     }
 
     /// The report on a frame that updated nothing.
-    fn unused(&self, status: Status, past: Option<Entry>) -> Report {
+    fn report_unused(&self, status: Status, past: Option<Entry>) -> Report {
         let predicted_state = past.map_or([f64::NAN; 3], |past| past.predicted_state);
         let prediction = self.feature_model.predict(predicted_state);
         Report {

@@ -58,14 +58,14 @@ impl Measurement {
 
 /// Whether the vectors from band A to band B of two sets of features (4,) in px differ in direction by more than
 /// 120 degrees.
-pub fn reversed([ua, va, ub, vb]: [f64; 4], [xa, ya, xb, yb]: [f64; 4]) -> bool {
+pub fn is_reversed([ua, va, ub, vb]: [f64; 4], [xa, ya, xb, yb]: [f64; 4]) -> bool {
     let (u, v, x, y) = (ub - ua, vb - va, xb - xa, yb - ya);
     let lengths = libm::sqrt((u * u + v * v) * (x * x + y * y));
     u * x + v * y < -0.5 * lengths
 }
 
 /// Whether a band was found, and every band found is finite.
-pub fn usable([ua, va, ub, vb]: [f64; 4]) -> bool {
+pub fn is_usable([ua, va, ub, vb]: [f64; 4]) -> bool {
     let [a, b] = found([ua, va, ub, vb]);
     (a || b) && (!a || all_finite([ua, va])) && (!b || all_finite([ub, vb]))
 }

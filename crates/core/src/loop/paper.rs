@@ -11,7 +11,7 @@ use crate::estimation::history::Entry;
 use crate::estimation::whereabouts::{Whereabouts, WhereaboutsSettings};
 use crate::r#loop::axis::{Axis, OffsetUpdate};
 use crate::r#loop::measurement::Measurement;
-use crate::r#loop::profile::Profile;
+use crate::r#loop::profile::ProfileBlocks;
 use crate::r#loop::settings::Settings;
 use crate::model::features::FeatureModel;
 use crate::settings::DofSettings;
@@ -33,7 +33,7 @@ pub struct Paper {
     state_estimator: StateEstimator,
 }
 
-impl Profile for Paper {
+impl ProfileBlocks for Paper {
     type Axis = ArticleAxis;
 
     /// The estimate jumps where a DOF begins or ceases to be held.
@@ -100,7 +100,7 @@ impl Profile for Paper {
         })
     }
 
-    fn settle(
+    fn update_prediction(
         &self,
         whereabouts: &mut Whereabouts,
         past: &Entry,

@@ -10,8 +10,14 @@ use crate::r#loop::settings::Settings;
 use crate::model::features::FeatureModel;
 use crate::supervision::flags::Flags;
 
-/// A profile of the loop: compensation laws and offset estimates of the three DOFs, and the state estimation.
-pub trait Profile: Sized {
+/// A profile of the loop, `Paper` or `Best`.
+#[expect(private_bounds, reason = "only this crate implements profiles")]
+pub trait Profile: ProfileBlocks {}
+
+impl<P: ProfileBlocks> Profile for P {}
+
+/// Compensation laws and offset estimates of the three DOFs, and the state estimation.
+pub(crate) trait ProfileBlocks: Sized {
     /// One DOF.
     type Axis: Axis;
 
@@ -51,7 +57,7 @@ pub trait Profile: Sized {
     ) -> Option<Measurement>;
 
     /// Updates the state prediction with a measurement.
-    fn settle(
+    fn update_prediction(
         &self,
         whereabouts: &mut Whereabouts,
         past: &Entry,

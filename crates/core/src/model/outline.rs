@@ -70,12 +70,12 @@ impl FeatureModel {
             let projection = self.project(point)?;
             *corner = projection;
         }
-        enclosed(&outline)
+        moments(&outline)
     }
 }
 
 /// Area, centroid and second moments of the region in an outline; None if its area is 0 or not finite.
-fn enclosed(outline: &[[f64; 2]; OUTLINE]) -> Option<BandImage> {
+fn moments(outline: &[[f64; 2]; OUTLINE]) -> Option<BandImage> {
     let [first, ..] = *outline;
     let (mut area, mut sum, mut square) = (0.0, [0.0; 2], [0.0; 3]);
     let next = outline.iter().skip(1).chain([&first]);
