@@ -6,7 +6,7 @@ mod support;
 
 use arbitrary::Arbitrary;
 use libfuzzer_sys::fuzz_target;
-use support::looped::{Loop, adaptive, article, model};
+use support::loops::{Loop, adaptive, article, model};
 use support::{PERIOD, UNITS};
 use tautscope_core::{Flag, Play, Profile, Reaction};
 
@@ -47,7 +47,7 @@ fn run<P: Profile>(mut reduction: Loop<P>, actions: Vec<Action>) {
     let (mut now, mut reference) = (0.0, [0.025, 0.0, 0.9]);
     let mut last = reduction.step(reference, None, now);
     for action in actions {
-        let was_held = reduction.monitors().supervision().reaction >= Reaction::HoldMotion;
+        let was_held = reduction.supervision().reaction >= Reaction::HoldMotion;
         let mut command = last;
         match action {
             Action::Move(by) => {
@@ -76,17 +76,17 @@ fn run<P: Profile>(mut reduction: Loop<P>, actions: Vec<Action>) {
             }
             Action::Raise(number) => {
                 let flag = Flag::ALL[usize::from(number) % Flag::ALL.len()];
-                reduction.monitors_mut().raise(flag);
-                let supervision = reduction.monitors().supervision();
+                reduction.raise(flag);
+                let supervision = reduction.supervision();
                 assert!(supervision.flags.contains(flag));
             }
-            Action::Engage => reduction.monitors_mut().engage(),
-            Action::Acknowledge => reduction.monitors_mut().acknowledge(),
+            Action::Engage => reduction.engage(),
+            Action::Acknowledge => reduction.acknowledge(),
         }
         assert!(command.iter().all(|value| value.is_finite()));
         assert!(!was_held || command == last, "a held command rests");
         last = command;
-        let supervision = reduction.monitors().supervision();
+        let supervision = reduction.supervision();
         assert!((0.0..=1.0).contains(&supervision.lead));
         let is_calm = supervision.reaction == Reaction::None;
         assert_eq!(supervision.flags.is_empty(), is_calm);

@@ -27,7 +27,7 @@ __version__: str
 DETECTORS: tuple[str, ...]
 MEANINGS: tuple[str, ...]
 
-# The control law: crates/core.
+# Models, estimation, compensation, supervision: crates/core.
 
 _Floats = NDArray[np.float64]
 _Flags = NDArray[np.bool_]
@@ -128,9 +128,9 @@ class FeatureModel:
     def nearest_state(
         self,
         state: ArrayLike,
-        state_deviation: ArrayLike,
+        state_std: ArrayLike,
         features: ArrayLike,
-        deviation: ArrayLike,
+        std: ArrayLike,
     ) -> tuple[_Floats, float] | None: ...
 
 @final
@@ -153,16 +153,16 @@ class WeightedEstimator:
     def estimate(
         self,
         model: FeatureModel,
-        belief: ArrayLike,
-        deviation: ArrayLike,
+        predicted_state: ArrayLike,
+        std: ArrayLike,
         measured_features: ArrayLike,
         covariance: ArrayLike | None = None,
     ) -> tuple[_Floats, _Floats, _Flags, _Flags, _Floats, _Floats] | None: ...
     def run(
         self,
         model: FeatureModel,
-        beliefs: ArrayLike,
-        deviation: ArrayLike,
+        predicted_states: ArrayLike,
+        std: ArrayLike,
         measured_features: ArrayLike,
         covariance: ArrayLike | None = None,
     ) -> tuple[_Floats, _Floats, _Flags]: ...
@@ -174,8 +174,8 @@ class AdaptiveAxis:
     def run(self, references: ArrayLike) -> _Floats: ...
     @property
     def gain(self) -> tuple[float, float]: ...
-    def learn(
-        self, command: float, measured: float, deviation: float, since: ArrayLike
+    def update_offsets(
+        self, command: float, measured: float, std: float, commands_since: ArrayLike
     ) -> _Triggers: ...
     @property
     def command(self) -> float: ...
@@ -186,7 +186,7 @@ class AdaptiveAxis:
     @property
     def delta_plus(self) -> float: ...
     @property
-    def deviation(self) -> tuple[float, float]: ...
+    def std(self) -> tuple[float, float]: ...
 
 @final
 class Reduction:
@@ -218,7 +218,7 @@ class Reduction:
     def acknowledge(self) -> None: ...
     def raise_flag(self, name: str) -> None: ...
     def predicted_features(self, captured_at: float) -> _Floats | None: ...
-    def expectation(self, captured_at: float) -> tuple[_Floats, _Floats] | None: ...
+    def predict_state(self, captured_at: float) -> tuple[_Floats, _Floats] | None: ...
     @property
     def predicted_state(self) -> _Floats: ...
     @property

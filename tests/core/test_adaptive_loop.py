@@ -1,4 +1,4 @@
-"""Profile `best` with a stand-in instrument: three true plays, seen by an ideal camera."""
+"""Profile `best` on three simulated plays in the images of an ideal camera."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tautscope.report.metrics import loop_width
 
 Floats = NDArray[np.float64]
 CONFIG = load_config(profile="best").replace(**{"adaptive.one_friction": False})
-"""Plays that know nothing of each other."""
+"""For independent plays."""
 MINUS, PLUS = np.array([-4e-3, -1.0, -0.5]), np.array([6e-3, 0.8, 0.6])
 PERIODS = (9.0, 6.7, 8.1)
 TICKS = 6000
@@ -29,9 +29,9 @@ def run(
     seed: int = 0,
     one_friction: bool = False,
 ) -> tuple[Floats, Floats, Floats]:
-    """All DOFs at once behind plays; reference, command and tip (n, 3).
+    """Reference, command and tip (n, 3) of three plays that move simultaneously.
 
-    The loop starts from `start` times the true offsets.
+    The initial offsets of the loop are `start` times the true ones.
     """
     config = CONFIG.replace(**{"adaptive.one_friction": one_friction})
     for dof in Dof:
@@ -64,16 +64,18 @@ def run(
 @pytest.mark.parametrize("delay", [0, 16, 40])
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("one_friction", [False, True])
-def test_all_three_at_once_lose_their_slack(delay: int, seed: int, one_friction: bool) -> None:
-    """Also where a friction that they do not share is expected."""
+def test_the_slack_of_three_simultaneous_dofs_is_compensated(
+    delay: int, seed: int, one_friction: bool
+) -> None:
+    """Also with `one_friction`, which these independent plays do not have."""
     reference, _, tip = run(delay=delay, seed=seed, one_friction=one_friction)
     for dof in Dof:
         last = slice(TICKS - round(2 * PERIODS[dof] / CONFIG.control.period), TICKS)
-        left = loop_width(reference[last, dof], tip[last, dof]).mean
-        assert abs(left) < 0.1 * (PLUS - MINUS)[dof], f"{dof.label}, seed {seed}: {left}"
+        width = loop_width(reference[last, dof], tip[last, dof]).mean
+        assert abs(width) < 0.1 * (PLUS - MINUS)[dof], f"{dof.label}, seed {seed}: {width}"
 
 
-def test_start_values_half_too_wide_overshoot_little() -> None:
+def test_a_start_width_50_percent_too_large_overshoots_by_less_than_1_mm() -> None:
     reference, _, tip = run(start=1.5)
     beyond = np.sign(np.gradient(reference, axis=0)) * (tip - reference)
     assert beyond[:, Dof.INSERTION].max() < 1e-3
@@ -88,9 +90,9 @@ def test_tremor_is_not_amplified() -> None:
     loop = HysteresisReduction(CONFIG.replace(**{"insertion.delta_minus": -5e-3}))
     rest = np.array([CONFIG.experiment[dof].centre for dof in Dof])
     times = np.arange(0, 5, CONFIG.control.period)
-    shake = 1e-3 * np.sin(2 * np.pi * 10 * times)
-    moved = [loop.step(rest + np.array([value, 0, 0]))[Dof.INSERTION] for value in shake]
-    assert np.ptp(moved[200:]) < 4e-3
+    tremor = 1e-3 * np.sin(2 * np.pi * 10 * times)
+    commands = [loop.step(rest + np.array([value, 0, 0]))[Dof.INSERTION] for value in tremor]
+    assert np.ptp(commands[200:]) < 4e-3
 
 
 @pytest.mark.parametrize(
@@ -102,6 +104,6 @@ def test_tremor_is_not_amplified() -> None:
         ("profile", "better"),
     ],
 )
-def test_what_cannot_be_is_refused(field: str, value: object) -> None:
+def test_invalid_settings_are_rejected(field: str, value: object) -> None:
     with pytest.raises(ConfigError, match=field):
         CONFIG.replace(**{field: value})

@@ -1,4 +1,4 @@
-"""Decision 0002: the centroid of a band's visible surface, against brute-force integration."""
+"""The centroid of a band's visible surface (decision 0002) against numerical integration."""
 
 from __future__ import annotations
 
@@ -20,11 +20,13 @@ def guide_to_camera(config: Config) -> tuple[Floats, Floats]:
 
 
 def tip_axis(state: Floats) -> Floats:
-    _, turn, bend = state
-    return np.array([np.sin(bend) * np.cos(turn), np.sin(bend) * np.sin(turn), np.cos(bend)])
+    _, rotation, bend = state
+    return np.array(
+        [np.sin(bend) * np.cos(rotation), np.sin(bend) * np.sin(rotation), np.cos(bend)]
+    )
 
 
-def seen_centroid(config: Config, centre: Floats, axis: Floats) -> Floats:
+def visible_centroid(config: Config, centre: Floats, axis: Floats) -> Floats:
     """Mean pixel of the visible half of a cylinder, by quadrature over length and azimuth."""
     camera, instrument = build_camera(config), config.instrument
     radius = instrument.diameter / 2
@@ -38,13 +40,13 @@ def seen_centroid(config: Config, centre: Floats, axis: Floats) -> Floats:
     points = (centre + along[..., None] * axis + radius * normals).reshape(-1, 3)
     facing = -np.einsum("ij,ij->i", points, normals.reshape(-1, 3))
     # Area in the image per area of surface: foreshortening, distance, lens.
-    stretch = np.array([np.linalg.det(camera.jacobian(p)[:, :2]) for p in points])
-    weights = np.outer(WEIGHTS, WEIGHTS).ravel() * facing / points[:, 2] * stretch
+    magnification = np.array([np.linalg.det(camera.jacobian(p)[:, :2]) for p in points])
+    weights = np.outer(WEIGHTS, WEIGHTS).ravel() * facing / points[:, 2] * magnification
     return weights @ camera.project(points) / weights.sum()
 
 
 def sweep() -> Floats:
-    """The postures of the experiment: one DOF moves, the others are held."""
+    """States of the experiment: one DOF moves, the others are constant."""
     experiment = Config().experiment
     sines = [experiment.insertion, experiment.rotation, experiment.bending]
     rest = np.array([sine.centre for sine in sines])
@@ -58,7 +60,7 @@ def sweep() -> Floats:
 
 
 def errors(config: Config, model_config: Config) -> Floats:
-    """Distance of predicted and integrated centroid [px], per posture and band."""
+    """Distance between predicted and integrated centroid [px], per state and band."""
     rotation, translation = guide_to_camera(config)
     model, instrument = build_feature_model(model_config), build_instrument(config)
     distances = []
@@ -68,30 +70,30 @@ def errors(config: Config, model_config: Config) -> Floats:
         centres = instrument.markers(state) @ rotation.T + translation
         axis = rotation @ tip_axis(state)
         for found, centre in zip(prediction[0].reshape(2, 2), centres, strict=True):
-            distances.append(np.linalg.norm(found - seen_centroid(config, centre, axis)))
+            distances.append(np.linalg.norm(found - visible_centroid(config, centre, axis)))
     return np.array(distances)
 
 
-def test_without_distortion_the_model_is_the_integral() -> None:
+def test_without_distortion_the_model_equals_the_integral() -> None:
     config = Config().replace(**{"camera.distortion": [0.0] * 8})
     assert errors(config, config).max() < 0.05
 
 
-def test_with_distortion_what_is_left_is_below_the_markers_noise() -> None:
+def test_with_distortion_the_error_is_below_the_marker_noise() -> None:
     config = Config()
     found = errors(config, config)
     assert np.sqrt((found**2).mean()) < 0.15
     assert found.max() < 0.4
 
 
-def test_the_bands_centre_is_not_what_is_seen() -> None:
-    """What decision 0002 is about: the article's h misses by several px."""
+def test_the_image_of_the_bands_centre_is_not_the_centroid() -> None:
+    """The reason for decision 0002: the error of the article's h is several px."""
     config = Config()
     points = config.replace(**{"instrument.diameter": 1e-9, "instrument.band_length": 1e-9})
     assert np.median(errors(config, points)) > 5.0
 
 
-def test_without_thickness_it_is_the_articles_model() -> None:
+def test_without_thickness_the_model_is_the_articles() -> None:
     config = Config().replace(**{"instrument.diameter": 1e-12, "instrument.band_length": 1e-12})
     rotation, translation = guide_to_camera(config)
     model, instrument, camera = (
@@ -115,12 +117,12 @@ def test_without_thickness_it_is_the_articles_model() -> None:
                 "camera.camera_from_guide.translation": [1e-4, 0.0, 0.01],
                 "camera.camera_from_guide.rotation": [0.0, 0.0, 0.0],
             },
-            "looked at along its axis",
+            "seen along its axis",
         ),
         ({"camera.distortion": [-300.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]}, "folded over"),
     ],
 )
-def test_a_band_that_cannot_be_seen_has_no_features(changes: dict[str, object], why: str) -> None:
+def test_an_invisible_band_has_no_features(changes: dict[str, object], why: str) -> None:
     model = build_feature_model(Config().replace(**changes))
     assert model.predict([0.025, 0.0, 0.0]) is None, why
     assert build_feature_model(Config()).predict([np.nan, 0.0, 0.0]) is None

@@ -1,4 +1,4 @@
-"""The image of a band: area, centroid and moments of its outline against OpenCV and the twin."""
+"""Outline of a band: area, centroid and moments against OpenCV; nearest state of features."""
 
 import cv2
 import numpy as np
@@ -14,39 +14,41 @@ def states(count: int, seed: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_moments_are_opencvs_of_the_outline(seed: int) -> None:
+def test_moments_equal_opencvs_of_the_outline(seed: int) -> None:
     for state in states(20, seed):
         for area, centroid, moments, outline in MODEL.bands(state) or ():
             expected = cv2.moments((outline - outline[0]).astype(np.float32))
             assert area == pytest.approx(abs(expected["m00"]), rel=1e-4)
-            place = np.array([expected["m10"], expected["m01"]]) / expected["m00"] + outline[0]
-            np.testing.assert_allclose(centroid, place, atol=0.01)
-            spread = np.array([expected[name] for name in ("mu20", "mu11", "mu11", "mu02")])
-            spread = spread.reshape(2, 2) / expected["m00"]
-            np.testing.assert_allclose(moments, spread, atol=2e-3 * np.trace(spread))
+            expected_centroid = (
+                np.array([expected["m10"], expected["m01"]]) / expected["m00"] + outline[0]
+            )
+            np.testing.assert_allclose(centroid, expected_centroid, atol=0.01)
+            covariance = np.array([expected[name] for name in ("mu20", "mu11", "mu11", "mu02")])
+            covariance = covariance.reshape(2, 2) / expected["m00"]
+            np.testing.assert_allclose(moments, covariance, atol=2e-3 * np.trace(covariance))
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_its_centroid_is_the_predicted_feature_but_for_the_lens(seed: int) -> None:
+def test_the_centroid_is_the_predicted_feature_up_to_distortion(seed: int) -> None:
     for state in states(50, seed):
         bands, prediction = MODEL.bands(state), MODEL.predict(state)
         assert (bands is None) == (prediction is None)
         if bands is None or prediction is None:
-            continue  # looked at along the axis
+            continue  # seen along the axis
         centroids = np.concatenate([band[1] for band in bands])
         np.testing.assert_allclose(centroids, prediction[0], atol=0.6, err_msg=str(state))
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_the_state_is_found_back_from_its_features(seed: int) -> None:
+def test_the_nearest_state_reproduces_the_features(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    deviation = np.array([5e-3, 0.3, 0.3])
+    std = np.array([5e-3, 0.3, 0.3])
     for state in states(50, seed):
         prediction = MODEL.predict(state)
         if prediction is None:
-            continue  # looked at along the axis
-        start = state + rng.normal(0, 0.5, 3) * deviation
-        found = MODEL.nearest_state(start, 100 * deviation, prediction[0], np.full(4, 0.1))
+            continue  # seen along the axis
+        start = state + rng.normal(0, 0.5, 3) * std
+        found = MODEL.nearest_state(start, 100 * std, prediction[0], np.full(4, 0.1))
         if found is None:
             assert MODEL.predict(start) is None
             continue
@@ -55,7 +57,7 @@ def test_the_state_is_found_back_from_its_features(seed: int) -> None:
         np.testing.assert_allclose(seen[0], prediction[0], atol=0.3, err_msg=str(state))
 
 
-def test_what_is_not_measured_stays_as_believed() -> None:
+def test_without_measurements_the_nearest_state_is_the_prior() -> None:
     state = np.array([0.025, 0.3, 0.8])
     nothing = np.full(4, np.nan)
     found = MODEL.nearest_state(state, [1e-3, 0.1, 0.1], nothing, np.full(4, 1.0))

@@ -1,4 +1,4 @@
-"""Eq. (8) against OpenCV, poses against its Rodrigues."""
+"""Projection, Eq. (8), and poses against OpenCV."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def camera(distortion: np.ndarray) -> _core.Camera:
 
 @pytest.mark.parametrize("rational", [False, True])
 @pytest.mark.parametrize("seed", range(5))
-def test_projection_is_opencvs(seed: int, rational: bool) -> None:
+def test_projection_equals_opencv(seed: int, rational: bool) -> None:
     rng = np.random.default_rng(seed)
     distortion = rng.uniform(-1.0, 1.0, 8) * [0.3, 0.1, 0.01, 0.01, 0.05, 0.2, 0.05, 0.02]
     if not rational:
@@ -28,15 +28,15 @@ def test_projection_is_opencvs(seed: int, rational: bool) -> None:
     np.testing.assert_allclose(found, expected[:, 0], atol=1e-9, err_msg=f"seed {seed}")
 
 
-def test_what_is_not_in_front_of_the_camera_is_not_seen() -> None:
+def test_points_not_in_front_of_the_camera_have_no_image() -> None:
     points = [[0.0, 0.0, 0.0], [0.0, 0.0, -0.05], [np.nan, 0.0, 0.05], [0.0, 0.0, np.nan]]
     assert np.isnan(camera(np.zeros(8)).project(points)).all()
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_poses_are_opencvs_rodrigues(seed: int) -> None:
+def test_poses_equal_opencvs_rodrigues(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    # Without thickness a band is a point.
+    # With radius and length 0 a band is a point.
     instrument = _core.Instrument(
         bending_length=0.01, marker_a=0.0, marker_b=0.01, radius=0.0, band_length=0.0
     )
@@ -49,6 +49,6 @@ def test_poses_are_opencvs_rodrigues(seed: int) -> None:
         state = rng.uniform([0.02, -3.0, 0.2], [0.03, 3.0, 0.8])
         prediction = model.predict(state)
         assert prediction is not None
-        turn = cv2.Rodrigues(rotation)[0]
-        expected = flat.project(translation + instrument.markers(state) @ turn.T)
+        matrix = cv2.Rodrigues(rotation)[0]
+        expected = flat.project(translation + instrument.markers(state) @ matrix.T)
         np.testing.assert_allclose(prediction[0], expected.ravel(), atol=1e-9)

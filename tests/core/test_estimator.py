@@ -1,4 +1,4 @@
-"""The estimator as a lab uses it: on a record, causally."""
+"""The estimator on a record: causal prediction, offsets, triggers."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ def record(seed: int) -> tuple[np.ndarray, np.ndarray]:
     return command, play.run(command) + rng.normal(0.0, 1e-5, command.size)
 
 
-def fresh() -> _core.Estimator:
+def new_estimator() -> _core.Estimator:
     return build_estimator(Config().insertion)
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_run_is_predict_then_update(seed: int) -> None:
+def test_run_equals_predict_then_update(seed: int) -> None:
     command, measured = record(seed)
-    predicted, minus, plus = fresh().run(command, measured)
-    estimator = fresh()
+    predicted, minus, plus = new_estimator().run(command, measured)
+    estimator = new_estimator()
     for k, (c, m) in enumerate(zip(command, measured, strict=True)):
         assert predicted[k] == estimator.predict(c)
         estimator.update(c, m)
@@ -34,26 +34,29 @@ def test_run_is_predict_then_update(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_a_prediction_uses_the_past_only(seed: int) -> None:
     command, measured = record(seed)
-    spoilt = measured.copy()
-    spoilt[2000:] += 1.0
-    before, after = fresh().run(command, measured)[0], fresh().run(command, spoilt)[0]
+    changed = measured.copy()
+    changed[2000:] += 1.0
+    before, after = (
+        new_estimator().run(command, measured)[0],
+        new_estimator().run(command, changed)[0],
+    )
     np.testing.assert_array_equal(before[:2001], after[:2001], err_msg=f"seed {seed}")
     assert not np.allclose(before[2001:], after[2001:])
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_it_predicts_the_tip_better_than_the_command_does(seed: int) -> None:
+def test_the_prediction_is_better_than_the_command(seed: int) -> None:
     command, measured = record(seed)
-    predicted, minus, plus = fresh().run(command, measured)
-    late = slice(2000, None)
-    error = np.abs(predicted - measured)[late].mean()
-    assert error < 0.1 * np.abs(command - measured)[late].mean(), f"seed {seed}"
+    predicted, minus, plus = new_estimator().run(command, measured)
+    last = slice(2000, None)
+    error = np.abs(predicted - measured)[last].mean()
+    assert error < 0.1 * np.abs(command - measured)[last].mean(), f"seed {seed}"
     assert minus[-1] == pytest.approx(-3e-3, abs=2e-4), f"seed {seed}"
     assert plus[-1] == pytest.approx(5e-3, abs=2e-4), f"seed {seed}"
 
 
 def test_triggers_are_named() -> None:
-    estimator = fresh()
+    estimator = new_estimator()
     assert estimator.update(0.0, 0.0) == (None, None)
     assert estimator.update(0.01, 0.0) == (None, "violation")
     assert estimator.update(0.02, 0.01) == (None, "contact")

@@ -1,4 +1,4 @@
-"""f, g and h: each analytic Jacobian against finite differences, across every special place."""
+"""Analytic Jacobians of f, g and h against finite differences, also near singular states."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from tautscope.loop.construction import build_camera, build_feature_model, build
 
 Floats = NDArray[np.float64]
 
-# Zero, its neighbourhood, and both sides of where the series hands over (1, and 2 for the half).
+# Zero, its neighbourhood, and both sides of the limits of the series (1, and 2 for half the bend).
 BENDS = [0.0, 1e-12, -1e-7, 1e-3, -0.3, 0.999999, 1.000001, -1.0, 1.999999, 2.000001, 2.8]
 
 
 def differences(function: Callable[[Floats], Floats], at: Floats, step: float) -> Floats:
-    """Central, extrapolated once: fourth order."""
+    """Central differences, extrapolated once: fourth order."""
 
     def central(size: float) -> Floats:
         return np.column_stack(
@@ -68,7 +68,7 @@ def test_features(bend: float, thickness: float) -> None:
 
 
 def test_bend_zero_is_smooth() -> None:
-    """Neither value nor slope jumps, down to the last digits a double holds."""
+    """The Jacobian is continuous to the precision of a double."""
     instrument = build_instrument(Config())
     bends = np.concatenate([-np.logspace(-1, -16, 200), [0.0], np.logspace(-16, -1, 200)])
     slopes = np.array([instrument.jacobian([0.02, 0.0, bend])[:, 2] for bend in bends])

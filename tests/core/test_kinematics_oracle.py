@@ -1,7 +1,7 @@
-"""Eq. (7) against MuJoCo: a chain of many short links whose hinges share the bend.
+"""Kinematics, Eq. (7), against MuJoCo: a chain of many short links whose hinges share the bend.
 
-A chain of equal links with equal hinge angles tends to the arc of constant curvature with the
-square of the link length; extrapolated from two chains it agrees far below any tolerance.
+The error of a chain of equal links with equal hinge angles is of second order in the link length;
+the test extrapolates it from two chains.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ BENDING_LENGTH, MARKER_A, MARKER_B = 18.5e-3, 5e-3, 15e-3
 
 @cache
 def chain(links: int) -> mujoco.MjModel:
-    """Slide, turn, then `links` links; a hinge before, between and after them; then the tip."""
+    """A slide, a rotation, `links` links with a hinge before, between and after them, the tip."""
     inertia = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
     step = BENDING_LENGTH / links
     xml = f'<body>{inertia}<joint type="slide" axis="0 0 1"/><joint axis="0 0 1"/>'
     for link in range(links + 1):
-        place = 0.0 if link == 0 else step
-        xml += f'<body pos="0 0 {place!r}">{inertia}<joint axis="0 1 0"/>'
+        offset = 0.0 if link == 0 else step
+        xml += f'<body pos="0 0 {offset!r}">{inertia}<joint axis="0 1 0"/>'
     xml += f'<site name="a" pos="0 0 {MARKER_A}"/><site name="b" pos="0 0 {MARKER_B}"/>'
     xml += "</body>" * (links + 2)
     return mujoco.MjModel.from_xml_string(
@@ -37,7 +37,7 @@ def rigid_body_markers(state: NDArray[np.float64], links: int) -> NDArray[np.flo
     model = chain(links)
     data = mujoco.MjData(model)
     bend = np.full(links + 1, state[2] / links)
-    # The chain is tangent to the arc at both ends: half a step there.
+    # The first and last hinge have half the angle: the chain is tangent to the arc at both ends.
     bend[[0, -1]] /= 2
     data.qpos[:] = [state[0], state[1], *bend]
     mujoco.mj_kinematics(model, data)
@@ -45,7 +45,7 @@ def rigid_body_markers(state: NDArray[np.float64], links: int) -> NDArray[np.flo
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_markers_are_where_rigid_bodies_put_them(seed: int) -> None:
+def test_markers_equal_those_of_a_rigid_body_chain(seed: int) -> None:
     rng = np.random.default_rng(seed)
     instrument = _core.Instrument(
         bending_length=BENDING_LENGTH,

@@ -1,4 +1,4 @@
-"""HysteresisReduction with a stand-in instrument: three true plays, seen by an ideal camera."""
+"""HysteresisReduction on three simulated plays in the images of an ideal camera."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-from resting import CONFIG, REST, Floats, started
+from loop_at_rest import CONFIG, REST, Floats, loop_at_rest
 from tautscope import _core
 from tautscope.errors import ConfigError, SignalError
 from tautscope.loop.construction import build_feature_model
@@ -18,7 +18,7 @@ PERIOD = CONFIG.control.period
 
 
 class Plays:
-    """The instrument as three plays with a fixed delay of the images; no part of the package."""
+    """An instrument of three plays with a fixed delay of the images; independent of the package."""
 
     def __init__(self, delay: int, noise: float = 0.0, seed: int = 0) -> None:
         self.tip = REST.copy()
@@ -26,12 +26,12 @@ class Plays:
         self.rng = np.random.default_rng(seed)
         self.past: list[Floats] = []
 
-    def move(self, command: Floats) -> None:
+    def step(self, command: Floats) -> None:
         self.tip = np.clip(self.tip, command - WIDTHS / 2, command + WIDTHS / 2)
         self.past.append(self.tip)
 
-    def seen(self) -> tuple[int, Floats] | None:
-        """The tick of the newest image that arrived, and the features in it."""
+    def newest_image(self) -> tuple[int, Floats] | None:
+        """Tick of capture and features of the image that arrives now."""
         tick = len(self.past) - 1 - self.delay
         if tick < 0 or tick % 8:
             return None
@@ -41,7 +41,7 @@ class Plays:
 
 
 def run(compensate: bool, delay: int, noise: float = 0.0, seed: int = 0) -> dict[str, Floats]:
-    """Five periods per DOF in succession; reference, command and tip."""
+    """Reference, command and tip over five periods per DOF in succession."""
     loop, plays = HysteresisReduction(CONFIG, compensate), Plays(delay, noise, seed)
     traces: dict[str, list[Floats]] = {"reference": [], "command": [], "tip": []}
     ticks = 1000
@@ -50,8 +50,8 @@ def run(compensate: bool, delay: int, noise: float = 0.0, seed: int = 0) -> dict
             reference = REST.copy()
             reference[dof] += AMPLITUDES[dof] * np.sin(2 * np.pi * tick / ticks)
             command = loop.step(reference)
-            plays.move(command)
-            image = plays.seen()
+            plays.step(command)
+            image = plays.newest_image()
             if image is not None:
                 loop.on_features(image[1], image[0] * PERIOD)
             for name, value in zip(traces, (reference, command, plays.tip), strict=True):
@@ -60,7 +60,7 @@ def run(compensate: bool, delay: int, noise: float = 0.0, seed: int = 0) -> dict
 
 
 def width(traces: dict[str, Floats], dof: int, against: str) -> float:
-    """Width of the last loop of a DOF at the middle of its output."""
+    """Width of the last hysteresis loop of a DOF at the middle of its output."""
     last = slice(dof * 5000 + 4000, dof * 5000 + 5000)
     x, y = traces[against][last, dof], traces["tip"][last, dof]
     middle = (y.max() + y.min()) / 2
@@ -70,16 +70,16 @@ def width(traces: dict[str, Floats], dof: int, against: str) -> float:
 
 
 @pytest.mark.parametrize("delay", [0, 16])
-def test_the_loop_takes_the_slack_out(delay: int) -> None:
-    compensated, plain = run(True, delay), run(False, delay)
+def test_the_loop_compensates_the_slack(delay: int) -> None:
+    compensated, uncompensated = run(True, delay), run(False, delay)
     for dof in range(3):
-        before, after = width(plain, dof, "command"), width(compensated, dof, "reference")
+        before, after = width(uncompensated, dof, "command"), width(compensated, dof, "reference")
         assert before == pytest.approx(WIDTHS[dof], rel=0.05), f"DOF {dof}"
         assert 1 - after / before > 0.7, f"DOF {dof}: {before} to {after}"
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_it_stands_noise(seed: int) -> None:
+def test_the_loop_compensates_the_slack_with_noise(seed: int) -> None:
     traces = run(True, 16, noise=0.3, seed=seed)
     for dof in range(3):
         assert width(traces, dof, "reference") < 0.35 * WIDTHS[dof], f"seed {seed}, DOF {dof}"
@@ -90,8 +90,8 @@ def test_without_compensation_the_command_is_the_reference() -> None:
     np.testing.assert_allclose(traces["command"], traces["reference"], atol=1e-12)
 
 
-def test_report_shows_its_working() -> None:
-    loop = started()
+def test_the_report_contains_intermediate_results() -> None:
+    loop = loop_at_rest()
     predicted = loop.predicted_features(0.2)
     assert predicted is not None
     report = loop.on_features(predicted + np.array([1.0, 0.0, -1.0, 0.5]), 0.2)
@@ -113,15 +113,17 @@ def test_report_shows_its_working() -> None:
     assert len(shapes) == 9 and len(report.triggers) == 3
 
 
-def test_frames_that_teach_nothing_say_why() -> None:
-    loop = started()
+def test_unused_frames_report_the_reason() -> None:
+    loop = loop_at_rest()
     seen = loop.predicted_features(0.3)
     assert seen is not None
     assert loop.on_features(seen, 0.3).status is Status.OK
     assert loop.on_features(seen, 0.3).status is Status.DUPLICATE
     assert loop.on_features(seen, 0.1).status is Status.DUPLICATE
     assert loop.on_features(None, 0.4).status is Status.NO_MARKERS
-    assert loop.on_features(seen, 0.4).status is Status.OK, "a lost marker uses no frame up"
+    assert loop.on_features(seen, 0.4).status is Status.OK, (
+        "a frame without markers does not count as used"
+    )
     assert loop.on_features(seen, 9.0).status is Status.STALE
     assert loop.predicted_features(9.0) is None
     lost = loop.on_features(None, 0.45)
@@ -131,14 +133,14 @@ def test_frames_that_teach_nothing_say_why() -> None:
 
 
 def test_after_the_clock_jumps_back_frames_are_used_again() -> None:
-    loop = started()
+    loop = loop_at_rest()
     seen = loop.predicted_features(0.4)
     assert loop.on_features(seen, 0.4).status is Status.OK
     loop.step(REST, time=0.1)
     assert loop.on_features(seen, 0.1).status is Status.OK
 
 
-def test_a_held_dof_learns_nothing() -> None:
+def test_a_held_dof_updates_no_offset() -> None:
     strict = CONFIG.replace(**{"rotation.observable_deviation": 1e-6})
     loop = HysteresisReduction(strict)
     for tick in range(2000):
@@ -158,7 +160,7 @@ def test_a_held_dof_learns_nothing() -> None:
 
 
 def test_the_command_is_looked_up_at_the_capture_time() -> None:
-    """An estimate of a moving tip without slack: any misalignment would read as width."""
+    """A moving tip without slack: any misalignment in time would appear as width."""
     loop = HysteresisReduction(CONFIG)
     model = build_feature_model(CONFIG)
     references = [REST + 0.4 * AMPLITUDES * np.sin(2 * np.pi * tick / 500) for tick in range(1500)]
@@ -166,7 +168,7 @@ def test_the_command_is_looked_up_at_the_capture_time() -> None:
         loop.step(reference)
         captured = tick - 16
         if captured >= 0 and captured % 8 == 0:
-            # Between two ticks, so that the history has to interpolate.
+            # Between two ticks, to test the interpolation of the history.
             tip = (references[captured] + references[captured + 1]) / 2
             prediction = model.predict(tip)
             assert prediction is not None
@@ -177,8 +179,8 @@ def test_the_command_is_looked_up_at_the_capture_time() -> None:
 @pytest.mark.parametrize(
     "reference", [[0.0, np.nan, 0.0], [0.0, 1.0], "abc", None, [[0.0, 0.0, 0.0]], np.inf]
 )
-def test_a_bad_reference_is_named_and_changes_nothing(reference: object) -> None:
-    loop = started()
+def test_an_invalid_reference_is_named_and_ignored(reference: object) -> None:
+    loop = loop_at_rest()
     before = loop.step(REST)
     with pytest.raises(SignalError) as error:
         loop.step(reference)  # type: ignore[arg-type]
@@ -186,8 +188,8 @@ def test_a_bad_reference_is_named_and_changes_nothing(reference: object) -> None
     np.testing.assert_array_equal(loop.step(REST), before)
 
 
-def test_bad_features_and_times_are_named() -> None:
-    loop = started()
+def test_invalid_features_and_times_are_named() -> None:
+    loop = loop_at_rest()
     with pytest.raises(SignalError, match="features"):
         loop.on_features([1.0, 2.0, np.nan, 4.0], 0.1)
     with pytest.raises(SignalError, match="captured_at"):
@@ -196,7 +198,7 @@ def test_bad_features_and_times_are_named() -> None:
         loop.step(REST, time=np.inf)
 
 
-def test_the_blocks_name_what_is_wrong_with_their_settings() -> None:
+def test_blocks_name_the_invalid_setting() -> None:
     with pytest.raises(ConfigError) as error:
         _core.Play(delta_minus=1.0, delta_plus=0.0)
     assert (error.value.field, error.value.value) == ("delta_minus", 1.0)
@@ -210,7 +212,7 @@ def test_the_blocks_name_what_is_wrong_with_their_settings() -> None:
         _core.Camera(fx=0.0, fy=1.0, cx=0.0, cy=0.0, distortion=(0.0,) * 8)
 
 
-def test_batch_run_is_step_by_step() -> None:
+def test_run_equals_step_by_step() -> None:
     from tautscope.loop.construction import build_loop
 
     references = REST + 0.1 * np.sin(np.arange(300.0))[:, None] * AMPLITUDES

@@ -1,4 +1,4 @@
-"""Eq. (1) against python-control's backlash, which is the centred case."""
+"""The play operator, Eq. (1), against the centred backlash of python-control."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from tautscope import _core
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_play_is_the_backlash_of_python_control(seed: int) -> None:
+def test_play_equals_the_backlash_of_python_control(seed: int) -> None:
     rng = np.random.default_rng(seed)
     width = rng.uniform(0.1, 3.0)
     offset = rng.uniform(-2.0, 2.0)

@@ -1,4 +1,4 @@
-"""Decision 0001: one sign convention works, the printed mixture of two does not."""
+"""Sign convention of the offsets (decision 0001): the article's printed signs do not converge."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ DISTANCE, TOLERANCE, FACTOR = 0.05, 0.4, 0.25
 
 
 def signals(delta_minus: float, delta_plus: float) -> Iterator[tuple[float, float]]:
-    """Command and tip of a true play over six periods of a sine."""
+    """Command and tip of a simulated play over six periods of a sine."""
     tip = 0.0
     for command in 3.0 * np.sin(np.linspace(0.0, 12.0 * np.pi, 12_000)):
         tip = min(max(tip, command - delta_plus), command - delta_minus)
@@ -23,9 +23,9 @@ def signals(delta_minus: float, delta_plus: float) -> Iterator[tuple[float, floa
 
 
 def as_printed(delta_minus: float, delta_plus: float) -> Floats:
-    """The printed signs: (5) takes an offset as output minus input, (4) and (6) the reverse.
+    """Estimated width after each update with the printed signs.
 
-    The estimated width after each update.
+    In (5) an offset is output minus input, in (4) and (6) input minus output.
     """
     minus = plus = last_c = last_m = 0.0
     widths = []
@@ -45,8 +45,8 @@ def as_printed(delta_minus: float, delta_plus: float) -> Floats:
     return np.array(widths)
 
 
-def as_decided(delta_minus: float, delta_plus: float) -> Floats:
-    """Ours: an offset is input minus output throughout. The estimated width after each sample."""
+def consistent(delta_minus: float, delta_plus: float) -> Floats:
+    """Estimated width after each sample; every offset is input minus output."""
     estimator = _core.Estimator(
         update_distance=DISTANCE,
         contact_tolerance=TOLERANCE,
@@ -65,11 +65,11 @@ def second_half(widths: Floats) -> Floats:
 
 
 @pytest.mark.parametrize("truth", [(-0.5, 0.5), (-1.0, 0.2), (-0.2, 1.4)])
-def test_the_printed_signs_collapse_and_ours_find_the_play(truth: tuple[float, float]) -> None:
+def test_printed_signs_collapse_and_consistent_signs_converge(truth: tuple[float, float]) -> None:
     width = truth[1] - truth[0]
     assert np.abs(second_half(as_printed(*truth))).min() < 1e-3 * width
-    assert np.abs(second_half(as_decided(*truth)) - width).max() < 1e-3 * width
+    assert np.abs(second_half(consistent(*truth)) - width).max() < 1e-3 * width
 
 
-def test_about_zero_nothing_of_the_width_is_left() -> None:
+def test_printed_signs_lose_the_width_of_a_centred_play() -> None:
     assert np.abs(second_half(as_printed(-0.5, 0.5))).mean() < 0.1

@@ -1,4 +1,4 @@
-"""Eqs. (13)-(16) against numpy's pseudo-inverse, and the rank watch."""
+"""State estimation, Eqs. (13)-(16), against numpy's pseudo-inverse, and its rank check."""
 
 from __future__ import annotations
 
@@ -8,32 +8,30 @@ from tautscope import _core
 from tautscope.config import Config
 from tautscope.loop.construction import build_feature_model, build_state_estimator
 
-EVERYTHING = (1e9, 1e9, 1e9)
+NEVER_HELD = (1e9, 1e9, 1e9)
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_the_step_is_numpys_pinv(seed: int) -> None:
+def test_the_step_equals_numpys_pinv(seed: int) -> None:
     rng = np.random.default_rng(seed)
     model = build_feature_model(Config())
-    estimator = _core.StateEstimator(observable_deviation=EVERYTHING)
+    estimator = _core.StateEstimator(observable_deviation=NEVER_HELD)
     for _ in range(50):
         state = rng.uniform([0.015, -1.5, 0.2], [0.035, 1.5, 1.2])
         prediction = model.predict(state)
         assert prediction is not None
         features, matrix = prediction
         innovation = rng.normal(0.0, 5.0, 4)
-        found, observable, deviation = estimator.estimate(
-            state, features, matrix, features + innovation
-        )
-        # rcond: the columns differ by their units; none is to be dropped.
+        found, observable, std = estimator.estimate(state, features, matrix, features + innovation)
+        # rcond keeps all columns, which differ in scale by their units.
         expected = state + np.linalg.pinv(matrix, rcond=1e-15) @ innovation
         np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-10, err_msg=f"{seed}")
         covariance = np.linalg.inv(matrix.T @ matrix)
-        np.testing.assert_allclose(deviation, np.sqrt(np.diag(covariance)), rtol=1e-8)
+        np.testing.assert_allclose(std, np.sqrt(np.diag(covariance)), rtol=1e-8)
         assert observable.all()
 
 
-def test_run_does_the_same_for_many() -> None:
+def test_run_equals_one_estimate_per_row() -> None:
     rng = np.random.default_rng(7)
     model, estimator = build_feature_model(Config()), build_state_estimator(Config())
     states = rng.uniform([0.015, -1.5, 0.0], [0.035, 1.5, 1.2], (100, 3))
@@ -50,7 +48,7 @@ def test_run_does_the_same_for_many() -> None:
         np.testing.assert_array_equal(observable[k], one[1])
 
 
-def test_rotation_is_held_where_the_bend_hides_it_and_only_there() -> None:
+def test_rotation_is_held_only_where_it_is_unobservable() -> None:
     config = Config().replace(**{"insertion.observable_deviation": 5e-3})
     model, estimator = build_feature_model(config), build_state_estimator(config)
     limit = config.rotation.observable_deviation
@@ -67,14 +65,14 @@ def test_rotation_is_held_where_the_bend_hides_it_and_only_there() -> None:
         if not observable[1]:
             held.append(bend)
             assert found[1] == state[1]
-            rest = matrix[:, [0, 2]]
-            expected = state[[0, 2]] + np.linalg.pinv(rest) @ np.ones(4)
+            others = matrix[:, [0, 2]]
+            expected = state[[0, 2]] + np.linalg.pinv(others) @ np.ones(4)
             np.testing.assert_allclose(found[[0, 2]], expected, rtol=1e-10)
     assert 0.0 in held and max(np.abs(held)) < 0.5
 
 
 def test_inputs_of_the_wrong_shape_are_named() -> None:
-    estimator = _core.StateEstimator(observable_deviation=EVERYTHING)
+    estimator = _core.StateEstimator(observable_deviation=NEVER_HELD)
     with pytest.raises(ValueError, match="interaction_matrix"):
         estimator.estimate(np.zeros(3), np.zeros(4), np.zeros((3, 3)), np.zeros(4))
     with pytest.raises(ValueError, match="measured_features"):

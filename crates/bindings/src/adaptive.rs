@@ -9,7 +9,7 @@ use crate::errors;
 use crate::estimator::{TriggerNames, trigger_names};
 use crate::settings::from_mapping;
 
-/// One DOF of profile `best`: the lead law and the offsets it learns.
+/// One DOF of profile `best`: lead law and offset estimate.
 ///
 /// Lengths are in the unit of the DOF. Raises `ConfigError`.
 #[pyclass(name = "AdaptiveAxis", module = "tautscope._core")]
@@ -17,7 +17,7 @@ pub struct AdaptiveAxis(pub core::AdaptiveAxis);
 
 #[pymethods]
 impl AdaptiveAxis {
-    /// DOF number `dof`, 0 to 2, from the settings of the loop.
+    /// From the settings of the loop; `dof` is 0 for insertion, 1 for rotation, 2 for bending.
     #[new]
     fn new(settings: Bound<'_, PyAny>, dof: usize) -> PyResult<Self> {
         let py = settings.py();
@@ -27,35 +27,32 @@ impl AdaptiveAxis {
             .map_err(errors::config(py))
     }
 
-    /// The command c for the next reference u. The first is passed through; an unchanged one, or one
-    /// that is not finite, gives the same command again.
+    /// The command c for the next reference u. The first command is the reference; a reference that is
+    /// unchanged or not finite repeats the last command.
     fn step(&mut self, reference: f64) -> f64 {
         self.0.step(reference)
     }
 
-    /// `step` for each of references (n,): commands (n,).
+    /// `step` for references (n,): commands (n,).
     fn run<'py>(&mut self, py: Python<'py>, references: Vector<'py>) -> Bound<'py, PyArray1<f64>> {
         let references = references.as_array();
         let commands = references.iter().map(|reference| self.step(*reference));
         PyArray1::from_iter(py, commands)
     }
 
-    /// Learn from a command, the output measured at the same instant, its standard deviation per px
-    /// of marker noise, and the commands since then (n,), oldest first.
+    /// Updates the offsets from a command, the output measured at the same instant, its standard
+    /// deviation, and the commands since then (n,), oldest first.
     ///
-    /// Returns why (`delta_minus`, `delta_plus`) were updated: "contact", "violation" or None.
-    fn learn(
+    /// Returns the triggers of (`delta_minus`, `delta_plus`): "contact", "violation" or None.
+    fn update_offsets(
         &mut self,
         command: f64,
         measured: f64,
-        deviation: f64,
-        since: Vector<'_>,
+        std: f64,
+        commands_since: Vector<'_>,
     ) -> TriggerNames {
-        let since = since.as_array();
-        trigger_names(
-            self.0
-                .learn(command, measured, deviation, since.iter().copied()),
-        )
+        let since = commands_since.as_array();
+        trigger_names(self.0.learn(command, measured, std, since.iter().copied()))
     }
 
     /// The command c; NaN before the first reference.
@@ -70,13 +67,13 @@ impl AdaptiveAxis {
         self.0.predicted_state()
     }
 
-    /// Offset at the negative contact where the reference is now, input minus output.
+    /// Offset at the negative contact at the present reference, input minus output.
     #[getter]
     fn delta_minus(&self) -> f64 {
         self.0.play().delta_minus()
     }
 
-    /// Offset at the positive contact where the reference is now, input minus output.
+    /// Offset at the positive contact at the present reference, input minus output.
     #[getter]
     fn delta_plus(&self) -> f64 {
         self.0.play().delta_plus()
@@ -88,9 +85,9 @@ impl AdaptiveAxis {
         self.0.gain()
     }
 
-    /// Standard deviations of (`delta_minus`, `delta_plus`) where the reference is now.
+    /// Standard deviations of (`delta_minus`, `delta_plus`) at the present reference.
     #[getter]
-    fn deviation(&self) -> (f64, f64) {
+    fn std(&self) -> (f64, f64) {
         self.0.deviation()
     }
 }

@@ -1,4 +1,4 @@
-//! Between numpy arrays and the fixed-size arrays of the core.
+//! Conversion between numpy arrays and the fixed-size arrays of the core.
 
 use numpy::ndarray::ArrayView1;
 use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayLike1, PyArrayLike2, PyArrayMethods};
@@ -6,10 +6,10 @@ use pyo3::prelude::*;
 
 use crate::errors;
 
-/// Anything numpy makes a vector (n,) of.
+/// Anything that numpy converts to a vector (n,).
 pub type Vector<'py> = PyArrayLike1<'py, f64, AllowTypeChange>;
 
-/// Anything numpy makes a table (n, columns) of.
+/// Anything that numpy converts to a table (n, columns).
 pub type Table<'py> = PyArrayLike2<'py, f64, AllowTypeChange>;
 
 /// The N values of a vector.
@@ -31,7 +31,7 @@ pub fn rows<const N: usize>(field: &str, table: &Table<'_>) -> PyResult<Vec<[f64
     })
 }
 
-/// Rows as a table.
+/// A table from rows.
 pub fn table<'py, T: numpy::Element + Copy, const N: usize>(
     py: Python<'py>,
     rows: &[[T; N]],
@@ -39,7 +39,7 @@ pub fn table<'py, T: numpy::Element + Copy, const N: usize>(
     PyArray1::from_slice(py, rows.as_flattened()).reshape([rows.len(), N])
 }
 
-/// Columns as a table.
+/// A table from columns.
 pub fn columns<'py>(
     py: Python<'py>,
     columns: &[impl AsRef<[f64]>],
@@ -49,7 +49,7 @@ pub fn columns<'py>(
     PyArray1::from_iter(py, values).reshape([height, columns.len()])
 }
 
-/// That two arrays that belong together are of one length.
+/// Checks that two arrays that belong together have equal lengths.
 pub fn same_length(py: Python<'_>, field: &str, length: usize, expected: usize) -> PyResult<()> {
     if length == expected {
         return Ok(());
@@ -69,13 +69,13 @@ fn row<const N: usize>(view: ArrayView1<'_, f64>) -> Option<[f64; N]> {
     Some(values)
 }
 
-/// A covariance (4, 4) of features, if there is one.
+/// An optional covariance (4, 4) of features.
 pub fn covariance(table: Option<Table<'_>>) -> PyResult<Option<[[f64; 4]; 4]>> {
     let table = table.as_ref();
     table.map(|table| four("covariance", table)).transpose()
 }
 
-/// A table with a row per feature.
+/// The four rows of a table, one per feature.
 pub fn four<const N: usize>(field: &str, table: &Table<'_>) -> PyResult<[[f64; N]; 4]> {
     let lines = rows(field, table)?;
     let found = lines.len();

@@ -7,7 +7,7 @@ use tautscope_core as core;
 use crate::arrays::{Table, Vector, fixed, rows, table};
 use crate::errors;
 
-/// Pinhole with `OpenCV`'s distortion k1, k2, p1, p2, k3, k4, k5, k6, Eq. (8). Raises `ConfigError`.
+/// Pinhole camera with `OpenCV`'s distortion k1, k2, p1, p2, k3, k4, k5, k6, Eq. (8). Raises `ConfigError`.
 #[pyclass(name = "Camera", module = "tautscope._core", frozen)]
 pub struct Camera(pub core::Camera);
 
@@ -34,10 +34,10 @@ impl Camera {
         py: Python<'py>,
         points: Table<'py>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let unseen = [f64::NAN; 2];
+        let invisible = [f64::NAN; 2];
         let pixels: Vec<[f64; 2]> = rows("points", &points)?
             .into_iter()
-            .map(|point| self.0.project(point).map_or(unseen, |image| image.pixel))
+            .map(|point| self.0.project(point).map_or(invisible, |image| image.pixel))
             .collect();
         table(py, &pixels)
     }
@@ -48,8 +48,8 @@ impl Camera {
         py: Python<'py>,
         point: Vector<'py>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let unseen = [[f64::NAN; 3]; 2];
+        let invisible = [[f64::NAN; 3]; 2];
         let image = self.0.project(fixed("point", &point)?);
-        table(py, &image.map_or(unseen, |image| image.pixel_by_point))
+        table(py, &image.map_or(invisible, |image| image.pixel_by_point))
     }
 }

@@ -7,12 +7,12 @@ use tautscope_core as core;
 use crate::arrays::Vector;
 use crate::errors;
 
-/// The limited-gain inverse of one DOF's hysteresis, Eqs. (2)-(3), Fig. 2.
+/// The limited-gain inverse of one DOF's play, Eqs. (2)-(3), Fig. 2.
 ///
 /// Gain 1 in contact, `free_gain` (at least 1, at most `gain_limit`) while the slack is crossed. A
 /// slack of width w leaves w / `free_gain`; an over-estimated width overshoots beyond a margin of
-/// 1 / (`free_gain` - 1). With `recovery` above 0, what changed offsets have left between command
-/// and reference is given back by that share of the further travel. Signals are in the unit of the DOF. Raises `ConfigError`.
+/// 1 / (`free_gain` - 1). With `recovery` above 0 the command returns to the reference after changed
+/// offsets, by that share of the further travel. Signals are in the unit of the DOF. Raises `ConfigError`.
 #[pyclass(name = "Compensator", module = "tautscope._core")]
 pub struct Compensator {
     pub inner: core::Compensator,
@@ -39,27 +39,27 @@ impl Compensator {
         Ok(Self { inner, state })
     }
 
-    /// The command c for the next reference u. The first is passed through; an unchanged one, or one
-    /// that is not finite, gives the same command again.
+    /// The command c for the next reference u. The first command is the reference; a reference that is
+    /// unchanged or not finite repeats the last command.
     fn step(&mut self, reference: f64) -> f64 {
         self.inner.step(&mut self.state, reference)
     }
 
-    /// `step` for each of references (n,): commands (n,).
+    /// `step` for references (n,): commands (n,).
     fn run<'py>(&mut self, py: Python<'py>, references: Vector<'py>) -> Bound<'py, PyArray1<f64>> {
         let references = references.as_array();
         let commands = references.iter().map(|reference| self.step(*reference));
         PyArray1::from_iter(py, commands)
     }
 
-    /// Go on with other contact offsets (input minus output): the command does not move.
+    /// Changes the contact offsets (input minus output); the command does not move.
     fn set_offsets(&mut self, py: Python<'_>, delta_minus: f64, delta_plus: f64) -> PyResult<()> {
         let play = core::Play::new(delta_minus, delta_plus).map_err(errors::config(py))?;
         self.inner.retune(&mut self.state, play);
         Ok(())
     }
 
-    /// Go on with another gain, 1 for no compensation: the command does not move.
+    /// Changes the gain, 1 for no compensation; the command does not move.
     fn set_gain(&mut self, py: Python<'_>, free_gain: f64, gain_limit: f64) -> PyResult<()> {
         self.inner = self
             .inner
@@ -76,7 +76,7 @@ impl Compensator {
         self.state.command()
     }
 
-    /// p = c - q, between the contacts; NaN before the first reference.
+    /// p = c - q, the position between the contacts; NaN before the first reference.
     #[getter]
     fn position(&self) -> f64 {
         self.state.position()

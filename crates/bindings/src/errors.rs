@@ -1,4 +1,4 @@
-//! Errors of the core, raised as the package's own.
+//! Errors of the core as exceptions of `tautscope.errors`.
 
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
@@ -6,22 +6,22 @@ use tautscope_core::ConfigError;
 
 /// A `ConfigError` as `tautscope.errors.ConfigError`.
 pub fn config(py: Python<'_>) -> impl Fn(ConfigError) -> PyErr {
-    move |error| raised(py, "ConfigError", error.field, error.value, error.allowed)
+    move |error| exception(py, "ConfigError", error.field, error.value, error.allowed)
 }
 
-/// A `tautscope.errors.ConfigError` on a name that is not one of those allowed.
+/// A `tautscope.errors.ConfigError` for a name that is not allowed.
 pub fn choice(py: Python<'_>, field: &str, name: &str, allowed: &str) -> PyErr {
-    raised(py, "ConfigError", field, name, allowed)
+    exception(py, "ConfigError", field, name, allowed)
 }
 
-/// A `tautscope.errors.SignalError` on an array of the wrong length.
+/// A `tautscope.errors.SignalError` for an array of the wrong length.
 pub fn length(py: Python<'_>, field: &str, length: usize, allowed: &str) -> PyErr {
     let value = format!("{length} values");
-    raised(py, "SignalError", field, value, allowed)
+    exception(py, "SignalError", field, value, allowed)
 }
 
-/// An error of `tautscope.errors` by its class, with its facts.
-pub fn raised<'py>(
+/// An exception of the class `class` of `tautscope.errors`.
+pub fn exception<'py>(
     py: Python<'py>,
     class: &str,
     field: &str,

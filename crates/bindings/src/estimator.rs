@@ -45,9 +45,9 @@ impl Estimator {
         })
     }
 
-    /// Take in a command and the output measured at the same instant.
+    /// Updates the offsets from a command and the output measured at the same instant.
     ///
-    /// Returns why (`delta_minus`, `delta_plus`) were updated: "contact", Eq. (4), "violation", Eq. (5),
+    /// Returns the triggers of (`delta_minus`, `delta_plus`): "contact", Eq. (4), "violation", Eq. (5),
     /// or None. A pair that is not finite is ignored.
     fn update(&mut self, command: f64, measured: f64) -> TriggerNames {
         let triggers = self.inner.update(&mut self.state, command, measured);
@@ -62,7 +62,7 @@ impl Estimator {
         self.state.play().step(&mut self.output, command)
     }
 
-    /// `predict` then `update` for each of commands (n,) and measured (n,).
+    /// `predict`, then `update`, for commands (n,) and measured (n,).
     ///
     /// Returns predicted, `delta_minus` and `delta_plus`, each (n,): `predicted[k]` uses `measured[:k]` only,
     /// the offsets are those after sample k. Raises `SignalError` for unequal lengths.
@@ -103,7 +103,7 @@ impl Estimator {
     }
 }
 
-/// Of `delta_minus` and of `delta_plus`.
+/// The triggers of `delta_minus` and `delta_plus`.
 pub type TriggerNames = (Option<&'static str>, Option<&'static str>);
 
 pub fn trigger_names(triggers: core::Triggers) -> TriggerNames {

@@ -11,7 +11,7 @@ use crate::instrument::Instrument;
 
 type Prediction<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>);
 
-/// From the state to the centroids of the two marker bands: h = g after f, Eqs. (9)-(11).
+/// The feature model h: from the state to the centroids of the two marker bands, Eqs. (9)-(11).
 ///
 /// `translation` in m and `rotation` (rotation vector, rad) are `camera_from_guide`. It predicts the
 /// centroid of the visible half of each band (decision 0002). Raises `ConfigError`.
@@ -35,7 +35,7 @@ impl FeatureModel {
 
     /// Features (4,) in px and interaction matrix (4, 3) for a state (3,) [m, rad, rad].
     ///
-    /// None where a band cannot be seen.
+    /// None where a band is not visible.
     fn predict<'py>(
         &self,
         py: Python<'py>,
@@ -50,33 +50,40 @@ impl FeatureModel {
 
     /// Per band area in px^2, centroid (2,) in px, second moments (2, 2) in px^2 and outline (26, 2) in px.
     ///
-    /// None where a band cannot be seen.
+    /// None where a band is not visible.
     fn bands<'py>(&self, py: Python<'py>, state: Vector<'py>) -> PyResult<Option<Bands<'py>>> {
-        let Some([a, b]) = self.0.bands(fixed("state", &state)?) else {
+        let Some(bands) = self.0.bands(fixed("state", &state)?) else {
             return Ok(None);
         };
-        Ok(Some((band(py, &a)?, band(py, &b)?)))
+        let [a, b] = bands.map(|band| {
+            let [uu, uv, vv] = band.moments;
+            Ok::<_, PyErr>((
+                band.area,
+                PyArray1::from_slice(py, &band.centroid),
+                table(py, &[[uu, uv], [uv, vv]])?,
+                table(py, &band.outline)?,
+            ))
+        });
+        Ok(Some((a?, b?)))
     }
 
-    /// The most probable state (3,) for features (4,) in px of standard deviations (4,), from a belief
-    /// (3,) of standard deviations (3,); None where the model sees no band.
+    /// The most probable state (3,) and its cost, from a prior state (3,) with standard deviations (3,) and
+    /// features (4,) with standard deviations (4,) in px; None where a band is not visible.
     fn nearest_state<'py>(
         &self,
         py: Python<'py>,
         state: Vector<'py>,
-        state_deviation: Vector<'py>,
+        state_std: Vector<'py>,
         features: Vector<'py>,
-        deviation: Vector<'py>,
+        std: Vector<'py>,
     ) -> PyResult<Option<(Bound<'py, PyArray1<f64>>, f64)>> {
-        let belief = core::Belief {
+        let prior = core::Belief {
             state: fixed("state", &state)?,
-            deviation: fixed("state_deviation", &state_deviation)?,
+            deviation: fixed("state_std", &state_std)?,
         };
-        let found = self.0.nearest_state(
-            &belief,
-            fixed("features", &features)?,
-            fixed("deviation", &deviation)?,
-        );
+        let found =
+            self.0
+                .nearest_state(&prior, fixed("features", &features)?, fixed("std", &std)?);
         Ok(found.map(|(state, misfit)| (PyArray1::from_slice(py, &state), misfit)))
     }
 }
@@ -89,13 +96,3 @@ type Band<'py> = (
 );
 
 type Bands<'py> = (Band<'py>, Band<'py>);
-
-fn band<'py>(py: Python<'py>, image: &core::BandImage) -> PyResult<Band<'py>> {
-    let [uu, uv, vv] = image.moments;
-    Ok((
-        image.area,
-        PyArray1::from_slice(py, &image.centroid),
-        table(py, &[[uu, uv], [uv, vv]])?,
-        table(py, &image.outline)?,
-    ))
-}

@@ -1,4 +1,4 @@
-//! Flags and reactions, by their names.
+//! Names of flags and reactions.
 
 use pyo3::prelude::*;
 use tautscope_core as core;
@@ -6,7 +6,7 @@ use tautscope_core as core;
 use crate::errors;
 
 /// The names of all flags.
-// Inlined into what joins them, they would take many minutes to compile.
+// Inlined into the callers that join the names, this would take many minutes to compile.
 #[inline(never)]
 pub fn names() -> Vec<&'static str> {
     core::Flag::ALL.iter().map(|flag| flag.name()).collect()

@@ -1,4 +1,4 @@
-//! `tautscope._core`: what Python sees of the Rust crates. The only crate that knows Python.
+//! `tautscope._core`: Python interface of the Rust crates, and the only crate that depends on Python.
 
 // PyO3 hands arguments over by value.
 #![allow(clippy::needless_pass_by_value)]

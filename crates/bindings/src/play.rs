@@ -10,7 +10,7 @@ use crate::errors;
 /// The play (backlash) operator, Eq. (1): the output lags the input between two contacts.
 ///
 /// `v - delta_plus <= y <= v - delta_minus`, offsets being input minus output; all in one unit. It
-/// knows no time. `output` is the output to start from. Raises `ConfigError` for offsets that are
+/// is rate independent. `output` is the initial output. Raises `ConfigError` for offsets that are
 /// not finite or in the wrong order.
 #[pyclass(name = "Play", module = "tautscope._core")]
 pub struct Play {
@@ -33,7 +33,7 @@ impl Play {
         self.play.step(&mut self.state, input)
     }
 
-    /// `step` for each of inputs (n,): outputs (n,).
+    /// `step` for inputs (n,): outputs (n,).
     fn run<'py>(&mut self, py: Python<'py>, inputs: Vector<'py>) -> Bound<'py, PyArray1<f64>> {
         let inputs = inputs.as_array();
         let outputs = inputs.iter().map(|input| self.step(*input));

@@ -13,7 +13,7 @@ use crate::settings::from_mapping;
 type Floats<'py> = Bound<'py, PyArray1<f64>>;
 
 /// status, `state_estimate`, `predicted_state`, `predicted_features`, innovation, observable,
-/// deviation, `state_deviation`, triggers, `delta_minus`, `delta_plus`.
+/// standard deviation per px, `state_deviation`, triggers, `delta_minus`, `delta_plus`.
 type Report<'py> = (
     &'static str,
     Floats<'py>,
@@ -36,7 +36,7 @@ enum Profile {
     Best(Loop<core::Best>),
 }
 
-/// The loop of either profile.
+/// Evaluates an expression with the loop of either profile.
 macro_rules! on_loop {
     ($reduction:expr, $name:ident => $body:expr) => {
         match $reduction {
@@ -66,7 +66,7 @@ impl Reduction {
         .map_err(errors::config(py))
     }
 
-    /// One control tick at `time` in s: reference (3,), made at `stamp` in s, in, command (3,) out.
+    /// One control tick at `time` in s: command (3,) for a reference (3,), which was generated at `stamp` in s.
     #[pyo3(signature = (reference, time, stamp=None))]
     fn step<'py>(
         &mut self,
@@ -131,11 +131,11 @@ impl Reduction {
         ))
     }
 
-    /// Reaction, names of the flags in force, names of those not acknowledged, and the share of the free
-    /// gain in use.
+    /// Reaction, names of the flags that cause it, names of those not acknowledged, and the share of the
+    /// compensation in use.
     #[getter]
     fn supervision(&self) -> (&'static str, Vec<&'static str>, Vec<&'static str>, f64) {
-        let now = on_loop!(&self.0, inner => inner.monitors().supervision());
+        let now = on_loop!(&self.0, inner => inner.supervision());
         (
             flags::reaction_name(now.reaction),
             flags::set(now.flags),
@@ -144,39 +144,38 @@ impl Reduction {
         )
     }
 
-    /// The operator goes on: the first increment of the reference is zero.
+    /// Re-engages the operator input; the first increment of the reference is zero.
     fn engage(&mut self) {
-        on_loop!(&mut self.0, inner => inner.monitors_mut().engage());
+        on_loop!(&mut self.0, inner => inner.engage());
     }
 
-    /// The operator has seen the warnings.
+    /// Acknowledges the warnings.
     fn acknowledge(&mut self) {
-        on_loop!(&mut self.0, inner => inner.monitors_mut().acknowledge());
+        on_loop!(&mut self.0, inner => inner.acknowledge());
     }
 
-    /// Something only the rig can see, by its name.
+    /// Raises a flag that only the rig can detect, by its name.
     fn raise_flag(&mut self, py: Python<'_>, name: &str) -> PyResult<()> {
         let flag = flags::flag(py, "flag", name)?;
-        on_loop!(&mut self.0, inner => inner.monitors_mut().raise(flag));
+        on_loop!(&mut self.0, inner => inner.raise(flag));
         Ok(())
     }
 
-    /// Features (4,) in px to expect at a capture time; None if not known.
+    /// Predicted features (4,) in px at a capture time; None if not known.
     fn predicted_features<'py>(&self, py: Python<'py>, captured_at: f64) -> Option<Floats<'py>> {
         let features = on_loop!(&self.0, inner => inner.predicted_features(captured_at))?;
         Some(PyArray1::from_slice(py, &features))
     }
 
-    /// Where the instrument should be at a capture time: state (3,) and standard deviations (3,)
-    /// [m, rad, rad]; None if not known.
-    fn expectation<'py>(
+    /// Predicted state (3,) and standard deviations (3,) [m, rad, rad] at a capture time; None if not known.
+    fn predict_state<'py>(
         &self,
         py: Python<'py>,
         captured_at: f64,
     ) -> Option<(Floats<'py>, Floats<'py>)> {
-        let belief = on_loop!(&self.0, inner => inner.expectation(captured_at))?;
+        let prior = on_loop!(&self.0, inner => inner.predict_state(captured_at))?;
         let array = |values| PyArray1::from_slice(py, values);
-        Some((array(&belief.state), array(&belief.deviation)))
+        Some((array(&prior.state), array(&prior.deviation)))
     }
 
     /// The predicted state (3,) now.
@@ -185,7 +184,7 @@ impl Reduction {
         PyArray1::from_slice(py, &on_loop!(&self.0, inner => inner.predicted_state()))
     }
 
-    /// The estimated offsets (3,), input minus output.
+    /// The estimated offsets at the negative contacts (3,), input minus output.
     #[getter]
     fn delta_minus<'py>(&self, py: Python<'py>) -> Floats<'py> {
         PyArray1::from_slice(
@@ -194,7 +193,7 @@ impl Reduction {
         )
     }
 
-    /// The estimated offsets (3,), input minus output.
+    /// The estimated offsets at the positive contacts (3,), input minus output.
     #[getter]
     fn delta_plus<'py>(&self, py: Python<'py>) -> Floats<'py> {
         PyArray1::from_slice(
@@ -205,9 +204,7 @@ impl Reduction {
 }
 
 fn build<P: core::Profile>(settings: &core::Settings) -> Result<Loop<P>, core::ConfigError> {
-    let control = &settings.control;
-    let ticks = core::history_entries(control.history, control.period);
-    let storage = vec![core::Entry::BLANK; ticks];
+    let storage = vec![core::Entry::BLANK; settings.history_entries()];
     core::HysteresisReduction::new(settings, storage).map(Box::new)
 }
 

@@ -1,11 +1,11 @@
-//! Tables of settings: a mapping of Python becomes the struct that has its keys as fields.
+//! Conversion of a Python mapping to the settings struct with its keys as fields.
 
 use pyo3::prelude::*;
 use serde::de::DeserializeOwned;
 
 use crate::errors;
 
-/// A settings struct from a nested mapping; keys that it does not have are ignored.
+/// A settings struct from a nested mapping; unknown keys are ignored.
 ///
 /// # Errors
 /// `ConfigError` on `table`: a key is missing, or a value is not of the type of its field.

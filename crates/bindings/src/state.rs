@@ -16,7 +16,7 @@ type Estimate<'py> = (
 
 type Estimates<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<bool>>);
 
-/// One linear step from prediction to measurement with its rank watched, Eqs. (13)-(16).
+/// One linear step from prediction to measurement with a check of its rank, Eqs. (13)-(16).
 ///
 /// A DOF whose standard deviation per px of marker noise exceeds its `observable_deviation`
 /// [m/px, rad/px] is held at its prediction. Raises `ConfigError`.
@@ -33,8 +33,8 @@ impl StateEstimator {
             .map_err(errors::config(py))
     }
 
-    /// State estimate (3,), observable (3,) and deviation (3,) from one measurement (4,) in px, two NaN for
-    /// a band that was not found.
+    /// State estimate (3,), observable (3,) and standard deviation per px of marker noise (3,) from measured
+    /// features (4,) in px, two NaN for a band that was not found.
     fn estimate<'py>(
         &self,
         py: Python<'py>,
@@ -60,8 +60,8 @@ impl StateEstimator {
         ))
     }
 
-    /// Prediction and estimate for many: states (n, 3) and features (n, 4) in, estimates (n, 3) and
-    /// observable (n, 3) out. Where the model sees no band nothing is observable.
+    /// Prediction and estimate for states (n, 3) and features (n, 4): estimates (n, 3) and observable (n, 3).
+    /// Where a band is not visible, no DOF is observable.
     fn run<'py>(
         &self,
         py: Python<'py>,

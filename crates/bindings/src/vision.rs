@@ -230,7 +230,7 @@ fn rejected(py: Python<'_>) -> impl Fn(Error) -> PyErr {
               value,
               allowed,
           }| {
-        errors::raised(
+        errors::exception(
             py,
             "ConfigError",
             &format!("vision.{field}"),

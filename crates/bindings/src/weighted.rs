@@ -24,7 +24,7 @@ type Estimates<'py> = (
     Bound<'py, PyArray2<bool>>,
 );
 
-/// The state estimate of profile `best`: weighted, iterated, outliers left out; decision 0018. Raises `ConfigError`.
+/// The state estimate of profile `best`: weighted, iterated, robust to outliers; decision 0018. Raises `ConfigError`.
 #[pyclass(name = "WeightedEstimator", module = "tautscope._core", frozen)]
 pub struct WeightedEstimator(pub core::WeightedEstimator);
 
@@ -40,29 +40,29 @@ impl WeightedEstimator {
             .map_err(errors::config(py))
     }
 
-    /// From a belief, state (3,) and standard deviations (3,), and features (4,) in px, two NaN for
-    /// a band that was not found, with covariance (4, 4) in `px^2`: state (3,), its deviation (3,),
-    /// observable (3,), markers used (2,), and state (3,) and deviation (3,) by the image alone.
+    /// From a predicted state (3,) with standard deviations (3,) and features (4,) in px, two NaN for
+    /// a band that was not found, with covariance (4, 4) in `px^2`: state (3,), its standard deviations (3,),
+    /// observable (3,), markers used (2,), and state (3,) and standard deviations (3,) without the prediction.
     ///
-    /// None where the model sees no band.
-    #[pyo3(signature = (model, belief, deviation, measured_features, covariance=None))]
+    /// None where a band is not visible.
+    #[pyo3(signature = (model, predicted_state, std, measured_features, covariance=None))]
     fn estimate<'py>(
         &self,
         py: Python<'py>,
         model: &FeatureModel,
-        belief: Vector<'py>,
-        deviation: Vector<'py>,
+        predicted_state: Vector<'py>,
+        std: Vector<'py>,
         measured_features: Vector<'py>,
         covariance: Option<Table<'py>>,
     ) -> PyResult<Option<Estimate<'py>>> {
         let covariance = known(covariance)?;
-        let belief = core::Belief {
-            state: fixed("belief", &belief)?,
-            deviation: fixed("deviation", &deviation)?,
+        let prior = core::Belief {
+            state: fixed("predicted_state", &predicted_state)?,
+            deviation: fixed("std", &std)?,
         };
         let found = self.0.estimate(
             &model.0,
-            &belief,
+            &prior,
             fixed("measured_features", &measured_features)?,
             covariance.as_ref(),
         );
@@ -79,36 +79,39 @@ impl WeightedEstimator {
         }))
     }
 
-    /// `estimate` for many beliefs (n, 3), all with one deviation (3,) and covariance (4, 4), and
-    /// features (n, 4): states (n, 3), deviations (n, 3), observable (n, 3). Where the model sees no band
-    /// the belief is given back.
-    #[pyo3(signature = (model, beliefs, deviation, measured_features, covariance=None))]
+    /// `estimate` for predicted states (n, 3) and features (n, 4), all with equal standard deviations (3,) and
+    /// covariance (4, 4): states (n, 3), standard deviations (n, 3), observable (n, 3). Where a band is not
+    /// visible, the prediction is returned.
+    #[pyo3(signature = (model, predicted_states, std, measured_features, covariance=None))]
     fn run<'py>(
         &self,
         py: Python<'py>,
         model: &FeatureModel,
-        beliefs: Table<'py>,
-        deviation: Vector<'py>,
+        predicted_states: Table<'py>,
+        std: Vector<'py>,
         measured_features: Table<'py>,
         covariance: Option<Table<'py>>,
     ) -> PyResult<Estimates<'py>> {
         let covariance = known(covariance)?;
-        let states: Vec<[f64; 3]> = rows("beliefs", &beliefs)?;
+        let states: Vec<[f64; 3]> = rows("predicted_states", &predicted_states)?;
         let measured: Vec<[f64; 4]> = rows("measured_features", &measured_features)?;
         same_length(py, "measured_features", measured.len(), states.len())?;
-        let deviation = fixed("deviation", &deviation)?;
+        let std = fixed("std", &std)?;
         let mut found = (Vec::new(), Vec::new(), Vec::new());
         for (state, measured) in states.into_iter().zip(measured) {
-            let belief = core::Belief { state, deviation };
+            let prior = core::Belief {
+                state,
+                deviation: std,
+            };
             let one = self
                 .0
-                .estimate(&model.0, &belief, measured, covariance.as_ref());
-            let nothing = (state, deviation, [false; 3]);
-            let (state, deviation, observable) = one.map_or(nothing, |one| {
+                .estimate(&model.0, &prior, measured, covariance.as_ref());
+            let unchanged = (state, std, [false; 3]);
+            let (state, std, observable) = one.map_or(unchanged, |one| {
                 (one.estimate.state, one.deviation, one.estimate.observable)
             });
             found.0.push(state);
-            found.1.push(deviation);
+            found.1.push(std);
             found.2.push(observable);
         }
         Ok((

@@ -1,4 +1,4 @@
-//! The whole loop of Fig. 6 on a simulated instrument: three plays, seen by an ideal camera 80 ms later.
+//! The whole loop of Fig. 6 on a simulated instrument: three plays in the images of an ideal camera with 80 ms latency.
 //!
 //! ```sh
 //! uv run tautscope config > rig.toml
@@ -10,17 +10,14 @@
 use std::error::Error;
 use std::f64::consts::TAU;
 
-use tautscope_core::{
-    Entry, HysteresisReduction, Paper, PerDof, Play, PlayState, Settings, history_entries,
-};
+use tautscope_core::{Entry, HysteresisReduction, Paper, Play, PlayState, Settings};
 
 /// Widths of the plays: Table 1 of the article [m, rad, rad].
-const WIDTHS: PerDof<f64> = [10e-3, 1.8, 1.1];
+const WIDTHS: [f64; 3] = [10e-3, 1.8, 1.1];
 /// Centre, amplitude and period in s of the reference of each DOF.
-const REFERENCE: PerDof<(f64, f64, f64)> =
-    [(25e-3, 15e-3, 20.0), (0.0, 1.5, 23.0), (0.9, 0.6, 17.0)];
+const REFERENCE: [(f64, f64, f64); 3] = [(25e-3, 15e-3, 20.0), (0.0, 1.5, 23.0), (0.9, 0.6, 17.0)];
 const DURATION: f64 = 120.0;
-/// The first part of the run, in which the offsets are estimated, is not counted [s].
+/// From when on the error counts [s]; before that the offsets are estimated.
 const COUNTED_FROM: f64 = 60.0;
 const TICKS_PER_FRAME: u32 = 8;
 const LATENCY: f64 = 0.08;
@@ -51,9 +48,9 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// RMS distance (3,) of the tip from the reference [m, rad, rad].
-fn tracking_error(settings: &Settings) -> Result<PerDof<f64>, Box<dyn Error>> {
+fn tracking_error(settings: &Settings) -> Result<[f64; 3], Box<dyn Error>> {
     let control = settings.control;
-    let storage = vec![Entry::BLANK; history_entries(control.history, control.period)];
+    let storage = vec![Entry::BLANK; settings.history_entries()];
     let mut reduction = HysteresisReduction::<Paper, _>::new(settings, storage)?;
     let model = settings.feature_model()?;
     let mut plays = Vec::new();

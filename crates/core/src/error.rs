@@ -1,4 +1,4 @@
-//! What a constructor says when a value is out of range.
+//! The error of a constructor whose argument is out of range.
 
 use core::fmt;
 
@@ -7,9 +7,9 @@ use core::fmt;
 pub struct ConfigError {
     /// The name of the argument.
     pub field: &'static str,
-    /// What came.
+    /// The value given.
     pub value: f64,
-    /// What may come, in words.
+    /// The allowed values, in words.
     pub allowed: &'static str,
 }
 

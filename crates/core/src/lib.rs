@@ -1,33 +1,35 @@
-//! Image-based hysteresis reduction for flexible endoscopic instruments: the control law.
+//! Image-based hysteresis reduction for flexible endoscopic instruments: models, estimation, compensation, supervision.
 //!
 //! One file per block of the loop. "Eq. (n)", "Fig. n" and "Table n" always mean R. Reilink,
 //! S. Stramigioli, S. Misra, "Image-based hysteresis reduction for the control of flexible
 //! endoscopic instruments", Mechatronics 23 (2013) 652-658, in the one sign convention of
 //! decision 0001: a contact offset is input minus output.
 //!
-//! Constructors check their arguments and say which is wrong ([`ConfigError`]); what runs in the
-//! loop cannot fail, does not allocate, reads no clock and does no I/O. Units are m, rad, s, px.
+//! Constructors check their arguments and name the wrong one ([`ConfigError`]); what runs in the
+//! loop cannot fail, does not allocate, reads no clock and does no I/O. Units are m, rad, s, px; one
+//! value per degree of freedom (DOF) is an array in the order insertion, rotation, bending.
 //!
-//! One DOF in the article's way; `examples/whole_loop.rs` is the whole loop, with settings from a TOML file.
+//! The example compensates one DOF by the article's scheme; `examples/whole_loop.rs` is the whole loop, with settings
+//! from a TOML file.
 //!
 //! ```
 //! use tautscope_core::{Compensator, CompensatorState, Estimator, EstimatorState, Play, PlayState};
 //!
 //! # fn main() -> Result<(), tautscope_core::ConfigError> {
 //! let unknown = Play::new(0.0, 0.0)?;
-//! let (compensator, mut lead) = (Compensator::new(5.0, 5.0)?, CompensatorState::new(unknown));
-//! let (estimator, mut learnt) = (Estimator::new(0.4, 0.4, 0.25)?, EstimatorState::new(unknown));
+//! let (compensator, mut compensation) = (Compensator::new(5.0, 5.0)?, CompensatorState::new(unknown));
+//! let (estimator, mut estimate) = (Estimator::new(0.4, 0.4, 0.25)?, EstimatorState::new(unknown));
 //! let (instrument, mut tip) = (Play::new(-5.0, 5.0)?, PlayState { output: 0.0 }); // 10 mm
 //!
 //! for tick in 0..20_000 {
 //!     let reference = 15.0 * (f64::from(tick) / 1000.0).sin();
-//!     let command = compensator.step(&mut lead, reference);
-//!     let measured = instrument.step(&mut tip, command); // yours: what the image says
-//!     if estimator.update(&mut learnt, command, measured).any() {
-//!         compensator.retune(&mut lead, learnt.play());
+//!     let command = compensator.step(&mut compensation, reference);
+//!     let measured = instrument.step(&mut tip, command); // in use: measured in the image
+//!     if estimator.update(&mut estimate, command, measured).any() {
+//!         compensator.retune(&mut compensation, estimate.play());
 //!     }
 //! }
-//! assert!((learnt.play().width() - 10.0).abs() < 0.5);
+//! assert!((estimate.play().width() - 10.0).abs() < 0.5);
 //! # Ok(())
 //! # }
 //! ```
@@ -67,13 +69,12 @@ pub use article::compensator::{Compensator, CompensatorState};
 pub use article::estimator::{Estimator, EstimatorState, Trigger, Triggers};
 pub use article::play::{Play, PlayState};
 pub use article::state::{StateEstimate, StateEstimator};
-pub use dof::PerDof;
 pub use error::ConfigError;
-pub use estimation::expectation::{Beliefs, Expected};
-pub use estimation::history::{Entry, history_entries};
+pub use estimation::expectation::Beliefs;
+pub use estimation::history::Entry;
 pub use estimation::posture::Belief;
 pub use estimation::settings::StateEstimationSettings;
-pub use estimation::weighted::{WeightedEstimate, WeightedEstimator};
+pub use estimation::weighted::WeightedEstimator;
 pub use r#loop::best::Best;
 pub use r#loop::paper::Paper;
 pub use r#loop::profile::Profile;
@@ -83,7 +84,6 @@ pub use r#loop::settings::Settings;
 pub use model::camera::{Camera, Pose};
 pub use model::features::{FeatureModel, FeaturePrediction};
 pub use model::instrument::Instrument;
-pub use model::outline::BandImage;
 pub use model::settings::{CameraSettings, InstrumentSettings, PoseSettings};
 pub use settings::{ControlSettings, DofSettings};
 pub use supervision::flags::{Flag, Flags};

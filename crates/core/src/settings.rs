@@ -1,6 +1,6 @@
 //! Settings that several blocks share.
 
-/// One degree of freedom; the same names, units and meaning as in `python/tautscope/config/dof.py`.
+/// One degree of freedom. Names, units and meaning are those of `python/tautscope/config/dof.py`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Deserialize))]
 pub struct DofSettings {
@@ -16,22 +16,22 @@ pub struct DofSettings {
     pub gain_limit: f64,
     /// Share of the reference's travel by which the command returns to the reference after changed offsets.
     pub recovery: f64,
-    /// ε in Eq. (4).
+    /// ε in Eq. (4): contact tolerance.
     pub contact_tolerance: f64,
-    /// α in Eq. (6), per `update_distance` travelled.
+    /// α in Eq. (6): smoothing factor, per `update_distance` travelled.
     pub smoothing_factor: f64,
-    /// Contact offset at the start [m or rad].
+    /// Initial offset at the negative contact [m or rad].
     pub delta_minus: f64,
-    /// Contact offset at the start [m or rad], not below `delta_minus`.
+    /// Initial offset at the positive contact [m or rad], not below `delta_minus`.
     pub delta_plus: f64,
 }
 
-/// The loop's clock; the same names, units and meaning as in `python/tautscope/config/control.py`.
+/// The loop's clock. Names, units and meaning are those of `python/tautscope/config/control.py`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Deserialize))]
 pub struct ControlSettings {
     /// Control period in s.
     pub period: f64,
-    /// How long control ticks are remembered, in s.
+    /// Time for which control ticks are stored, in s.
     pub history: f64,
 }

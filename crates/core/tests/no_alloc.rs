@@ -1,4 +1,4 @@
-//! The control tick and the image update do not allocate: an allocation aborts this test.
+//! The control tick and the image update do not allocate: an allocation aborts the test.
 
 // An allocator that aborts leaves the stack only.
 #![allow(clippy::large_stack_arrays)]
@@ -6,28 +6,28 @@
 mod support;
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
-use support::looped::{Loop, adaptive_with, article_with, model};
+use support::loops::{Loop, adaptive_with, article_with, model};
 use tautscope_core::{Flag, Play, Profile, Reaction, SafetySettings, Status, Triggers};
 
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;
 
-/// The tip below is late by a third of a second, as none in contact is.
-fn patient() -> SafetySettings {
+/// Settings without the contact consistency check: the tip below is late by 0.3 s, which no tip in contact is.
+fn without_slip_check() -> SafetySettings {
     SafetySettings {
         slip: [1e3; 3],
         ..support::safety()
     }
 }
 
-/// Over as many ticks as `TAUTSCOPE_TICKS` says, each loop at least once through every flag.
+/// Over at least `TAUTSCOPE_TICKS` ticks, each loop at least once through every flag.
 #[test]
 fn step_and_image_update_do_not_allocate() {
     let wanted = std::env::var("TAUTSCOPE_TICKS");
     let wanted: u64 = wanted.map_or(0, |text| text.parse().unwrap());
     let mut ticks = 0;
     loop {
-        ticks += run_article() + run_best() + run_best_without_doubt();
+        ticks += run_article() + run_best() + run_best_without_outliers();
         if ticks >= wanted {
             break;
         }
@@ -35,25 +35,25 @@ fn step_and_image_update_do_not_allocate() {
     println!("G12 both {ticks} 0 0");
 }
 
-// Apart, so that the stack has one loop at a time.
+// Separate functions, so that the stack holds one loop at a time.
 fn run_article() -> u64 {
-    run(article_with(&patient(), 0.0, |_| {
+    run(article_with(&without_slip_check(), 0.0, |_| {
         Play::new(0.0, 0.0).unwrap()
     }))
 }
 
 fn run_best() -> u64 {
-    run(adaptive_with(&patient(), 4.0))
+    run(adaptive_with(&without_slip_check(), 4.0))
 }
 
-fn run_best_without_doubt() -> u64 {
-    run(adaptive_with(&patient(), f64::INFINITY))
+fn run_best_without_outliers() -> u64 {
+    run(adaptive_with(&without_slip_check(), f64::INFINITY))
 }
 
-/// How many ticks there were.
+/// Runs a loop; returns the number of ticks.
 fn run<P: Profile>(mut reduction: Loop<P>) -> u64 {
     let mut ticks = 1;
-    let (mut used, mut learnt, mut worst) = (0, 0, Reaction::None);
+    let (mut used, mut updated, mut worst) = (0, 0, Reaction::None);
     let truth = model();
     let posture = |time: f64| {
         let wave = time.sin();
@@ -74,32 +74,32 @@ fn run<P: Profile>(mut reduction: Loop<P>) -> u64 {
                 });
                 let report = reduction.on_features(measured, None, captured_at, None);
                 used += u32::from(report.status == Status::Ok);
-                learnt += u32::from(report.triggers.iter().any(Triggers::any));
+                updated += u32::from(report.triggers.iter().any(Triggers::any));
             }
         }
         reduction.step([f64::NAN; 3], None, 20.0);
         reduction.on_features(None, None, 20.0, None);
-        // Every flag, long enough for every rung of its ladder.
+        // Every flag, long enough for every step of its escalation.
         for (flag, minute) in Flag::ALL.iter().zip(1_u32..) {
-            reduction.monitors_mut().engage();
+            reduction.engage();
             for tick in 0..2000_u32 {
                 let time = 60.0 * f64::from(minute) + f64::from(tick) * 0.005;
-                reduction.monitors_mut().raise(*flag);
+                reduction.raise(*flag);
                 reduction.step(posture(time), Some(time), time);
                 ticks += 1;
                 if tick % 8 == 0 {
                     let seen = truth.predict(posture(time)).map(|seen| seen.features);
                     reduction.on_features(seen, None, time, Some(u64::from(tick)));
                 }
-                worst = worst.max(reduction.monitors().supervision().reaction);
+                worst = worst.max(reduction.supervision().reaction);
             }
-            reduction.monitors_mut().acknowledge();
+            reduction.acknowledge();
         }
     });
     assert_eq!(worst, Reaction::Disable);
     assert!(
-        used > 400 && learnt > 40,
-        "the whole path ran: {used} {learnt}"
+        used > 400 && updated > 40,
+        "all parts of the update ran: {used} {updated}"
     );
     ticks
 }

@@ -1,35 +1,38 @@
-//! Hours of work in one piece: nothing grows, nothing drifts. `TAUTSCOPE_HOURS` says how many; a few minutes without.
+//! Soak test: over hours of simulated use neither memory, open files nor the tip's error grow. `TAUTSCOPE_HOURS` sets the
+//! duration; the default is three minutes.
 //!
-//! Three degrees of freedom with play, a hand that never repeats itself, images every 40 ms with 0.2 px of noise.
+//! Three degrees of freedom with play, a reference that does not repeat, images every 40 ms with 0.2 px of noise.
 
-// Three axes are more than the lint allows, and are moved once.
+// A loop is larger than the lint allows, and is moved once.
 #![allow(clippy::large_stack_arrays)]
 
 mod support;
 
 use support::PERIOD;
-use support::looped::{Loop, adaptive, article, article_with};
-use support::stand_in::{World, hand, real};
+use support::loops::{Loop, adaptive, article, article_with};
+use support::plays::{ThreePlays, real, reference};
 use tautscope_core::{Play, Profile, Reaction};
 
 const TICKS_PER_FRAME: u64 = 8;
 const TENTHS: u8 = 10;
-/// When the slack is learnt, and nothing had time to drift [s]; what the last tenth is compared with.
+/// From when to when the error is averaged with which the last tenth is compared [s]: the offsets are estimated, and
+/// nothing has had time to drift.
 const EARLY: (f64, f64) = (60.0, 180.0);
-/// Resident memory in pages, and open files; none where the system does not say.
+
+/// Resident memory in pages and number of open files; none where the system does not provide them.
 fn resources() -> Option<(u32, usize)> {
     let memory = std::fs::read_to_string("/proc/self/statm").ok()?;
     let files = std::fs::read_dir("/proc/self/fd").ok()?.count();
     Some((memory.split(' ').nth(1)?.parse().ok()?, files))
 }
 
-/// Of each law.
+/// Simulated duration for each law.
 fn hours() -> f64 {
     let hours = std::env::var("TAUTSCOPE_HOURS");
     hours.map_or(0.05, |text| text.parse().unwrap())
 }
 
-/// What grew or drifted, in words; nothing if nothing did.
+/// Runs a loop; returns a description of what grew or drifted, empty if nothing did.
 fn soak<P: Profile>(law: &str, mut reduction: Loop<P>) -> String {
     #[expect(
         clippy::cast_possible_truncation,
@@ -37,28 +40,28 @@ fn soak<P: Profile>(law: &str, mut reduction: Loop<P>) -> String {
         reason = "positive"
     )]
     let ticks = (hours() / f64::from(TENTHS) * 3600.0 / PERIOD) as u64;
-    let mut world = World::new();
+    let mut plays = ThreePlays::new();
     let (mut early, mut late) = (0.0, 0.0);
     let (mut before, mut worst) = (None, Reaction::None);
     for tenth in 0..TENTHS {
         let (start, mut error) = (u64::from(tenth) * ticks, 0.0);
         for tick in start..start + ticks {
             let time = real(tick) * PERIOD;
-            let hand = hand(time);
-            let command = reduction.step(hand, None, time);
+            let reference = reference(time);
+            let command = reduction.step(reference, None, time);
             assert!(
                 command.iter().all(|value| value.is_finite()),
                 "{law} {tick}"
             );
-            world.follow(command);
+            plays.step(command);
             if tick.is_multiple_of(TICKS_PER_FRAME) {
-                reduction.on_features(world.seen(), None, time, Some(tick));
+                reduction.on_features(plays.measure(), None, time, Some(tick));
             }
-            worst = worst.max(reduction.monitors().supervision().reaction);
-            let off = (world.tip[0].output - hand[0]).abs();
-            error += off / real(ticks);
+            worst = worst.max(reduction.supervision().reaction);
+            let distance = (plays.tip[0].output - reference[0]).abs();
+            error += distance / real(ticks);
             if (EARLY.0..EARLY.1).contains(&time) {
-                early += off * PERIOD / (EARLY.1 - EARLY.0);
+                early += distance * PERIOD / (EARLY.1 - EARLY.0);
             }
         }
         if tenth == 1 {
@@ -66,7 +69,7 @@ fn soak<P: Profile>(law: &str, mut reduction: Loop<P>) -> String {
         }
         late = error;
         eprintln!(
-            "{law}: {:.2} h, tip off by {:.3} mm",
+            "{law}: {:.2} h, error of the tip {:.3} mm",
             hours() * f64::from(tenth + 1) / f64::from(TENTHS),
             1e3 * error
         );
@@ -87,14 +90,14 @@ fn soak<P: Profile>(law: &str, mut reduction: Loop<P>) -> String {
         return String::new();
     }
     format!(
-        "{law}: more memory or files: {grown}, tip off by {early} m, later {late} m, {worst:?}. "
+        "{law}: memory or files grew: {grown}, error of the tip {early} m, later {late} m, {worst:?}. "
     )
 }
 
-/// One after the other: files and memory are those of the process.
+/// The runs are sequential: files and memory are those of the process.
 ///
-/// The article's law goes without recovery of its anchor as well, for which `broken` counts its drift and nothing is
-/// claimed: docs/safety.md.
+/// The article's law also runs without recovery of its anchor: `broken` counts its drift, but the test does not require
+/// that it is none (docs/safety.md).
 #[test]
 fn nothing_grows_and_nothing_drifts() {
     let none = |_| Play::new(0.0, 0.0).unwrap();

@@ -1,4 +1,4 @@
-"""The article's scheme, one degree of freedom at a time."""
+"""Settings of one degree of freedom in the article's scheme."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ class DofConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Largest standard deviation of the state per px of marker noise [m/px or rad/px] at which
     the DOF counts as observable; beyond it the DOF is held."""
     start_deviation: Positive
-    """How far the tip may be from the reference before the first image: standard deviation [m or
-    rad]; about half the slack [ours]."""
+    """Standard deviation of the tip about the reference before the first image [m or rad]; about
+    half the slack [ours]."""
     free_gain: Gain = 5.0
     """K_b: command over reference while the slack is crossed [paper]."""
     gain_limit: Gain = 5.0
     """Upper bound of every gain; free_gain may not exceed it [paper]."""
     recovery: Annotated[float, Meta(ge=0, lt=1)] = 0.0
-    """Share of the reference's travel by which the command gives back what changed offsets have
-    left between it and the reference; 0 keeps it [paper]."""
+    """Share of the reference's travel by which the command returns to the reference after changed
+    offsets; with 0 it does not return [paper]."""
     contact_tolerance: Fraction = 0.4
-    """epsilon in Eq. (4) [ours]."""
+    """epsilon: contact tolerance in Eq. (4) [ours]."""
     smoothing_factor: Fraction = 0.25
-    """alpha in Eq. (6), per update_distance travelled [ours]."""
+    """alpha: smoothing factor in Eq. (6), per update_distance travelled [ours]."""
     delta_minus: float = 0.0
-    """Contact offset at the start [m or rad] [paper]."""
+    """Initial offset at the negative contact [m or rad] [paper]."""
     delta_plus: float = 0.0
-    """Contact offset at the start [m or rad], not below delta_minus [paper]."""
+    """Initial offset at the positive contact [m or rad], not below delta_minus [paper]."""

@@ -1,4 +1,4 @@
-"""Blocks of the core from a configuration."""
+"""Construction of the blocks of the core from a configuration."""
 
 from __future__ import annotations
 
@@ -79,5 +79,5 @@ def build_weighted_estimator(config: Config) -> _core.WeightedEstimator:
 
 
 def build_loop(config: Config, compensate: bool = True) -> _core.Reduction:
-    """The whole loop, Fig. 6, without checks of what goes in: `HysteresisReduction` has those."""
+    """The whole loop, Fig. 6, without the input checks of `HysteresisReduction`."""
     return _core.Reduction(core_settings(config, compensate), config.profile)

@@ -217,7 +217,7 @@ class HysteresisReduction:
 
         `MarkerDetector.detect` searches around it. None if the history does not reach that time.
         """
-        prediction = self._loop.expectation(captured_at)
+        prediction = self._loop.predict_state(captured_at)
         return None if prediction is None else StatePrediction(*prediction)
 
     def predicted_features(self, captured_at: float) -> NDArray[np.float64] | None:

@@ -42,7 +42,7 @@ impl AdaptiveAxis {
     ///
     /// # Errors
     /// A setting is out of range.
-    pub fn new(settings: AxisParameters, play: Play) -> Result<Self, ConfigError> {
+    pub(crate) fn new(settings: AxisParameters, play: Play) -> Result<Self, ConfigError> {
         let settings = settings.checked()?;
         Ok(Self {
             settings,

@@ -9,28 +9,27 @@ use crate::error::{ConfigError, require, require_non_negative, require_positive}
 /// Parameters of an [`AdaptiveAxis`](crate::AdaptiveAxis); lengths in the unit of the DOF.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AxisParameters {
-    /// How the lead is brought about.
+    /// The lead law.
     pub law: LeadLaw,
     /// `contact_gain` of a stroke that began with an offset uncertain by more than
     /// `cautious_deviation`.
     pub cautious_gain: f64,
-    /// See `cautious_gain`. The free zone ends deviation^2 / `cautious_deviation` before the
-    /// contact: hardly at all where the offset is known, well before it where it is not.
+    /// See `cautious_gain`. The free zone ends std^2 / `cautious_deviation` before the contact, with the standard
+    /// deviation (std) of the offset.
     pub cautious_deviation: f64,
-    /// What is known beforehand of the offsets.
+    /// The prior of the offsets.
     pub prior: OffsetPrior,
-    /// How fast they may change.
+    /// The rate limit of the offsets.
     pub change: ChangeLimit,
-    /// When tip and command move together.
+    /// The test whether tip and command move together.
     pub contact: ContactTest,
-    /// Deviation of a measured offset beyond that of the output.
+    /// Standard deviation of a measured offset beyond that of the output.
     pub model_deviation: f64,
-    /// Share of what an image says of the play state that is taken over: 1, or 0 to leave it to
-    /// the model.
+    /// Share of the measured correction of the predicted state that is applied, 0 to 1.
     pub correction: f64,
-    /// Bound of every gain.
+    /// Upper bound of every gain.
     pub gain_limit: f64,
-    /// Time constant of the smoothing that tells tremor from intention, in s.
+    /// Time constant of the low-pass filter of the operator input that separates tremor from motion, in s.
     pub tremor_time: f64,
     /// Control period, in s.
     pub period: f64,

@@ -1,4 +1,4 @@
-//! The limited-gain inverse of the hysteresis, Eqs. (2)-(3), Fig. 2.
+//! The limited-gain inverse of the play operator, Eqs. (2)-(3), Fig. 2.
 
 use crate::article::play::{Play, PlayState};
 use crate::error::{ConfigError, require};
@@ -20,10 +20,10 @@ use crate::error::{ConfigError, require};
 /// c - u - (1 - 1 / `free_gain`) p is the anchor: zero, and constant however many reversals come.
 /// New offsets may move p but never c, so the anchor takes up the difference.
 ///
-/// As in the article, it keeps it. The noise of the offsets then adds up in it, because each
-/// inwards step in contact pushes p and no outwards step pulls it back. With a `recovery` above
+/// As in the article, the anchor stays. The noise of the offsets then adds up in it, because each
+/// inwards step in contact moves p and no outwards step moves it back. With a `recovery` above
 /// zero (ours) the anchor returns to zero by at most that share of the reference's further travel;
-/// the gain in contact is then within `recovery` of 1 until it has.
+/// until then the gain in contact is within `recovery` of 1.
 ///
 /// What remains of a slack of width w is w / `free_gain`.
 ///
@@ -36,18 +36,19 @@ pub struct Compensator {
     recovery: f64,
 }
 
-/// The memory of a [`Compensator`]: the play it believes in and where it stands.
+/// The state of a [`Compensator`]: the assumed play, reference and command.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CompensatorState {
     play: Play,
     tip: PlayState,
     reference: Option<f64>,
     command: f64,
-    anchor: f64,
+    /// c - u beyond the law: 0 until `retune` moves p.
+    pub(crate) anchor: f64,
 }
 
 impl CompensatorState {
-    /// Before the first reference, which will find the position nearest to zero.
+    /// The state before the first reference, which sets the position nearest to zero.
     pub const fn new(play: Play) -> Self {
         Self {
             play,
@@ -58,7 +59,7 @@ impl CompensatorState {
         }
     }
 
-    /// The play operator believed in.
+    /// The play operator that the compensator inverts.
     pub const fn play(&self) -> Play {
         self.play
     }
@@ -76,11 +77,6 @@ impl CompensatorState {
     /// The predicted state q; NaN before the first reference.
     pub const fn predicted_state(&self) -> f64 {
         self.tip.output
-    }
-
-    /// What the command leads the reference by beyond the law: 0 until `retune` pushes p.
-    pub const fn anchor(&self) -> f64 {
-        self.anchor
     }
 }
 
@@ -111,7 +107,7 @@ impl Compensator {
         })
     }
 
-    /// The same with other gains.
+    /// This compensator with other gains.
     ///
     /// # Errors
     /// As [`Compensator::new`].
@@ -119,7 +115,7 @@ impl Compensator {
         Self::new(free_gain, gain_limit)?.with_recovery(self.recovery)
     }
 
-    /// The same with the anchor's return to zero, as a share of the reference's travel.
+    /// This compensator with the anchor's return to zero, as a share of the reference's travel.
     ///
     /// # Errors
     /// The share is not at least 0 and below 1.
@@ -129,9 +125,9 @@ impl Compensator {
         Ok(Self { recovery, ..self })
     }
 
-    /// The same with a share of the free gain beyond 1: all of it with 1, no compensation with 0.
+    /// This compensator with a share of the free gain beyond 1: all of it with 1, no compensation with 0.
     #[must_use]
-    pub const fn with_share(self, share: f64) -> Self {
+    pub(crate) const fn with_share(self, share: f64) -> Self {
         let free_gain = 1.0 + share * (self.free_gain - 1.0);
         Self { free_gain, ..self }
     }
@@ -139,12 +135,12 @@ impl Compensator {
     /// The command for the next reference.
     ///
     /// The first reference is passed through. A reference that has not changed, or is not
-    /// finite, gives the same command again, bit for bit.
+    /// finite, repeats the last command, bit for bit.
     pub fn step(&self, state: &mut CompensatorState, reference: f64) -> f64 {
         self.step_within(state, reference, |command| command)
     }
 
-    /// [`Compensator::step`] whose command `limit` may change before the state goes on from it.
+    /// [`Compensator::step`] whose command `limit` may change before the state is updated with it.
     ///
     /// `limit` is called exactly once, with the command of the law.
     pub(crate) fn step_within(
@@ -153,16 +149,16 @@ impl Compensator {
         reference: f64,
         limit: impl FnOnce(f64) -> f64,
     ) -> f64 {
-        let (lawful, is_anchored) = self
+        let (proposed, is_anchored) = self
             .propose(state, reference)
             .unwrap_or((state.command, true));
-        let command = limit(lawful);
+        let command = limit(proposed);
         state.command = command;
         if state.tip.output.is_nan() {
             state.tip.output = command - state.play.clamp(0.0);
         }
         state.play.step(&mut state.tip, command);
-        if !is_anchored || (command - lawful).abs() > 0.0 {
+        if !is_anchored || (command - proposed).abs() > 0.0 {
             self.hold(state);
         }
         command
@@ -194,9 +190,9 @@ impl Compensator {
         Some((allowed, (allowed - command).abs() == 0.0))
     }
 
-    /// Go on from here with other offsets, or with this compensator after another: bumpless.
+    /// Changes the offsets, or continues with this compensator after another: bumpless.
     ///
-    /// The command does not move. The position moves only as far as the new contacts push it.
+    /// The command does not move. The position moves only as far as the new contacts require.
     pub fn retune(&self, state: &mut CompensatorState, play: Play) {
         state.play = play;
         if state.reference.is_some() {
@@ -205,7 +201,7 @@ impl Compensator {
         }
     }
 
-    /// Count the reference from elsewhere by `shift`: the command stays.
+    /// Adds `shift` to the reference that the law counts from; the command does not move.
     pub(crate) fn shift_reference(&self, state: &mut CompensatorState, shift: f64) {
         if let Some(reference) = &mut state.reference {
             *reference += shift;
@@ -213,14 +209,14 @@ impl Compensator {
         }
     }
 
-    /// Anchor the law where the command is.
+    /// Sets the anchor such that the law gives the present command.
     fn hold(&self, state: &mut CompensatorState) {
         if let Some(reference) = state.reference {
             state.anchor = state.command - reference - self.surplus() * state.position();
         }
     }
 
-    /// 1 - 1 / `free_gain`: the share of the position by which the command leads the reference.
+    /// 1 - 1 / `free_gain`: the share of the position that the law adds to the reference.
     fn surplus(&self) -> f64 {
         1.0 - 1.0 / self.free_gain
     }

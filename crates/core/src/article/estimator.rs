@@ -4,7 +4,7 @@ use crate::article::play::Play;
 use crate::article::play_limit::PlayLimit;
 use crate::error::{ConfigError, require_fraction, require_positive};
 
-/// Learns the two contact offsets from command and measured output while the DOF moves.
+/// Estimates the two contact offsets from command and measured output while the DOF moves.
 ///
 /// Each time the command c has moved by `update_distance` since the last update, with the
 /// changes dc and dm of command and measured output m since then (offsets are c - m):
@@ -31,7 +31,7 @@ pub struct Estimator {
     smoothing_factor: f64,
 }
 
-/// The memory of an [`Estimator`].
+/// The state of an [`Estimator`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EstimatorState {
     play: Play,
@@ -64,12 +64,12 @@ impl Triggers {
 }
 
 impl EstimatorState {
-    /// Before the first measurement, from offsets to start with.
+    /// The state before the first measurement, with the initial offsets.
     pub const fn new(play: Play) -> Self {
         Self { play, last: None }
     }
 
-    /// Believe in no more slack than that from now on; whether it did.
+    /// Limits the estimated offsets; returns whether they exceeded the limit.
     pub(crate) fn limit(&mut self, limit: PlayLimit) -> bool {
         let (minus, plus) = (self.play.delta_minus(), self.play.delta_plus());
         let exceeds = limit.exceeds(minus, plus);
@@ -107,9 +107,9 @@ impl Estimator {
         })
     }
 
-    /// Take in the command and the output measured at the same instant.
+    /// Updates the offsets from the command and the output measured at the same instant.
     ///
-    /// A pair that is not finite is ignored. The first pair is only remembered.
+    /// A pair that is not finite is ignored. The first pair is only stored.
     pub fn update(&self, state: &mut EstimatorState, command: f64, measured: f64) -> Triggers {
         let offset = command - measured;
         if !offset.is_finite() {
@@ -156,7 +156,7 @@ fn trigger(contact: bool, violation: bool) -> Option<Trigger> {
     }
 }
 
-/// Eq. (6); kept between its two ends, which rounding may leave, so that offsets keep their order.
+/// Eq. (6), clamped to the interval that rounding may leave, so that the offsets keep their order.
 fn blend(delta: f64, offset: f64, factor: f64) -> f64 {
     let mixed = (1.0 - factor) * delta + factor * offset;
     mixed.max(delta.min(offset)).min(delta.max(offset))

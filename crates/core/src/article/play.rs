@@ -9,7 +9,7 @@ use crate::error::{ConfigError, require, require_finite};
 /// ```
 ///
 /// with input v and output y in any one unit. An offset is input minus output (decision 0001);
-/// it may have any sign. The operator is rate independent: it knows no time.
+/// it may have any sign. The operator is rate independent.
 ///
 /// Wrong when the slack has a rounded, pre-sliding shape (friction spread along a shaft): play
 /// has sharp corners.
@@ -19,7 +19,7 @@ pub struct Play {
     delta_plus: f64,
 }
 
-/// The memory of a [`Play`].
+/// The state of a [`Play`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlayState {
     /// The output y.
@@ -42,7 +42,7 @@ impl Play {
         })
     }
 
-    /// From offsets whose order the caller has established.
+    /// A play operator from offsets that the caller has ordered.
     pub(crate) const fn from_ordered(delta_minus: f64, delta_plus: f64) -> Self {
         Self {
             delta_minus,
@@ -77,7 +77,7 @@ impl Play {
     }
 
     /// The nearest position p = v - y that the contacts allow.
-    pub fn clamp(&self, position: f64) -> f64 {
+    pub(crate) fn clamp(&self, position: f64) -> f64 {
         position.max(self.delta_minus).min(self.delta_plus)
     }
 }

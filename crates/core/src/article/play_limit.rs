@@ -1,8 +1,8 @@
-//! How much slack there can be.
+//! Limits of the estimated contact offsets.
 
 use crate::error::{ConfigError, require_positive};
 
-/// The most slack to believe in, in the unit of the DOF.
+/// Largest width and offset of an estimated play, in the unit of the DOF.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlayLimit {
     width: f64,
@@ -10,7 +10,7 @@ pub struct PlayLimit {
 }
 
 impl PlayLimit {
-    /// Believes in any.
+    /// No limit.
     pub const NONE: Self = Self {
         width: f64::INFINITY,
         offset: f64::INFINITY,
@@ -26,17 +26,17 @@ impl PlayLimit {
         Ok(Self { width, offset })
     }
 
-    /// Whether command minus output may be so much.
+    /// Whether an offset, command minus output, is within the limit.
     pub fn allows(&self, offset: f64) -> bool {
         offset.abs() <= self.offset
     }
 
-    /// Whether these offsets are more slack than may be.
+    /// Whether the offsets or their width exceed the limit.
     pub fn exceeds(&self, minus: f64, plus: f64) -> bool {
         plus - minus > self.width || !self.allows(minus) || !self.allows(plus)
     }
 
-    /// The nearest offsets that may be: a width too large loses on both sides alike.
+    /// The nearest offsets within the limit: the surplus of a width is taken from both sides equally.
     pub fn clamp(&self, minus: f64, plus: f64) -> [f64; 2] {
         let [minus, plus] = [minus, plus].map(|value| value.max(-self.offset).min(self.offset));
         let surplus = (plus - minus - self.width) / 2.0;

@@ -1,4 +1,4 @@
-//! The state estimate from one image, Eqs. (13)-(16), and which DOF the image says nothing about.
+//! The state estimate from one image, Eqs. (13)-(16), and which DOFs the image does not determine.
 
 use crate::dof::{PerDof, all_finite};
 use crate::error::{ConfigError, require_positive};
@@ -6,20 +6,19 @@ use crate::model::features::FeaturePrediction;
 
 type Column = [f64; 4];
 
-/// One linear step from prediction to measurement, Eqs. (13)-(16), with its rank watched.
+/// One linear step from prediction to measurement, Eqs. (13)-(16), with a check of its rank.
 ///
 /// ```text
 /// q_hat = q + pinv(L) (s_measured - s_predicted)
-/// deviation_j = sqrt(((L' L)^-1)_jj)       standard deviation of DOF j per px of marker noise
+/// deviation_j = sqrt(((L' L)^-1)_jj)       standard deviation (std) of DOF j per px of marker noise
 /// ```
 ///
-/// with the interaction matrix L (4, 3). While a DOF's deviation exceeds its
-/// `observable_deviation`, one of these is held at its prediction, the one without which the rest
+/// with the interaction matrix L (4, 3). While the std of a DOF exceeds its
+/// `observable_deviation`, one such DOF is held at its prediction, the one without which the rest
 /// is best determined (by the worst ratio of the two, so that m and rad compare), and the rest is solved
 /// for again: rotation, for example, near zero bend.
 ///
-/// A band that was not found has no say: its two rows of L are left out, so that at least one DOF
-/// is held.
+/// The two rows of L of a band that was not found are left out, so that at least one DOF is held.
 ///
 /// Wrong far from the prediction: the step is linear and there is one of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,14 +26,14 @@ pub struct StateEstimator {
     observable_deviation: PerDof<f64>,
 }
 
-/// What one image says about the state.
+/// The state estimate from one image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StateEstimate {
     /// `q_hat` [m, rad, rad]; a DOF that is not observable has its prediction here.
     pub state: PerDof<f64>,
     /// Which DOFs the image determined.
     pub observable: PerDof<bool>,
-    /// Standard deviation per px of marker noise [m/px, rad/px]; for a held DOF that for which it
+    /// Standard deviation per px of marker noise [m/px, rad/px]; for a held DOF the value for which it
     /// was held.
     pub deviation: PerDof<f64>,
     /// `s_measured - s_predicted` in px; NaN for a band that was not found.
@@ -44,11 +43,11 @@ pub struct StateEstimate {
 }
 
 impl StateEstimate {
-    /// Standard deviations (3,) [m, rad, rad] of what was estimated from features of this covariance
-    /// (4, 4) in px^2: `sqrt((pinv(L) covariance pinv(L)')_jj)`. NaN for a DOF that was held.
+    /// Standard deviations (3,) [m, rad, rad] of the state estimate from the covariance (4, 4) of the features
+    /// in px^2: `sqrt((pinv(L) covariance pinv(L)')_jj)`. NaN for a DOF that was held.
     ///
-    /// The step is not weighted with the covariance, Eq. (16): this is how sure it is, not how
-    /// sure it could be. What a held DOF is off by is not in it.
+    /// The step is not weighted with the covariance, Eq. (16), so that a weighted estimate has smaller ones. The error
+    /// of a held DOF is not included.
     pub fn state_deviation(&self, covariance: &[[f64; 4]; 4]) -> PerDof<f64> {
         let mut deviations = [f64::NAN; 3];
         let rows = self.inverse.iter().zip(self.observable);
@@ -82,9 +81,9 @@ impl StateEstimator {
         })
     }
 
-    /// The state estimate for measured features (4,) in px, from the predicted state and what the
-    /// model predicts for it. Two NaN for a band say that it was not found. With anything else not
-    /// finite, no DOF is observable.
+    /// The state estimate from measured features (4,) in px, the predicted state and the features predicted for it.
+    ///
+    /// Two NaN mark a band that was not found. With any other value that is not finite, no DOF is observable.
     pub fn estimate(
         &self,
         predicted_state: PerDof<f64>,
@@ -93,15 +92,15 @@ impl StateEstimator {
     ) -> StateEstimate {
         let innovation = subtract(measured_features, prediction.features);
         let found = found(measured_features);
-        let seen = |column: Column| only(found, column);
-        let [insertion, rotation, bending] = prediction.columns.map(seen);
+        let masked = |column: Column| mask(found, column);
+        let [insertion, rotation, bending] = prediction.columns.map(masked);
         let [insertion_unit, rotation_unit, bending_unit] = self.observable_deviation;
-        let step = seen(innovation);
+        let step = masked(innovation);
         let finite = all_finite(step)
             && all_finite(predicted_state)
             && prediction.columns.iter().all(|column| all_finite(*column));
 
-        // In units of the largest deviation allowed, "observable" is "at most one".
+        // In units of the largest std allowed, a DOF is observable up to 1.
         let mut axes = [
             Unknown::new(insertion, insertion_unit, finite),
             Unknown::new(rotation, rotation_unit, finite),
@@ -129,13 +128,13 @@ impl StateEstimator {
     }
 }
 
-/// Which bands were found: not those with two NaN.
+/// Whether each band was found: two NaN mark one that was not.
 pub fn found([ua, va, ub, vb]: [f64; 4]) -> [bool; 2] {
     [!(ua.is_nan() && va.is_nan()), !(ub.is_nan() && vb.is_nan())]
 }
 
-/// Zeros for a band that was not found.
-fn only([a, b]: [bool; 2], [ua, va, ub, vb]: Column) -> Column {
+/// Replaces the entries of a band that was not found by zeros.
+fn mask([a, b]: [bool; 2], [ua, va, ub, vb]: Column) -> Column {
     let part = |found: bool, u: f64, v: f64| if found { (u, v) } else { (0.0, 0.0) };
     let ((ua, va), (ub, vb)) = (part(a, ua, va), part(b, ub, vb));
     [ua, va, ub, vb]
@@ -147,7 +146,7 @@ struct Unknown {
     column: Column,
     unit: f64,
     active: bool,
-    /// Deviation over `observable_deviation`.
+    /// Standard deviation over `observable_deviation`.
     ratio: f64,
     /// In `unit`.
     solution: f64,
@@ -184,12 +183,12 @@ impl Unknown {
     }
 
     /// Least squares for this DOF: with r the part of its column that no other column explains,
-    /// the solution is r e / r r and the deviation 1 / |r|.
+    /// the solution is r e / r r and the standard deviation 1 / |r|.
     fn solve(&mut self, others: [&Self; 2], innovation: Column) {
         let [first, second] =
             others.map(|other| if other.active { other.column } else { [0.0; 4] });
         let second = without(second, first);
-        // Twice: what rounding left of the other columns goes with the second pass.
+        // Twice: the second pass removes what rounding left of the other columns.
         let own = without(without(self.column, first), second);
         let own = without(without(own, first), second);
         let square = dot(own, own);
@@ -203,7 +202,7 @@ impl Unknown {
     }
 }
 
-/// Solve for the active DOFs; hold one that is not observable and say so if there is one.
+/// Solves for the active DOFs and holds one that is not observable; returns whether there was one.
 fn solve_and_hold_one(axes: &mut [Unknown; 3], innovation: Column) -> bool {
     solve(axes, innovation);
     let mut best: Option<(f64, [Unknown; 3])> = None;

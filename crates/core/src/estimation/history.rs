@@ -1,4 +1,4 @@
-//! The latest control ticks: a frame is compared with the state at its capture, not at its arrival.
+//! History of control ticks: a frame is compared with the state at its capture, not at its arrival.
 
 use crate::dof::{PerDof, all_finite};
 use crate::error::{ConfigError, require, require_positive};
@@ -6,23 +6,23 @@ use crate::error::{ConfigError, require, require_positive};
 /// One control tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Entry {
-    /// On the clock of the control tick, in s.
+    /// Time in s, on the clock of the control tick.
     pub time: f64,
-    /// The reference u, as far as it was admitted [m, rad, rad].
+    /// The reference u after the reference gate [m, rad, rad].
     pub reference: PerDof<f64>,
     /// The command c [m, rad, rad].
     pub command: PerDof<f64>,
     /// The predicted state q [m, rad, rad].
     pub predicted_state: PerDof<f64>,
-    /// The part of it by which images have moved the model so far [m, rad, rad].
+    /// The sum of the changes of q by image updates so far [m, rad, rad].
     pub corrected: PerDof<f64>,
-    /// How far the tip may have gone so far, forth and back [m, rad, rad]: as far as its command, or, where another DOF
-    /// takes the friction that held it, as the predicted state.
+    /// Largest possible travel of the tip so far, the sum of absolute motions [m, rad, rad]: that of its command, or of the
+    /// predicted state where another DOF takes up the friction that held the tip.
     pub travel: PerDof<f64>,
 }
 
 impl Entry {
-    /// An empty place in the storage of the history.
+    /// Initial content of the storage of a history.
     pub const BLANK: Self = Self {
         time: 0.0,
         reference: [0.0; 3],
@@ -33,11 +33,11 @@ impl Entry {
     };
 }
 
-/// The latest control ticks, as many as its storage `S` holds: an array, a vector, or a borrowed slice.
+/// Ring buffer of the latest control ticks in a storage `S`: an array, a vector, or a borrowed slice.
 #[derive(Debug, Clone)]
 pub struct History<S> {
     ring: S,
-    /// Where the next entry goes.
+    /// Index of the next entry.
     next: usize,
     len: usize,
     span: f64,
@@ -67,10 +67,9 @@ impl<S: AsRef<[Entry]> + AsMut<[Entry]>> History<S> {
         })
     }
 
-    /// Remember a tick.
+    /// Stores a tick; returns whether its time is before the newest one, which clears the history.
     ///
-    /// A time that jumps back starts the history afresh; then the answer is true. The same time
-    /// again replaces the newest entry. An entry that is not finite is not remembered.
+    /// An entry of equal time replaces the newest one. An entry that is not finite is not stored.
     pub fn push(&mut self, entry: Entry) -> bool {
         let finite = all_finite(entry.command) && all_finite(entry.predicted_state);
         if !(finite && entry.time.is_finite()) {
@@ -92,13 +91,13 @@ impl<S: AsRef<[Entry]> + AsMut<[Entry]>> History<S> {
         jumped
     }
 
-    /// What held at `time` in s, interpolated between two ticks.
+    /// The entry at `time` in s, interpolated between two ticks.
     ///
     /// None before the oldest tick within the span, more than one period after the newest, and
     /// for a time that is not finite.
     pub fn at(&self, time: f64) -> Option<Entry> {
         let newest = *self.newest()?;
-        // Clocks that count ticks differ in the last digits.
+        // Times that count ticks differ by rounding.
         let ahead = self.period * (1.0 + 1e-6);
         if !(time >= newest.time - self.span && time <= newest.time + ahead) {
             return None;
@@ -106,7 +105,7 @@ impl<S: AsRef<[Entry]> + AsMut<[Entry]>> History<S> {
         if time >= newest.time {
             return Some(Entry { time, ..newest });
         }
-        // Ages 0 (newest, later than `time`) to len - 1: the youngest that is not later.
+        // Bisection over the ages 0 (newest, later than `time`) to len - 1 for the youngest that is not later.
         let (mut later, mut sought) = (0, self.len - 1);
         if self.aged(sought)?.time > time {
             return None;
@@ -139,7 +138,7 @@ impl<S: AsRef<[Entry]> + AsMut<[Entry]>> History<S> {
         (0..count).rev().filter_map(|age| self.aged(age))
     }
 
-    /// The time of the newest tick in s, NaN without one.
+    /// The time of the newest tick in s; NaN if the history is empty.
     pub fn newest_time(&self) -> f64 {
         self.newest().map_or(f64::NAN, |newest| newest.time)
     }

@@ -87,7 +87,7 @@ impl FeatureModel {
     }
 
     /// What `nearest_state` minimises, for a state.
-    pub fn misfit(
+    pub(crate) fn misfit(
         &self,
         belief: &Belief,
         state: PerDof<f64>,

@@ -4,11 +4,11 @@
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Deserialize))]
 pub struct StateEstimationSettings {
-    /// Standard deviation in px of a marker that comes without a covariance.
+    /// Standard deviation in px of a marker without a covariance.
     pub marker_deviation: f64,
     /// Standard deviation in px of the feature model beyond the markers' covariance.
     pub model_deviation: f64,
-    /// Standard deviation in m of the tip's displacement across the bend by a section that bends unevenly.
+    /// Standard deviation in m of the tip's displacement across the bend by uneven curvature.
     pub sideways_deviation: f64,
     /// Mahalanobis distance beyond which a marker is an outlier; infinite: never.
     pub outlier_distance: f64,

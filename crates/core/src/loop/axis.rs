@@ -1,29 +1,29 @@
-//! One DOF of the loop: its law, and the estimate of its offsets.
+//! One DOF of the loop: compensation law and offset estimate.
 
 use crate::article::estimator::Triggers;
 use crate::article::play::Play;
 use crate::article::play_limit::PlayLimit;
 use crate::supervision::monitors::Law;
 
-/// One DOF, whatever the profile; every quantity in its unit.
+/// One DOF of either profile; every quantity is in its unit.
 pub trait Axis: Law {
     /// The predicted state q; NaN before the first reference.
     fn predicted_state(&self) -> f64;
 
-    /// The estimated play where the DOF is now.
+    /// The estimated play at the present position of the DOF.
     fn play(&self) -> Play;
 
-    /// Least and largest offset that the estimate allows where the DOF is now.
+    /// Least and largest offset that the estimate allows at the present position of the DOF.
     fn offsets(&self) -> (f64, f64);
 
-    /// Limit the estimate of the offsets.
+    /// Sets the limit of the estimated offsets.
     fn set_limit(&mut self, limit: PlayLimit);
 
-    /// The limit of the estimate.
+    /// The limit of the estimated offsets.
     fn play_limit(&self) -> PlayLimit;
 
-    /// Update the offsets from command and output of one instant, the output's standard deviation, and the commands
-    /// since, oldest first.
+    /// Updates the offsets from command and output of one instant, the output's standard deviation, and the commands
+    /// since then, oldest first.
     fn update_offsets(
         &mut self,
         command: f64,
@@ -50,14 +50,14 @@ pub trait Axis: Law {
     }
 }
 
-/// What an image changed of the offsets of a DOF.
+/// Result of the offset update of a DOF.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct OffsetUpdate {
     /// Which offsets were updated, and why.
     pub triggers: Triggers,
     /// Whether the limit bounded the update.
     pub is_limited: bool,
-    /// Change of (`delta_minus`, `delta_plus`) where the DOF is; 0 in profile `paper`, where any one image may change
-    /// all.
+    /// Change of (`delta_minus`, `delta_plus`) at the position of the DOF; 0 in profile `paper`, whose changes are not
+    /// monitored.
     pub change: [f64; 2],
 }

@@ -14,7 +14,7 @@ use crate::estimation::whereabouts::{Whereabouts, WhereaboutsSettings};
 use crate::r#loop::axis::{Axis, OffsetUpdate};
 use crate::r#loop::measurement::Measurement;
 use crate::r#loop::paper::state_estimator;
-use crate::r#loop::profile::Profile;
+use crate::r#loop::profile::ProfileBlocks;
 use crate::r#loop::settings::Settings;
 use crate::model::features::FeatureModel;
 use crate::supervision::flags::Flags;
@@ -28,12 +28,12 @@ pub struct Best {
     state_estimator: WeightedEstimator,
 }
 
-impl Profile for Best {
+impl ProfileBlocks for Best {
     type Axis = AdaptiveAxis;
 
     const UNCHECKED: Flags = Flags::NONE;
 
-    // Without an allocator the axes have nowhere else to be.
+    // Without an allocator the axes are on the stack.
     #[allow(clippy::large_stack_arrays)]
     fn new(settings: &Settings) -> Result<Self, ConfigError> {
         let diameter = settings.instrument.diameter;
@@ -90,25 +90,25 @@ impl Profile for Best {
         measured: [f64; 4],
         covariance: Option<&[[f64; 4]; 4]>,
     ) -> Option<Measurement> {
-        let belief = whereabouts.at(past);
-        let seen = self
+        let prior = whereabouts.at(past);
+        let posterior = self
             .state_estimator
-            .estimate(model, &belief, measured, covariance)?;
-        let half_turn = half_turn(belief.state, seen.estimate.state);
+            .estimate(model, &prior, measured, covariance)?;
+        let half_turn = half_turn(prior.state, posterior.estimate.state);
         Some(Measurement {
             estimate: StateEstimate {
-                state: turn(seen.estimate.state, half_turn),
-                ..seen.estimate
+                state: turn(posterior.estimate.state, half_turn),
+                ..posterior.estimate
             },
-            used: seen.used,
-            predicted_features: seen.predicted_features,
-            state_deviation: seen.deviation,
-            output: turn(seen.image_state, half_turn),
-            output_deviation: seen.image_deviation,
+            used: posterior.used,
+            predicted_features: posterior.predicted_features,
+            state_deviation: posterior.deviation,
+            output: turn(posterior.image_state, half_turn),
+            output_deviation: posterior.image_deviation,
         })
     }
 
-    fn settle(
+    fn update_prediction(
         &self,
         whereabouts: &mut Whereabouts,
         past: &Entry,

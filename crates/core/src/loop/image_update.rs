@@ -1,11 +1,11 @@
-//! The image update of the loop: from features to estimates, through the monitors.
+//! The image update of the loop: checks of the monitors, state estimate, offset estimates.
 
 use crate::article::estimator::Triggers;
 use crate::article::state::{StateEstimate, found};
 use crate::dof::PerDof;
 use crate::estimation::history::Entry;
 use crate::r#loop::axis::Axis;
-use crate::r#loop::measurement::{Measurement, reversed, usable};
+use crate::r#loop::measurement::{Measurement, is_reversed, is_usable};
 use crate::r#loop::profile::Profile;
 use crate::r#loop::reduction::HysteresisReduction;
 use crate::r#loop::report::{Report, Status};
@@ -16,8 +16,8 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
     /// Image update: the features (4,) in px measured in a frame captured at `captured_at` in s, and their
     /// covariance (4, 4) in px^2; None is 1 px^2 for each, or `marker_deviation` of profile `best`.
     ///
-    /// Two NaN for a band say that it was not found; None, or features that are not finite otherwise, that neither
-    /// was. A `checksum` of the pixels identifies a frozen image; without it, equal features do.
+    /// Two NaN mark a band that was not found; None, or any other value that is not finite, means that no band was. A
+    /// `checksum` of the pixels identifies a frozen image; without it, equal features do.
     pub fn on_features(
         &mut self,
         measured: Option<[f64; 4]>,
@@ -53,27 +53,27 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
             *raised = self
                 .monitors
                 .enabled(raised.union(Flags::of(Flag::Duplicate)));
-            return self.unused(Status::Duplicate, None);
+            return self.report_unused(Status::Duplicate, None);
         }
         let Some(past) = past else {
-            return self.unused(Status::Stale, None);
+            return self.report_unused(Status::Stale, None);
         };
         if !raised.is_empty() {
-            return self.unused(Status::Refused, Some(past));
+            return self.report_unused(Status::Refused, Some(past));
         }
-        let Some(measured) = measured.filter(|features| usable(*features)) else {
+        let Some(measured) = measured.filter(|features| is_usable(*features)) else {
             self.whereabouts.miss(&past);
             self.monitors.frames.miss(past.travel);
             *raised = self.monitors.enabled(Flags::of(Flag::Lost));
-            return self.unused(Status::NoMarkers, Some(past));
+            return self.report_unused(Status::NoMarkers, Some(past));
         };
         let Some(measurement) = self.measure(&past, measured, covariance) else {
-            return self.unused(Status::Held, Some(past));
+            return self.report_unused(Status::Held, Some(past));
         };
         *raised = self.check_innovation(&past, &measurement, measured, covariance);
         if !raised.is_empty() {
             self.whereabouts.miss(&past);
-            return self.unused(Status::Refused, Some(past));
+            return self.report_unused(Status::Refused, Some(past));
         }
         self.last_used = captured_at;
         self.accept(&past, &measurement, measured, raised)
@@ -102,26 +102,27 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
         measured: [f64; 4],
         covariance: Option<&[[f64; 4]; 4]>,
     ) -> Flags {
-        let belief = self.whereabouts.at(past);
+        let prior = self.whereabouts.at(past);
         let moved = self.whereabouts.moved(past);
         let offsets = self.offsets();
         let check = |measurement: &Measurement| {
             let sightings = measurement.sightings(past, offsets);
             let frames = &self.monitors.frames;
             frames
-                .check_innovation(&belief, moved, &sightings)
+                .check_innovation(&prior, moved, &sightings)
                 .difference(P::UNCHECKED)
         };
         let flags = check(measurement);
         let is_used = measurement.used != [false; 2];
-        let expected = self.feature_model.predict(belief.state);
-        let is_reversed = expected.is_some_and(|expected| reversed(expected.features, measured));
-        if !is_reversed && is_used && flags.is_empty() {
+        let expected = self.feature_model.predict(prior.state);
+        let is_exchanged =
+            expected.is_some_and(|expected| is_reversed(expected.features, measured));
+        if !is_exchanged && is_used && flags.is_empty() {
             return Flags::NONE;
         }
         let [ua, va, ub, vb] = measured;
         let exchanged = self.measure(past, [ub, vb, ua, va], covariance);
-        let is_swapped = is_reversed
+        let is_swapped = is_exchanged
             || exchanged.is_some_and(|other| other.used == [true; 2] && check(&other).is_empty());
         let swapped = self
             .monitors
@@ -133,7 +134,7 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
         }
     }
 
-    /// Take in a measurement that has passed the checks.
+    /// Updates the estimates from a measurement that has passed the checks.
     fn accept(
         &mut self,
         past: &Entry,
@@ -141,11 +142,11 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
         measured: [f64; 4],
         raised: &mut Flags,
     ) -> Report {
-        let belief = self.whereabouts.at(past);
+        let prior = self.whereabouts.at(past);
         let sightings = measurement.sightings(past, self.offsets());
-        self.monitors.frames.accept(&belief, &sightings);
+        self.monitors.frames.accept(&prior, &sightings);
         self.profile
-            .settle(&mut self.whereabouts, past, measurement, measured);
+            .update_prediction(&mut self.whereabouts, past, measurement, measured);
         let estimate = measurement.estimate;
         let status = match (measurement.used, estimate.observable) {
             ([true, false] | [false, true], _) => Status::Partial,
@@ -153,7 +154,7 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
             _ => Status::Held,
         };
         let is_used = measurement.used != [false; 2];
-        // Two markers of which one is an outlier: the other may be as wrong.
+        // Of two markers with an outlier, the other one may be wrong, too.
         let has_outlier = is_used && measurement.used != found(measured);
         let outlier = self
             .monitors
@@ -184,7 +185,7 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
         }
     }
 
-    /// Update the offsets of the observable DOFs; flags of what the update shows are raised.
+    /// Updates the offsets of the observable DOFs and raises flags for conspicuous changes.
     fn update_offsets(
         &mut self,
         past: &Entry,
@@ -233,7 +234,7 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
     }
 
     /// The report on a frame that updated nothing.
-    fn unused(&self, status: Status, past: Option<Entry>) -> Report {
+    fn report_unused(&self, status: Status, past: Option<Entry>) -> Report {
         let predicted_state = past.map_or([f64::NAN; 3], |past| past.predicted_state);
         let prediction = self.feature_model.predict(predicted_state);
         Report {

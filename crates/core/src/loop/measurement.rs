@@ -1,14 +1,14 @@
-//! What one image says of the state.
+//! The state estimate from one image, as both profiles provide it.
 
 use crate::article::state::{StateEstimate, found};
 use crate::dof::{PerDof, all_finite};
 use crate::estimation::history::Entry;
 use crate::supervision::grip::Sighting;
 
-/// The state estimate from one image.
+/// A state estimate with the outputs for the offset estimation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measurement {
-    /// `q_hat`, innovation and what could be observed.
+    /// `q_hat`, innovation and which DOFs are observable.
     pub estimate: StateEstimate,
     /// Which markers were used.
     pub used: [bool; 2],
@@ -58,14 +58,14 @@ impl Measurement {
 
 /// Whether the vectors from band A to band B of two sets of features (4,) in px differ in direction by more than
 /// 120 degrees.
-pub fn reversed([ua, va, ub, vb]: [f64; 4], [xa, ya, xb, yb]: [f64; 4]) -> bool {
+pub fn is_reversed([ua, va, ub, vb]: [f64; 4], [xa, ya, xb, yb]: [f64; 4]) -> bool {
     let (u, v, x, y) = (ub - ua, vb - va, xb - xa, yb - ya);
     let lengths = libm::sqrt((u * u + v * v) * (x * x + y * y));
     u * x + v * y < -0.5 * lengths
 }
 
 /// Whether a band was found, and every band found is finite.
-pub fn usable([ua, va, ub, vb]: [f64; 4]) -> bool {
+pub fn is_usable([ua, va, ub, vb]: [f64; 4]) -> bool {
     let [a, b] = found([ua, va, ub, vb]);
     (a || b) && (!a || all_finite([ua, va])) && (!b || all_finite([ub, vb]))
 }

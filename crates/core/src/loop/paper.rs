@@ -11,7 +11,7 @@ use crate::estimation::history::Entry;
 use crate::estimation::whereabouts::{Whereabouts, WhereaboutsSettings};
 use crate::r#loop::axis::{Axis, OffsetUpdate};
 use crate::r#loop::measurement::Measurement;
-use crate::r#loop::profile::Profile;
+use crate::r#loop::profile::ProfileBlocks;
 use crate::r#loop::settings::Settings;
 use crate::model::features::FeatureModel;
 use crate::settings::DofSettings;
@@ -33,7 +33,7 @@ pub struct Paper {
     state_estimator: StateEstimator,
 }
 
-impl Profile for Paper {
+impl ProfileBlocks for Paper {
     type Axis = ArticleAxis;
 
     /// The estimate jumps where a DOF begins or ceases to be held.
@@ -71,8 +71,8 @@ impl Profile for Paper {
         false
     }
 
-    /// One linear step from the prediction, Eqs. (13)-(16). With one band it starts from where the last images had the
-    /// tip: what is held must be as right as is known.
+    /// One linear step from the prediction, Eqs. (13)-(16). With one band the step starts from the state prediction of the
+    /// last images, because the DOFs that are held keep its error.
     fn measure(
         &self,
         model: &FeatureModel,
@@ -100,7 +100,7 @@ impl Profile for Paper {
         })
     }
 
-    fn settle(
+    fn update_prediction(
         &self,
         whereabouts: &mut Whereabouts,
         past: &Entry,
@@ -122,7 +122,7 @@ pub fn state_estimator(settings: &Settings) -> Result<StateEstimator, ConfigErro
 /// Compensator and estimator of one DOF, each with its state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ArticleAxis {
-    /// As configured; `compensator` has the share of its free gain in use.
+    /// The compensator of the configuration; `compensator` uses a share of its free gain.
     configured: Compensator,
     compensator: Compensator,
     estimator: Estimator,

@@ -1,4 +1,4 @@
-//! What the profiles `paper` and `best` have in common.
+//! The interface of the profiles `paper` and `best`.
 
 use crate::dof::PerDof;
 use crate::error::ConfigError;
@@ -10,8 +10,14 @@ use crate::r#loop::settings::Settings;
 use crate::model::features::FeatureModel;
 use crate::supervision::flags::Flags;
 
-/// The laws of the three DOFs, and the state estimation that feeds them.
-pub trait Profile: Sized {
+/// A profile of the loop, `Paper` or `Best`.
+#[expect(private_bounds, reason = "only this crate implements profiles")]
+pub trait Profile: ProfileBlocks {}
+
+impl<P: ProfileBlocks> Profile for P {}
+
+/// Compensation laws and offset estimates of the three DOFs, and the state estimation.
+pub(crate) trait ProfileBlocks: Sized {
     /// One DOF.
     type Axis: Axis;
 
@@ -24,7 +30,7 @@ pub trait Profile: Sized {
     /// A setting is out of range.
     fn new(settings: &Settings) -> Result<Self, ConfigError>;
 
-    /// The prediction of where the bands are, before the first image.
+    /// The state prediction before the first image.
     ///
     /// # Errors
     /// A setting is out of range.
@@ -33,14 +39,14 @@ pub trait Profile: Sized {
     /// The three DOFs.
     fn axes(&self) -> &PerDof<Self::Axis>;
 
-    /// The three DOFs, to step and to update.
+    /// The three DOFs, mutable.
     fn axes_mut(&mut self) -> &mut PerDof<Self::Axis>;
 
-    /// Pass the friction that the DOFs share between them, after a control tick; whether they share any.
+    /// Updates the friction that the DOFs share, after a control tick; returns whether they share any.
     fn couple(&mut self, reference: PerDof<f64>) -> bool;
 
-    /// The state estimate from features (4,) in px and their covariance (4, 4) in px^2; None where the model sees no
-    /// band.
+    /// The state estimate from features (4,) in px and their covariance (4, 4) in px^2; None where a band is not
+    /// visible.
     fn measure(
         &self,
         model: &FeatureModel,
@@ -50,8 +56,8 @@ pub trait Profile: Sized {
         covariance: Option<&[[f64; 4]; 4]>,
     ) -> Option<Measurement>;
 
-    /// Update the prediction of where the bands are.
-    fn settle(
+    /// Updates the state prediction with a measurement.
+    fn update_prediction(
         &self,
         whereabouts: &mut Whereabouts,
         past: &Entry,

@@ -10,7 +10,8 @@ use crate::r#loop::axis::Axis;
 use crate::r#loop::profile::Profile;
 use crate::r#loop::settings::Settings;
 use crate::model::features::FeatureModel;
-use crate::supervision::monitors::{Law, Monitors};
+use crate::supervision::flags::Flag;
+use crate::supervision::monitors::{Law, Monitors, Supervision};
 
 /// Image-based hysteresis reduction, Fig. 6: reference in, command out; images update the estimate of the hysteresis.
 ///
@@ -53,7 +54,7 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
 
     /// Control tick at `time` in s: reference (3,) in, command (3,) out [m, rad, rad].
     ///
-    /// `stamp` in s is when the reference was made, if that is known. A reference that is not finite
+    /// `stamp` is the time in s at which the reference was generated, if known. A reference that is not finite
     /// holds the command, which before the first reference is NaN.
     pub fn step(&mut self, reference: PerDof<f64>, stamp: Option<f64>, time: f64) -> PerDof<f64> {
         let (command_before, state_before) = (self.command(), self.predicted_state());
@@ -62,7 +63,7 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
         let (gated, command) = (self.monitors.reference(), self.command());
         let mut moved = distance(command_before, command);
         if self.profile.couple(gated) {
-            // Friction that another DOF takes releases a tip whose command rests.
+            // Where another DOF takes up the friction, a tip moves although its command rests.
             let released = distance(state_before, self.predicted_state());
             for (moved, released) in moved.iter_mut().zip(released) {
                 *moved = moved.max(released);
@@ -85,17 +86,17 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
         command
     }
 
-    /// The state (3,) [m, rad, rad] in a frame captured at `captured_at` in s, with its standard deviation: the
-    /// prediction, corrected by the last images. It says where to look, and to the weighted estimation where to start.
+    /// The predicted state (3,) [m, rad, rad] at `captured_at` in s with its standard deviation: the prior of the marker
+    /// detection and of the weighted state estimation, corrected by the last images.
     ///
     /// None beyond the history.
-    pub fn expectation(&self, captured_at: f64) -> Option<Belief> {
+    pub fn predict_state(&self, captured_at: f64) -> Option<Belief> {
         Some(self.whereabouts.at(&self.history.at(captured_at)?))
     }
 
     /// Predicted features (4,) in px of a frame captured at `captured_at` in s.
     ///
-    /// None beyond the history and where a band cannot be seen.
+    /// None beyond the history and where a band is not visible.
     pub fn predicted_features(&self, captured_at: f64) -> Option<[f64; 4]> {
         let past = self.history.at(captured_at)?;
         let prediction = self.feature_model.predict(past.predicted_state)?;
@@ -112,14 +113,24 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
         self.profile.axes().each_ref().map(Axis::play)
     }
 
-    /// Supervision of the loop.
-    pub const fn monitors(&self) -> &Monitors {
-        &self.monitors
+    /// State of the supervision.
+    pub fn supervision(&self) -> Supervision {
+        self.monitors.supervision()
     }
 
-    /// Supervision of the loop, to re-engage, to acknowledge, and to raise flags of the rig.
-    pub const fn monitors_mut(&mut self) -> &mut Monitors {
-        &mut self.monitors
+    /// Re-engage the operator input: motion continues from rest, with the next increment of the reference.
+    pub fn engage(&mut self) {
+        self.monitors.engage();
+    }
+
+    /// Acknowledge the warnings.
+    pub const fn acknowledge(&mut self) {
+        self.monitors.acknowledge();
+    }
+
+    /// Raise a flag that only the rig can detect.
+    pub fn raise(&mut self, flag: Flag) {
+        self.monitors.raise(flag);
     }
 
     fn command(&self) -> PerDof<f64> {

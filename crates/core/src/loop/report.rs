@@ -11,37 +11,37 @@ use crate::supervision::monitors::Supervision;
 pub enum Status {
     /// Every DOF was measured.
     Ok,
-    /// Some DOF could not be observed and was held.
+    /// At least one DOF was not observable and was held.
     Held,
-    /// Only one marker was used; what it does not determine was held.
+    /// Only one marker was used; the DOFs that it does not determine were held.
     Partial,
     /// The markers were not found.
     NoMarkers,
-    /// Captured at a time the history does not reach.
+    /// The frame was captured at a time beyond the history.
     Stale,
-    /// Captured no later than a frame already used.
+    /// The frame was captured no later than one already used.
     Duplicate,
-    /// A monitor refused it: it updated nothing.
+    /// A monitor refused the frame: it updated nothing.
     Refused,
 }
 
-/// The image update of a frame; NaN is what is not known.
+/// The image update of a frame; unknown values are NaN.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Report {
-    /// What became of the frame.
+    /// Whether the frame was used, or why not.
     pub status: Status,
     /// q at the capture time [m, rad, rad].
     pub predicted_state: PerDof<f64>,
     /// h in px of the state the estimate started from: q, or the state predicted from the last images.
     pub predicted_features: [f64; 4],
-    /// `q_hat`, innovation and what could be observed.
+    /// `q_hat`, innovation and which DOFs are observable.
     pub estimate: StateEstimate,
     /// Standard deviation of each DOF of `q_hat` [m, rad, rad].
     pub state_deviation: PerDof<f64>,
     /// Which offsets were updated, and why.
     pub triggers: PerDof<Triggers>,
-    /// The offsets from now on [m, rad, rad].
+    /// The estimated play after the update [m, rad, rad].
     pub play: PerDof<Play>,
-    /// What is in force from now on, and why.
+    /// State of the supervision after the update.
     pub supervision: Supervision,
 }

@@ -3,13 +3,14 @@
 use crate::adaptive::settings::AdaptiveSettings;
 use crate::dof::PerDof;
 use crate::error::ConfigError;
+use crate::estimation::history::history_entries;
 use crate::estimation::settings::StateEstimationSettings;
 use crate::model::features::FeatureModel;
 use crate::model::settings::{CameraSettings, InstrumentSettings};
 use crate::settings::{ControlSettings, DofSettings};
 use crate::supervision::settings::SafetySettings;
 
-/// What a loop depends on: the sections of the TOML configuration that the core reads, by their names.
+/// Settings of a loop: the sections of the TOML configuration that the core reads, by their names.
 ///
 /// `python/tautscope/config` has every default with its origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,11 +38,16 @@ pub struct Settings {
 
 impl Settings {
     /// The three DOFs in their order.
-    pub const fn dofs(&self) -> PerDof<DofSettings> {
+    pub(crate) const fn dofs(&self) -> PerDof<DofSettings> {
         [self.insertion, self.rotation, self.bending]
     }
 
-    /// Predicted features, Eqs. (9)-(11).
+    /// Entries of the history that a loop with these settings needs.
+    pub fn history_entries(&self) -> usize {
+        history_entries(self.control.history, self.control.period)
+    }
+
+    /// The model that predicts features, Eqs. (9)-(11).
     ///
     /// # Errors
     /// A length, a focal length or the pose is out of range.

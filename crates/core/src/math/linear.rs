@@ -1,8 +1,8 @@
-//! Vectors in three dimensions, and two functions that are exact and smooth at zero.
+//! Vectors in three dimensions, small linear systems, and the function sinc with its derivative.
 
 pub type Vector = [f64; 3];
 
-/// Three rows.
+/// A matrix as three rows.
 pub type Matrix = [Vector; 3];
 
 pub fn dot([ax, ay, az]: Vector, [bx, by, bz]: Vector) -> f64 {
@@ -18,7 +18,7 @@ pub fn scale(factor: f64, vector: Vector) -> Vector {
     vector.map(|value| factor * value)
 }
 
-/// Entry by entry.
+/// Product entry by entry.
 pub fn times([a, b, c]: Vector, [x, y, z]: Vector) -> Vector {
     [a * x, b * y, c * z]
 }
@@ -45,7 +45,7 @@ pub fn sinc_slope(x: f64) -> f64 {
     -x / 3.0 * tail
 }
 
-/// Right-handed.
+/// Right-handed cross product.
 pub fn cross([ax, ay, az]: Vector, [bx, by, bz]: Vector) -> Vector {
     [ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx]
 }
@@ -54,7 +54,7 @@ pub fn square(x: f64) -> f64 {
     x * x
 }
 
-/// x in A x = b for a symmetric, positive definite A; None where it is not.
+/// x in A x = b for a symmetric, positive definite A; None for any other matrix.
 pub fn solve_symmetric(
     [[a, b, c], [_, d, e], [_, _, f]]: Matrix,
     [x, y, z]: Vector,
@@ -72,7 +72,7 @@ pub fn solve_symmetric(
     (a > 0.0 && p1 > 0.0 && p2 > 0.0).then_some([x, y, z])
 }
 
-/// The diagonal of the inverse of a symmetric, positive definite matrix; None where it is not.
+/// The diagonal of the inverse of a symmetric, positive definite matrix; None for any other matrix.
 pub fn diagonal_of_inverse(rows: Matrix) -> Option<Vector> {
     let [x, _, _] = solve_symmetric(rows, [1.0, 0.0, 0.0])?;
     let [_, y, _] = solve_symmetric(rows, [0.0, 1.0, 0.0])?;

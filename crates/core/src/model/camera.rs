@@ -1,9 +1,9 @@
-//! The endoscope's camera, Eq. (8).
+//! Model of the endoscope's camera, Eq. (8).
 
 use crate::error::{ConfigError, require_finite, require_positive};
 use crate::math::linear::{Matrix, Vector, add, rotate, sinc};
 
-/// Pinhole with the distortion of `OpenCV`'s calibration, Eq. (8).
+/// Pinhole camera with the distortion model of `OpenCV`, Eq. (8).
 ///
 /// ```text
 /// x = X / Z,  y = Y / Z,  r2 = x^2 + y^2
@@ -14,8 +14,7 @@ use crate::math::linear::{Matrix, Vector, add, rotate, sinc};
 ///
 /// for a point (X, Y, Z) in m in the camera frame (x right, y down, z forward); u, v in px.
 ///
-/// Wrong far outside the calibrated field, where the polynomial folds back into the image:
-/// `Projection::is_folded`.
+/// Wrong far outside the calibrated field, where the polynomial folds back into the image.
 /// Source: `OpenCV`, `calib3d` module, "Camera Calibration and 3D Reconstruction".
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Camera {
@@ -24,7 +23,7 @@ pub struct Camera {
     distortion: [f64; 8],
 }
 
-/// An image point and how it moves with the point in space.
+/// An image point and its Jacobian by the point in space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Projection {
     /// u, v in px.
@@ -35,8 +34,8 @@ pub struct Projection {
 }
 
 impl Projection {
-    /// Whether the distortion has mirrored or turned the image over here: no lens does that.
-    pub const fn is_folded(&self) -> bool {
+    /// Whether the distortion mirrors the image here, which no lens does.
+    pub(crate) const fn is_folded(&self) -> bool {
         self.folded
     }
 }
@@ -81,7 +80,7 @@ impl Camera {
         let above_slope = k1 + square * (2.0 * k2 + square * 3.0 * k3);
         let below_slope = k4 + square * (2.0 * k5 + square * 3.0 * k6);
         let gain = above / below;
-        // By x: this times x; by y: this times y.
+        // d gain / dx is this times x, d gain / dy this times y.
         let gain_slope = 2.0 * (above_slope - gain * below_slope) / below;
 
         let bent_x = x * gain + 2.0 * p1 * x * y + p2 * (square + 2.0 * x * x);
@@ -111,7 +110,7 @@ impl Camera {
     }
 }
 
-/// A rigid motion; named by the frames it joins: `camera_from_guide` takes guide to camera.
+/// A rigid transform, named by its frames: `camera_from_guide` transforms from the guide to the camera frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
     rotation: Matrix,
@@ -159,13 +158,13 @@ impl Pose {
         })
     }
 
-    /// A point, from the inner frame to the outer.
-    pub fn transform(&self, point: Vector) -> Vector {
+    /// Transforms a point from the inner frame to the outer.
+    pub(crate) fn transform(&self, point: Vector) -> Vector {
         add(self.rotate(point), 1.0, self.translation)
     }
 
-    /// A direction, from the inner frame to the outer.
-    pub fn rotate(&self, direction: Vector) -> Vector {
+    /// Rotates a direction from the inner frame to the outer.
+    pub(crate) fn rotate(&self, direction: Vector) -> Vector {
         rotate(&self.rotation, direction)
     }
 }

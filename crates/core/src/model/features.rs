@@ -23,11 +23,11 @@ use crate::model::settings::{CameraSettings, InstrumentSettings};
 /// ```
 ///
 /// m is the mean of the visible surface, each element weighted by the solid angle it fills, to
-/// first order in r/D; e adds that near parts fill more of the image than far ones. With r = l = 0
+/// first order in r/D; e accounts for near parts filling more of the image than far ones. With r = l = 0
 /// it is the article's h.
 ///
-/// Wrong where the scope or tissue hides part of a band, within a few radii of the camera, and, by
-/// some 0.3 px, where the distortion changes much across a band.
+/// Wrong where the endoscope or tissue hides part of a band, within a few radii of the camera, and, by
+/// about 0.3 px, where the distortion varies strongly across a band.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FeatureModel {
     instrument: Instrument,
@@ -35,7 +35,7 @@ pub struct FeatureModel {
     camera_from_guide: Pose,
 }
 
-/// What the camera should see, and how it changes with the state.
+/// Predicted features and their interaction matrix.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FeaturePrediction {
     /// h(q): u and v of band A, u and v of band B in px.
@@ -44,14 +44,14 @@ pub struct FeaturePrediction {
     pub columns: PerDof<[f64; 4]>,
 }
 
-/// A function of the state: its value and its change per DOF.
-struct Moving {
+/// A vector that depends on the state, and its derivative by each DOF.
+struct Differentiated {
     value: Vector,
     by_dof: PerDof<Vector>,
 }
 
 impl FeatureModel {
-    /// The model of one instrument seen by one camera.
+    /// The model of an instrument in the image of a camera.
     pub const fn new(instrument: Instrument, camera: Camera, camera_from_guide: Pose) -> Self {
         Self {
             instrument,
@@ -88,8 +88,8 @@ impl FeatureModel {
 
     /// h(q) and its interaction matrix for the state q (3,) [m, rad, rad].
     ///
-    /// None where a band cannot be seen: behind the camera, looked at along its axis, in the part
-    /// of the image the distortion folds over, or for a state that is not finite.
+    /// None where a band is not visible: behind the camera, seen along its axis, or in the part
+    /// of the image that the distortion folds; and for a state that is not finite.
     pub fn predict(&self, state: PerDof<f64>) -> Option<FeaturePrediction> {
         let [marker_a, marker_b] = self.instrument.markers(state);
         let ([ua, va], [ua_by, va_by]) = self.centroid(&marker_a)?;
@@ -103,10 +103,10 @@ impl FeatureModel {
         finite.then_some(prediction)
     }
 
-    /// How the features move, (4,) in px/m, when the tip is displaced across the bend and not
-    /// turned, towards the side it bends to: what a section that does not bend evenly does.
+    /// Derivative (4,) in px/m of the features by a displacement of the tip across the bend, towards the side it bends
+    /// to and without a rotation, as by a section of uneven curvature.
     ///
-    /// None where [`FeatureModel::predict`] gives none.
+    /// None where [`FeatureModel::predict`] is.
     pub(crate) fn sideways(&self, state: PerDof<f64>) -> Option<[f64; 4]> {
         let [_, rotation, bending] = state;
         let (along, across) = (libm::sin(bending / 2.0), libm::cos(bending / 2.0));
@@ -138,21 +138,21 @@ impl FeatureModel {
         })
     }
 
-    /// The image of a point in the camera frame; None where there is none.
+    /// The image (u, v) in px of a point in the camera frame; None where it has none.
     pub(crate) fn project(&self, point: Vector) -> Option<[f64; 2]> {
         let projection = self.camera.project(point)?;
         (!projection.is_folded()).then_some(projection.pixel)
     }
 
-    /// The image of one band: u and v, and each by DOF.
+    /// The centroid (u, v) in px of the image of a band, and the derivatives of u and v by each DOF.
     fn centroid(&self, marker: &Marker) -> Option<([f64; 2], [PerDof<f64>; 2])> {
-        let centre = Moving {
+        let centre = Differentiated {
             value: self.camera_from_guide.transform(marker.position),
             by_dof: marker
                 .position_by_dof
                 .map(|by| self.camera_from_guide.rotate(by)),
         };
-        let axis = Moving {
+        let axis = Differentiated {
             value: self.camera_from_guide.rotate(marker.axis),
             by_dof: marker
                 .axis_by_dof
@@ -170,13 +170,17 @@ impl FeatureModel {
     }
 
     /// The point whose image is the centroid of the visible part of a band.
-    fn visible_point(&self, centre: &Moving, axis: &Moving) -> Option<Moving> {
+    fn visible_point(
+        &self,
+        centre: &Differentiated,
+        axis: &Differentiated,
+    ) -> Option<Differentiated> {
         let (radius, length) = (self.instrument.radius(), self.instrument.band_length());
         let (p, t) = (centre.value, axis.value);
         let along = dot(p, t);
         let across = add(scale(-1.0, p), along, t);
         let distance = libm::sqrt(dot(across, across));
-        // A camera inside the cylinder's extension sees none of its outside.
+        // From inside the infinitely extended cylinder its outside is not visible.
         if distance.is_nan() || distance <= radius {
             return None;
         }
@@ -189,7 +193,7 @@ impl FeatureModel {
         let spread_along = length * length / 12.0 - spread_across;
         let spread_towards = radius * radius * (2.0 / 3.0 - PI * PI / 16.0) - spread_across;
         let [[_, _, n_z], [_, _, t_z], [_, _, mean_z]] = [n, t, mean];
-        // S z, with the part across both t and n written as what they leave of z.
+        // S z; the part across t and n is the remainder of z.
         let spread = add(
             add([0.0, 0.0, spread_across], spread_along * t_z, t),
             spread_towards * n_z,
@@ -197,7 +201,7 @@ impl FeatureModel {
         );
         let pull = -4.0 / mean_z;
 
-        let slope = |p_by: Vector, t_by: Vector| {
+        let derivative = |p_by: Vector, t_by: Vector| {
             let along_by = dot(p_by, t) + dot(p, t_by);
             let across_by = add(add(scale(-1.0, p_by), along_by, t), along, t_by);
             let distance_by = dot(across_by, n);
@@ -217,9 +221,9 @@ impl FeatureModel {
         };
         let [p0, p1, p2] = centre.by_dof;
         let [t0, t1, t2] = axis.by_dof;
-        Some(Moving {
+        Some(Differentiated {
             value: add(mean, pull, spread),
-            by_dof: [slope(p0, t0), slope(p1, t1), slope(p2, t2)],
+            by_dof: [derivative(p0, t0), derivative(p1, t1), derivative(p2, t2)],
         })
     }
 }

@@ -11,7 +11,7 @@ use crate::math::linear::{Vector, sinc, sinc_slope};
 /// constant curvature that bends by the total angle q3 towards (cos q2, sin q2, 0); then a
 /// straight tip with two marker bands.
 ///
-/// Wrong when the section sags or is pressed against tissue: its curvature is then not constant.
+/// Wrong when the section sags or touches tissue: its curvature is then not constant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Instrument {
     bending_length: f64,
@@ -20,7 +20,7 @@ pub struct Instrument {
     band_length: f64,
 }
 
-/// The centre of a marker band on the instrument's axis, and how it moves with the state.
+/// The centre of a marker band on the instrument's axis, its axis, and their derivatives by the state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Marker {
     /// The centre, (3,) in m.
@@ -62,12 +62,12 @@ impl Instrument {
     }
 
     /// Radius of the tip in m.
-    pub const fn radius(&self) -> f64 {
+    pub(crate) const fn radius(&self) -> f64 {
         self.radius
     }
 
     /// Length of a band along the axis in m.
-    pub const fn band_length(&self) -> f64 {
+    pub(crate) const fn band_length(&self) -> f64 {
         self.band_length
     }
 
@@ -81,16 +81,17 @@ impl Instrument {
     ///
     /// with the band's distance d from the section's end; exact and smooth at q3 = 0.
     pub fn markers(&self, [insertion, rotation, bending]: PerDof<f64>) -> [Marker; 2] {
-        let (sin_turn, cos_turn) = libm::sincos(rotation);
+        let (sin_rotation, cos_rotation) = libm::sincos(rotation);
         let (sin_bend, cos_bend) = libm::sincos(bending);
         let half = bending / 2.0;
         let (sin_half, cos_half) = libm::sincos(half);
         let (sinc_half, sinc_half_slope) = (sinc(half), sinc_slope(half));
-        // (1 - cos x) / x written without a difference.
+        // (1 - cos x) / x without the cancellation of a difference.
         let across = sin_half * sinc_half;
         let across_slope = 0.5 * (cos_half * sinc_half + sin_half * sinc_half_slope);
-        let in_plane = |radial: f64, axial: f64| [radial * cos_turn, radial * sin_turn, axial];
-        let turned = |radial: f64| [-radial * sin_turn, radial * cos_turn, 0.0];
+        let in_plane =
+            |radial: f64, axial: f64| [radial * cos_rotation, radial * sin_rotation, axial];
+        let rotated = |radial: f64| [-radial * sin_rotation, radial * cos_rotation, 0.0];
 
         self.markers.map(|distance| {
             let length = self.bending_length;
@@ -103,10 +104,10 @@ impl Instrument {
                 axis: in_plane(sin_bend, cos_bend),
                 position_by_dof: [
                     [0.0, 0.0, 1.0],
-                    turned(radial),
+                    rotated(radial),
                     in_plane(radial_slope, axial_slope),
                 ],
-                axis_by_dof: [[0.0; 3], turned(sin_bend), in_plane(cos_bend, -sin_bend)],
+                axis_by_dof: [[0.0; 3], rotated(sin_bend), in_plane(cos_bend, -sin_bend)],
             }
         })
     }

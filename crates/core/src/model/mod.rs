@@ -1,4 +1,4 @@
-//! Where the bands are in an image: kinematics, camera, features, outlines, Eqs. (7)-(11).
+//! Models of the bands in an image: kinematics, camera, features, outlines, Eqs. (7)-(11).
 
 pub(crate) mod camera;
 pub(crate) mod features;

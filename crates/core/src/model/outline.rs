@@ -1,4 +1,4 @@
-//! The outline of a band in the image: what the detector should find, and how large.
+//! The outline of a band in the image, with its area, centroid and moments.
 
 use crate::dof::{PerDof, all_finite};
 use crate::math::linear::{Vector, add, cross, dot, scale};
@@ -10,7 +10,7 @@ const RIM: usize = 13;
 /// Points of an outline.
 pub const OUTLINE: usize = 2 * RIM;
 
-/// The image of a band: of the side of a cylinder that faces the camera.
+/// The image of a band: the side of a cylinder that faces the camera.
 ///
 /// With the band's centre p, its axis t, radius r and length l; D the distance from the camera to
 /// the axis, n the unit vector from the axis to the camera across the axis and b = t x n:
@@ -20,17 +20,17 @@ pub const OUTLINE: usize = 2 * RIM;
 /// area = sum of x_i y_j - x_j y_i over its edges / 2;    moments likewise (Green's theorem)
 /// ```
 ///
-/// The rims' visible arcs and the two lines where the sight grazes the cylinder enclose exactly what is
-/// seen of it; the arcs are replaced by 12 chords each, which takes 1 % of their height.
+/// The rims' visible arcs and the two lines along which rays from the camera touch the cylinder enclose its visible part
+/// exactly; 12 chords replace each arc, which reduces its height by 1 %.
 ///
-/// Wrong where something is in front of the band, the instrument itself included.
+/// Wrong where anything, including the instrument itself, is in front of the band.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BandImage {
-    /// Corners u, v (px), once around.
+    /// Corners u, v (px) in order.
     pub outline: [[f64; 2]; OUTLINE],
-    /// (px^2).
+    /// Area (px^2).
     pub area: f64,
-    /// Mean place u, v (px): what `FeatureModel::predict` gives, but for the lens.
+    /// Centroid u, v (px): equal to that of `FeatureModel::predict` up to the lens distortion.
     pub centroid: [f64; 2],
     /// Second central moments over area: uu, uv, vv (px^2).
     pub moments: [f64; 3],
@@ -39,7 +39,7 @@ pub struct BandImage {
 impl FeatureModel {
     /// The images of bands A and B for the state q (3,) [m, rad, rad].
     ///
-    /// None where `predict` has none, and where a part of an outline cannot be projected.
+    /// None where `predict` is, and where a part of an outline cannot be projected.
     pub fn bands(&self, state: PerDof<f64>) -> Option<[BandImage; 2]> {
         let [a, b] = self.axes(state);
         Some([self.band(a)?, self.band(b)?])
@@ -70,26 +70,26 @@ impl FeatureModel {
             let projection = self.project(point)?;
             *corner = projection;
         }
-        enclosed(&outline)
+        moments(&outline)
     }
 }
 
-/// Area, centroid and second moments of what an outline encloses; None if that is nothing.
-fn enclosed(outline: &[[f64; 2]; OUTLINE]) -> Option<BandImage> {
+/// Area, centroid and second moments of the region in an outline; None if its area is 0 or not finite.
+fn moments(outline: &[[f64; 2]; OUTLINE]) -> Option<BandImage> {
     let [first, ..] = *outline;
     let (mut area, mut sum, mut square) = (0.0, [0.0; 2], [0.0; 3]);
     let next = outline.iter().skip(1).chain([&first]);
-    // About the first corner: far from the origin the sums would cancel.
+    // Relative to the first corner: far from the origin the sums would cancel.
     for (from, to) in outline.iter().zip(next) {
         let [x0, y0] = [from[0] - first[0], from[1] - first[1]];
         let [x1, y1] = [to[0] - first[0], to[1] - first[1]];
-        let turn = x0 * y1 - x1 * y0;
-        area += turn / 2.0;
-        sum[0] += (x0 + x1) * turn / 6.0;
-        sum[1] += (y0 + y1) * turn / 6.0;
-        square[0] += (x0 * x0 + x0 * x1 + x1 * x1) * turn / 12.0;
-        square[1] += (x0 * (2.0 * y0 + y1) + x1 * (y0 + 2.0 * y1)) * turn / 24.0;
-        square[2] += (y0 * y0 + y0 * y1 + y1 * y1) * turn / 12.0;
+        let cross = x0 * y1 - x1 * y0;
+        area += cross / 2.0;
+        sum[0] += (x0 + x1) * cross / 6.0;
+        sum[1] += (y0 + y1) * cross / 6.0;
+        square[0] += (x0 * x0 + x0 * x1 + x1 * x1) * cross / 12.0;
+        square[1] += (x0 * (2.0 * y0 + y1) + x1 * (y0 + 2.0 * y1)) * cross / 24.0;
+        square[2] += (y0 * y0 + y0 * y1 + y1 * y1) * cross / 12.0;
     }
     let [x, y] = sum.map(|sum| sum / area);
     let [xx, xy, yy] = square.map(|square| square / area);

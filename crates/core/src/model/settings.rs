@@ -28,7 +28,7 @@ pub struct CameraSettings {
     pub cx: f64,
     /// Principal point, v in px.
     pub cy: f64,
-    /// Rational distortion k1, k2, p1, p2, k3, k4, k5, k6, as `OpenCV` has it.
+    /// Rational distortion k1, k2, p1, p2, k3, k4, k5, k6, in the order of `OpenCV`.
     pub distortion: [f64; 8],
     /// Pose of the guide in the camera frame.
     pub camera_from_guide: PoseSettings,

@@ -103,7 +103,7 @@ impl Flags {
     }
 
     /// The set of one flag if a condition holds, else the empty set.
-    pub const fn when(condition: bool, flag: Flag) -> Self {
+    pub(crate) const fn when(condition: bool, flag: Flag) -> Self {
         if condition {
             Self::of(flag)
         } else {
@@ -119,7 +119,7 @@ impl Flags {
 
     /// The flags of this set that are not in the other.
     #[must_use]
-    pub const fn difference(self, other: Self) -> Self {
+    pub(crate) const fn difference(self, other: Self) -> Self {
         Self(self.0 & !other.0)
     }
 

@@ -184,11 +184,7 @@ fn the_noise_of_the_offsets_does_not_carry_the_command_away() {
             compensator.retune(&mut state, play);
         }
         compensator.step(&mut state, 15.0 * (phase / 500.0).sin());
-        assert!(
-            state.anchor().abs() < 0.1,
-            "{} in tick {tick}",
-            state.anchor()
-        );
+        assert!(state.anchor.abs() < 0.1, "{} in tick {tick}", state.anchor);
     }
 }
 
@@ -204,7 +200,7 @@ fn without_recovery_the_gain_in_contact_is_one() {
         let (before, command) = (state.command(), compensator.step(&mut state, reference));
         assert!(close(command - before, 0.07), "{}", command - before);
     }
-    assert!(close(state.anchor(), 0.8), "{}", state.anchor());
+    assert!(close(state.anchor, 0.8), "{}", state.anchor);
 }
 
 #[test]
@@ -214,15 +210,15 @@ fn the_anchor_goes_home_gently() {
         compensator.step(&mut state, reference);
     }
     compensator.retune(&mut state, Play::new(-2.0, 1.0).unwrap());
-    assert!(close(state.anchor(), 0.8), "{}", state.anchor());
+    assert!(close(state.anchor, 0.8), "{}", state.anchor);
     for reference in path(&[10.0, 17.0], 100).split_off(1) {
         let (before, command) = (state.command(), compensator.step(&mut state, reference));
         let gain = (command - before) / 0.07;
         assert!((0.899..1.001).contains(&gain), "{gain}");
     }
-    assert!(close(state.anchor(), 0.1), "{}", state.anchor());
+    assert!(close(state.anchor, 0.1), "{}", state.anchor);
     compensator.step(&mut state, 19.0);
-    assert_eq!(state.anchor(), 0.0);
+    assert_eq!(state.anchor, 0.0);
 }
 
 #[test]
@@ -262,7 +258,7 @@ fn recovery_never_makes_a_jump_at_the_contact() {
         compensator.step(&mut state, reference);
     }
     compensator.retune(&mut state, Play::new(-1.0, 2.0).unwrap());
-    assert!(close(state.anchor(), -0.8), "{}", state.anchor());
+    assert!(close(state.anchor, -0.8), "{}", state.anchor);
     let mut was_in_contact = false;
     for reference in path(&[-10.0, -5.0], 500).split_off(1) {
         let (before, command) = (state.command(), compensator.step(&mut state, reference));

@@ -7,7 +7,7 @@ use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::reactions::Reaction;
 use crate::supervision::settings::SafetySettings;
 
-use super::support::looped::{Loop, article, article_with, model};
+use super::support::loops::{Loop, article, article_with, model};
 use super::support::{PERIOD, UNITS, safety};
 
 const START: PerDof<f64> = [0.025, 0.0, 0.9];
@@ -58,7 +58,7 @@ impl Strokes {
         let mut most = 0.0_f64;
         for _ in 0..10 * units {
             if let Some(flag) = flag {
-                self.reduction.monitors_mut().raise(flag);
+                self.reduction.raise(flag);
             }
             most = most.max(self.go(0.1));
             if self.tick.is_multiple_of(8) {
@@ -87,7 +87,7 @@ fn compensation_fades_with_motion_and_returns_once_the_warning_is_acknowledged()
     // Four widths of 30, and two more to fade.
     assert!(whole(strokes.travel(100, Some(Flag::Frozen))));
     strokes.travel(82, Some(Flag::Frozen));
-    let supervision = strokes.reduction.monitors().supervision();
+    let supervision = strokes.reduction.supervision();
     assert_eq!(
         (supervision.reaction, supervision.lead),
         (Reaction::Fade, 0.0)
@@ -95,16 +95,16 @@ fn compensation_fades_with_motion_and_returns_once_the_warning_is_acknowledged()
     let factor = strokes.travel(100, Some(Flag::Frozen));
     assert!(none(factor), "{factor}");
     assert!(none(strokes.travel(5, None)));
-    let supervision = strokes.reduction.monitors().supervision();
+    let supervision = strokes.reduction.supervision();
     assert_eq!(supervision.reaction, Reaction::None);
     assert_eq!(supervision.latched, Flags::of(Flag::Frozen));
     let factor = strokes.travel(100, None);
     assert!(none(factor), "the warning was not acknowledged: {factor}");
-    strokes.reduction.monitors_mut().acknowledge();
-    let supervision = strokes.reduction.monitors().supervision();
+    strokes.reduction.acknowledge();
+    let supervision = strokes.reduction.supervision();
     assert_eq!(supervision.latched, Flags::NONE);
     strokes.travel(62, None);
-    assert_eq!(strokes.reduction.monitors().supervision().lead, 1.0);
+    assert_eq!(strokes.reduction.supervision().lead, 1.0);
     let factor = strokes.travel(100, None);
     assert!(whole(factor), "{factor}");
 }
@@ -122,7 +122,7 @@ fn a_tip_that_overtakes_the_reference_is_reported_unless_its_detector_is_off() {
                 strokes.image_update(strokes.command);
             }
         }
-        let latched = strokes.reduction.monitors().supervision().latched;
+        let latched = strokes.reduction.supervision().latched;
         assert_eq!(
             latched.contains(Flag::Overcompensation),
             off.is_empty(),

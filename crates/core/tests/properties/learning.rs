@@ -6,7 +6,7 @@ use crate::r#loop::profile::Profile;
 use crate::supervision::flags::Flag;
 use crate::supervision::reactions::Reaction;
 
-use super::support::looped::{Loop, adaptive, article, model};
+use super::support::loops::{Loop, adaptive, article, model};
 use super::support::{PERIOD, UNITS};
 
 const CENTRES: PerDof<f64> = [0.025, 0.0, 0.9];
@@ -70,9 +70,9 @@ fn learns_and_is_held<P: Profile>(reduction: Loop<P>) {
     let before = run.believed();
     run.slack = Play::new(-3.0 * UNITS[0], 3.0 * UNITS[0]).unwrap();
     for _ in 0..400 {
-        run.reduction.monitors_mut().raise(Flag::Frozen);
+        run.reduction.raise(Flag::Frozen);
         run.tick();
-        let reaction = run.reduction.monitors().supervision().reaction;
+        let reaction = run.reduction.supervision().reaction;
         assert_eq!(reaction, Reaction::HoldEstimate);
     }
     let after = run.believed();
@@ -102,7 +102,7 @@ fn no_more_slack_is_believed_than_may_be() {
         widest = widest.max(plus - minus);
     }
     assert!((28.0..=30.0 + 1e-9).contains(&widest), "{widest}");
-    let latched = run.reduction.monitors().supervision().latched;
+    let latched = run.reduction.supervision().latched;
     assert!(latched.contains(Flag::WidthLimit));
 }
 
@@ -119,9 +119,9 @@ fn a_hold_ends_by_the_hands_travel_counted_in_widths() {
         } else {
             -0.15e-3
         };
-        reduction.monitors_mut().raise(Flag::Frozen);
+        reduction.raise(Flag::Frozen);
         reduction.step(hand, None, f64::from(tick) * PERIOD);
-        let reaction = reduction.monitors().supervision().reaction;
+        let reaction = reduction.supervision().reaction;
         if gone < 3.9 {
             assert_eq!(reaction, Reaction::HoldEstimate, "after {gone} widths");
         } else if gone > 4.1 {
@@ -135,10 +135,10 @@ fn at_the_top_of_its_ladder_a_flag_stays() {
     let mut reduction = article(|_| Play::new(0.0, 0.0).unwrap());
     reduction.step(CENTRES, None, 0.0);
     for tick in 1..=10_000_u32 {
-        reduction.monitors_mut().raise(Flag::Frozen);
+        reduction.raise(Flag::Frozen);
         reduction.step(CENTRES, None, f64::from(tick) * PERIOD);
         if tick > 1000 {
-            let reaction = reduction.monitors().supervision().reaction;
+            let reaction = reduction.supervision().reaction;
             assert_eq!(reaction, Reaction::Fade, "tick {tick}");
         }
     }
@@ -148,7 +148,7 @@ fn at_the_top_of_its_ladder_a_flag_stays() {
 fn slack_that_was_learnt_and_changes_is_said() {
     let mut run = Run::new(adaptive(), -6.0, 9.0);
     run.swing(4);
-    let latched = run.reduction.monitors().supervision().latched;
+    let latched = run.reduction.supervision().latched;
     assert!(!latched.contains(Flag::SlackChanged), "{latched:?}");
     for tick in 0..3200 {
         // Some new place of the contact at every image, as if the shaft were bent.
@@ -156,7 +156,7 @@ fn slack_that_was_learnt_and_changes_is_said() {
         run.slack = Play::new((-6.0 - more) * UNITS[0], 9.0 * UNITS[0]).unwrap();
         run.tick();
     }
-    let latched = run.reduction.monitors().supervision().latched;
+    let latched = run.reduction.supervision().latched;
     assert!(latched.contains(Flag::SlackChanged), "{latched:?}");
 }
 
@@ -165,15 +165,12 @@ fn slack_that_was_learnt_and_changes_is_said() {
 fn a_tip_that_has_jumped_is_not_believed_until_it_has_stayed() {
     let mut run = Run::new(adaptive(), -3.0, 3.0);
     run.swing(3);
-    assert_eq!(
-        run.reduction.monitors().supervision().reaction,
-        Reaction::None
-    );
+    assert_eq!(run.reduction.supervision().reaction, Reaction::None);
     run.slack = Play::new(9.0 * UNITS[0], 15.0 * UNITS[0]).unwrap();
     let (mut worst, mut believed) = (Reaction::None, false);
     for tick in 0..4800 {
         run.tick();
-        let supervision = run.reduction.monitors().supervision();
+        let supervision = run.reduction.supervision();
         worst = worst.max(supervision.reaction);
         believed |= worst == Reaction::Fade && supervision.reaction < Reaction::HoldEstimate;
         if tick == 40 {

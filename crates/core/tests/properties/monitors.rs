@@ -8,7 +8,7 @@ use crate::supervision::reactions::Reaction;
 use crate::supervision::reference_gate::ReferenceGate;
 use crate::supervision::settings::SafetySettings;
 
-use super::support::looped::{Loop, article, article_with};
+use super::support::loops::{Loop, article, article_with};
 use super::support::{PERIOD, UNITS, safety};
 
 #[test]
@@ -27,15 +27,12 @@ fn the_motion_of_a_stall_is_discarded_and_motion_stops_until_re_engaged() {
     let (still, step) = (0.0, 1e-4);
     assert!(tick(&mut reduction, PERIOD, step) > 0.0);
     assert_eq!(tick(&mut reduction, 4.0 * PERIOD, 7e-3), still);
-    assert_eq!(reduction.monitors().supervision().reaction, Reaction::Warn);
+    assert_eq!(reduction.supervision().reaction, Reaction::Warn);
     assert!(tick(&mut reduction, PERIOD, step) > 0.0);
     assert_eq!(tick(&mut reduction, 0.117, 7e-3), still);
-    assert_eq!(
-        reduction.monitors().supervision().reaction,
-        Reaction::HoldMotion
-    );
+    assert_eq!(reduction.supervision().reaction, Reaction::HoldMotion);
     assert_eq!(tick(&mut reduction, PERIOD, step), still);
-    reduction.monitors_mut().engage();
+    reduction.engage();
     assert_eq!(tick(&mut reduction, 2.0, 0.0), still);
     let moved = tick(&mut reduction, PERIOD, step);
     assert!(moved > 0.0 && moved <= 5.0 * step * (1.0 + 1e-9), "{moved}");
@@ -55,7 +52,7 @@ fn a_reference_that_is_old_or_invalid_stops_motion() {
         let mut reduction = begun();
         let command = reduction.step([input, 0.0, 0.9], Some(stamp), PERIOD);
         assert_eq!(command, START);
-        let reaction = reduction.monitors().supervision().reaction;
+        let reaction = reduction.supervision().reaction;
         assert_eq!(reaction, Reaction::HoldMotion, "{input} of {stamp} s");
     }
 }
@@ -64,14 +61,9 @@ fn a_reference_that_is_old_or_invalid_stops_motion() {
 fn a_reference_that_is_too_fast_stops_motion() {
     let mut fast = begun();
     assert_eq!(fast.step([0.035, 0.0, 0.9], Some(0.0), PERIOD), START);
-    assert!(
-        fast.monitors()
-            .supervision()
-            .flags
-            .contains(Flag::ReferenceJump)
-    );
-    assert_eq!(fast.monitors().supervision().reaction, Reaction::HoldMotion);
-    fast.monitors_mut().engage();
+    assert!(fast.supervision().flags.contains(Flag::ReferenceJump));
+    assert_eq!(fast.supervision().reaction, Reaction::HoldMotion);
+    fast.engage();
     let [time, then] = [2.0 * PERIOD, 3.0 * PERIOD];
     assert_eq!(fast.step([0.035, 0.0, 0.9], Some(time), time), START);
     let [command, ..] = fast.step([0.0351, 0.0, 0.9], Some(then), then);
@@ -191,21 +183,15 @@ fn a_jump_that_passes_the_gate_is_stopped_by_the_command_limiter_and_moves_nothi
             .map(|tick| go(&mut reduction, 0.1 * f64::from(tick)))
             .last()
             .unwrap();
-        assert_eq!(reduction.monitors().supervision().reaction, Reaction::None);
+        assert_eq!(reduction.supervision().reaction, Reaction::None);
         assert_eq!(go(&mut reduction, 9.9 + jump), before);
-        assert!(
-            reduction
-                .monitors()
-                .supervision()
-                .flags
-                .contains(Flag::CommandJump)
-        );
+        assert!(reduction.supervision().flags.contains(Flag::CommandJump));
         assert_eq!(
             go(&mut reduction, 10.0),
             before,
             "the way back moves nothing either"
         );
-        reduction.monitors_mut().engage();
+        reduction.engage();
         go(&mut reduction, 10.0);
         let moved = go(&mut reduction, 10.1) - before;
         assert!(

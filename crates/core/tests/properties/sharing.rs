@@ -10,8 +10,8 @@ use proptest::prelude::*;
 
 use super::config;
 use super::friction_step::slid;
-use super::support::looped::{Loop, adaptive, adaptive_uncoupled, model};
-use super::support::stand_in::{WIDTH, World, hand};
+use super::support::loops::{Loop, adaptive, adaptive_uncoupled, model};
+use super::support::plays::{ThreePlays, WIDTH, reference};
 use super::support::{PERIOD, UNITS};
 
 /// After offsets of a slack about `middle`, `half` wide each way, whose other DOF takes `shared` of what it can.
@@ -68,12 +68,12 @@ proptest! {
 /// A loop that expects one friction finds three plays apart as wide as they are, and believes what it sees of them.
 #[test]
 fn slacks_apart_are_learnt_as_they_are() {
-    let (mut reduction, mut world) = (adaptive(), World::new());
+    let (mut reduction, mut plays) = (adaptive(), ThreePlays::new());
     for tick in 0..60_000_u32 {
         let time = f64::from(tick) * PERIOD;
-        world.follow(reduction.step(hand(time), None, time));
+        plays.step(reduction.step(reference(time), None, time));
         if tick.is_multiple_of(8) {
-            let report = reduction.on_features(world.seen(), None, time, Some(u64::from(tick)));
+            let report = reduction.on_features(plays.measure(), None, time, Some(u64::from(tick)));
             assert_ne!(report.status, Status::Refused, "{time} s: {report:?}");
             for (play, unit) in report.play.iter().zip(UNITS) {
                 let off = (play.width() / (WIDTH * unit) - 1.0).abs();
@@ -123,11 +123,11 @@ impl Shaft {
 
 /// What the prediction of a loop that has learnt such an instrument is off without images, root mean square in [`UNITS`].
 fn blindly_off<P: Profile>(mut reduction: Loop<P>) -> [f64; 2] {
-    let mut shaft = Shaft::new(hand(0.0));
+    let mut shaft = Shaft::new(reference(0.0));
     let (mut sums, mut count) = ([0.0; 2], 0.0);
     for tick in 0..20_000_u32 {
         let time = f64::from(tick) * PERIOD;
-        let tip = shaft.follow(reduction.step(hand(time), None, time));
+        let tip = shaft.follow(reduction.step(reference(time), None, time));
         if tick >= 15_000 {
             count += 1.0;
             let predicted = reduction.predicted_state();

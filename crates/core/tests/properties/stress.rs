@@ -6,7 +6,7 @@ use crate::r#loop::report::Status;
 use crate::supervision::flags::Flag;
 use crate::supervision::reactions::Reaction;
 
-use super::support::looped::{Loop, adaptive, article, model};
+use super::support::loops::{Loop, adaptive, article, model};
 use super::support::{self, PERIOD, UNITS};
 
 /// Xorshift.
@@ -61,21 +61,21 @@ fn stress<P: Profile>(mut reduction: Loop<P>, seed: u64) {
         }
         if tick == 10_000 {
             // However few steps there are, this comes.
-            reduction.monitors_mut().raise(Flag::FollowingError);
+            reduction.raise(Flag::FollowingError);
         }
         match chance.bits() % 20_000 {
             0 => next[0] += 0.01 * chance.share(),
             1 => next[1] = f64::NAN,
             2 => time += 0.5 * chance.share().abs(),
             3 => time -= 0.3,
-            4 => reduction.monitors_mut().raise(Flag::FollowingError),
+            4 => reduction.raise(Flag::FollowingError),
             _ => {}
         }
         if chance.once_in(1000) {
-            reduction.monitors_mut().engage();
+            reduction.engage();
         }
         if chance.once_in(5000) {
-            reduction.monitors_mut().acknowledge();
+            reduction.acknowledge();
         }
         time += PERIOD;
         let stamp = (!chance.once_in(20_000))
@@ -168,6 +168,6 @@ fn nothing_drifts() {
             worst = worst.max((command[0] - reference[0] - 0.8 * (command[0] - tip[0])).abs());
         }
     }
-    assert_eq!(reduction.monitors().supervision().reaction, Reaction::None);
+    assert_eq!(reduction.supervision().reaction, Reaction::None);
     assert!(worst <= 1e-12, "{worst} m");
 }

@@ -4,7 +4,7 @@ use crate::article::play::Play;
 use crate::r#loop::paper::Paper;
 use crate::supervision::flags::Flag;
 
-use super::support::looped::{Loop, article_with};
+use super::support::loops::{Loop, article_with};
 use super::support::{PERIOD, UNITS, safety};
 
 /// A loop that knows its slack, and the tip; in [`UNITS`] of the insertion.
@@ -42,7 +42,7 @@ impl Run {
     }
 
     fn is_limited(&self) -> bool {
-        let supervision = self.reduction.monitors().supervision();
+        let supervision = self.reduction.supervision();
         supervision.latched.contains(Flag::Monitor)
     }
 }

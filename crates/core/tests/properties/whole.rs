@@ -6,7 +6,7 @@ use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::reactions::Reaction;
 use crate::supervision::settings::SafetySettings;
 
-use super::support::looped::{article, article_with};
+use super::support::loops::{article, article_with};
 use super::support::{PERIOD, UNITS, safety};
 
 /// While nothing is wrong, what the loop commands is what the law does by itself.
@@ -28,7 +28,7 @@ fn a_nominal_run_is_the_laws_to_the_bit() {
             assert_eq!(*command, law.step(state, value), "tick {tick}");
         }
     }
-    assert_eq!(reduction.monitors().supervision().latched, Flags::NONE);
+    assert_eq!(reduction.supervision().latched, Flags::NONE);
 }
 
 /// A first reference beyond the end of the travel is taken at the end, and no motion is lost but what was beyond.
@@ -51,11 +51,7 @@ fn a_start_beyond_the_end_is_at_the_end() {
             assert!(command < last, "tick {tick}: {command} after {last}");
             last = command;
         }
-        assert_eq!(
-            reduction.monitors().supervision().flags,
-            Flags::NONE,
-            "it is over"
-        );
+        assert_eq!(reduction.supervision().flags, Flags::NONE, "it is over");
     }
 }
 
@@ -67,10 +63,10 @@ fn the_end_of_the_travel_stops_nothing_else() {
         let time = f64::from(tick) * PERIOD;
         let hand = 230.0 * (0.4 * time).sin().max(0.0) * UNITS[0];
         reduction.step([hand, 0.0, 0.0], None, time);
-        let supervision = reduction.monitors().supervision();
+        let supervision = reduction.supervision();
         assert!(supervision.reaction < Reaction::HoldMotion, "tick {tick}");
     }
-    let latched = reduction.monitors().supervision().latched;
+    let latched = reduction.supervision().latched;
     assert_eq!(latched, Flags::of(Flag::Monitor));
 }
 
@@ -84,7 +80,7 @@ fn a_hand_that_trembles_is_said_unless_it_is_not_looked_for() {
             let hand = UNITS[0] * (40.0 * time).sin();
             reduction.step([hand, 0.0, 0.0], None, time);
         }
-        let latched = reduction.monitors().supervision().latched;
+        let latched = reduction.supervision().latched;
         assert_eq!(latched, Flags::of(Flag::Tremor).difference(off));
     }
 }
@@ -95,8 +91,8 @@ fn what_the_rig_says_counts_unless_it_is_not_looked_for() {
         let settings = SafetySettings { off, ..safety() };
         let mut reduction = article_with(&settings, 0.0, |_| Play::new(0.0, 0.0).unwrap());
         reduction.step([0.0; 3], None, 0.0);
-        reduction.monitors_mut().raise(Flag::FollowingError);
-        let supervision = reduction.monitors().supervision();
+        reduction.raise(Flag::FollowingError);
+        let supervision = reduction.supervision();
         assert_eq!(
             supervision.flags,
             Flags::of(Flag::FollowingError).difference(off)

@@ -1,14 +1,14 @@
 //! Settings for the tests of the loop: lengths in units of 0.4 mm, 0.04 rad, 0.02 rad.
 
-pub mod looped;
-pub mod stand_in;
+pub mod loops;
+pub mod plays;
 
 use tautscope_core::{
     AdaptiveSettings, CameraSettings, ControlSettings, DofSettings, Flags, InstrumentSettings,
-    PerDof, PoseSettings, SafetySettings, Settings, StateEstimationSettings,
+    PoseSettings, SafetySettings, Settings, StateEstimationSettings,
 };
 
-pub const UNITS: PerDof<f64> = [0.4e-3, 0.04, 0.02];
+pub const UNITS: [f64; 3] = [0.4e-3, 0.04, 0.02];
 pub const PERIOD: f64 = 0.005;
 
 /// Settings of the monitors in [`UNITS`].
@@ -17,7 +17,7 @@ pub fn safety() -> SafetySettings {
 }
 
 /// Settings of the monitors with lengths in the given units.
-pub fn safety_in(units: PerDof<f64>) -> SafetySettings {
+pub fn safety_in(units: [f64; 3]) -> SafetySettings {
     SafetySettings {
         off: Flags::NONE,
         width_limit: units.map(|unit| 30.0 * unit),
@@ -62,7 +62,7 @@ pub fn safety_in(units: PerDof<f64>) -> SafetySettings {
 }
 
 /// Settings of the DOFs, with lengths in [`UNITS`].
-pub fn dofs() -> PerDof<DofSettings> {
+pub fn dofs() -> [DofSettings; 3] {
     let [insertion, rotation, bending] = UNITS.map(|unit| DofSettings {
         update_distance: unit,
         observable_deviation: 1.0,

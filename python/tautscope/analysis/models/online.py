@@ -118,7 +118,7 @@ class _Adaptive:
         for k, (command, tip) in enumerate(zip(commands.tolist(), measured.tolist(), strict=True)):
             axis.step(command)
             found[0, k] = axis.predicted_state
-            axis.learn(command, tip, 0.0, no_features)
+            axis.update_offsets(command, tip, 0.0, no_features)
             found[1:, k] = axis.delta_minus, axis.delta_plus
         predicted, delta_minus, delta_plus = found
         return predicted, delta_minus, delta_plus

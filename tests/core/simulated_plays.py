@@ -1,4 +1,4 @@
-"""A run of the loop on three true plays, seen by an ideal camera with noise."""
+"""A run of the loop on three simulated plays in the images of an ideal camera with noise."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ NOISE = 0.1
 """[px]."""
 
 Fault = Callable[[Floats, Floats, np.random.Generator], Floats | None]
-"""(features now, features when the fault began, chance) -> what arrives."""
+"""(features, features when the fault began, generator) -> measured features."""
 
 
 @dataclass
 class Run:
-    """What happened."""
+    """Traces and reports of a run."""
 
     tip: Floats
     command: Floats
@@ -38,13 +38,13 @@ class Run:
 
 def config(profile: str = "best", **safety: object) -> Config:
     changes = {f"safety.{key}": value for key, value in safety.items()}
-    # The stand-in's plays know nothing of each other.
+    # The simulated plays are independent.
     changes["adaptive.one_friction"] = False
     return load_config(profile=profile).replace(**changes)  # type: ignore[arg-type]
 
 
 def reference(time: float) -> Floats:
-    """Strokes of 30 mm at up to 12.6 mm/s, and some of the other two."""
+    """Strokes of 30 mm at up to 12.6 mm/s, with small motions of the other two DOFs."""
     wave = np.sin(12.6 / 15 * time)
     return REST + np.array([15e-3 * wave, 0.3 * wave, 0.1 * wave])
 
@@ -58,9 +58,12 @@ def run(
     *,
     begin: float = BEGIN,
 ) -> Run:
-    """The same hand, the same noise; from `begin` to END the fault sees to the images."""
+    """Run the loop along `reference`; from `begin` to END the fault changes the features.
+
+    `delay` gives the error of the capture time [s], None for a lost frame.
+    """
     loop, model = HysteresisReduction(settings), build_feature_model(settings)
-    noise, chance = np.random.default_rng(seed), np.random.default_rng(seed + 1)
+    noise, generator = np.random.default_rng(seed), np.random.default_rng(seed + 1)
     tip, tips, commands, reports = REST.copy(), [], [], []
     frozen: Floats | None = None
     for tick in range(round(until / PERIOD)):
@@ -74,20 +77,20 @@ def run(
             continue
         prediction = model.predict(tips[captured])
         assert prediction is not None
-        seen: Floats | None = prediction[0] + noise.normal(0.0, NOISE, 4)
+        measured: Floats | None = prediction[0] + noise.normal(0.0, NOISE, 4)
         at = captured * PERIOD
         if begin <= at < END:
-            assert seen is not None
-            frozen = seen if frozen is None else frozen
+            assert measured is not None
+            frozen = measured if frozen is None else frozen
             shift = delay(at)
             if shift is None:
                 continue
             at += shift
-            seen = seen if fault is None else fault(seen, frozen, chance)
-        reports.append(loop.on_features(seen, at))
+            measured = measured if fault is None else fault(measured, frozen, generator)
+        reports.append(loop.on_features(measured, at))
     return Run(np.array(tips), np.array(commands), reports, loop)
 
 
-def excursion(one: Run, other: Run) -> float:
-    """Largest difference of the tips' insertion [m]."""
+def insertion_error(one: Run, other: Run) -> float:
+    """Largest difference of the insertion of both tips [m]."""
     return float(np.abs(one.tip[:, 0] - other.tip[:, 0]).max())

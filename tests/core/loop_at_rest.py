@@ -1,4 +1,4 @@
-"""A loop whose reference rests, and its configuration."""
+"""A loop after a constant reference, and its configuration."""
 
 from __future__ import annotations
 
@@ -8,22 +8,18 @@ from tautscope.config import Config
 from tautscope.loop.reduction import HysteresisReduction
 
 Floats = NDArray[np.float64]
-
-
 CONFIG = Config().replace(
     **{
         "insertion.observable_deviation": 5e-3,
         "bending.observable_deviation": 0.1,
-        # Without noise, pictures repeat themselves while the slack is crossed.
+        # Without noise, images are identical while the slack is crossed.
         "safety.frozen_travel": 1e6,
     }
 )
-
-
 REST = np.array([0.025, 0.0, 0.9])
 
 
-def started(ticks: int = 100, config: Config = CONFIG) -> HysteresisReduction:
+def loop_at_rest(ticks: int = 100, config: Config = CONFIG) -> HysteresisReduction:
     loop = HysteresisReduction(config)
     for _ in range(ticks):
         loop.step(REST)

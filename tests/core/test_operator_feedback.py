@@ -1,4 +1,4 @@
-"""Profile `best` with an operator in the loop, who corrects the error seen at the tip, and late."""
+"""Profile `best` with an operator in the loop, who corrects the observed tip error with a delay."""
 
 from __future__ import annotations
 
@@ -14,14 +14,15 @@ from tautscope.loop.reduction import HysteresisReduction
 
 PERIOD = 0.005
 HALF = np.array([5e-3, 0.9, 0.55])
-"""Of the slack, which the loop knows at the start."""
+"""Half widths of the slack, which are the initial offsets of the loop."""
 
 
-def operated(
+def run_with_operator(
     gain: float, delay: float, step: float, seed: int, off: tuple[str, ...] = ()
 ) -> tuple[NDArray[np.float64], set[str], float]:
-    """A hand at gain [1/s] times the error of insertion, seen `delay` [s] ago, after a step of what
-    is wanted [m]; the error (n,) [m], what was raised, and the share of the gain left.
+    """Response to a step [m] of the target: error (n,) [m], raised flags, share of compensation.
+
+    The operator moves the reference at `gain` [1/s] times the insertion error of `delay` [s] ago.
     """
     config = load_config(profile="best").replace(**{"safety.off": off})
     for dof in Dof:
@@ -31,16 +32,16 @@ def operated(
         )
     loop, model = HysteresisReduction(config), build_feature_model(config)
     noise, seen = np.random.default_rng(seed), deque[tuple[int, NDArray[np.float64]]]()
-    hand = np.array([config.experiment[dof].centre for dof in Dof])
-    tip, wanted = hand.copy(), hand[0] + step
-    past = deque([hand[0]] * (round(delay / PERIOD) + 1), maxlen=round(delay / PERIOD) + 1)
+    reference = np.array([config.experiment[dof].centre for dof in Dof])
+    tip, target = reference.copy(), reference[0] + step
+    past = deque([reference[0]] * (round(delay / PERIOD) + 1), maxlen=round(delay / PERIOD) + 1)
     errors, raised = [], set[str]()
     for tick in range(round(20 / PERIOD)):
-        hand = hand + np.array([gain * (wanted - past[0]) * PERIOD, 0, 0])
-        command = loop.step(hand)
+        reference = reference + np.array([gain * (target - past[0]) * PERIOD, 0, 0])
+        command = loop.step(reference)
         tip = np.clip(tip, command - HALF, command + HALF)
         past.append(tip[0])
-        errors.append(wanted - tip[0])
+        errors.append(target - tip[0])
         prediction = model.predict(tip) if tick % 8 == 0 else None
         if prediction is not None:
             seen.append((tick, prediction[0] + noise.normal(0, 0.2, 4)))
@@ -53,12 +54,12 @@ def operated(
 
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize(("gain", "delay"), [(4, 0.0), (4, 0.1), (3, 0.2), (2, 0.3), (1, 0.4)])
-def test_an_operator_with_a_gain_margin_of_two_and_a_half_comes_to_rest(
+def test_operator_with_a_gain_margin_of_two_and_a_half_converges(
     gain: float, delay: float, seed: int
 ) -> None:
     # gain exp(-i w delay) / (i w) is real and negative first at w = pi / (2 delay).
-    assert np.pi / 2 > 2.5 * gain * delay, "the margin without any slack"
-    errors, raised, lead = operated(gain, delay, 5e-3, seed)
+    assert np.pi / 2 > 2.5 * gain * delay, "the gain margin without slack"
+    errors, raised, lead = run_with_operator(gain, delay, 5e-3, seed)
     last = errors[round(15 / PERIOD) :]
     assert np.ptp(last) < 0.5e-3, f"seed {seed}: {np.ptp(last)} m"
     assert abs(last).max() < 0.5e-3, f"seed {seed}"
@@ -67,9 +68,9 @@ def test_an_operator_with_a_gain_margin_of_two_and_a_half_comes_to_rest(
 
 
 @pytest.mark.parametrize("seed", [0, 1])
-def test_an_operator_who_could_not_hold_an_instrument_without_slack_is_stopped(seed: int) -> None:
+def test_operator_unstable_without_slack_is_stopped(seed: int) -> None:
     gain, delay = 5.0, 0.4
-    assert gain * delay > np.pi / 2, "unstable without any slack"
-    errors, raised, _ = operated(gain, delay, 1e-3, seed)
+    assert gain * delay > np.pi / 2, "unstable without slack"
+    errors, raised, _ = run_with_operator(gain, delay, 1e-3, seed)
     assert "reference_jump" in raised
     assert (errors[-100:] == errors[-1]).all(), f"seed {seed}: the tip rests"

@@ -1,11 +1,10 @@
-//! The whole loop of either profile, with all monitors.
+//! Loops of both profiles, with all monitors.
 
-// Every test takes of it what it needs.
+// No test uses all of it.
 #![allow(dead_code)]
 
 use tautscope_core::{
     Best, Entry, FeatureModel, HysteresisReduction, Paper, Play, Profile, SafetySettings, Settings,
-    history_entries,
 };
 
 use super::{UNITS, safety, settings};
@@ -13,17 +12,17 @@ use super::{UNITS, safety, settings};
 /// A loop with its history on the heap.
 pub type Loop<P> = HysteresisReduction<P, Vec<Entry>>;
 
-/// Predicted features of the loop, and the ground truth of tests.
+/// The feature model of the loops; it also gives the true features in tests.
 pub fn model() -> FeatureModel {
     settings(&safety()).feature_model().unwrap()
 }
 
-/// Profile `paper` that starts from the play that `play` gives for a unit.
+/// Profile `paper`; `play` gives the initial estimate of a DOF from its unit.
 pub fn article(play: impl Fn(f64) -> Play) -> Loop<Paper> {
     article_with(&safety(), 0.0, play)
 }
 
-/// [`article`] with these settings of the monitors, and the anchor's return.
+/// [`article`] with other settings of the monitors and another `recovery`.
 pub fn article_with(
     safety: &SafetySettings,
     recovery: f64,
@@ -40,7 +39,7 @@ pub fn article_with(
         dof.recovery = recovery;
         (dof.delta_minus, dof.delta_plus) = (play.delta_minus(), play.delta_plus());
     }
-    looped(&settings)
+    build(&settings)
 }
 
 /// Profile `best`.
@@ -48,22 +47,21 @@ pub fn adaptive() -> Loop<Best> {
     adaptive_with(&safety(), 4.0)
 }
 
-/// [`adaptive`] with these settings of the monitors, and the distance from which a marker is an outlier.
+/// [`adaptive`] with other settings of the monitors and another Mahalanobis distance of outliers.
 pub fn adaptive_with(safety: &SafetySettings, outlier_distance: f64) -> Loop<Best> {
     let mut settings = settings(safety);
     settings.state_estimation.outlier_distance = outlier_distance;
-    looped(&settings)
+    build(&settings)
 }
 
-/// [`adaptive`] whose insertion and rotation have friction of their own.
+/// [`adaptive`] without shared friction of insertion and rotation.
 pub fn adaptive_uncoupled() -> Loop<Best> {
     let mut settings = settings(&safety());
     settings.adaptive.one_friction = false;
-    looped(&settings)
+    build(&settings)
 }
 
-fn looped<P: Profile>(settings: &Settings) -> Loop<P> {
-    let control = settings.control;
-    let storage = vec![Entry::BLANK; history_entries(control.history, control.period)];
+fn build<P: Profile>(settings: &Settings) -> Loop<P> {
+    let storage = vec![Entry::BLANK; settings.history_entries()];
     HysteresisReduction::new(settings, storage).unwrap()
 }

@@ -1,4 +1,4 @@
-"""Where the loop looks for the bands, and how sure it is of what it saw."""
+"""State prediction for the marker detection, and the standard deviation of the state estimate."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from resting import CONFIG, REST, Floats, started
+from loop_at_rest import CONFIG, REST, Floats, loop_at_rest
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import SignalError
@@ -34,10 +34,10 @@ class FakeDetector:
         return self.found
 
 
-def test_markers_are_sought_around_the_predicted_state(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_detector_receives_the_state_prediction(monkeypatch: pytest.MonkeyPatch) -> None:
     vision = SimpleNamespace(MarkerDetector=FakeDetector)
     monkeypatch.setitem(sys.modules, "tautscope.loop.vision", vision)
-    loop = started()
+    loop = loop_at_rest()
     predicted, prior = loop.predicted_features(0.2), loop.predict_state(0.2)
     assert predicted is not None and prior is not None
     frame = Frame(np.zeros((576, 720, 3), np.uint8), captured_at=0.2, sequence=0)
@@ -59,16 +59,16 @@ def test_markers_are_sought_around_the_predicted_state(monkeypatch: pytest.Monke
         loop.on_frame(replace(frame, captured_at=np.nan))
 
 
-def test_where_to_look_follows_the_images_and_widens_with_travel() -> None:
-    loop = started()
+def test_the_prediction_follows_images_and_its_std_grows_with_travel() -> None:
+    loop = loop_at_rest()
     before = loop.predict_state(0.3)
     assert before is not None
     np.testing.assert_array_equal(before.state, REST)
     start = [CONFIG[dof].start_deviation for dof in Dof]
     np.testing.assert_array_equal(before.std, start)
 
-    off = REST + np.array([1e-3, 0.05, -0.03])
-    seen = build_feature_model(CONFIG).predict(off)
+    displaced = REST + np.array([1e-3, 0.05, -0.03])
+    seen = build_feature_model(CONFIG).predict(displaced)
     assert seen is not None
     report = loop.on_features(seen[0], 0.3)
     after = loop.predict_state(0.3)
@@ -84,36 +84,36 @@ def test_where_to_look_follows_the_images_and_widens_with_travel() -> None:
     np.testing.assert_allclose(later.std[1:], after.std[1:])
 
 
-def test_a_search_that_finds_nothing_widens_and_one_that_finds_narrows() -> None:
-    loop = started()
+def test_std_grows_without_markers_and_shrinks_with_them() -> None:
+    loop = loop_at_rest()
     seen = build_feature_model(CONFIG).predict(REST)
     assert seen is not None
     loop.on_features(seen[0], 0.3)
-    sure = loop.predict_state(0.3)
-    assert sure is not None
-    last = sure.std
-    for missed in range(20):
+    measured = loop.predict_state(0.3)
+    assert measured is not None
+    last = measured.std
+    for frame in range(20):
         loop.step(REST)
-        now = 0.31 + 0.01 * missed
+        now = 0.31 + 0.01 * frame
         assert loop.on_features(None, now).status is Status.NO_MARKERS
-        belief = loop.predict_state(now)
-        assert belief is not None
-        np.testing.assert_array_equal(belief.state, sure.state)
-        assert (belief.std >= last).all()
-        last = belief.std
+        prediction = loop.predict_state(now)
+        assert prediction is not None
+        np.testing.assert_array_equal(prediction.state, measured.state)
+        assert (prediction.std >= last).all()
+        last = prediction.std
     start = np.array([CONFIG[dof].start_deviation for dof in Dof])
     assert (last >= 0.14 * start).all()
     assert (last < 0.5 * start).all()
-    assert (last > 2 * sure.std).any()
+    assert (last > 2 * measured.std).any()
     loop.on_features(seen[0], 0.51)
     again = loop.predict_state(0.51)
     assert again is not None
-    np.testing.assert_allclose(again.std, sure.std, rtol=0.1)
+    np.testing.assert_allclose(again.std, measured.std, rtol=0.1)
 
 
 @pytest.mark.parametrize("lost", [0, 1])
-def test_one_band_alone_informs_and_is_called_partial(lost: int) -> None:
-    loop = started()
+def test_one_band_updates_the_state_with_status_partial(lost: int) -> None:
+    loop = loop_at_rest()
     seen = build_feature_model(CONFIG).predict(REST)
     assert seen is not None
     features = seen[0].copy()
@@ -127,8 +127,8 @@ def test_one_band_alone_informs_and_is_called_partial(lost: int) -> None:
         loop.on_features([np.nan] * 4, 0.31)
 
 
-def test_the_states_deviation_is_the_covariance_through_the_pseudo_inverse() -> None:
-    loop = started()
+def test_state_std_is_the_covariance_through_the_pseudo_inverse() -> None:
+    loop = loop_at_rest()
     prediction = build_feature_model(CONFIG).predict(REST)
     assert prediction is not None
     features, matrix = prediction
@@ -140,9 +140,9 @@ def test_the_states_deviation_is_the_covariance_through_the_pseudo_inverse() -> 
     np.testing.assert_allclose(report.state_deviation, expected, rtol=1e-8)
 
 
-def deviations(stop_after: float, until: float) -> Floats:
-    """Expected deviations (n, 3) just before each of the images that come every 40 ms and show what
-    is predicted; the hand moves, and rests from `stop_after` [s] on.
+def predicted_std(stop_after: float, until: float) -> Floats:
+    """Standard deviations (n, 3) before each image, for images every 40 ms that show the predicted
+    state and a reference that moves until `stop_after` [s].
     """
     config = CONFIG.replace(profile="best")
     loop, model = HysteresisReduction(config), build_feature_model(config)
@@ -152,16 +152,16 @@ def deviations(stop_after: float, until: float) -> Floats:
         moved = min(tick * period, stop_after) * np.array([5e-3, 0.5, 0.2])
         loop.step(np.asarray(REST) + moved, tick * period)
         if tick % 8 == 7:
-            expectation = loop.predict_state(tick * period)
+            prediction = loop.predict_state(tick * period)
             seen = model.predict(loop.predicted_state)
-            assert expectation is not None and seen is not None
-            found.append(expectation.std)
+            assert prediction is not None and seen is not None
+            found.append(prediction.std)
             loop.on_features(seen[0], tick * period)
     return np.array(found)
 
 
-def test_a_tip_may_go_on_for_a_while_when_its_command_rests() -> None:
-    moves = deviations(stop_after=1.0, until=2.0)
-    stopped, rested = moves[26], moves[-1]
+def test_std_decays_after_the_command_comes_to_rest() -> None:
+    std = predicted_std(stop_after=1.0, until=2.0)
+    stopped, rested = std[26], std[-1]
     assert np.all(stopped > 1.25 * rested), (stopped, rested)
-    assert np.all(np.diff(moves[26:36], axis=0) < 0), moves[26:36]
+    assert np.all(np.diff(std[26:36], axis=0) < 0), std[26:36]
