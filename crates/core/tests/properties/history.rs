@@ -31,7 +31,7 @@ proptest! {
     #![proptest_config(config())]
 
     #[test]
-    fn between_ticks_it_interpolates(ticks in 2_u32..3000, share in 0.0..1.0) {
+    fn entries_are_interpolated_between_ticks(ticks in 2_u32..3000, share in 0.0..1.0) {
         let history = filled(5.0, ticks);
         let newest = f64::from(ticks - 1) * PERIOD;
         let kept = f64::from((ticks - 1).min(1000)) * PERIOD;
@@ -48,7 +48,7 @@ proptest! {
 }
 
 #[test]
-fn beyond_either_end_there_is_nothing() {
+fn times_outside_the_history_have_no_entry() {
     let history = filled(1.0, 500);
     let newest = 499.0 * PERIOD;
     assert!(history.at(newest - 1.0 + 1e-9).is_some());
@@ -83,7 +83,7 @@ fn beyond_either_end_there_is_nothing() {
 }
 
 #[test]
-fn a_time_that_jumps_back_starts_afresh() {
+fn a_time_that_jumps_back_clears_the_history() {
     let mut history = filled(2.0, 100);
     assert!(history.push(entry(0.1)));
     assert!(history.at(0.2).is_none());
@@ -91,7 +91,7 @@ fn a_time_that_jumps_back_starts_afresh() {
 }
 
 #[test]
-fn the_same_time_again_replaces_and_what_is_not_finite_is_left_out() {
+fn equal_times_replace_and_entries_that_are_not_finite_are_ignored() {
     let mut history = filled(2.0, 3);
     let again = Entry {
         command: [7.0; 3],
