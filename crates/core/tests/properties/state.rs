@@ -160,8 +160,24 @@ fn a_zero_or_repeated_column_is_held() {
     assert_eq!(none.observable, [true, false, true]);
     assert_eq!(none.deviation[1], f64::INFINITY);
     let twice = watch.estimate([0.0; 3], &prediction([x, x, y]), [1.0; 4]);
-    assert_eq!(twice.observable.iter().filter(|seen| **seen).count(), 2);
-    assert!(twice.observable[2]);
+    assert_eq!(
+        twice.observable,
+        [false, true, true],
+        "of two alike the first"
+    );
+}
+
+/// Of three unit vectors each is known to 1 per px, and the limit is 1.
+#[test]
+fn a_dof_exactly_at_its_limit_is_observable() {
+    let watch = StateEstimator::new([1.0; 3]).unwrap();
+    let mut units = [[0.0; 4]; 3];
+    for (dof, column) in units.iter_mut().enumerate() {
+        column[dof] = 1.0;
+    }
+    let found = watch.estimate([0.0; 3], &prediction(units), [1.0, 2.0, 3.0, 4.0]);
+    assert_eq!((found.observable, found.deviation), ([true; 3], [1.0; 3]));
+    assert_eq!(found.state, [1.0, 2.0, 3.0]);
 }
 
 #[test]
@@ -181,6 +197,13 @@ fn no_dof_is_observable_if_an_input_is_not_finite() {
         watch.estimate([0.5; 3], &prediction(huge), [1.0; 4]),
     ];
     for found in cases {
+        assert_eq!((found.state, found.observable), ([0.5; 3], [false; 3]));
+    }
+    // One NaN of a band is no band that was not found.
+    for entry in 0..4 {
+        let mut measured = [1.0; 4];
+        measured[entry] = f64::NAN;
+        let found = watch.estimate([0.5; 3], &prediction(good), measured);
         assert_eq!((found.state, found.observable), ([0.5; 3], [false; 3]));
     }
     assert_eq!(StateEstimator::new([1.0, 0.0, 1.0]).unwrap_err().value, 0.0);
