@@ -6,8 +6,8 @@ use proptest::prelude::*;
 
 use super::{close, config};
 
-const FOCAL: [f64; 2] = [600.0, 580.0];
-const CENTRE: [f64; 2] = [380.0, 290.0];
+pub const FOCAL: [f64; 2] = [600.0, 580.0];
+pub const CENTRE: [f64; 2] = [380.0, 290.0];
 
 pub fn distortions() -> impl Strategy<Value = [f64; 8]> {
     // k1, k2, p1, p2, k3, k4, k5, k6

@@ -7,9 +7,10 @@ use crate::math::linear::Vector;
 use crate::model::camera::Pose;
 use crate::model::features::FeatureModel;
 use crate::model::instrument::Instrument;
+use crate::model::settings::{CameraSettings, InstrumentSettings, PoseSettings};
 use proptest::prelude::*;
 
-use super::camera::{camera, distortions, formula};
+use super::camera::{CENTRE, FOCAL, camera, distortions, formula};
 use super::config;
 
 const LENGTH: f64 = 0.0186;
@@ -166,6 +167,37 @@ fn most_of_the_workspace_is_visible() {
             assert!(model.predict(state).is_some() && model.sideways(state).is_some());
         }
     }
+}
+
+#[test]
+fn settings_give_the_model_of_their_values() {
+    let shape = (
+        0.0015,
+        0.003,
+        [0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08],
+    );
+    let instrument = InstrumentSettings {
+        bending_length: LENGTH,
+        marker_a: MARKERS[0],
+        marker_b: MARKERS[1],
+        diameter: 0.003,
+        band_length: shape.1,
+    };
+    let camera = CameraSettings {
+        fx: FOCAL[0],
+        fy: FOCAL[1],
+        cx: CENTRE[0],
+        cy: CENTRE[1],
+        distortion: shape.2,
+        camera_from_guide: PoseSettings {
+            translation: TRANSLATION,
+            rotation: ROTATION,
+        },
+    };
+    assert_eq!(
+        FeatureModel::from_settings(&instrument, &camera).unwrap(),
+        model(shape)
+    );
 }
 
 /// Straight ahead, in the camera's frame: the axis is parallel to the optical axis, at a distance of `offset`.
