@@ -92,6 +92,8 @@ def _test(wanted: list[str], folder: Path, seconds: float) -> None:
         "TAUTSCOPE_STEPS": STEPS,
         "CARGO_TARGET_DIR": str(KEPT / "builds"),
         "RUSTC_BOOTSTRAP": "1",
+        # A failure is enough; nobody reads its smallest example.
+        "PROPTEST_MAX_SHRINK_ITERS": "0",
     }
     command = [*LIST, "--config", str(config), "-o", str(folder)]
     running = subprocess.Popen(command, cwd=ROOT, env=os.environ | environment)

@@ -223,4 +223,16 @@ mod tests {
         assert_eq!(flags(&[]), Ok(Flags::NONE));
         assert!(flags(&["lost", "frost"]).is_err());
     }
+
+    #[cfg(feature = "serde")]
+    #[test]
+    fn errors_of_type_state_what_is_expected() {
+        use serde::de::value::{Error, U32Deserializer};
+        use serde::de::{Deserialize, IntoDeserializer};
+        let number = || -> U32Deserializer<Error> { 1_u32.into_deserializer() };
+        let error = Flags::deserialize(number()).unwrap_err().to_string();
+        assert!(error.contains("a sequence of names of flags"), "{error}");
+        let error = Flag::deserialize(number()).unwrap_err().to_string();
+        assert!(error.contains("the name of a flag"), "{error}");
+    }
 }

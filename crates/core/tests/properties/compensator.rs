@@ -53,7 +53,7 @@ proptest! {
     #![proptest_config(config())]
 
     #[test]
-    fn gain_is_between_nothing_and_the_limit_and_every_switch_is_bumpless(
+    fn gain_is_between_zero_and_its_limit_and_switching_is_bumpless(
         play in plays(), first in -5.0..5.0, events in events()
     ) {
         let (mut compensator, mut state) = start(5.0, play);
@@ -120,7 +120,7 @@ proptest! {
     }
 
     #[test]
-    fn what_remains_of_the_width_is_one_gainth(gain in 1.0..5.0_f64, width in 0.1..3.0_f64) {
+    fn remaining_width_is_the_width_over_the_gain(gain in 1.0..5.0_f64, width in 0.1..3.0_f64) {
         let play = Play::new(-width, 0.0).unwrap();
         let compensator = Compensator::new(gain, 5.0).unwrap();
         let rest = width / gain;
@@ -130,7 +130,7 @@ proptest! {
     }
 
     #[test]
-    fn over_estimation_overshoots_by_the_law(
+    fn overestimated_width_overshoots_by_the_formula(
         gain in 1.0..5.0_f64, true_width in 0.0..3.0_f64, estimated_width in 0.0..3.0_f64
     ) {
         let believed = Play::new(-estimated_width, 0.0).unwrap();
@@ -174,7 +174,7 @@ fn nothing_drifts_over_a_hundred_thousand_reversals() {
 /// New offsets push the position inwards at either contact, never outwards. The law allows each
 /// push; what it must not do is add them up.
 #[test]
-fn the_noise_of_the_offsets_does_not_carry_the_command_away() {
+fn noise_of_the_offsets_does_not_accumulate_in_the_command() {
     let (compensator, mut state) = start_with_recovery(Play::new(-5.0, 5.0).unwrap());
     for tick in 0..400_000_u32 {
         let phase = f64::from(tick);
@@ -204,7 +204,7 @@ fn without_recovery_the_gain_in_contact_is_one() {
 }
 
 #[test]
-fn the_anchor_goes_home_gently() {
+fn anchor_returns_to_zero_with_a_bounded_gain() {
     let (compensator, mut state) = start_with_recovery(Play::new(-2.0, 2.0).unwrap());
     for reference in path(&[0.0, 10.0], 100) {
         compensator.step(&mut state, reference);
@@ -274,7 +274,7 @@ fn recovery_never_makes_a_jump_at_the_contact() {
 
 /// Of 5 it is 1 + 4 of that share; all else stays as it is.
 #[test]
-fn a_share_of_the_gain_is_that_of_what_is_beyond_one() {
+fn gain_share_scales_the_gain_beyond_one() {
     let whole = Compensator::new(5.0, 6.0)
         .and_then(|law| law.with_recovery(0.1))
         .unwrap();
@@ -292,5 +292,45 @@ fn a_share_of_the_gain_is_that_of_what_is_beyond_one() {
     for tick in 0..100 {
         let reference = 3.0 * (0.1 * f64::from(tick)).sin();
         assert!(close(none.step(&mut state, reference), reference));
+    }
+}
+
+/// What a limit keeps back is not made up for later: in contact the gain is 1 from there on.
+#[test]
+fn the_law_continues_from_a_limited_command() {
+    for play in [Play::new(-2.0, 2.0), Play::new(1.0, 2.0)].map(Result::unwrap) {
+        let (compensator, mut state) = start(5.0, play);
+        for reference in path(&[0.0, 10.0], 100) {
+            compensator.step(&mut state, reference);
+        }
+        let before = state.command();
+        let limited = compensator.step_within(&mut state, 10.5, |command| {
+            assert!(close(command, before + 0.5));
+            before + 0.2
+        });
+        assert_eq!((limited, state.command()), (before + 0.2, before + 0.2));
+        assert!(close(state.position(), 2.0));
+        let next = compensator.step(&mut state, 10.6);
+        assert!(close(next - limited, 0.1), "{}", next - limited);
+    }
+}
+
+/// The same law for a reference that is counted from elsewhere.
+#[test]
+fn a_shift_of_the_reference_moves_nothing() {
+    let play = Play::new(-2.0, 2.0).unwrap();
+    let (compensator, mut plain) = start(5.0, play);
+    let mut shifted = CompensatorState::new(play);
+    compensator.shift_reference(&mut shifted, 3.0);
+    assert!(shifted.command().is_nan(), "nothing to shift yet");
+    for reference in path(&[0.0, 10.0, 8.0], 10) {
+        compensator.step(&mut plain, reference);
+        compensator.step(&mut shifted, reference);
+    }
+    compensator.shift_reference(&mut shifted, 3.0);
+    for reference in path(&[8.0, 4.0, 9.0], 10) {
+        let expected = compensator.step(&mut plain, reference);
+        let command = compensator.step(&mut shifted, reference + 3.0);
+        assert!(close(command, expected), "{command} {expected}");
     }
 }

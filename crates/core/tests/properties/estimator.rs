@@ -25,7 +25,7 @@ proptest! {
     #![proptest_config(config())]
 
     #[test]
-    fn offsets_keep_their_order_and_stay_among_what_was_seen(
+    fn offsets_keep_their_order_and_stay_within_measured_values(
         first in plays(), signals in prop::collection::vec((-5.0..5.0, -5.0..5.0), 1..100)
     ) {
         let mut state = EstimatorState::new(first);
@@ -53,7 +53,7 @@ proptest! {
     }
 
     #[test]
-    fn it_converges_on_a_play_that_is_fully_crossed(truth in plays()) {
+    fn estimate_converges_if_the_play_is_fully_crossed(truth in plays()) {
         let (mut state, mut tip) = (unknown(), PlayState { output: 0.0 });
         let commands: Vec<f64> = (0..6).map(|turn| if turn % 2 == 0 { -6.0 } else { 6.0 }).collect();
         for command in path(&commands, 600) {
@@ -64,7 +64,7 @@ proptest! {
 
     /// Steady contact, looked at more or less often: what counts is the distance travelled.
     #[test]
-    fn the_sample_rate_does_not_matter(offset in 0.5..2.0, every in 1_u32..20) {
+    fn estimate_does_not_depend_on_the_sample_rate(offset in 0.5..2.0, every in 1_u32..20) {
         let learn = |stride: f64, updates: u32| {
             let mut state = unknown();
             for update in 0..=updates {
@@ -79,7 +79,7 @@ proptest! {
     }
 
     #[test]
-    fn what_is_not_finite_is_ignored(
+    fn values_that_are_not_finite_are_ignored(
         command in prop_oneof![Just(f64::NAN), Just(f64::INFINITY), Just(1.0)],
         measured in prop_oneof![Just(f64::NAN), Just(f64::NEG_INFINITY)]
     ) {
@@ -92,7 +92,7 @@ proptest! {
 }
 
 #[test]
-fn one_distance_counts_the_articles_factor() {
+fn one_update_distance_applies_the_smoothing_factor() {
     let mut state = unknown();
     estimator().update(&mut state, 0.0, -1.0);
     estimator().update(&mut state, DISTANCE, DISTANCE - 1.0);
@@ -100,7 +100,7 @@ fn one_distance_counts_the_articles_factor() {
 }
 
 #[test]
-fn triggers_say_which_condition_and_contact_first() {
+fn triggers_report_the_condition_and_prefer_contact() {
     let mut state = unknown();
     let rule = estimator();
     assert!(
@@ -128,7 +128,7 @@ fn triggers_say_which_condition_and_contact_first() {
 }
 
 #[test]
-fn the_reference_point_moves_on_though_no_condition_holds() {
+fn reference_point_advances_if_no_condition_holds() {
     let mut state = EstimatorState::new(Play::new(-1.0, 1.0).unwrap());
     let rule = estimator();
     rule.update(&mut state, 0.0, 0.0);
@@ -149,11 +149,63 @@ fn bad_settings_are_named() {
 }
 
 #[test]
-fn together_means_within_the_tolerance_of_the_commands_travel() {
+fn contact_needs_equal_travel_within_the_tolerance() {
     for (followed, expected) in [(0.61, Some(Trigger::Contact)), (0.59, None)] {
         let mut state = EstimatorState::new(Play::new(-2.0, 2.0).unwrap());
         estimator().update(&mut state, 0.0, 0.0);
         let triggers = estimator().update(&mut state, 1.0, followed);
         assert_eq!((triggers.minus, triggers.plus), (None, expected));
+    }
+}
+
+#[test]
+fn exactly_at_a_bound_no_condition_holds() {
+    let rule = Estimator::new(0.5, 0.5, 0.25).unwrap();
+    // All numbers are exact in binary. The first pairs are half the tolerance apart, the others on an offset.
+    for (command, measured) in [(1.0, 0.5), (-1.0, -0.5), (1.0, 0.0), (-1.0, 0.0)] {
+        let mut state = EstimatorState::new(Play::new(-1.0, 1.0).unwrap());
+        rule.update(&mut state, 0.0, 0.0);
+        let triggers = rule.update(&mut state, command, measured);
+        assert_eq!((triggers.minus, triggers.plus), (None, None));
+        assert!(!triggers.any());
+    }
+}
+
+#[test]
+fn an_update_of_either_offset_is_an_update() {
+    for command in [3.0, -3.0] {
+        let mut state = EstimatorState::new(Play::new(-1.0, 1.0).unwrap());
+        estimator().update(&mut state, 0.0, 0.0);
+        assert!(estimator().update(&mut state, command, 0.0).any());
+    }
+}
+
+#[test]
+fn exactly_one_update_distance_is_enough() {
+    let rule = Estimator::new(0.5, 0.5, 0.25).unwrap();
+    let mut state = EstimatorState::new(Play::new(-0.25, 0.25).unwrap());
+    rule.update(&mut state, 0.0, 0.0);
+    assert!(rule.update(&mut state, 0.5, 0.0).any());
+}
+
+/// Eq. (6) from an offset of 1 to a measured one of 3, with a = 1/4 per distance: 1 + 2 a, and once more 1 + 2 (a + a (1 - a)).
+#[test]
+fn smoothing_starts_from_the_offset_before() {
+    let rule = Estimator::new(0.5, 0.5, 0.25).unwrap();
+    for (distances, expected) in [(1.0, 1.5), (2.0, 1.875)] {
+        for side in [-1.0, 1.0] {
+            let mut state = EstimatorState::new(Play::new(-1.0, 1.0).unwrap());
+            let travel = 0.5 * distances;
+            rule.update(&mut state, 0.0, side * (travel - 3.0));
+            rule.update(&mut state, side * travel, side * (travel - 3.0));
+            let (minus, plus) = (state.play().delta_minus(), state.play().delta_plus());
+            let (used, other) = if side > 0.0 {
+                (plus, minus)
+            } else {
+                (minus, plus)
+            };
+            assert!(close(used, side * expected), "{used}");
+            assert_eq!(other, -side);
+        }
     }
 }

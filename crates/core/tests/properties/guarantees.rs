@@ -106,7 +106,7 @@ fn walk(chance: &mut Chance, reference: f64) -> f64 {
 }
 
 #[test]
-fn gain_of_the_articles_law() {
+fn gain_of_the_compensator() {
     let (mut chance, mut count) = (Chance(2013), Count::default());
     let mut law = Compensator::new(LIMIT, LIMIT).unwrap();
     let mut state = CompensatorState::new(chance.play());
@@ -192,7 +192,7 @@ fn adaptive_walk(seed: u64, wanted: u64) -> Count {
 
 /// c - u - (1 - 1/K) p, in m, over reversals at every 1000 ticks.
 #[test]
-fn nothing_ratchets() {
+fn the_command_does_not_ratchet() {
     let law = Compensator::new(LIMIT, LIMIT).unwrap();
     let mut state = CompensatorState::new(Play::new(-4.3e-3, 5.7e-3).unwrap());
     let (mut reference, mut speed, mut worst) = (0.025, 37.1e-6, 0.0_f64);
@@ -218,7 +218,7 @@ fn nothing_ratchets() {
 
 /// After a reversal the tip overshoots by max(0, estimated width (1 - 1/K) - true width), in mm.
 #[test]
-fn over_estimation_overshoots_by_the_law_everywhere() {
+fn overestimated_width_overshoots_by_the_formula_everywhere() {
     let (mut worst, mut cases) = (0.0_f64, 0_u64);
     let truth = Play::new(-10.0, 0.0).unwrap();
     for ratio in 0..=20 {

@@ -31,7 +31,7 @@ proptest! {
     #![proptest_config(config())]
 
     #[test]
-    fn between_ticks_it_interpolates(ticks in 2_u32..3000, share in 0.0..1.0) {
+    fn entries_are_interpolated_between_ticks(ticks in 2_u32..3000, share in 0.0..1.0) {
         let history = filled(5.0, ticks);
         let newest = f64::from(ticks - 1) * PERIOD;
         let kept = f64::from((ticks - 1).min(1000)) * PERIOD;
@@ -45,10 +45,91 @@ proptest! {
             prop_assert!(found.iter().zip(expected).all(|(a, b)| close(*a, b)));
         }
     }
+
+    /// Against a list that is searched from its start. Times are multiples of 2^-4, span and period of 2^-3.
+    #[test]
+    fn a_history_agrees_with_a_plain_list(
+        steps in prop::collection::vec((-6..12_i32, -1.0..1.0_f64), 1..60), spare in 0_usize..3,
+        late in 0..30_i32
+    ) {
+        let (span, period) = (1.0, 0.125);
+        let capacity = 10 + spare;
+        let mut history = History::new(span, period, vec![Entry::BLANK; capacity]).unwrap();
+        prop_assert!(history.newest_time().is_nan() && history.since(-1e9).next().is_none());
+        let mut list: Vec<Entry> = Vec::new();
+        let mut now = 0;
+        for (step, value) in steps {
+            // Most steps are one period forward; some repeat the time, and few go back.
+            now += match step { -6 => -7, -5..0 => 0, other => other.min(2) };
+            let new = Entry {
+                command: [value, -value, 2.0 * value],
+                reference: [value; 3],
+                ..entry(f64::from(now) / 16.0)
+            };
+            let newest = list.last().map(|last| last.time);
+            let is_back = newest.is_some_and(|newest| new.time < newest);
+            if is_back {
+                list.clear();
+            } else if newest == Some(new.time) {
+                list.pop();
+            }
+            list.push(new);
+            if list.len() > capacity {
+                list.remove(0);
+            }
+            prop_assert_eq!(history.push(new), is_back);
+        }
+        let newest = *list.last().unwrap();
+        prop_assert_eq!(history.newest_time(), newest.time);
+        let time = newest.time + (f64::from(3 - late)) / 16.0;
+        let after: Vec<Entry> = list.iter().copied().filter(|entry| entry.time > time).collect();
+        prop_assert_eq!(history.since(time).copied().collect::<Vec<_>>(), after);
+        let found = history.at(time);
+        let before = list.iter().rev().find(|entry| entry.time <= time);
+        let next = list.iter().find(|entry| entry.time > time);
+        let is_kept = time >= newest.time - span && time <= newest.time + period;
+        match (before.filter(|_| is_kept), next) {
+            (None, _) => prop_assert_eq!(found, None),
+            (Some(before), None) => prop_assert_eq!(found, Some(Entry { time, ..*before })),
+            (Some(before), Some(next)) => {
+                let found = found.unwrap();
+                let share = (time - before.time) / (next.time - before.time);
+                let mix = |of: fn(&Entry) -> [f64; 3]| {
+                    let (from, to, found) = (of(before), of(next), of(&found));
+                    (0..3).all(|k| close(found[k], (1.0 - share) * from[k] + share * to[k]))
+                };
+                prop_assert!(mix(|entry| entry.reference) && mix(|entry| entry.command));
+                prop_assert!(mix(|entry| entry.predicted_state) && mix(|entry| entry.corrected));
+                prop_assert!(mix(|entry| entry.travel) && found.time == time);
+            }
+        }
+    }
 }
 
 #[test]
-fn beyond_either_end_there_is_nothing() {
+fn an_entry_needs_finite_values() {
+    for spoil in [f64::NAN, f64::INFINITY] {
+        let mut history = filled(2.0, 3);
+        history.push(Entry {
+            predicted_state: [0.0, spoil, 0.0],
+            ..entry(1.0)
+        });
+        history.push(Entry {
+            time: spoil,
+            ..entry(1.0)
+        });
+        assert_eq!(history.newest_time(), 2.0 * PERIOD);
+    }
+}
+
+#[test]
+fn the_storage_is_one_entry_per_period_and_two() {
+    assert_eq!(history_entries(1.0, 0.125), 10);
+    assert_eq!(history_entries(1.1, 0.125), 11);
+}
+
+#[test]
+fn times_outside_the_history_have_no_entry() {
     let history = filled(1.0, 500);
     let newest = 499.0 * PERIOD;
     assert!(history.at(newest - 1.0 + 1e-9).is_some());
@@ -83,7 +164,7 @@ fn beyond_either_end_there_is_nothing() {
 }
 
 #[test]
-fn a_time_that_jumps_back_starts_afresh() {
+fn a_time_that_jumps_back_clears_the_history() {
     let mut history = filled(2.0, 100);
     assert!(history.push(entry(0.1)));
     assert!(history.at(0.2).is_none());
@@ -91,7 +172,7 @@ fn a_time_that_jumps_back_starts_afresh() {
 }
 
 #[test]
-fn the_same_time_again_replaces_and_what_is_not_finite_is_left_out() {
+fn equal_times_replace_and_entries_that_are_not_finite_are_ignored() {
     let mut history = filled(2.0, 3);
     let again = Entry {
         command: [7.0; 3],

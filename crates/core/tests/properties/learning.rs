@@ -81,17 +81,17 @@ fn learns_and_is_held<P: Profile>(reduction: Loop<P>) {
 }
 
 #[test]
-fn images_teach_the_articles_slack_and_nothing_while_the_estimate_is_held() {
+fn measurements_update_profile_paper_unless_the_estimate_is_held() {
     learns_and_is_held(article(|_| Play::new(0.0, 0.0).unwrap()));
 }
 
 #[test]
-fn images_teach_the_best_profile_and_nothing_while_the_estimate_is_held() {
+fn measurements_update_profile_best_unless_the_estimate_is_held() {
     learns_and_is_held(adaptive());
 }
 
 #[test]
-fn no_more_slack_is_believed_than_may_be() {
+fn the_estimated_slack_stays_within_its_limits() {
     // 36 wide, and 30 may be.
     let start = article(|unit| Play::new(-13.0 * unit, 13.0 * unit).unwrap());
     let mut run = Run::new(start, -18.0, 18.0);
@@ -107,7 +107,7 @@ fn no_more_slack_is_believed_than_may_be() {
 }
 
 #[test]
-fn a_hold_ends_by_the_hands_travel_counted_in_widths() {
+fn a_hold_ends_after_reference_travel_counted_in_widths() {
     let mut reduction = article(|_| Play::new(0.0, 0.0).unwrap());
     let mut hand = CENTRES;
     reduction.step(hand, None, 0.0);
@@ -131,7 +131,7 @@ fn a_hold_ends_by_the_hands_travel_counted_in_widths() {
 }
 
 #[test]
-fn at_the_top_of_its_ladder_a_flag_stays() {
+fn a_flag_at_its_last_level_stays() {
     let mut reduction = article(|_| Play::new(0.0, 0.0).unwrap());
     reduction.step(CENTRES, None, 0.0);
     for tick in 1..=10_000_u32 {
@@ -145,7 +145,7 @@ fn at_the_top_of_its_ladder_a_flag_stays() {
 }
 
 #[test]
-fn slack_that_was_learnt_and_changes_is_said() {
+fn a_change_of_the_estimated_slack_is_flagged() {
     let mut run = Run::new(adaptive(), -6.0, 9.0);
     run.swing(4);
     let latched = run.reduction.supervision().latched;
@@ -162,7 +162,7 @@ fn slack_that_was_learnt_and_changes_is_said() {
 
 /// What images have said for as long as a hold lasts is believed in the end.
 #[test]
-fn a_tip_that_has_jumped_is_not_believed_until_it_has_stayed() {
+fn a_jump_of_the_tip_is_accepted_once_it_has_lasted() {
     let mut run = Run::new(adaptive(), -3.0, 3.0);
     run.swing(3);
     assert_eq!(run.reduction.supervision().reaction, Reaction::None);

@@ -1,5 +1,7 @@
 //! The most slack that is believed.
 
+use crate::article::estimator::EstimatorState;
+use crate::article::play::Play;
 use crate::article::play_limit::PlayLimit;
 use proptest::prelude::*;
 
@@ -19,7 +21,7 @@ fn limits_out_of_range_are_named() {
 }
 
 #[test]
-fn a_limit_itself_may_be_reached_and_not_passed() {
+fn a_limit_may_be_reached_and_not_exceeded() {
     let limit = PlayLimit::new(WIDTH, OFFSET).unwrap();
     for side in [-1.0, 1.0] {
         assert!(limit.allows(side * OFFSET));
@@ -38,7 +40,7 @@ proptest! {
     #![proptest_config(config())]
 
     #[test]
-    fn what_may_be_stays_and_the_rest_comes_as_near_as_it_may(
+    fn offsets_within_the_limits_stay_and_others_move_to_the_nearest(
         minus in -20.0..20.0_f64, width in 0.0..30.0_f64,
     ) {
         let (limit, plus) = (PlayLimit::new(WIDTH, OFFSET).unwrap(), minus + width);
@@ -53,5 +55,17 @@ proptest! {
         } else {
             prop_assert_eq!([low, high], [minus, plus]);
         }
+    }
+}
+
+#[test]
+fn an_estimate_is_limited_only_beyond_the_limit() {
+    let limit = PlayLimit::new(WIDTH, OFFSET).unwrap();
+    for (minus, plus, exceeds) in [(-4.0, 8.0, false), (-8.0, 8.0, true), (7.0, 9.0, true)] {
+        let before = Play::new(minus, plus).unwrap();
+        let mut state = EstimatorState::new(before);
+        assert_eq!(state.limit(limit), exceeds);
+        assert_eq!(state.play() != before, exceeds);
+        assert!(!limit.exceeds(state.play().delta_minus(), state.play().delta_plus()));
     }
 }

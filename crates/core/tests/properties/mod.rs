@@ -4,12 +4,14 @@
 #![allow(clippy::float_cmp)]
 
 mod adaptive;
+mod camera;
 mod change_watch;
 mod command_limiter;
 mod compensator;
 mod estimator;
 mod expectation;
 mod fading;
+mod features;
 mod frame_gate;
 mod frames;
 mod friction;
@@ -19,14 +21,17 @@ mod guarantees;
 mod history;
 mod innovations;
 mod input_device;
+mod instrument;
 mod lead;
 mod lead_rates;
 mod learning;
 mod limits;
+mod linear;
 mod monitors;
 mod motion_bounds;
 mod motion_monitor;
 mod offset_map;
+mod outline;
 mod play;
 mod reference_gate;
 mod sharing;
@@ -36,6 +41,7 @@ mod strokes;
 mod supervisor;
 #[path = "../support/mod.rs"]
 mod support;
+mod symmetric;
 mod thrown_away;
 mod weighted;
 mod whole;

@@ -138,18 +138,18 @@ fn stress<P: Profile>(mut reduction: Loop<P>, seed: u64) {
 }
 
 #[test]
-fn no_command_ever_breaks_the_law_in_the_articles_scheme() {
+fn every_command_keeps_the_law_in_profile_paper() {
     stress(article(|_| Play::new(0.0, 0.0).unwrap()), 2013);
 }
 
 #[test]
-fn no_command_ever_breaks_the_law_in_the_best_profile() {
+fn every_command_keeps_the_law_in_profile_best() {
     stress(adaptive(), 652);
 }
 
 /// c - u - (1 - 1 / `K_b`) p is what it was, however many reversals came.
 #[test]
-fn nothing_drifts() {
+fn the_command_does_not_drift() {
     let mut reduction = article(|unit| Play::new(-12.0 * unit, 12.0 * unit).unwrap());
     let start = [0.025, 0.0, 0.9];
     reduction.step(start, None, 0.0);

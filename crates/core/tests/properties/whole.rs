@@ -11,7 +11,7 @@ use super::support::{PERIOD, UNITS, safety};
 
 /// While nothing is wrong, what the loop commands is what the law does by itself.
 #[test]
-fn a_nominal_run_is_the_laws_to_the_bit() {
+fn supervision_changes_no_bit_of_a_nominal_run() {
     let play = |unit: f64| Play::new(-7.0 * unit, 11.0 * unit).unwrap();
     let mut reduction = article(play);
     let law = Compensator::new(5.0, 5.0).unwrap();
@@ -33,7 +33,7 @@ fn a_nominal_run_is_the_laws_to_the_bit() {
 
 /// A first reference beyond the end of the travel is taken at the end, and no motion is lost but what was beyond.
 #[test]
-fn a_start_beyond_the_end_is_at_the_end() {
+fn a_start_beyond_the_travel_begins_at_its_end() {
     for (minus, plus) in [(2.0, 6.0), (-6.0, -2.0), (-3.0, 3.0)] {
         let mut reduction = article(|unit| Play::new(minus * unit, plus * unit).unwrap());
         let unit = UNITS[0];
@@ -57,7 +57,7 @@ fn a_start_beyond_the_end_is_at_the_end() {
 
 /// The end of the travel is no jump of a command, and no fault of the law.
 #[test]
-fn the_end_of_the_travel_stops_nothing_else() {
+fn the_end_of_the_travel_is_neither_a_jump_nor_a_violation() {
     let mut reduction = article(|_| Play::new(0.0, 0.0).unwrap());
     for tick in 0..3000_u32 {
         let time = f64::from(tick) * PERIOD;
@@ -71,7 +71,7 @@ fn the_end_of_the_travel_stops_nothing_else() {
 }
 
 #[test]
-fn a_hand_that_trembles_is_said_unless_it_is_not_looked_for() {
+fn tremor_is_flagged_unless_its_detector_is_off() {
     for off in [Flags::NONE, Flags::of(Flag::Tremor)] {
         let settings = SafetySettings { off, ..safety() };
         let mut reduction = article_with(&settings, 0.0, |_| Play::new(0.0, 0.0).unwrap());
@@ -86,7 +86,7 @@ fn a_hand_that_trembles_is_said_unless_it_is_not_looked_for() {
 }
 
 #[test]
-fn what_the_rig_says_counts_unless_it_is_not_looked_for() {
+fn a_flag_of_the_rig_counts_unless_it_is_off() {
     for off in [Flags::NONE, Flags::of(Flag::FollowingError)] {
         let settings = SafetySettings { off, ..safety() };
         let mut reduction = article_with(&settings, 0.0, |_| Play::new(0.0, 0.0).unwrap());
