@@ -18,7 +18,7 @@ from tautscope.report.figures import BLACK, BLUE, GREY, ORANGE, style
 Floats = NDArray[np.float64]
 
 PERIOD, STROKE = 10.0, 15.0
-"""Of the hand's motion [s, mm]."""
+"""Period and stroke of the reference [s, mm]."""
 OFFSETS = {"delta_minus": -5.0, "delta_plus": 5.0}
 """Of the slack [mm]: 10 mm wide, the insertion of the article's Table 1."""
 SHADE = "#f0e6cc"
@@ -27,9 +27,9 @@ SHADE = "#f0e6cc"
 def main() -> None:
     """Write problem.png beside this file."""
     time = np.linspace(0, 2.25 * PERIOD, 4501)
-    hand = STROKE * np.sin(2 * np.pi * time / PERIOD)
-    command = Compensator(free_gain=5.0, gain_limit=5.0, **OFFSETS).run(hand)
-    plain, compensated = (Play(**OFFSETS).run(motor) for motor in (hand, command))
+    reference = STROKE * np.sin(2 * np.pi * time / PERIOD)
+    command = Compensator(free_gain=5.0, gain_limit=5.0, **OFFSETS).run(reference)
+    plain, compensated = (Play(**OFFSETS).run(motor) for motor in (reference, command))
 
     with style():
         figure = Figure(figsize=(7.2, 3.7), layout="constrained")
@@ -37,22 +37,24 @@ def main() -> None:
         above = figure.add_subplot(grid[0, 0])
         below = figure.add_subplot(grid[1, 0], sharex=above, sharey=above)
         loop = figure.add_subplot(grid[:, 1])
-        draw_signals(above, time, hand, hand, plain)
+        draw_signals(above, time, reference, reference, plain)
         above.set_title("(a) without: the tip stands still after each reversal")
         above.tick_params(labelbottom=False)
-        draw_signals(below, time, hand, command, compensated)
+        draw_signals(below, time, reference, command, compensated)
         below.set_title("(b) with: the motor crosses the slack five times as fast")
         below.set_xlabel("time [s]")
-        draw_loops(loop, hand, plain, compensated)
+        draw_loops(loop, reference, plain, compensated)
         lines, labels = below.get_legend_handles_labels()
         figure.legend(lines, labels, loc="outside lower left", ncols=4)
         figure.savefig(Path(__file__).with_suffix(".png"), dpi=160)
 
 
-def draw_signals(axes: Axes, time: Floats, hand: Floats, motor: Floats, tip: Floats) -> None:
+def draw_signals(axes: Axes, time: Floats, reference: Floats, motor: Floats, tip: Floats) -> None:
     """Hand, motor and tip over time [mm]; shaded where the motor moves and the tip does not."""
     shown = time >= PERIOD / 4
-    time, hand, motor, tip = (values[shown] for values in (time - PERIOD / 4, hand, motor, tip))
+    time, reference, motor, tip = (
+        values[shown] for values in (time - PERIOD / 4, reference, motor, tip)
+    )
     stuck = np.isclose(np.gradient(tip), 0.0, atol=1e-9)
     axes.fill_between(
         time,
@@ -65,20 +67,22 @@ def draw_signals(axes: Axes, time: Floats, hand: Floats, motor: Floats, tip: Flo
         label="motor moves, tip does not",
     )
     axes.plot(time, motor, color=ORANGE, linewidth=1.4, label="motor")
-    axes.plot(time, hand, color=BLACK, linestyle=(0, (4, 2)), linewidth=0.9, label="hand")
+    axes.plot(time, reference, color=BLACK, linestyle=(0, (4, 2)), linewidth=0.9, label="reference")
     axes.plot(time, tip, color=BLUE, linewidth=1.6, label="tip")
     axes.set_ylabel("insertion [mm]")
     axes.set_xlim(time[0], time[-1])
     axes.set_ylim(-24, 24)
 
 
-def draw_loops(axes: Axes, hand: Floats, plain: Floats, compensated: Floats) -> None:
-    """Tip over hand [mm], the last period of each."""
+def draw_loops(axes: Axes, reference: Floats, plain: Floats, compensated: Floats) -> None:
+    """Tip over reference [mm], the last period of each."""
     last = slice(-2001, None)
-    axes.plot(hand[last], plain[last], color=GREY, linewidth=1.6, label="without: 10 mm wide")
-    axes.plot(hand[last], compensated[last], color=BLUE, linewidth=1.6, label="with: 2 mm wide")
-    axes.set_title("(c) tip over hand")
-    axes.set_xlabel("hand [mm]")
+    axes.plot(reference[last], plain[last], color=GREY, linewidth=1.6, label="without: 10 mm wide")
+    axes.plot(
+        reference[last], compensated[last], color=BLUE, linewidth=1.6, label="with: 2 mm wide"
+    )
+    axes.set_title("(c) tip over reference")
+    axes.set_xlabel("reference [mm]")
     axes.set_ylabel("tip [mm]")
     axes.set_box_aspect(1)
     axes.set_xlim(-18, 18)
