@@ -130,7 +130,7 @@ pub fn settings(safety: &SafetySettings) -> Settings {
             correlation: 40.0,
             level_drift: 0.2,
             gain_drift: 0.002,
-            local_drift: 0.03,
+            local_drift: 0.2,
             symmetry: 0.8,
             change_rate: UNITS.map(|unit| 0.03 / unit),
             change_spare: 1.0,
