@@ -106,6 +106,24 @@ proptest! {
     }
 }
 
+/// Values so far apart that interpolation from the entry before would round.
+#[test]
+fn at_the_time_of_an_entry_it_is_that_entry_bit_for_bit() {
+    let mut history = filled(2.0, 0);
+    let ticks: Vec<Entry> = (0..16)
+        .map(|tick| Entry {
+            command: [if tick % 2 == 0 { 1e17 } else { 1.0 }; 3],
+            ..entry(f64::from(tick) / 256.0)
+        })
+        .collect();
+    for tick in &ticks {
+        history.push(*tick);
+    }
+    for tick in ticks {
+        assert_eq!(history.at(tick.time).unwrap().command, tick.command);
+    }
+}
+
 #[test]
 fn an_entry_needs_finite_values() {
     for spoil in [f64::NAN, f64::INFINITY] {
