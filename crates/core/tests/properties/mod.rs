@@ -38,6 +38,7 @@ mod sharing;
 mod state;
 mod stress;
 mod strokes;
+mod supervised_law;
 mod supervisor;
 #[path = "../support/mod.rs"]
 mod support;
