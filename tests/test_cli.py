@@ -1,19 +1,21 @@
 """The command line: output, run folders, messages, exit status."""
 
 import json
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import matplotlib.image
 import numpy as np
 import pytest
-from drawn import BadFrameRig, DrawnRig, short_experiment
+from drawn import make_bad_frame_rig, make_drawn_rig, short_experiment
 from refused import failed
 from tautscope.cli import main
 from tautscope.config import dump_config, load_config
 from tautscope.report import demo
+from tautscope.report.operator_motion import operator_motion
 from tautscope.report.tables import ROWS
-from tautscope.runs.recording import Recording
+from tautscope.runs.recording import Recording, per_dof
 
 SUMMARY = [
     "unit",
@@ -28,9 +30,26 @@ SUMMARY = [
 ]
 
 
+OPERATOR_DURATION = 50.0
+OPERATOR_FIGURES = [
+    "uncompensated_rms",
+    "compensated_rms",
+    "reduction",
+    "largest",
+    "overspeed",
+    "creep",
+    "bound",
+]
+
+
 @pytest.fixture
 def on_drawn_rig(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(demo, "run_demo", partial(demo.run_demo, make_rig=DrawnRig))
+    monkeypatch.setattr(demo, "run_demo", partial(demo.run_demo, make_rig=make_drawn_rig))
+    monkeypatch.setattr(
+        demo,
+        "operator_motion",
+        lambda config: replace(operator_motion(config), duration=OPERATOR_DURATION),
+    )
 
 
 @pytest.fixture
@@ -60,10 +79,10 @@ def test_demo_writes_a_run_folder_and_prints_one_json_object(
     arguments = ["demo", "--config", config_file, "--seed", "3", "--seeds", "2", "--json"]
     assert main([*arguments, "--profile", "paper", "--out", str(out)]) == 0
     captured = capsys.readouterr()
-    assert "4 runs: 100 %" in captured.err
+    assert "8 runs: 100 %" in captured.err
     assert captured.out.count("\n") == 1
     found = json.loads(captured.out)
-    assert list(found) == ["profile", "seeds", "dof", "sim_seconds", "wall_seconds"]
+    assert list(found) == ["profile", "seeds", "dof", "hand", "sim_seconds", "wall_seconds"]
     assert found["profile"] == "paper"
     assert found["seeds"] == [3, 4]
     assert list(found["dof"]) == ["insertion", "rotation", "bending"]
@@ -74,14 +93,27 @@ def test_demo_writes_a_run_folder_and_prints_one_json_object(
     assert 10 < insertion["uncompensated"] < 11
     assert 0.7 < insertion["reduction"] < 0.82
     assert insertion["marker_rms_px"] is None  # this rig has no true features
-    assert found["sim_seconds"] == pytest.approx(4 * 36, abs=0.1)
+    assert found["sim_seconds"] == pytest.approx(4 * (36 + OPERATOR_DURATION), abs=0.1)
+
+    assert list(found["hand"]) == list(found["dof"])
+    for dof in found["hand"].values():
+        assert list(dof) == OPERATOR_FIGURES
+    operator = found["hand"]["insertion"]
+    assert 1e-3 < operator["uncompensated_rms"] < 5e-3  # m, half of this rig's width at most
+    assert operator["compensated_rms"] < 0.5 * operator["uncompensated_rms"]
 
     assert {path.name for path in out.iterdir()} == {
         "config.toml",
         "table1.csv",
-        *(f"{name}{run}" for name in ("trace", "frames") for run in (".csv", "_uncompensated.csv")),
-        "recording.toml",
-        "recording_uncompensated.toml",
+        "operator_motion.csv",
+        "operator_motion.png",
+        "operator_motion.pdf",
+        *(
+            f"{name}{motion}{run}.{end}"
+            for name, end in (("trace", "csv"), ("frames", "csv"), ("recording", "toml"))
+            for motion in ("", "_operator_motion")
+            for run in ("", "_uncompensated")
+        ),
         "fig5.png",
         "fig9.png",
         "fig9.pdf",
@@ -90,7 +122,14 @@ def test_demo_writes_a_run_folder_and_prints_one_json_object(
     assert load_config(out / "config.toml").twin.seed == 3
     assert Recording.load(out).compensated
     assert not Recording.load(out, "_uncompensated").compensated
-    for name in ("fig5.png", "fig9.png"):
+    motion = Recording.load(out, "_operator_motion")
+    assert motion.compensated
+    assert len(motion.trace) == OPERATOR_DURATION / 0.01
+    free = Recording.load(out, "_operator_motion_uncompensated")
+    assert not free.compensated
+    for name in ("reference", "command"):
+        np.testing.assert_array_equal(per_dof(free.trace, name), per_dof(motion.trace, "reference"))
+    for name in ("fig5.png", "fig9.png", "operator_motion.png"):
         image = matplotlib.image.imread(out / name)
         assert min(image.shape[:2]) > 600
         assert np.ptp(image) > 0
@@ -102,6 +141,15 @@ def test_demo_writes_a_run_folder_and_prints_one_json_object(
     ]  # fmt: skip
     assert {line.split(",")[2] for line in lines} == {"", "paper"}
     assert lines[0].split(",")[4] == "10"
+    header, *lines = (out / "operator_motion.csv").read_text().splitlines()
+    assert header.split(",") == ["dof", "unit", "profile", "source", *OPERATOR_FIGURES]
+    assert [line.split(",")[0] for line in lines[::4]] == list(found["hand"])
+    assert [line.split(",")[3] for line in lines[:4]] == ["seed 3", "seed 4", "median", "worst"]
+    assert float(lines[2].split(",")[4]) == pytest.approx(
+        1e3 * operator["uncompensated_rms"], rel=1e-5
+    )
+    low, high = sorted(float(line.split(",")[6]) for line in lines[:2])
+    assert float(lines[3].split(",")[6]) == low < high
 
 
 @pytest.mark.usefixtures("on_drawn_rig")
@@ -120,6 +168,10 @@ def test_demo_prints_the_articles_values_and_both_profiles(
     assert [cell for cell in reduction.split("  ") if cell.strip()][1].strip() == "75 %"
     assert "rotation [rad]" in out
     assert "report.html" in out
+    operator = out[out.index("Operator motion") :]
+    rows = [line for line in operator.splitlines() if line.startswith("reduction ")]
+    assert [cell.strip()[-1] for cell in rows[0].split("  ")[1:] if cell.strip()] == ["%"] * 3
+    assert "paper" not in operator.splitlines()[1]
 
 
 def test_a_failed_run_leaves_no_folder(
@@ -128,7 +180,7 @@ def test_a_failed_run_leaves_no_folder(
     config_file: str,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(demo, "run_demo", partial(demo.run_demo, make_rig=BadFrameRig))
+    monkeypatch.setattr(demo, "run_demo", partial(demo.run_demo, make_rig=make_bad_frame_rig))
     out = tmp_path / "run"
     assert main(["demo", "--config", config_file, "--out", str(out)]) == 2
     assert "error: " in capsys.readouterr().err

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drawn import BadFrameRig, DrawnRig, short_experiment
+from drawn import make_bad_frame_rig, make_drawn_rig, short_experiment
 from tautscope.errors import (
     FrameError,
     MissingPathError,
@@ -85,7 +85,7 @@ def test_runs_in_worker_processes_are_identical(
 ) -> None:
     shares: list[float] = []
     trials = [Trial(CONFIG, False), Trial(CONFIG, True)]
-    first, second = run_trials(trials, shares.append, DrawnRig, workers=2)
+    first, second = run_trials(trials, shares.append, make_drawn_rig, workers=2)
     assert_same(first.trace, uncompensated.trace)
     assert_same(second.trace, compensated.trace)
     assert shares == sorted(shares)
@@ -93,5 +93,5 @@ def test_runs_in_worker_processes_are_identical(
 
 def test_an_error_in_a_worker_process_keeps_its_facts() -> None:
     with pytest.raises(FrameError) as error:
-        run_trials([Trial(CONFIG, True)] * 2, lambda share: None, BadFrameRig, workers=2)
+        run_trials([Trial(CONFIG, True)] * 2, lambda share: None, make_bad_frame_rig, workers=2)
     assert error.value.allowed

@@ -12,9 +12,11 @@ from matplotlib.figure import Figure
 from tautscope.dof import Dof
 from tautscope.report import figures, tables
 from tautscope.report.demo import Demo, demo_report
+from tautscope.report.operator_figure import draw_operator_motion
+from tautscope.report.operator_motion import OperatorResult
 from tautscope.report.report import CaptionedFigure, run_report
 from tautscope.report.results import DofResult, evaluate
-from tautscope.report.tables import ROWS, article_cell, cell
+from tautscope.report.tables import OPERATOR_ROWS, ROWS, article_cell, cell
 from tautscope.runs.recording import Recording
 
 VOID = {"meta", "img", "br"}
@@ -54,7 +56,20 @@ def demo(runs: tuple[Recording, Recording]) -> Demo:
     uncompensated, compensated = runs
     result = evaluate(uncompensated, compensated)
     config = compensated.config.replace(**{"twin.background": "<b>&"})
-    return Demo(config, (3, 4), (result, result), uncompensated, compensated, 144.0, 12.0)
+    figures = {dof: OperatorResult(3e-3, 1e-3, 0.66, 2e-3, 1.5, 1e-4, 0.9) for dof in Dof}
+    worse = {dof: replace(each, reduction=0.5, overspeed=4.4) for dof, each in figures.items()}
+    return Demo(
+        config,
+        seeds=(3, 4),
+        results=(result, result),
+        uncompensated=uncompensated,
+        compensated=compensated,
+        operator_results=(figures, worse),
+        operator_uncompensated=uncompensated,
+        operator_compensated=replace(compensated, warnings=("tremor at 1 of 2 images",)),
+        sim_seconds=144.0,
+        wall_seconds=12.0,
+    )
 
 
 def test_the_report_is_self_contained(demo: Demo) -> None:
@@ -82,6 +97,16 @@ def test_the_report_contains_the_results(demo: Demo) -> None:
     assert "nan" not in page.text
 
 
+def test_the_report_has_the_operator_motion(demo: Demo) -> None:
+    text = demo_report(demo, [])
+    for row in OPERATOR_ROWS:
+        assert f"<td>{row.title}</td>" in text
+    assert text.count('<td class="ours">58 %<small>(50 %)</small></td>') == len(Dof)
+    assert text.count('<td class="ours">2.95<small>(4.4)</small></td>') == len(Dof)
+    assert '<td class="ours">3<small>(3)</small></td>' in text  # mm
+    assert "operator motion: tremor at 1 of 2 images" in text
+
+
 def test_the_report_has_a_column_for_each_profile_that_was_run(demo: Demo) -> None:
     worse = tuple(
         {dof: replace(result, reduction=0.123) for dof, result in each.items()}
@@ -93,9 +118,9 @@ def test_the_report_has_a_column_for_each_profile_that_was_run(demo: Demo) -> No
     text = demo_report(both, [])
     assert text.count("<th>paper</th><th>best</th>") == len(Dof)
     assert text.count("<td>12 %<small>(12 %)</small></td>") == len(Dof)
-    assert "in 9 runs" in text  # of three seeds: without, and under two profiles
+    assert "in 15 runs" in text  # of three seeds: three of the article, two of the operator
     assert "<th>best</th>" not in demo_report(demo, [])
-    assert "in 4 runs" in demo_report(demo, [])
+    assert "in 8 runs" in demo_report(demo, [])
 
 
 def test_the_report_of_one_run_without_a_true_state(runs: tuple[Recording, Recording]) -> None:
@@ -153,6 +178,28 @@ def test_a_loop_without_measurements_is_labelled(runs: tuple[Recording, Recordin
         assert [text.get_text() for text in axis.texts] == ["not measured"] * (index == 1)
 
 
+def test_the_operator_figure_has_both_tips_and_both_errors(
+    runs: tuple[Recording, Recording],
+) -> None:
+    """A shift of each tip shows in its own line, in the display unit."""
+    free, run = (replace(each, trace=each.trace.copy()) for each in runs)
+    shift = 7e-3
+    for each in (free, run):
+        each.trace["time"] += 40 + shift  # the rig's clock need not begin at 0
+    run.trace["true_insertion"] = run.trace["reference_insertion"] + shift
+    free.trace["true_insertion"] = free.trace["reference_insertion"] - shift
+    panels = draw_operator_motion(free, run).axes
+    assert [axes.get_title(loc="left")[:3] for axes in panels] == [f"({k})" for k in "adbecf"]
+    before, after, *_ = panels[1].lines
+    np.testing.assert_allclose(before.get_ydata(), -1e3 * shift)
+    np.testing.assert_allclose(after.get_ydata(), 1e3 * shift)
+    assert after.get_xdata()[0] == 0
+    lines = {line.get_label(): line.get_ydata() for line in panels[0].lines}
+    assert set(lines) == {
+        "tip without compensation", "command", "tip with compensation", "reference",
+    }  # fmt: skip
+
+
 def test_figure5_labels_the_markers_at_their_features(runs: tuple[Recording, Recording]) -> None:
     snapshot = runs[1].snapshot
     assert snapshot is not None
@@ -188,13 +235,19 @@ def test_the_articles_values_are_those_of_its_table() -> None:
 
 def test_every_figure_has_a_row() -> None:
     assert {row.name for row in ROWS} == set(DofResult.__dataclass_fields__)
+    assert [row.name for row in OPERATOR_ROWS] == list(OperatorResult.__dataclass_fields__)
 
 
 def test_an_unknown_figure_is_null_in_json(demo: Demo) -> None:
     unknown = {
         dof: replace(result, tracking_rms=float("nan")) for dof, result in demo.results[0].items()
     }
-    found = tables.to_json("paper", [0], [unknown], 1.0, 1.0)
+    figures = {
+        dof: replace(result, creep=float("nan")) for dof, result in demo.operator_results[0].items()
+    }
+    found = tables.to_json("paper", [0], [unknown], [figures], sim_seconds=1.0, wall_seconds=1.0)
+    assert found["hand"]["bending"]["creep"] is None
+    assert found["hand"]["insertion"]["largest"] == 2e-3  # in m, the rest of the object in mm
     assert found["dof"]["rotation"]["tracking_rms"] is None
     assert found["dof"]["rotation"]["worst"]["tracking_rms"] is None
     assert found["dof"]["insertion"]["unit"] == "mm"

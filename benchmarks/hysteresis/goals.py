@@ -41,6 +41,7 @@ GOALS = {
             "largest error": Goal("tip"),
             "tip overspeed": Goal("ratio", 2.0),
             "creep": Goal("tip"),
+            "bound of the reduction": Goal("share", None, "min"),
         }.items()
     },
     "reduction of mean width": Goal("share", 0.95, "min"),

@@ -12,10 +12,10 @@ from hysteresis.simulation import Simulation, Sines, uncompensated
 from hysteresis.store import Recordings
 from tautscope.config import Config
 from tautscope.dof import Dof
-from tautscope.loop.references import OperatorMotion
 from tautscope.report import metrics
+from tautscope.report.operator_motion import evaluate_operator_motion, operator_motion
 from tautscope.report.results import evaluate
-from tautscope.runs.recording import Recording, Table, per_dof
+from tautscope.runs.recording import Recording, Table
 
 Plan = dict[str, Simulation]
 Found = list[tuple[str, Dof, float]]
@@ -35,10 +35,6 @@ TREMOR = 1e-3
 """Amplitude of the tremor: 2 mm peak to peak [m]."""
 RESTS = (0.0, 1e-3, 2e-3)
 """How far beyond a reversal the reference stops [m]."""
-FIRST_OPERATOR = 40
-"""Seed of the operator's motion on the twin of seed 0."""
-ESTIMATED = 40.0
-"""When the figures of the operator's motion begin [s]."""
 REST_AFTER, REST_FOR = 20.0, 5.0
 """The reference stops after the reversal that follows the first time, for the second [s]."""
 
@@ -61,8 +57,7 @@ class Scenario:
 def operator_plan(config: Config) -> Plan:
     runs: Plan = {}
     for name in OPERATORS:
-        seed = FIRST_OPERATOR + config.twin.seed
-        motion = OperatorMotion(config.experiment, seed, is_disturbed=name != "operator")
+        motion = operator_motion(config, is_disturbed=name != "operator")
         runs |= {f"{name}, free": uncompensated(config, motion), name: Simulation(config, motion)}
     return runs
 
@@ -71,23 +66,20 @@ def operator(recordings: Recordings) -> Found:
     """Measure the motion of an operator, after its first 40 s."""
     found: Found = []
     for name in OPERATORS:
-        free, run = (
-            each.trace[each.trace["time"] >= ESTIMATED]
-            for each in (recordings[f"{name}, free"], recordings[name])
-        )
-        references = per_dof(run, "reference")
-        for dof in Dof:
-            tip, reference = run[f"true_{dof.label}"], references[:, dof]
-            before = metrics.tracking_rms(reference, free[f"true_{dof.label}"])
-            after = metrics.tracking_rms(reference, tip)
+        results = evaluate_operator_motion(recordings[f"{name}, free"], recordings[name])
+        for dof, result in results.items():
             found += [
-                (f"{name}: reduction of tracking error", dof, 1 - after / before),
-                (f"{name}: tracking error", dof, after),
-                (f"{name}: largest error", dof, float(np.abs(tip - reference).max())),
-                (f"{name}: tip overspeed", dof, metrics.tip_overspeed(run["time"], reference, tip)),
+                (f"{name}: reduction of tracking error", dof, result.reduction),
+                (f"{name}: tracking error", dof, result.compensated_rms),
+                (f"{name}: largest error", dof, result.largest),
+                (f"{name}: tip overspeed", dof, result.overspeed),
             ]
+            # The reference with tremor never rests, and the bound knows no filter of the tremor.
             if name == "operator":
-                found.append((f"{name}: creep", dof, metrics.creep(references, tip)))
+                found += [
+                    (f"{name}: creep", dof, result.creep),
+                    (f"{name}: bound of the reduction", dof, result.bound),
+                ]
     return found
 
 

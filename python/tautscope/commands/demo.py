@@ -21,9 +21,10 @@ def add_parser(verbs: arguments.Verbs) -> None:
         "demo",
         allow_abbrev=False,
         help="run the article's experiment on the simulated instrument",
-        description="Run the article's experiment on the simulated instrument, with and without "
-        "compensation, with camera images as the only feedback. Prints Table 1 with the article's "
-        "values, and writes a run folder with tables, traces, figures and a report.",
+        description="Run the article's experiment and an operator motion on the simulated "
+        "instrument, each with and without compensation, with camera images as the only feedback. "
+        "Prints Table 1 with the article's values and the tracking error of the operator motion, "
+        "and writes a run folder with tables, traces, figures and a report.",
     )
     arguments.add_profile(demo, "compensation scheme: the article's, or also our own", "best")
     demo.add_argument(
@@ -62,8 +63,8 @@ def _run(options: argparse.Namespace) -> None:
     folder = check_free(options.out or default_folder("demo"))
     first = config.twin.seed
     seeds = range(first, first + options.seeds)
-    each = 2 if config.profile == "paper" else 3
-    with progress_bar(f"{each * len(seeds)} runs") as progress:
+    runs = len(seeds) * len(demo.demo_trials(config))
+    with progress_bar(f"{runs} runs") as progress:
         found = demo.run_demo(config, seeds, progress)
     demo.write_run_folder(found, folder)
     if options.json:
@@ -72,13 +73,16 @@ def _run(options: argparse.Namespace) -> None:
                 options.profile,
                 seeds,
                 found.results,
-                found.sim_seconds,
-                found.wall_seconds,
+                found.operator_results,
+                sim_seconds=found.sim_seconds,
+                wall_seconds=found.wall_seconds,
                 article_results=found.article_results,
             )
         )
     else:
-        _print_table1(found, folder)
+        _print_table1(found)
+        _print_operator_motion(found)
+        _print_facts(found, folder)
 
 
 def _load(options: argparse.Namespace) -> Config:
@@ -97,7 +101,7 @@ def _load(options: argparse.Namespace) -> Config:
     return config
 
 
-def _print_table1(demo: Demo, folder: Path) -> None:
+def _print_table1(demo: Demo) -> None:
     from rich.table import Table  # noqa: PLC0415
 
     from tautscope.report import tables  # noqa: PLC0415
@@ -129,10 +133,39 @@ def _print_table1(demo: Demo, folder: Path) -> None:
         table.add_row(row.title, *cells)
     screen = console()
     screen.print(table)
-    screen.print(
-        f"\n{demo.sim_seconds:.0f} s simulated in {demo.wall_seconds:.0f} s. "
-        f"Widths in the last two periods, of the true tip unless stated otherwise."
+    screen.print("Widths in the last two periods, of the true tip unless stated otherwise.\n")
+
+
+def _print_operator_motion(demo: Demo) -> None:
+    from rich.table import Table  # noqa: PLC0415
+
+    from tautscope.report import tables  # noqa: PLC0415
+
+    results = demo.operator_results
+    several = len(results) > 1
+    title = f"Operator motion, all degrees of freedom at once, profile {demo.config.profile}" + (
+        f" (median of {len(results)} seeds, worst in brackets)" if several else ""
     )
-    for line in demo.compensated.warnings:
+    table = Table(title=title, box=None, title_justify="left", title_style="bold", pad_edge=False)
+    table.add_column("", no_wrap=True)
+    middle, bad = tables.median(results), tables.worst(results, tables.OPERATOR_ROWS)
+    for dof in middle:
+        table.add_column(tables.heading(dof), justify="right", no_wrap=True)
+    for row in tables.OPERATOR_ROWS:
+        cells = []
+        for dof in middle:
+            ours = tables.cell(row, dof, getattr(middle[dof], row.name))
+            worst = f" ({tables.cell(row, dof, getattr(bad[dof], row.name))})"
+            cells.append(ours + worst * several)
+        table.add_row(row.title, *cells)
+    screen = console()
+    screen.print(table)
+    screen.print("Errors of the true tip, after the first 40 s.\n")
+
+
+def _print_facts(demo: Demo, folder: Path) -> None:
+    screen = console()
+    screen.print(f"{demo.sim_seconds:.0f} s simulated in {demo.wall_seconds:.0f} s.")
+    for line in demo.warnings:
         screen.print(f"Warning: {line}.", soft_wrap=True)
     screen.print(f"Report, figures and traces: {folder / 'report.html'}", soft_wrap=True)

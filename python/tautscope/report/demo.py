@@ -1,4 +1,4 @@
-"""The article's experiment on the twin: runs, Table 1, figures, run folder, report."""
+"""The article's experiment and an operator motion on the twin: runs, figures, folder, report."""
 
 from __future__ import annotations
 
@@ -12,6 +12,11 @@ from os import PathLike
 from tautscope._core import __version__
 from tautscope.config import Config
 from tautscope.report import report, tables
+from tautscope.report.operator_motion import (
+    OperatorResults,
+    evaluate_operator_motion,
+    operator_motion,
+)
 from tautscope.report.report import CaptionedFigure
 from tautscope.report.results import Results, evaluate
 from tautscope.runs.output_folder import new_folder
@@ -42,6 +47,19 @@ _PROFILES = {
 }
 
 
+OPERATOR_NOTE = (
+    "Minimum-jerk moves of all degrees of freedom at once between random targets, with rests, "
+    "evaluated after the first 40 s. Errors are those of the true tip, without removing their "
+    "mean. Creep is the tip's travel while every reference rests. The bound is the reduction of "
+    "a law that knows tip and widths exactly, on ideal plays of the article's widths."
+)
+_OPERATOR_CAPTION = (
+    "Operator motion, seed {}. (a)-(c) reference, command with compensation, and true tip without "
+    "and with it, in 20 s of the run. (d)-(f) tracking error of the true tip; the grey part is "
+    "not evaluated, because the offsets are still being estimated."
+)
+
+
 @dataclass(frozen=True)
 class Demo:
     """Results of ``tautscope demo``.
@@ -52,6 +70,9 @@ class Demo:
         results: Table 1 of each seed.
         uncompensated: The first seed's run without compensation.
         compensated: The first seed's run with it.
+        operator_results: The figures of the operator motion of each seed.
+        operator_uncompensated: The first seed's operator motion without compensation.
+        operator_compensated: The first seed's operator motion with it.
         sim_seconds: Simulated time of all runs [s].
         wall_seconds: Computing time [s].
         article_results: Table 1 of each seed with profile ``paper``, if `config` has another one.
@@ -62,9 +83,18 @@ class Demo:
     results: tuple[Results, ...]
     uncompensated: Recording
     compensated: Recording
+    operator_results: tuple[OperatorResults, ...]
+    operator_uncompensated: Recording
+    operator_compensated: Recording
     sim_seconds: float
     wall_seconds: float
     article_results: tuple[Results, ...] = ()
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Warnings of the first seed's compensated runs, those of the operator motion marked."""
+        marked = (f"operator motion: {line}" for line in self.operator_compensated.warnings)
+        return (*self.compensated.warnings, *marked)
 
     @property
     def by_profile(self) -> dict[str, tuple[Results, ...]]:
@@ -79,48 +109,65 @@ def run_demo(
     progress: Callable[[float], None],
     make_rig: RigMaker = make_twin,
 ) -> Demo:
-    """Run the article's protocol with and without compensation, for every seed.
+    """Run the article's protocol and an operator motion, each with and without compensation.
 
-    If the profile is not ``paper``, a third run per seed uses it for comparison.
+    For every seed. If the profile is not ``paper``, another run of the article's protocol uses it
+    for comparison.
 
     Raises:
         TautscopeError: The first error of a run.
     """
     started = time.perf_counter()
     configs = [config.replace(**{"twin.seed": seed}) for seed in seeds]
-    kinds = [Trial(configs[0], False), Trial(configs[0], True)]
-    if config.profile != "paper":
-        kinds.append(Trial(config.replace(profile="paper"), True))
-    trials = [
-        Trial(kind.config.replace(**{"twin.seed": each.twin.seed}), kind.compensate)
-        for each in configs
-        for kind in kinds
-    ]
+    trials = [trial for each in configs for trial in demo_trials(each)]
     recordings = run_trials(trials, progress, make_rig)
-    runs = [recordings[first :: len(kinds)] for first in range(len(kinds))]
-    results = [tuple(map(evaluate, runs[0], compensated)) for compensated in runs[1:]]
+    kinds = len(recordings) // len(configs)
+    runs = [recordings[first::kinds] for first in range(kinds)]
+    results = [tuple(map(evaluate, runs[0], compensated)) for compensated in (runs[1], *runs[4:])]
     return Demo(
         config=configs[0],
         seeds=tuple(seeds),
         results=results[0],
         uncompensated=runs[0][0],
         compensated=runs[1][0],
+        operator_results=tuple(map(evaluate_operator_motion, runs[2], runs[3])),
+        operator_uncompensated=runs[2][0],
+        operator_compensated=runs[3][0],
         sim_seconds=sum(float(run.trace["time"][-1] - run.trace["time"][0]) for run in recordings),
         wall_seconds=time.perf_counter() - started,
         article_results=results[1] if len(results) > 1 else (),
     )
 
 
+def demo_trials(config: Config) -> list[Trial]:
+    """The runs of one seed: free and compensated of either reference, then the article's scheme."""
+    motion = operator_motion(config)
+    trials = [
+        Trial(config, False),
+        Trial(config, True),
+        # Only the true tip of this run is evaluated.
+        Trial(config, False, motion, images=False),
+        Trial(config, True, motion),
+    ]
+    if config.profile != "paper":
+        trials.append(Trial(config.replace(profile="paper"), True))
+    return trials
+
+
 def write_run_folder(demo: Demo, folder: str | PathLike[str]) -> None:
     """Make the run folder, complete or not at all.
 
     Files: config.toml, table1.csv, trace.csv and frames.csv (first seed, compensated), the same
-    with _uncompensated, fig9.png, fig9.pdf, fig5.png, report.html.
+    with _uncompensated, fig9.png, fig9.pdf, fig5.png; of the operator motion
+    operator_motion.csv, .png and .pdf, and trace and frames with _operator_motion and
+    _operator_motion_uncompensated; report.html.
 
     Raises:
         OutputError: The folder is not empty, or cannot be written.
     """
-    from tautscope.report import figures  # noqa: PLC0415  matplotlib takes half a second
+    # Matplotlib takes half a second to import.
+    from tautscope.report import figures  # noqa: PLC0415
+    from tautscope.report.operator_figure import draw_operator_motion  # noqa: PLC0415
 
     figure9 = figures.figure9(demo.uncompensated, demo.compensated)
     captioned = [
@@ -142,14 +189,23 @@ def write_run_folder(demo: Demo, folder: str | PathLike[str]) -> None:
                 "predicted features.",
             )
         )
+    operator_figure = draw_operator_motion(demo.operator_uncompensated, demo.operator_compensated)
+    captioned.append(CaptionedFigure(operator_figure, _OPERATOR_CAPTION.format(demo.seeds[0])))
     with new_folder(folder) as place:
+        demo.operator_compensated.write(place, "_operator_motion")
+        demo.operator_uncompensated.write(place, "_operator_motion_uncompensated")
         demo.compensated.write(place)
         demo.uncompensated.write(place, "_uncompensated")
         tables.write_csv(place / "table1.csv", demo.seeds, demo.by_profile)
+        tables.write_operator_csv(
+            place / "operator_motion.csv", demo.config.profile, demo.seeds, demo.operator_results
+        )
         with figures.style():
             figure9.savefig(place / "fig9.png")
             figure9.savefig(place / "fig9.pdf", metadata={"CreationDate": None})
-            for each in captioned[1:]:
+            operator_figure.savefig(place / "operator_motion.png")
+            operator_figure.savefig(place / "operator_motion.pdf", metadata={"CreationDate": None})
+            for each in captioned[1:-1]:
                 each.figure.savefig(place / "fig5.png")
             page = demo_report(demo, captioned)
         (place / "report.html").write_text(page, encoding="utf-8")
@@ -166,7 +222,7 @@ def demo_report(demo: Demo, figures: Sequence[CaptionedFigure]) -> str:
         **{name: _version(name) for name in ("numpy", "mujoco", "opencv-python-headless")},
         "machine": f"{platform.system()} {platform.machine()}",
         "seeds": ", ".join(map(str, seeds)),
-        "simulated": f"{demo.sim_seconds:.0f} s in {(1 + len(profiles)) * len(seeds)} runs",
+        "simulated": f"{demo.sim_seconds:.0f} s in {(3 + len(profiles)) * len(seeds)} runs",
         "took": f"{demo.wall_seconds:.0f} s",
     }
     return report.page(
@@ -178,7 +234,10 @@ def demo_report(demo: Demo, figures: Sequence[CaptionedFigure]) -> str:
         }
 Widths over the last two periods of each degree of freedom: mean over 41 levels across the central
 80&nbsp;% of the tip&rsquo;s range, of the true tip unless stated otherwise.</p>
-{report.warning_list(demo.compensated.warnings)}
+<h2>Operator motion</h2>
+<div class="wide">{report.operator_table(demo.operator_results)}</div>
+<p class="note">Profile &ldquo;{demo.config.profile}&rdquo;. {OPERATOR_NOTE}</p>
+{report.warning_list(demo.warnings)}
 <h2>Figures{f", profile {demo.config.profile}" if len(profiles) > 1 else ""}</h2>
 {report.figure_list(figures)}
 <h2>Limits of these results</h2>

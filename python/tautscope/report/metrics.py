@@ -159,6 +159,13 @@ def tracking_rms(reference: ArrayLike, tip: ArrayLike) -> float:
     return rms(np.subtract(*_pair("reference", reference, "tip", tip)))
 
 
+def largest_error(reference: ArrayLike, tip: ArrayLike) -> float:
+    """Largest |tip - reference|, in their unit; NaN if none is known."""
+    errors = np.abs(np.subtract(*_pair("reference", reference, "tip", tip)))
+    known = errors[np.isfinite(errors)]
+    return float(known.max()) if known.size else np.nan
+
+
 def creep(references: ArrayLike, tip: ArrayLike) -> float:
     """Travel of the tip (n,) while every reference of (n, 3) rests, in the unit of the tip.
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from tautscope._core import __version__
 from tautscope.config import Config, dump_config
 from tautscope.report import tables
+from tautscope.report.operator_motion import OperatorResults
 from tautscope.report.results import Results
 
 if TYPE_CHECKING:
@@ -139,6 +140,23 @@ def results_table(columns: Mapping[str, Sequence[Results]], by_camera: bool = Fa
         f"<table><thead><tr><th></th>{heads}</tr><tr><th></th>{names}</tr></thead>"
         f"<tbody>{''.join(lines)}</tbody></table>"
     )
+
+
+def operator_table(results: Sequence[OperatorResults]) -> str:
+    """The table of the operator motion: median over the seeds, the worst below it."""
+    middle, bad = tables.median(results), tables.worst(results, tables.OPERATOR_ROWS)
+    heads = "".join(f"<th>{tables.heading(dof)}</th>" for dof in middle)
+    lines = []
+    for row in tables.OPERATOR_ROWS:
+        cells = []
+        for dof in middle:
+            value, worst = (
+                tables.cell(row, dof, getattr(each[dof], row.name)) for each in (middle, bad)
+            )
+            note = f"<small>({worst})</small>" if len(results) > 1 else ""
+            cells.append(f'<td class="ours">{value}{note}</td>')
+        lines.append(f"<tr><td>{escape(row.title)}</td>{''.join(cells)}</tr>")
+    return f"<table><thead><tr><th></th>{heads}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
 
 
 def _figure(captioned: CaptionedFigure) -> str:

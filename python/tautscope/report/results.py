@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,12 @@ from tautscope.dof import Dof
 from tautscope.loop.references import Segment
 from tautscope.report import metrics
 from tautscope.runs.recording import Recording, Table, per_feature
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+Figures = TypeVar("Figures", bound="DataclassInstance")
+"""A dataclass of figures of merit of one DOF."""
 
 LAST_PERIODS = 2
 """Number of periods at the end of a segment over which loop widths are measured."""
@@ -77,23 +84,23 @@ def evaluate(uncompensated: Recording | None, compensated: Recording) -> Results
     }
 
 
-def combine(results: Sequence[Results], how: dict[str, str] | str) -> Results:
+def combine(results: Sequence[dict[Dof, Figures]], how: dict[str, str] | str) -> dict[Dof, Figures]:
     """Combine seeds: ``"median"``, or per name of a figure ``"min"``, ``"max"`` or ``"median"``.
 
     Seeds with an unknown figure are skipped.
     """
-    names = DofResult.__dataclass_fields__
     return {
-        dof: DofResult(
+        dof: replace(
+            figures,
             **{
-                name: _combined(
-                    [getattr(result[dof], name) for result in results],
-                    how if isinstance(how, str) else how[name],
+                field.name: _combined(
+                    [getattr(result[dof], field.name) for result in results],
+                    how if isinstance(how, str) else how[field.name],
                 )
-                for name in names
-            }
+                for field in fields(figures)
+            },
         )
-        for dof in results[0]
+        for dof, figures in results[0].items()
     }
 
 

@@ -1,4 +1,4 @@
-"""Table 1 as text, CSV and JSON, with the article's values."""
+"""Table 1 with the article's values, and the table of the operator motion: text, CSV, JSON."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from tautscope.dof import Dof
-from tautscope.report.results import DofResult, Results, combine
+from tautscope.report.results import DofResult, Figures, Results, combine
 
 Worst = Literal["min", "max"]
 
@@ -20,7 +20,7 @@ class Row:
     """One row of the table.
 
     Attributes:
-        name: Field of `DofResult`.
+        name: Field of `DofResult` or of the figures of an operator motion.
         title: Title in printed tables.
         kind: ``length`` is in the DOF's unit, ``share`` is printed in percent, ``number`` and
             ``count`` have no conversion.
@@ -55,6 +55,16 @@ ROWS = (
     Row("actuator_gain", "actuator gain", "number"),
 )
 
+OPERATOR_ROWS = (
+    Row("uncompensated_rms", "uncompensated tracking error, RMS", "length"),
+    Row("compensated_rms", "compensated tracking error, RMS", "length"),
+    Row("reduction", "reduction", "share", "min"),
+    Row("largest", "largest error", "length"),
+    Row("overspeed", "tip overspeed", "number"),
+    Row("creep", "creep", "length"),
+    Row("bound", "bound of the reduction", "share", "min"),
+)
+
 ARTICLE: dict[str, dict[Dof, float]] = {
     "uncompensated": {Dof.INSERTION: 10e-3, Dof.ROTATION: 1.8, Dof.BENDING: 1.1},
     "compensated": {Dof.INSERTION: 2.5e-3, Dof.ROTATION: 0.4, Dof.BENDING: 0.3},
@@ -63,14 +73,14 @@ ARTICLE: dict[str, dict[Dof, float]] = {
 """Table 1 of the article [m or rad, fraction]."""
 
 
-def median(results: Sequence[Results]) -> Results:
+def median(results: Sequence[dict[Dof, Figures]]) -> dict[Dof, Figures]:
     """Median of every figure over the seeds."""
     return combine(results, "median")
 
 
-def worst(results: Sequence[Results]) -> Results:
+def worst(results: Sequence[dict[Dof, Figures]], rows: Sequence[Row] = ROWS) -> dict[Dof, Figures]:
     """Worst value of every figure over the seeds."""
-    return combine(results, {row.name: row.worst for row in ROWS})
+    return combine(results, {row.name: row.worst for row in rows})
 
 
 def in_display_unit(row: Row, dof: Dof, value: float) -> float:
@@ -109,14 +119,10 @@ def write_csv(
     path: Path, seeds: Sequence[int], by_profile: Mapping[str, Sequence[Results]]
 ) -> None:
     """Write table1.csv in display units: per DOF the article, per profile seeds, median, worst."""
-    lines: list[tuple[str, str, Results]] = [
+    lines = [
         (profile, source, found)
         for profile, results in by_profile.items()
-        for source, found in (
-            *((f"seed {seed}", result) for seed, result in zip(seeds, results, strict=True)),
-            ("median", median(results)),
-            ("worst", worst(results)),
-        )
+        for source, found in _sources(seeds, results, ROWS)
     ]
     dofs = lines[0][2]
     with path.open("w", newline="", encoding="utf-8") as file:
@@ -126,29 +132,65 @@ def write_csv(
             article = [_number(row, dof, ARTICLE.get(row.name, {}).get(dof)) for row in ROWS]
             writer.writerow([dof.label, dof.display_unit, "", "article", *article])
             for profile, source, result in lines:
-                values = [_number(row, dof, getattr(result[dof], row.name)) for row in ROWS]
+                writer.writerow(
+                    [dof.label, dof.display_unit, profile, source, *_numbers(result, dof, ROWS)]
+                )
+
+
+def write_operator_csv(
+    path: Path, profile: str, seeds: Sequence[int], results: Sequence[dict[Dof, Figures]]
+) -> None:
+    """Write operator_motion.csv in display units: per DOF seeds, median, worst."""
+    sources = _sources(seeds, results, OPERATOR_ROWS)
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["dof", "unit", "profile", "source", *(row.name for row in OPERATOR_ROWS)])
+        for dof in results[0]:
+            for source, result in sources:
+                values = _numbers(result, dof, OPERATOR_ROWS)
                 writer.writerow([dof.label, dof.display_unit, profile, source, *values])
+
+
+def _sources(
+    seeds: Sequence[int], results: Sequence[dict[Dof, Figures]], rows: Sequence[Row]
+) -> list[tuple[str, dict[Dof, Figures]]]:
+    """The figures of every seed, their median and the worst, each with its name."""
+    return [
+        *((f"seed {seed}", result) for seed, result in zip(seeds, results, strict=True)),
+        ("median", median(results)),
+        ("worst", worst(results, rows)),
+    ]
+
+
+def _numbers(result: dict[Dof, Figures], dof: Dof, rows: Sequence[Row]) -> list[str]:
+    return [_number(row, dof, getattr(result[dof], row.name)) for row in rows]
 
 
 def to_json(
     profile: str,
     seeds: Sequence[int],
     results: Sequence[Results],
+    operator_results: Sequence[dict[Dof, Figures]],
+    *,
     sim_seconds: float,
     wall_seconds: float,
-    *,
     article_results: Sequence[Results] = (),
 ) -> dict[str, Any]:
     """The output of ``tautscope demo --json``; an unknown figure is None.
 
     Medians over the seeds, and under ``worst`` the worst values; insertion in mm. Under ``paper``
-    the results of the article's scheme, if it was run beside another one.
+    the results of the article's scheme, if it was run beside another one. Under ``hand`` the
+    medians of the operator motion's figures, in m and rad.
     """
     return {
         "profile": profile,
         "seeds": list(seeds),
         "dof": _by_dof(results),
         **({"paper": _by_dof(article_results)} if article_results else {}),
+        "hand": {
+            dof.label: {name: finite_or_none(value) for name, value in asdict(figures).items()}
+            for dof, figures in median(operator_results).items()
+        },
         "sim_seconds": sim_seconds,
         "wall_seconds": wall_seconds,
     }

@@ -11,31 +11,41 @@ from multiprocessing import get_context
 from typing import Any
 
 from tautscope.config import Config
-from tautscope.loop.references import SineSequence
+from tautscope.loop.references import Reference, SineSequence
 from tautscope.loop.rig import Rig
 from tautscope.runs.experiment import run_experiment
 from tautscope.runs.recording import Recording
 
-RigMaker = Callable[[Config], Rig]
-
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """One run of the article's protocol."""
+    """One run.
+
+    Attributes:
+        config: Configuration of loop and twin.
+        compensate: Whether compensation is on.
+        motion: Reference; None is the article's protocol.
+        images: Whether the run needs camera images; without them the twin is faster.
+    """
 
     config: Config
     compensate: bool
+    motion: Reference | None = None
+    images: bool = True
+
+
+RigMaker = Callable[[Trial], Rig]
 
 
 class _StoppedError(Exception):
     """Another run failed, or the user interrupted."""
 
 
-def make_twin(config: Config) -> Rig:
-    """The twin of a configuration."""
+def make_twin(trial: Trial) -> Rig:
+    """The twin of a trial."""
     from tautscope.twin import Twin  # noqa: PLC0415  MuJoCo is loaded only when used
 
-    return Twin(config)
+    return Twin(trial.config, images=trial.images)
 
 
 def run_trials(
@@ -102,9 +112,9 @@ def _run(index: int, trial: Trial, make_rig: RigMaker) -> Recording:
             raise _StoppedError
         shares.put((index, min(elapsed / duration, 1.0)))
 
-    rig = make_rig(trial.config)
+    rig = make_rig(trial)
     try:
-        reference = SineSequence(trial.config.experiment)
+        reference = trial.motion or SineSequence(trial.config.experiment)
         return run_experiment(rig, reference, trial.config, trial.compensate, report)
     finally:
         rig.close()
