@@ -225,6 +225,12 @@ def test_marker_errors_are_distances_per_marker() -> None:
     assert metrics.marker_rms(measured, truth) == pytest.approx(2.5)
 
 
+def test_the_largest_error_counts_either_sign_and_skips_unknown_tips() -> None:
+    reference, tip = [1.0, 2.0, 3.0, 4.0], [1.5, -1.0, np.nan, 4.0]
+    assert metrics.largest_error(reference, tip) == metrics.largest_error(tip, reference) == 3.0
+    assert np.isnan(metrics.largest_error([1.0], [np.nan]))
+
+
 def test_creep_is_the_travel_of_the_tip_while_every_reference_rests() -> None:
     references = np.array([[0.0, 0, 0], [1, 0, 0], [1, 0, 0], [1, 0, 1], [1, 0, 1], [1, 0, 1]])
     tip = [0.0, 1.0, 1.5, 7.0, 6.5, 7.5]

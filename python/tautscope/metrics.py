@@ -1,9 +1,10 @@
-"""Users import figures of merit from here; the code is in `tautscope.report.metrics`."""
+"""Users import figures of merit from here; the code is in `tautscope.report`."""
 
 from tautscope.report.metrics import (
     LoopWidth,
     actuator_gain,
     creep,
+    largest_error,
     loop_width,
     marker_errors,
     marker_rms,
@@ -18,11 +19,13 @@ from tautscope.report.metrics import (
     tracking_rms,
     until_within,
 )
+from tautscope.report.tracking_bound import tracking_bound
 
 __all__ = [
     "LoopWidth",
     "actuator_gain",
     "creep",
+    "largest_error",
     "loop_width",
     "marker_errors",
     "marker_rms",
@@ -34,6 +37,7 @@ __all__ = [
     "start_periods",
     "state_rms",
     "tip_overspeed",
+    "tracking_bound",
     "tracking_rms",
     "until_within",
 ]

@@ -47,12 +47,6 @@ _PROFILES = {
 }
 
 
-OPERATOR_NOTE = (
-    "Minimum-jerk moves of all degrees of freedom at once between random targets, with rests, "
-    "evaluated after the first 40 s. Errors are those of the true tip, without removing their "
-    "mean. Creep is the tip's travel while every reference rests. The bound is the reduction of "
-    "a law that knows tip and widths exactly, on ideal plays of the article's widths."
-)
 _OPERATOR_CAPTION = (
     "Operator motion, seed {}. (a)-(c) reference, command with compensation, and true tip without "
     "and with it, in 20 s of the run. (d)-(f) tracking error of the true tip; the grey part is "
@@ -234,9 +228,7 @@ def demo_report(demo: Demo, figures: Sequence[CaptionedFigure]) -> str:
         }
 Widths over the last two periods of each degree of freedom: mean over 41 levels across the central
 80&nbsp;% of the tip&rsquo;s range, of the true tip unless stated otherwise.</p>
-<h2>Operator motion</h2>
-<div class="wide">{report.operator_table(demo.operator_results)}</div>
-<p class="note">Profile &ldquo;{demo.config.profile}&rdquo;. {OPERATOR_NOTE}</p>
+{report.operator_section(demo.config.profile, demo.operator_results)}
 {report.warning_list(demo.warnings)}
 <h2>Figures{f", profile {demo.config.profile}" if len(profiles) > 1 else ""}</h2>
 {report.figure_list(figures)}

@@ -142,8 +142,8 @@ def results_table(columns: Mapping[str, Sequence[Results]], by_camera: bool = Fa
     )
 
 
-def operator_table(results: Sequence[OperatorResults]) -> str:
-    """The table of the operator motion: median over the seeds, the worst below it."""
+def operator_section(profile: str, results: Sequence[OperatorResults]) -> str:
+    """The section of the operator motion: per figure the median over the seeds, and the worst."""
     middle, bad = tables.median(results), tables.worst(results, tables.OPERATOR_ROWS)
     heads = "".join(f"<th>{tables.heading(dof)}</th>" for dof in middle)
     lines = []
@@ -154,9 +154,16 @@ def operator_table(results: Sequence[OperatorResults]) -> str:
                 tables.cell(row, dof, getattr(each[dof], row.name)) for each in (middle, bad)
             )
             note = f"<small>({worst})</small>" if len(results) > 1 else ""
-            cells.append(f'<td class="ours">{value}{note}</td>')
+            cells.append(f"<td>{value}{note}</td>")
         lines.append(f"<tr><td>{escape(row.title)}</td>{''.join(cells)}</tr>")
-    return f"<table><thead><tr><th></th>{heads}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
+    return f"""<h2>Operator motion</h2>
+<div class="wide"><table><thead><tr><th></th>{heads}</tr></thead>
+<tbody>{"".join(lines)}</tbody></table></div>
+<p class="note">Profile &ldquo;{profile}&rdquo;. All degrees of freedom make minimum-jerk moves
+between random targets at the same time, with rests; the first 40&nbsp;s do not count. Errors are of
+the true tip, and their mean is not removed. Creep is the travel of the tip while every reference
+rests. The bound is the reduction of a law with exact knowledge, on ideal plays of the widths of the
+article.</p>"""
 
 
 def _figure(captioned: CaptionedFigure) -> str:
