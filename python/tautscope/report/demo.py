@@ -116,17 +116,17 @@ def run_demo(
     trials = [trial for each in configs for trial in demo_trials(each)]
     recordings = run_trials(trials, progress, make_rig)
     kinds = len(recordings) // len(configs)
-    runs = [recordings[first::kinds] for first in range(kinds)]
-    results = [tuple(map(evaluate, runs[0], compensated)) for compensated in (runs[1], *runs[4:])]
+    free, *runs, operator, operator_free = (recordings[first::kinds] for first in range(kinds))
+    results = [tuple(map(evaluate, free, compensated)) for compensated in runs]
     return Demo(
         config=configs[0],
         seeds=tuple(seeds),
         results=results[0],
-        uncompensated=runs[0][0],
-        compensated=runs[1][0],
-        operator_results=tuple(map(evaluate_operator_motion, runs[2], runs[3])),
-        operator_uncompensated=runs[2][0],
-        operator_compensated=runs[3][0],
+        uncompensated=free[0],
+        compensated=runs[0][0],
+        operator_results=tuple(map(evaluate_operator_motion, operator_free, operator)),
+        operator_uncompensated=operator_free[0],
+        operator_compensated=operator[0],
         sim_seconds=sum(float(run.trace["time"][-1] - run.trace["time"][0]) for run in recordings),
         wall_seconds=time.perf_counter() - started,
         article_results=results[1] if len(results) > 1 else (),
@@ -134,18 +134,16 @@ def run_demo(
 
 
 def demo_trials(config: Config) -> list[Trial]:
-    """The runs of one seed: free and compensated of either reference, then the article's scheme."""
+    """The runs of one seed, the longest first, so that parallel processes end together."""
+    article = [config] if config.profile == "paper" else [config, config.replace(profile="paper")]
     motion = operator_motion(config)
-    trials = [
+    return [
         Trial(config, False),
-        Trial(config, True),
+        *(Trial(each, True) for each in article),
+        Trial(config, True, motion),
         # Only the true tip of this run is evaluated.
         Trial(config, False, motion, images=False),
-        Trial(config, True, motion),
     ]
-    if config.profile != "paper":
-        trials.append(Trial(config.replace(profile="paper"), True))
-    return trials
 
 
 def write_run_folder(demo: Demo, folder: str | PathLike[str]) -> None:
