@@ -88,8 +88,11 @@ def test_a_frame_shows_the_state_at_its_capture_not_at_its_arrival():
     assert fit["capture"] < 0.3 * fit["arrival"], fit
 
 
-def test_without_images_no_frame_arrives():
-    assert not frames(samples(0.5, images=False))
+def test_without_images_no_frame_arrives_and_the_tip_moves_the_same():
+    blind = samples(0.5, images=False)
+    assert not frames(blind)
+    for one, other in zip(blind, samples(0.5), strict=True):
+        np.testing.assert_array_equal(one.true_state, other.true_state)
 
 
 @pytest.mark.parametrize("command", [[0, 0], [np.nan, 0, 0], [0, np.inf, 0], [[0, 0, 0]]])
