@@ -63,7 +63,6 @@ mod model;
 mod settings;
 mod supervision;
 
-pub use adaptive::axis::AdaptiveAxis;
 pub use adaptive::settings::AdaptiveSettings;
 pub use article::compensator::{Compensator, CompensatorState};
 pub use article::estimator::{Estimator, EstimatorState, Trigger, Triggers};
@@ -74,7 +73,6 @@ pub use estimation::expectation::Beliefs;
 pub use estimation::history::Entry;
 pub use estimation::posture::Belief;
 pub use estimation::settings::StateEstimationSettings;
-pub use estimation::weighted::WeightedEstimator;
 pub use r#loop::best::Best;
 pub use r#loop::paper::Paper;
 pub use r#loop::profile::Profile;

@@ -1,13 +1,7 @@
-//! Compensation of profile `best`.
+//! Compensation law of profile `best`.
 
-pub(crate) mod axis;
-pub(crate) mod contact;
-pub(crate) mod friction;
-pub(crate) mod lead;
-pub(crate) mod offset_map;
-pub(crate) mod parameters;
+pub(crate) mod offset_rate_limit;
 pub(crate) mod settings;
-pub(crate) mod sharing;
-pub(crate) mod slack;
+pub(crate) mod slip_direction;
 pub(crate) mod smoother;
-pub(crate) mod withheld;
+pub(crate) mod vector_law;

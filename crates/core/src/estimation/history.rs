@@ -131,7 +131,7 @@ impl<S: AsRef<[Entry]> + AsMut<[Entry]>> History<S> {
     }
 
     /// The ticks after `time`, oldest first.
-    pub fn since(&self, time: f64) -> impl Iterator<Item = &Entry> {
+    pub fn since(&self, time: f64) -> impl Iterator<Item = &Entry> + Clone {
         let count = (0..self.len)
             .take_while(|age| self.aged(*age).is_some_and(|entry| entry.time > time))
             .count();

@@ -1,6 +1,9 @@
 //! Settings of the state estimation of profile `best`.
 
-/// State estimation of profile `best`, decision 0018. Names and units are those of the TOML keys.
+use crate::dof::PerDof;
+
+/// The estimate of profile `best`, decision 0030. Names and units are those of the TOML keys; half widths and travels
+/// are in half of `width_limit`, so that one set serves all DOFs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Deserialize))]
 pub struct StateEstimationSettings {
@@ -10,12 +13,28 @@ pub struct StateEstimationSettings {
     pub model_deviation: f64,
     /// Standard deviation in m of the tip's displacement across the bend by uneven curvature.
     pub sideways_deviation: f64,
-    /// Mahalanobis distance beyond which a marker is an outlier; infinite: never.
+    /// Standard deviation in px of the lasting error of the predicted features: camera pose and section as configured.
+    pub geometry_deviation: f64,
+    /// Mahalanobis distance beyond which a marker is an outlier.
     pub outlier_distance: f64,
-    /// Gauss-Newton steps, at most.
-    pub steps: u32,
-    /// Standard deviation of the motion of an idle tip between two images, in `update_distance`.
-    pub rest_deviation: f64,
-    /// Time constant in s with which a tip comes to rest after its command.
-    pub settling_time: f64,
+    /// Standard deviation of the logarithm of the initial half width.
+    pub width_deviation: f64,
+    /// Standard deviation of the initial centre of the contact offsets.
+    pub centre_deviation: f64,
+    /// Standard deviation of the logit of the share of the friction that insertion and rotation have in common.
+    pub share_deviation: f64,
+    /// Standard deviation of the random walk of the tip over a travel of 1, in half widths.
+    pub tip_walk: f64,
+    /// The same of the logarithm of the half width.
+    pub width_walk: f64,
+    /// The same of the centre, in half widths.
+    pub centre_walk: f64,
+    /// The same of the logit of the share.
+    pub share_walk: f64,
+    /// Share of the centre that its map over the position takes over per travel 1, for each DOF.
+    pub map_rate: PerDof<f64>,
+    /// Travel over which the regression of the gain forgets.
+    pub gain_window: f64,
+    /// Strength of the prior of the gain, as a variance of the position times a travel.
+    pub gain_prior: f64,
 }

@@ -1,213 +1,231 @@
-//! Profile `best`: lead law, offsets over position, shared friction, weighted state estimation.
+//! Profile `best`: the vector law on one ensemble filter.
 
-use crate::adaptive::axis::AdaptiveAxis;
-use crate::adaptive::friction::Friction;
+use crate::adaptive::vector_law::VectorLaw;
+use crate::article::estimator::{Trigger, Triggers};
 use crate::article::play::Play;
 use crate::article::play_limit::PlayLimit;
-use crate::article::state::{StateEstimate, found};
+use crate::article::state::{StateEstimate, StateEstimator};
 use crate::dof::PerDof;
 use crate::error::ConfigError;
-use crate::estimation::history::Entry;
-use crate::estimation::posture::{half_turn, turn};
-use crate::estimation::weighted::WeightedEstimator;
-use crate::estimation::whereabouts::{Whereabouts, WhereaboutsSettings};
-use crate::r#loop::axis::{Axis, OffsetUpdate};
+use crate::estimation::filter::Filter;
+use crate::estimation::history::{Entry, History};
+use crate::estimation::marker_measurement::Markers;
+use crate::estimation::posture::Belief;
+use crate::estimation::settings::StateEstimationSettings;
 use crate::r#loop::measurement::Measurement;
 use crate::r#loop::paper::state_estimator;
-use crate::r#loop::profile::ProfileBlocks;
+use crate::r#loop::profile::{Image, ImageUpdate, ProfileBlocks};
 use crate::r#loop::settings::Settings;
 use crate::model::features::FeatureModel;
-use crate::supervision::flags::Flags;
+use crate::settings::DofSettings;
+use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::monitors::Law;
+
+/// Deflection over the half width from which on a DOF counts as in contact.
+const CONTACT: f64 = 0.98;
+
+/// Part of half of `width_limit` from which on an offset that the rate limit withholds is a changed slack.
+const CHANGED: f64 = 0.1;
 
 /// Profile `best`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Best {
-    axes: PerDof<AdaptiveAxis>,
-    friction: Option<Friction>,
-    state_estimator: WeightedEstimator,
+    law: VectorLaw,
+    filter: Filter,
+    limits: PerDof<PlayLimit>,
+    settings: StateEstimationSettings,
+    observability: StateEstimator,
+    /// Largest part of a half width or centre that the rate limit withholds before it is a changed slack.
+    change_limit: PerDof<f64>,
+    history: f64,
 }
 
-impl ProfileBlocks for Best {
-    type Axis = AdaptiveAxis;
-
-    const UNCHECKED: Flags = Flags::NONE;
-
-    // Without an allocator the axes are on the stack.
-    #[allow(clippy::large_stack_arrays)]
-    fn new(settings: &Settings) -> Result<Self, ConfigError> {
-        let diameter = settings.instrument.diameter;
-        let friction = settings.adaptive.friction(&settings.insertion, diameter);
-        Ok(Self {
-            axes: [
-                AdaptiveAxis::from_settings(settings, 0)?,
-                AdaptiveAxis::from_settings(settings, 1)?,
-                AdaptiveAxis::from_settings(settings, 2)?,
-            ],
-            friction: friction.map(Friction::new).transpose()?,
-            state_estimator: WeightedEstimator::from_settings(settings)?,
-        })
+impl Law for Best {
+    fn command(&self) -> PerDof<f64> {
+        self.law.command()
     }
 
-    fn whereabouts(settings: &Settings) -> Result<Whereabouts, ConfigError> {
-        let rest = settings.state_estimation.rest_deviation;
-        Whereabouts::new(WhereaboutsSettings {
-            start_deviation: settings.dofs().map(|dof| dof.start_deviation),
-            rest_deviation: settings.dofs().map(|dof| dof.update_distance * rest),
-            settling_time: settings.state_estimation.settling_time,
-        })
-    }
-
-    fn axes(&self) -> &PerDof<AdaptiveAxis> {
-        &self.axes
-    }
-
-    fn axes_mut(&mut self) -> &mut PerDof<AdaptiveAxis> {
-        &mut self.axes
-    }
-
-    fn couple(&mut self, [u1, u2, _]: PerDof<f64>) -> bool {
-        let Some(friction) = &mut self.friction else {
-            return false;
-        };
-        let [insertion, rotation, _] = &mut self.axes;
-        let [first, second] = friction.step(
-            [u1, u2],
-            [insertion.command(), rotation.command()],
-            [insertion.half_width(), rotation.half_width()],
-        );
-        let shared = [insertion.shared(), rotation.shared()];
-        insertion.set_slack_share(first, shared[1]);
-        rotation.set_slack_share(second, shared[0]);
-        true
-    }
-
-    fn measure(
-        &self,
-        model: &FeatureModel,
-        whereabouts: &Whereabouts,
-        past: &Entry,
-        measured: [f64; 4],
-        covariance: Option<&[[f64; 4]; 4]>,
-    ) -> Option<Measurement> {
-        let prior = whereabouts.at(past);
-        let posterior = self
-            .state_estimator
-            .estimate(model, &prior, measured, covariance)?;
-        let half_turn = half_turn(prior.state, posterior.estimate.state);
-        Some(Measurement {
-            estimate: StateEstimate {
-                state: turn(posterior.estimate.state, half_turn),
-                ..posterior.estimate
-            },
-            used: posterior.used,
-            predicted_features: posterior.predicted_features,
-            state_deviation: posterior.deviation,
-            output: turn(posterior.image_state, half_turn),
-            output_deviation: posterior.image_deviation,
-        })
-    }
-
-    fn update_prediction(
-        &self,
-        whereabouts: &mut Whereabouts,
-        past: &Entry,
-        measurement: &Measurement,
-        measured: [f64; 4],
+    fn step_within(
+        &mut self,
+        reference: PerDof<f64>,
+        limit: impl FnOnce(PerDof<f64>) -> PerDof<f64>,
     ) {
-        let left_out = measurement.used != found(measured);
-        let state = measurement.estimate.state;
-        whereabouts.settle(past, state, measurement.state_deviation, left_out);
-    }
-}
-
-impl WeightedEstimator {
-    /// The state estimation of a configured loop.
-    ///
-    /// # Errors
-    /// A setting is out of range.
-    pub fn from_settings(settings: &Settings) -> Result<Self, ConfigError> {
-        Self::new(state_estimator(settings)?, settings.state_estimation)
-    }
-}
-
-impl AdaptiveAxis {
-    /// DOF number `index` of a configured loop.
-    ///
-    /// # Errors
-    /// A setting is out of range, or `index` is above 2.
-    pub fn from_settings(settings: &Settings, index: usize) -> Result<Self, ConfigError> {
-        let (dofs, rates) = (settings.dofs(), settings.adaptive.change_rate);
-        let (Some(dof), Some(change_rate)) = (dofs.get(index), rates.get(index)) else {
-            return Err(ConfigError {
-                field: "dof",
-                value: f64::NAN,
-                allowed: "0, 1 or 2",
-            });
-        };
-        let parameters = settings
-            .adaptive
-            .parameters(dof, *change_rate, &settings.control);
-        Self::new(parameters, Play::new(dof.delta_minus, dof.delta_plus)?)
-    }
-}
-
-impl Law for AdaptiveAxis {
-    fn command(&self) -> f64 {
-        self.command()
+        self.law.step_within(reference, &mut self.filter, limit);
     }
 
-    fn step_within(&mut self, reference: f64, limit: impl FnOnce(f64) -> f64) {
-        self.step_within(reference, limit);
-    }
-
-    fn shift_reference(&mut self, shift: f64) {
-        self.shift_reference(shift);
+    fn shift_reference(&mut self, shift: PerDof<f64>) {
+        self.law.shift_reference(shift);
     }
 
     fn set_share(&mut self, share: f64) {
-        self.set_share(share);
+        self.law.set_share(share);
     }
 }
 
-impl Axis for AdaptiveAxis {
-    fn predicted_state(&self) -> f64 {
-        self.predicted_state()
+impl ProfileBlocks for Best {
+    const IS_COUPLED: bool = true;
+
+    fn new(settings: &Settings, limits: PerDof<PlayLimit>) -> Result<Self, ConfigError> {
+        let unit = settings.safety.width_limit.map(|width| width / 2.0);
+        let radius = settings.instrument.diameter / 2.0;
+        let dofs = settings.dofs();
+        let [first, second, third] = &dofs;
+        let play = |dof: &DofSettings| Play::new(dof.delta_minus, dof.delta_plus);
+        Ok(Self {
+            law: VectorLaw::new(
+                &settings.adaptive,
+                &dofs,
+                &settings.control,
+                unit,
+                radius,
+                limits,
+            )?,
+            filter: Filter::new(
+                settings.state_estimation,
+                unit,
+                dofs.map(|dof| dof.start_deviation),
+                [play(first)?, play(second)?, play(third)?],
+                radius,
+            )?,
+            limits,
+            settings: settings.state_estimation,
+            observability: state_estimator(settings)?,
+            change_limit: unit.map(|unit| CHANGED * unit),
+            history: settings.control.history,
+        })
     }
 
-    fn play(&self) -> Play {
-        self.play()
+    fn predicted_state(&self) -> PerDof<f64> {
+        let nominal = self.filter.nominal();
+        nominal.tip(nominal.position.output)
     }
 
-    fn offsets(&self) -> (f64, f64) {
-        self.offsets()
+    fn corrected(&self) -> PerDof<f64> {
+        [0.0; 3]
     }
 
-    fn set_limit(&mut self, limit: PlayLimit) {
-        self.limit(limit);
+    fn play(&self) -> PerDof<Play> {
+        self.filter.nominal().hysteresis.plays()
     }
 
-    fn play_limit(&self) -> PlayLimit {
-        self.play_limit()
-    }
-
-    fn update_offsets(
+    fn keep_up<S: AsRef<[Entry]> + AsMut<[Entry]>>(
         &mut self,
-        command: f64,
-        measured: f64,
-        deviation: f64,
-        since: impl Iterator<Item = f64>,
-    ) -> OffsetUpdate {
-        let before = self.play();
-        let triggers = self.learn(command, measured, deviation, since);
-        let after = self.play();
-        OffsetUpdate {
-            triggers,
-            is_limited: self.is_limited(),
-            change: [
-                after.delta_minus() - before.delta_minus(),
-                after.delta_plus() - before.delta_plus(),
-            ],
+        history: &History<S>,
+        has_clock_gone_back: bool,
+    ) {
+        if has_clock_gone_back {
+            self.filter.restart_clock();
         }
+        // The history forgets what the filter has not followed.
+        let oldest = history.newest_time() - self.history / 2.0;
+        if self.filter.time() < oldest
+            && let Some(past) = history.at(oldest)
+        {
+            self.filter.advance(history, &past);
+        }
+    }
+
+    fn predict<S: AsRef<[Entry]> + AsMut<[Entry]>>(
+        &self,
+        history: &History<S>,
+        past: &Entry,
+    ) -> Belief {
+        self.filter.predict(history, past)
+    }
+
+    fn advance<S: AsRef<[Entry]> + AsMut<[Entry]>>(&mut self, history: &History<S>, past: &Entry) {
+        self.filter.advance(history, past);
+    }
+
+    fn measure(&self, model: &FeatureModel, _: &Entry, image: Image<'_>) -> Option<Measurement> {
+        let markers = Markers::new(image.features, image.covariance, &self.settings);
+        let estimate = self.filter.measure(model, &markers)?;
+        let prior = self.filter.belief();
+        let start = model.predict(prior.state)?;
+        let kept = estimate.keep(image.features);
+        let about = self
+            .observability
+            .estimate(estimate.state, &estimate.prediction, kept);
+        let mut innovation = image.features;
+        for (value, predicted) in innovation.iter_mut().zip(start.features) {
+            *value -= predicted;
+        }
+        Some(Measurement {
+            estimate: StateEstimate {
+                state: estimate.state,
+                innovation,
+                ..about
+            },
+            used: estimate.used,
+            predicted_features: start.features,
+            state_deviation: estimate.std,
+            distance: libm::sqrt(estimate.distance_squared),
+            markers: Some(estimate),
+        })
+    }
+
+    fn update<S: AsRef<[Entry]> + AsMut<[Entry]>>(
+        &mut self,
+        history: &History<S>,
+        _: &Entry,
+        measurement: &Measurement,
+        image: Image<'_>,
+        is_learning: bool,
+    ) -> ImageUpdate {
+        let Some(estimate) = &measurement.markers else {
+            return ImageUpdate::default();
+        };
+        let markers = Markers::new(image.features, image.covariance, &self.settings);
+        let before = self.parameters();
+        self.filter.update(history, &markers, estimate, !is_learning);
+        if !is_learning {
+            return ImageUpdate::default();
+        }
+        let after = self.parameters();
+        self.law.rate_limit_mut().update(before, after);
+        let withheld = self.law.rate_limit().withheld();
+        let has_changed = withheld.iter().zip(self.change_limit).any(|(w, limit)| *w > limit);
+        let is_limited = self
+            .play()
+            .iter()
+            .zip(self.limits)
+            .any(|(play, limit)| limit.exceeds(play.delta_minus(), play.delta_plus()));
+        ImageUpdate {
+            triggers: self.triggers(),
+            raised: Flags::when(is_limited, Flag::WidthLimit)
+                .union(Flags::when(has_changed, Flag::SlackChanged)),
+        }
+    }
+
+    fn miss(&mut self, _: &Entry) {
+        self.filter.miss();
+    }
+
+    fn reset_prediction(&mut self, _: &Entry) {
+        self.filter.reset_position();
+    }
+}
+
+impl Best {
+    /// Half widths and centres where the tip is.
+    fn parameters(&self) -> [PerDof<f64>; 2] {
+        let hysteresis = &self.filter.nominal().hysteresis;
+        [hysteresis.half_width, hysteresis.centre]
+    }
+
+    /// The contacts in which each DOF is: there an image measures an offset.
+    fn triggers(&self) -> PerDof<Triggers> {
+        let nominal = self.filter.nominal();
+        let mut deflection = self.law.command();
+        let at = nominal.position.output.into_iter().zip(nominal.hysteresis.centre);
+        for ((value, (output, centre)), half) in
+            deflection.iter_mut().zip(at).zip(nominal.hysteresis.half_width)
+        {
+            *value = (*value - output - centre) / half;
+        }
+        deflection.map(|value| Triggers {
+            minus: (value < -CONTACT).then_some(Trigger::Contact),
+            plus: (value > CONTACT).then_some(Trigger::Contact),
+        })
     }
 }

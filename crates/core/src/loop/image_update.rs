@@ -2,11 +2,9 @@
 
 use crate::article::estimator::Triggers;
 use crate::article::state::{StateEstimate, found};
-use crate::dof::PerDof;
 use crate::estimation::history::Entry;
-use crate::r#loop::axis::Axis;
 use crate::r#loop::measurement::{Measurement, is_reversed, is_usable};
-use crate::r#loop::profile::Profile;
+use crate::r#loop::profile::{Image, ImageUpdate, Profile};
 use crate::r#loop::reduction::HysteresisReduction;
 use crate::r#loop::report::{Report, Status};
 use crate::supervision::flags::{Flag, Flags};
@@ -61,73 +59,55 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
         if !raised.is_empty() {
             return self.report_unused(Status::Refused, Some(past));
         }
-        let Some(measured) = measured.filter(|features| is_usable(*features)) else {
-            self.whereabouts.miss(&past);
-            self.monitors.frames.miss(past.travel);
+        self.profile.advance(&self.history, &past);
+        let Some(features) = measured.filter(|features| is_usable(*features)) else {
+            self.profile.miss(&past);
             *raised = self.monitors.enabled(Flags::of(Flag::Lost));
             return self.report_unused(Status::NoMarkers, Some(past));
         };
-        let Some(measurement) = self.measure(&past, measured, covariance) else {
+        let image = Image {
+            features,
+            covariance,
+        };
+        let Some(measurement) = self.profile.measure(&self.feature_model, &past, image) else {
             return self.report_unused(Status::Held, Some(past));
         };
-        *raised = self.check_innovation(&past, &measurement, measured, covariance);
+        *raised = self.check_innovation(&past, &measurement, image);
         if !raised.is_empty() {
-            self.whereabouts.miss(&past);
+            // Bands that contradict the prediction for as long as a hold lasts are more credible than the prediction.
+            if self.monitors.is_fading() {
+                self.profile.reset_prediction(&past);
+            } else {
+                self.profile.miss(&past);
+            }
             return self.report_unused(Status::Refused, Some(past));
         }
         self.last_used = captured_at;
-        self.accept(&past, &measurement, measured, raised)
-    }
-
-    fn measure(
-        &self,
-        past: &Entry,
-        measured: [f64; 4],
-        covariance: Option<&[[f64; 4]; 4]>,
-    ) -> Option<Measurement> {
-        self.profile.measure(
-            &self.feature_model,
-            &self.whereabouts,
-            past,
-            measured,
-            covariance,
-        )
+        self.accept(&past, &measurement, image, raised)
     }
 
     /// Flags for which the image is refused.
-    fn check_innovation(
-        &self,
-        past: &Entry,
-        measurement: &Measurement,
-        measured: [f64; 4],
-        covariance: Option<&[[f64; 4]; 4]>,
-    ) -> Flags {
-        let prior = self.whereabouts.at(past);
-        let moved = self.whereabouts.moved(past);
-        let offsets = self.offsets();
-        let check = |measurement: &Measurement| {
-            let sightings = measurement.sightings(past, offsets);
-            let frames = &self.monitors.frames;
-            frames
-                .check_innovation(&prior, moved, &sightings)
-                .difference(P::UNCHECKED)
-        };
-        let flags = check(measurement);
-        let is_used = measurement.used != [false; 2];
+    fn check_innovation(&self, past: &Entry, measurement: &Measurement, image: Image<'_>) -> Flags {
+        let frames = &self.monitors.frames;
+        let flags = frames.check_innovation(measurement.distance);
+        let prior = self.profile.predict(&self.history, past);
         let expected = self.feature_model.predict(prior.state);
         let is_exchanged =
-            expected.is_some_and(|expected| is_reversed(expected.features, measured));
-        if !is_exchanged && is_used && flags.is_empty() {
+            expected.is_some_and(|expected| is_reversed(expected.features, image.features));
+        if !is_exchanged && flags.is_empty() {
             return Flags::NONE;
         }
-        let [ua, va, ub, vb] = measured;
-        let exchanged = self.measure(past, [ub, vb, ua, va], covariance);
+        let exchanged = self
+            .profile
+            .measure(&self.feature_model, past, image.exchanged());
         let is_swapped = is_exchanged
-            || exchanged.is_some_and(|other| other.used == [true; 2] && check(&other).is_empty());
+            || exchanged.is_some_and(|other| {
+                other.used == [true; 2] && frames.check_innovation(other.distance).is_empty()
+            });
         let swapped = self
             .monitors
             .enabled(Flags::when(is_swapped, Flag::Swapped));
-        if swapped.is_empty() && is_used {
+        if swapped.is_empty() {
             self.monitors.enabled(flags)
         } else {
             swapped
@@ -139,39 +119,43 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
         &mut self,
         past: &Entry,
         measurement: &Measurement,
-        measured: [f64; 4],
+        image: Image<'_>,
         raised: &mut Flags,
     ) -> Report {
-        let prior = self.whereabouts.at(past);
-        let sightings = measurement.sightings(past, self.offsets());
-        self.monitors.frames.accept(&prior, &sightings);
-        self.profile
-            .update_prediction(&mut self.whereabouts, past, measurement, measured);
         let estimate = measurement.estimate;
         let status = match (measurement.used, estimate.observable) {
             ([true, false] | [false, true], _) => Status::Partial,
             ([true, true], [true, true, true]) => Status::Ok,
             _ => Status::Held,
         };
-        let is_used = measurement.used != [false; 2];
         // Of two markers with an outlier, the other one may be wrong, too.
-        let has_outlier = is_used && measurement.used != found(measured);
+        let has_outlier = measurement.used != found(image.features);
         let outlier = self
             .monitors
             .enabled(Flags::when(has_outlier, Flag::Innovation));
-        let triggers = if outlier.is_empty() && self.monitors.permits_updates() {
-            self.update_offsets(past, measurement, raised)
-        } else {
-            [Triggers::default(); 3]
-        };
-        *raised = self.monitors.enabled(
-            raised
-                .union(Flags::when(status == Status::Partial, Flag::Merged))
-                .union(Flags::when(!is_used, Flag::Lost))
-                .union(Flags::when(
-                    is_used && status == Status::Held,
-                    Flag::Unobservable,
-                )),
+        let is_learning = outlier.is_empty() && self.monitors.permits_updates();
+        let mut motion = Flags::NONE;
+        if is_learning {
+            let play = self.play();
+            motion = self.monitors.check_motion(
+                past.time,
+                past.reference,
+                measurement.observed_state(),
+                play,
+            );
+        }
+        let ImageUpdate {
+            triggers,
+            raised: conspicuous,
+        } = self
+            .profile
+            .update(&self.history, past, measurement, image, is_learning);
+        *raised = motion.union(
+            self.monitors.enabled(
+                conspicuous
+                    .union(Flags::when(status == Status::Partial, Flag::Merged))
+                    .union(Flags::when(status == Status::Held, Flag::Unobservable)),
+            ),
         );
         Report {
             status,
@@ -183,54 +167,6 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
             play: self.play(),
             supervision: self.monitors.supervision(),
         }
-    }
-
-    /// Updates the offsets of the observable DOFs and raises flags for conspicuous changes.
-    fn update_offsets(
-        &mut self,
-        past: &Entry,
-        measurement: &Measurement,
-        raised: &mut Flags,
-    ) -> PerDof<Triggers> {
-        let play = self.play();
-        let motion = self.monitors.check_motion(
-            past.time,
-            past.reference,
-            measurement.observed_output(),
-            play,
-        );
-        *raised = raised.union(motion);
-        let mut triggers = [Triggers::default(); 3];
-        let mut changes = [[0.0; 2]; 3];
-        let history = &self.history;
-        let outputs = measurement.output.iter().zip(measurement.output_deviation);
-        let observable = measurement.estimate.observable;
-        let signals = observable.iter().zip(past.command).zip(outputs);
-        let results = triggers.iter_mut().zip(&mut changes);
-        let axes = self.profile.axes_mut().iter_mut().zip(results);
-        let axes = axes.zip(&mut self.corrected).zip(signals).enumerate();
-        for (dof, (((axis, results), corrected), ((observable, command), (output, deviation)))) in
-            axes
-        {
-            if !observable {
-                continue;
-            }
-            let since = history
-                .since(past.time)
-                .filter_map(|entry| entry.command.get(dof).copied());
-            let before = axis.predicted_state();
-            let update = axis.update_within_limit(command, *output, deviation, since);
-            (*results.0, *results.1) = (update.triggers, update.change);
-            *raised = raised.union(Flags::when(update.is_limited, Flag::WidthLimit));
-            let moved = axis.predicted_state() - before;
-            *corrected += if moved.is_finite() { moved } else { 0.0 };
-        }
-        *raised = raised.union(self.monitors.check_changes(changes, past.travel));
-        triggers
-    }
-
-    fn offsets(&self) -> PerDof<(f64, f64)> {
-        self.profile.axes().each_ref().map(Axis::offsets)
     }
 
     /// The report on a frame that updated nothing.

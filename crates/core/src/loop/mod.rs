@@ -1,6 +1,5 @@
 //! The whole loop, Fig. 6.
 
-pub(crate) mod axis;
 pub(crate) mod best;
 pub(crate) mod image_update;
 pub(crate) mod measurement;

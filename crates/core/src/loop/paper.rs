@@ -1,17 +1,17 @@
 //! Profile `paper`: the article's compensator, estimator and state estimation, Eqs. (2)-(6) and (13)-(16).
 
 use crate::article::compensator::{Compensator, CompensatorState};
-use crate::article::estimator::{Estimator, EstimatorState};
+use crate::article::estimator::{Estimator, EstimatorState, Triggers};
 use crate::article::play::Play;
 use crate::article::play_limit::PlayLimit;
-use crate::article::state::{StateEstimator, found};
+use crate::article::state::{StateEstimate, StateEstimator, found};
 use crate::dof::PerDof;
 use crate::error::ConfigError;
-use crate::estimation::history::Entry;
-use crate::estimation::whereabouts::{Whereabouts, WhereaboutsSettings};
-use crate::r#loop::axis::{Axis, OffsetUpdate};
+use crate::estimation::history::{Entry, History};
+use crate::estimation::posture::Belief;
+use crate::estimation::whereabouts::Whereabouts;
 use crate::r#loop::measurement::Measurement;
-use crate::r#loop::profile::ProfileBlocks;
+use crate::r#loop::profile::{Image, ImageUpdate, ProfileBlocks};
 use crate::r#loop::settings::Settings;
 use crate::model::features::FeatureModel;
 use crate::settings::DofSettings;
@@ -31,84 +31,174 @@ const UNIT: [[f64; 4]; 4] = [
 pub struct Paper {
     axes: PerDof<ArticleAxis>,
     state_estimator: StateEstimator,
+    whereabouts: Whereabouts,
+    corrected: PerDof<f64>,
+}
+
+impl Law for Paper {
+    fn command(&self) -> PerDof<f64> {
+        self.axes.each_ref().map(|axis| axis.compensation.command())
+    }
+
+    fn step_within(
+        &mut self,
+        [u1, u2, u3]: PerDof<f64>,
+        limit: impl FnOnce(PerDof<f64>) -> PerDof<f64>,
+    ) {
+        let [first, second, third] = &mut self.axes;
+        let (mut limited2, mut limited3) = (f64::NAN, f64::NAN);
+        // Each law has proposed its command before the limits are applied to all.
+        first.step_within(u1, |c1| {
+            let mut limited1 = f64::NAN;
+            second.step_within(u2, |c2| {
+                third.step_within(u3, |c3| {
+                    [limited1, limited2, limited3] = limit([c1, c2, c3]);
+                    limited3
+                });
+                limited2
+            });
+            limited1
+        });
+    }
+
+    fn shift_reference(&mut self, shift: PerDof<f64>) {
+        for (axis, shift) in self.axes.iter_mut().zip(shift) {
+            if shift != 0.0 {
+                axis.compensator
+                    .shift_reference(&mut axis.compensation, shift);
+            }
+        }
+    }
+
+    fn set_share(&mut self, share: f64) {
+        for axis in &mut self.axes {
+            axis.set_share(share);
+        }
+    }
 }
 
 impl ProfileBlocks for Paper {
-    type Axis = ArticleAxis;
+    const IS_COUPLED: bool = false;
 
-    /// The estimate jumps where a DOF begins or ceases to be held.
-    const UNCHECKED: Flags = Flags::of(Flag::Jump).union(Flags::of(Flag::Slip));
-
-    fn new(settings: &Settings) -> Result<Self, ConfigError> {
+    fn new(settings: &Settings, limits: PerDof<PlayLimit>) -> Result<Self, ConfigError> {
         let [insertion, rotation, bending] = settings.dofs();
+        let [limit1, limit2, limit3] = limits;
         Ok(Self {
             axes: [
-                ArticleAxis::new(&insertion)?,
-                ArticleAxis::new(&rotation)?,
-                ArticleAxis::new(&bending)?,
+                ArticleAxis::new(&insertion, limit1)?,
+                ArticleAxis::new(&rotation, limit2)?,
+                ArticleAxis::new(&bending, limit3)?,
             ],
             state_estimator: state_estimator(settings)?,
+            whereabouts: Whereabouts::new(settings.dofs().map(|dof| dof.start_deviation))?,
+            corrected: [0.0; 3],
         })
     }
 
-    fn whereabouts(settings: &Settings) -> Result<Whereabouts, ConfigError> {
-        Whereabouts::new(WhereaboutsSettings {
-            start_deviation: settings.dofs().map(|dof| dof.start_deviation),
-            rest_deviation: [0.0; 3],
-            settling_time: 0.0,
-        })
+    fn predicted_state(&self) -> PerDof<f64> {
+        self.axes
+            .each_ref()
+            .map(|axis| axis.compensation.predicted_state())
     }
 
-    fn axes(&self) -> &PerDof<ArticleAxis> {
-        &self.axes
+    fn corrected(&self) -> PerDof<f64> {
+        self.corrected
     }
 
-    fn axes_mut(&mut self) -> &mut PerDof<ArticleAxis> {
-        &mut self.axes
+    fn play(&self) -> PerDof<Play> {
+        self.axes.each_ref().map(|axis| axis.estimation.play())
     }
 
-    fn couple(&mut self, _: PerDof<f64>) -> bool {
-        false
+    fn keep_up<S: AsRef<[Entry]> + AsMut<[Entry]>>(&mut self, _: &History<S>, _: bool) {}
+
+    fn predict<S: AsRef<[Entry]> + AsMut<[Entry]>>(&self, _: &History<S>, past: &Entry) -> Belief {
+        self.whereabouts.at(past)
     }
+
+    fn advance<S: AsRef<[Entry]> + AsMut<[Entry]>>(&mut self, _: &History<S>, _: &Entry) {}
 
     /// One linear step from the prediction, Eqs. (13)-(16). With one band the step starts from the state prediction of the
     /// last images, because the DOFs that are held keep its error.
-    fn measure(
-        &self,
-        model: &FeatureModel,
-        whereabouts: &Whereabouts,
-        past: &Entry,
-        measured: [f64; 4],
-        covariance: Option<&[[f64; 4]; 4]>,
-    ) -> Option<Measurement> {
-        let used = found(measured);
+    fn measure(&self, model: &FeatureModel, past: &Entry, image: Image<'_>) -> Option<Measurement> {
+        let used = found(image.features);
+        let prior = self.whereabouts.at(past);
         let start = if used == [true; 2] {
             past.predicted_state
         } else {
-            whereabouts.at(past).state
+            prior.state
         };
         let prediction = model.predict(start)?;
-        let estimate = self.state_estimator.estimate(start, &prediction, measured);
-        let state_deviation = estimate.state_deviation(covariance.unwrap_or(&UNIT));
+        let estimate = self
+            .state_estimator
+            .estimate(start, &prediction, image.features);
+        let state_deviation = estimate.state_deviation(image.covariance.unwrap_or(&UNIT));
         Some(Measurement {
             estimate,
             used,
             predicted_features: prediction.features,
             state_deviation,
-            output: estimate.state,
-            output_deviation: state_deviation,
+            distance: distance(&prior, &estimate, state_deviation),
+            markers: None,
         })
     }
 
-    fn update_prediction(
-        &self,
-        whereabouts: &mut Whereabouts,
+    fn update<S: AsRef<[Entry]> + AsMut<[Entry]>>(
+        &mut self,
+        _: &History<S>,
         past: &Entry,
         measurement: &Measurement,
-        _: [f64; 4],
-    ) {
-        whereabouts.learn(past, &measurement.estimate, measurement.state_deviation);
+        _: Image<'_>,
+        is_learning: bool,
+    ) -> ImageUpdate {
+        let estimate = &measurement.estimate;
+        self.whereabouts
+            .learn(past, estimate, measurement.state_deviation);
+        let mut update = ImageUpdate::default();
+        if !is_learning {
+            return update;
+        }
+        let signals = estimate.observable.iter().zip(past.command).zip(estimate.state);
+        let axes = self.axes.iter_mut().zip(&mut self.corrected);
+        for ((axis, corrected), (triggers, ((observable, command), output))) in
+            axes.zip(update.triggers.iter_mut().zip(signals))
+        {
+            if !observable {
+                continue;
+            }
+            let before = axis.compensation.predicted_state();
+            let is_limited;
+            (*triggers, is_limited) = axis.update_offsets(command, output);
+            let limited = Flags::when(is_limited, Flag::WidthLimit);
+            update.raised = update.raised.union(limited);
+            let moved = axis.compensation.predicted_state() - before;
+            *corrected += if moved.is_finite() { moved } else { 0.0 };
+        }
+        update
     }
+
+    fn miss(&mut self, past: &Entry) {
+        self.whereabouts.miss(past);
+    }
+
+    fn reset_prediction(&mut self, past: &Entry) {
+        self.whereabouts.reset(past);
+    }
+}
+
+/// Largest innovation of a DOF, measured less predicted state, in standard deviations of prediction and measurement
+/// together.
+fn distance(prior: &Belief, estimate: &StateEstimate, std: PerDof<f64>) -> f64 {
+    let innovations = estimate.state.into_iter().zip(prior.state);
+    let stds = std.into_iter().zip(prior.deviation);
+    innovations
+        .zip(stds)
+        .zip(estimate.observable)
+        .filter(|(_, observable)| *observable)
+        .map(|(((state, predicted), (own, prior)), _)| {
+            (state - predicted).abs() / libm::sqrt(own * own + prior * prior)
+        })
+        .filter(|distance| distance.is_finite())
+        .fold(0.0, f64::max)
 }
 
 /// The state estimation with its rank monitored, Eqs. (13)-(16).
@@ -132,11 +222,11 @@ pub struct ArticleAxis {
 }
 
 impl ArticleAxis {
-    /// One DOF from its settings.
+    /// One DOF from its settings, with the limit of its offsets.
     ///
     /// # Errors
     /// As [`Compensator::new`], [`Compensator::with_recovery`], [`Estimator::new`] and [`Play::new`].
-    pub fn new(dof: &DofSettings) -> Result<Self, ConfigError> {
+    fn new(dof: &DofSettings, limit: PlayLimit) -> Result<Self, ConfigError> {
         let compensator =
             Compensator::new(dof.free_gain, dof.gain_limit)?.with_recovery(dof.recovery)?;
         let play = Play::new(dof.delta_minus, dof.delta_plus)?;
@@ -150,14 +240,8 @@ impl ArticleAxis {
             )?,
             compensation: CompensatorState::new(play),
             estimation: EstimatorState::new(play),
-            limit: PlayLimit::NONE,
+            limit,
         })
-    }
-}
-
-impl Law for ArticleAxis {
-    fn command(&self) -> f64 {
-        self.compensation.command()
     }
 
     fn step_within(&mut self, reference: f64, limit: impl FnOnce(f64) -> f64) {
@@ -165,46 +249,18 @@ impl Law for ArticleAxis {
             .step_within(&mut self.compensation, reference, limit);
     }
 
-    fn shift_reference(&mut self, shift: f64) {
-        self.compensator
-            .shift_reference(&mut self.compensation, shift);
-    }
-
     fn set_share(&mut self, share: f64) {
         self.compensator = self.configured.with_share(share);
         let play = self.compensation.play();
         self.compensator.retune(&mut self.compensation, play);
     }
-}
 
-impl Axis for ArticleAxis {
-    fn predicted_state(&self) -> f64 {
-        self.compensation.predicted_state()
-    }
-
-    fn play(&self) -> Play {
-        self.estimation.play()
-    }
-
-    fn offsets(&self) -> (f64, f64) {
-        (f64::NEG_INFINITY, f64::INFINITY)
-    }
-
-    fn set_limit(&mut self, limit: PlayLimit) {
-        self.limit = limit;
-    }
-
-    fn play_limit(&self) -> PlayLimit {
-        self.limit
-    }
-
-    fn update_offsets(
-        &mut self,
-        command: f64,
-        measured: f64,
-        _: f64,
-        _: impl Iterator<Item = f64>,
-    ) -> OffsetUpdate {
+    /// Updates the offsets from command and output of one instant: which were updated and why, and whether the limit
+    /// bounded them. An offset beyond the limit updates nothing.
+    fn update_offsets(&mut self, command: f64, measured: f64) -> (Triggers, bool) {
+        if !self.limit.allows(command - measured) {
+            return (Triggers::default(), true);
+        }
         let triggers = self
             .estimator
             .update(&mut self.estimation, command, measured);
@@ -213,10 +269,6 @@ impl Axis for ArticleAxis {
             self.compensator
                 .retune(&mut self.compensation, self.estimation.play());
         }
-        OffsetUpdate {
-            triggers,
-            is_limited,
-            change: [0.0; 2],
-        }
+        (triggers, is_limited)
     }
 }

@@ -1,14 +1,17 @@
 //! The interface of the profiles `paper` and `best`.
 
+use crate::article::estimator::Triggers;
+use crate::article::play::Play;
+use crate::article::play_limit::PlayLimit;
 use crate::dof::PerDof;
 use crate::error::ConfigError;
-use crate::estimation::history::Entry;
-use crate::estimation::whereabouts::Whereabouts;
-use crate::r#loop::axis::Axis;
+use crate::estimation::history::{Entry, History};
+use crate::estimation::posture::Belief;
 use crate::r#loop::measurement::Measurement;
 use crate::r#loop::settings::Settings;
 use crate::model::features::FeatureModel;
 use crate::supervision::flags::Flags;
+use crate::supervision::monitors::Law;
 
 /// A profile of the loop, `Paper` or `Best`.
 #[expect(private_bounds, reason = "only this crate implements profiles")]
@@ -16,52 +19,86 @@ pub trait Profile: ProfileBlocks {}
 
 impl<P: ProfileBlocks> Profile for P {}
 
-/// Compensation laws and offset estimates of the three DOFs, and the state estimation.
-pub(crate) trait ProfileBlocks: Sized {
-    /// One DOF.
-    type Axis: Axis;
+/// An image: features (4,) in px with two NaN for a band that was not found, and their covariance (4, 4) in px^2, if known.
+#[derive(Debug, Clone, Copy)]
+pub struct Image<'a> {
+    pub features: [f64; 4],
+    pub covariance: Option<&'a [[f64; 4]; 4]>,
+}
 
-    /// Flags that the profile's state estimate raises in normal operation, and that are therefore not checked.
-    const UNCHECKED: Flags;
+impl Image<'_> {
+    /// The image with its two markers exchanged.
+    pub fn exchanged(self) -> Self {
+        let [ua, va, ub, vb] = self.features;
+        Self {
+            features: [ub, vb, ua, va],
+            ..self
+        }
+    }
+}
+
+/// Result of an update with an image.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ImageUpdate {
+    /// Which offsets were updated, and why.
+    pub triggers: PerDof<Triggers>,
+    /// What was conspicuous.
+    pub raised: Flags,
+}
+
+/// Compensation law, offset estimates and state estimation.
+pub(crate) trait ProfileBlocks: Law + Sized {
+    /// Whether the motions of insertion and rotation are bounded together.
+    const IS_COUPLED: bool;
 
     /// A profile at rest.
     ///
     /// # Errors
     /// A setting is out of range.
-    fn new(settings: &Settings) -> Result<Self, ConfigError>;
+    fn new(settings: &Settings, limits: PerDof<PlayLimit>) -> Result<Self, ConfigError>;
 
-    /// The state prediction before the first image.
-    ///
-    /// # Errors
-    /// A setting is out of range.
-    fn whereabouts(settings: &Settings) -> Result<Whereabouts, ConfigError>;
+    /// The predicted state q (3,) [m, rad, rad]; NaN before the first reference.
+    fn predicted_state(&self) -> PerDof<f64>;
 
-    /// The three DOFs.
-    fn axes(&self) -> &PerDof<Self::Axis>;
+    /// The sum of the changes of q by images so far (3,) [m, rad, rad].
+    fn corrected(&self) -> PerDof<f64>;
 
-    /// The three DOFs, mutable.
-    fn axes_mut(&mut self) -> &mut PerDof<Self::Axis>;
+    /// The estimated play of each DOF.
+    fn play(&self) -> PerDof<Play>;
 
-    /// Updates the friction that the DOFs share, after a control tick; returns whether they share any.
-    fn couple(&mut self, reference: PerDof<f64>) -> bool;
+    /// Keeps up with the history at the end of a control tick.
+    fn keep_up<S: AsRef<[Entry]> + AsMut<[Entry]>>(
+        &mut self,
+        history: &History<S>,
+        has_clock_gone_back: bool,
+    );
 
-    /// The state estimate from features (4,) in px and their covariance (4, 4) in px^2; None where a band is not
-    /// visible.
-    fn measure(
+    /// The state prediction at a tick of the history.
+    fn predict<S: AsRef<[Entry]> + AsMut<[Entry]>>(
         &self,
-        model: &FeatureModel,
-        whereabouts: &Whereabouts,
+        history: &History<S>,
         past: &Entry,
-        measured: [f64; 4],
-        covariance: Option<&[[f64; 4]; 4]>,
-    ) -> Option<Measurement>;
+    ) -> Belief;
 
-    /// Updates the state prediction with a measurement.
-    fn update_prediction(
-        &self,
-        whereabouts: &mut Whereabouts,
+    /// Propagates the state prediction to the time of an image.
+    fn advance<S: AsRef<[Entry]> + AsMut<[Entry]>>(&mut self, history: &History<S>, past: &Entry);
+
+    /// The state estimate from an image of that time; None where a band is not visible.
+    fn measure(&self, model: &FeatureModel, past: &Entry, image: Image<'_>) -> Option<Measurement>;
+
+    /// Updates the state prediction with an accepted image, and with `is_learning` the offsets.
+    fn update<S: AsRef<[Entry]> + AsMut<[Entry]>>(
+        &mut self,
+        history: &History<S>,
         past: &Entry,
         measurement: &Measurement,
-        measured: [f64; 4],
-    );
+        image: Image<'_>,
+        is_learning: bool,
+    ) -> ImageUpdate;
+
+    /// Makes the state prediction less certain after an image without markers.
+    fn miss(&mut self, past: &Entry);
+
+    /// Makes the state prediction as uncertain as at the start.
+    fn reset_prediction(&mut self, past: &Entry);
 }

@@ -5,13 +5,11 @@ use crate::dof::PerDof;
 use crate::error::ConfigError;
 use crate::estimation::history::{Entry, History};
 use crate::estimation::posture::Belief;
-use crate::estimation::whereabouts::Whereabouts;
-use crate::r#loop::axis::Axis;
 use crate::r#loop::profile::Profile;
 use crate::r#loop::settings::Settings;
 use crate::model::features::FeatureModel;
 use crate::supervision::flags::Flag;
-use crate::supervision::monitors::{Law, Monitors, Supervision};
+use crate::supervision::monitors::{Monitors, Supervision};
 
 /// Image-based hysteresis reduction, Fig. 6: reference in, command out; images update the estimate of the hysteresis.
 ///
@@ -21,9 +19,7 @@ pub struct HysteresisReduction<P, S = [Entry; 256]> {
     pub(super) profile: P,
     pub(super) feature_model: FeatureModel,
     pub(super) history: History<S>,
-    pub(super) whereabouts: Whereabouts,
     pub(super) monitors: Monitors,
-    pub(super) corrected: PerDof<f64>,
     pub(super) last_used: f64,
     travel: PerDof<f64>,
 }
@@ -35,18 +31,13 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
     /// A setting is out of range, or the storage is too small.
     pub fn new(settings: &Settings, storage: S) -> Result<Self, ConfigError> {
         let control = &settings.control;
-        let monitors = Monitors::new(&settings.safety, &settings.dofs(), control.period)?;
-        let mut profile = P::new(settings)?;
-        for (axis, limit) in profile.axes_mut().iter_mut().zip(monitors.play_limits()) {
-            axis.set_limit(limit);
-        }
+        let monitors =
+            Monitors::new(&settings.safety, &settings.dofs(), control.period, P::IS_COUPLED)?;
         Ok(Self {
-            profile,
+            profile: P::new(settings, monitors.play_limits())?,
             feature_model: settings.feature_model()?,
             history: History::new(control.history, control.period, storage)?,
-            whereabouts: P::whereabouts(settings)?,
             monitors,
-            corrected: [0.0; 3],
             last_used: f64::NEG_INFINITY,
             travel: [0.0; 3],
         })
@@ -57,12 +48,12 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
     /// `stamp` is the time in s at which the reference was generated, if known. A reference that is not finite
     /// holds the command, which before the first reference is NaN.
     pub fn step(&mut self, reference: PerDof<f64>, stamp: Option<f64>, time: f64) -> PerDof<f64> {
-        let (command_before, state_before) = (self.command(), self.predicted_state());
+        let (command_before, state_before) = (self.profile.command(), self.predicted_state());
         self.monitors
-            .step(self.profile.axes_mut(), reference, stamp, time);
-        let (gated, command) = (self.monitors.reference(), self.command());
+            .step(&mut self.profile, reference, stamp, time);
+        let (gated, command) = (self.monitors.reference(), self.profile.command());
         let mut moved = distance(command_before, command);
-        if self.profile.couple(gated) {
+        if P::IS_COUPLED {
             // Where another DOF takes up the friction, a tip moves although its command rests.
             let released = distance(state_before, self.predicted_state());
             for (moved, released) in moved.iter_mut().zip(released) {
@@ -77,12 +68,13 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
             reference: gated,
             command,
             predicted_state: self.predicted_state(),
-            corrected: self.corrected,
+            corrected: self.profile.corrected(),
             travel: self.travel,
         });
         if clock_went_back {
             self.last_used = f64::NEG_INFINITY;
         }
+        self.profile.keep_up(&self.history, clock_went_back);
         command
     }
 
@@ -91,7 +83,8 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
     ///
     /// None beyond the history.
     pub fn predict_state(&self, captured_at: f64) -> Option<Belief> {
-        Some(self.whereabouts.at(&self.history.at(captured_at)?))
+        let past = self.history.at(captured_at)?;
+        Some(self.profile.predict(&self.history, &past))
     }
 
     /// Predicted features (4,) in px of a frame captured at `captured_at` in s.
@@ -105,12 +98,12 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
 
     /// The predicted state q now [m, rad, rad]; NaN before the first reference.
     pub fn predicted_state(&self) -> PerDof<f64> {
-        self.profile.axes().each_ref().map(Axis::predicted_state)
+        self.profile.predicted_state()
     }
 
     /// The estimated play of each DOF now.
     pub fn play(&self) -> PerDof<Play> {
-        self.profile.axes().each_ref().map(Axis::play)
+        self.profile.play()
     }
 
     /// State of the supervision.
@@ -131,10 +124,6 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
     /// Raise a flag that only the rig can detect.
     pub fn raise(&mut self, flag: Flag) {
         self.monitors.raise(flag);
-    }
-
-    fn command(&self) -> PerDof<f64> {
-        self.profile.axes().each_ref().map(Law::command)
     }
 }
 

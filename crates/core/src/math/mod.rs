@@ -1,4 +1,4 @@
 //! Vectors and small linear systems.
 
 pub(crate) mod linear;
-pub(crate) mod symmetric;
+pub(crate) mod random;

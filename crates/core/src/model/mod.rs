@@ -1,7 +1,9 @@
-//! Models of the bands in an image: kinematics, camera, features, outlines, Eqs. (7)-(11).
+//! Models: hysteresis of the three DOFs; bands in an image, Eqs. (7)-(11).
 
 pub(crate) mod camera;
 pub(crate) mod features;
+pub(crate) mod friction;
+pub(crate) mod hysteresis;
 pub(crate) mod instrument;
 pub(crate) mod outline;
 pub(crate) mod settings;

@@ -1,8 +1,13 @@
 //! Limits of the command: the bounds of the law, checked by code and state that share nothing with it.
 
+use crate::dof::PerDof;
 use crate::error::{ConfigError, require, require_positive};
+use crate::math::linear::square;
 use crate::settings::DofSettings;
 use crate::supervision::settings::SafetySettings;
+
+/// Share by which rounding may exceed the common bound of insertion and rotation.
+const ROUNDING: f64 = 1e-9;
 
 /// Limits the command of one DOF.
 ///
@@ -81,10 +86,15 @@ impl CommandLimiter {
         })
     }
 
-    /// The limited command for a gated reference.
+    /// The limited command for a gated reference; the law's bound is 0 <= dc / du <= `gain_limit`, or |dc| <= `reach`.
     ///
     /// Where reference or command is not finite, this is the last command, or NaN before the first.
-    pub fn limit(&mut self, reference: f64, command: f64) -> (f64, LimiterResult) {
+    pub fn limit(
+        &mut self,
+        reference: f64,
+        command: f64,
+        reach: Option<f64>,
+    ) -> (f64, LimiterResult) {
         let Self {
             gain_limit,
             step_limit,
@@ -110,9 +120,15 @@ impl CommandLimiter {
             return (last, LimiterResult::Violation);
         }
         let increment = reference - last_reference;
-        let farthest = last + gain_limit * increment;
-        let lawful = if command.is_finite() && farthest.is_finite() {
-            command.max(last.min(farthest)).min(last.max(farthest))
+        let (low, high) = reach.map_or_else(
+            || {
+                let farthest = last + gain_limit * increment;
+                (last.min(farthest), last.max(farthest))
+            },
+            |reach| (last - reach, last + reach),
+        );
+        let lawful = if command.is_finite() && low.is_finite() && high.is_finite() {
+            command.max(low).min(high)
         } else {
             last
         };
@@ -136,7 +152,7 @@ impl CommandLimiter {
             .max(last - step_limit)
             .min(last + step_limit);
         // Rounding of the bounds on c - u must not violate the law.
-        let sent = limited.max(last.min(farthest)).min(last.max(farthest));
+        let sent = limited.max(low).min(high);
         let sent = if sent.is_finite() { sent } else { last };
         let bound = result(
             limited,
@@ -150,10 +166,108 @@ impl CommandLimiter {
         (sent, result)
     }
 
+    /// Motion of reference and command since the last tick; None before the first.
+    fn motion(&self, reference: f64, command: f64) -> Option<(f64, f64)> {
+        let (last_reference, last) = self.last?;
+        Some((reference - last_reference, command - last))
+    }
+
     /// Moves the origin of the reference by `shift`.
     pub fn shift_reference(&mut self, shift: f64) {
         if let Some((reference, _)) = &mut self.last {
             *reference += shift;
+        }
+    }
+}
+
+/// The limiters of the three DOFs.
+///
+/// Where insertion and rotation are `coupled`, their motions are bounded together, as the vector law has it,
+///
+/// ```text
+/// |dc| <= gain_limit |du|,   |x|^2 = (x1 / unit1)^2 + (x2 / unit2)^2
+/// ```
+///
+/// with `width_limit` as unit and the smaller of both gains: each may move with the reference of the other.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CommandLimiters {
+    dofs: PerDof<CommandLimiter>,
+    is_coupled: bool,
+}
+
+impl CommandLimiters {
+    /// As [`CommandLimiter::new`], for each DOF.
+    ///
+    /// # Errors
+    /// As [`CommandLimiter::new`].
+    pub fn new(
+        safety: &SafetySettings,
+        [first, second, third]: &PerDof<DofSettings>,
+        period: f64,
+        is_coupled: bool,
+    ) -> Result<Self, ConfigError> {
+        Ok(Self {
+            dofs: [
+                CommandLimiter::new(safety, first, 0, period)?,
+                CommandLimiter::new(safety, second, 1, period)?,
+                CommandLimiter::new(safety, third, 2, period)?,
+            ],
+            is_coupled,
+        })
+    }
+
+    /// The limited commands (3,) for a gated reference (3,) [m, rad, rad], and what was limited.
+    pub fn limit(
+        &mut self,
+        reference: PerDof<f64>,
+        command: PerDof<f64>,
+    ) -> (PerDof<f64>, PerDof<LimiterResult>) {
+        let ([u1, u2, u3], [c1, c2, c3]) = (reference, command);
+        let ([c1, c2], [reach1, reach2], is_violated) = self.couple([u1, u2], [c1, c2]);
+        let [first, second, third] = &mut self.dofs;
+        let (limited1, result1) = first.limit(u1, c1, reach1);
+        let (limited2, result2) = second.limit(u2, c2, reach2);
+        let (limited3, result3) = third.limit(u3, c3, None);
+        let shaft = [result1, result2].map(|result| {
+            if is_violated {
+                LimiterResult::Violation
+            } else {
+                result
+            }
+        });
+        let [result1, result2] = shaft;
+        ([limited1, limited2, limited3], [result1, result2, result3])
+    }
+
+    /// Commands of insertion and rotation within their common bound, how far each may move, and whether they were not.
+    fn couple(
+        &self,
+        [u1, u2]: [f64; 2],
+        [c1, c2]: [f64; 2],
+    ) -> ([f64; 2], [Option<f64>; 2], bool) {
+        let [first, second, _] = &self.dofs;
+        let (Some((du1, dc1)), Some((du2, dc2)), true) =
+            (first.motion(u1, c1), second.motion(u2, c2), self.is_coupled)
+        else {
+            return ([c1, c2], [None; 2], false);
+        };
+        let (unit1, unit2) = (first.lead_limit, second.lead_limit);
+        let norm = |x: f64, y: f64| libm::sqrt(square(x / unit1) + square(y / unit2));
+        let reach = first.gain_limit.min(second.gain_limit) * norm(du1, du2) * (1.0 + ROUNDING);
+        let length = norm(dc1, dc2);
+        let reaches = [Some(reach * unit1), Some(reach * unit2)];
+        if length.is_nan() || length <= reach {
+            return ([c1, c2], reaches, false);
+        }
+        let kept = reach / length;
+        let commands = [c1 - (1.0 - kept) * dc1, c2 - (1.0 - kept) * dc2];
+        (commands, reaches, true)
+    }
+
+    /// Moves the origin of the reference by `shift` (3,).
+    pub fn shift_reference(&mut self, shift: PerDof<f64>) {
+        for (limiter, shift) in self.dofs.iter_mut().zip(shift) {
+            limiter.shift_reference(shift);
         }
     }
 }

@@ -1,10 +1,8 @@
 //! Supervision: reference gate, frame gate, command limiter, monitors, and the supervisor with its reactions.
 
-pub(crate) mod change_watch;
 pub(crate) mod command_limiter;
 pub(crate) mod flags;
 pub(crate) mod frame_gate;
-pub(crate) mod grip;
 pub(crate) mod input_device;
 pub(crate) mod monitors;
 pub(crate) mod motion_monitor;

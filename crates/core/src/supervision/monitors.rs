@@ -5,8 +5,7 @@ use crate::article::play_limit::PlayLimit;
 use crate::dof::PerDof;
 use crate::error::ConfigError;
 use crate::settings::DofSettings;
-use crate::supervision::change_watch::{ChangeSettings, ChangeWatch};
-use crate::supervision::command_limiter::{CommandLimiter, LimiterResult};
+use crate::supervision::command_limiter::{CommandLimiters, LimiterResult};
 use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::frame_gate::{FrameArrival, FrameGate};
 use crate::supervision::motion_monitor::MotionMonitor;
@@ -28,17 +27,21 @@ pub struct Supervision {
     pub lead: f64,
 }
 
-/// The law of one DOF, as far as supervision wraps it.
+/// The law of the three DOFs, as far as supervision wraps it.
 pub trait Law {
-    /// The command c; NaN before the first reference.
-    fn command(&self) -> f64;
+    /// The command c (3,) [m, rad, rad]; NaN before the first reference.
+    fn command(&self) -> PerDof<f64>;
 
     /// Control tick: follow the next reference. `limit` is called exactly once, with the command of the law; the law
     /// continues from what it returns.
-    fn step_within(&mut self, reference: f64, limit: impl FnOnce(f64) -> f64);
+    fn step_within(
+        &mut self,
+        reference: PerDof<f64>,
+        limit: impl FnOnce(PerDof<f64>) -> PerDof<f64>,
+    );
 
-    /// Count the reference from elsewhere by `shift`; the command stays.
-    fn shift_reference(&mut self, shift: f64);
+    /// Count the reference from elsewhere by `shift` (3,); the command stays.
+    fn shift_reference(&mut self, shift: PerDof<f64>);
 
     /// Use this share of the compensation: all with 1, none with 0. Bumpless.
     fn set_share(&mut self, share: f64);
@@ -50,10 +53,9 @@ pub trait Law {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Monitors {
     gate: ReferenceGate,
-    limiters: PerDof<CommandLimiter>,
+    limiters: CommandLimiters,
     pub(crate) frames: FrameGate,
     motion: MotionMonitor,
-    changes: ChangeWatch,
     supervisor: Supervisor,
     play_limits: PerDof<PlayLimit>,
     unit: PerDof<f64>,
@@ -64,7 +66,7 @@ pub struct Monitors {
 }
 
 impl Monitors {
-    /// Supervision of three DOFs with a control period in s.
+    /// Supervision of three DOFs with a control period in s; `is_coupled` as of [`CommandLimiters`].
     ///
     /// # Errors
     /// A setting is out of range.
@@ -72,23 +74,15 @@ impl Monitors {
         safety: &SafetySettings,
         dofs: &PerDof<DofSettings>,
         period: f64,
+        is_coupled: bool,
     ) -> Result<Self, ConfigError> {
-        let [first, second, third] = dofs;
         let [w1, w2, w3] = safety.width_limit;
         let [o1, o2, o3] = safety.offset_limit;
         Ok(Self {
             gate: ReferenceGate::new(safety, period)?,
-            limiters: [
-                CommandLimiter::new(safety, first, 0, period)?,
-                CommandLimiter::new(safety, second, 1, period)?,
-                CommandLimiter::new(safety, third, 2, period)?,
-            ],
+            limiters: CommandLimiters::new(safety, dofs, period, is_coupled)?,
             frames: FrameGate::new(safety, dofs)?,
             motion: MotionMonitor::new(safety, dofs, period)?,
-            changes: ChangeWatch::new(ChangeSettings {
-                limit: safety.change_limit,
-                travel: safety.width_limit.map(|width| safety.change_travel * width),
-            })?,
             supervisor: Supervisor::new(safety)?,
             play_limits: if safety.off.contains(Flag::WidthLimit) {
                 [PlayLimit::NONE; 3]
@@ -114,7 +108,7 @@ impl Monitors {
     /// A control tick: gate, law, limiter.
     pub(crate) fn step<L: Law>(
         &mut self,
-        laws: &mut PerDof<L>,
+        law: &mut L,
         reference: PerDof<f64>,
         stamp: Option<f64>,
         time: f64,
@@ -136,41 +130,43 @@ impl Monitors {
         if let Some(reference) = gated.reference {
             let motion = self.motion.update_reference(reference);
             event.raised = event.raised.union(self.enabled(motion));
-            self.set_share(laws);
-            self.step_laws(laws, reference, gated.increments, &mut event);
+            self.set_share(law);
+            self.step_law(law, reference, gated.increments, &mut event);
         }
         self.time = time;
         self.supervisor.update(&event);
     }
 
-    /// Step each law within its limiter.
+    /// Step the law within the limiters.
     ///
     /// Where a limit binds, the share of the reference's motion that the command could not follow is discarded: never
     /// more than the reference moved, which crossing the slack takes for more.
-    fn step_laws<L: Law>(
+    fn step_law<L: Law>(
         &mut self,
-        laws: &mut PerDof<L>,
+        law: &mut L,
         reference: PerDof<f64>,
         increments: PerDof<f64>,
         event: &mut Event,
     ) {
+        if self.off.contains(Flag::Monitor) {
+            law.step_within(reference, |command| command);
+            return;
+        }
+        let before = law.command();
         let mut shifts = [0.0; 3];
-        let dofs = laws.iter_mut().zip(&mut self.limiters).zip(&mut shifts);
-        let inputs = reference.into_iter().zip(increments);
-        for (((law, limiter), shift), (reference, increment)) in dofs.zip(inputs) {
-            if self.off.contains(Flag::Monitor) {
-                law.step_within(reference, |command| command);
-                continue;
-            }
-            let before = law.command();
-            let mut result = LimiterResult::Unchanged;
-            law.step_within(reference, |command| {
-                let limited;
-                (limited, result) = limiter.limit(reference, command);
+        let mut results = [LimiterResult::Unchanged; 3];
+        law.step_within(reference, |command| {
+            let limited;
+            (limited, results) = self.limiters.limit(reference, command);
+            let motions = limited.into_iter().zip(before).zip(command).zip(increments);
+            for (shift, (((limited, before), command), increment)) in shifts.iter_mut().zip(motions)
+            {
                 let followed = (limited - before) / (command - before);
                 *shift = -increment * (1.0 - followed.clamp(0.0, 1.0));
-                limited
-            });
+            }
+            limited
+        });
+        for ((shift, increment), result) in shifts.iter_mut().zip(increments).zip(results) {
             match result {
                 LimiterResult::Unchanged => {
                     *shift = 0.0;
@@ -183,8 +179,6 @@ impl Monitors {
                     }
                 }
             }
-            law.shift_reference(*shift);
-            limiter.shift_reference(*shift);
             let jump = Flags::when(result == LimiterResult::Jump, Flag::CommandJump);
             event.raised = event
                 .raised
@@ -194,24 +188,23 @@ impl Monitors {
                 event.severe = event.severe.union(Flags::of(Flag::Monitor));
             }
         }
+        if results != [LimiterResult::Unchanged; 3] {
+            law.shift_reference(shifts);
+            self.limiters.shift_reference(shifts);
+        }
         self.gate.shift(shifts);
     }
 
-    fn set_share<L: Law>(&mut self, laws: &mut PerDof<L>) {
+    fn set_share<L: Law>(&mut self, law: &mut L) {
         let share = self.supervisor.gain_share();
         if (share - self.share).abs() > 0.0 {
             self.share = share;
-            for law in laws {
-                law.set_share(share);
-            }
+            law.set_share(share);
         }
     }
 
     /// Check a frame on its arrival.
     pub(crate) fn check_arrival(&mut self, arrival: &FrameArrival) -> Flags {
-        if self.supervisor.reaction() == Reaction::Fade {
-            self.frames.reset();
-        }
         let flags = self.frames.check_arrival(arrival);
         self.enabled(flags)
     }
@@ -240,14 +233,9 @@ impl Monitors {
         self.enabled(flags)
     }
 
-    /// Check what an image changed of (`delta_minus`, `delta_plus`), with the travel of the command at its capture.
-    pub(crate) fn check_changes(
-        &mut self,
-        changes: PerDof<[f64; 2]>,
-        travel: PerDof<f64>,
-    ) -> Flags {
-        let flags = self.changes.look(changes, travel);
-        self.enabled(flags)
+    /// Whether the compensation fades out.
+    pub(crate) fn is_fading(&self) -> bool {
+        self.supervisor.reaction() == Reaction::Fade
     }
 
     /// Whether images may update the offsets.

@@ -43,20 +43,6 @@ pub struct SafetySettings {
     pub frozen_travel: f64,
     /// Largest innovation, in standard deviations.
     pub innovation_limit: f64,
-    /// Least standard deviation of the innovation [in `start_deviation`].
-    pub innovation_floor: f64,
-    /// Smoothing factor of the innovation variance for an innovation above it.
-    pub innovation_growth: f64,
-    /// Smoothing factor of the innovation variance for an innovation below it.
-    pub innovation_decay: f64,
-    /// Largest motion of the tip between two images beyond that of its command [m, rad, rad].
-    pub jump: PerDof<f64>,
-    /// Largest deviation of a tip in contact from the motion of its command [m, rad, rad].
-    pub slip: PerDof<f64>,
-    /// Travel of the command over which a tip that moves with it is found in contact [in `update_distance`].
-    pub grip_distance: f64,
-    /// Growth of the innovation's standard deviation and of `jump` per travel of the command without a marker.
-    pub blind_growth: f64,
     /// Least swing of a tremor [in `update_distance`].
     pub tremor_swing: f64,
     /// Reversals per second that are a tremor, in 1/s.
@@ -73,10 +59,6 @@ pub struct SafetySettings {
     pub cycle_growth: f64,
     /// Longest swing of a limit cycle, one way, in s.
     pub cycle_time: f64,
-    /// Largest change of a contact offset that had settled [m, rad, rad].
-    pub change_limit: PerDof<f64>,
-    /// Travel of the command over which changes of a contact offset add up [in `width_limit`].
-    pub change_travel: f64,
     /// Time until a reaction escalates, in s.
     pub hold_time: f64,
     /// Travel of the reference until a reaction escalates, summed over the DOFs [in `width_limit`].

@@ -1,0 +1,292 @@
+//! Compensation law of profile `best`: the limited gain of Eq. (2) for insertion and rotation together.
+
+use crate::adaptive::offset_rate_limit::OffsetRateLimit;
+use crate::adaptive::settings::AdaptiveSettings;
+use crate::adaptive::slip_direction::SlipDirection;
+use crate::article::play_limit::PlayLimit;
+use crate::dof::{PerDof, all_finite};
+use crate::error::{ConfigError, require, require_non_negative, require_positive};
+use crate::estimation::filter::Filter;
+use crate::model::hysteresis::Hysteresis;
+use crate::settings::{ControlSettings, DofSettings};
+
+/// Insertion with rotation, and bending: DOFs whose motions are bounded together.
+const GROUPS: [PerDof<f64>; 2] = [[1.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+/// Steps in search of the largest motion whose predicted tip is slow enough.
+const STEPS: usize = 5;
+
+/// Vector law of limited gain.
+///
+/// With the reference u, the command c, the estimated hysteresis (half widths h, centres m), the direction w of the
+/// operator's motion, and norms over insertion and rotation in units `unit` of each DOF,
+///
+/// ```text
+/// target    c* = u' + m(u') + f h w + (1 - f) h sign(w)         u': output of the plays at which the tip is at u
+/// command   dc towards c* - c,   |dc| <= K_b |du|,   dc . du >= 0
+/// contact   |dq| <= tip_gain |du| for the tip q that the estimate predicts
+/// ```
+///
+/// of bending by itself. One DOF alone: 0 <= dc / du <= K_b, Eq. (2). Where insertion and rotation rest, neither command
+/// moves, but each moves where the other does: while rotation turns, the friction that held the insertion is released.
+/// A share of the compensation s makes it dc = du + s (dc - du).
+///
+/// Wrong as far as the estimate is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VectorLaw {
+    free_gain: f64,
+    bending_gain: f64,
+    tip_gain: f64,
+    unit: PerDof<f64>,
+    limits: PerDof<PlayLimit>,
+    direction: SlipDirection,
+    rate_limit: OffsetRateLimit,
+    reference: Option<PerDof<f64>>,
+    /// Command less reference.
+    lead: PerDof<f64>,
+    command: PerDof<f64>,
+    share: f64,
+}
+
+impl VectorLaw {
+    /// The law before the first reference; `unit` (3,) [m, rad, rad] is that of the norms, `radius` the shaft's in m.
+    ///
+    /// # Errors
+    /// A setting is out of range.
+    pub fn new(
+        settings: &AdaptiveSettings,
+        [insertion, rotation, bending]: &PerDof<DofSettings>,
+        control: &ControlSettings,
+        unit: PerDof<f64>,
+        radius: f64,
+        limits: PerDof<PlayLimit>,
+    ) -> Result<Self, ConfigError> {
+        let gain = |dof: &DofSettings| dof.free_gain.min(dof.gain_limit);
+        for dof in [insertion, rotation, bending] {
+            let is_gain = dof.free_gain.is_finite() && dof.free_gain >= 1.0;
+            require(is_gain, "free_gain", dof.free_gain, "finite, 1 or above")?;
+        }
+        require(
+            settings.tip_gain >= 1.0,
+            "tip_gain",
+            settings.tip_gain,
+            "1 or above",
+        )?;
+        require_non_negative("tremor_time", settings.tremor_time)?;
+        require_positive("direction_travel", settings.direction_travel)?;
+        require_non_negative("known_travel", settings.known_travel)?;
+        for rate in settings.change_rate {
+            require_non_negative("change_rate", rate)?;
+        }
+        let mut rate = settings.change_rate;
+        for (rate, unit) in rate.iter_mut().zip(unit) {
+            *rate *= unit;
+        }
+        Ok(Self {
+            free_gain: gain(insertion).min(gain(rotation)),
+            bending_gain: gain(bending),
+            tip_gain: settings.tip_gain,
+            unit,
+            limits,
+            direction: SlipDirection::new(
+                radius,
+                unit.map(|unit| settings.direction_travel * unit),
+                settings.tremor_time,
+                control.period,
+            ),
+            rate_limit: OffsetRateLimit::new(rate, settings.known_travel, control.period),
+            reference: None,
+            lead: [0.0; 3],
+            command: [f64::NAN; 3],
+            share: 1.0,
+        })
+    }
+
+    /// The command c (3,) [m, rad, rad]; NaN before the first reference.
+    pub const fn command(&self) -> PerDof<f64> {
+        self.command
+    }
+
+    /// The command for the next reference (3,) [m, rad, rad]; `limit` is called exactly once, with the command of the
+    /// law, which goes on from what it returns. The filter follows the command.
+    ///
+    /// The first reference is passed through. A reference that is not finite moves nothing.
+    pub fn step_within(
+        &mut self,
+        reference: PerDof<f64>,
+        filter: &mut Filter,
+        limit: impl FnOnce(PerDof<f64>) -> PerDof<f64>,
+    ) {
+        if !all_finite(reference) {
+            let command = limit(self.command);
+            self.follow(command, filter);
+            return;
+        }
+        let Some(last) = self.reference.replace(reference) else {
+            self.direction.step(reference);
+            self.command = limit(reference);
+            self.lead = subtract(self.command, reference);
+            filter.start(reference, self.command);
+            return;
+        };
+        let motion = subtract(reference, last);
+        self.direction.step(reference);
+        let mut travel = motion.map(f64::abs);
+        for (travel, unit) in travel.iter_mut().zip(self.unit) {
+            *travel /= unit;
+        }
+        self.rate_limit.step(travel);
+        let lead = self.next_lead(reference, motion, filter);
+        let mut lawful = self.command;
+        let moves = self.moves(motion);
+        let dofs = lawful.iter_mut().zip(reference).zip(lead).zip(moves);
+        for (((command, reference), lead), moves) in dofs {
+            if moves {
+                *command = reference + lead;
+            }
+        }
+        let command = limit(lawful);
+        self.lead = subtract(command, reference);
+        self.follow(command, filter);
+    }
+
+    /// Which commands may move at all.
+    fn moves(&self, motion: PerDof<f64>) -> PerDof<bool> {
+        let [shaft, bending] = GROUPS.map(|group| self.norm(group, motion) > 0.0);
+        [shaft, shaft, bending]
+    }
+
+    fn follow(&mut self, command: PerDof<f64>, filter: &mut Filter) {
+        let before = self.command;
+        self.command = command;
+        if all_finite(before) && all_finite(command) {
+            filter.step(before, command);
+        }
+    }
+
+    /// The lead for a reference after its motion.
+    fn next_lead(&self, reference: PerDof<f64>, motion: PerDof<f64>, filter: &Filter) -> PerDof<f64> {
+        let output = filter.nominal().output(reference);
+        let used = self.usable(filter, output);
+        let deflection = used.steady_deflection(self.direction.value());
+        let mut wanted = output;
+        let parts = used.centre.into_iter().zip(deflection).zip(self.command);
+        for (wanted, ((centre, deflection), command)) in wanted.iter_mut().zip(parts) {
+            *wanted += centre + deflection - command;
+        }
+        let mut lead = self.lead;
+        let gains = [self.free_gain, self.bending_gain];
+        for (group, gain) in GROUPS.into_iter().zip(gains) {
+            let step = self.bounded_step(group, gain, wanted, motion, filter);
+            let axes = step.into_iter().zip(motion).zip(group);
+            for (lead, ((step, motion), own)) in lead.iter_mut().zip(axes) {
+                *lead += own * self.share * (step - motion);
+            }
+        }
+        lead
+    }
+
+    /// The hysteresis in use where the output is at `output` (3,).
+    fn usable(&self, filter: &Filter, output: PerDof<f64>) -> Hysteresis {
+        let estimate = Hysteresis {
+            centre: filter.centre(output),
+            ..filter.nominal().hysteresis
+        };
+        let mut used = self.rate_limit.apply(&estimate);
+        let dofs = used.half_width.iter_mut().zip(&mut used.centre);
+        for ((half, centre), limit) in dofs.zip(self.limits) {
+            let [minus, plus] = limit.clamp(*centre - *half, *centre + *half);
+            (*half, *centre) = ((plus - minus) / 2.0, (plus + minus) / 2.0);
+        }
+        used
+    }
+
+    /// The motion of the commands of a group towards what is wanted, within the bounds.
+    fn bounded_step(
+        &self,
+        group: PerDof<f64>,
+        gain: f64,
+        wanted: PerDof<f64>,
+        motion: PerDof<f64>,
+        filter: &Filter,
+    ) -> PerDof<f64> {
+        let moved = self.norm(group, motion);
+        if moved == 0.0 {
+            return [0.0; 3];
+        }
+        let mut step = times(group, wanted);
+        // Never against the reference.
+        let against = self.product(group, step, motion).min(0.0) / (moved * moved);
+        for (step, motion) in step.iter_mut().zip(times(group, motion)) {
+            *step -= against * motion;
+        }
+        let length = self.norm(group, step);
+        if length == 0.0 {
+            return step;
+        }
+        let mut share = (gain * moved / length).min(1.0);
+        let nominal = filter.nominal();
+        let before = nominal.tip(nominal.position.output);
+        for _ in 0..STEPS {
+            let mut command = self.command;
+            for (command, step) in command.iter_mut().zip(step) {
+                *command += share * step;
+            }
+            let there = nominal.hysteresis.propagate(
+                filter.radius(),
+                &nominal.position,
+                self.command,
+                command,
+            );
+            let tip = self.norm(group, subtract(nominal.tip(there.output), before));
+            if tip <= self.tip_gain * moved {
+                break;
+            }
+            share *= (self.tip_gain * moved / tip).max(0.2);
+        }
+        step.map(|step| share * step)
+    }
+
+    fn product(&self, group: PerDof<f64>, a: PerDof<f64>, b: PerDof<f64>) -> f64 {
+        let units = self.unit.into_iter().zip(group);
+        let pairs = a.into_iter().zip(b).zip(units);
+        pairs.map(|((a, b), (unit, own))| own * (a / unit) * (b / unit)).sum()
+    }
+
+    fn norm(&self, group: PerDof<f64>, vector: PerDof<f64>) -> f64 {
+        libm::sqrt(self.product(group, vector, vector))
+    }
+
+    /// Uses this share of the compensation: all with 1, none with 0. Bumpless.
+    pub const fn set_share(&mut self, share: f64) {
+        self.share = share;
+    }
+
+    /// Counts the reference from elsewhere by `shift` (3,); the command stays.
+    pub fn shift_reference(&mut self, shift: PerDof<f64>) {
+        if let Some(reference) = &mut self.reference {
+            for ((reference, lead), shift) in reference.iter_mut().zip(&mut self.lead).zip(shift) {
+                *reference += shift;
+                *lead -= shift;
+            }
+            self.direction.shift(shift);
+        }
+    }
+
+    /// The rate limit of the offsets.
+    pub const fn rate_limit_mut(&mut self) -> &mut OffsetRateLimit {
+        &mut self.rate_limit
+    }
+
+    /// The rate limit of the offsets.
+    pub const fn rate_limit(&self) -> &OffsetRateLimit {
+        &self.rate_limit
+    }
+}
+
+fn subtract([a, b, c]: PerDof<f64>, [x, y, z]: PerDof<f64>) -> PerDof<f64> {
+    [a - x, b - y, c - z]
+}
+
+fn times([a, b, c]: PerDof<f64>, [x, y, z]: PerDof<f64>) -> PerDof<f64> {
+    [a * x, b * y, c * z]
+}

@@ -1,0 +1,225 @@
+//! Ensemble of hypotheses about tip, hysteresis and geometry.
+
+use core::array;
+
+use crate::dof::PerDof;
+use crate::estimation::centre_map::CentreMap;
+use crate::math::random::Normal;
+use crate::model::hysteresis::{Hysteresis, PlayPosition};
+
+/// Number of members.
+pub const MEMBERS: usize = 64;
+/// Length of a member's state.
+pub const STATE: usize = 16;
+/// Number of the entries of a state that describe the position of the tip.
+const POSITION: usize = 5;
+
+/// State of a member: output of the plays (3,) and of the shaft (2,), ln half width (3,), centre (3,) without the map,
+/// logit of the share, and error of the predicted features (4,) in px.
+pub type State = [f64; STATE];
+
+/// Hypotheses, each a complete state that the exact plays propagate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ensemble {
+    members: [State; MEMBERS],
+    random: Normal,
+}
+
+/// One scalar measurement, whitened: row (7,) of its derivatives by output (3,) and feature error (4,), and the
+/// innovation `value - row . mean`, both over the standard deviation of the measurement.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ScalarMeasurement {
+    /// Derivatives by the output of each DOF.
+    pub output: PerDof<f64>,
+    /// Derivatives by the feature errors.
+    pub error: [f64; 4],
+    /// Measured less predicted value, of a prediction from output and feature error zero.
+    pub value: f64,
+}
+
+impl Ensemble {
+    /// Members drawn from independent normal distributions.
+    pub fn new(mean: &State, std: &State, seed: u64) -> Self {
+        let mut ensemble = Self {
+            members: [*mean; MEMBERS],
+            random: Normal::new(seed),
+        };
+        ensemble.add_noise(std);
+        // Without a motion so far, the shaft is where the output is.
+        for [q1, q2, _, shaft1, shaft2, ..] in &mut ensemble.members {
+            (*shaft1, *shaft2) = (*q1, *q2);
+        }
+        ensemble
+    }
+
+    /// Adds independent normal noise to each entry; shaft and output move together.
+    pub fn add_noise(&mut self, std: &State) {
+        for member in &mut self.members {
+            for (entry, std) in member.iter_mut().zip(std) {
+                if *std > 0.0 {
+                    *entry += std * self.random.draw();
+                }
+            }
+        }
+    }
+
+    /// Moves output and shaft of insertion, rotation and bending together, by independent normal noise.
+    pub fn disturb_position(&mut self, [d1, d2, d3]: PerDof<f64>) {
+        for [q1, q2, q3, shaft1, shaft2, ..] in &mut self.members {
+            let (z1, z2) = (d1 * self.random.draw(), d2 * self.random.draw());
+            *q1 += z1;
+            *q2 += z2;
+            *q3 += d3 * self.random.draw();
+            *shaft1 += z1;
+            *shaft2 += z2;
+        }
+    }
+
+    /// Propagates every member along a path of commands [m, rad, rad] from `from` on.
+    pub fn propagate(
+        &mut self,
+        maps: &PerDof<CentreMap>,
+        radius: f64,
+        from: PerDof<f64>,
+        path: impl Iterator<Item = PerDof<f64>> + Clone,
+    ) {
+        for member in &mut self.members {
+            let mut position = position(member);
+            let hysteresis = hysteresis(member, maps, position.output);
+            let mut last = from;
+            for command in path.clone() {
+                position = hysteresis.propagate(radius, &position, last, command);
+                last = command;
+            }
+            set_position(member, &position);
+        }
+    }
+
+    /// Mean of the states.
+    pub fn mean(&self) -> State {
+        let mut sum = [0.0; STATE];
+        for member in &self.members {
+            for (sum, entry) in sum.iter_mut().zip(member) {
+                *sum += entry;
+            }
+        }
+        sum.map(|sum| sum / MEMBERS as f64)
+    }
+
+    /// Covariance of a function of the states with N values.
+    pub fn covariance<const N: usize>(
+        &self,
+        of: impl Fn(&State) -> [f64; N],
+    ) -> ([f64; N], [[f64; N]; N]) {
+        let mut mean = [0.0; N];
+        for member in &self.members {
+            for (sum, value) in mean.iter_mut().zip(of(member)) {
+                *sum += value / MEMBERS as f64;
+            }
+        }
+        let mut covariance = [[0.0; N]; N];
+        for member in &self.members {
+            let mut away = of(member);
+            for (value, mean) in away.iter_mut().zip(mean) {
+                *value -= mean;
+            }
+            for (row, own) in covariance.iter_mut().zip(away) {
+                for (entry, other) in row.iter_mut().zip(away) {
+                    *entry += own * other / (MEMBERS - 1) as f64;
+                }
+            }
+        }
+        (mean, covariance)
+    }
+
+    /// Updates the members with a measurement of standard deviation 1 by the ensemble square root filter (Whitaker,
+    /// Hamill, Monthly Weather Review 130, 2002):
+    ///
+    /// ```text
+    /// K = cov(x, y) / (var(y) + 1);   mean += K (value - mean(y));   x - mean -= K (y - mean(y)) / (1 + 1 / sqrt(var(y) + 1))
+    /// ```
+    ///
+    /// with y = row . x. With `is_position_only` the hysteresis stays as it is.
+    pub fn update(&mut self, measurement: &ScalarMeasurement, is_position_only: bool) {
+        let predicted: [f64; MEMBERS] = array::from_fn(|index| {
+            self.members.get(index).map_or(0.0, |member| measurement.predict(member))
+        });
+        let mean_value = predicted.iter().sum::<f64>() / MEMBERS as f64;
+        let mean = self.mean();
+        let (mut covariance, mut variance) = ([0.0; STATE], 0.0);
+        for (member, value) in self.members.iter().zip(predicted) {
+            let away = (value - mean_value) / (MEMBERS - 1) as f64;
+            variance += away * (value - mean_value);
+            for ((covariance, entry), mean) in covariance.iter_mut().zip(member).zip(mean) {
+                *covariance += away * (entry - mean);
+            }
+        }
+        let total = variance + 1.0;
+        let reduced = 1.0 / (1.0 + 1.0 / libm::sqrt(total));
+        let innovation = measurement.value - mean_value;
+        let count = if is_position_only { POSITION } else { STATE };
+        for (member, value) in self.members.iter_mut().zip(predicted) {
+            let step = (innovation - reduced * (value - mean_value)) / total;
+            for (entry, covariance) in member.iter_mut().zip(covariance).take(count) {
+                *entry += covariance * step;
+            }
+        }
+    }
+
+    /// Keeps the parameters within the half widths (3,) `least` to `largest` and the share within 1 to 99 %.
+    pub fn limit(&mut self, least: PerDof<f64>, largest: PerDof<f64>) {
+        let bounds = least.map(libm::log).into_iter().zip(largest.map(libm::log));
+        for [_, _, _, _, _, h1, h2, h3, _, _, _, share, ..] in &mut self.members {
+            for (half, (least, largest)) in [h1, h2, h3].into_iter().zip(bounds.clone()) {
+                *half = half.max(least).min(largest);
+            }
+            *share = share.max(-5.0).min(5.0);
+        }
+    }
+
+    /// Subtracts `change` from the centre of every member.
+    pub fn shift_centres(&mut self, [d1, d2, d3]: PerDof<f64>) {
+        for [_, _, _, _, _, _, _, _, m1, m2, m3, ..] in &mut self.members {
+            *m1 -= d1;
+            *m2 -= d2;
+            *m3 -= d3;
+        }
+    }
+}
+
+impl ScalarMeasurement {
+    fn predict(&self, member: &State) -> f64 {
+        let [q1, q2, q3, .., e1, e2, e3, e4] = *member;
+        let ([a, b, c], [d, e, f, g]) = (self.output, self.error);
+        a * q1 + b * q2 + c * q3 + d * e1 + e * e2 + f * e3 + g * e4
+    }
+}
+
+/// Position of the plays in a state.
+pub const fn position(state: &State) -> PlayPosition {
+    let [q1, q2, q3, shaft1, shaft2, ..] = *state;
+    PlayPosition {
+        shaft: [shaft1, shaft2],
+        output: [q1, q2, q3],
+    }
+}
+
+const fn set_position(state: &mut State, position: &PlayPosition) {
+    let [q1, q2, q3, shaft1, shaft2, ..] = state;
+    [*q1, *q2, *q3] = position.output;
+    [*shaft1, *shaft2] = position.shaft;
+}
+
+/// Hysteresis of a state where the output is at `output`.
+pub fn hysteresis(state: &State, maps: &PerDof<CentreMap>, output: PerDof<f64>) -> Hysteresis {
+    let [_, _, _, _, _, h1, h2, h3, m1, m2, m3, share, ..] = *state;
+    let mut centre = [m1, m2, m3];
+    for ((centre, map), output) in centre.iter_mut().zip(maps).zip(output) {
+        *centre += map.at(output);
+    }
+    Hysteresis {
+        half_width: [h1, h2, h3].map(libm::exp),
+        centre,
+        shared: 1.0 / (1.0 + libm::exp(-share)),
+    }
+}

@@ -1,0 +1,456 @@
+//! The estimate of profile `best`: tip, hysteresis and geometry from the commands and the images.
+
+use crate::article::play::Play;
+use crate::dof::PerDof;
+use crate::error::{ConfigError, require, require_non_negative, require_positive};
+use crate::estimation::centre_map::CentreMap;
+use crate::estimation::ensemble::{Ensemble, STATE, State, hysteresis, position};
+use crate::estimation::gain::GainEstimate;
+use crate::estimation::history::{Entry, History};
+use crate::estimation::marker_measurement::{ImagePrediction, MarkerEstimate, Markers};
+use crate::estimation::posture::Belief;
+use crate::estimation::settings::StateEstimationSettings;
+use crate::model::features::FeatureModel;
+use crate::model::hysteresis::{Hysteresis, PlayPosition};
+
+/// Initial half width of a slack of unknown width, and its bounds, in half of `width_limit`.
+const USUAL_WIDTH: f64 = 2.0 / 3.0;
+const LEAST_WIDTH: f64 = 0.02;
+const LARGEST_WIDTH: f64 = 1.2;
+/// Standard deviation of the tip, in `start_deviation`, up to which images without markers make it uncertain, and by
+/// how much each does.
+const MISSED: f64 = 0.15;
+const MISS: f64 = 0.03;
+/// Largest geometry error that a reset assumes, in `geometry_deviation`.
+const RESET_GEOMETRY: f64 = 20.0;
+
+/// Ensemble filter over tip, hysteresis and geometry.
+///
+/// Each member has the outputs of the plays, half widths, centres, the share of the friction that insertion and rotation
+/// have in common, and an error of the predicted features. Between images each is propagated by the exact plays along
+/// the commands; the travel of the reference adds a random walk. The image of a time updates the members at that time.
+/// The mean, propagated to now, is the prediction that the compensation uses.
+///
+/// Wrong where an instrument is no play: by the rounding of its loop.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Filter {
+    settings: StateEstimationSettings,
+    /// Unit of lengths and travels (3,): half of `width_limit` [m, rad, rad].
+    unit: PerDof<f64>,
+    start_std: PerDof<f64>,
+    start_plays: PerDof<Play>,
+    radius: f64,
+    ensemble: Ensemble,
+    maps: PerDof<CentreMap>,
+    gain: PerDof<GainEstimate>,
+    /// Plays of the mean that no image corrects.
+    uncorrected: PlayPosition,
+    /// First reference; None before it.
+    origin: Option<PerDof<f64>>,
+    /// Time, command, reference of the ensemble, and the travel of the reference since the last update.
+    time: f64,
+    command: PerDof<f64>,
+    reference: PerDof<f64>,
+    travel: PerDof<f64>,
+    nominal: Nominal,
+}
+
+/// The mean of the ensemble, propagated to now.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Nominal {
+    /// Hysteresis at the present position.
+    pub hysteresis: Hysteresis,
+    /// Plays.
+    pub position: PlayPosition,
+    /// Travel of the tip over that of the output, about `origin`.
+    pub gain: PerDof<f64>,
+    /// First reference [m, rad, rad].
+    pub origin: PerDof<f64>,
+}
+
+impl Nominal {
+    /// The tip for an output of the plays (3,) [m, rad, rad].
+    pub fn tip(&self, output: PerDof<f64>) -> PerDof<f64> {
+        let mut tip = output;
+        for ((tip, gain), origin) in tip.iter_mut().zip(self.gain).zip(self.origin) {
+            *tip = origin + gain * (*tip - origin);
+        }
+        tip
+    }
+
+    /// The output of the plays for a tip (3,) [m, rad, rad].
+    pub fn output(&self, tip: PerDof<f64>) -> PerDof<f64> {
+        let mut output = tip;
+        for ((output, gain), origin) in output.iter_mut().zip(self.gain).zip(self.origin) {
+            *output = origin + (*output - origin) / gain;
+        }
+        output
+    }
+}
+
+impl Filter {
+    /// The filter before the first reference, for half widths of at most `unit` (3,) and a shaft of a radius in m.
+    ///
+    /// # Errors
+    /// A setting is out of range.
+    pub fn new(
+        settings: StateEstimationSettings,
+        unit: PerDof<f64>,
+        start_std: PerDof<f64>,
+        start_plays: PerDof<Play>,
+        radius: f64,
+    ) -> Result<Self, ConfigError> {
+        for (field, value) in [
+            ("marker_deviation", settings.marker_deviation),
+            ("width_deviation", settings.width_deviation),
+            ("gain_window", settings.gain_window),
+            ("gain_prior", settings.gain_prior),
+            ("diameter", radius),
+        ] {
+            require_positive(field, value)?;
+        }
+        for (field, value) in [
+            ("model_deviation", settings.model_deviation),
+            ("sideways_deviation", settings.sideways_deviation),
+            ("geometry_deviation", settings.geometry_deviation),
+            ("centre_deviation", settings.centre_deviation),
+            ("share_deviation", settings.share_deviation),
+            ("tip_walk", settings.tip_walk),
+            ("width_walk", settings.width_walk),
+            ("centre_walk", settings.centre_walk),
+            ("share_walk", settings.share_walk),
+        ] {
+            require_non_negative(field, value)?;
+        }
+        for rate in settings.map_rate {
+            require_non_negative("map_rate", rate)?;
+        }
+        for value in unit {
+            require_positive("width_limit", value)?;
+        }
+        for value in start_std {
+            require_positive("start_deviation", value)?;
+        }
+        let outlier = settings.outlier_distance;
+        require(outlier > 0.0, "outlier_distance", outlier, "above 0")?;
+        let blank = PlayPosition::at([f64::NAN; 3]);
+        let zero = [0.0; STATE];
+        Ok(Self {
+            settings,
+            unit,
+            start_std,
+            start_plays,
+            radius,
+            ensemble: Ensemble::new(&zero, &zero, 0),
+            maps: unit.map(|unit| CentreMap::new(0.0, unit)),
+            gain: [GainEstimate::new(); 3],
+            uncorrected: blank,
+            origin: None,
+            time: f64::NEG_INFINITY,
+            command: [f64::NAN; 3],
+            reference: [f64::NAN; 3],
+            travel: [0.0; 3],
+            nominal: Nominal {
+                hysteresis: Hysteresis {
+                    half_width: start_plays.map(|play| play.width() / 2.0),
+                    centre: start_plays.map(|play| (play.delta_plus() + play.delta_minus()) / 2.0),
+                    shared: 0.5,
+                },
+                position: blank,
+                gain: [1.0; 3],
+                origin: [f64::NAN; 3],
+            },
+        })
+    }
+
+    /// The prediction now.
+    pub const fn nominal(&self) -> &Nominal {
+        &self.nominal
+    }
+
+    /// Radius of the shaft in m.
+    pub const fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    /// Begins at the first reference and command (3,) [m, rad, rad], about which the tip is known to `start_deviation`.
+    pub fn start(&mut self, reference: PerDof<f64>, command: PerDof<f64>) {
+        let [u1, u2, u3] = reference;
+        let mut half = self.unit;
+        let mut centre = [0.0; 3];
+        for ((half, centre), play) in half.iter_mut().zip(&mut centre).zip(self.start_plays) {
+            *half = if play.width() > 0.0 {
+                play.width() / 2.0
+            } else {
+                USUAL_WIDTH * *half
+            };
+            *centre = (play.delta_minus() + play.delta_plus()) / 2.0;
+        }
+        let [h1, h2, h3] = half;
+        let [l1, l2, l3] = half.map(libm::log);
+        let [m1, m2, m3] = centre;
+        let [d1, d2, d3] = self.start_std;
+        let spread = self.settings.width_deviation;
+        let offset = self.settings.centre_deviation;
+        let error = self.settings.geometry_deviation;
+        let mean: State = [
+            u1, u2, u3, u1, u2, l1, l2, l3, m1, m2, m3, 0.0, 0.0, 0.0, 0.0, 0.0,
+        ];
+        let std: State = [
+            d1, d2, d3, d1, d2, spread, spread, spread, offset * h1, offset * h2, offset * h3,
+            self.settings.share_deviation, error, error, error, error,
+        ];
+        self.ensemble = Ensemble::new(&mean, &std, 1);
+        for ((map, middle), unit) in self.maps.iter_mut().zip(reference).zip(self.unit) {
+            *map = CentreMap::new(middle, unit);
+        }
+        self.origin = Some(reference);
+        (self.command, self.reference) = (command, reference);
+        self.uncorrected = PlayPosition::at(reference);
+        self.nominal.origin = reference;
+        self.settle();
+    }
+
+    /// Follows the command of a control tick [m, rad, rad] with the prediction.
+    pub fn step(&mut self, from: PerDof<f64>, to: PerDof<f64>) {
+        let nominal = &mut self.nominal;
+        nominal.position = nominal
+            .hysteresis
+            .propagate(self.radius, &nominal.position, from, to);
+    }
+
+    /// Propagates the ensemble along the control ticks to a tick of the history, unless that is past already.
+    pub fn advance<S: AsRef<[Entry]> + AsMut<[Entry]>>(&mut self, history: &History<S>, to: &Entry) {
+        if self.origin.is_none() || to.time <= self.time {
+            return;
+        }
+        let path = history.since(self.time).filter(|entry| entry.time < to.time);
+        let commands = path.clone().map(|entry| entry.command);
+        let commands = commands.chain(core::iter::once(to.command));
+        self.ensemble
+            .propagate(&self.maps, self.radius, self.command, commands.clone());
+        let mut last = self.command;
+        for command in commands {
+            let plays = &self.nominal.hysteresis;
+            self.uncorrected = plays.propagate(self.radius, &self.uncorrected, last, command);
+            last = command;
+        }
+        let mut walked = [0.0; 3];
+        let mut last = self.reference;
+        for reference in path.map(|entry| entry.reference).chain(core::iter::once(to.reference)) {
+            let steps = reference.into_iter().zip(last).zip(self.unit);
+            for ((walked, travel), ((reference, last), unit)) in
+                walked.iter_mut().zip(&mut self.travel).zip(steps)
+            {
+                let step = ((reference - last) / unit).abs();
+                *travel += step;
+                *walked += step;
+            }
+            last = reference;
+        }
+        (self.time, self.command, self.reference) = (to.time, to.command, to.reference);
+        self.walk(walked);
+    }
+
+    /// Random walks over a travel of the reference (3,): standard deviations grow with its square root.
+    fn walk(&mut self, [t1, t2, t3]: PerDof<f64>) {
+        let (shaft, bending) = (libm::sqrt(libm::sqrt(t1 * t1 + t2 * t2)), libm::sqrt(t3));
+        if shaft + bending == 0.0 {
+            return;
+        }
+        let settings = &self.settings;
+        let [h1, h2, h3] = self.nominal.hysteresis.half_width;
+        let tip = settings.tip_walk;
+        self.ensemble
+            .disturb_position([tip * shaft * h1, tip * shaft * h2, tip * bending * h3]);
+        let (width, centre) = (settings.width_walk, settings.centre_walk);
+        let mut std = [0.0; STATE];
+        let [_, _, _, _, _, w1, w2, w3, c1, c2, c3, share, ..] = &mut std;
+        (*w1, *w2, *w3) = (width * shaft, width * shaft, width * bending);
+        (*c1, *c2, *c3) = (centre * shaft * h1, centre * shaft * h2, centre * bending * h3);
+        *share = settings.share_walk * shaft;
+        self.ensemble.add_noise(&std);
+    }
+
+    /// Mean and standard deviations of the tip at a tick of the history.
+    pub fn predict<S: AsRef<[Entry]> + AsMut<[Entry]>>(
+        &self,
+        history: &History<S>,
+        to: &Entry,
+    ) -> Belief {
+        let mut ahead = self.clone();
+        ahead.advance(history, to);
+        ahead.belief()
+    }
+
+    /// Mean and standard deviations of the tip of the ensemble.
+    pub fn belief(&self) -> Belief {
+        let ([q1, q2, q3], [[v1, _, _], [_, v2, _], [_, _, v3]]) = self.tips();
+        Belief {
+            state: [q1, q2, q3],
+            deviation: [v1, v2, v3].map(libm::sqrt),
+        }
+    }
+
+    fn tips(&self) -> ([f64; 3], [[f64; 3]; 3]) {
+        let nominal = &self.nominal;
+        self.ensemble.covariance(|state| nominal.tip(position(state).output))
+    }
+
+    /// The prediction of an image at the time of the ensemble.
+    fn image_prediction(&self) -> ImagePrediction {
+        let (state, covariance) = self.tips();
+        let (error, error_covariance) = self.ensemble.covariance(|state| {
+            let [.., a, b, c, d] = *state;
+            [a, b, c, d]
+        });
+        ImagePrediction {
+            state,
+            covariance,
+            error,
+            error_covariance,
+        }
+    }
+
+    /// The most probable tip for the markers of an image at the time of the ensemble; None where the model sees no band.
+    pub fn measure(&self, model: &FeatureModel, markers: &Markers) -> Option<MarkerEstimate> {
+        self.origin?;
+        markers.estimate(model, &self.image_prediction(), &self.settings)
+    }
+
+    /// Updates the ensemble with the markers of an estimate by [`Filter::measure`]; with `is_position_only` only the tip.
+    pub fn update<S: AsRef<[Entry]> + AsMut<[Entry]>>(
+        &mut self,
+        history: &History<S>,
+        markers: &Markers,
+        estimate: &MarkerEstimate,
+        is_position_only: bool,
+    ) {
+        let Nominal { origin, gain, .. } = self.nominal;
+        let Some(rows) = markers.linearize(estimate, origin, gain) else {
+            return;
+        };
+        for row in &rows {
+            self.ensemble.update(row, is_position_only);
+        }
+        if !is_position_only {
+            self.update_gain(self.belief().state);
+            self.update_maps();
+        }
+        self.travel = [0.0; 3];
+        self.settle();
+        self.catch_up(history);
+    }
+
+    /// Makes the tip as uncertain as at the start, and the geometry far more than that, about the mean: what comes next
+    /// decides.
+    pub fn reset_position(&mut self) {
+        let Belief { deviation, .. } = self.belief();
+        let mut missing = self.start_std;
+        for (missing, std) in missing.iter_mut().zip(deviation) {
+            *missing = libm::sqrt((*missing * *missing - std * std).max(0.0));
+        }
+        self.ensemble.disturb_position(missing);
+        let (_, [[error, ..], ..]) = self.ensemble.covariance(|state| {
+            let [.., a, _, _, _] = *state;
+            [a]
+        });
+        let wide = RESET_GEOMETRY * self.settings.geometry_deviation;
+        let error = libm::sqrt((wide * wide - error).max(0.0));
+        let mut std = [0.0; STATE];
+        let [.., a, b, c, d] = &mut std;
+        (*a, *b, *c, *d) = (error, error, error, error);
+        self.ensemble.add_noise(&std);
+    }
+
+    /// Makes the tip a little less certain, after an image without markers.
+    pub fn miss(&mut self) {
+        let Belief { deviation, .. } = self.belief();
+        let mut step = self.start_std;
+        for (step, std) in step.iter_mut().zip(deviation) {
+            *step = if std < MISSED * *step { MISS * *step } else { 0.0 };
+        }
+        self.ensemble.disturb_position(step);
+    }
+
+    fn update_gain(&mut self, tip: PerDof<f64>) {
+        let Some(origin) = self.origin else {
+            return;
+        };
+        let StateEstimationSettings {
+            gain_window,
+            gain_prior,
+            ..
+        } = self.settings;
+        let travels = self.travel.into_iter().zip(self.unit).zip(origin);
+        let outputs = self.uncorrected.output.into_iter().zip(tip);
+        let gains = self.gain.iter_mut().zip(&mut self.nominal.gain);
+        for ((regression, gain), ((output, tip), ((travel, unit), origin))) in
+            gains.zip(outputs.zip(travels))
+        {
+            let (x, y) = ((output - origin) / unit, (tip - origin) / unit);
+            regression.update(x, y, travel, gain_window);
+            *gain = regression.value(gain_prior);
+        }
+    }
+
+    /// Passes a share of the mean centre on to the map at the position of the tip.
+    fn update_maps(&mut self) {
+        let mean = self.ensemble.mean();
+        let [q1, q2, q3, _, _, _, _, _, m1, m2, m3, ..] = mean;
+        let rates = self.settings.map_rate.into_iter().zip(self.travel);
+        let mut changes = [m1, m2, m3];
+        let maps = self.maps.iter_mut().zip([q1, q2, q3]).zip(rates);
+        for (change, ((map, position), (rate, travel))) in changes.iter_mut().zip(maps) {
+            *change *= (rate * travel).min(0.5);
+            map.add(position, *change);
+        }
+        self.ensemble.shift_centres(changes);
+    }
+
+    /// Moves every member to where its plays allow it, and takes the mean.
+    fn settle(&mut self) {
+        let largest = self.unit.map(|unit| LARGEST_WIDTH * unit);
+        self.ensemble
+            .limit(self.unit.map(|unit| LEAST_WIDTH * unit), largest);
+        let here = core::iter::once(self.command);
+        self.ensemble
+            .propagate(&self.maps, self.radius, self.command, here);
+        let mean = self.ensemble.mean();
+        let at = position(&mean);
+        let nominal = &mut self.nominal;
+        nominal.hysteresis = hysteresis(&mean, &self.maps, at.output);
+        nominal.position = nominal
+            .hysteresis
+            .propagate(self.radius, &at, self.command, self.command);
+    }
+
+    /// Propagates the prediction from the time of the ensemble to now.
+    fn catch_up<S: AsRef<[Entry]> + AsMut<[Entry]>>(&mut self, history: &History<S>) {
+        let mut from = self.command;
+        for entry in history.since(self.time) {
+            self.step(from, entry.command);
+            from = entry.command;
+        }
+    }
+
+    /// Centre of the contact offsets (3,) at outputs of the plays (3,) [m, rad, rad].
+    pub fn centre(&self, output: PerDof<f64>) -> PerDof<f64> {
+        let mut centre = self.nominal.hysteresis.centre;
+        let at = self.nominal.position.output.into_iter().zip(output);
+        for ((centre, map), (here, there)) in centre.iter_mut().zip(&self.maps).zip(at) {
+            *centre += map.at(there) - map.at(here);
+        }
+        centre
+    }
+
+    /// The time to which the ensemble has been propagated, in s.
+    pub const fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// Continues on a clock that was set back.
+    pub const fn restart_clock(&mut self) {
+        self.time = f64::NEG_INFINITY;
+    }
+}

@@ -1,0 +1,378 @@
+//! Most probable state of the tip for the markers of one image, and their linear measurement about it.
+
+use core::array;
+
+use crate::article::state::found;
+use crate::dof::{PerDof, all_finite};
+use crate::estimation::ensemble::ScalarMeasurement;
+use crate::estimation::settings::StateEstimationSettings;
+use crate::math::linear::{Matrix, add, dot, solve_symmetric, square};
+use crate::model::features::{FeatureModel, FeaturePrediction};
+
+/// Gauss-Newton steps at most, and halvings of each.
+const STEPS: usize = 12;
+const HALVINGS: usize = 6;
+/// Step in standard deviations at which the iteration ends.
+const SMALL: f64 = 1e-4;
+/// States, in standard deviations from the prediction, from which the minimum is sought again where it is bad.
+const STARTS: [PerDof<f64>; 4] = [
+    [0.0, 1.0, 0.0],
+    [0.0, -1.0, 0.0],
+    [0.0, 0.0, 1.0],
+    [0.0, 0.0, -1.0],
+];
+
+/// A vector of features, and a symmetric matrix of their size.
+type Features = [f64; 4];
+type Square = [[f64; 4]; 4];
+
+/// Prediction of an image (prior): tip and feature errors, each with its covariance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ImagePrediction {
+    /// Tip (3,) [m, rad, rad].
+    pub state: PerDof<f64>,
+    /// Its covariance (3, 3).
+    pub covariance: Matrix,
+    /// Error of the predicted features (4,) in px.
+    pub error: Features,
+    /// Its covariance (4, 4) in px^2.
+    pub error_covariance: Square,
+}
+
+/// Markers (4,) of an image in px with their covariance (4, 4) in px^2.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Markers {
+    features: Features,
+    covariance: Square,
+}
+
+/// The most probable state for the markers of an image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MarkerEstimate {
+    /// Most probable tip (3,) [m, rad, rad].
+    pub state: PerDof<f64>,
+    /// Squared Mahalanobis distance of the innovation: what is minimised.
+    pub distance_squared: f64,
+    /// Which markers were used.
+    pub used: [bool; 2],
+    /// Features predicted there and their interaction matrix.
+    pub prediction: FeaturePrediction,
+    /// Standard deviations of the state (3,) [m, rad, rad].
+    pub std: PerDof<f64>,
+}
+
+impl MarkerEstimate {
+    /// The features (4,) that were used, NaN for the others.
+    pub fn keep(&self, [ua, va, ub, vb]: Features) -> Features {
+        let [a, b] = self.used;
+        let shown = |used: bool, value: f64| if used { value } else { f64::NAN };
+        [shown(a, ua), shown(a, va), shown(b, ub), shown(b, vb)]
+    }
+}
+
+impl Markers {
+    /// Features (4,) in px, two NaN for a band that was not found, and their covariance (4, 4) in px^2; without one each
+    /// has `marker_deviation`.
+    pub fn new(
+        features: Features,
+        covariance: Option<&Square>,
+        settings: &StateEstimationSettings,
+    ) -> Self {
+        let own = square(settings.marker_deviation);
+        let mut covariance = covariance.copied().unwrap_or_else(|| diagonal([own; 4]));
+        let model = diagonal([square(settings.model_deviation); 4]);
+        for (row, added) in covariance.iter_mut().zip(model) {
+            for (entry, added) in row.iter_mut().zip(added) {
+                *entry += added;
+            }
+        }
+        Self {
+            features,
+            covariance,
+        }
+    }
+
+    /// The most probable state, over all choices of the markers that are used:
+    ///
+    /// ```text
+    /// argmin_q  (q - q0)' P^-1 (q - q0) + (s - e - h(q))' (R + E + g g')^-1 (s - e - h(q)) + outlier_distance^2 for each marker left out
+    /// ```
+    ///
+    /// with the prediction q0, P of the tip, that e, E of the feature errors, and g what a displacement of the tip
+    /// across the bend by its standard deviation does to the features.
+    ///
+    /// None where the model sees no band.
+    pub fn estimate(
+        &self,
+        model: &FeatureModel,
+        prior: &ImagePrediction,
+        settings: &StateEstimationSettings,
+    ) -> Option<MarkerEstimate> {
+        let seen = found(self.features);
+        let price = square(settings.outlier_distance);
+        let sideways = model
+            .sideways(prior.state)?
+            .map(|value| settings.sideways_deviation * value);
+        let problem = |used: [bool; 2]| Problem::new(self, prior, used, sideways);
+        let mut best = problem(seen)?.minimum(model, [0.0; 3])?;
+        if best.distance_squared > price {
+            for start in STARTS {
+                if let Some(other) = problem(seen)?.minimum(model, start)
+                    && other.distance_squared < best.distance_squared
+                {
+                    best = other;
+                }
+            }
+        }
+        if seen == [true; 2] && best.distance_squared > price {
+            let both = best.distance_squared;
+            for used in [[true, false], [false, true]] {
+                if let Some(one) = problem(used).and_then(|one| one.minimum(model, [0.0; 3]))
+                    && one.distance_squared + price < both
+                    && (best.used == seen || one.distance_squared < best.distance_squared)
+                {
+                    best = one;
+                }
+            }
+        }
+        Some(best)
+    }
+
+    /// The markers used by an estimate as four independent measurements of standard deviation 1, linear about it; `gain`
+    /// (3,) is the travel of the tip over that of the output, about `origin` (3,).
+    pub fn linearize(
+        &self,
+        estimate: &MarkerEstimate,
+        origin: PerDof<f64>,
+        gain: PerDof<f64>,
+    ) -> Option<[ScalarMeasurement; 4]> {
+        let FeaturePrediction { features, columns } = estimate.prediction;
+        let whitener = Whitener::new(&self.covariance, estimate.used)?;
+        let mut misfit = self.features;
+        let offset = columns.iter().zip(estimate.state).zip(origin.into_iter().zip(gain));
+        for (value, predicted) in misfit.iter_mut().zip(features) {
+            *value -= predicted;
+        }
+        for ((column, state), (origin, gain)) in offset {
+            let constant = state - origin * (1.0 - gain);
+            for (value, by) in misfit.iter_mut().zip(column) {
+                *value += by * constant;
+            }
+        }
+        let misfit = whitener.apply(misfit);
+        let [c1, c2, c3] = columns.map(|column| whitener.apply(column));
+        let errors: [Features; 4] = array::from_fn(|entry| {
+            whitener.apply(array::from_fn(|row| if row == entry { 1.0 } else { 0.0 }))
+        });
+        let [g1, g2, g3] = gain;
+        let mut rows = [ScalarMeasurement {
+            output: [0.0; 3],
+            error: [0.0; 4],
+            value: 0.0,
+        }; 4];
+        let [e1, e2, e3, e4] = errors;
+        let outputs = c1.into_iter().zip(c2).zip(c3);
+        let errors = e1.into_iter().zip(e2).zip(e3).zip(e4);
+        for ((row, value), (((a, b), c), (((d, e), f), g))) in
+            rows.iter_mut().zip(misfit).zip(outputs.zip(errors))
+        {
+            *row = ScalarMeasurement {
+                output: [g1 * a, g2 * b, g3 * c],
+                error: [d, e, f, g],
+                value,
+            };
+        }
+        Some(rows)
+    }
+}
+
+/// The least squares of one choice of markers; x is the state in standard deviations: q = q0 + factor x.
+struct Problem<'a> {
+    markers: &'a Markers,
+    prior: &'a ImagePrediction,
+    factor: Matrix,
+    used: [bool; 2],
+    whitener: Whitener,
+}
+
+impl<'a> Problem<'a> {
+    fn new(
+        markers: &'a Markers,
+        prior: &'a ImagePrediction,
+        used: [bool; 2],
+        sideways: Features,
+    ) -> Option<Self> {
+        let mut covariance = markers.covariance;
+        let rows = covariance.iter_mut().zip(prior.error_covariance).zip(sideways);
+        for ((row, errors), own) in rows {
+            for ((entry, error), other) in row.iter_mut().zip(errors).zip(sideways) {
+                *entry += error + own * other;
+            }
+        }
+        Some(Self {
+            markers,
+            prior,
+            factor: factor(&prior.covariance)?,
+            used,
+            whitener: Whitener::new(&covariance, used)?,
+        })
+    }
+
+    fn state(&self, x: PerDof<f64>) -> PerDof<f64> {
+        add(self.prior.state, 1.0, self.factor.map(|row| dot(row, x)))
+    }
+
+    fn misfit(&self, prediction: &FeaturePrediction) -> Features {
+        let mut misfit = self.markers.features;
+        let predicted = prediction.features.into_iter().zip(self.prior.error);
+        for (value, (predicted, error)) in misfit.iter_mut().zip(predicted) {
+            *value -= predicted + error;
+        }
+        self.whitener.apply(misfit)
+    }
+
+    fn cost(&self, x: PerDof<f64>, prediction: &FeaturePrediction) -> f64 {
+        let misfit = self.misfit(prediction);
+        dot(x, x) + misfit.iter().map(|value| value * value).sum::<f64>()
+    }
+
+    fn minimum(&self, model: &FeatureModel, start: PerDof<f64>) -> Option<MarkerEstimate> {
+        let mut x = start;
+        let mut prediction = model.predict(self.state(x))?;
+        let mut cost = self.cost(x, &prediction);
+        for _ in 0..STEPS {
+            let Some(step) = self.step(x, &prediction) else {
+                break;
+            };
+            let mut share = 1.0;
+            let better = (0..HALVINGS).find_map(|_| {
+                let trial = add(x, share, step);
+                share /= 2.0;
+                let there = model.predict(self.state(trial))?;
+                let less = self.cost(trial, &there);
+                (less <= cost).then_some((trial, there, less))
+            });
+            let Some(found) = better else { break };
+            (x, prediction, cost) = found;
+            if dot(step, step) < square(SMALL) {
+                break;
+            }
+        }
+        let (normal, _) = self.equations(x, &prediction);
+        let std = self.std(normal)?;
+        cost.is_finite().then(|| MarkerEstimate {
+            state: self.state(x),
+            distance_squared: cost,
+            used: self.used,
+            prediction,
+            std,
+        })
+    }
+
+    /// Standard deviations of the state: roots of the diagonal of F N^-1 F' with the normal matrix N.
+    fn std(&self, normal: Matrix) -> Option<PerDof<f64>> {
+        let [first, second, third] = self.factor;
+        let variance = |row: PerDof<f64>| Some(dot(row, solve_symmetric(normal, row)?));
+        Some([variance(first)?, variance(second)?, variance(third)?].map(libm::sqrt))
+    }
+
+    /// Gauss-Newton step.
+    fn step(&self, x: PerDof<f64>, prediction: &FeaturePrediction) -> Option<PerDof<f64>> {
+        let (normal, right) = self.equations(x, prediction);
+        solve_symmetric(normal, right).filter(|step| all_finite(*step))
+    }
+
+    /// Normal equations of the step.
+    fn equations(&self, x: PerDof<f64>, prediction: &FeaturePrediction) -> (Matrix, PerDof<f64>) {
+        let [c1, c2, c3] = prediction.columns.map(|column| self.whitener.apply(column));
+        let [[f11, _, _], [f21, f22, _], [f31, f32, f33]] = self.factor;
+        let mut normal = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let mut right = x.map(|value| -value);
+        let columns = c1.into_iter().zip(c2).zip(c3);
+        for (misfit, ((a, b), c)) in self.misfit(prediction).into_iter().zip(columns) {
+            let row = [a * f11 + b * f21 + c * f31, b * f22 + c * f32, c * f33];
+            right = add(right, misfit, row);
+            for (line, entry) in normal.iter_mut().zip(row) {
+                *line = add(*line, entry, row);
+            }
+        }
+        (normal, right)
+    }
+}
+
+/// Lower factor F of a covariance, F F' = P; None if it is not positive definite.
+fn factor(&[[a, _, _], [b, c, _], [d, e, f]]: &Matrix) -> Option<Matrix> {
+    let f11 = libm::sqrt(a);
+    let (f21, f31) = (b / f11, d / f11);
+    let f22 = libm::sqrt(c - f21 * f21);
+    let f32 = (e - f31 * f21) / f22;
+    let f33 = libm::sqrt(f - f31 * f31 - f32 * f32);
+    let rows = [[f11, 0.0, 0.0], [f21, f22, 0.0], [f31, f32, f33]];
+    rows.iter().all(|row| all_finite(*row)).then_some(rows)
+}
+
+/// W with W R W' = I for the markers that are used; the other rows are 0.
+struct Whitener([Features; 4]);
+
+impl Whitener {
+    fn new(covariance: &Square, [a, b]: [bool; 2]) -> Option<Self> {
+        let used = [a, a, b, b];
+        // Cholesky's factor F row by row; F W = I.
+        let mut factor: Square = [[0.0; 4]; 4];
+        let mut whitener: Square = [[0.0; 4]; 4];
+        for index in 0..4 {
+            if !used.get(index)? {
+                continue;
+            }
+            let mut row = [0.0; 4];
+            for column in 0..=index {
+                if !used.get(column)? {
+                    continue;
+                }
+                let other = if column == index { row } else { *factor.get(column)? };
+                let sum: f64 = row.iter().zip(other).take(column).map(|(x, y)| x * y).sum();
+                let rest = covariance.get(index)?.get(column)? - sum;
+                *row.get_mut(column)? = if column == index {
+                    libm::sqrt(rest)
+                } else {
+                    rest / other.get(column)?
+                };
+            }
+            let diagonal = *row.get(index)?;
+            let mut line: Features = array::from_fn(|entry| if entry == index { 1.0 } else { 0.0 });
+            for (by, above) in row.iter().zip(whitener).take(index) {
+                for (entry, above) in line.iter_mut().zip(above) {
+                    *entry -= by * above;
+                }
+            }
+            let line = line.map(|entry| entry / diagonal);
+            if !all_finite(line) {
+                return None;
+            }
+            *factor.get_mut(index)? = row;
+            *whitener.get_mut(index)? = line;
+        }
+        Some(Self(whitener))
+    }
+
+    /// W v, in which entries that are not used, and may be NaN, do not count.
+    fn apply(&self, vector: Features) -> Features {
+        self.0.map(|row| {
+            row.iter()
+                .zip(vector)
+                .filter(|(weight, _)| **weight != 0.0)
+                .map(|(weight, value)| weight * value)
+                .sum()
+        })
+    }
+}
+
+fn diagonal(values: Features) -> Square {
+    let [a, b, c, d] = values;
+    [
+        [a, 0.0, 0.0, 0.0],
+        [0.0, b, 0.0, 0.0],
+        [0.0, 0.0, c, 0.0],
+        [0.0, 0.0, 0.0, d],
+    ]
+}
