@@ -1,6 +1,7 @@
 """The rig of examples/own_rig.py, for tests and for the worker processes they start."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -8,7 +9,7 @@ sys.path.insert(0, str(EXAMPLES))  # spawned workers inherit the path
 
 from own_rig import BACKLASH, DrawnRig, short_experiment  # noqa: E402
 
-__all__ = ["BACKLASH", "EXAMPLES", "BadFrameRig", "DrawnRig", "short_experiment"]
+__all__ = ["BACKLASH", "EXAMPLES", "BadFrameRig", "DrawnRig", "StallingRig", "short_experiment"]
 
 
 class BadFrameRig(DrawnRig):
@@ -16,3 +17,17 @@ class BadFrameRig(DrawnRig):
 
     def _draw(self):
         return super()._draw()[:-1]
+
+
+class StallingRig(DrawnRig):
+    """A rig that calls nobody for half a second after its first second."""
+
+    STALL, DURATION = 1.0, 0.5
+
+    def step(self, command):
+        sample = super().step(command)
+        late = self.DURATION if sample.time > self.STALL else 0.0
+        frame = sample.frame
+        if frame is not None and frame.captured_at > self.STALL:
+            frame = replace(frame, captured_at=frame.captured_at + late)
+        return replace(sample, time=sample.time + late, frame=frame)
