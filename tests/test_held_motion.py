@@ -102,13 +102,19 @@ def test_a_caller_who_can_engage_may_wait() -> None:
     assert trace["time"][-1] > StallingRig.STALL + StallingRig.DURATION + 2 * HELD_TIME
 
 
-def test_a_caller_who_uses_the_image_update_to_engage_is_in_time() -> None:
+def test_a_caller_who_engages_in_the_image_update_is_in_time_however_often() -> None:
+    since: list[float] = []
+
     def look(loop: HysteresisReduction, frame: Frame) -> Report:
-        if loop.supervision.reaction is Reaction.HOLD_MOTION:
+        if loop.supervision.reaction is not Reaction.HOLD_MOTION:
+            loop.raise_flag("command_jump")
+            since.append(frame.captured_at)
+        elif frame.captured_at > since[-1] + 0.6 * HELD_TIME:
             loop.engage()
         return loop.on_frame(frame)
 
-    run_experiment(StallingRig(CONFIG), Slide(), CONFIG, look=look)
+    run_experiment(DrawnRig(CONFIG), Slide(), CONFIG, look=look)
+    assert len(since) > 3
 
 
 def test_a_loop_that_has_to_be_restarted_ends_the_run_also_with_an_operator() -> None:

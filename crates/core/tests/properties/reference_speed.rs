@@ -237,23 +237,30 @@ fn a_jump_stops_motion_and_is_no_fast_reference() {
     }
 }
 
+/// And the motion before: a burst passes as one from rest.
 #[test]
 fn a_lag_is_discarded_where_motion_is_held() {
-    let mut bench = Bench::new(0);
+    let settings = SafetySettings {
+        command_speed: [1e3; 3],
+        ..safety()
+    };
+    let farthest = 1.0 / (1.0 - libm::exp(-PERIOD / settings.reference_time));
+    let mut bench = Bench::with(&settings, 0);
     for _ in 0..100 {
         bench.go(2.0);
     }
     assert!(bench.lag() > 10.0);
     let at = bench.gate.reference();
-    let time = f64::from(bench.tick + 1) * PERIOD;
+    bench.tick += 1;
+    let (input, time) = (bench.input, f64::from(bench.tick) * PERIOD);
     let held = bench
         .gate
-        .step([bench.input, 0.0, 0.0], time, None, true, Flags::NONE);
+        .step([input, 0.0, 0.0], time, None, true, Flags::NONE);
     assert_eq!(held.reference, Some(at));
-    bench.tick += 1;
-    for _ in 0..50 {
-        let step = bench.go(0.2);
-        assert!((step.passed - 0.2).abs() < 1e-9);
+    for by in [farthest * (1.0 - 1e-9), 0.2, 0.2, -0.2] {
+        let step = bench.go(by);
+        assert_eq!(step.raised, Flags::NONE);
+        assert!((step.passed - by).abs() < 1e-9, "nothing catches up");
     }
 }
 
