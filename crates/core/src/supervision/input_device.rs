@@ -89,11 +89,6 @@ impl InputDeviceMonitor {
         raised
     }
 
-    /// The speeds of the last increments (3,) [m/s, rad/s, rad/s]: each over the time since the value changed before.
-    pub const fn speeds(&self) -> PerDof<f64> {
-        self.speeds
-    }
-
     /// Forget the motion before: the next increment is compared with an input at rest.
     pub const fn reset(&mut self) {
         self.speeds = [0.0; 3];

@@ -130,8 +130,7 @@ impl ReferenceGate {
             is_stopped = !wrong.is_empty();
             gated.raised = gated.raised.union(wrong);
             if !is_stopped && !off.contains(Flag::ReferenceFast) {
-                let speeds = self.device.speeds();
-                let fast = self.limiter.limit(&mut next, last, increments, speeds);
+                let fast = self.limiter.limit(&mut next, last, increments);
                 gated.raised = gated.raised.union(fast);
             }
         }

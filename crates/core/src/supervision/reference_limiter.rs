@@ -6,6 +6,9 @@ use crate::settings::DofSettings;
 use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::settings::SafetySettings;
 
+/// The limited reference stays this share below `command_speed`, or rounding of its increments would exceed it.
+const ROUNDING: f64 = 1e-9;
+
 /// Limits the speed of the reference of each DOF.
 ///
 /// The travel of the limited reference in one direction is a leaky sum of its increments dg,
@@ -13,12 +16,12 @@ use crate::supervision::settings::SafetySettings;
 /// ```text
 /// travel <- k travel + dg,   k = exp(-period / reference_time)
 /// |travel| <= reference_speed period / (1 - k)
-/// |dg| <= T command_speed / gain_limit
+/// |dg| <= n period command_speed / gain_limit
 /// ```
 ///
-/// which a steady `reference_speed` just reaches; a tremor reverses before its travel adds up. T is the time for which
-/// the input had repeated itself before this increment: one tick for a device as fast as the loop, of which the law can
-/// make no command faster than `command_speed`.
+/// which a steady `reference_speed` just reaches; a tremor reverses before its travel adds up. n counts the ticks
+/// since the input moved last: 1 for a device as fast as the loop, of which the law makes no command faster than
+/// `command_speed`.
 ///
 /// Beyond these bounds the rest of an increment du of the input becomes lag. With each increment,
 ///
@@ -36,9 +39,11 @@ pub struct ReferenceLimiter {
     decay: f64,
     /// `reference_speed` period / (1 - k).
     travel_limit: PerDof<f64>,
-    /// `command_speed` / `gain_limit`.
-    speed_limit: PerDof<f64>,
+    /// period `command_speed` / `gain_limit`.
+    step_limit: PerDof<f64>,
     travel: PerDof<f64>,
+    /// n.
+    ticks: PerDof<f64>,
 }
 
 impl ReferenceLimiter {
@@ -53,9 +58,9 @@ impl ReferenceLimiter {
     ) -> Result<Self, ConfigError> {
         require_positive("period", period)?;
         require_positive("reference_time", safety.reference_time)?;
-        let mut speed_limit = safety.command_speed;
-        for (limit, dof) in speed_limit.iter_mut().zip(dofs) {
-            *limit /= dof.gain_limit;
+        let mut step_limit = safety.command_speed;
+        for (limit, dof) in step_limit.iter_mut().zip(dofs) {
+            *limit *= period / dof.gain_limit * (1.0 - ROUNDING);
             require_positive("command_speed", *limit)?;
         }
         let decay = libm::exp(-period / safety.reference_time);
@@ -63,38 +68,37 @@ impl ReferenceLimiter {
         Ok(Self {
             decay,
             travel_limit: safety.reference_speed.map(|speed| speed * steady),
-            speed_limit,
+            step_limit,
             travel: [0.0; 3],
+            ticks: [0.0; 3],
         })
     }
 
     /// Limit the motion from `last` to `next` (3,) [m, rad, rad], in place.
     ///
-    /// The input has moved by `increments` (3,) [m, rad, rad], at `speeds` (3,) [m/s, rad/s, rad/s]: each over its T.
-    /// Raises `ReferenceFast` where a bound is exceeded.
+    /// The input has moved by `increments` (3,) [m, rad, rad]. Raises `ReferenceFast` where a bound is exceeded.
     pub fn limit(
         &mut self,
         next: &mut PerDof<f64>,
         last: PerDof<f64>,
         increments: PerDof<f64>,
-        speeds: PerDof<f64>,
     ) -> Flags {
         let mut is_fast = false;
-        let outputs = next.iter_mut().zip(last).zip(&mut self.travel);
-        let inputs = increments.into_iter().zip(speeds);
-        let limits = self.travel_limit.into_iter().zip(self.speed_limit);
-        for ((((next, last), travel), (increment, speed)), (travel_limit, speed_limit)) in
-            outputs.zip(inputs).zip(limits)
+        let outputs = next.iter_mut().zip(last).zip(increments);
+        let states = self.travel.iter_mut().zip(&mut self.ticks);
+        let limits = self.travel_limit.into_iter().zip(self.step_limit);
+        for ((((next, last), increment), (travel, ticks)), (travel_limit, step_limit)) in
+            outputs.zip(states).zip(limits)
         {
             *travel *= self.decay;
+            *ticks += 1.0;
             let with_lag = *next - last;
             let twice = 2.0 * increment;
             let wanted = with_lag.max(twice.min(0.0)).min(twice.max(0.0));
-            let reach = if increment.abs() > 0.0 {
-                speed_limit * (increment / speed)
-            } else {
-                0.0
-            };
+            let reach = step_limit * *ticks;
+            if increment.abs() > 0.0 {
+                *ticks = 0.0;
+            }
             let limited = wanted
                 .max(-travel_limit - *travel)
                 .min(travel_limit - *travel)
@@ -111,6 +115,6 @@ impl ReferenceLimiter {
 
     /// Forget the motion before.
     pub const fn reset(&mut self) {
-        self.travel = [0.0; 3];
+        (self.travel, self.ticks) = ([0.0; 3], [0.0; 3]);
     }
 }

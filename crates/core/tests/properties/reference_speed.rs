@@ -2,12 +2,14 @@
 
 use std::f64::consts::TAU;
 
+use crate::article::play::Play;
 use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::reference_gate::ReferenceGate;
 use crate::supervision::settings::SafetySettings;
 use proptest::prelude::*;
 
 use super::config;
+use super::support::loops::article_with;
 use super::support::{PERIOD, UNITS, dofs, safety};
 
 const FAST: Flags = Flags::of(Flag::ReferenceFast);
@@ -184,7 +186,7 @@ proptest! {
 #[test]
 fn a_steady_input_above_the_limit_is_followed_at_the_limit_and_this_is_said() {
     for dof in 0..3 {
-        for ratio in [1.0 - 1e-9, 1.001, 1.5, 3.0, 30.0] {
+        for ratio in [1.0 - 1e-8, 1.001, 1.5, 3.0, 30.0] {
             let mut bench = Bench::new(dof);
             let mut raised = Flags::NONE;
             for _ in 0..2000 {
@@ -212,6 +214,30 @@ fn a_burst_is_followed_as_far_as_its_speed_limit_allows_and_no_farther() {
             let passed = farthest * share.clamp(-1.0, 1.0);
             assert!((step.passed - passed).abs() < 1e-9, "{dof}, {share}");
         }
+    }
+}
+
+/// In the slack the command moves five times as fast as the reference.
+#[test]
+fn no_reference_that_is_followed_makes_the_command_exceed_its_speed() {
+    for speed in [1.5, 1.7, 3.0] {
+        let settings = SafetySettings {
+            off: Flags::of(Flag::ReferenceJump).union(Flags::of(Flag::ReferenceLate)),
+            ..safety()
+        };
+        let mut reduction = article_with(&settings, 0.0, |unit| {
+            Play::new(-12.0 * unit, 12.0 * unit).unwrap()
+        });
+        let (mut time, mut input, mut flags) = (0.0, 0.0, Flags::NONE);
+        for tick in 0..2000 {
+            let side = if (tick / 17) % 2 == 0 { 1.0 } else { -1.0 };
+            input += side * speed;
+            time += PERIOD;
+            reduction.step(UNITS.map(|unit| input * unit), None, time);
+            flags = flags.union(reduction.supervision().flags);
+        }
+        assert!(flags.contains(Flag::ReferenceFast));
+        assert!(!flags.contains(Flag::CommandJump), "{speed}");
     }
 }
 
