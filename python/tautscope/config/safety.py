@@ -37,9 +37,9 @@ class SafetyConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     [s]."""
     command_speed: PerDof = (0.4, 27.0, 16.0)
     """Largest speed of the command; the reference is followed at no more than this over
-    `gain_limit`. A faster command does not move, and motion stops until the
-    operator re-engages. Six times the command's speed for a reference of 12.6 mm/s, which crosses
-    the slack K_b times as fast."""
+    `gain_limit`. A faster command does not move, and motion stops until the operator re-engages.
+    Six times the command's speed for a reference of 12.6 mm/s, which crosses the slack K_b times as
+    fast."""
     command_travel: tuple[Range, Range, Range] = ((-0.1, 0.3), (-12.6, 12.6), (-4.0, 4.0))
     """Least and largest command [m, rad, rad]."""
     reference_count: PerDof = (50e-6, 5e-3, 2.5e-3)
