@@ -77,7 +77,7 @@ impl Monitors {
         let [w1, w2, w3] = safety.width_limit;
         let [o1, o2, o3] = safety.offset_limit;
         Ok(Self {
-            gate: ReferenceGate::new(safety, period)?,
+            gate: ReferenceGate::new(safety, dofs, period)?,
             limiters: [
                 CommandLimiter::new(safety, first, 0, period)?,
                 CommandLimiter::new(safety, second, 1, period)?,
