@@ -1,6 +1,7 @@
 """The rig of examples/own_rig.py, for tests and for the worker processes they start."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -14,8 +15,10 @@ __all__ = [
     "EXAMPLES",
     "BadFrameRig",
     "DrawnRig",
+    "StallingRig",
     "make_bad_frame_rig",
     "make_drawn_rig",
+    "make_stalling_rig",
     "short_experiment",
 ]
 
@@ -35,3 +38,22 @@ def make_drawn_rig(trial: Trial) -> DrawnRig:
 def make_bad_frame_rig(trial: Trial) -> BadFrameRig:
     """The rig of a trial, with images of the wrong size."""
     return BadFrameRig(trial.config)
+
+
+class StallingRig(DrawnRig):
+    """A rig that calls nobody for half a second after its first second."""
+
+    STALL, DURATION = 1.0, 0.5
+
+    def step(self, command):
+        sample = super().step(command)
+        late = self.DURATION if sample.time > self.STALL else 0.0
+        frame = sample.frame
+        if frame is not None and frame.captured_at > self.STALL:
+            frame = replace(frame, captured_at=frame.captured_at + late)
+        return replace(sample, time=sample.time + late, frame=frame)
+
+
+def make_stalling_rig(trial: Trial) -> StallingRig:
+    """The rig of a trial that stalls."""
+    return StallingRig(trial.config)

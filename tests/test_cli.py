@@ -8,7 +8,7 @@ from pathlib import Path
 import matplotlib.image
 import numpy as np
 import pytest
-from drawn import make_bad_frame_rig, make_drawn_rig, short_experiment
+from drawn import make_bad_frame_rig, make_drawn_rig, make_stalling_rig, short_experiment
 from refused import failed
 from tautscope.cli import main
 from tautscope.config import dump_config, load_config
@@ -185,6 +185,23 @@ def test_a_failed_run_leaves_no_folder(
     assert main(["demo", "--config", config_file, "--out", str(out)]) == 2
     assert "error: " in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["short.toml"]
+
+
+def test_a_run_in_which_motion_is_held_keeps_what_was_recorded(
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    config_file: str,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(demo, "run_demo", partial(demo.run_demo, make_rig=make_stalling_rig))
+    out = tmp_path / "run"
+    assert main(["demo", "--config", config_file, "--out", str(out)]) == 2
+    message = capsys.readouterr().err
+    assert "error: Motion stopped at 1.510 s (hold_motion: late_tick" in message
+    assert f"What was recorded until then: {out}" in message
+    (trace,) = out.glob("trace*.csv")
+    lines = trace.read_text(encoding="utf-8").splitlines()
+    assert float(lines[-1].split(",")[0]) == pytest.approx(2.505, abs=0.011)
 
 
 def test_demo_names_an_invalid_input(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

@@ -34,7 +34,7 @@ EXPECTED_FLAGS = {
     "C5": (("hand_displaced",), {"reference_jump"}),
     "C7": (("stall",), {"late_tick"}),
     "C8": (("hand_slow",), {"reference_late"}),
-    "C9": (("hand_step", "hand_fast"), {"reference_jump"}),
+    "C9": (("hand_step", "hand_fast"), {"reference_jump", "reference_fast"}),
     "D1": (("axis_off",), {"drive_fault"}),
     "D5": (("axis_reversed",), {"following_error", "innovation"}),
     "P5": (("clock_ahead", "clock_back"), {"late_tick", "clock", "sample.time", "late"}),

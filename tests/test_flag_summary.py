@@ -37,7 +37,7 @@ def test_a_line_says_how_often_when_and_the_strongest_reaction() -> None:
 
 def test_a_flag_between_two_images_is_listed() -> None:
     (line,) = summarise([(Reaction.NONE, ())], ("reference_jump",))
-    assert line.startswith("reference_jump (the reference was faster")
+    assert line.startswith("reference_jump (the reference jumped")
     assert line.endswith("between two images")
 
 

@@ -83,7 +83,14 @@ class Instrument:
         """Run to the end; the drives stop if the loop raises an error."""
         recorder, rig = self._recorder, self._rig
         try:
-            run_experiment(rig, self._device, self._config, look=recorder.update, log=recorder)
+            run_experiment(
+                rig,
+                self._device,
+                self._config,
+                look=recorder.update,
+                log=recorder,
+                engage=lambda _: False,  # `InputDevice` ends the run
+            )
         except RunFinished:
             pass
         except TautscopeError as error:

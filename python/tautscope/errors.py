@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 
 class TautscopeError(Exception):
     """Base class of all errors of this package."""
@@ -48,6 +50,33 @@ class MissingPathError(FieldError):
 
 class OutputError(FieldError):
     """A result cannot be written to the given place."""
+
+
+class MotionHeldError(TautscopeError):
+    """Motion was held, and nobody could re-engage it.
+
+    Args:
+        time: Since when [s, the rig's clock].
+        reaction: The reaction in force, `tautscope.loop.safety.Reaction`.
+        flags: The flags in force, by the names of `tautscope.loop.safety.DETECTORS`.
+
+    Attributes:
+        recording: `tautscope.runs.recording.Recording` of the run up to its end, if there is one.
+    """
+
+    def __init__(self, time: float, reaction: str, flags: tuple[str, ...]) -> None:
+        self.time = time
+        self.reaction = reaction
+        self.flags = flags
+        self.recording: Any = None
+        super().__init__(time, reaction, flags)
+
+    def __str__(self) -> str:
+        return (
+            f"Motion stopped at {self.time:.3f} s ({self.reaction}: {', '.join(self.flags)}), and "
+            "nobody re-engaged it. docs/safety.md explains the flags. Remove the cause and repeat "
+            "the run, or give run_experiment a function `engage`"
+        )
 
 
 class DriveError(TautscopeError):

@@ -20,6 +20,7 @@ from tautscope.errors import (
     ConfigError,
     DriveError,
     FollowingError,
+    MotionHeldError,
     SignalError,
     StateError,
 )
@@ -28,6 +29,7 @@ from tautscope.hardware.rig import HardwareRig
 from tautscope.hardware.timing import Timing, read_sent
 from tautscope.loop.reduction import HysteresisReduction
 from tautscope.loop.rig import Rig
+from tautscope.runs.experiment import HELD_TIME
 
 
 @pytest.fixture
@@ -252,6 +254,27 @@ def test_supervisor_reaction_reaches_the_drives_in_the_same_tick(
         run_on_hardware(config, tmp_path / "run", lambda share: None, make_rig=lambda _: one.rig)
     assert (one.motors.stopped, one.motors.disabled, one.camera.closed) == (1, disabled, 1)
     assert next(ticks) == 21  # no further tick
+
+
+def test_held_motion_ends_the_run_and_stops_the_motors(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    one = Setup()
+    step, ticks = HysteresisReduction.step, itertools.count(1)
+
+    def step_with_flag(loop: HysteresisReduction, *values: Any, **more: Any) -> Any:
+        if next(ticks) == 20:
+            loop.raise_flag("command_jump")
+        return step(loop, *values, **more)
+
+    monkeypatch.setattr(HysteresisReduction, "step", step_with_flag)
+    folder = tmp_path / "run"
+    with pytest.raises(MotionHeldError, match=r"hold_motion: command_jump") as caught:
+        run_on_hardware(one.config, folder, lambda share: None, make_rig=lambda _: one.rig)
+    assert (one.motors.stopped, one.camera.closed) == (1, 1)
+    assert caught.value.__notes__ == [f"The log of the run is {folder / 'compensated.mcap'}"]
+    ticks_recorded = len(caught.value.recording.trace)
+    assert ticks_recorded == 20 + round(HELD_TIME / one.config.control.period)
 
 
 def test_configuration_without_matching_drives_is_refused() -> None:

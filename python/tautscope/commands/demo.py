@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tautscope.commands import arguments
+from tautscope.commands.held_run import recording_saved
 from tautscope.commands.printing import console, print_json
 from tautscope.config import DISTURBANCES, Config, load_config
 from tautscope.errors import MissingPathError
@@ -64,7 +65,7 @@ def _run(options: argparse.Namespace) -> None:
     first = config.twin.seed
     seeds = range(first, first + options.seeds)
     runs = len(seeds) * len(demo.demo_trials(config))
-    with progress_bar(f"{runs} runs") as progress:
+    with recording_saved(folder), progress_bar(f"{runs} runs") as progress:
         found = demo.run_demo(config, seeds, progress)
     demo.write_run_folder(found, folder)
     if options.json:

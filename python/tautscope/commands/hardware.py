@@ -8,6 +8,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
+from tautscope.commands.held_run import recording_saved
 from tautscope.commands.printing import print_json
 from tautscope.config import load_config
 from tautscope.dof import Dof
@@ -47,7 +48,7 @@ def _run(options: argparse.Namespace) -> int:
     config = load_config(options.config, options.profile)
     folder = options.out or default_folder("run")
     try:
-        with progress_bar("run") as progress:
+        with recording_saved(folder), progress_bar("run") as progress:
             found = run_on_hardware(config, folder, progress, compare=options.compare)
     except KeyboardInterrupt as stop:
         notes = getattr(stop, "__notes__", ())

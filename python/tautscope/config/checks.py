@@ -114,10 +114,10 @@ def check_safety(
         sine = experiment[dof]
         least_period = 2 * math.pi * sine.amplitude / speed
         _require(
-            sine.period >= least_period or "reference_jump" in safety.off,
+            sine.period >= least_period or "reference_fast" in safety.off,
             f"experiment.{dof.label}.period",
             sine.period,
-            f"at least {least_period:.3g}: safety.reference_speed stops faster references",
+            f"at least {least_period:.3g}: safety.reference_speed limits faster references",
         )
     for dof, noise in zip(Dof, safety.state_noise, strict=True):
         tolerance = dofs[dof].contact_tolerance * dofs[dof].update_distance

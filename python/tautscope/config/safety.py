@@ -29,20 +29,23 @@ class SafetyConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     offset_limit: PerDof = (8e-3, 1.6, 0.9)
     """Largest absolute value of an estimated contact offset."""
     reference_speed: PerDof = (0.04, 4.0, 2.0)
-    """Largest speed of the reference over `reference_time`; a faster one stops motion until the
-    operator re-engages. Three times the fastest operator in docs/faults.md."""
+    """Largest speed of the reference over `reference_time`; a faster one is followed at this speed,
+    and what it lags is caught up while the operator moves on. Three times the fastest operator in
+    docs/faults.md."""
     reference_time: Positive = 0.04
     """Time over which the speed is averaged: a tremor of 1 mm passes, a jump of 2 mm does not
     [s]."""
     command_speed: PerDof = (0.4, 27.0, 16.0)
-    """Largest speed of the command; a faster command does not move, and motion stops until the
-    operator re-engages. Six times the command's speed for a reference of 12.6 mm/s, which crosses
-    the slack K_b times as fast."""
+    """Largest speed of the command; the reference is followed at no more than this over
+    `gain_limit`. A faster command does not move, and motion stops until the operator re-engages.
+    Six times the command's speed for a reference of 12.6 mm/s, which crosses the slack K_b times as
+    fast."""
     command_travel: tuple[Range, Range, Range] = ((-0.1, 0.3), (-12.6, 12.6), (-4.0, 4.0))
     """Least and largest command [m, rad, rad]."""
     reference_count: PerDof = (50e-6, 5e-3, 2.5e-3)
     """Resolution of the input device, or its largest step from rest: its value may change by this
-    more than its speed before and `reference_speed` allow [m, rad, rad]."""
+    more than its speed before and `reference_speed` allow [m, rad, rad]; beyond this it has jumped,
+    and motion stops until the operator re-engages."""
     reference_age: Positive = 0.05
     """Largest age of a reference, where its time is known; an older one moves nothing [s]. A device
     that repeats its value bit for bit for longer is at rest or silent: its next change must be one
@@ -120,7 +123,8 @@ class SafetyConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     fade_travel: Positive = 2.0
     """Travel over which compensation fades to nothing [in width_limit]."""
     restore_travel: Positive = 2.0
-    """Travel over which compensation returns after warnings were acknowledged [in width_limit]."""
+    """Travel over which compensation returns after the cause of a fade has cleared [in
+    width_limit]."""
     good_frames: Count = 5
     """Good frames in a row after which a flag of frames is cleared."""
     good_ticks: Count = 200

@@ -207,7 +207,14 @@ def _video_inputs(frames: Iterable[Frame], times: Floats, positions: Floats) -> 
 def _estimate(inputs: Inputs, config: Config, compensated: bool) -> Recording:
     # Without compensation the loop passes commands on and only estimates. Some detectors are off:
     # the commands were executed already and may be faster than an operator; codecs repeat frames.
-    ignored = ("reference_jump", "reference_late", "late_tick", "monitor", "frozen")
+    ignored = (
+        "reference_jump",
+        "reference_fast",
+        "reference_late",
+        "late_tick",
+        "monitor",
+        "frozen",
+    )
     off = {"safety.off": [*config.safety.off, *ignored]}
     loop = HysteresisReduction(config.replace(**off), compensate=False)
     recorder = RunRecorder(config)

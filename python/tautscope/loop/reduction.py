@@ -199,7 +199,10 @@ class HysteresisReduction:
         self._notify("engage")
 
     def acknowledge(self) -> None:
-        """Acknowledge the warnings: compensation that was faded out returns with motion."""
+        """Acknowledge the warnings: empty `Supervision.latched`; nothing else changes.
+
+        Compensation that was faded out returns with motion, once the cause has cleared.
+        """
         self._loop.acknowledge()
         self._notify("acknowledge")
 

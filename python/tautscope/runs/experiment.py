@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from tautscope.config import Config
-from tautscope.errors import SignalError
+from tautscope.errors import MotionHeldError, SignalError
 from tautscope.loop.reduction import HysteresisReduction, Report
 from tautscope.loop.references import DatedReference, Reference
 from tautscope.loop.rig import Frame, Rig, Sample
-from tautscope.loop.safety import Supervision, disabled_monitors
+from tautscope.loop.safety import Reaction, Supervision, disabled_monitors
 from tautscope.runs.flag_summary import FlagSummary
 from tautscope.runs.recording import Floats, Recording, Snapshot
 from tautscope.runs.run_recorder import RunRecorder, frame_row
@@ -26,6 +26,8 @@ Progress = Callable[[float, float], None]
 """Called about once per second of the rig's clock with (elapsed, duration) [s]."""
 ImageUpdate = Callable[[HysteresisReduction, Frame], Report]
 """Updates the loop with a frame."""
+HELD_TIME = 1.0
+"""How long motion is held before a run ends in which nobody can re-engage it [s]."""
 _Reports = Iterator[tuple[Frame, Report]]
 
 
@@ -58,6 +60,7 @@ def run_experiment(
     log: Log | None = None,
     executor: Executor | None = None,
     watch: Callable[[Supervision], None] | None = None,
+    engage: Callable[[Supervision], bool] | None = None,
 ) -> Recording:
     """Run a reference on a rig, with the camera as the only feedback.
 
@@ -81,8 +84,13 @@ def run_experiment(
             that runs in real time.
         watch: Called with the state of the supervisor before each command is sent; an exception
             from it ends the run.
+        engage: The operator's decision to re-engage: called in every tick in which motion is held,
+            re-engages if it returns True. Without it nobody can, and neither where the loop has to
+            be restarted (reaction `disable`): the run then ends after `HELD_TIME`.
 
     Raises:
+        MotionHeldError: Motion was held, and nobody could re-engage it. The error has the recording
+            up to this time.
         SignalError: The reference is not three finite numbers, or the rig's clock does not advance.
         FrameError: An image is not what the configured camera gives.
     """
@@ -90,6 +98,19 @@ def run_experiment(
     recorder = _ExperimentRecorder(config, reference.duration / 2)
     updater = _InlineUpdater(look) if executor is None else _BackgroundUpdater(executor)
     events = None if log is None else _EventLog(reduction, log)
+    stop = _MotionStop(reduction, engage, rig.control_period)
+
+    def recording() -> Recording:
+        if events is not None:
+            events.write(sample.time)
+        trace, frames = recorder.tables()
+        warnings = (
+            *disabled_monitors(config),
+            *recorder.flags.lines(reduction.supervision.latched),
+        )
+        segments = tuple(reference.segments)
+        return Recording(trace, frames, config, compensate, segments, recorder.snapshot, warnings)
+
     sample = rig.reset()
     start = sample.time
     while (elapsed := sample.time - start) < reference.duration:
@@ -109,20 +130,48 @@ def run_experiment(
                 log.frame(sample.time, frame, report)
         if watch is not None:
             watch(reduction.supervision)
+        if (error := stop.update(sample.time)) is not None:
+            error.recording = recording()
+            raise error
         before, sample = sample, rig.step(command)
         if not sample.time > before.time:
             raise SignalError("sample.time", sample.time, f"later than the last, {before.time}")
         if progress is not None and int(sample.time - start) > int(elapsed):
             progress(sample.time - start, reference.duration)
-    if events is not None:
-        events.write(sample.time)
-    trace, frames = recorder.tables()
-    segments = tuple(reference.segments)
-    warnings = (
-        *disabled_monitors(config),
-        *recorder.flags.lines(reduction.supervision.latched),
-    )
-    return Recording(trace, frames, config, compensate, segments, recorder.snapshot, warnings)
+    return recording()
+
+
+class _MotionStop:
+    """Re-engages held motion as `run_experiment` describes, or ends the run."""
+
+    def __init__(
+        self,
+        loop: HysteresisReduction,
+        engage: Callable[[Supervision], bool] | None,
+        period: float,
+    ) -> None:
+        self._loop, self._engage = loop, engage
+        self._limit = round(HELD_TIME / period)
+        self._ticks = 0
+        self._since = 0.0
+
+    def update(self, now: float) -> MotionHeldError | None:
+        """The error that ends the run, if there is one, after a tick at time `now` [s]."""
+        supervision = self._loop.supervision
+        reaction = supervision.reaction
+        if reaction.rank < Reaction.HOLD_MOTION.rank:
+            self._ticks = 0
+            return None
+        if self._ticks == 0:
+            self._since = now
+        # Counted in ticks, because a faulty clock is one of the causes.
+        self._ticks += 1
+        if self._engage is not None and reaction is not Reaction.DISABLE:
+            if self._engage(supervision):
+                self._loop.engage()
+        elif self._ticks > self._limit:
+            return MotionHeldError(self._since, str(reaction), supervision.flags)
+        return None
 
 
 class _InlineUpdater:

@@ -321,12 +321,12 @@ impl Whitener {
         let mut factor: Square = [[0.0; 4]; 4];
         let mut whitener: Square = [[0.0; 4]; 4];
         for index in 0..4 {
-            if !used.get(index)? {
+            if !*used.get(index)? {
                 continue;
             }
             let mut row = [0.0; 4];
             for column in 0..=index {
-                if !used.get(column)? {
+                if !*used.get(column)? {
                     continue;
                 }
                 let other = if column == index { row } else { *factor.get(column)? };

@@ -8,6 +8,7 @@ pub(crate) mod monitors;
 pub(crate) mod motion_monitor;
 pub(crate) mod reactions;
 pub(crate) mod reference_gate;
+pub(crate) mod reference_limiter;
 pub(crate) mod settings;
 pub(crate) mod supervisor;
 pub(crate) mod turning_points;

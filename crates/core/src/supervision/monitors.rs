@@ -79,7 +79,7 @@ impl Monitors {
         let [w1, w2, w3] = safety.width_limit;
         let [o1, o2, o3] = safety.offset_limit;
         Ok(Self {
-            gate: ReferenceGate::new(safety, period)?,
+            gate: ReferenceGate::new(safety, dofs, period)?,
             limiters: CommandLimiters::new(safety, dofs, period, is_coupled)?,
             frames: FrameGate::new(safety, dofs)?,
             motion: MotionMonitor::new(safety, dofs, period)?,

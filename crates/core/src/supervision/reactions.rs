@@ -84,7 +84,7 @@ const fn rule(
 /// `lost` fades without a hold because a frame without markers updates nothing in any case; `unobservable` needs no hold
 /// because the state estimation holds a DOF that the markers do not determine.
 #[rustfmt::skip]
-pub static TABLE: [Rule; 26] = [
+pub static TABLE: [Rule; 27] = [
     rule(Flag::Frozen,           Frame, HOLD_THEN_FADE,                          true),
     rule(Flag::Late,             Frame, HOLD_THEN_FADE,                          true),
     rule(Flag::Duplicate,        Frame, WARN,                                    false),
@@ -99,6 +99,7 @@ pub static TABLE: [Rule; 26] = [
     rule(Flag::Unobservable,     Frame, WARN,                                    false),
     rule(Flag::FollowingError,   Rig,   &[(QuickStop, Engage)],                  false),
     rule(Flag::ReferenceJump,    Tick,  &[(HoldMotion, Engage)],                 false),
+    rule(Flag::ReferenceFast,    Tick,  WARN,                                    false),
     rule(Flag::ReferenceLate,    Tick,  &[(HoldMotion, Engage)],                 false),
     rule(Flag::ReferenceInvalid, Tick,  &[(HoldMotion, Engage)],                 false),
     rule(Flag::LateTick,         Tick,  &[(Warn, Auto), (HoldMotion, Engage)],   false),

@@ -2,43 +2,33 @@
 
 use crate::dof::{PerDof, all_finite};
 use crate::error::{ConfigError, require, require_positive};
+use crate::settings::DofSettings;
 use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::input_device::InputDeviceMonitor;
+use crate::supervision::reference_limiter::ReferenceLimiter;
 use crate::supervision::settings::SafetySettings;
 
 /// `late_tick` allows this share more: two stamps of up to 10^6 s differ by a period with an error of 10^-10 s.
 const ROUNDING: f64 = 1e-6;
 
-/// Passes the increments of the reference that are recent, finite, on time and no faster than an operator moves.
+/// Passes the increments of the reference that are recent, finite and on time, at a limited speed.
 ///
 /// ```text
-/// gated reference = reference + offset
+/// gated reference = reference + offset - lag
 /// ```
 ///
-/// A discarded increment goes into the offset, so that nothing catches up later. With nothing discarded the reference
-/// passes bit for bit.
+/// A discarded increment goes into the offset, so that nothing catches up later. [`ReferenceLimiter`] has the lag.
+/// With nothing discarded and no limit reached, the reference passes bit for bit. [`InputDeviceMonitor`] detects jumps:
+/// these are discarded, and motion stops.
 ///
-/// The travel of the reference in one direction is a leaky sum of its increments du,
-///
-/// ```text
-/// travel <- k travel + du,   k = exp(-period / reference_time)
-/// |travel| <= reference_speed period / (1 - k)
-/// ```
-///
-/// which a steady `reference_speed` just reaches. An increment beyond this bound is discarded, and motion stops. A tremor
-/// reverses before its travel adds up; an input that runs away slower than `reference_speed` is followed.
-/// [`InputDeviceMonitor`] checks the increments as well.
+/// Wrong when an input runs away: slower than `reference_speed` it is followed as it is, and faster at the limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReferenceGate {
     period: f64,
     reference_age: f64,
     late_tick: f64,
     stall: f64,
-    /// k.
-    decay: f64,
-    /// `reference_speed` period / (1 - k).
-    travel_limit: PerDof<f64>,
-    travel: PerDof<f64>,
+    limiter: ReferenceLimiter,
     device: InputDeviceMonitor,
     offset: PerDof<f64>,
     /// The reference of the last tick, without the offset.
@@ -68,9 +58,12 @@ impl ReferenceGate {
     ///
     /// # Errors
     /// A value is not a finite number above 0, or `late_tick` is not above 1.
-    pub fn new(safety: &SafetySettings, period: f64) -> Result<Self, ConfigError> {
+    pub fn new(
+        safety: &SafetySettings,
+        dofs: &PerDof<DofSettings>,
+        period: f64,
+    ) -> Result<Self, ConfigError> {
         require_positive("period", period)?;
-        require_positive("reference_time", safety.reference_time)?;
         let is_late_tick = safety.late_tick.is_finite() && safety.late_tick > 1.0;
         require(
             is_late_tick,
@@ -79,16 +72,12 @@ impl ReferenceGate {
             "finite, above 1",
         )?;
         require_positive("stall", safety.stall)?;
-        let decay = libm::exp(-period / safety.reference_time);
-        let steady = period / (1.0 - decay);
         Ok(Self {
             period,
             reference_age: safety.reference_age,
             late_tick: safety.late_tick,
             stall: safety.stall,
-            decay,
-            travel_limit: safety.reference_speed.map(|speed| speed * steady),
-            travel: [0.0; 3],
+            limiter: ReferenceLimiter::new(safety, dofs, period)?,
             device: InputDeviceMonitor::new(safety, period)?,
             offset: [0.0; 3],
             input: [f64::NAN; 3],
@@ -131,17 +120,24 @@ impl ReferenceGate {
             self.input = reference;
             return gated;
         };
-        let next = self.add_offset(reference, last);
+        let mut next = self.add_offset(reference, last);
         if !is_stopped {
-            let wrong = self.check_motion(reference, next, last, elapsed);
-            let wrong = wrong.difference(off);
-            gated.raised = gated.raised.union(wrong);
+            let mut increments = reference;
+            for (increment, before) in increments.iter_mut().zip(self.input) {
+                *increment -= before;
+            }
+            let wrong = self.device.update(increments, elapsed).difference(off);
             is_stopped = !wrong.is_empty();
+            gated.raised = gated.raised.union(wrong);
+            if !is_stopped && !off.contains(Flag::ReferenceFast) {
+                let fast = self.limiter.limit(&mut next, last, increments);
+                gated.raised = gated.raised.union(fast);
+            }
         }
         self.input = reference;
         self.is_engaging = false;
         if is_stopped {
-            self.travel = [0.0; 3];
+            self.limiter.reset();
             self.device.reset();
             for ((offset, last), input) in self.offset.iter_mut().zip(last).zip(reference) {
                 *offset = last - input;
@@ -166,33 +162,6 @@ impl ReferenceGate {
             }
         }
         sums
-    }
-
-    /// Check the increment, together with those before it.
-    fn check_motion(
-        &mut self,
-        reference: PerDof<f64>,
-        next: PerDof<f64>,
-        last: PerDof<f64>,
-        elapsed: f64,
-    ) -> Flags {
-        let mut increments = reference;
-        for (increment, before) in increments.iter_mut().zip(self.input) {
-            *increment -= before;
-        }
-        let is_fast = Flags::when(self.exceeds_speed(next, last), Flag::ReferenceJump);
-        self.device.update(increments, elapsed).union(is_fast)
-    }
-
-    /// Whether a DOF exceeds its speed limit with this increment.
-    fn exceeds_speed(&mut self, next: PerDof<f64>, last: PerDof<f64>) -> bool {
-        let axes = self.travel.iter_mut().zip(next).zip(last);
-        let mut exceeds = false;
-        for (((travel, next), last), limit) in axes.zip(self.travel_limit) {
-            *travel = self.decay * *travel + (next - last);
-            exceeds |= travel.abs() > limit;
-        }
-        exceeds
     }
 
     /// The gated reference (3,) [m, rad, rad]; NaN before the first.

@@ -17,7 +17,7 @@ pub struct SafetySettings {
     pub width_limit: PerDof<f64>,
     /// Largest absolute value of an estimated contact offset [m, rad, rad].
     pub offset_limit: PerDof<f64>,
-    /// Largest speed of the reference over `reference_time` [m/s, rad/s, rad/s].
+    /// Largest speed of the reference over `reference_time` at which it is followed [m/s, rad/s, rad/s].
     pub reference_speed: PerDof<f64>,
     /// Time constant of the mean of the reference's speed, in s.
     pub reference_time: f64,
@@ -65,7 +65,7 @@ pub struct SafetySettings {
     pub hold_travel: f64,
     /// Travel over which the compensation fades to nothing [in `width_limit`].
     pub fade_travel: f64,
-    /// Travel over which the compensation returns after warnings have been acknowledged [in `width_limit`].
+    /// Travel over which the compensation returns after the cause of a fade has cleared [in `width_limit`].
     pub restore_travel: f64,
     /// Good frames in a row that clear a flag of frames.
     pub good_frames: u32,

@@ -27,11 +27,12 @@ pub struct Event {
 ///
 /// ```text
 /// gain_share <- gain_share - travel / fade_travel       while fading
-/// gain_share <- gain_share + travel / restore_travel    otherwise, once every warning has been acknowledged
+/// gain_share <- gain_share + travel / restore_travel    while nothing more severe than a warning is in force
 /// ```
 ///
 /// is the share of the free gain in use, 0 to 1. It changes with motion only, never with time, so that nothing moves by
-/// itself.
+/// itself; while the estimate or motion is held, it stays. Compensation returns without an acknowledgement, which only
+/// clears the list of warnings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Supervisor {
     settings: SafetySettings,
@@ -109,13 +110,14 @@ impl Supervisor {
                 self.gain_share = (self.gain_share - travel / self.settings.fade_travel).max(0.0);
             }
             Reaction::PassThrough => self.gain_share = 0.0,
-            Reaction::None | Reaction::Warn | Reaction::HoldEstimate => {
-                if self.gain_share < 1.0 && self.latched.is_empty() {
-                    self.gain_share =
-                        (self.gain_share + travel / self.settings.restore_travel).min(1.0);
-                }
+            Reaction::None | Reaction::Warn => {
+                self.gain_share =
+                    (self.gain_share + travel / self.settings.restore_travel).min(1.0);
             }
-            Reaction::HoldMotion | Reaction::QuickStop | Reaction::Disable => {}
+            Reaction::HoldEstimate
+            | Reaction::HoldMotion
+            | Reaction::QuickStop
+            | Reaction::Disable => {}
         }
     }
 

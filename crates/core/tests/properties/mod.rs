@@ -34,6 +34,7 @@ mod offset_map;
 mod outline;
 mod play;
 mod reference_gate;
+mod reference_speed;
 mod sharing;
 mod state;
 mod stress;

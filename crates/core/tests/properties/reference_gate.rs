@@ -6,7 +6,7 @@ use crate::supervision::settings::SafetySettings;
 use proptest::prelude::*;
 
 use super::config;
-use super::support::{PERIOD, UNITS, safety};
+use super::support::{PERIOD, UNITS, dofs, safety};
 
 /// A gate whose input moves all DOFs, in units.
 struct Bench {
@@ -18,7 +18,7 @@ struct Bench {
 impl Bench {
     fn new(input: f64) -> Self {
         let mut bench = Self {
-            gate: ReferenceGate::new(&safety(), PERIOD).unwrap(),
+            gate: ReferenceGate::new(&safety(), &dofs(), PERIOD).unwrap(),
             time: 0.0,
             input,
         };
@@ -114,7 +114,7 @@ fn started() -> ReferenceGate {
 }
 
 fn started_with(settings: &SafetySettings) -> ReferenceGate {
-    let mut gate = ReferenceGate::new(settings, PERIOD).unwrap();
+    let mut gate = ReferenceGate::new(settings, &dofs(), PERIOD).unwrap();
     assert!(gate.reference().iter().all(|value| value.is_nan()));
     assert_eq!(step(&mut gate, 0.0, 0.0, None).raised, Flags::NONE);
     gate
@@ -135,7 +135,7 @@ fn a_tick_is_late_after_three_periods_and_severe_after_the_stall_time() {
     ] {
         // The first tick cannot be late.
         for start in [0.0, 4.0] {
-            let mut gate = ReferenceGate::new(&safety(), PERIOD).unwrap();
+            let mut gate = ReferenceGate::new(&safety(), &dofs(), PERIOD).unwrap();
             let first = step(&mut gate, 0.0, start, None);
             assert_eq!((first.raised, first.severe), (Flags::NONE, Flags::NONE));
             if gap == 0.1 && start > 0.0 {
@@ -197,34 +197,10 @@ fn a_detector_that_is_off_raises_and_stops_nothing() {
     }
 }
 
-/// The bound holds for each DOF, in each direction.
-#[test]
-fn the_reference_may_travel_as_far_as_its_speed_limit_allows_and_no_farther() {
-    // The input device monitor would refuse a step from rest.
-    let settings = SafetySettings {
-        reference_count: [1e3; 3],
-        ..safety()
-    };
-    let steady = PERIOD / (1.0 - libm::exp(-PERIOD / settings.reference_time));
-    for dof in 0..3 {
-        for (share, raised) in [(1.0, false), (1.0 + 1e-9, true), (-1.0 - 1e-9, true)] {
-            let mut reference = [0.0; 3];
-            reference[dof] = settings.reference_speed[dof] * steady * share;
-            let mut gate = started_with(&settings);
-            let found = gate.step(reference, PERIOD, None, false, Flags::NONE);
-            assert_eq!(
-                found.raised,
-                Flags::when(raised, Flag::ReferenceJump),
-                "{dof}, {share}"
-            );
-        }
-    }
-}
-
 #[test]
 fn nothing_passes_that_is_not_finite_or_while_motion_is_held() {
     let invalid = Flags::of(Flag::ReferenceInvalid);
-    let mut gate = ReferenceGate::new(&safety(), PERIOD).unwrap();
+    let mut gate = ReferenceGate::new(&safety(), &dofs(), PERIOD).unwrap();
     let wrong = step(&mut gate, f64::NAN, 0.0, None);
     assert_eq!((wrong.reference, wrong.raised), (None, invalid));
     let held = gate.step([0.5; 3], PERIOD, None, true, Flags::NONE);
@@ -252,8 +228,9 @@ fn nothing_passes_that_is_not_finite_or_while_motion_is_held() {
 #[test]
 fn settings_out_of_range_are_named() {
     type Change = fn(&mut SafetySettings);
-    let changes: [(&str, Change); 6] = [
+    let changes: [(&str, Change); 7] = [
         ("reference_speed", |s| s.reference_speed[1] = 0.0),
+        ("command_speed", |s| s.command_speed[2] = f64::NAN),
         ("reference_time", |s| s.reference_time = f64::NAN),
         ("reference_age", |s| s.reference_age = -1.0),
         ("late_tick", |s| s.late_tick = 1.0),
@@ -263,8 +240,13 @@ fn settings_out_of_range_are_named() {
     for (field, change) in changes {
         let mut wrong = safety();
         change(&mut wrong);
-        assert_eq!(ReferenceGate::new(&wrong, PERIOD).unwrap_err().field, field);
+        assert_eq!(
+            ReferenceGate::new(&wrong, &dofs(), PERIOD)
+                .unwrap_err()
+                .field,
+            field
+        );
     }
-    let error = ReferenceGate::new(&safety(), 0.0).unwrap_err();
+    let error = ReferenceGate::new(&safety(), &dofs(), 0.0).unwrap_err();
     assert_eq!(error.field, "period");
 }

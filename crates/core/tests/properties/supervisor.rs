@@ -155,7 +155,7 @@ fn every_level_is_reached_and_cleared_as_the_table_says() {
 }
 
 #[test]
-fn a_hold_ends_by_time_or_travel_and_compensation_returns_once_acknowledged() {
+fn a_hold_ends_by_time_or_travel_and_compensation_returns_with_motion_once_the_cause_is_gone() {
     let frozen = Flags::of(Flag::Frozen);
     let mut by_travel = supervisor();
     by_travel.update(&event(Source::Frame, 0.0, 0.0, frozen));
@@ -179,14 +179,19 @@ fn a_hold_ends_by_time_or_travel_and_compensation_returns_once_acknowledged() {
         supervisor.update(&event(Source::Frame, 1000.0, 0.0, Flags::NONE));
     }
     assert_eq!(supervisor.reaction(), Reaction::None);
-    supervisor.update(&event(Source::Tick, 1001.0, 9.0, Flags::NONE));
-    assert!(
-        (supervisor.gain_share() - 0.75).abs() < 1e-12,
-        "the warning was not acknowledged"
-    );
-    supervisor.acknowledge();
+    supervisor.update(&event(Source::Tick, 1001.0, 0.0, Flags::NONE));
+    assert!((supervisor.gain_share() - 0.75).abs() < 1e-12);
     supervisor.update(&event(Source::Tick, 1001.0, 0.3, Flags::NONE));
     assert!((supervisor.gain_share() - 0.9).abs() < 1e-12);
+    assert_eq!(supervisor.latched(), frozen, "the warning stays");
+    // While the estimate is held again, the share stays.
+    supervisor.update(&event(Source::Frame, 1001.0, 0.0, frozen));
+    supervisor.update(&event(Source::Tick, 1002.0, 1.0, Flags::NONE));
+    assert_eq!(supervisor.reaction(), Reaction::HoldEstimate);
+    assert!((supervisor.gain_share() - 0.9).abs() < 1e-12);
+    for _ in 0..5 {
+        supervisor.update(&event(Source::Frame, 1002.0, 0.0, Flags::NONE));
+    }
     supervisor.update(&event(Source::Tick, 1001.0, 9.0, Flags::NONE));
     assert!((supervisor.gain_share() - 1.0).abs() < 1e-12);
 }
@@ -243,6 +248,42 @@ proptest! {
             prop_assert!(passes || !still || (share - before).abs() == 0.0);
             prop_assert!(!supervisor.flags().is_empty() || supervisor.reaction() == Reaction::None);
         }
+    }
+
+    /// The share falls and rises with the travel alone, however often the cause comes and goes, and never by more.
+    #[test]
+    fn a_cause_that_comes_and_goes_changes_the_share_by_the_travel_alone(
+        flag in prop::sample::select(&[Flag::Frozen, Flag::Lost, Flag::Merged, Flag::LimitCycle]),
+        phases in prop::collection::vec((0.0..3.0_f64, 1..60_u32, any::<bool>()), 1..40),
+    ) {
+        let settings = safety();
+        let least = settings.fade_travel.min(settings.restore_travel);
+        let (mut supervisor, mut now) = (supervisor(), 0.0);
+        for (travel, frames, is_present) in phases {
+            let raised = Flags::when(is_present, flag);
+            for _ in 0..frames {
+                now += 0.04;
+                let before = supervisor.gain_share();
+                supervisor.update(&event(Source::Frame, now, 0.0, raised));
+                prop_assert_eq!(supervisor.gain_share(), before, "a frame moves nothing");
+                let moved = travel / f64::from(frames);
+                supervisor.update(&event(Source::Tick, now, moved, Flags::NONE));
+                let change = supervisor.gain_share() - before;
+                prop_assert!(change.abs() <= moved / least + 1e-12);
+                prop_assert!((0.0..=1.0).contains(&supervisor.gain_share()));
+                match supervisor.reaction() {
+                    Reaction::Fade => prop_assert!(change <= 0.0),
+                    Reaction::None | Reaction::Warn => prop_assert!(change >= 0.0),
+                    _ => prop_assert_eq!(change, 0.0),
+                }
+            }
+        }
+        // Where the cause has gone, all of the compensation returns.
+        for _ in 0..5 {
+            supervisor.update(&event(Source::Frame, now, 0.0, Flags::NONE));
+        }
+        supervisor.update(&event(Source::Tick, now, settings.restore_travel, Flags::NONE));
+        prop_assert_eq!(supervisor.gain_share(), 1.0);
     }
 
     /// With one more flag raised at every event, the reaction is never weaker.
