@@ -7,7 +7,6 @@ from numpy.typing import ArrayLike, NDArray
 __all__ = [
     "DETECTORS",
     "MEANINGS",
-    "AdaptiveAxis",
     "Camera",
     "Compensator",
     "Estimator",
@@ -18,7 +17,7 @@ __all__ = [
     "Reduction",
     "Renderer",
     "StateEstimator",
-    "WeightedEstimator",
+    "TipFilter",
     "__version__",
     "label_regions",
 ]
@@ -148,45 +147,13 @@ class StateEstimator:
     ) -> tuple[_Floats, _Flags]: ...
 
 @final
-class WeightedEstimator:
-    def __new__(cls, settings: Mapping[str, Any]) -> WeightedEstimator: ...
-    def estimate(
-        self,
-        model: FeatureModel,
-        predicted_state: ArrayLike,
-        std: ArrayLike,
-        measured_features: ArrayLike,
-        covariance: ArrayLike | None = None,
-    ) -> tuple[_Floats, _Floats, _Flags, _Flags, _Floats, _Floats] | None: ...
+class TipFilter:
+    def __new__(cls, settings: Mapping[str, Any], *, unit: float, std: float) -> TipFilter: ...
     def run(
-        self,
-        model: FeatureModel,
-        predicted_states: ArrayLike,
-        std: ArrayLike,
-        measured_features: ArrayLike,
-        covariance: ArrayLike | None = None,
-    ) -> tuple[_Floats, _Floats, _Flags]: ...
-
-@final
-class AdaptiveAxis:
-    def __new__(cls, settings: Mapping[str, Any], dof: int) -> AdaptiveAxis: ...
-    def step(self, reference: float) -> float: ...
-    def run(self, references: ArrayLike) -> _Floats: ...
+        self, commands: ArrayLike, measured: ArrayLike
+    ) -> tuple[_Floats, _Floats, _Floats]: ...
     @property
-    def gain(self) -> tuple[float, float]: ...
-    def update_offsets(
-        self, command: float, measured: float, std: float, commands_since: ArrayLike
-    ) -> _Triggers: ...
-    @property
-    def command(self) -> float: ...
-    @property
-    def predicted_state(self) -> float: ...
-    @property
-    def delta_minus(self) -> float: ...
-    @property
-    def delta_plus(self) -> float: ...
-    @property
-    def std(self) -> tuple[float, float]: ...
+    def gain(self) -> float: ...
 
 @final
 class Reduction:

@@ -3,7 +3,6 @@
 // PyO3 hands arguments over by value.
 #![allow(clippy::needless_pass_by_value)]
 
-mod adaptive;
 mod arrays;
 mod camera;
 mod compensator;
@@ -19,8 +18,8 @@ mod region;
 mod render;
 mod settings;
 mod state;
+mod tip_filter;
 mod vision;
-mod weighted;
 
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
@@ -29,8 +28,6 @@ use pyo3::types::PyTuple;
 mod _core {
     use super::{Bound, PyModule, PyModuleMethods, PyResult, PyTuple};
 
-    #[pymodule_export]
-    use super::adaptive::AdaptiveAxis;
     #[pymodule_export]
     use super::camera::Camera;
     #[pymodule_export]
@@ -52,7 +49,7 @@ mod _core {
     #[pymodule_export]
     use super::vision::{MarkerDetector, label_regions};
     #[pymodule_export]
-    use super::weighted::WeightedEstimator;
+    use super::tip_filter::TipFilter;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

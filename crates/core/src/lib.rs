@@ -73,6 +73,7 @@ pub use estimation::expectation::Beliefs;
 pub use estimation::history::Entry;
 pub use estimation::posture::Belief;
 pub use estimation::settings::StateEstimationSettings;
+pub use estimation::tip_filter::TipFilter;
 pub use r#loop::best::Best;
 pub use r#loop::paper::Paper;
 pub use r#loop::profile::Profile;

@@ -10,7 +10,6 @@ from typing import Any
 import msgspec
 
 from tautscope._core import DETECTORS
-from tautscope.config.adaptive import AdaptiveConfig
 from tautscope.config.control import ControlConfig
 from tautscope.config.dof import DofConfig
 from tautscope.config.drives import DrivesConfig
@@ -70,11 +69,6 @@ def check_dof(dof: Dof, settings: DofConfig) -> None:
     """The relations in a DOF's block. This and all below raise `ConfigError` with the key."""
     _require_at_most(dof.label, settings, "free_gain", "gain_limit")
     _require_at_most(dof.label, settings, "delta_minus", "delta_plus")
-
-
-def check_adaptive(adaptive: AdaptiveConfig) -> None:
-    """The relations in block ``adaptive``."""
-    _require_at_most("adaptive", adaptive, "cautious_gain", "contact_gain")
 
 
 def check_instrument(instrument: InstrumentConfig) -> None:

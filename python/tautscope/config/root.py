@@ -10,7 +10,6 @@ from msgspec import Struct, field
 from tautscope.config.adaptive import AdaptiveConfig
 from tautscope.config.camera import CameraConfig
 from tautscope.config.checks import (
-    check_adaptive,
     check_control,
     check_dof,
     check_drives,
@@ -104,7 +103,6 @@ def from_document(document: dict[str, Any]) -> Config:
     check_finite(msgspec.to_builtins(config), "")
     for dof in Dof:
         check_dof(dof, config[dof])
-    check_adaptive(config.adaptive)
     check_instrument(config.instrument)
     check_twin(config.twin)
     check_control(config.control)

@@ -68,25 +68,6 @@ class SafetyConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     noise needs more than the slack."""
     innovation_limit: Positive = 8.0
     """Largest innovation; a frame with a larger one is refused [in standard deviations]."""
-    innovation_floor: Positive = 0.08
-    """Least standard deviation of the innovation [in start_deviation]."""
-    innovation_growth: SmoothingFactor = 0.3
-    """Share by which the variance of the innovation follows one that is larger."""
-    innovation_decay: SmoothingFactor = 0.05
-    """Share by which the variance of the innovation follows one that is smaller, in motion."""
-    jump: PerDof = (0.2e-3, 0.2, 0.05)
-    """How much farther than its command the tip may move from one image to the next, in addition
-    to two standard deviations of the measurement [m, rad, rad]."""
-    slip: PerDof = (0.4e-3, 2.6, 0.04)
-    """How far a tip in contact may be from where its command takes it, in addition to 15 % of the
-    travel and the standard deviation of the measurement [m, rad, rad]. Rotation has no lasting
-    contact, because the shaft winds up while insertion moves."""
-    grip_distance: Positive = 15.0
-    """Travel of the command after which a tip that moves with it is in contact [in
-    update_distance]."""
-    blind_growth: NonNegative = 0.1
-    """Growth of the innovation's standard deviation and of `jump` per travel of the command while
-    no marker is found."""
     state_noise: Vector3 = (0.03e-3, 1.5e-3, 1.5e-3)
     """Standard deviation of the state estimate in a still scene [m, rad, rad], twin. Three times
     this must be below contact_tolerance times update_distance, or noise is taken for contact."""
@@ -110,11 +91,6 @@ class SafetyConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """Ratio of a swing to the one before it, from which it grows."""
     cycle_time: Positive = 2.0
     """Longest swing of a limit cycle, one way [s]."""
-    change_limit: PerDof = (0.8e-3, 0.9, 0.08)
-    """Largest change of a contact offset after it had settled; that of rotation varies as much with
-    position."""
-    change_travel: Positive = 1.5
-    """Travel of the command over which changes add up [in width_limit]."""
     hold_time: NonNegative = 4.0
     """Time after which a flag that is still raised goes to its next reaction [s]."""
     hold_travel: NonNegative = 4.0

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from msgspec import Meta, Struct
+from msgspec import Struct
 
 from tautscope.config.fields import NonNegative, Positive
 
 
 class StateEstimationConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Weighted state estimation of profile ``best``, decision 0018. All [ours]."""
+    """Ensemble filter of profile ``best``, decision 0030. All [ours].
+
+    Half widths, centres and travels are in halves of the DOF's safety.width_limit, so that one set
+    serves all three. A random walk has the given standard deviation over a travel of 1.
+    """
 
     marker_deviation: Positive = 0.3
     """Standard deviation of a marker without a covariance [px]."""
@@ -19,12 +21,32 @@ class StateEstimationConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_
     sideways_deviation: NonNegative = 0.3e-3
     """Standard deviation of the tip's displacement across the bend by uneven curvature of the
     bending section [m]."""
+    geometry_deviation: NonNegative = 0.5
+    """Standard deviation of the lasting error of the predicted features, by camera pose and section
+    as configured [px]."""
     outlier_distance: Positive = 4.0
     """Mahalanobis distance beyond which a marker is an outlier."""
-    steps: Annotated[int, Meta(ge=1, le=100)] = 12
-    """Gauss-Newton steps, at most."""
-    rest_deviation: NonNegative = 0.25
-    """Standard deviation of the motion of a tip between two images while its command rests [in
-    update_distance of the DOF]."""
-    settling_time: NonNegative = 0.15
-    """Time constant with which a tip comes to rest after its command [s]."""
+    tip_deviation: Positive = 0.05
+    """Standard deviation of the tip from the plays, by rounding of the loop and viscous friction."""
+    width_deviation: Positive = 0.35
+    """Standard deviation of the logarithm of the initial half width."""
+    centre_deviation: NonNegative = 0.25
+    """Standard deviation of the initial centre of the contact offsets [in half widths]."""
+    share_deviation: NonNegative = 1.5
+    """Standard deviation of the logit of the share of the friction that insertion and rotation have
+    in common."""
+    tip_walk: NonNegative = 0.012
+    """Random walk of the tip [in half widths]."""
+    width_walk: NonNegative = 0.03
+    """Random walk of the logarithm of the half width."""
+    centre_walk: NonNegative = 0.012
+    """Random walk of the centre [in half widths]."""
+    share_walk: NonNegative = 0.006
+    """Random walk of the logit of the share."""
+    map_rate: tuple[NonNegative, NonNegative, NonNegative] = (0.35, 0.35, 0.0)
+    """Share of the centre that its map over the position takes over per travel of 1, for each
+    DOF."""
+    gain_window: Positive = 25.0
+    """Travel over which the regression of the gain forgets."""
+    gain_prior: Positive = 1.0
+    """Strength of the prior of a gain of 1: a variance of the position times a travel."""

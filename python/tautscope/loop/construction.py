@@ -20,11 +20,6 @@ def core_settings(config: Config, compensate: bool = True) -> dict[str, Any]:
     return document
 
 
-def build_adaptive_axis(config: Config, dof: Dof, compensate: bool = True) -> _core.AdaptiveAxis:
-    """One DOF of profile ``best``; without compensation its gains are 1."""
-    return _core.AdaptiveAxis(core_settings(config, compensate), list(Dof).index(dof))
-
-
 def build_estimator(dof: DofConfig) -> _core.Estimator:
     """The hysteresis estimator of one DOF, Eqs. (4)-(6)."""
     return _core.Estimator(
@@ -71,11 +66,6 @@ def build_state_estimator(config: Config) -> _core.StateEstimator:
     """The state estimation with its rank monitored, Eqs. (13)-(16)."""
     insertion, rotation, bending = (config[dof].observable_deviation for dof in Dof)
     return _core.StateEstimator(observable_deviation=(insertion, rotation, bending))
-
-
-def build_weighted_estimator(config: Config) -> _core.WeightedEstimator:
-    """The state estimation of profile ``best``, decision 0018."""
-    return _core.WeightedEstimator(core_settings(config))
 
 
 def build_loop(config: Config, compensate: bool = True) -> _core.Reduction:

@@ -136,23 +136,21 @@ impl VectorLaw {
         }
         self.rate_limit.step(travel);
         let lead = self.next_lead(reference, motion, filter);
-        let mut lawful = self.command;
-        let moves = self.moves(motion);
-        let dofs = lawful.iter_mut().zip(reference).zip(lead).zip(moves);
-        for (((command, reference), lead), moves) in dofs {
-            if moves {
-                *command = reference + lead;
-            }
-        }
-        let command = limit(lawful);
+        let command = limit(self.lawful(reference, motion, lead));
         self.lead = subtract(command, reference);
         self.follow(command, filter);
     }
 
-    /// Which commands may move at all.
-    fn moves(&self, motion: PerDof<f64>) -> PerDof<bool> {
-        let [shaft, bending] = GROUPS.map(|group| self.norm(group, motion) > 0.0);
-        [shaft, shaft, bending]
+    /// Reference plus lead, within the bounds despite rounding; of DOFs that rest the last command, bit for bit.
+    fn lawful(&self, reference: PerDof<f64>, motion: PerDof<f64>, lead: PerDof<f64>) -> PerDof<f64> {
+        let ([u1, u2, u3], [l1, l2, l3], [c1, c2, c3]) = (reference, lead, self.command);
+        let [_, _, du3] = motion;
+        let [shaft, _] = GROUPS.map(|group| self.norm(group, motion) > 0.0);
+        let [first, second] = if shaft { [u1 + l1, u2 + l2] } else { [c1, c2] };
+        // Eq. (2), to the last bit.
+        let farthest = c3 + self.bending_gain * du3;
+        let third = (u3 + l3).max(c3.min(farthest)).min(c3.max(farthest));
+        [first, second, third]
     }
 
     fn follow(&mut self, command: PerDof<f64>, filter: &mut Filter) {
@@ -178,8 +176,10 @@ impl VectorLaw {
         for (group, gain) in GROUPS.into_iter().zip(gains) {
             let step = self.bounded_step(group, gain, wanted, motion, filter);
             let axes = step.into_iter().zip(motion).zip(group);
+            // Without gain there is no compensation.
+            let share = if gain > 1.0 { self.share } else { 0.0 };
             for (lead, ((step, motion), own)) in lead.iter_mut().zip(axes) {
-                *lead += own * self.share * (step - motion);
+                *lead += own * share * (step - motion);
             }
         }
         lead

@@ -4,7 +4,9 @@ use crate::article::play::Play;
 use crate::dof::PerDof;
 use crate::error::{ConfigError, require, require_non_negative, require_positive};
 use crate::estimation::centre_map::CentreMap;
-use crate::estimation::ensemble::{Ensemble, STATE, State, hysteresis, position};
+use crate::estimation::ensemble::{
+    Ensemble, STATE, ScalarMeasurement, State, hysteresis, position,
+};
 use crate::estimation::gain::GainEstimate;
 use crate::estimation::history::{Entry, History};
 use crate::estimation::marker_measurement::{ImagePrediction, MarkerEstimate, Markers};
@@ -102,6 +104,7 @@ impl Filter {
     ) -> Result<Self, ConfigError> {
         for (field, value) in [
             ("marker_deviation", settings.marker_deviation),
+            ("tip_deviation", settings.tip_deviation),
             ("width_deviation", settings.width_deviation),
             ("gain_window", settings.gain_window),
             ("gain_prior", settings.gain_prior),
@@ -225,30 +228,30 @@ impl Filter {
             return;
         }
         let path = history.since(self.time).filter(|entry| entry.time < to.time);
-        let commands = path.clone().map(|entry| entry.command);
-        let commands = commands.chain(core::iter::once(to.command));
+        let path = path.chain(core::iter::once(to));
+        self.follow(path.map(|entry| (entry.command, entry.reference)));
+        self.time = to.time;
+    }
+
+    /// Propagates the ensemble along commands with their references, from the last ones on.
+    pub fn follow(&mut self, path: impl Iterator<Item = (PerDof<f64>, PerDof<f64>)> + Clone) {
+        let commands = path.clone().map(|(command, _)| command);
         self.ensemble
-            .propagate(&self.maps, self.radius, self.command, commands.clone());
-        let mut last = self.command;
-        for command in commands {
-            let plays = &self.nominal.hysteresis;
-            self.uncorrected = plays.propagate(self.radius, &self.uncorrected, last, command);
-            last = command;
-        }
+            .propagate(&self.maps, self.radius, self.command, commands);
         let mut walked = [0.0; 3];
-        let mut last = self.reference;
-        for reference in path.map(|entry| entry.reference).chain(core::iter::once(to.reference)) {
-            let steps = reference.into_iter().zip(last).zip(self.unit);
-            for ((walked, travel), ((reference, last), unit)) in
-                walked.iter_mut().zip(&mut self.travel).zip(steps)
-            {
-                let step = ((reference - last) / unit).abs();
-                *travel += step;
-                *walked += step;
+        for (command, reference) in path {
+            let plays = &self.nominal.hysteresis;
+            self.uncorrected =
+                plays.propagate(self.radius, &self.uncorrected, self.command, command);
+            let steps = reference.into_iter().zip(self.reference).zip(self.unit);
+            for (walked, ((reference, last), unit)) in walked.iter_mut().zip(steps) {
+                *walked += ((reference - last) / unit).abs();
             }
-            last = reference;
+            (self.command, self.reference) = (command, reference);
         }
-        (self.time, self.command, self.reference) = (to.time, to.command, to.reference);
+        for (travel, walked) in self.travel.iter_mut().zip(walked) {
+            *travel += walked;
+        }
         self.walk(walked);
     }
 
@@ -292,9 +295,23 @@ impl Filter {
         }
     }
 
+    /// Mean and covariance of the tip, with its deviation from the plays.
     fn tips(&self) -> ([f64; 3], [[f64; 3]; 3]) {
         let nominal = &self.nominal;
-        self.ensemble.covariance(|state| nominal.tip(position(state).output))
+        let (mean, [[v1, a, b], [c, v2, d], [e, f, v3]]) =
+            self.ensemble.covariance(|state| nominal.tip(position(state).output));
+        let [d1, d2, d3] = self.deviation();
+        let covariance = [
+            [v1 + d1 * d1, a, b],
+            [c, v2 + d2 * d2, d],
+            [e, f, v3 + d3 * d3],
+        ];
+        (mean, covariance)
+    }
+
+    /// Standard deviation of the tip from that of the plays (3,) [m, rad, rad].
+    fn deviation(&self) -> PerDof<f64> {
+        self.unit.map(|unit| self.settings.tip_deviation * unit)
     }
 
     /// The prediction of an image at the time of the ensemble.
@@ -327,10 +344,16 @@ impl Filter {
         is_position_only: bool,
     ) {
         let Nominal { origin, gain, .. } = self.nominal;
-        let Some(rows) = markers.linearize(estimate, origin, gain) else {
+        let Some(rows) = markers.linearize(estimate, origin, gain, self.deviation()) else {
             return;
         };
-        for row in &rows {
+        self.update_with(&rows, is_position_only);
+        self.catch_up(history);
+    }
+
+    /// Updates the ensemble at its time with measurements; with `is_position_only` only the tip.
+    pub fn update_with(&mut self, rows: &[ScalarMeasurement], is_position_only: bool) {
+        for row in rows {
             self.ensemble.update(row, is_position_only);
         }
         if !is_position_only {
@@ -339,7 +362,6 @@ impl Filter {
         }
         self.travel = [0.0; 3];
         self.settle();
-        self.catch_up(history);
     }
 
     /// Makes the tip as uncertain as at the start, and the geometry far more than that, about the mean: what comes next

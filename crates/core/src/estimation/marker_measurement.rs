@@ -139,15 +139,21 @@ impl Markers {
     }
 
     /// The markers used by an estimate as four independent measurements of standard deviation 1, linear about it; `gain`
-    /// (3,) is the travel of the tip over that of the output, about `origin` (3,).
+    /// (3,) is the travel of the tip over that of the output, about `origin` (3,), from which the tip deviates by `std`
+    /// (3,).
     pub fn linearize(
         &self,
         estimate: &MarkerEstimate,
         origin: PerDof<f64>,
         gain: PerDof<f64>,
+        std: PerDof<f64>,
     ) -> Option<[ScalarMeasurement; 4]> {
         let FeaturePrediction { features, columns } = estimate.prediction;
-        let whitener = Whitener::new(&self.covariance, estimate.used)?;
+        let mut covariance = self.covariance;
+        for (column, std) in columns.iter().zip(std) {
+            add_product(&mut covariance, column.map(|by| by * std));
+        }
+        let whitener = Whitener::new(&covariance, estimate.used)?;
         let mut misfit = self.features;
         let offset = columns.iter().zip(estimate.state).zip(origin.into_iter().zip(gain));
         for (value, predicted) in misfit.iter_mut().zip(features) {
@@ -203,10 +209,10 @@ impl<'a> Problem<'a> {
         sideways: Features,
     ) -> Option<Self> {
         let mut covariance = markers.covariance;
-        let rows = covariance.iter_mut().zip(prior.error_covariance).zip(sideways);
-        for ((row, errors), own) in rows {
-            for ((entry, error), other) in row.iter_mut().zip(errors).zip(sideways) {
-                *entry += error + own * other;
+        add_product(&mut covariance, sideways);
+        for (row, errors) in covariance.iter_mut().zip(prior.error_covariance) {
+            for (entry, error) in row.iter_mut().zip(errors) {
+                *entry += error;
             }
         }
         Some(Self {
@@ -364,6 +370,15 @@ impl Whitener {
                 .map(|(weight, value)| weight * value)
                 .sum()
         })
+    }
+}
+
+/// A + v v'.
+fn add_product(matrix: &mut Square, vector: Features) {
+    for (row, own) in matrix.iter_mut().zip(vector) {
+        for (entry, other) in row.iter_mut().zip(vector) {
+            *entry += own * other;
+        }
     }
 }
 

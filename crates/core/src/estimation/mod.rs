@@ -9,4 +9,5 @@ pub(crate) mod history;
 pub(crate) mod marker_measurement;
 pub(crate) mod posture;
 pub(crate) mod settings;
+pub(crate) mod tip_filter;
 pub(crate) mod whereabouts;

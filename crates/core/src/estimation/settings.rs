@@ -17,6 +17,8 @@ pub struct StateEstimationSettings {
     pub geometry_deviation: f64,
     /// Mahalanobis distance beyond which a marker is an outlier.
     pub outlier_distance: f64,
+    /// Standard deviation of the tip from the plays, by rounding of the loop and viscous friction.
+    pub tip_deviation: f64,
     /// Standard deviation of the logarithm of the initial half width.
     pub width_deviation: f64,
     /// Standard deviation of the initial centre of the contact offsets.

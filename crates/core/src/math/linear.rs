@@ -18,11 +18,6 @@ pub fn scale(factor: f64, vector: Vector) -> Vector {
     vector.map(|value| factor * value)
 }
 
-/// Product entry by entry.
-pub fn times([a, b, c]: Vector, [x, y, z]: Vector) -> Vector {
-    [a * x, b * y, c * z]
-}
-
 pub fn rotate(rows: &Matrix, vector: Vector) -> Vector {
     rows.map(|row| dot(row, vector))
 }
@@ -70,12 +65,4 @@ pub fn solve_symmetric(
     let y = y / p1 - m21 * z;
     let x = x / a - m10 * y - m20 * z;
     (a > 0.0 && p1 > 0.0 && p2 > 0.0).then_some([x, y, z])
-}
-
-/// The diagonal of the inverse of a symmetric, positive definite matrix; None for any other matrix.
-pub fn diagonal_of_inverse(rows: Matrix) -> Option<Vector> {
-    let [x, _, _] = solve_symmetric(rows, [1.0, 0.0, 0.0])?;
-    let [_, y, _] = solve_symmetric(rows, [0.0, 1.0, 0.0])?;
-    let [_, _, z] = solve_symmetric(rows, [0.0, 0.0, 1.0])?;
-    Some([x, y, z])
 }

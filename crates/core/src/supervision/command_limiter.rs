@@ -8,6 +8,8 @@ use crate::supervision::settings::SafetySettings;
 
 /// Share by which rounding may exceed the common bound of insertion and rotation.
 const ROUNDING: f64 = 1e-9;
+/// How far, in `width_limit`, rounding of a sum of reference and lead may do so.
+const SUM_ROUNDING: f64 = 1e-14;
 
 /// Limits the command of one DOF.
 ///
@@ -253,7 +255,10 @@ impl CommandLimiters {
         };
         let (unit1, unit2) = (first.lead_limit, second.lead_limit);
         let norm = |x: f64, y: f64| libm::sqrt(square(x / unit1) + square(y / unit2));
-        let reach = first.gain_limit.min(second.gain_limit) * norm(du1, du2) * (1.0 + ROUNDING);
+        let moved = norm(du1, du2);
+        let rounding = if moved > 0.0 { SUM_ROUNDING } else { 0.0 };
+        let gain = first.gain_limit.min(second.gain_limit);
+        let reach = gain * moved * (1.0 + ROUNDING) + rounding;
         let length = norm(dc1, dc2);
         let reaches = [Some(reach * unit1), Some(reach * unit2)];
         if length.is_nan() || length <= reach {

@@ -47,10 +47,6 @@ flags! {
     Clock = "clock",
     /// The measured state is too far from the predicted state.
     Innovation = "innovation",
-    /// The tip moved farther between two images than its command did.
-    Jump = "jump",
-    /// The tip was in contact and did not move with its command.
-    Slip = "slip",
     /// The image agrees with the prediction if its two markers are exchanged.
     Swapped = "swapped",
     /// Only one marker was found, or one of the two is where it cannot be.

@@ -84,15 +84,13 @@ const fn rule(
 /// `lost` fades without a hold because a frame without markers updates nothing in any case; `unobservable` needs no hold
 /// because the state estimation holds a DOF that the markers do not determine.
 #[rustfmt::skip]
-pub static TABLE: [Rule; 27] = [
+pub static TABLE: [Rule; 25] = [
     rule(Flag::Frozen,           Frame, HOLD_THEN_FADE,                          true),
     rule(Flag::Late,             Frame, HOLD_THEN_FADE,                          true),
     rule(Flag::Duplicate,        Frame, WARN,                                    false),
     rule(Flag::Dropped,          Frame, HOLD_THEN_FADE,                          true),
     rule(Flag::Clock,            Frame, HOLD_THEN_FADE,                          true),
     rule(Flag::Innovation,       Frame, HOLD_THEN_FADE,                          true),
-    rule(Flag::Jump,             Frame, HOLD_THEN_FADE,                          true),
-    rule(Flag::Slip,             Frame, HOLD_THEN_FADE,                          true),
     rule(Flag::Swapped,          Frame, HOLD_THEN_FADE,                          true),
     rule(Flag::Merged,           Frame, &[(Warn, Auto), (HoldEstimate, Auto), (Fade, Auto)], true),
     rule(Flag::Lost,             Frame, &[(Warn, Auto), (Fade, Auto)],           true),

@@ -8,15 +8,18 @@ from typing import Protocol
 
 import numpy as np
 
-from tautscope._core import AdaptiveAxis, Estimator
+from tautscope._core import Estimator, TipFilter
 from tautscope.analysis.models import constant_play
 from tautscope.analysis.models.task import Floats, Prediction, Task
 from tautscope.config import Config
-from tautscope.dof import Dof
-from tautscope.loop.construction import build_adaptive_axis
+from tautscope.loop.construction import core_settings
 
 UPDATE_SHARE = 0.01
 """Default update distance, as a share of the command's range in the first half."""
+
+
+HALF_WIDTH, TIP_STD = 15.0, 0.5
+"""Largest half width, and standard deviation of a measured tip [in update distances]."""
 
 
 class OnlineEstimator(Protocol):
@@ -100,25 +103,6 @@ def paper(config: Config, update_distance: float) -> OnlineEstimator:
 
 
 def best(config: Config, update_distance: float) -> OnlineEstimator:
-    """The estimator of profile ``best``: offsets over position, play state corrected by the tip."""
-    scaled = config.replace(**{"insertion.update_distance": update_distance})
-    return _Adaptive(build_adaptive_axis(scaled, Dof.INSERTION, compensate=False))
-
-
-@dataclass(frozen=True)
-class _Adaptive:
-    """An axis of profile ``best`` without compensation, which follows recorded commands."""
-
-    axis: AdaptiveAxis
-
-    def run(self, commands: Floats, measured: Floats) -> tuple[Floats, Floats, Floats]:
-        """`OnlineEstimator.run`; a measured tip has the std `adaptive.model_deviation`."""
-        found = np.empty((3, len(commands)))
-        axis, no_features = self.axis, np.empty(0)
-        for k, (command, tip) in enumerate(zip(commands.tolist(), measured.tolist(), strict=True)):
-            axis.step(command)
-            found[0, k] = axis.predicted_state
-            axis.update_offsets(command, tip, 0.0, no_features)
-            found[1:, k] = axis.delta_minus, axis.delta_plus
-        predicted, delta_minus, delta_plus = found
-        return predicted, delta_minus, delta_plus
+    """The estimator of profile ``best``."""
+    unit = HALF_WIDTH * update_distance
+    return TipFilter(core_settings(config), unit=unit, std=TIP_STD * update_distance)
