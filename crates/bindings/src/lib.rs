@@ -47,9 +47,9 @@ mod _core {
     #[pymodule_export]
     use super::state::StateEstimator;
     #[pymodule_export]
-    use super::vision::{MarkerDetector, label_regions};
-    #[pymodule_export]
     use super::tip_filter::TipFilter;
+    #[pymodule_export]
+    use super::vision::{MarkerDetector, label_regions};
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -9,9 +9,12 @@ use crate::error::{ConfigError, require, require_non_negative, require_positive}
 use crate::estimation::filter::Filter;
 use crate::model::hysteresis::Hysteresis;
 use crate::settings::{ControlSettings, DofSettings};
+use crate::supervision::settings::SafetySettings;
 
 /// Insertion with rotation, and bending: DOFs whose motions are bounded together.
 const GROUPS: [PerDof<f64>; 2] = [[1.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+/// Share of `command_speed` that the law uses, so that rounding does not exceed it.
+const BELOW_LIMIT: f64 = 0.999;
 /// Steps in search of the largest motion whose predicted tip is slow enough.
 const STEPS: usize = 5;
 
@@ -22,7 +25,7 @@ const STEPS: usize = 5;
 ///
 /// ```text
 /// target    c* = u' + m(u') + f h w + (1 - f) h sign(w)         u': output of the plays at which the tip is at u
-/// command   dc towards c* - c,   |dc| <= K_b |du|,   dc . du >= 0
+/// command   dc towards c* - c,   |dc| <= K_b |du|,   dc . du >= 0,   each |dc| <= command_speed period
 /// contact   |dq| <= tip_gain |du| for the tip q that the estimate predicts
 /// ```
 ///
@@ -37,6 +40,8 @@ pub struct VectorLaw {
     bending_gain: f64,
     tip_gain: f64,
     unit: PerDof<f64>,
+    /// Largest |dc| in a tick.
+    step_limit: PerDof<f64>,
     limits: PerDof<PlayLimit>,
     direction: SlipDirection,
     rate_limit: OffsetRateLimit,
@@ -48,7 +53,7 @@ pub struct VectorLaw {
 }
 
 impl VectorLaw {
-    /// The law before the first reference; `unit` (3,) [m, rad, rad] is that of the norms, `radius` the shaft's in m.
+    /// The law before the first reference, for a shaft of a radius in m; half of `width_limit` is the unit of the norms.
     ///
     /// # Errors
     /// A setting is out of range.
@@ -56,7 +61,7 @@ impl VectorLaw {
         settings: &AdaptiveSettings,
         [insertion, rotation, bending]: &PerDof<DofSettings>,
         control: &ControlSettings,
-        unit: PerDof<f64>,
+        safety: &SafetySettings,
         radius: f64,
         limits: PerDof<PlayLimit>,
     ) -> Result<Self, ConfigError> {
@@ -77,6 +82,7 @@ impl VectorLaw {
         for rate in settings.change_rate {
             require_non_negative("change_rate", rate)?;
         }
+        let unit = safety.width_limit.map(|width| width / 2.0);
         let mut rate = settings.change_rate;
         for (rate, unit) in rate.iter_mut().zip(unit) {
             *rate *= unit;
@@ -86,6 +92,9 @@ impl VectorLaw {
             bending_gain: gain(bending),
             tip_gain: settings.tip_gain,
             unit,
+            step_limit: safety
+                .command_speed
+                .map(|speed| speed * control.period * BELOW_LIMIT),
             limits,
             direction: SlipDirection::new(
                 radius,
@@ -142,7 +151,12 @@ impl VectorLaw {
     }
 
     /// Reference plus lead, within the bounds despite rounding; of DOFs that rest the last command, bit for bit.
-    fn lawful(&self, reference: PerDof<f64>, motion: PerDof<f64>, lead: PerDof<f64>) -> PerDof<f64> {
+    fn lawful(
+        &self,
+        reference: PerDof<f64>,
+        motion: PerDof<f64>,
+        lead: PerDof<f64>,
+    ) -> PerDof<f64> {
         let ([u1, u2, u3], [l1, l2, l3], [c1, c2, c3]) = (reference, lead, self.command);
         let [_, _, du3] = motion;
         let [shaft, _] = GROUPS.map(|group| self.norm(group, motion) > 0.0);
@@ -162,7 +176,12 @@ impl VectorLaw {
     }
 
     /// The lead for a reference after its motion.
-    fn next_lead(&self, reference: PerDof<f64>, motion: PerDof<f64>, filter: &Filter) -> PerDof<f64> {
+    fn next_lead(
+        &self,
+        reference: PerDof<f64>,
+        motion: PerDof<f64>,
+        filter: &Filter,
+    ) -> PerDof<f64> {
         let output = filter.nominal().output(reference);
         let used = self.usable(filter, output);
         let deflection = used.steady_deflection(self.direction.value());
@@ -224,6 +243,9 @@ impl VectorLaw {
             return step;
         }
         let mut share = (gain * moved / length).min(1.0);
+        for (step, limit) in step.iter().zip(self.step_limit) {
+            share = share.min(limit / step.abs());
+        }
         let nominal = filter.nominal();
         let before = nominal.tip(nominal.position.output);
         for _ in 0..STEPS {
@@ -249,7 +271,9 @@ impl VectorLaw {
     fn product(&self, group: PerDof<f64>, a: PerDof<f64>, b: PerDof<f64>) -> f64 {
         let units = self.unit.into_iter().zip(group);
         let pairs = a.into_iter().zip(b).zip(units);
-        pairs.map(|((a, b), (unit, own))| own * (a / unit) * (b / unit)).sum()
+        pairs
+            .map(|((a, b), (unit, own))| own * (a / unit) * (b / unit))
+            .sum()
     }
 
     fn norm(&self, group: PerDof<f64>, vector: PerDof<f64>) -> f64 {

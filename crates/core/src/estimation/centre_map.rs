@@ -28,7 +28,11 @@ impl CentreMap {
     /// The centre at a position.
     pub fn at(&self, position: f64) -> f64 {
         let weights = self.weights(position);
-        self.nodes.iter().zip(weights).map(|(node, w)| node * w).sum()
+        self.nodes
+            .iter()
+            .zip(weights)
+            .map(|(node, w)| node * w)
+            .sum()
     }
 
     /// Moves the centre at a position by `change`, and its neighbours by less.

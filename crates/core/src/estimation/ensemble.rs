@@ -142,7 +142,9 @@ impl Ensemble {
     /// with y = row . x. With `is_position_only` the hysteresis stays as it is.
     pub fn update(&mut self, measurement: &ScalarMeasurement, is_position_only: bool) {
         let predicted: [f64; MEMBERS] = array::from_fn(|index| {
-            self.members.get(index).map_or(0.0, |member| measurement.predict(member))
+            self.members
+                .get(index)
+                .map_or(0.0, |member| measurement.predict(member))
         });
         let mean_value = predicted.iter().sum::<f64>() / MEMBERS as f64;
         let mean = self.mean();

@@ -200,8 +200,22 @@ impl Filter {
             u1, u2, u3, u1, u2, l1, l2, l3, m1, m2, m3, 0.0, 0.0, 0.0, 0.0, 0.0,
         ];
         let std: State = [
-            d1, d2, d3, d1, d2, spread, spread, spread, offset * h1, offset * h2, offset * h3,
-            self.settings.share_deviation, error, error, error, error,
+            d1,
+            d2,
+            d3,
+            d1,
+            d2,
+            spread,
+            spread,
+            spread,
+            offset * h1,
+            offset * h2,
+            offset * h3,
+            self.settings.share_deviation,
+            error,
+            error,
+            error,
+            error,
         ];
         self.ensemble = Ensemble::new(&mean, &std, 1);
         for ((map, middle), unit) in self.maps.iter_mut().zip(reference).zip(self.unit) {
@@ -223,11 +237,17 @@ impl Filter {
     }
 
     /// Propagates the ensemble along the control ticks to a tick of the history, unless that is past already.
-    pub fn advance<S: AsRef<[Entry]> + AsMut<[Entry]>>(&mut self, history: &History<S>, to: &Entry) {
+    pub fn advance<S: AsRef<[Entry]> + AsMut<[Entry]>>(
+        &mut self,
+        history: &History<S>,
+        to: &Entry,
+    ) {
         if self.origin.is_none() || to.time <= self.time {
             return;
         }
-        let path = history.since(self.time).filter(|entry| entry.time < to.time);
+        let path = history
+            .since(self.time)
+            .filter(|entry| entry.time < to.time);
         let path = path.chain(core::iter::once(to));
         self.follow(path.map(|entry| (entry.command, entry.reference)));
         self.time = to.time;
@@ -270,7 +290,11 @@ impl Filter {
         let mut std = [0.0; STATE];
         let [_, _, _, _, _, w1, w2, w3, c1, c2, c3, share, ..] = &mut std;
         (*w1, *w2, *w3) = (width * shaft, width * shaft, width * bending);
-        (*c1, *c2, *c3) = (centre * shaft * h1, centre * shaft * h2, centre * bending * h3);
+        (*c1, *c2, *c3) = (
+            centre * shaft * h1,
+            centre * shaft * h2,
+            centre * bending * h3,
+        );
         *share = settings.share_walk * shaft;
         self.ensemble.add_noise(&std);
     }
@@ -298,8 +322,9 @@ impl Filter {
     /// Mean and covariance of the tip, with its deviation from the plays.
     fn tips(&self) -> ([f64; 3], [[f64; 3]; 3]) {
         let nominal = &self.nominal;
-        let (mean, [[v1, a, b], [c, v2, d], [e, f, v3]]) =
-            self.ensemble.covariance(|state| nominal.tip(position(state).output));
+        let (mean, [[v1, a, b], [c, v2, d], [e, f, v3]]) = self
+            .ensemble
+            .covariance(|state| nominal.tip(position(state).output));
         let [d1, d2, d3] = self.deviation();
         let covariance = [
             [v1 + d1 * d1, a, b],
@@ -390,7 +415,11 @@ impl Filter {
         let Belief { deviation, .. } = self.belief();
         let mut step = self.start_std;
         for (step, std) in step.iter_mut().zip(deviation) {
-            *step = if std < MISSED * *step { MISS * *step } else { 0.0 };
+            *step = if std < MISSED * *step {
+                MISS * *step
+            } else {
+                0.0
+            };
         }
         self.ensemble.disturb_position(step);
     }
@@ -442,9 +471,10 @@ impl Filter {
         let at = position(&mean);
         let nominal = &mut self.nominal;
         nominal.hysteresis = hysteresis(&mean, &self.maps, at.output);
-        nominal.position = nominal
-            .hysteresis
-            .propagate(self.radius, &at, self.command, self.command);
+        nominal.position =
+            nominal
+                .hysteresis
+                .propagate(self.radius, &at, self.command, self.command);
     }
 
     /// Propagates the prediction from the time of the ensemble to now.

@@ -155,7 +155,10 @@ impl Markers {
         }
         let whitener = Whitener::new(&covariance, estimate.used)?;
         let mut misfit = self.features;
-        let offset = columns.iter().zip(estimate.state).zip(origin.into_iter().zip(gain));
+        let offset = columns
+            .iter()
+            .zip(estimate.state)
+            .zip(origin.into_iter().zip(gain));
         for (value, predicted) in misfit.iter_mut().zip(features) {
             *value -= predicted;
         }
@@ -335,7 +338,11 @@ impl Whitener {
                 if !*used.get(column)? {
                     continue;
                 }
-                let other = if column == index { row } else { *factor.get(column)? };
+                let other = if column == index {
+                    row
+                } else {
+                    *factor.get(column)?
+                };
                 let sum: f64 = row.iter().zip(other).take(column).map(|(x, y)| x * y).sum();
                 let rest = covariance.get(index)?.get(column)? - sum;
                 *row.get_mut(column)? = if column == index {

@@ -76,7 +76,7 @@ impl ProfileBlocks for Best {
                 &settings.adaptive,
                 &dofs,
                 &settings.control,
-                unit,
+                &settings.safety,
                 radius,
                 limits,
             )?,
@@ -177,14 +177,18 @@ impl ProfileBlocks for Best {
         };
         let markers = Markers::new(image.features, image.covariance, &self.settings);
         let before = self.parameters();
-        self.filter.update(history, &markers, estimate, !is_learning);
+        self.filter
+            .update(history, &markers, estimate, !is_learning);
         if !is_learning {
             return ImageUpdate::default();
         }
         let after = self.parameters();
         self.law.rate_limit_mut().update(before, after);
         let withheld = self.law.rate_limit().withheld();
-        let has_changed = withheld.iter().zip(self.change_limit).any(|(w, limit)| *w > limit);
+        let has_changed = withheld
+            .iter()
+            .zip(self.change_limit)
+            .any(|(w, limit)| *w > limit);
         let is_limited = self
             .play()
             .iter()
@@ -217,9 +221,15 @@ impl Best {
     fn triggers(&self) -> PerDof<Triggers> {
         let nominal = self.filter.nominal();
         let mut deflection = self.law.command();
-        let at = nominal.position.output.into_iter().zip(nominal.hysteresis.centre);
-        for ((value, (output, centre)), half) in
-            deflection.iter_mut().zip(at).zip(nominal.hysteresis.half_width)
+        let at = nominal
+            .position
+            .output
+            .into_iter()
+            .zip(nominal.hysteresis.centre);
+        for ((value, (output, centre)), half) in deflection
+            .iter_mut()
+            .zip(at)
+            .zip(nominal.hysteresis.half_width)
         {
             *value = (*value - output - centre) / half;
         }

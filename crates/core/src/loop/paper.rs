@@ -157,7 +157,11 @@ impl ProfileBlocks for Paper {
         if !is_learning {
             return update;
         }
-        let signals = estimate.observable.iter().zip(past.command).zip(estimate.state);
+        let signals = estimate
+            .observable
+            .iter()
+            .zip(past.command)
+            .zip(estimate.state);
         let axes = self.axes.iter_mut().zip(&mut self.corrected);
         for ((axis, corrected), (triggers, ((observable, command), output))) in
             axes.zip(update.triggers.iter_mut().zip(signals))

@@ -31,8 +31,12 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
     /// A setting is out of range, or the storage is too small.
     pub fn new(settings: &Settings, storage: S) -> Result<Self, ConfigError> {
         let control = &settings.control;
-        let monitors =
-            Monitors::new(&settings.safety, &settings.dofs(), control.period, P::IS_COUPLED)?;
+        let monitors = Monitors::new(
+            &settings.safety,
+            &settings.dofs(),
+            control.period,
+            P::IS_COUPLED,
+        )?;
         Ok(Self {
             profile: P::new(settings, monitors.play_limits())?,
             feature_model: settings.feature_model()?,

@@ -242,11 +242,7 @@ impl CommandLimiters {
     }
 
     /// Commands of insertion and rotation within their common bound, how far each may move, and whether they were not.
-    fn couple(
-        &self,
-        [u1, u2]: [f64; 2],
-        [c1, c2]: [f64; 2],
-    ) -> ([f64; 2], [Option<f64>; 2], bool) {
+    fn couple(&self, [u1, u2]: [f64; 2], [c1, c2]: [f64; 2]) -> ([f64; 2], [Option<f64>; 2], bool) {
         let [first, second, _] = &self.dofs;
         let (Some((du1, dc1)), Some((du2, dc2)), true) =
             (first.motion(u1, c1), second.motion(u2, c2), self.is_coupled)
