@@ -19,6 +19,8 @@ use crate::model::hysteresis::{Hysteresis, PlayPosition};
 const USUAL_WIDTH: f64 = 2.0 / 3.0;
 const LEAST_WIDTH: f64 = 0.02;
 const LARGEST_WIDTH: f64 = 1.2;
+/// Distance of the nodes of the centre's map over the position, in half of `width_limit`.
+const MAP_SPACING: f64 = 0.7;
 /// Standard deviation of the tip, in `start_deviation`, up to which images without markers make it uncertain, and by
 /// how much each does.
 const MISSED: f64 = 0.15;
@@ -216,7 +218,7 @@ impl Filter {
         ];
         self.ensemble = Ensemble::new(&mean, &std, 1);
         for ((map, middle), unit) in self.maps.iter_mut().zip(reference).zip(self.unit) {
-            *map = CentreMap::new(middle, unit);
+            *map = CentreMap::new(middle, MAP_SPACING * unit);
         }
         self.origin = Some(reference);
         (self.command, self.reference) = (command, reference);
