@@ -171,6 +171,12 @@ impl Filter {
         &self.nominal
     }
 
+    /// The estimated play of each DOF that moves alone.
+    pub fn plays(&self) -> PerDof<Play> {
+        let offsets = self.nominal.hysteresis.offsets();
+        offsets.map(|(minus, plus)| Play::from_ordered(minus, plus))
+    }
+
     /// Radius of the shaft in m.
     pub const fn radius(&self) -> f64 {
         self.radius
