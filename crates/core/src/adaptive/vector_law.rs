@@ -28,7 +28,7 @@ const STEPS: usize = 5;
 /// contact   |dq| <= tip_gain |du| for the tip q that the estimate predicts
 /// ```
 ///
-/// of bending by itself. One DOF alone: 0 <= dc / du <= K_b, Eq. (2). Where insertion and rotation rest, neither command
+/// of bending by itself. One DOF alone: 0 <= dc / du <= `K_b`, Eq. (2). Where insertion and rotation rest, neither command
 /// moves, but each moves where the other does: while rotation turns, the friction that held the insertion is released.
 /// A share of the compensation s makes it dc = du + s (dc - du).
 ///
@@ -213,7 +213,7 @@ impl VectorLaw {
         let dofs = used.half_width.iter_mut().zip(&mut used.centre);
         for ((half, centre), limit) in dofs.zip(self.limits) {
             let [minus, plus] = limit.clamp(*centre - *half, *centre + *half);
-            (*half, *centre) = ((plus - minus) / 2.0, (plus + minus) / 2.0);
+            (*half, *centre) = ((plus - minus) / 2.0, f64::midpoint(minus, plus));
         }
         used
     }
