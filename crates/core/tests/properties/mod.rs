@@ -25,10 +25,12 @@ mod reference_gate;
 mod reference_speed;
 mod state;
 mod stress;
+mod strokes;
 mod supervised_law;
 mod supervisor;
 #[path = "../support/mod.rs"]
 mod support;
+mod thrown_away;
 mod whole;
 
 use crate::article::play::Play;
