@@ -162,7 +162,8 @@ impl Filter {
             nominal: Nominal {
                 hysteresis: Hysteresis {
                     half_width: start_plays.map(|play| play.width() / 2.0),
-                    centre: start_plays.map(|play| (play.delta_plus() + play.delta_minus()) / 2.0),
+                    centre: start_plays
+                        .map(|play| f64::midpoint(play.delta_minus(), play.delta_plus())),
                     shared: 0.5,
                 },
                 position: blank,
@@ -175,6 +176,12 @@ impl Filter {
     /// The prediction now.
     pub const fn nominal(&self) -> &Nominal {
         &self.nominal
+    }
+
+    /// The estimated play of each DOF that moves alone.
+    pub fn plays(&self) -> PerDof<Play> {
+        let offsets = self.nominal.hysteresis.offsets();
+        offsets.map(|(minus, plus)| Play::from_ordered(minus, plus))
     }
 
     /// Radius of the shaft in m.
@@ -193,7 +200,7 @@ impl Filter {
             } else {
                 USUAL_WIDTH * *half
             };
-            *centre = (play.delta_minus() + play.delta_plus()) / 2.0;
+            *centre = f64::midpoint(play.delta_minus(), play.delta_plus());
         }
         let [h1, h2, h3] = half;
         let [l1, l2, l3] = half.map(libm::log);
@@ -256,7 +263,7 @@ impl Filter {
     pub fn follow(&mut self, path: impl Iterator<Item = (PerDof<f64>, PerDof<f64>)> + Clone) {
         let commands = path.clone().map(|(command, _)| command);
         self.ensemble
-            .propagate(&self.maps, self.radius, self.command, commands);
+            .propagate(&self.maps, self.radius, self.command, &commands);
         let mut walked = [0.0; 3];
         for (command, reference) in path {
             let plays = &self.nominal.hysteresis;
@@ -454,7 +461,7 @@ impl Filter {
             .limit(self.unit.map(|unit| LEAST_WIDTH * unit), largest);
         let here = core::iter::once(self.command);
         self.ensemble
-            .propagate(&self.maps, self.radius, self.command, here);
+            .propagate(&self.maps, self.radius, self.command, &here);
         let mean = self.ensemble.mean();
         let at = position(&mean);
         let nominal = &mut self.nominal;
