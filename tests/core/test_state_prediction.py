@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from loop_at_rest import CONFIG, REST, Floats, loop_at_rest
+from scipy.optimize import least_squares
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import SignalError
@@ -140,11 +141,11 @@ def test_state_std_is_the_covariance_through_the_pseudo_inverse() -> None:
     np.testing.assert_allclose(report.state_deviation, expected, rtol=1e-8)
 
 
-def predicted_std(stop_after: float, until: float) -> Floats:
-    """Standard deviations (n, 3) before each image, for images every 40 ms that show the predicted
-    state and a reference that moves until `stop_after` [s].
+def predicted_std(stop_after: float, until: float, lost_after: float) -> Floats:
+    """Standard deviations (n, 3) every 40 ms of profile `best`, whose images show the predicted
+    state until `lost_after` [s], for a reference that moves until `stop_after` [s].
     """
-    config = CONFIG.replace(profile="best")
+    config = CONFIG.replace(profile="best", **{"safety.off": ["dropped"]})
     loop, model = HysteresisReduction(config), build_feature_model(config)
     period = config.control.period
     found: list[Floats] = []
@@ -156,12 +157,51 @@ def predicted_std(stop_after: float, until: float) -> Floats:
             seen = model.predict(loop.predicted_state)
             assert prediction is not None and seen is not None
             found.append(prediction.std)
-            loop.on_features(seen[0], tick * period)
+            if tick * period <= lost_after:
+                loop.on_features(seen[0], tick * period)
     return np.array(found)
 
 
-def test_std_decays_after_the_command_comes_to_rest() -> None:
-    std = predicted_std(stop_after=1.0, until=2.0)
-    stopped, rested = std[26], std[-1]
-    assert np.all(stopped > 1.25 * rested), (stopped, rested)
-    assert np.all(np.diff(std[26:36], axis=0) < 0), std[26:36]
+def test_std_of_best_grows_with_travel_without_images_and_not_at_rest() -> None:
+    std = predicted_std(stop_after=2.0, until=3.0, lost_after=1.0)
+    assert np.all(std[49] > 1.1 * std[25]), (std[25], std[49])
+    np.testing.assert_allclose(std[-1], std[55], rtol=1e-6)
+
+
+def test_std_of_best_shrinks_with_images_at_rest() -> None:
+    std = predicted_std(stop_after=1.0, until=3.0, lost_after=3.0)
+    assert np.all(np.diff(std[30:], axis=0) <= 1e-12), std[30:]
+    assert np.all(std[-1] < std[30])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_first_estimate_of_best_is_that_of_scipys_least_squares(seed: int) -> None:
+    """With a prior far wider than the image's accuracy and an exact model."""
+    rng = np.random.default_rng(seed)
+    exact = ("model_deviation", "sideways_deviation", "geometry_deviation")
+    config = CONFIG.replace(
+        profile="best",
+        **{f"state_estimation.{name}": 0.0 for name in exact},
+        **{"state_estimation.outlier_distance": 1e6, "safety.off": ["innovation"]},
+        **{f"{dof.label}.start_deviation": 5 * CONFIG[dof].start_deviation for dof in Dof},
+    )
+    model = build_feature_model(config)
+    root = rng.normal(0.0, 0.1, (4, 4))
+    covariance = root @ root.T + 0.01 * np.eye(4)
+    truth = REST + np.array([2e-3, 0.2, 0.1]) * rng.uniform(-1, 1, 3)
+    shown = model.predict(truth)
+    assert shown is not None
+    measured = shown[0] + rng.multivariate_normal(np.zeros(4), covariance)
+    whitener = np.linalg.inv(np.linalg.cholesky(covariance))
+
+    def residual(state: Floats) -> Floats:
+        prediction = model.predict(state)
+        assert prediction is not None
+        return whitener @ (measured - prediction[0])
+
+    expected = least_squares(residual, REST, x_scale=[1e-3, 0.1, 0.1], xtol=1e-15, ftol=1e-15)
+    std = np.sqrt(np.diag(np.linalg.inv(expected.jac.T @ expected.jac)))
+    report = loop_at_rest(config=config)._update(measured, covariance, 0.3)
+    difference = (report.state_estimate - expected.x) / std
+    assert np.all(np.abs(difference) < 0.05), f"seed {seed}: {difference}"
+    np.testing.assert_allclose(report.state_deviation, std, rtol=0.02, err_msg=f"seed {seed}")
