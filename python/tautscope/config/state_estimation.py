@@ -21,9 +21,6 @@ class StateEstimationConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_
     sideways_deviation: NonNegative = 0.3e-3
     """Standard deviation of the tip's displacement across the bend by uneven curvature of the
     bending section [m]."""
-    geometry_deviation: NonNegative = 0.5
-    """Standard deviation of the lasting error of the predicted features, by camera pose and section
-    as configured [px]."""
     outlier_distance: Positive = 4.0
     """Mahalanobis distance beyond which a marker is an outlier."""
     tip_deviation: Positive = 0.05

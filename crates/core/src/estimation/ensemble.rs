@@ -1,4 +1,4 @@
-//! Ensemble of hypotheses about tip, hysteresis and geometry.
+//! Ensemble of hypotheses about tip and hysteresis.
 
 use core::array;
 
@@ -10,12 +10,12 @@ use crate::model::hysteresis::{Hysteresis, PlayPosition};
 /// Number of members.
 pub const MEMBERS: usize = 64;
 /// Length of a member's state.
-pub const STATE: usize = 16;
+pub const STATE: usize = 12;
 /// Number of the entries of a state that describe the position of the tip.
 const POSITION: usize = 5;
 
-/// State of a member: output of the plays (3,) and of the shaft (2,), ln half width (3,), centre (3,) without the map,
-/// logit of the share, and error of the predicted features (4,) in px.
+/// State of a member: output of the plays (3,) and of the shaft (2,), ln half width (3,), centre (3,) without the map, and
+/// logit of the share.
 pub type State = [f64; STATE];
 
 /// Hypotheses, each a complete state that the exact plays propagate.
@@ -25,15 +25,12 @@ pub struct Ensemble {
     random: Normal,
 }
 
-/// One scalar measurement, whitened: row (7,) of its derivatives by output (3,) and feature error (4,), and the
-/// innovation `value - row . mean`, both over the standard deviation of the measurement.
+/// One scalar measurement of the outputs of the plays, whose error has the standard deviation 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScalarMeasurement {
-    /// Derivatives by the output of each DOF.
+    /// Derivative by the output of each DOF.
     pub output: PerDof<f64>,
-    /// Derivatives by the feature errors.
-    pub error: [f64; 4],
-    /// Measured less predicted value, of a prediction from output and feature error zero.
+    /// The measured value.
     pub value: f64,
 }
 
@@ -171,7 +168,7 @@ impl Ensemble {
     /// Keeps the parameters within the half widths (3,) `least` to `largest` and the share within 1 to 99 %.
     pub fn limit(&mut self, least: PerDof<f64>, largest: PerDof<f64>) {
         let bounds = least.map(libm::log).into_iter().zip(largest.map(libm::log));
-        for [_, _, _, _, _, h1, h2, h3, _, _, _, share, ..] in &mut self.members {
+        for [_, _, _, _, _, h1, h2, h3, _, _, _, share] in &mut self.members {
             for (half, (least, largest)) in [h1, h2, h3].into_iter().zip(bounds.clone()) {
                 *half = half.max(least).min(largest);
             }
@@ -181,7 +178,7 @@ impl Ensemble {
 
     /// Subtracts `change` from the centre of every member.
     pub fn shift_centres(&mut self, [d1, d2, d3]: PerDof<f64>) {
-        for [_, _, _, _, _, _, _, _, m1, m2, m3, ..] in &mut self.members {
+        for [_, _, _, _, _, _, _, _, m1, m2, m3, _] in &mut self.members {
             *m1 -= d1;
             *m2 -= d2;
             *m3 -= d3;
@@ -190,10 +187,9 @@ impl Ensemble {
 }
 
 impl ScalarMeasurement {
-    fn predict(&self, member: &State) -> f64 {
-        let [q1, q2, q3, .., e1, e2, e3, e4] = *member;
-        let ([a, b, c], [d, e, f, g]) = (self.output, self.error);
-        a * q1 + b * q2 + c * q3 + d * e1 + e * e2 + f * e3 + g * e4
+    fn predict(&self, [q1, q2, q3, ..]: &State) -> f64 {
+        let [a, b, c] = self.output;
+        a * q1 + b * q2 + c * q3
     }
 }
 
@@ -214,7 +210,7 @@ const fn set_position(state: &mut State, position: &PlayPosition) {
 
 /// Hysteresis of a state where the output is at `output`.
 pub fn hysteresis(state: &State, maps: &PerDof<CentreMap>, output: PerDof<f64>) -> Hysteresis {
-    let [_, _, _, _, _, h1, h2, h3, m1, m2, m3, share, ..] = *state;
+    let [_, _, _, _, _, h1, h2, h3, m1, m2, m3, share] = *state;
     let mut centre = [m1, m2, m3];
     for ((centre, map), output) in centre.iter_mut().zip(maps).zip(output) {
         *centre += map.at(output);

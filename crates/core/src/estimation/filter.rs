@@ -1,4 +1,4 @@
-//! The estimate of profile `best`: tip, hysteresis and geometry from the commands and the images.
+//! The estimate of profile `best`: tip and hysteresis from the commands and the images.
 
 use crate::article::play::Play;
 use crate::dof::PerDof;
@@ -23,15 +23,17 @@ const LARGEST_WIDTH: f64 = 1.2;
 /// how much each does.
 const MISSED: f64 = 0.15;
 const MISS: f64 = 0.03;
-/// Largest geometry error that a reset assumes, in `geometry_deviation`.
-const RESET_GEOMETRY: f64 = 20.0;
+/// Error of the feature model that a reset assumes, in `model_deviation`, and number of images over which it is adapted.
+const RESET_MODEL: f64 = 30.0;
+const MODEL_IMAGES: f64 = 200.0;
 
-/// Ensemble filter over tip, hysteresis and geometry.
+/// Ensemble filter over tip and hysteresis.
 ///
-/// Each member has the outputs of the plays, half widths, centres, the share of the friction that insertion and rotation
-/// have in common, and an error of the predicted features. Between images each is propagated by the exact plays along
+/// Each member has the outputs of the plays, half widths, centres, and the share of the friction that insertion and rotation
+/// have in common. Between images each is propagated by the exact plays along
 /// the commands; the travel of the reference adds a random walk. The image of a time updates the members at that time.
-/// The mean, propagated to now, is the prediction that the compensation uses.
+/// The mean, propagated to now, is the prediction that the compensation uses. A camera pose or section that is not as
+/// configured is an error of the feature model, which adapts to the misfit of the markers: an image is not refused for it.
 ///
 /// Wrong where an instrument is no play: by the rounding of its loop.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,6 +45,8 @@ pub struct Filter {
     start_plays: PerDof<Play>,
     radius: f64,
     ensemble: Ensemble,
+    /// Standard deviation of the feature model in px.
+    model_std: f64,
     maps: PerDof<CentreMap>,
     gain: PerDof<GainEstimate>,
     /// Plays of the mean that no image corrects.
@@ -115,7 +119,6 @@ impl Filter {
         for (field, value) in [
             ("model_deviation", settings.model_deviation),
             ("sideways_deviation", settings.sideways_deviation),
-            ("geometry_deviation", settings.geometry_deviation),
             ("centre_deviation", settings.centre_deviation),
             ("share_deviation", settings.share_deviation),
             ("tip_walk", settings.tip_walk),
@@ -145,6 +148,7 @@ impl Filter {
             start_plays,
             radius,
             ensemble: Ensemble::new(&zero, &zero, 0),
+            model_std: settings.model_deviation,
             maps: unit.map(|unit| CentreMap::new(0.0, unit)),
             gain: [GainEstimate::new(); 3],
             uncorrected: blank,
@@ -195,10 +199,7 @@ impl Filter {
         let [d1, d2, d3] = self.start_std;
         let spread = self.settings.width_deviation;
         let offset = self.settings.centre_deviation;
-        let error = self.settings.geometry_deviation;
-        let mean: State = [
-            u1, u2, u3, u1, u2, l1, l2, l3, m1, m2, m3, 0.0, 0.0, 0.0, 0.0, 0.0,
-        ];
+        let mean: State = [u1, u2, u3, u1, u2, l1, l2, l3, m1, m2, m3, 0.0];
         let std: State = [
             d1,
             d2,
@@ -212,10 +213,6 @@ impl Filter {
             offset * h2,
             offset * h3,
             self.settings.share_deviation,
-            error,
-            error,
-            error,
-            error,
         ];
         self.ensemble = Ensemble::new(&mean, &std, 1);
         for ((map, middle), unit) in self.maps.iter_mut().zip(reference).zip(self.unit) {
@@ -288,7 +285,7 @@ impl Filter {
             .disturb_position([tip * shaft * h1, tip * shaft * h2, tip * bending * h3]);
         let (width, centre) = (settings.width_walk, settings.centre_walk);
         let mut std = [0.0; STATE];
-        let [_, _, _, _, _, w1, w2, w3, c1, c2, c3, share, ..] = &mut std;
+        let [_, _, _, _, _, w1, w2, w3, c1, c2, c3, share] = &mut std;
         (*w1, *w2, *w3) = (width * shaft, width * shaft, width * bending);
         (*c1, *c2, *c3) = (
             centre * shaft * h1,
@@ -339,25 +336,17 @@ impl Filter {
         self.unit.map(|unit| self.settings.tip_deviation * unit)
     }
 
-    /// The prediction of an image at the time of the ensemble.
-    fn image_prediction(&self) -> ImagePrediction {
-        let (state, covariance) = self.tips();
-        let (error, error_covariance) = self.ensemble.covariance(|state| {
-            let [.., a, b, c, d] = *state;
-            [a, b, c, d]
-        });
-        ImagePrediction {
-            state,
-            covariance,
-            error,
-            error_covariance,
-        }
+    /// Markers (4,) of an image in px, with their covariance (4, 4) in px^2.
+    pub fn markers(&self, features: [f64; 4], covariance: Option<&[[f64; 4]; 4]>) -> Markers {
+        Markers::new(features, covariance, &self.settings, self.model_std)
     }
 
     /// The most probable tip for the markers of an image at the time of the ensemble; None where the model sees no band.
     pub fn measure(&self, model: &FeatureModel, markers: &Markers) -> Option<MarkerEstimate> {
         self.origin?;
-        markers.estimate(model, &self.image_prediction(), &self.settings)
+        let (state, covariance) = self.tips();
+        let prior = ImagePrediction { state, covariance };
+        markers.estimate(model, &prior, &self.settings)
     }
 
     /// Updates the ensemble with the markers of an estimate by [`Filter::measure`]; with `is_position_only` only the tip.
@@ -373,6 +362,12 @@ impl Filter {
             return;
         };
         self.update_with(&rows, is_position_only);
+        if let Some(misfit) = markers.misfit(estimate) {
+            let variance = self.model_std * self.model_std;
+            let change = (misfit - variance) / MODEL_IMAGES;
+            let least = self.settings.model_deviation;
+            self.model_std = libm::sqrt(variance + change).max(least);
+        }
         self.catch_up(history);
     }
 
@@ -389,8 +384,8 @@ impl Filter {
         self.settle();
     }
 
-    /// Makes the tip as uncertain as at the start, and the geometry far more than that, about the mean: what comes next
-    /// decides.
+    /// Makes the tip as uncertain as at the start, about the mean, and the feature model far more than that: what the next
+    /// images show decides.
     pub fn reset_position(&mut self) {
         let Belief { deviation, .. } = self.belief();
         let mut missing = self.start_std;
@@ -398,16 +393,7 @@ impl Filter {
             *missing = libm::sqrt((*missing * *missing - std * std).max(0.0));
         }
         self.ensemble.disturb_position(missing);
-        let (_, [[error, ..], ..]) = self.ensemble.covariance(|state| {
-            let [.., a, _, _, _] = *state;
-            [a]
-        });
-        let wide = RESET_GEOMETRY * self.settings.geometry_deviation;
-        let error = libm::sqrt((wide * wide - error).max(0.0));
-        let mut std = [0.0; STATE];
-        let [.., a, b, c, d] = &mut std;
-        (*a, *b, *c, *d) = (error, error, error, error);
-        self.ensemble.add_noise(&std);
+        self.model_std = RESET_MODEL * self.settings.model_deviation;
     }
 
     /// Makes the tip a little less certain, after an image without markers.
@@ -448,7 +434,7 @@ impl Filter {
     /// Passes a share of the mean centre on to the map at the position of the tip.
     fn update_maps(&mut self) {
         let mean = self.ensemble.mean();
-        let [q1, q2, q3, _, _, _, _, _, m1, m2, m3, ..] = mean;
+        let [q1, q2, q3, _, _, _, _, _, m1, m2, m3, _] = mean;
         let rates = self.settings.map_rate.into_iter().zip(self.travel);
         let mut changes = [m1, m2, m3];
         let maps = self.maps.iter_mut().zip([q1, q2, q3]).zip(rates);

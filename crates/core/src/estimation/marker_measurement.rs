@@ -26,17 +26,13 @@ const STARTS: [PerDof<f64>; 4] = [
 type Features = [f64; 4];
 type Square = [[f64; 4]; 4];
 
-/// Prediction of an image (prior): tip and feature errors, each with its covariance.
+/// Prediction of an image (prior).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImagePrediction {
     /// Tip (3,) [m, rad, rad].
     pub state: PerDof<f64>,
     /// Its covariance (3, 3).
     pub covariance: Matrix,
-    /// Error of the predicted features (4,) in px.
-    pub error: Features,
-    /// Its covariance (4, 4) in px^2.
-    pub error_covariance: Square,
 }
 
 /// Markers (4,) of an image in px with their covariance (4, 4) in px^2.
@@ -72,15 +68,16 @@ impl MarkerEstimate {
 
 impl Markers {
     /// Features (4,) in px, two NaN for a band that was not found, and their covariance (4, 4) in px^2; without one each
-    /// has `marker_deviation`.
+    /// has `marker_deviation`. The model is wrong by `model_std` in px.
     pub fn new(
         features: Features,
         covariance: Option<&Square>,
         settings: &StateEstimationSettings,
+        model_std: f64,
     ) -> Self {
         let own = square(settings.marker_deviation);
         let mut covariance = covariance.copied().unwrap_or_else(|| diagonal([own; 4]));
-        let model = diagonal([square(settings.model_deviation); 4]);
+        let model = diagonal([square(model_std); 4]);
         for (row, added) in covariance.iter_mut().zip(model) {
             for (entry, added) in row.iter_mut().zip(added) {
                 *entry += added;
@@ -95,11 +92,11 @@ impl Markers {
     /// The most probable state, over all choices of the markers that are used:
     ///
     /// ```text
-    /// argmin_q  (q - q0)' P^-1 (q - q0) + (s - e - h(q))' (R + E + g g')^-1 (s - e - h(q)) + outlier_distance^2 for each marker left out
+    /// argmin_q  (q - q0)' P^-1 (q - q0) + (s - h(q))' (R + g g')^-1 (s - h(q)) + outlier_distance^2 for each marker left out
     /// ```
     ///
-    /// with the prediction q0, P of the tip, that e, E of the feature errors, and g what a displacement of the tip
-    /// across the bend by its standard deviation does to the features.
+    /// with the prediction q0, P of the tip, R of the markers and the model, and g what a displacement of the tip across
+    /// the bend by its standard deviation does to the features.
     ///
     /// None where the model sees no band.
     pub fn estimate(
@@ -138,6 +135,14 @@ impl Markers {
         Some(best)
     }
 
+    /// Mean square of the misfit of both markers to an estimate, in px^2; None if not both were used.
+    pub fn misfit(&self, estimate: &MarkerEstimate) -> Option<f64> {
+        let features = self.features.into_iter().zip(estimate.prediction.features);
+        let sum: f64 = features.map(|(measured, h)| square(measured - h)).sum();
+        // Four features determine three DOFs.
+        (estimate.used == [true; 2]).then_some(sum)
+    }
+
     /// The markers used by an estimate as four independent measurements of standard deviation 1, linear about it; `gain`
     /// (3,) is the travel of the tip over that of the output, about `origin` (3,), from which the tip deviates by `std`
     /// (3,).
@@ -170,24 +175,15 @@ impl Markers {
         }
         let misfit = whitener.apply(misfit);
         let [c1, c2, c3] = columns.map(|column| whitener.apply(column));
-        let errors: [Features; 4] = array::from_fn(|entry| {
-            whitener.apply(array::from_fn(|row| if row == entry { 1.0 } else { 0.0 }))
-        });
         let [g1, g2, g3] = gain;
         let mut rows = [ScalarMeasurement {
             output: [0.0; 3],
-            error: [0.0; 4],
             value: 0.0,
         }; 4];
-        let [e1, e2, e3, e4] = errors;
         let outputs = c1.into_iter().zip(c2).zip(c3);
-        let errors = e1.into_iter().zip(e2).zip(e3).zip(e4);
-        for ((row, value), (((a, b), c), (((d, e), f), g))) in
-            rows.iter_mut().zip(misfit).zip(outputs.zip(errors))
-        {
+        for ((row, value), ((a, b), c)) in rows.iter_mut().zip(misfit).zip(outputs) {
             *row = ScalarMeasurement {
                 output: [g1 * a, g2 * b, g3 * c],
-                error: [d, e, f, g],
                 value,
             };
         }
@@ -213,11 +209,6 @@ impl<'a> Problem<'a> {
     ) -> Option<Self> {
         let mut covariance = markers.covariance;
         add_product(&mut covariance, sideways);
-        for (row, errors) in covariance.iter_mut().zip(prior.error_covariance) {
-            for (entry, error) in row.iter_mut().zip(errors) {
-                *entry += error;
-            }
-        }
         Some(Self {
             markers,
             prior,
@@ -233,9 +224,8 @@ impl<'a> Problem<'a> {
 
     fn misfit(&self, prediction: &FeaturePrediction) -> Features {
         let mut misfit = self.markers.features;
-        let predicted = prediction.features.into_iter().zip(self.prior.error);
-        for (value, (predicted, error)) in misfit.iter_mut().zip(predicted) {
-            *value -= predicted + error;
+        for (value, predicted) in misfit.iter_mut().zip(prediction.features) {
+            *value -= predicted;
         }
         self.whitener.apply(misfit)
     }

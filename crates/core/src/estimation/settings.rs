@@ -13,8 +13,6 @@ pub struct StateEstimationSettings {
     pub model_deviation: f64,
     /// Standard deviation in m of the tip's displacement across the bend by uneven curvature.
     pub sideways_deviation: f64,
-    /// Standard deviation in px of the lasting error of the predicted features: camera pose and section as configured.
-    pub geometry_deviation: f64,
     /// Mahalanobis distance beyond which a marker is an outlier.
     pub outlier_distance: f64,
     /// Standard deviation of the tip from the plays, by rounding of the loop and viscous friction.

@@ -58,7 +58,6 @@ impl TipFilter {
         let ([gain, ..], [origin, ..]) = (nominal.gain, nominal.origin);
         let row = ScalarMeasurement {
             output: [gain / self.std, 0.0, 0.0],
-            error: [0.0; 4],
             value: (tip - origin * (1.0 - gain)) / self.std,
         };
         self.filter.update_with(&[row], false);

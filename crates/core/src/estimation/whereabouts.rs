@@ -39,6 +39,16 @@ struct Last {
     travel: f64,
 }
 
+/// Standard deviation of a state estimated by one linear step from the predicted state, from that of the markers.
+pub fn step_deviation(past: &Entry, state: PerDof<f64>, deviation: PerDof<f64>) -> PerDof<f64> {
+    let mut own = deviation;
+    let seen = state.into_iter().zip(past.predicted_state);
+    for (own, (state, predicted)) in own.iter_mut().zip(seen) {
+        *own = libm::sqrt(square(*own) + square(STEP_ERROR * (state - predicted)));
+    }
+    own
+}
+
 impl Whereabouts {
     /// Before the first image: at the prediction.
     ///
@@ -76,14 +86,9 @@ impl Whereabouts {
         belief
     }
 
-    /// Takes in what one linear step determined.
+    /// Takes in what one linear step determined, with its standard deviation by [`step_deviation`].
     pub(crate) fn learn(&mut self, past: &Entry, estimate: &StateEstimate, deviation: PerDof<f64>) {
-        let mut own = deviation;
-        let seen = estimate.state.iter().zip(past.predicted_state);
-        for (own, (state, predicted)) in own.iter_mut().zip(seen) {
-            *own = libm::sqrt(square(*own) + square(STEP_ERROR * (state - predicted)));
-        }
-        self.set(past, estimate.state, own, estimate.observable);
+        self.set(past, estimate.state, deviation, estimate.observable);
     }
 
     /// Makes the prediction less certain after an image without markers.

@@ -9,9 +9,7 @@ use crate::dof::PerDof;
 use crate::error::ConfigError;
 use crate::estimation::filter::Filter;
 use crate::estimation::history::{Entry, History};
-use crate::estimation::marker_measurement::Markers;
 use crate::estimation::posture::Belief;
-use crate::estimation::settings::StateEstimationSettings;
 use crate::r#loop::measurement::Measurement;
 use crate::r#loop::paper::state_estimator;
 use crate::r#loop::profile::{Image, ImageUpdate, ProfileBlocks};
@@ -33,7 +31,6 @@ pub struct Best {
     law: VectorLaw,
     filter: Filter,
     limits: PerDof<PlayLimit>,
-    settings: StateEstimationSettings,
     observability: StateEstimator,
     /// Largest part of a half width or centre that the rate limit withholds before it is a changed slack.
     change_limit: PerDof<f64>,
@@ -88,7 +85,6 @@ impl ProfileBlocks for Best {
                 radius,
             )?,
             limits,
-            settings: settings.state_estimation,
             observability: state_estimator(settings)?,
             change_limit: unit.map(|unit| CHANGED * unit),
             history: settings.control.history,
@@ -138,7 +134,7 @@ impl ProfileBlocks for Best {
     }
 
     fn measure(&self, model: &FeatureModel, _: &Entry, image: Image<'_>) -> Option<Measurement> {
-        let markers = Markers::new(image.features, image.covariance, &self.settings);
+        let markers = self.filter.markers(image.features, image.covariance);
         let estimate = self.filter.measure(model, &markers)?;
         let prior = self.filter.belief();
         let start = model.predict(prior.state)?;
@@ -175,7 +171,7 @@ impl ProfileBlocks for Best {
         let Some(estimate) = &measurement.markers else {
             return ImageUpdate::default();
         };
-        let markers = Markers::new(image.features, image.covariance, &self.settings);
+        let markers = self.filter.markers(image.features, image.covariance);
         let before = self.parameters();
         self.filter
             .update(history, &markers, estimate, !is_learning);

@@ -9,7 +9,7 @@ use crate::dof::PerDof;
 use crate::error::ConfigError;
 use crate::estimation::history::{Entry, History};
 use crate::estimation::posture::Belief;
-use crate::estimation::whereabouts::Whereabouts;
+use crate::estimation::whereabouts::{Whereabouts, step_deviation};
 use crate::r#loop::measurement::Measurement;
 use crate::r#loop::profile::{Image, ImageUpdate, ProfileBlocks};
 use crate::r#loop::settings::Settings;
@@ -137,7 +137,11 @@ impl ProfileBlocks for Paper {
             used,
             predicted_features: prediction.features,
             state_deviation,
-            distance: distance(&prior, &estimate, state_deviation),
+            distance: distance(
+                &prior,
+                &estimate,
+                step_deviation(past, estimate.state, state_deviation),
+            ),
             markers: None,
         })
     }
@@ -151,8 +155,8 @@ impl ProfileBlocks for Paper {
         is_learning: bool,
     ) -> ImageUpdate {
         let estimate = &measurement.estimate;
-        self.whereabouts
-            .learn(past, estimate, measurement.state_deviation);
+        let std = step_deviation(past, estimate.state, measurement.state_deviation);
+        self.whereabouts.learn(past, estimate, std);
         let mut update = ImageUpdate::default();
         if !is_learning {
             return update;
