@@ -20,7 +20,6 @@ IDEAS: dict[str, dict[str, Any]] = {
         "state_estimation.share_walk": 0.0,
     },
     "deviation of the tip from the plays": {"state_estimation.tip_deviation": 1e-3},
-    "error of the predicted features": {"state_estimation.geometry_deviation": 0.0},
     "uneven curvature": {"state_estimation.sideways_deviation": 0.0},
     "rejection of a marker": {"state_estimation.outlier_distance": 1e6},
 }

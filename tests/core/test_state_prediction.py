@@ -141,48 +141,39 @@ def test_state_std_is_the_covariance_through_the_pseudo_inverse() -> None:
     np.testing.assert_allclose(report.state_deviation, expected, rtol=1e-8)
 
 
-def predicted_std(stop_after: float, until: float, lost_after: float) -> Floats:
-    """Standard deviations (n, 3) every 40 ms of profile `best`, whose images show the predicted
-    state until `lost_after` [s], for a reference that moves until `stop_after` [s].
-    """
-    config = CONFIG.replace(profile="best", **{"safety.off": ["dropped"]})
+def test_std_of_best_shrinks_with_images_at_rest() -> None:
+    """Images every 40 ms show the predicted state, after a motion of 1 s."""
+    config = CONFIG.replace(profile="best")
     loop, model = HysteresisReduction(config), build_feature_model(config)
     period = config.control.period
     found: list[Floats] = []
-    for tick in range(round(until / period)):
-        moved = min(tick * period, stop_after) * np.array([5e-3, 0.5, 0.2])
+    for tick in range(600):
+        moved = min(tick * period, 1.0) * np.array([5e-3, 0.5, 0.2])
         loop.step(np.asarray(REST) + moved, tick * period)
         if tick % 8 == 7:
             prediction = loop.predict_state(tick * period)
             seen = model.predict(loop.predicted_state)
             assert prediction is not None and seen is not None
             found.append(prediction.std)
-            if tick * period <= lost_after:
-                loop.on_features(seen[0], tick * period)
-    return np.array(found)
-
-
-def test_std_of_best_grows_with_travel_without_images_and_not_at_rest() -> None:
-    std = predicted_std(stop_after=2.0, until=3.0, lost_after=1.0)
-    assert np.all(std[49] > 1.1 * std[25]), (std[25], std[49])
-    np.testing.assert_allclose(std[-1], std[55], rtol=1e-6)
-
-
-def test_std_of_best_shrinks_with_images_at_rest() -> None:
-    std = predicted_std(stop_after=1.0, until=3.0, lost_after=3.0)
-    assert np.all(np.diff(std[30:], axis=0) <= 1e-12), std[30:]
-    assert np.all(std[-1] < std[30])
+            loop.on_features(seen[0], tick * period)
+    std = np.array(found)
+    # The spread of 64 members, moved to where their plays allow it, varies a little.
+    assert np.all(np.diff(std[30:], axis=0) <= 1e-3 * std[30:-1]), std[30:]
+    assert np.all(std[-1] < 0.99 * std[30]) and np.all(std[30] < 0.2 * std[0])
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_the_first_estimate_of_best_is_that_of_scipys_least_squares(seed: int) -> None:
     """With a prior far wider than the image's accuracy and an exact model."""
     rng = np.random.default_rng(seed)
-    exact = ("model_deviation", "sideways_deviation", "geometry_deviation")
     config = CONFIG.replace(
         profile="best",
-        **{f"state_estimation.{name}": 0.0 for name in exact},
-        **{"state_estimation.outlier_distance": 1e6, "safety.off": ["innovation"]},
+        **{
+            "state_estimation.model_deviation": 0.0,
+            "state_estimation.sideways_deviation": 0.0,
+            "state_estimation.outlier_distance": 1e6,
+            "safety.off": ["innovation"],
+        },
         **{f"{dof.label}.start_deviation": 5 * CONFIG[dof].start_deviation for dof in Dof},
     )
     model = build_feature_model(config)
