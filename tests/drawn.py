@@ -7,7 +7,9 @@ from pathlib import Path
 EXAMPLES = Path(__file__).parents[1] / "examples"
 sys.path.insert(0, str(EXAMPLES))  # spawned workers inherit the path
 
-from own_rig import BACKLASH, DrawnRig, short_experiment  # noqa: E402
+import own_rig  # noqa: E402
+from own_rig import BACKLASH, DrawnRig  # noqa: E402
+from tautscope.config import Config  # noqa: E402
 from tautscope.runs.trials import Trial  # noqa: E402
 
 __all__ = [
@@ -21,6 +23,11 @@ __all__ = [
     "make_stalling_rig",
     "short_experiment",
 ]
+
+
+def short_experiment() -> Config:
+    """That of the example in profile `paper`, whose reduction is that of the gain."""
+    return own_rig.short_experiment().replace(profile="paper")
 
 
 class BadFrameRig(DrawnRig):

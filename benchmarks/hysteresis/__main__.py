@@ -29,7 +29,7 @@ from tautscope.dof import Dof
 PROFILES: tuple[Profile, ...] = ("paper", "best")
 SEEDS = range(5)
 """Seeds of the tables."""
-ABLATION_SCENARIOS = ("alone", "together", "changing", "too wide", "tremor")
+ABLATION_SCENARIOS = ("operator", "alone", "together", "changing", "too wide", "tremor")
 """Scenarios of an ablation, by default."""
 ABLATION_SEEDS = range(100, 103)
 """Seeds of an ablation. It compares the control law and the offsets, with features for images."""

@@ -8,30 +8,20 @@ from typing import Any
 from hysteresis.tables import Row, show
 
 IDEAS: dict[str, dict[str, Any]] = {
-    "compensation completed in contact": {
-        "adaptive.contact_gain": 1.0,
-        "adaptive.cautious_gain": 1.0,
-    },
-    "cautious approach for uncertain offsets": {"adaptive.cautious_deviation": 1e6},
-    "lower gain for uncertain offsets": {"adaptive.cautious_gain": 2.0},
-    "gain taper before the contact": {"adaptive.taper": 1e-3},
-    "gain taper at the end of the compensation": {"adaptive.settling": 1e-3},
+    "bound of the predicted tip's speed": {"adaptive.tip_gain": 100.0},
     "separation of tremor and intended motion": {"adaptive.tremor_time": 0.0},
-    "adaptive offsets": {"adaptive.level_deviation": 1e-3, "adaptive.local_deviation": 0.0},
-    "offsets as functions of position": {
-        "adaptive.local_deviation": 0.0,
-        "adaptive.local_drift": 0.0,
+    "rate limit of the offsets": {"adaptive.change_rate": [100.0, 100.0, 100.0]},
+    "centre as a function of position": {"state_estimation.map_rate": [0.0, 0.0, 0.0]},
+    "regression of the gain": {"state_estimation.gain_prior": 1e9},
+    "widths that change": {"state_estimation.width_walk": 0.0},
+    "centres that change": {"state_estimation.centre_walk": 0.0},
+    "share of the common friction estimated (0.5 instead)": {
+        "state_estimation.share_deviation": 0.0,
+        "state_estimation.share_walk": 0.0,
     },
-    "drift of the offsets": {"adaptive.level_drift": 0.0, "adaptive.local_drift": 0.0},
-    "symmetry of the offsets": {"adaptive.symmetry": 0.0},
-    "contact requires a slope near 1": {"adaptive.slope_tolerance": 0.99},
-    "contact requires motion of the tip": {"adaptive.contact_moved": 0.0},
-    "play state corrected by images": {"adaptive.state_correction": 0.0},
-    "iterated estimation without outliers": {
-        "state_estimation.steps": 1,
-        "state_estimation.outlier_distance": 1e6,
-    },
-    "gain assumed to be known (0.3 instead)": {"adaptive.gain_deviation": 0.3},
+    "deviation of the tip from the plays": {"state_estimation.tip_deviation": 1e-3},
+    "uneven curvature": {"state_estimation.sideways_deviation": 0.0},
+    "rejection of a marker": {"state_estimation.outlier_distance": 1e6},
 }
 """Name of each idea, and the configuration changes that disable it."""
 

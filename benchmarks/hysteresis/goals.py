@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tautscope.config import DISTURBANCES
+from tautscope.dof import Dof
 
 OPERATORS = ("operator", "disturbed operator")
 LATENCIES = {"0 ms": 0.0, "200 ms": 0.2}
@@ -20,30 +21,32 @@ class Goal:
 
     Attributes:
         unit: "share", "ratio", "tip" (the display unit of the DOF), or what is counted.
-        value: Limit in that unit; None if there is no goal.
+        value: Limit in that unit, for all DOFs or each; None if there is no goal.
         sense: Whether it is an upper ("max") or a lower ("min") limit.
         paired: The quantity is the ratio of this one in profile `best` to that in profile `paper`.
     """
 
     unit: str
-    value: float | None = None
+    value: float | tuple[float, float, float] | None = None
     sense: str = "max"
     paired: str | None = None
 
+    def limit(self, dof: Dof) -> float | None:
+        """Limit for one DOF."""
+        return self.value[dof] if isinstance(self.value, tuple) else self.value
+
 
 GOALS = {
-    **{
-        f"{name}: {what}": goal
-        for name in OPERATORS
-        for what, goal in {
-            "reduction of tracking error": Goal("share", None, "min"),
-            "tracking error": Goal("tip"),
-            "largest error": Goal("tip"),
-            "tip overspeed": Goal("ratio", 2.0),
-            "creep": Goal("tip"),
-            "bound of the reduction": Goal("share", None, "min"),
-        }.items()
-    },
+    "operator: reduction of tracking error": Goal("share", (0.85, 0.78, 0.80), "min"),
+    "operator: tracking error": Goal("tip"),
+    "operator: largest error": Goal("tip", (2.0, 0.5, 0.25)),
+    "operator: tip overspeed": Goal("ratio", 2.0),
+    "operator: creep": Goal("tip", (0.5, 0.05, 0.01)),
+    "operator: bound of the reduction": Goal("share", None, "min"),
+    "disturbed operator: reduction of tracking error": Goal("share", (0.70, 0.60, 0.70), "min"),
+    "disturbed operator: tracking error": Goal("tip"),
+    "disturbed operator: largest error": Goal("tip"),
+    "disturbed operator: tip overspeed": Goal("ratio"),
     "reduction of mean width": Goal("share", 0.95, "min"),
     "reduction of max width": Goal("share", 0.90, "min"),
     "actuator gain": Goal("ratio", 5.0),

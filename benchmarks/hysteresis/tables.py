@@ -8,7 +8,7 @@ from statistics import median
 from typing import Any
 
 import numpy as np
-from hysteresis.goals import CONDITIONS, GOALS, LATENCIES, Goal
+from hysteresis.goals import CONDITIONS, GOALS, LATENCIES
 from tautscope.dof import Dof
 
 Row = dict[str, Any]
@@ -61,6 +61,7 @@ def to_rows(by_seed: Values) -> list[Row]:
     rows = []
     for what, dof, name in sorted(by_seed, key=lambda key: (order.index(key[0]), key[1])):
         goal = GOALS[what]
+        limit = goal.limit(dof)
         unknown = np.inf if goal.sense == "max" else -np.inf
         values = [unknown if np.isnan(each) else each for each in by_seed[what, dof, name].values()]
         middle, worst = median(values), max(values) if goal.sense == "max" else min(values)
@@ -73,22 +74,20 @@ def to_rows(by_seed: Values) -> list[Row]:
                 "median": middle if np.isfinite(middle) else None,
                 "worst": worst if np.isfinite(worst) else None,
                 "n": len(values),
-                "goal": goal.value,
+                "goal": limit,
                 "sense": goal.sense,
-                "holds": _holds(goal, middle),
+                "holds": _holds(limit, goal.sense, middle),
                 "steady": bool(abs(worst - middle) <= POINTS) if goal.unit == "share" else None,
             }
         )
     return rows
 
 
-def _holds(goal: Goal, value: float) -> bool | None:
-    if goal.value is None:
+def _holds(limit: float | None, sense: str, value: float) -> bool | None:
+    if limit is None:
         return None
-    rounding = 1e-9 * abs(goal.value)
-    return bool(
-        value <= goal.value + rounding if goal.sense == "max" else value >= goal.value - rounding
-    )
+    rounding = 1e-9 * abs(limit)
+    return bool(value <= limit + rounding if sense == "max" else value >= limit - rounding)
 
 
 def to_json(rows: Sequence[Row], **facts: Any) -> str:

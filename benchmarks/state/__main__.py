@@ -1,8 +1,9 @@
-"""State estimation: the article's single unweighted step compared with ours, idea by idea.
+"""State estimation from one image: the article's unweighted step, and the estimate of `best`.
 
 The truth is the twin's: states and features of its physics and renderer, which share no code with
 the models of the loop. Each seed is another instrument that moves in all three DOFs at once without
 compensation. A measurement is a true feature with noise, a prediction the true state with an error.
+The estimate of `best` is that of a loop's first image; the first reference is the prediction.
 
 `--images` adds the state error of both profiles in the whole loop with images (a minute per seed).
 """

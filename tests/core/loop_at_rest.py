@@ -1,4 +1,4 @@
-"""A loop after a constant reference, and its configuration."""
+"""A loop of profile `paper` after a constant reference, and its configuration."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from tautscope.config import Config
 from tautscope.loop.reduction import HysteresisReduction
 
 Floats = NDArray[np.float64]
-CONFIG = Config().replace(
+CONFIG = Config(profile="paper").replace(
     **{
         "insertion.observable_deviation": 5e-3,
         "bending.observable_deviation": 0.1,

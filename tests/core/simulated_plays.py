@@ -38,8 +38,6 @@ class Run:
 
 def config(profile: str = "best", **safety: object) -> Config:
     changes = {f"safety.{key}": value for key, value in safety.items()}
-    # The simulated plays are independent.
-    changes["adaptive.one_friction"] = False
     return load_config(profile=profile).replace(**changes)  # type: ignore[arg-type]
 
 

@@ -1,4 +1,7 @@
-"""HysteresisReduction on three simulated plays in the images of an ideal camera."""
+"""HysteresisReduction on three simulated plays in the images of an ideal camera.
+
+Profile `paper` unless stated; test_adaptive_loop.py has `best`.
+"""
 
 from __future__ import annotations
 

@@ -27,7 +27,9 @@ def add_parser(verbs: arguments.Verbs) -> None:
         "Prints Table 1 with the article's values and the tracking error of the operator motion, "
         "and writes a run folder with tables, traces, figures and a report.",
     )
-    arguments.add_profile(demo, "compensation scheme: the article's, or also our own", "best")
+    arguments.add_profile(
+        demo, "compensation scheme: the article's alone (paper), or also our own (best)"
+    )
     demo.add_argument(
         "--seed",
         type=arguments.natural,
@@ -71,7 +73,7 @@ def _run(options: argparse.Namespace) -> None:
     if options.json:
         print_json(
             tables.to_json(
-                options.profile,
+                config.profile,
                 seeds,
                 found.results,
                 found.operator_results,

@@ -18,7 +18,7 @@ def load_config(path: str | PathLike[str] | None = None, profile: Profile | None
 
     Args:
         path: TOML file; by default the article's experiment.
-        profile: ``"paper"`` or ``"best"``; by default that of the file, else ``"paper"``.
+        profile: ``"paper"`` or ``"best"``; by default that of the file, else ``"best"``.
 
     Raises:
         MissingPathError: The file does not exist.

@@ -37,7 +37,7 @@ Profile = Literal["paper", "best"]
 class Config(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """All settings of a run. The defaults are the article's experiment."""
 
-    profile: Profile = "paper"
+    profile: Profile = "best"
     """Scheme of compensation and estimation: ``paper`` is the article's, ``best`` that of
     `AdaptiveConfig` and `StateEstimationConfig`."""
     adaptive: AdaptiveConfig = field(default_factory=AdaptiveConfig)

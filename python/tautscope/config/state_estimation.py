@@ -24,7 +24,7 @@ class StateEstimationConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_
     outlier_distance: Positive = 4.0
     """Mahalanobis distance beyond which a marker is an outlier."""
     tip_deviation: Positive = 0.1
-    """Standard deviation of the tip from the plays, by rounding of the loop and viscous friction."""
+    """Standard deviation of the tip from the plays, by round loops and viscous friction."""
     width_deviation: Positive = 0.35
     """Standard deviation of the logarithm of the initial half width."""
     centre_deviation: NonNegative = 0.25
