@@ -23,7 +23,7 @@ class StateEstimationConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_
     bending section [m]."""
     outlier_distance: Positive = 4.0
     """Mahalanobis distance beyond which a marker is an outlier."""
-    tip_deviation: Positive = 0.05
+    tip_deviation: Positive = 0.1
     """Standard deviation of the tip from the plays, by round loops and viscous friction."""
     width_deviation: Positive = 0.35
     """Standard deviation of the logarithm of the initial half width."""
@@ -36,7 +36,7 @@ class StateEstimationConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_
     """Random walk of the tip [in half widths]."""
     width_walk: NonNegative = 0.03
     """Random walk of the logarithm of the half width."""
-    centre_walk: NonNegative = 0.012
+    centre_walk: NonNegative = 0.03
     """Random walk of the centre [in half widths]."""
     share_walk: NonNegative = 0.006
     """Random walk of the logit of the share."""

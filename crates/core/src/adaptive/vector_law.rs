@@ -9,7 +9,6 @@ use crate::error::{ConfigError, require, require_non_negative, require_positive}
 use crate::estimation::filter::Filter;
 use crate::model::hysteresis::Hysteresis;
 use crate::settings::{ControlSettings, DofSettings};
-use crate::supervision::settings::SafetySettings;
 
 /// Insertion with rotation, and bending: DOFs whose motions are bounded together.
 const GROUPS: [PerDof<f64>; 2] = [[1.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -29,7 +28,7 @@ const STEPS: usize = 5;
 /// contact   |dq| <= tip_gain |du| for the tip q that the estimate predicts
 /// ```
 ///
-/// of bending by itself. One DOF alone: 0 <= dc / du <= K_b, Eq. (2). Where insertion and rotation rest, neither command
+/// of bending by itself. One DOF alone: 0 <= dc / du <= `K_b`, Eq. (2). Where insertion and rotation rest, neither command
 /// moves, but each moves where the other does: while rotation turns, the friction that held the insertion is released.
 /// A share of the compensation s makes it dc = du + s (dc - du).
 ///
@@ -53,7 +52,8 @@ pub struct VectorLaw {
 }
 
 impl VectorLaw {
-    /// The law before the first reference, for a shaft of a radius in m; half of `width_limit` is the unit of the norms.
+    /// The law before the first reference, for a shaft of a radius in m; half of `width_limit` (3,) is the unit of the
+    /// norms, `command_speed` (3,) the largest speed of the command per s.
     ///
     /// # Errors
     /// A setting is out of range.
@@ -61,7 +61,8 @@ impl VectorLaw {
         settings: &AdaptiveSettings,
         [insertion, rotation, bending]: &PerDof<DofSettings>,
         control: &ControlSettings,
-        safety: &SafetySettings,
+        width_limit: PerDof<f64>,
+        command_speed: PerDof<f64>,
         radius: f64,
         limits: PerDof<PlayLimit>,
     ) -> Result<Self, ConfigError> {
@@ -82,7 +83,7 @@ impl VectorLaw {
         for rate in settings.change_rate {
             require_non_negative("change_rate", rate)?;
         }
-        let unit = safety.width_limit.map(|width| width / 2.0);
+        let unit = width_limit.map(|width| width / 2.0);
         let mut rate = settings.change_rate;
         for (rate, unit) in rate.iter_mut().zip(unit) {
             *rate *= unit;
@@ -92,9 +93,7 @@ impl VectorLaw {
             bending_gain: gain(bending),
             tip_gain: settings.tip_gain,
             unit,
-            step_limit: safety
-                .command_speed
-                .map(|speed| speed * control.period * BELOW_LIMIT),
+            step_limit: command_speed.map(|speed| speed * control.period * BELOW_LIMIT),
             limits,
             direction: SlipDirection::new(
                 radius,
@@ -214,7 +213,7 @@ impl VectorLaw {
         let dofs = used.half_width.iter_mut().zip(&mut used.centre);
         for ((half, centre), limit) in dofs.zip(self.limits) {
             let [minus, plus] = limit.clamp(*centre - *half, *centre + *half);
-            (*half, *centre) = ((plus - minus) / 2.0, (plus + minus) / 2.0);
+            (*half, *centre) = ((plus - minus) / 2.0, f64::midpoint(minus, plus));
         }
         used
     }

@@ -9,6 +9,8 @@ use crate::model::hysteresis::{Hysteresis, PlayPosition};
 
 /// Number of members.
 pub const MEMBERS: usize = 64;
+/// [`MEMBERS`] in sums.
+const COUNT: f64 = 64.0;
 /// Length of a member's state.
 pub const STATE: usize = 12;
 /// Number of the entries of a state that describe the position of the tip.
@@ -78,7 +80,7 @@ impl Ensemble {
         maps: &PerDof<CentreMap>,
         radius: f64,
         from: PerDof<f64>,
-        path: impl Iterator<Item = PerDof<f64>> + Clone,
+        path: &(impl Iterator<Item = PerDof<f64>> + Clone),
     ) {
         for member in &mut self.members {
             let mut position = position(member);
@@ -100,7 +102,7 @@ impl Ensemble {
                 *sum += entry;
             }
         }
-        sum.map(|sum| sum / MEMBERS as f64)
+        sum.map(|sum| sum / COUNT)
     }
 
     /// Covariance of a function of the states with N values.
@@ -111,7 +113,7 @@ impl Ensemble {
         let mut mean = [0.0; N];
         for member in &self.members {
             for (sum, value) in mean.iter_mut().zip(of(member)) {
-                *sum += value / MEMBERS as f64;
+                *sum += value / COUNT;
             }
         }
         let mut covariance = [[0.0; N]; N];
@@ -122,7 +124,7 @@ impl Ensemble {
             }
             for (row, own) in covariance.iter_mut().zip(away) {
                 for (entry, other) in row.iter_mut().zip(away) {
-                    *entry += own * other / (MEMBERS - 1) as f64;
+                    *entry += own * other / (COUNT - 1.0);
                 }
             }
         }
@@ -143,11 +145,11 @@ impl Ensemble {
                 .get(index)
                 .map_or(0.0, |member| measurement.predict(member))
         });
-        let mean_value = predicted.iter().sum::<f64>() / MEMBERS as f64;
+        let mean_value = predicted.iter().sum::<f64>() / COUNT;
         let mean = self.mean();
         let (mut covariance, mut variance) = ([0.0; STATE], 0.0);
         for (member, value) in self.members.iter().zip(predicted) {
-            let away = (value - mean_value) / (MEMBERS - 1) as f64;
+            let away = (value - mean_value) / (COUNT - 1.0);
             variance += away * (value - mean_value);
             for ((covariance, entry), mean) in covariance.iter_mut().zip(member).zip(mean) {
                 *covariance += away * (entry - mean);
@@ -172,7 +174,7 @@ impl Ensemble {
             for (half, (least, largest)) in [h1, h2, h3].into_iter().zip(bounds.clone()) {
                 *half = half.max(least).min(largest);
             }
-            *share = share.max(-5.0).min(5.0);
+            *share = share.clamp(-5.0, 5.0);
         }
     }
 

@@ -19,6 +19,8 @@ use crate::model::hysteresis::{Hysteresis, PlayPosition};
 const USUAL_WIDTH: f64 = 2.0 / 3.0;
 const LEAST_WIDTH: f64 = 0.02;
 const LARGEST_WIDTH: f64 = 1.2;
+/// Distance of the nodes of the centre's map over the position, in half of `width_limit`.
+const MAP_SPACING: f64 = 0.7;
 /// Standard deviation of the tip, in `start_deviation`, up to which images without markers make it uncertain, and by
 /// how much each does.
 const MISSED: f64 = 0.15;
@@ -160,7 +162,8 @@ impl Filter {
             nominal: Nominal {
                 hysteresis: Hysteresis {
                     half_width: start_plays.map(|play| play.width() / 2.0),
-                    centre: start_plays.map(|play| (play.delta_plus() + play.delta_minus()) / 2.0),
+                    centre: start_plays
+                        .map(|play| f64::midpoint(play.delta_minus(), play.delta_plus())),
                     shared: 0.5,
                 },
                 position: blank,
@@ -173,6 +176,12 @@ impl Filter {
     /// The prediction now.
     pub const fn nominal(&self) -> &Nominal {
         &self.nominal
+    }
+
+    /// The estimated play of each DOF that moves alone.
+    pub fn plays(&self) -> PerDof<Play> {
+        let offsets = self.nominal.hysteresis.offsets();
+        offsets.map(|(minus, plus)| Play::from_ordered(minus, plus))
     }
 
     /// Radius of the shaft in m.
@@ -191,7 +200,7 @@ impl Filter {
             } else {
                 USUAL_WIDTH * *half
             };
-            *centre = (play.delta_minus() + play.delta_plus()) / 2.0;
+            *centre = f64::midpoint(play.delta_minus(), play.delta_plus());
         }
         let [h1, h2, h3] = half;
         let [l1, l2, l3] = half.map(libm::log);
@@ -216,7 +225,7 @@ impl Filter {
         ];
         self.ensemble = Ensemble::new(&mean, &std, 1);
         for ((map, middle), unit) in self.maps.iter_mut().zip(reference).zip(self.unit) {
-            *map = CentreMap::new(middle, unit);
+            *map = CentreMap::new(middle, MAP_SPACING * unit);
         }
         self.origin = Some(reference);
         (self.command, self.reference) = (command, reference);
@@ -254,7 +263,7 @@ impl Filter {
     pub fn follow(&mut self, path: impl Iterator<Item = (PerDof<f64>, PerDof<f64>)> + Clone) {
         let commands = path.clone().map(|(command, _)| command);
         self.ensemble
-            .propagate(&self.maps, self.radius, self.command, commands);
+            .propagate(&self.maps, self.radius, self.command, &commands);
         let mut walked = [0.0; 3];
         for (command, reference) in path {
             let plays = &self.nominal.hysteresis;
@@ -452,7 +461,7 @@ impl Filter {
             .limit(self.unit.map(|unit| LEAST_WIDTH * unit), largest);
         let here = core::iter::once(self.command);
         self.ensemble
-            .propagate(&self.maps, self.radius, self.command, here);
+            .propagate(&self.maps, self.radius, self.command, &here);
         let mean = self.ensemble.mean();
         let at = position(&mean);
         let nominal = &mut self.nominal;

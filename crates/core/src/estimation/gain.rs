@@ -59,8 +59,6 @@ impl GainEstimate {
         }
         let variance = self.xx - self.x * self.x / self.weight;
         let covariance = self.xy - self.x * self.y / self.weight;
-        ((covariance + prior) / (variance + prior))
-            .max(LEAST)
-            .min(LARGEST)
+        ((covariance + prior) / (variance + prior)).clamp(LEAST, LARGEST)
     }
 }

@@ -65,7 +65,7 @@ impl TipFilter {
 
     /// The estimated play.
     pub fn play(&self) -> Play {
-        let [play, ..] = self.filter.nominal().hysteresis.plays();
+        let [play, ..] = self.filter.plays();
         play
     }
 

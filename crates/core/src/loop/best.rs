@@ -73,7 +73,8 @@ impl ProfileBlocks for Best {
                 &settings.adaptive,
                 &dofs,
                 &settings.control,
-                &settings.safety,
+                settings.safety.width_limit,
+                settings.safety.command_speed,
                 radius,
                 limits,
             )?,
@@ -101,7 +102,7 @@ impl ProfileBlocks for Best {
     }
 
     fn play(&self) -> PerDof<Play> {
-        self.filter.nominal().hysteresis.plays()
+        self.filter.plays()
     }
 
     fn keep_up<S: AsRef<[Entry]> + AsMut<[Entry]>>(

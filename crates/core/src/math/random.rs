@@ -1,6 +1,6 @@
 //! Seeded random numbers.
 
-/// Generator of normally distributed numbers: SplitMix64 (Steele, Lea, Flood, OOPSLA 2014), four 16-bit uniform numbers
+/// Generator of normally distributed numbers: `SplitMix64` (Steele, Lea, Flood, OOPSLA 2014), four 16-bit uniform numbers
 /// summed.
 ///
 /// Mean 0, variance 1, |z| <= 3.5. The same seed gives the same numbers.

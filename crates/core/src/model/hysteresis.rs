@@ -1,6 +1,5 @@
 //! Hysteresis of the three DOFs: the model of the estimate and of the compensation law of profile `best`.
 
-use crate::article::play::Play;
 use crate::dof::PerDof;
 use crate::model::friction::slide;
 
@@ -93,13 +92,10 @@ impl Hysteresis {
         ]
     }
 
-    /// The play of each DOF that moves alone.
-    pub fn plays(&self) -> PerDof<Play> {
+    /// Contact offsets (minus, plus) of each DOF that moves alone [m, rad, rad].
+    pub fn offsets(&self) -> PerDof<(f64, f64)> {
         let ([h1, h2, h3], [m1, m2, m3]) = (self.half_width, self.centre);
-        [(h1, m1), (h2, m2), (h3, m3)].map(|(half, centre)| {
-            let half = half.max(0.0);
-            Play::from_ordered(centre - half, centre + half)
-        })
+        [(h1, m1), (h2, m2), (h3, m3)].map(|(half, centre)| (centre - half, centre + half))
     }
 }
 

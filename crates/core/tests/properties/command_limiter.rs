@@ -21,8 +21,17 @@ fn with(settings: &SafetySettings) -> Result<CommandLimiter, ConfigError> {
     CommandLimiter::new(settings, &dofs()[1], 1, PERIOD)
 }
 
-fn new_limiter() -> CommandLimiter {
-    with(&settings()).unwrap()
+/// A limiter whose DOF moves by itself.
+struct Single(CommandLimiter);
+
+impl Single {
+    fn limit(&mut self, reference: f64, command: f64) -> (f64, LimiterResult) {
+        self.0.limit(reference, command, None)
+    }
+}
+
+fn new_limiter() -> Single {
+    Single(with(&settings()).unwrap())
 }
 
 #[test]
@@ -182,7 +191,7 @@ fn a_shift_of_the_reference_is_no_motion() {
     for shift in [0.7, -0.7] {
         let mut limiter = new_limiter();
         limiter.limit(2.0, 3.0);
-        limiter.shift_reference(shift);
+        limiter.0.shift_reference(shift);
         assert_eq!(
             limiter.limit(2.0 + shift, 3.1),
             (3.0, LimiterResult::Violation)

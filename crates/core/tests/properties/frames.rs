@@ -1,4 +1,4 @@
-//! The frame gate: times and images of frames.
+//! The frame gate: times, images and innovations of frames.
 
 use crate::dof::PerDof;
 use crate::supervision::flags::{Flag, Flags};
@@ -153,19 +153,12 @@ fn a_clock_is_wrong_if_not_finite_or_ahead_or_set_back_by_a_second() {
 #[test]
 fn settings_out_of_range_are_named() {
     type Change = fn(&mut SafetySettings);
-    let changes: [(&str, Change); 12] = [
+    let changes: [(&str, Change); 5] = [
         ("frame_age", |s| s.frame_age = 0.0),
         ("frame_gap", |s| s.frame_gap = f64::NAN),
         ("clock_jump", |s| s.clock_jump = 0.0),
-        ("innovation_growth", |s| s.innovation_growth = 0.0),
-        ("innovation_decay", |s| s.innovation_decay = 1.1),
         ("innovation_limit", |s| s.innovation_limit = 0.0),
-        ("blind_growth", |s| s.blind_growth = -0.1),
         ("frozen_travel", |s| s.frozen_travel = 0.0),
-        ("jump", |s| s.jump[0] = -1.0),
-        ("grip_distance", |s| s.grip_distance = 0.0),
-        ("slip", |s| s.slip[2] = f64::INFINITY),
-        ("innovation_floor", |s| s.innovation_floor = 0.0),
     ];
     for (field, change) in changes {
         let mut wrong = safety();
@@ -173,11 +166,18 @@ fn settings_out_of_range_are_named() {
         let error = FrameGate::new(&wrong, &dofs()).unwrap_err();
         assert_eq!(error.field, field);
     }
-    let mut dofs = dofs();
-    dofs[2].start_deviation = 0.0;
-    let error = FrameGate::new(&safety(), &dofs).unwrap_err();
-    assert_eq!(error.field, "start_deviation");
-    let mut sound = safety();
-    sound.blind_growth = 0.0;
-    FrameGate::new(&sound, &super::support::dofs()).unwrap();
+}
+
+#[test]
+fn an_innovation_beyond_its_limit_is_refused_and_one_on_it_is_not() {
+    let limit = safety().innovation_limit;
+    let refused = Flags::of(Flag::Innovation);
+    for (distance, expected) in [
+        (0.0, Flags::NONE),
+        (limit, Flags::NONE),
+        (limit.next_up(), refused),
+        (f64::INFINITY, refused),
+    ] {
+        assert_eq!(new_gate().check_innovation(distance), expected);
+    }
 }

@@ -3,39 +3,26 @@
 // Where these compare floats for equality, equality to the last bit is what they claim.
 #![allow(clippy::float_cmp)]
 
-mod adaptive;
 mod camera;
-mod change_watch;
 mod command_limiter;
 mod compensator;
 mod estimator;
 mod expectation;
 mod fading;
 mod features;
-mod frame_gate;
 mod frames;
-mod friction;
-mod friction_step;
-mod grip;
-mod guarantees;
 mod history;
-mod innovations;
 mod input_device;
 mod instrument;
-mod lead;
-mod lead_rates;
-mod learning;
 mod limits;
 mod linear;
 mod monitors;
 mod motion_bounds;
 mod motion_monitor;
-mod offset_map;
 mod outline;
 mod play;
 mod reference_gate;
 mod reference_speed;
-mod sharing;
 mod state;
 mod stress;
 mod strokes;
@@ -43,11 +30,8 @@ mod supervised_law;
 mod supervisor;
 #[path = "../support/mod.rs"]
 mod support;
-mod symmetric;
 mod thrown_away;
-mod weighted;
 mod whole;
-mod withheld;
 
 use crate::article::play::Play;
 use proptest::prelude::*;

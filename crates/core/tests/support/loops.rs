@@ -54,13 +54,6 @@ pub fn adaptive_with(safety: &SafetySettings, outlier_distance: f64) -> Loop<Bes
     build(&settings)
 }
 
-/// [`adaptive`] without shared friction of insertion and rotation.
-pub fn adaptive_uncoupled() -> Loop<Best> {
-    let mut settings = settings(&safety());
-    settings.adaptive.one_friction = false;
-    build(&settings)
-}
-
 fn build<P: Profile>(settings: &Settings) -> Loop<P> {
     let storage = vec![Entry::BLANK; settings.history_entries()];
     HysteresisReduction::new(settings, storage).unwrap()
