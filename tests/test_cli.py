@@ -156,7 +156,7 @@ def test_demo_writes_a_run_folder_and_prints_one_json_object(
 def test_demo_prints_the_articles_values_and_both_profiles(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, config_file: str
 ) -> None:
-    arguments = ["demo", "--config", config_file]
+    arguments = ["demo", "--config", config_file, "--profile", "best"]
     assert main([*arguments, "--out", str(tmp_path / "run")]) == 0
     out = capsys.readouterr().out
     assert next(line.split() for line in out.splitlines() if "article" in line and "paper" in line)[

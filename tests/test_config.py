@@ -19,6 +19,7 @@ def loaded(tmp_path: Path, text: str) -> Config:
 
 def test_defaults_are_the_articles_protocol() -> None:
     config = load_config()
+    assert config.profile == Config().profile == "best"
     assert config.experiment.periods == 5
     for dof in Dof:
         assert config[dof].free_gain == 5.0

@@ -50,7 +50,8 @@ def measure(seeds: Sequence[int], count: int) -> list[dict[str, Any]]:
             scale, unit = dof.display_scale, dof.display_unit
             rms = [scale * float(np.sqrt(np.mean(each.absolute[:, dof] ** 2))) for each in found]
             nees = [
-                float(np.mean(each.normalised[:, dof] ** 2))
+                # An image that updated nothing has no standard deviation.
+                float(np.nanmean(each.normalised[:, dof] ** 2))
                 for each in found
                 if each.normalised is not None
             ]

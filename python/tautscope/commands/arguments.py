@@ -19,11 +19,10 @@ def add_config(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_profile(parser: argparse.ArgumentParser, what: str, default: str | None = None) -> None:
+def add_profile(parser: argparse.ArgumentParser, what: str) -> None:
     """``--profile``; `what` describes its effect."""
-    shown = "the configuration's" if default is None else default
     parser.add_argument(
-        "--profile", choices=get_args(Profile), default=default, help=f"{what} [{shown}]"
+        "--profile", choices=get_args(Profile), help=f"{what} [that of the configuration]"
     )
 
 

@@ -35,7 +35,7 @@ Profile = Literal["paper", "best"]
 
 
 class Config(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """All settings of a run. The defaults are the article's experiment."""
+    """All settings of a run. The defaults are the article's experiment with profile ``best``."""
 
     profile: Profile = "best"
     """Scheme of compensation and estimation: ``paper`` is the article's, ``best`` that of

@@ -52,7 +52,7 @@ class Report:
         captured_at: When the frame was captured [s].
         status: Result of the update.
         state_estimate: q_hat (3,). Profile ``paper``: Eq. (16), the prediction where a DOF is not
-            observable. Profile ``best``: the most probable state, decision 0018.
+            observable. Profile ``best``: the most probable state, decision 0030.
         predicted_state: q (3,) at the capture time.
         predicted_features: h (4,) [px], Eq. (9), of the state the estimation started from: q, or
             with one band alone or profile ``best`` the state prediction of `predict_state`.
