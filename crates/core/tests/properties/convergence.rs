@@ -51,18 +51,17 @@ fn run(truth: &Hysteresis, seconds: u32, seed: u64) -> (Filter, PerDof<f64>) {
         if tick % 8 == 0 {
             filter.follow(core::iter::once((next, next)));
             let tip = position.output;
+            let seen = [0, 1, 2].map(|dof| tip[dof] + NOISE[dof] * noise.draw());
             let rows = [0, 1, 2].map(|dof| {
                 let (gain, origin) = (filter.nominal().gain[dof], filter.nominal().origin[dof]);
-                let seen = tip[dof] + NOISE[dof] * noise.draw();
                 let mut output = [0.0; 3];
                 output[dof] = gain / NOISE[dof];
                 ScalarMeasurement {
                     output,
-                    error: [0.0; 4],
-                    value: (seen - origin * (1.0 - gain)) / NOISE[dof],
+                    value: (seen[dof] - origin * (1.0 - gain)) / NOISE[dof],
                 }
             });
-            filter.update_with(&rows, false);
+            filter.update_with(&rows, seen, false);
             if tick > seconds * 100 {
                 count += 1.0;
                 let found = filter.nominal();

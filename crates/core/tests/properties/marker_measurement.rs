@@ -53,8 +53,6 @@ fn prediction(state: [f64; 3]) -> ImagePrediction {
     ImagePrediction {
         state,
         covariance: diagonal(STD.map(|std| std * std)),
-        error: [0.3, -0.2, 0.1, 0.4],
-        error_covariance: diagonal([0.2; 4]),
     }
 }
 
@@ -92,14 +90,14 @@ fn cost(
     for row in 0..4 {
         total[row][row] += settings.model_deviation.powi(2);
         for column in 0..4 {
-            total[row][column] += prior.error_covariance[row][column]
-                + settings.sideways_deviation.powi(2) * sideways[row] * sideways[column];
+            total[row][column] +=
+                settings.sideways_deviation.powi(2) * sideways[row] * sideways[column];
         }
     }
     let Some(seen) = model.predict(state) else {
         return f64::INFINITY;
     };
-    let misfit = [0, 1, 2, 3].map(|k| features[k] - prior.error[k] - seen.features[k]);
+    let misfit = [0, 1, 2, 3].map(|k| features[k] - seen.features[k]);
     let solved = eliminate(total, misfit);
     let markers: f64 = (0..4).map(|k| misfit[k] * solved[k]).sum();
     let from_prior: f64 = (0..3)
@@ -114,7 +112,12 @@ fn estimate(
     features: [f64; 4],
     covariance: &Square,
 ) -> Option<(Markers, MarkerEstimate)> {
-    let markers = Markers::new(features, Some(covariance), &estimation());
+    let markers = Markers::new(
+        features,
+        Some(covariance),
+        &estimation(),
+        estimation().model_deviation,
+    );
     let found = markers.estimate(model, prior, &estimation())?;
     Some((markers, found))
 }
@@ -149,50 +152,14 @@ proptest! {
         }
     }
 
-    /// The rows of the linear measurement are white: W R W' = I with R of the markers, W from the feature errors' rows.
+    /// The rows have the information of the markers: with R of markers, model and deviation of the tip, J of the features
+    /// by the tip, and the gain g, their sum of a (value - a . output) is g J' R^-1 (s - h(tip)), and that of a a' is
+    /// g J' R^-1 J g.
     #[test]
-    fn rows_are_white(
-        state in states(), covariance in covariances(), used in prop_oneof![
-            Just([true, true]), Just([true, false]), Just([false, true])],
-    ) {
-        let model = model();
-        let Some(seen) = model.predict(state) else { return Ok(()); };
-        let mut features = seen.features;
-        for (marker, used) in used.into_iter().enumerate() {
-            if !used {
-                features[2 * marker] = f64::NAN;
-                features[2 * marker + 1] = f64::NAN;
-            }
-        }
-        let Some((markers, found)) = estimate(&model, &prediction(state), features, &covariance) else {
-            return Ok(());
-        };
-        prop_assert_eq!(found.used, used);
-        let rows = markers.linearize(&found, [0.0; 3], [1.0; 3], [0.0; 3]).unwrap();
-        let whitener = rows.map(|row: ScalarMeasurement| row.error);
-        let mut total = covariance;
-        for (k, row) in total.iter_mut().enumerate() {
-            row[k] += estimation().model_deviation.powi(2);
-        }
-        for a in 0..4 {
-            for b in 0..4 {
-                let mut sum = 0.0;
-                for i in 0..4 {
-                    for j in 0..4 {
-                        sum += whitener[a][i] * total[i][j] * whitener[b][j];
-                    }
-                }
-                let expected = f64::from(u8::from(a == b && used[a / 2]));
-                prop_assert!((sum - expected).abs() <= 1e-9, "{a} {b}: {sum}");
-            }
-        }
-    }
-
-    /// About the estimate, a row's value is its whitened misfit there plus its slope times the output, with gain and origin.
-    #[test]
-    fn rows_predict_the_features_of_states_nearby(
+    fn rows_have_the_information_of_the_markers(
         state in states(), covariance in covariances(), noise in prop::array::uniform4(-1.0..1.0_f64),
         small in prop::array::uniform3(-1.0..1.0_f64), gain in prop::array::uniform3(0.7..1.2_f64),
+        deviation in 0.0..0.5_f64,
     ) {
         let model = model();
         let Some(seen) = model.predict(state) else { return Ok(()); };
@@ -202,14 +169,53 @@ proptest! {
         };
         prop_assume!(found.used == [true; 2]);
         let origin = [0.02, 0.1, 0.5];
-        let rows = markers.linearize(&found, origin, gain, [0.0; 3]).unwrap();
+        let std = STD.map(|std| deviation * std);
+        let rows = markers.linearize(&found, origin, gain, std).unwrap();
         let tip = [0, 1, 2].map(|dof| found.state[dof] + 1e-3 * small[dof] * STD[dof]);
         let output = [0, 1, 2].map(|dof| origin[dof] + (tip[dof] - origin[dof]) / gain[dof]);
+        let columns = found.prediction.columns;
+        let mut total = covariance;
+        for a in 0..4 {
+            total[a][a] += estimation().model_deviation.powi(2);
+            for b in 0..4 {
+                total[a][b] += (0..3).map(|dof| columns[dof][a] * columns[dof][b] * std[dof].powi(2)).sum::<f64>();
+            }
+        }
         let there = model.predict(tip).unwrap();
-        for row in rows {
-            let linear: f64 = row.value - (0..3).map(|dof| row.output[dof] * output[dof]).sum::<f64>();
-            let direct: f64 = (0..4).map(|k| row.error[k] * (features[k] - there.features[k])).sum();
-            prop_assert!((linear - direct).abs() <= 1e-4, "{linear} {direct}");
+        let misfit = eliminate(total, [0, 1, 2, 3].map(|k| features[k] - there.features[k]));
+        for dof in 0..3 {
+            let scale = gain[dof] * STD[dof];
+            let right: f64 = rows.iter().map(|row: &ScalarMeasurement| {
+                let rest = row.value - (0..3).map(|k| row.output[k] * output[k]).sum::<f64>();
+                row.output[dof] * rest
+            }).sum();
+            let direct: f64 = (0..4).map(|k| gain[dof] * columns[dof][k] * misfit[k]).sum();
+            prop_assert!(((right - direct) * STD[dof]).abs() <= 1e-2, "{dof}: {right} {direct}");
+            for other in 0..3 {
+                let product: f64 = rows.iter().map(|row| row.output[dof] * row.output[other]).sum();
+                let solved = eliminate(total, columns[other]);
+                let direct: f64 = (0..4).map(|k| gain[dof] * gain[other] * columns[dof][k] * solved[k]).sum();
+                let off = (product - direct) * scale * STD[other];
+                prop_assert!(off.abs() <= 1e-6 * (1.0 + (direct * scale * STD[other]).abs()), "{dof} {other}: {product} {direct}");
+            }
+        }
+    }
+
+    /// With one marker only its two rows count.
+    #[test]
+    fn a_marker_that_was_not_found_has_no_rows(state in states(), covariance in covariances(), lost in 0..2_usize) {
+        let model = model();
+        let Some(seen) = model.predict(state) else { return Ok(()); };
+        let mut features = seen.features;
+        features[2 * lost] = f64::NAN;
+        features[2 * lost + 1] = f64::NAN;
+        let Some((markers, found)) = estimate(&model, &prediction(state), features, &covariance) else {
+            return Ok(());
+        };
+        prop_assert_eq!(found.used, [lost == 1, lost == 0]);
+        let rows = markers.linearize(&found, [0.0; 3], [1.0; 3], [0.0; 3]).unwrap();
+        for row in [rows[2 * lost], rows[2 * lost + 1]] {
+            prop_assert_eq!((row.output, row.value), ([0.0; 3], 0.0));
         }
     }
 
