@@ -118,7 +118,6 @@ pub fn settings(safety: &SafetySettings) -> Settings {
             marker_deviation: 0.3,
             model_deviation: 0.3,
             sideways_deviation: 0.3e-3,
-            geometry_deviation: 0.5,
             outlier_distance: 4.0,
             tip_deviation: 0.05,
             width_deviation: 0.35,
