@@ -9,6 +9,8 @@ use crate::dof::PerDof;
 pub struct AdaptiveSettings {
     /// Largest speed of the predicted tip over that of the reference.
     pub tip_gain: f64,
+    /// Standard deviations of the half width by which less of it is compensated than estimated.
+    pub caution: f64,
     /// Time constant of the low-pass filter of the operator input that separates tremor from motion, in s.
     pub tremor_time: f64,
     /// Travel of the reference over which its direction is averaged.

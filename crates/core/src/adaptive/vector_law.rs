@@ -7,7 +7,7 @@ use crate::article::play_limit::PlayLimit;
 use crate::dof::{PerDof, all_finite};
 use crate::error::{ConfigError, require, require_non_negative, require_positive};
 use crate::estimation::filter::Filter;
-use crate::model::hysteresis::Hysteresis;
+use crate::model::hysteresis::{Hysteresis, PlayPosition};
 use crate::settings::{ControlSettings, DofSettings};
 
 /// Insertion with rotation, and bending: DOFs whose motions are bounded together.
@@ -38,6 +38,7 @@ pub struct VectorLaw {
     free_gain: f64,
     bending_gain: f64,
     tip_gain: f64,
+    caution: f64,
     unit: PerDof<f64>,
     /// Largest |dc| in a tick.
     step_limit: PerDof<f64>,
@@ -77,6 +78,7 @@ impl VectorLaw {
             settings.tip_gain,
             "1 or above",
         )?;
+        require_non_negative("caution", settings.caution)?;
         require_non_negative("tremor_time", settings.tremor_time)?;
         require_positive("direction_travel", settings.direction_travel)?;
         require_non_negative("known_travel", settings.known_travel)?;
@@ -92,6 +94,7 @@ impl VectorLaw {
             free_gain: gain(insertion).min(gain(rotation)),
             bending_gain: gain(bending),
             tip_gain: settings.tip_gain,
+            caution: settings.caution,
             unit,
             step_limit: command_speed.map(|speed| speed * control.period * BELOW_LIMIT),
             limits,
@@ -192,7 +195,7 @@ impl VectorLaw {
         let mut lead = self.lead;
         let gains = [self.free_gain, self.bending_gain];
         for (group, gain) in GROUPS.into_iter().zip(gains) {
-            let step = self.bounded_step(group, gain, wanted, motion, filter);
+            let step = self.bounded_step(group, gain, wanted, motion, &used, filter);
             let axes = step.into_iter().zip(motion).zip(group);
             // Without gain there is no compensation.
             let share = if gain > 1.0 { self.share } else { 0.0 };
@@ -210,6 +213,9 @@ impl VectorLaw {
             ..filter.nominal().hysteresis
         };
         let mut used = self.rate_limit.apply(&estimate);
+        for (half, std) in used.half_width.iter_mut().zip(filter.nominal().width_std) {
+            *half *= libm::exp(-self.caution * std);
+        }
         let dofs = used.half_width.iter_mut().zip(&mut used.centre);
         for ((half, centre), limit) in dofs.zip(self.limits) {
             let [minus, plus] = limit.clamp(*centre - *half, *centre + *half);
@@ -225,6 +231,7 @@ impl VectorLaw {
         gain: f64,
         wanted: PerDof<f64>,
         motion: PerDof<f64>,
+        used: &Hysteresis,
         filter: &Filter,
     ) -> PerDof<f64> {
         let moved = self.norm(group, motion);
@@ -246,18 +253,22 @@ impl VectorLaw {
             share = share.min(limit / step.abs());
         }
         let nominal = filter.nominal();
-        let before = nominal.tip(nominal.position.output);
+        // Where the tip may already be in contact.
+        let predicted = Hysteresis {
+            half_width: used.half_width,
+            ..nominal.hysteresis
+        };
+        let propagate = |position: &PlayPosition, command: PerDof<f64>| {
+            predicted.propagate(filter.radius(), position, self.command, command)
+        };
+        let position = propagate(&nominal.position, self.command);
+        let before = nominal.tip(position.output);
         for _ in 0..STEPS {
             let mut command = self.command;
             for (command, step) in command.iter_mut().zip(step) {
                 *command += share * step;
             }
-            let there = nominal.hysteresis.propagate(
-                filter.radius(),
-                &nominal.position,
-                self.command,
-                command,
-            );
+            let there = propagate(&position, command);
             let tip = self.norm(group, subtract(nominal.tip(there.output), before));
             if tip <= self.tip_gain * moved {
                 break;

@@ -70,6 +70,8 @@ pub struct Nominal {
     pub hysteresis: Hysteresis,
     /// Plays.
     pub position: PlayPosition,
+    /// Standard deviation of the logarithm of each half width.
+    pub width_std: PerDof<f64>,
     /// Travel of the tip over that of the output, about `origin`.
     pub gain: PerDof<f64>,
     /// First reference [m, rad, rad].
@@ -167,6 +169,7 @@ impl Filter {
                     shared: 0.5,
                 },
                 position: blank,
+                width_std: [0.0; 3],
                 gain: [1.0; 3],
                 origin: [f64::NAN; 3],
             },
@@ -489,7 +492,11 @@ impl Filter {
             .propagate(&self.maps, self.radius, self.command, &here);
         let mean = self.ensemble.mean();
         let at = position(&mean);
+        let (_, [[v1, _, _], [_, v2, _], [_, _, v3]]) = self
+            .ensemble
+            .covariance(|[_, _, _, _, _, h1, h2, h3, ..]| [*h1, *h2, *h3]);
         let nominal = &mut self.nominal;
+        nominal.width_std = [v1, v2, v3].map(libm::sqrt);
         nominal.hysteresis = hysteresis(&mean, &self.maps, at.output);
         nominal.position =
             nominal

@@ -227,12 +227,17 @@ impl CommandLimiters {
         let ([u1, u2, u3], [c1, c2, c3]) = (reference, command);
         let ([c1, c2], [reach1, reach2], is_violated) = self.couple([u1, u2], [c1, c2]);
         let [first, second, third] = &mut self.dofs;
+        let before = [first.last, second.last];
         let (limited1, result1) = first.limit(u1, c1, reach1);
         let (limited2, result2) = second.limit(u2, c2, reach2);
         let (limited3, result3) = third.limit(u3, c3, None);
+        let ([limited1, limited2], has_changed) =
+            self.couple_again(before, [u1, u2], [limited1, limited2]);
         let shaft = [result1, result2].map(|result| {
             if is_violated {
                 LimiterResult::Violation
+            } else if has_changed && result == LimiterResult::Unchanged {
+                LimiterResult::LeadLimited
             } else {
                 result
             }
@@ -263,6 +268,57 @@ impl CommandLimiters {
         let kept = reach / length;
         let commands = [c1 - (1.0 - kept) * dc1, c2 - (1.0 - kept) * dc2];
         (commands, reaches, true)
+    }
+
+    /// Commands of insertion and rotation that their own limits have moved beyond the common bound, and whether there
+    /// were such: brought back to it towards the motion of the reference, which is within every limit of a DOF.
+    fn couple_again(
+        &mut self,
+        before: [Option<(f64, f64)>; 2],
+        reference: [f64; 2],
+        command: [f64; 2],
+    ) -> ([f64; 2], bool) {
+        let [first, second, _] = &mut self.dofs;
+        let ([Some((l1, b1)), Some((l2, b2))], true) = (before, self.is_coupled) else {
+            return (command, false);
+        };
+        let ([u1, u2], [c1, c2]) = (reference, command);
+        let units = [first.lead_limit, second.lead_limit];
+        let [unit1, unit2] = units;
+        let (du, dc) = (
+            [(u1 - l1) / unit1, (u2 - l2) / unit2],
+            [(c1 - b1) / unit1, (c2 - b2) / unit2],
+        );
+        let product = |[a, b]: [f64; 2], [c, d]: [f64; 2]| a * c + b * d;
+        let gain = first.gain_limit.min(second.gain_limit);
+        let bound = square(gain) * product(du, du);
+        let exceeds = product(dc, dc) > bound * square(1.0 + ROUNDING) + square(SUM_ROUNDING);
+        if !exceeds {
+            return (command, false);
+        }
+        // Between no motion and the command, as near to the motion of the reference as may be.
+        let mut inner = du;
+        let mut rest = dc;
+        for ((inner, rest), dc) in inner.iter_mut().zip(&mut rest).zip(dc) {
+            *inner = inner.max(dc.min(0.0)).min(dc.max(0.0));
+            *rest -= *inner;
+        }
+        let (along, length) = (product(inner, rest), product(rest, rest));
+        let left = (bound - product(inner, inner)).max(0.0);
+        let share = left / (along + libm::sqrt(square(along) + length * left));
+        let share = share.clamp(0.0, 1.0);
+        let ([i1, i2], [r1, r2]) = (inner, rest);
+        let bounded = [
+            b1 + unit1 * (i1 + share * r1),
+            b2 + unit2 * (i2 + share * r2),
+        ];
+        for (limiter, (reference, command)) in [first, second]
+            .into_iter()
+            .zip(reference.into_iter().zip(bounded))
+        {
+            limiter.last = Some((reference, command));
+        }
+        (bounded, true)
     }
 
     /// Moves the origin of the reference by `shift` (3,).

@@ -1,0 +1,165 @@
+//! The filter on simulated plays of known widths, centres, share and gain; equal inputs give equal filters.
+
+use crate::article::play::{Play, PlayState};
+use crate::dof::PerDof;
+use crate::estimation::ensemble::ScalarMeasurement;
+use crate::estimation::filter::Filter;
+use crate::estimation::tip_filter::TipFilter;
+use crate::math::random::Normal;
+use crate::model::hysteresis::{Hysteresis, PlayPosition};
+
+use super::support::{dofs, safety, settings};
+
+const UNIT: PerDof<f64> = [6e-3, 1.3, 0.75];
+const RADIUS: f64 = 1.75e-3;
+const NOISE: PerDof<f64> = [0.2e-3, 0.015, 0.015];
+
+fn new_filter() -> Filter {
+    let none = Play::new(0.0, 0.0).unwrap();
+    let start = dofs().map(|dof| dof.start_deviation);
+    Filter::new(
+        settings(&safety()).state_estimation,
+        UNIT,
+        start,
+        [none; 3],
+        RADIUS,
+    )
+    .unwrap()
+}
+
+/// Sines of incommensurate periods.
+fn command(time: f64) -> PerDof<f64> {
+    [
+        0.025 + 15e-3 * (0.63 * time).sin(),
+        2.0 * (0.86 * time).sin(),
+        0.9 + 0.9 * (0.73 * time).sin(),
+    ]
+}
+
+/// A filter after so many s on an instrument of that hysteresis, and the RMS error of its tip over the last half.
+fn run(truth: &Hysteresis, seconds: u32, seed: u64) -> (Filter, PerDof<f64>) {
+    let (mut filter, mut noise) = (new_filter(), Normal::new(seed));
+    let mut last = command(0.0);
+    filter.start(last, last);
+    let mut position = truth.propagate(RADIUS, &PlayPosition::at(last), last, last);
+    let (mut squares, mut count) = ([0.0; 3], 0.0);
+    for tick in 1..seconds * 200 {
+        let next = command(0.005 * f64::from(tick));
+        position = truth.propagate(RADIUS, &position, last, next);
+        filter.step(last, next);
+        last = next;
+        if tick % 8 == 0 {
+            filter.follow(core::iter::once((next, next)));
+            let tip = position.output;
+            let rows = [0, 1, 2].map(|dof| {
+                let (gain, origin) = (filter.nominal().gain[dof], filter.nominal().origin[dof]);
+                let seen = tip[dof] + NOISE[dof] * noise.draw();
+                let mut output = [0.0; 3];
+                output[dof] = gain / NOISE[dof];
+                ScalarMeasurement {
+                    output,
+                    error: [0.0; 4],
+                    value: (seen - origin * (1.0 - gain)) / NOISE[dof],
+                }
+            });
+            filter.update_with(&rows, false);
+            if tick > seconds * 100 {
+                count += 1.0;
+                let found = filter.nominal();
+                let found = found.tip(found.position.output);
+                for dof in 0..3 {
+                    squares[dof] += (found[dof] - tip[dof]).powi(2);
+                }
+            }
+        }
+    }
+    (filter, squares.map(|square: f64| (square / count).sqrt()))
+}
+
+fn truths() -> [Hysteresis; 4] {
+    let usual = Hysteresis {
+        half_width: [4e-3, 0.8, 0.5],
+        centre: [0.4e-3, -0.1, 0.05],
+        shared: 0.97,
+    };
+    [
+        usual,
+        Hysteresis {
+            shared: 0.02,
+            ..usual
+        },
+        Hysteresis {
+            half_width: [2.5e-3, 1.1, 0.3],
+            ..usual
+        },
+        Hysteresis {
+            half_width: [5.5e-3, 0.5, 0.7],
+            centre: [-0.8e-3, 0.1, -0.1],
+            ..usual
+        },
+    ]
+}
+
+#[test]
+fn widths_centres_and_share_of_known_plays_are_found() {
+    for (index, truth) in truths().iter().enumerate() {
+        let (filter, error) = run(truth, 60, 2026);
+        let found = filter.nominal().hysteresis;
+        println!("{index}: {found:?} {error:?}");
+        for dof in 0..3 {
+            let wide = found.half_width[dof] / truth.half_width[dof] - 1.0;
+            assert!(
+                wide.abs() < 0.15,
+                "{index}, {dof}: half width off by {wide}"
+            );
+            let centre = filter.centre(filter.nominal().position.output)[dof];
+            let off = (centre - truth.centre[dof]) / truth.half_width[dof];
+            assert!(off.abs() < 0.2, "{index}, {dof}: centre off by {off}");
+            assert!(
+                error[dof] < NOISE[dof],
+                "{index}, {dof}: tip off by {}",
+                error[dof]
+            );
+        }
+        let share = (found.shared - truth.shared).abs();
+        assert!(
+            share < 0.25,
+            "{index}: share {} for {}",
+            found.shared,
+            truth.shared
+        );
+    }
+}
+
+/// Bit for bit: the same seed of the members, and no clock and no address in them.
+#[test]
+fn filters_with_equal_inputs_are_equal() {
+    let [truth, ..] = truths();
+    let ((one, _), (other, _)) = (run(&truth, 5, 3), run(&truth, 5, 3));
+    assert!(one == other);
+    let (third, _) = run(&truth, 5, 4);
+    assert!(one != third);
+}
+
+/// Width and gain of one DOF whose tip is measured directly, over a range of several widths.
+#[test]
+fn the_gain_of_a_long_motion_is_found() {
+    for gain in [0.8, 1.0, 1.2] {
+        let mut filter = TipFilter::new(settings(&safety()).state_estimation, 1.0, 0.02).unwrap();
+        let (play, mut tip) = (Play::new(-0.7, 0.7).unwrap(), PlayState { output: 0.0 });
+        let mut noise = Normal::new(5);
+        for tick in 0..2500_u32 {
+            let input = 6.0 * (0.04 * f64::from(tick)).sin();
+            filter.step(input);
+            let seen = gain * play.step(&mut tip, input) + 0.02 * noise.draw();
+            filter.update(seen);
+        }
+        assert!(
+            (filter.gain() / gain - 1.0).abs() < 0.05,
+            "{} for {gain}",
+            filter.gain()
+        );
+        let width = filter.play().width();
+        assert!((width / 1.4 - 1.0).abs() < 0.2, "{width} with gain {gain}");
+    }
+}
