@@ -40,7 +40,7 @@ class Size:
 
 
 SIZES = {
-    "steps": Size(1_000_000_000, 350),
+    "steps": Size(1_000_000_000, 3_200),
     "ticks": Size(1_000_000, 40),
     "hours": Size(1_000, 3_000),
     "loaded": Size(100_000, 100),

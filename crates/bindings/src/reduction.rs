@@ -31,6 +31,14 @@ type Report<'py> = (
 /// The loop with storage for its history on the heap.
 type Loop<P> = Box<core::HysteresisReduction<P, Vec<core::Entry>>>;
 
+type Hysteresis<'py> = (
+    Floats<'py>,
+    Floats<'py>,
+    Floats<'py>,
+    f64,
+    Floats<'py>,
+);
+
 enum Profile {
     Paper(Loop<core::Paper>),
     Best(Loop<core::Best>),
@@ -182,6 +190,24 @@ impl Reduction {
     #[getter]
     fn predicted_state<'py>(&self, py: Python<'py>) -> Floats<'py> {
         PyArray1::from_slice(py, &on_loop!(&self.0, inner => inner.predicted_state()))
+    }
+
+    /// In profile `best`: half widths (3,), standard deviations of their logarithms (3,), centres (3,), share of the
+    /// friction in common, and gains (3,).
+    #[getter]
+    fn hysteresis<'py>(&self, py: Python<'py>) -> Option<Hysteresis<'py>> {
+        let Profile::Best(inner) = &self.0 else {
+            return None;
+        };
+        let found = inner.hysteresis();
+        let floats = |values| PyArray1::from_slice(py, values);
+        Some((
+            floats(&found.half_width),
+            floats(&found.width_std),
+            floats(&found.centre),
+            found.shared,
+            floats(&found.gain),
+        ))
     }
 
     /// The estimated offsets at the negative contacts (3,), input minus output.

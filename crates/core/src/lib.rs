@@ -78,7 +78,7 @@ pub use r#loop::best::Best;
 pub use r#loop::paper::Paper;
 pub use r#loop::profile::Profile;
 pub use r#loop::reduction::HysteresisReduction;
-pub use r#loop::report::{Report, Status};
+pub use r#loop::report::{HysteresisEstimate, Report, Status};
 pub use r#loop::settings::Settings;
 pub use model::camera::{Camera, Pose};
 pub use model::features::{FeatureModel, FeaturePrediction};

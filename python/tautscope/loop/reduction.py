@@ -88,6 +88,25 @@ class Report:
     warnings: tuple[str, ...]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class HysteresisEstimate:
+    """The estimated hysteresis in profile ``best``; (3,) arrays are [m, rad, rad].
+
+    Attributes:
+        half_width: (3,) half widths of the slack of each DOF that moves alone.
+        width_std: (3,) standard deviations of their logarithms.
+        centre: (3,) centres of the contact offsets at the present position, input minus output.
+        shared: Share of the friction that insertion and rotation have in common, 0 to 1.
+        gain: (3,) travel of the tip over that of the command in contact.
+    """
+
+    half_width: NDArray[np.float64]
+    width_std: NDArray[np.float64]
+    centre: NDArray[np.float64]
+    shared: float
+    gain: NDArray[np.float64]
+
+
 class HysteresisReduction:
     """Image-based hysteresis reduction, Fig. 6: `step` at the control rate, `on_frame` per image.
 
@@ -244,6 +263,12 @@ class HysteresisReduction:
     def delta_plus(self) -> NDArray[np.float64]:
         """The estimated positive contact offsets (3,) [m, rad, rad], input minus output."""
         return self._loop.delta_plus
+
+    @property
+    def hysteresis(self) -> HysteresisEstimate | None:
+        """The estimated hysteresis; None in profile ``paper``."""
+        found = self._loop.hysteresis
+        return None if found is None else HysteresisEstimate(*found)
 
     @cached_property
     def _detector(self) -> MarkerDetector:

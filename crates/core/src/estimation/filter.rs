@@ -398,7 +398,7 @@ impl Filter {
         let Some(rows) = markers.linearize(estimate, origin, gain, self.deviation()) else {
             return;
         };
-        self.update_with(&rows, is_position_only);
+        self.update_with(&rows, estimate.state, is_position_only);
         if let Some(misfit) = markers.misfit(estimate) {
             let variance = self.model_std * self.model_std;
             let change = (misfit - variance) / MODEL_IMAGES;
@@ -408,13 +408,19 @@ impl Filter {
         self.catch_up(history);
     }
 
-    /// Updates the ensemble at its time with measurements; with `is_position_only` only the tip.
-    pub fn update_with(&mut self, rows: &[ScalarMeasurement], is_position_only: bool) {
+    /// Updates the ensemble at its time with measurements of the plays, which belong to a tip (3,) [m, rad, rad]; with
+    /// `is_position_only` only the tip.
+    pub fn update_with(
+        &mut self,
+        rows: &[ScalarMeasurement],
+        tip: PerDof<f64>,
+        is_position_only: bool,
+    ) {
         for row in rows {
             self.ensemble.update(row, is_position_only);
         }
         if !is_position_only {
-            self.update_gain(self.belief().state);
+            self.update_gain(tip);
             self.update_maps();
         }
         self.travel = [0.0; 3];

@@ -60,7 +60,7 @@ impl TipFilter {
             output: [gain / self.std, 0.0, 0.0],
             value: (tip - origin * (1.0 - gain)) / self.std,
         };
-        self.filter.update_with(&[row], false);
+        self.filter.update_with(&[row], [tip, 0.0, 0.0], false);
     }
 
     /// The estimated play.

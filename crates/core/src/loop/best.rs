@@ -13,8 +13,11 @@ use crate::estimation::posture::Belief;
 use crate::r#loop::measurement::Measurement;
 use crate::r#loop::paper::state_estimator;
 use crate::r#loop::profile::{Image, ImageUpdate, ProfileBlocks};
+use crate::r#loop::reduction::HysteresisReduction;
+use crate::r#loop::report::HysteresisEstimate;
 use crate::r#loop::settings::Settings;
 use crate::model::features::FeatureModel;
+use crate::model::hysteresis::Hysteresis;
 use crate::settings::DofSettings;
 use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::monitors::Law;
@@ -209,6 +212,25 @@ impl ProfileBlocks for Best {
 
     fn reset_prediction(&mut self, _: &Entry) {
         self.filter.reset_position();
+    }
+}
+
+impl<S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<Best, S> {
+    /// The estimated hysteresis.
+    pub fn hysteresis(&self) -> HysteresisEstimate {
+        let nominal = self.profile.filter.nominal();
+        let Hysteresis {
+            half_width,
+            centre,
+            shared,
+        } = nominal.hysteresis;
+        HysteresisEstimate {
+            half_width,
+            width_std: nominal.width_std,
+            centre,
+            shared,
+            gain: nominal.gain,
+        }
     }
 }
 

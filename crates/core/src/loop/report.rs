@@ -45,3 +45,18 @@ pub struct Report {
     /// State of the supervision after the update.
     pub supervision: Supervision,
 }
+
+/// The estimated hysteresis in profile `best`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HysteresisEstimate {
+    /// Half widths (3,) [m, rad, rad].
+    pub half_width: PerDof<f64>,
+    /// Standard deviations of their logarithms (3,).
+    pub width_std: PerDof<f64>,
+    /// Centres of the contact offsets (3,), input minus output, at the present position [m, rad, rad].
+    pub centre: PerDof<f64>,
+    /// Share of the friction that insertion and rotation have in common, 0 to 1.
+    pub shared: f64,
+    /// Travel of the tip over that of the command in contact (3,).
+    pub gain: PerDof<f64>,
+}

@@ -84,8 +84,8 @@ proptest! {
             limit.update([estimate.half_width, estimate.centre], [[half; 3], [centre; 3]]);
             estimate = Hysteresis { half_width: [half; 3], centre: [centre; 3], ..estimate };
             let used = limit.apply(&estimate);
-            for dof in 0..3 {
-                let most = rate[dof] * period * f64::from(ticks) + 1e-9;
+            for (dof, rate) in rate.into_iter().enumerate() {
+                let most = rate * period * f64::from(ticks) + 1e-9;
                 prop_assert!((used.half_width[dof] - start.half_width[dof]).abs() <= most);
                 prop_assert!((used.centre[dof] - start.centre[dof]).abs() <= most);
                 let withheld = (estimate.half_width[dof] - used.half_width[dof])

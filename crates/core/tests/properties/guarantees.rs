@@ -294,10 +294,11 @@ impl Law for Watched {
 fn on_each_core(walk: impl Fn(u64, u64) -> Count + Sync) -> Count {
     let asked = std::env::var("TAUTSCOPE_STEPS").is_ok();
     // Unoptimised, a step takes 20 times as long.
+    // Half for each of the two tests.
     let wanted = if asked || !cfg!(debug_assertions) {
-        steps()
+        steps() / 2
     } else {
-        steps() / 10
+        steps() / 20
     };
     let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get() as u64);
     let mut count = Count::default();

@@ -68,8 +68,9 @@ fn eliminate(mut rows: Square, mut right: [f64; 4]) -> [f64; 4] {
         right.swap(column, pivot);
         for row in (0..4).filter(|row| *row != column) {
             let factor = rows[row][column] / rows[column][column];
-            for entry in 0..4 {
-                rows[row][entry] -= factor * rows[column][entry];
+            let above = rows[column];
+            for (entry, above) in rows[row].iter_mut().zip(above) {
+                *entry -= factor * above;
             }
             right[row] -= factor * right[column];
         }
@@ -234,8 +235,8 @@ proptest! {
         let Some((_, one)) = estimate(&model, &prior, alone, &covariance) else {
             return Ok(());
         };
-        for dof in 0..3 {
-            prop_assert!((found.state[dof] - one.state[dof]).abs() <= 1e-3 * STD[dof]);
+        for (dof, std) in STD.into_iter().enumerate() {
+            prop_assert!((found.state[dof] - one.state[dof]).abs() <= 1e-3 * std);
         }
     }
 }

@@ -38,6 +38,20 @@ fn steps(default: u64) -> u64 {
     std::env::var("TAUTSCOPE_STEPS").map_or(default, |text| text.parse().unwrap())
 }
 
+/// The common bound of insertion and rotation, in the limits of their width; nothing moves while both rest.
+fn check_coupled(moved: PerDof<f64>, pulled: PerDof<f64>, place: &str) {
+    let [first, second, _] = support::safety().width_limit;
+    let norm = |x: PerDof<f64>| (x[0] / first).hypot(x[1] / second);
+    let (dc, du) = (norm(moved), norm(pulled));
+    assert!(du > 0.0 || dc == 0.0, "{place}: {dc} for {du}");
+    // The travel, which the offset of the reference gate may have, is ten times the limit of the width.
+    let rounding = 160.0 * f64::EPSILON;
+    assert!(
+        du.is_nan() || dc <= 5.0 * du * (1.0 + 1e-9) + rounding,
+        "{place}: {dc} for {du}"
+    );
+}
+
 /// A hand that moves, rests, trembles and jumps, ticks that come late, images of every kind, an operator who goes on:
 /// every command keeps the law.
 fn stress<P: Profile>(mut reduction: Loop<P>, seed: u64, steps: u64) {
@@ -86,17 +100,7 @@ fn stress<P: Profile>(mut reduction: Loop<P>, seed: u64, steps: u64) {
         let moved = [0, 1, 2].map(|dof| now[dof] - command[dof]);
         let pulled = [0, 1, 2].map(|dof| next[dof] - reference[dof]);
         if P::IS_COUPLED {
-            let limits = [0, 1].map(|dof| limits.width_limit[dof]);
-            let norm = |x: PerDof<f64>| (x[0] / limits[0]).hypot(x[1] / limits[1]);
-            let (dc, du) = (norm(moved), norm(pulled));
-            let facts = format!("seed {seed}, tick {tick}: {dc} for {du}");
-            assert!(du > 0.0 || dc == 0.0, "{facts}");
-            // The same rounding as below, in units of the limits of the width.
-            let rounding = 16.0 * f64::EPSILON * 300.0 / 30.0;
-            assert!(
-                du.is_nan() || dc <= 5.0 * du * (1.0 + 1e-9) + rounding,
-                "{facts}"
-            );
+            check_coupled(moved, pulled, &format!("seed {seed}, tick {tick}"));
         }
         for dof in 0..3 {
             let (dc, du) = (moved[dof], pulled[dof]);
