@@ -31,13 +31,7 @@ type Report<'py> = (
 /// The loop with storage for its history on the heap.
 type Loop<P> = Box<core::HysteresisReduction<P, Vec<core::Entry>>>;
 
-type Hysteresis<'py> = (
-    Floats<'py>,
-    Floats<'py>,
-    Floats<'py>,
-    f64,
-    Floats<'py>,
-);
+type Hysteresis<'py> = (Floats<'py>, Floats<'py>, Floats<'py>, f64, Floats<'py>);
 
 enum Profile {
     Paper(Loop<core::Paper>),
