@@ -9,6 +9,7 @@ from hysteresis.tables import Row, show
 
 IDEAS: dict[str, dict[str, Any]] = {
     "bound of the predicted tip's speed": {"adaptive.tip_gain": 100.0},
+    "less compensation of uncertain widths": {"adaptive.caution": 0.0},
     "separation of tremor and intended motion": {"adaptive.tremor_time": 0.0},
     "rate limit of the offsets": {"adaptive.change_rate": [100.0, 100.0, 100.0]},
     "centre as a function of position": {"state_estimation.map_rate": [0.0, 0.0, 0.0]},

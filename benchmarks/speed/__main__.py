@@ -70,28 +70,31 @@ def state_estimation(config: Config) -> tuple[list[float], list[float]]:
     return ours, nanoseconds(use_numpy, len(samples))
 
 
-def image_update(config: Config) -> list[float]:
-    """Time of an image update with the features of the predicted state and noise."""
+def in_operation(config: Config) -> tuple[list[float], list[float]]:
+    """Times of a control tick and of an image update, with images of the predicted state."""
     rng = np.random.default_rng(0)
     loop, model = construction.build_loop(config), construction.build_feature_model(config)
     motion = OperatorMotion(config.experiment, seed=0, duration=1e3)
     period, tick = config.control.period, 0
-    found = []
+    ticks, updates = [], []
     for _ in range(REPEATS):
-        spent = 0
+        spent = [0, 0]
         for _ in range(IMAGES):
-            for _ in range(8):
-                tick += 1
-                loop.step(motion(tick * period), tick * period)
+            times = period * np.arange(tick + 1, tick + 9)
+            references, tick = np.array([motion(time) for time in times]), tick + 8
+            start = perf_counter_ns()
+            loop.run(references, times)
+            spent[0] += perf_counter_ns() - start
             prediction = model.predict(loop.predicted_state)
             if prediction is None:
                 continue
             features = prediction[0] + rng.normal(0.0, 0.2, 4)
             start = perf_counter_ns()
             loop.on_features(features, (tick - 16) * period)
-            spent += perf_counter_ns() - start
-        found.append(spent / IMAGES)
-    return found
+            spent[1] += perf_counter_ns() - start
+        ticks.append(spent[0] / IMAGES / 8)
+        updates.append(spent[1] / IMAGES)
+    return ticks, updates
 
 
 def main() -> None:
@@ -99,18 +102,19 @@ def main() -> None:
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     arguments = parser.parse_args()
 
-    paper, config = load_config(profile="paper"), load_config(profile="best")
-    ours, numpy_times = state_estimation(config)
+    ours, numpy_times = state_estimation(Config())
+    loop_rows = []
+    for each in (load_config(profile="paper"), load_config(profile="best")):
+        tick, update = in_operation(each)
+        for what, times, goal in (
+            ("control tick", tick, 1000.0),
+            ("control tick without images", control_tick(each), 1000.0),
+            ("image update", update, 50_000.0),
+        ):
+            loop_rows.append(goal_row(what, "ns", times, goal, profile=each.profile))
     ratio = [theirs / own for theirs, own in zip(numpy_times, ours, strict=True)]
     rows = [
-        *(
-            goal_row("control tick", "ns", control_tick(each), 1000.0, profile=each.profile)
-            for each in (paper, config)
-        ),
-        *(
-            goal_row("image update", "ns", image_update(each), 50_000.0, profile=each.profile)
-            for each in (paper, config)
-        ),
+        *loop_rows,
         goal_row("state estimation, Eqs. (9)-(16)", "ns", ours, 2000.0),
         goal_row("NumPy pinv over state estimation", "ratio", ratio, 10.0, "min"),
     ]

@@ -145,6 +145,7 @@ def test_replay_of_a_video_and_motor_positions(
             writer.writerow([float(time) - 1000, *map(float, command)])
     video, motors, out = tmp_path / "clip.mkv", tmp_path / "motors.csv", tmp_path / "out"
     arguments = ["--video", str(video), "--motors", str(motors), "--video-start", "-1000"]
+    arguments += ["--profile", log.config.profile]
     assert main(["replay", *arguments, "--out", str(out), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["images"] == pytest.approx(len(recording.frames), abs=1)

@@ -246,7 +246,32 @@ impl Filter {
     }
 
     /// Propagates the ensemble along the control ticks to a tick of the history, unless that is past already.
+    ///
+    /// In steps of at most a quarter of the history, so that a prediction does not depend on whether the ensemble has been
+    /// propagated over a part of the way before.
     pub fn advance<S: AsRef<[Entry]> + AsMut<[Entry]>>(
+        &mut self,
+        history: &History<S>,
+        to: &Entry,
+    ) {
+        while let Some(part) = self.next_step(history)
+            && part.time > self.time
+            && part.time < to.time
+        {
+            self.advance_once(history, &part);
+        }
+        self.advance_once(history, to);
+    }
+
+    /// The tick a quarter of the history after the time of the ensemble; None if the history does not have it.
+    pub fn next_step<S: AsRef<[Entry]> + AsMut<[Entry]>>(
+        &self,
+        history: &History<S>,
+    ) -> Option<Entry> {
+        history.at(self.time + history.span() / 4.0)
+    }
+
+    fn advance_once<S: AsRef<[Entry]> + AsMut<[Entry]>>(
         &mut self,
         history: &History<S>,
         to: &Entry,

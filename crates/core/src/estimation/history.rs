@@ -130,6 +130,11 @@ impl<S: AsRef<[Entry]> + AsMut<[Entry]>> History<S> {
         })
     }
 
+    /// Time that it covers, in s.
+    pub const fn span(&self) -> f64 {
+        self.span
+    }
+
     /// The ticks after `time`, oldest first.
     pub fn since(&self, time: f64) -> impl Iterator<Item = &Entry> + Clone {
         let count = (0..self.len)

@@ -37,7 +37,6 @@ pub struct Best {
     observability: StateEstimator,
     /// Largest part of a half width or centre that the rate limit withholds before it is a changed slack.
     change_limit: PerDof<f64>,
-    history: f64,
 }
 
 impl Law for Best {
@@ -91,7 +90,6 @@ impl ProfileBlocks for Best {
             limits,
             observability: state_estimator(settings)?,
             change_limit: unit.map(|unit| CHANGED * unit),
-            history: settings.control.history,
         })
     }
 
@@ -117,10 +115,17 @@ impl ProfileBlocks for Best {
             self.filter.restart_clock();
         }
         // The history forgets what the filter has not followed.
-        let oldest = history.newest_time() - self.history / 2.0;
-        if self.filter.time() < oldest
-            && let Some(past) = history.at(oldest)
-        {
+        let newest = history.newest_time();
+        let behind = newest - self.filter.time();
+        let past = if behind == f64::INFINITY {
+            history.at(newest)
+        } else if behind > 0.75 * history.span() {
+            let half = newest - history.span() / 2.0;
+            self.filter.next_step(history).or_else(|| history.at(half))
+        } else {
+            None
+        };
+        if let Some(past) = past {
             self.filter.advance(history, &past);
         }
     }
