@@ -1,7 +1,5 @@
 //! Recurrent variation of a contact centre with the position of the tip.
 
-use core::array;
-
 const NODES: usize = 17;
 
 /// Centre of the contact offsets of one DOF over the position of the tip, piecewise linear; constant outside.
@@ -27,28 +25,34 @@ impl CentreMap {
 
     /// The centre at a position.
     pub fn at(&self, position: f64) -> f64 {
-        let weights = self.weights(position);
-        self.nodes
-            .iter()
-            .zip(weights)
-            .map(|(node, w)| node * w)
-            .sum()
+        let (node, share) = self.place(position);
+        let [left, right] = [node, node + 1].map(|node| self.nodes.get(node).copied());
+        let left = left.unwrap_or(0.0);
+        left + share * (right.unwrap_or(left) - left)
     }
 
-    /// Moves the centre at a position by `change`, and its neighbours by less.
+    /// Moves the centre at a position by `change`, through the two nodes about it.
     pub fn add(&mut self, position: f64, change: f64) {
-        let weights = self.weights(position);
-        let norm: f64 = weights.iter().map(|w| w * w).sum();
-        for (node, weight) in self.nodes.iter_mut().zip(weights) {
-            *node += change * weight / norm;
+        let (place, share) = self.place(position);
+        let norm = share * share + (1.0 - share) * (1.0 - share);
+        for (node, weight) in [(place, 1.0 - share), (place + 1, share)] {
+            if let Some(node) = self.nodes.get_mut(node) {
+                *node += change * weight / norm;
+            }
         }
     }
 
-    /// Hat functions.
-    #[expect(clippy::cast_precision_loss, reason = "at most 16")]
-    fn weights(&self, position: f64) -> [f64; NODES] {
+    /// The node below a position, and how far towards the next it is, 0 to 1.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_precision_loss,
+        clippy::cast_sign_loss,
+        reason = "0 to 16"
+    )]
+    fn place(&self, position: f64) -> (usize, f64) {
         let last = (NODES - 1) as f64;
         let place = ((position - self.start) / self.spacing).max(0.0).min(last);
-        array::from_fn(|node| (1.0 - (place - node as f64).abs()).max(0.0))
+        let node = place as usize;
+        (node, place - node as f64)
     }
 }

@@ -51,7 +51,7 @@ pub struct Filter {
     model_std: f64,
     maps: PerDof<CentreMap>,
     gain: PerDof<GainEstimate>,
-    /// Plays of the mean that no image corrects.
+    /// Plays with the mean's half widths that no image corrects, about centres of 0.
     uncorrected: PlayPosition,
     /// First reference; None before it.
     origin: Option<PerDof<f64>>,
@@ -293,8 +293,12 @@ impl Filter {
         self.ensemble
             .propagate(&self.maps, self.radius, self.command, &commands);
         let mut walked = [0.0; 3];
+        // A centre that varies with the position looks like a gain.
+        let plays = Hysteresis {
+            centre: [0.0; 3],
+            ..self.nominal.hysteresis
+        };
         for (command, reference) in path {
-            let plays = &self.nominal.hysteresis;
             self.uncorrected =
                 plays.propagate(self.radius, &self.uncorrected, self.command, command);
             let steps = reference.into_iter().zip(self.reference).zip(self.unit);

@@ -39,7 +39,7 @@ struct Last {
     travel: f64,
 }
 
-/// Standard deviation of a state estimated by one linear step from the predicted state, from that of the markers.
+/// Standard deviation of an estimate by one linear step from the predicted state to `state`, from that of the markers.
 pub fn step_deviation(past: &Entry, state: PerDof<f64>, deviation: PerDof<f64>) -> PerDof<f64> {
     let mut own = deviation;
     let seen = state.into_iter().zip(past.predicted_state);

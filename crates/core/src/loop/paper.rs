@@ -140,7 +140,7 @@ impl ProfileBlocks for Paper {
             distance: distance(
                 &prior,
                 &estimate,
-                step_deviation(past, estimate.state, state_deviation),
+                step_deviation(past, prior.state, state_deviation),
             ),
             markers: None,
         })

@@ -62,20 +62,19 @@ fn turn([n1, n2]: [f64; 2], drive: [f64; 2], ratio: f64, share: f64) -> [f64; 2]
     let (along, across) = (half * (c * c - s * s), half * 2.0 * c * s * side);
     let p = 0.5 * (1.0 + ratio) + along;
     let slope = |cos: f64, sin: f64| p - 2.0 * sin * (along * sin + across * cos);
-    let value = |x: f64, cos: f64, sin: f64| p * x + 2.0 * (along * cos - across * sin);
-    let travel = share * libm::sqrt(norm_squared(drive));
-    let start = libm::log(tangent);
-    let goal = value(start, cos, sin) - travel;
-    let mut x = start - travel / slope(cos, sin);
+    let bent = |cos: f64, sin: f64| 2.0 * (along * cos - across * sin);
+    let goal = bent(cos, sin) - share * libm::sqrt(norm_squared(drive));
+    // x less its value at the start.
+    let mut x = (goal - bent(cos, sin)) / slope(cos, sin);
     let (mut cos, mut sin) = (cos, sin);
     for _ in 0..STEPS {
-        let tangent = libm::exp(x);
+        let tangent = tangent * libm::exp(x);
         let square = tangent * tangent;
         (cos, sin) = (
             (1.0 - square) / (1.0 + square),
             2.0 * tangent / (1.0 + square),
         );
-        let step = (value(x, cos, sin) - goal) / slope(cos, sin);
+        let step = (p * x + bent(cos, sin) - goal) / slope(cos, sin);
         if step.abs() < PRECISION {
             break;
         }

@@ -194,11 +194,12 @@ impl Watched {
         let tip = self.law.command()[dof] + UNITS[dof] * chance.within(-30.0, 30.0);
         let mut row = ScalarMeasurement {
             output: [0.0; 3],
-            error: [0.0; 4],
             value: tip / std,
         };
         row.output[dof] = 1.0 / std;
-        self.filter.update_with(&[row], chance.below(4) == 0);
+        let mut seen = self.law.command();
+        seen[dof] = tip;
+        self.filter.update_with(&[row], seen, chance.below(4) == 0);
         let after = self.filter.nominal().hysteresis;
         self.law.rate_limit_mut().update(
             [before.half_width, before.centre],
