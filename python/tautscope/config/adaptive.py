@@ -16,7 +16,7 @@ class AdaptiveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
     tip_gain: Gain = 1.9
     """Largest speed of the predicted tip over that of the reference."""
-    caution: NonNegative = 0.7
+    caution: NonNegative = 0.3
     """Standard deviations of the half width by which less of it is compensated than estimated: an
     overcompensated tip overtakes the reference."""
     tremor_time: NonNegative = 0.15

@@ -34,9 +34,9 @@ class StateEstimationConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_
     in common."""
     tip_walk: NonNegative = 0.012
     """Random walk of the tip [in half widths]."""
-    width_walk: NonNegative = 0.08
+    width_walk: NonNegative = 0.05
     """Random walk of the logarithm of the half width."""
-    centre_walk: NonNegative = 0.03
+    centre_walk: NonNegative = 0.012
     """Random walk of the centre [in half widths]."""
     share_walk: NonNegative = 0.006
     """Random walk of the logit of the share."""
