@@ -4,15 +4,12 @@ use crate::article::play::Play;
 use crate::dof::PerDof;
 use crate::error::{ConfigError, require, require_non_negative, require_positive};
 use crate::estimation::centre_map::CentreMap;
-use crate::estimation::ensemble::{
-    Ensemble, STATE, ScalarMeasurement, State, hysteresis, position,
-};
+use crate::estimation::ensemble::{Ensemble, STATE, State, hysteresis, position};
 use crate::estimation::gain::GainEstimate;
 use crate::estimation::history::{Entry, History};
-use crate::estimation::marker_measurement::{ImagePrediction, MarkerEstimate, Markers};
+use crate::estimation::nominal::Nominal;
 use crate::estimation::posture::Belief;
 use crate::estimation::settings::StateEstimationSettings;
-use crate::model::features::FeatureModel;
 use crate::model::hysteresis::{Hysteresis, PlayPosition};
 
 /// Initial half width of a slack of unknown width, and its bounds, in half of `width_limit`.
@@ -21,13 +18,6 @@ const LEAST_WIDTH: f64 = 0.02;
 const LARGEST_WIDTH: f64 = 1.2;
 /// Distance of the nodes of the centre's map over the position, in half of `width_limit`.
 const MAP_SPACING: f64 = 0.7;
-/// Standard deviation of the tip, in `start_deviation`, up to which images without markers make it uncertain, and by
-/// how much each does.
-const MISSED: f64 = 0.15;
-const MISS: f64 = 0.03;
-/// Error of the feature model that a reset assumes, in `model_deviation`, and number of images over which it is adapted.
-const RESET_MODEL: f64 = 30.0;
-const MODEL_IMAGES: f64 = 200.0;
 
 /// Ensemble filter over tip and hysteresis.
 ///
@@ -40,62 +30,27 @@ const MODEL_IMAGES: f64 = 200.0;
 /// Wrong where an instrument is no play: by the rounding of its loop.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Filter {
-    settings: StateEstimationSettings,
+    pub(super) settings: StateEstimationSettings,
     /// Unit of lengths and travels (3,): half of `width_limit` [m, rad, rad].
-    unit: PerDof<f64>,
-    start_std: PerDof<f64>,
-    start_plays: PerDof<Play>,
-    radius: f64,
-    ensemble: Ensemble,
+    pub(super) unit: PerDof<f64>,
+    pub(super) start_std: PerDof<f64>,
+    pub(super) start_plays: PerDof<Play>,
+    pub(super) radius: f64,
+    pub(super) ensemble: Ensemble,
     /// Standard deviation of the feature model in px.
-    model_std: f64,
-    maps: PerDof<CentreMap>,
-    gain: PerDof<GainEstimate>,
+    pub(super) model_std: f64,
+    pub(super) maps: PerDof<CentreMap>,
+    pub(super) gain: PerDof<GainEstimate>,
     /// Plays with the mean's half widths that no image corrects, about centres of 0.
-    uncorrected: PlayPosition,
+    pub(super) uncorrected: PlayPosition,
     /// First reference; None before it.
-    origin: Option<PerDof<f64>>,
+    pub(super) origin: Option<PerDof<f64>>,
     /// Time, command, reference of the ensemble, and the travel of the reference since the last update.
-    time: f64,
-    command: PerDof<f64>,
-    reference: PerDof<f64>,
-    travel: PerDof<f64>,
-    nominal: Nominal,
-}
-
-/// The mean of the ensemble, propagated to now.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Nominal {
-    /// Hysteresis at the present position.
-    pub hysteresis: Hysteresis,
-    /// Plays.
-    pub position: PlayPosition,
-    /// Standard deviation of the logarithm of each half width.
-    pub width_std: PerDof<f64>,
-    /// Travel of the tip over that of the output, about `origin`.
-    pub gain: PerDof<f64>,
-    /// First reference [m, rad, rad].
-    pub origin: PerDof<f64>,
-}
-
-impl Nominal {
-    /// The tip for an output of the plays (3,) [m, rad, rad].
-    pub fn tip(&self, output: PerDof<f64>) -> PerDof<f64> {
-        let mut tip = output;
-        for ((tip, gain), origin) in tip.iter_mut().zip(self.gain).zip(self.origin) {
-            *tip = origin + gain * (*tip - origin);
-        }
-        tip
-    }
-
-    /// The output of the plays for a tip (3,) [m, rad, rad].
-    pub fn output(&self, tip: PerDof<f64>) -> PerDof<f64> {
-        let mut output = tip;
-        for ((output, gain), origin) in output.iter_mut().zip(self.gain).zip(self.origin) {
-            *output = origin + (*output - origin) / gain;
-        }
-        output
-    }
+    pub(super) time: f64,
+    pub(super) command: PerDof<f64>,
+    pub(super) reference: PerDof<f64>,
+    pub(super) travel: PerDof<f64>,
+    pub(super) nominal: Nominal,
 }
 
 impl Filter {
@@ -358,7 +313,7 @@ impl Filter {
     }
 
     /// Mean and covariance of the tip, with its deviation from the plays.
-    fn tips(&self) -> ([f64; 3], [[f64; 3]; 3]) {
+    pub(super) fn tips(&self) -> ([f64; 3], [[f64; 3]; 3]) {
         let nominal = &self.nominal;
         let (mean, [[v1, a, b], [c, v2, d], [e, f, v3]]) = self
             .ensemble
@@ -373,127 +328,12 @@ impl Filter {
     }
 
     /// Standard deviation of the tip from that of the plays (3,) [m, rad, rad].
-    fn deviation(&self) -> PerDof<f64> {
+    pub(super) fn deviation(&self) -> PerDof<f64> {
         self.unit.map(|unit| self.settings.tip_deviation * unit)
     }
 
-    /// Markers (4,) of an image in px, with their covariance (4, 4) in px^2.
-    pub fn markers(&self, features: [f64; 4], covariance: Option<&[[f64; 4]; 4]>) -> Markers {
-        Markers::new(features, covariance, &self.settings, self.model_std)
-    }
-
-    /// The most probable tip for the markers of an image at the time of the ensemble; None where the model sees no band.
-    pub fn measure(&self, model: &FeatureModel, markers: &Markers) -> Option<MarkerEstimate> {
-        self.origin?;
-        let (state, covariance) = self.tips();
-        let prior = ImagePrediction { state, covariance };
-        markers.estimate(model, &prior, &self.settings)
-    }
-
-    /// Updates the ensemble with the markers of an estimate by [`Filter::measure`]; with `is_position_only` only the tip.
-    pub fn update<S: AsRef<[Entry]> + AsMut<[Entry]>>(
-        &mut self,
-        history: &History<S>,
-        markers: &Markers,
-        estimate: &MarkerEstimate,
-        is_position_only: bool,
-    ) {
-        let Nominal { origin, gain, .. } = self.nominal;
-        let Some(rows) = markers.linearize(estimate, origin, gain, self.deviation()) else {
-            return;
-        };
-        self.update_with(&rows, estimate.state, is_position_only);
-        if let Some(misfit) = markers.misfit(estimate) {
-            let variance = self.model_std * self.model_std;
-            let change = (misfit - variance) / MODEL_IMAGES;
-            let least = self.settings.model_deviation;
-            self.model_std = libm::sqrt(variance + change).max(least);
-        }
-        self.catch_up(history);
-    }
-
-    /// Updates the ensemble at its time with measurements of the plays, which belong to a tip (3,) [m, rad, rad]; with
-    /// `is_position_only` only the tip.
-    pub fn update_with(
-        &mut self,
-        rows: &[ScalarMeasurement],
-        tip: PerDof<f64>,
-        is_position_only: bool,
-    ) {
-        for row in rows {
-            self.ensemble.update(row, is_position_only);
-        }
-        if !is_position_only {
-            self.update_gain(tip);
-            self.update_maps();
-        }
-        self.travel = [0.0; 3];
-        self.settle();
-    }
-
-    /// Makes the tip as uncertain as at the start, about the mean, and the feature model far more than that: what the next
-    /// images show decides.
-    pub fn reset_position(&mut self) {
-        let Belief { deviation, .. } = self.belief();
-        let mut missing = self.start_std;
-        for (missing, std) in missing.iter_mut().zip(deviation) {
-            *missing = libm::sqrt((*missing * *missing - std * std).max(0.0));
-        }
-        self.ensemble.disturb_position(missing);
-        self.model_std = RESET_MODEL * self.settings.model_deviation;
-    }
-
-    /// Makes the tip a little less certain, after an image without markers.
-    pub fn miss(&mut self) {
-        let Belief { deviation, .. } = self.belief();
-        let mut step = self.start_std;
-        for (step, std) in step.iter_mut().zip(deviation) {
-            *step = if std < MISSED * *step {
-                MISS * *step
-            } else {
-                0.0
-            };
-        }
-        self.ensemble.disturb_position(step);
-    }
-
-    fn update_gain(&mut self, tip: PerDof<f64>) {
-        let Some(origin) = self.origin else {
-            return;
-        };
-        let StateEstimationSettings {
-            gain_window,
-            gain_prior,
-            ..
-        } = self.settings;
-        let travels = self.travel.into_iter().zip(self.unit).zip(origin);
-        let outputs = self.uncorrected.output.into_iter().zip(tip);
-        let gains = self.gain.iter_mut().zip(&mut self.nominal.gain);
-        for ((regression, gain), ((output, tip), ((travel, unit), origin))) in
-            gains.zip(outputs.zip(travels))
-        {
-            let (x, y) = ((output - origin) / unit, (tip - origin) / unit);
-            regression.update(x, y, travel, gain_window);
-            *gain = regression.value(gain_prior);
-        }
-    }
-
-    /// Passes a share of the mean centre on to the map at the position of the tip.
-    fn update_maps(&mut self) {
-        let mean = self.ensemble.mean();
-        let [q1, q2, q3, _, _, _, _, _, m1, m2, m3, _] = mean;
-        let rates = self.settings.map_rate.into_iter().zip(self.travel);
-        let mut changes = [m1, m2, m3];
-        let maps = self.maps.iter_mut().zip([q1, q2, q3]).zip(rates);
-        for (change, ((map, position), (rate, travel))) in changes.iter_mut().zip(maps) {
-            *change *= (rate * travel).min(0.5);
-            map.add(position, *change);
-        }
-        self.ensemble.shift_centres(changes);
-    }
-
     /// Moves every member to where its plays allow it, and takes the mean.
-    fn settle(&mut self) {
+    pub(super) fn settle(&mut self) {
         let largest = self.unit.map(|unit| LARGEST_WIDTH * unit);
         self.ensemble
             .limit(self.unit.map(|unit| LEAST_WIDTH * unit), largest);
@@ -515,7 +355,7 @@ impl Filter {
     }
 
     /// Propagates the prediction from the time of the ensemble to now.
-    fn catch_up<S: AsRef<[Entry]> + AsMut<[Entry]>>(&mut self, history: &History<S>) {
+    pub(super) fn catch_up<S: AsRef<[Entry]> + AsMut<[Entry]>>(&mut self, history: &History<S>) {
         let mut from = self.command;
         for entry in history.since(self.time) {
             self.step(from, entry.command);

@@ -1,12 +1,11 @@
 //! Most probable state of the tip for the markers of one image, and their linear measurement about it.
 
-use core::array;
-
 use crate::article::state::found;
 use crate::dof::{PerDof, all_finite};
 use crate::estimation::ensemble::ScalarMeasurement;
 use crate::estimation::settings::StateEstimationSettings;
 use crate::math::linear::{Matrix, add, dot, solve_symmetric, square};
+use crate::math::whitening::{Features, Square, Whitener, add_product, diagonal, factor};
 use crate::model::features::{FeatureModel, FeaturePrediction};
 
 /// Gauss-Newton steps at most, and halvings of each.
@@ -21,10 +20,6 @@ const STARTS: [PerDof<f64>; 4] = [
     [0.0, 0.0, 1.0],
     [0.0, 0.0, -1.0],
 ];
-
-/// A vector of features, and a symmetric matrix of their size.
-type Features = [f64; 4];
-type Square = [[f64; 4]; 4];
 
 /// Prediction of an image (prior).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -297,94 +292,4 @@ impl<'a> Problem<'a> {
         }
         (normal, right)
     }
-}
-
-/// Lower factor F of a covariance, F F' = P; None if it is not positive definite.
-fn factor(&[[a, _, _], [b, c, _], [d, e, f]]: &Matrix) -> Option<Matrix> {
-    let f11 = libm::sqrt(a);
-    let (f21, f31) = (b / f11, d / f11);
-    let f22 = libm::sqrt(c - f21 * f21);
-    let f32 = (e - f31 * f21) / f22;
-    let f33 = libm::sqrt(f - f31 * f31 - f32 * f32);
-    let rows = [[f11, 0.0, 0.0], [f21, f22, 0.0], [f31, f32, f33]];
-    rows.iter().all(|row| all_finite(*row)).then_some(rows)
-}
-
-/// W with W R W' = I for the markers that are used; the other rows are 0.
-struct Whitener([Features; 4]);
-
-impl Whitener {
-    fn new(covariance: &Square, [a, b]: [bool; 2]) -> Option<Self> {
-        let used = [a, a, b, b];
-        // Cholesky's factor F row by row; F W = I.
-        let mut factor: Square = [[0.0; 4]; 4];
-        let mut whitener: Square = [[0.0; 4]; 4];
-        for index in 0..4 {
-            if !*used.get(index)? {
-                continue;
-            }
-            let mut row = [0.0; 4];
-            for column in 0..=index {
-                if !*used.get(column)? {
-                    continue;
-                }
-                let other = if column == index {
-                    row
-                } else {
-                    *factor.get(column)?
-                };
-                let sum: f64 = row.iter().zip(other).take(column).map(|(x, y)| x * y).sum();
-                let rest = covariance.get(index)?.get(column)? - sum;
-                *row.get_mut(column)? = if column == index {
-                    libm::sqrt(rest)
-                } else {
-                    rest / other.get(column)?
-                };
-            }
-            let diagonal = *row.get(index)?;
-            let mut line: Features = array::from_fn(|entry| if entry == index { 1.0 } else { 0.0 });
-            for (by, above) in row.iter().zip(whitener).take(index) {
-                for (entry, above) in line.iter_mut().zip(above) {
-                    *entry -= by * above;
-                }
-            }
-            let line = line.map(|entry| entry / diagonal);
-            if !all_finite(line) {
-                return None;
-            }
-            *factor.get_mut(index)? = row;
-            *whitener.get_mut(index)? = line;
-        }
-        Some(Self(whitener))
-    }
-
-    /// W v, in which entries that are not used, and may be NaN, do not count.
-    fn apply(&self, vector: Features) -> Features {
-        self.0.map(|row| {
-            row.iter()
-                .zip(vector)
-                .filter(|(weight, _)| **weight != 0.0)
-                .map(|(weight, value)| weight * value)
-                .sum()
-        })
-    }
-}
-
-/// A + v v'.
-fn add_product(matrix: &mut Square, vector: Features) {
-    for (row, own) in matrix.iter_mut().zip(vector) {
-        for (entry, other) in row.iter_mut().zip(vector) {
-            *entry += own * other;
-        }
-    }
-}
-
-fn diagonal(values: Features) -> Square {
-    let [a, b, c, d] = values;
-    [
-        [a, 0.0, 0.0, 0.0],
-        [0.0, b, 0.0, 0.0],
-        [0.0, 0.0, c, 0.0],
-        [0.0, 0.0, 0.0, d],
-    ]
 }

@@ -9,7 +9,7 @@ use crate::dof::PerDof;
 use crate::error::ConfigError;
 use crate::estimation::history::{Entry, History};
 use crate::estimation::posture::Belief;
-use crate::estimation::whereabouts::{Whereabouts, step_deviation};
+use crate::estimation::state_prediction::{StatePrediction, step_deviation};
 use crate::r#loop::measurement::Measurement;
 use crate::r#loop::profile::{Image, ImageUpdate, ProfileBlocks};
 use crate::r#loop::settings::Settings;
@@ -31,7 +31,7 @@ const UNIT: [[f64; 4]; 4] = [
 pub struct Paper {
     axes: PerDof<ArticleAxis>,
     state_estimator: StateEstimator,
-    whereabouts: Whereabouts,
+    prediction: StatePrediction,
     corrected: PerDof<f64>,
 }
 
@@ -90,7 +90,7 @@ impl ProfileBlocks for Paper {
                 ArticleAxis::new(&bending, limit3)?,
             ],
             state_estimator: state_estimator(settings)?,
-            whereabouts: Whereabouts::new(settings.dofs().map(|dof| dof.start_deviation))?,
+            prediction: StatePrediction::new(settings.dofs().map(|dof| dof.start_deviation))?,
             corrected: [0.0; 3],
         })
     }
@@ -112,7 +112,7 @@ impl ProfileBlocks for Paper {
     fn keep_up<S: AsRef<[Entry]> + AsMut<[Entry]>>(&mut self, _: &History<S>, _: bool) {}
 
     fn predict<S: AsRef<[Entry]> + AsMut<[Entry]>>(&self, _: &History<S>, past: &Entry) -> Belief {
-        self.whereabouts.at(past)
+        self.prediction.at(past)
     }
 
     fn advance<S: AsRef<[Entry]> + AsMut<[Entry]>>(&mut self, _: &History<S>, _: &Entry) {}
@@ -121,7 +121,7 @@ impl ProfileBlocks for Paper {
     /// last images, because the DOFs that are held keep its error.
     fn measure(&self, model: &FeatureModel, past: &Entry, image: Image<'_>) -> Option<Measurement> {
         let used = found(image.features);
-        let prior = self.whereabouts.at(past);
+        let prior = self.prediction.at(past);
         let start = if used == [true; 2] {
             past.predicted_state
         } else {
@@ -156,7 +156,7 @@ impl ProfileBlocks for Paper {
     ) -> ImageUpdate {
         let estimate = &measurement.estimate;
         let std = step_deviation(past, estimate.state, measurement.state_deviation);
-        self.whereabouts.learn(past, estimate, std);
+        self.prediction.update(past, estimate, std);
         let mut update = ImageUpdate::default();
         if !is_learning {
             return update;
@@ -185,11 +185,11 @@ impl ProfileBlocks for Paper {
     }
 
     fn miss(&mut self, past: &Entry) {
-        self.whereabouts.miss(past);
+        self.prediction.miss(past);
     }
 
     fn reset_prediction(&mut self, past: &Entry) {
-        self.whereabouts.reset(past);
+        self.prediction.reset(past);
     }
 }
 

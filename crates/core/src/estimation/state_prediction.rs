@@ -25,7 +25,7 @@ const MISSED: f64 = 0.15;
 /// and, of the linear step of Eq. (16), a quarter of the correction. Every image without markers makes it half as large
 /// again, up to a part of `start_deviation`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Whereabouts {
+pub struct StatePrediction {
     start_deviation: PerDof<f64>,
     last: PerDof<Last>,
 }
@@ -49,7 +49,7 @@ pub fn step_deviation(past: &Entry, state: PerDof<f64>, deviation: PerDof<f64>) 
     own
 }
 
-impl Whereabouts {
+impl StatePrediction {
     /// Before the first image: at the prediction.
     ///
     /// # Errors
@@ -86,8 +86,13 @@ impl Whereabouts {
         belief
     }
 
-    /// Takes in what one linear step determined, with its standard deviation by [`step_deviation`].
-    pub(crate) fn learn(&mut self, past: &Entry, estimate: &StateEstimate, deviation: PerDof<f64>) {
+    /// Updates the prediction with an estimate by one linear step, with its standard deviation by [`step_deviation`].
+    pub(crate) fn update(
+        &mut self,
+        past: &Entry,
+        estimate: &StateEstimate,
+        deviation: PerDof<f64>,
+    ) {
         self.set(past, estimate.state, deviation, estimate.observable);
     }
 

@@ -1,0 +1,136 @@
+//! Update of the filter with an image, and what makes it less certain.
+
+use crate::dof::PerDof;
+use crate::estimation::ensemble::ScalarMeasurement;
+use crate::estimation::filter::Filter;
+use crate::estimation::history::{Entry, History};
+use crate::estimation::marker_measurement::{ImagePrediction, MarkerEstimate, Markers};
+use crate::estimation::nominal::Nominal;
+use crate::estimation::posture::Belief;
+use crate::estimation::settings::StateEstimationSettings;
+use crate::model::features::FeatureModel;
+
+/// Standard deviation of the tip, in `start_deviation`, up to which images without markers make it uncertain, and by
+/// how much each does.
+const MISSED: f64 = 0.15;
+const MISS: f64 = 0.03;
+/// Error of the feature model that a reset assumes, in `model_deviation`, and number of images over which it is adapted.
+const RESET_MODEL: f64 = 30.0;
+const MODEL_IMAGES: f64 = 200.0;
+
+impl Filter {
+    /// Markers (4,) of an image in px, with their covariance (4, 4) in px^2.
+    pub fn markers(&self, features: [f64; 4], covariance: Option<&[[f64; 4]; 4]>) -> Markers {
+        Markers::new(features, covariance, &self.settings, self.model_std)
+    }
+
+    /// The most probable tip for the markers of an image at the time of the ensemble; None where the model sees no band.
+    pub fn measure(&self, model: &FeatureModel, markers: &Markers) -> Option<MarkerEstimate> {
+        self.origin?;
+        let (state, covariance) = self.tips();
+        let prior = ImagePrediction { state, covariance };
+        markers.estimate(model, &prior, &self.settings)
+    }
+
+    /// Updates the ensemble with the markers of an estimate by [`Filter::measure`]; with `is_position_only` only the tip.
+    pub fn update<S: AsRef<[Entry]> + AsMut<[Entry]>>(
+        &mut self,
+        history: &History<S>,
+        markers: &Markers,
+        estimate: &MarkerEstimate,
+        is_position_only: bool,
+    ) {
+        let Nominal { origin, gain, .. } = self.nominal;
+        let Some(rows) = markers.linearize(estimate, origin, gain, self.deviation()) else {
+            return;
+        };
+        self.update_with(&rows, estimate.state, is_position_only);
+        if let Some(misfit) = markers.misfit(estimate) {
+            let variance = self.model_std * self.model_std;
+            let change = (misfit - variance) / MODEL_IMAGES;
+            let least = self.settings.model_deviation;
+            self.model_std = libm::sqrt(variance + change).max(least);
+        }
+        self.catch_up(history);
+    }
+
+    /// Updates the ensemble at its time with measurements of the plays, which belong to a tip (3,) [m, rad, rad]; with
+    /// `is_position_only` only the tip.
+    pub fn update_with(
+        &mut self,
+        rows: &[ScalarMeasurement],
+        tip: PerDof<f64>,
+        is_position_only: bool,
+    ) {
+        for row in rows {
+            self.ensemble.update(row, is_position_only);
+        }
+        if !is_position_only {
+            self.update_gain(tip);
+            self.update_maps();
+        }
+        self.travel = [0.0; 3];
+        self.settle();
+    }
+
+    /// Makes the tip as uncertain as at the start, about the mean, and the feature model far more than that: what the next
+    /// images show decides.
+    pub fn reset_position(&mut self) {
+        let Belief { deviation, .. } = self.belief();
+        let mut missing = self.start_std;
+        for (missing, std) in missing.iter_mut().zip(deviation) {
+            *missing = libm::sqrt((*missing * *missing - std * std).max(0.0));
+        }
+        self.ensemble.disturb_position(missing);
+        self.model_std = RESET_MODEL * self.settings.model_deviation;
+    }
+
+    /// Makes the tip a little less certain, after an image without markers.
+    pub fn miss(&mut self) {
+        let Belief { deviation, .. } = self.belief();
+        let mut step = self.start_std;
+        for (step, std) in step.iter_mut().zip(deviation) {
+            *step = if std < MISSED * *step {
+                MISS * *step
+            } else {
+                0.0
+            };
+        }
+        self.ensemble.disturb_position(step);
+    }
+
+    fn update_gain(&mut self, tip: PerDof<f64>) {
+        let Some(origin) = self.origin else {
+            return;
+        };
+        let StateEstimationSettings {
+            gain_window,
+            gain_prior,
+            ..
+        } = self.settings;
+        let travels = self.travel.into_iter().zip(self.unit).zip(origin);
+        let outputs = self.uncorrected.output.into_iter().zip(tip);
+        let gains = self.gain.iter_mut().zip(&mut self.nominal.gain);
+        for ((regression, gain), ((output, tip), ((travel, unit), origin))) in
+            gains.zip(outputs.zip(travels))
+        {
+            let (x, y) = ((output - origin) / unit, (tip - origin) / unit);
+            regression.update(x, y, travel, gain_window);
+            *gain = regression.value(gain_prior);
+        }
+    }
+
+    /// Passes a share of the mean centre on to the map at the position of the tip.
+    fn update_maps(&mut self) {
+        let mean = self.ensemble.mean();
+        let [q1, q2, q3, _, _, _, _, _, m1, m2, m3, _] = mean;
+        let rates = self.settings.map_rate.into_iter().zip(self.travel);
+        let mut changes = [m1, m2, m3];
+        let maps = self.maps.iter_mut().zip([q1, q2, q3]).zip(rates);
+        for (change, ((map, position), (rate, travel))) in changes.iter_mut().zip(maps) {
+            *change *= (rate * travel).min(0.5);
+            map.add(position, *change);
+        }
+        self.ensemble.shift_centres(changes);
+    }
+}
