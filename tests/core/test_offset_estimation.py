@@ -112,7 +112,7 @@ def beyond(*values: object, measured: str) -> object:
 
 
 @SEEDS
-@pytest.mark.parametrize("gain", [beyond(0.75, measured="found 0.87 and 0.90"), 0.9, 1.0])
+@pytest.mark.parametrize("gain", [0.75, 0.9, 1.0])
 def test_the_gain_of_a_play_is_estimated(gain: float, seed: int) -> None:
     steps = np.arange(1500)
     command = 40 * np.sin(2 * np.pi * steps / 250) + 15 * np.sin(2 * np.pi * steps / 97)
@@ -128,7 +128,7 @@ def test_the_gain_of_a_play_is_estimated(gain: float, seed: int) -> None:
     "gain",
     [
         beyond(0.75, measured="width 3.9, error 5.8"),
-        beyond(0.9, measured="error 1.8"),
+        0.9,
         1.0,
     ],
 )
@@ -193,9 +193,7 @@ def test_the_centre_may_depend_on_position(seed: int) -> None:
     assert errors[0] < 0.85 * errors[1], f"seed {seed}: {errors}"
 
 
-@pytest.mark.parametrize(
-    "seed", [beyond(0, measured="overshoot 3.1"), beyond(1, measured="overshoot 3.2")]
-)
+@SEEDS
 def test_the_width_may_change_over_time(seed: int) -> None:
     """Widths of 10, 2 and 10 mm; each change takes a period."""
 

@@ -26,6 +26,9 @@ const UNIT: [[f64; 4]; 4] = [
     [0.0, 0.0, 0.0, 1.0],
 ];
 
+/// Error of a linear step by that of another DOF, in `start_deviation`.
+const COUPLED: f64 = 0.08;
+
 /// Profile `paper`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Paper {
@@ -33,6 +36,7 @@ pub struct Paper {
     state_estimator: StateEstimator,
     prediction: StatePrediction,
     corrected: PerDof<f64>,
+    coupled_std: PerDof<f64>,
 }
 
 impl Law for Paper {
@@ -92,6 +96,7 @@ impl ProfileBlocks for Paper {
             state_estimator: state_estimator(settings)?,
             prediction: StatePrediction::new(settings.dofs().map(|dof| dof.start_deviation))?,
             corrected: [0.0; 3],
+            coupled_std: settings.dofs().map(|dof| COUPLED * dof.start_deviation),
         })
     }
 
@@ -137,7 +142,7 @@ impl ProfileBlocks for Paper {
             used,
             predicted_features: prediction.features,
             state_deviation,
-            distance: distance(
+            distance: self.distance(
                 &prior,
                 &estimate,
                 step_deviation(past, prior.state, state_deviation),
@@ -193,20 +198,23 @@ impl ProfileBlocks for Paper {
     }
 }
 
-/// Largest innovation of a DOF, measured less predicted state, in standard deviations of prediction and measurement
-/// together.
-fn distance(prior: &Belief, estimate: &StateEstimate, std: PerDof<f64>) -> f64 {
-    let innovations = estimate.state.into_iter().zip(prior.state);
-    let stds = std.into_iter().zip(prior.deviation);
-    innovations
-        .zip(stds)
-        .zip(estimate.observable)
-        .filter(|(_, observable)| *observable)
-        .map(|(((state, predicted), (own, prior)), _)| {
-            (state - predicted).abs() / libm::sqrt(own * own + prior * prior)
-        })
-        .filter(|distance| distance.is_finite())
-        .fold(0.0, f64::max)
+impl Paper {
+    /// Largest innovation of a DOF, measured less predicted state, in standard deviations of prediction and measurement
+    /// together, and of what the error of another DOF makes of a linear step.
+    fn distance(&self, prior: &Belief, estimate: &StateEstimate, std: PerDof<f64>) -> f64 {
+        let innovations = estimate.state.into_iter().zip(prior.state);
+        let stds = std.into_iter().zip(prior.deviation).zip(self.coupled_std);
+        innovations
+            .zip(stds)
+            .zip(estimate.observable)
+            .filter(|(_, observable)| *observable)
+            .map(|(((state, predicted), ((own, prior), coupled)), _)| {
+                let variance = own * own + prior * prior + coupled * coupled;
+                (state - predicted).abs() / libm::sqrt(variance)
+            })
+            .filter(|distance| distance.is_finite())
+            .fold(0.0, f64::max)
+    }
 }
 
 /// The state estimation with its rank monitored, Eqs. (13)-(16).
