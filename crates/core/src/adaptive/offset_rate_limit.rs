@@ -6,7 +6,7 @@ use crate::model::hysteresis::Hysteresis;
 /// Limits how fast the compensation follows a change of the estimated hysteresis.
 ///
 /// ```text
-/// w <- w + g, then towards 0 by rate t         g: change of half width or centre by an image
+/// w <- w + g, then towards 0 by rate t         w: lag of the value in use; g: change of half width or centre by an image
 /// used: estimate - w                           t: time in which the reference moved
 /// ```
 ///
@@ -57,18 +57,18 @@ impl OffsetRateLimit {
         let moving = core::mem::take(&mut self.moving);
         let [half_before, centre_before] = before;
         let [half_after, centre_after] = after;
-        for (withheld, (before, after)) in [
+        for (lag, (before, after)) in [
             (&mut self.half_width, (half_before, half_after)),
             (&mut self.centre, (centre_before, centre_after)),
         ] {
             let changes = before.into_iter().zip(after);
             let limits = self.rate.into_iter().zip(moving).zip(known);
-            for ((withheld, (before, after)), ((rate, moving), known)) in
-                withheld.iter_mut().zip(changes).zip(limits)
+            for ((lag, (before, after)), ((rate, moving), known)) in
+                lag.iter_mut().zip(changes).zip(limits)
             {
-                *withheld += after - before;
+                *lag += after - before;
                 let allowed = if known { rate * moving } else { f64::INFINITY };
-                *withheld -= withheld.max(-allowed).min(allowed);
+                *lag -= lag.max(-allowed).min(allowed);
             }
         }
     }
@@ -76,17 +76,17 @@ impl OffsetRateLimit {
     /// The hysteresis that the compensation uses, for an estimate.
     pub fn apply(&self, estimate: &Hysteresis) -> Hysteresis {
         let mut used = *estimate;
-        for (value, withheld) in used.half_width.iter_mut().zip(self.half_width) {
-            *value = (*value - withheld).max(0.0);
+        for (value, lag) in used.half_width.iter_mut().zip(self.half_width) {
+            *value = (*value - lag).max(0.0);
         }
-        for (value, withheld) in used.centre.iter_mut().zip(self.centre) {
-            *value -= withheld;
+        for (value, lag) in used.centre.iter_mut().zip(self.centre) {
+            *value -= lag;
         }
         used
     }
 
-    /// Largest part of a half width or centre (3,) that is withheld.
-    pub fn withheld(&self) -> PerDof<f64> {
+    /// How far the half width or centre in use (3,) lags the estimate, whichever is farther.
+    pub fn lag(&self) -> PerDof<f64> {
         let mut largest = self.half_width;
         for (value, centre) in largest.iter_mut().zip(self.centre) {
             *value = value.abs().max(centre.abs());

@@ -73,8 +73,8 @@ impl Filter {
         self.settle();
     }
 
-    /// Makes the tip as uncertain as at the start, about the mean, and the feature model far more than that: what the next
-    /// images show decides.
+    /// Makes the tip as uncertain as at the start, about its mean, and the feature model uncertain by many px, so that the
+    /// next images determine both.
     pub fn reset_position(&mut self) {
         let Belief { deviation, .. } = self.belief();
         let mut missing = self.start_std;

@@ -25,7 +25,7 @@ use crate::supervision::monitors::Law;
 /// Deflection over the half width from which on a DOF counts as in contact.
 const CONTACT: f64 = 0.98;
 
-/// Part of half of `width_limit` from which on an offset that the rate limit withholds is a changed slack.
+/// Lag of the offsets in use behind the estimate, in half of `width_limit`, beyond which the slack has changed.
 const CHANGED: f64 = 0.1;
 
 /// Profile `best`.
@@ -35,7 +35,7 @@ pub struct Best {
     filter: Filter,
     limits: PerDof<PlayLimit>,
     observability: StateEstimator,
-    /// Largest part of a half width or centre that the rate limit withholds before it is a changed slack.
+    /// Largest lag of a half width or centre in use behind the estimate of a slack that has not changed.
     change_limit: PerDof<f64>,
 }
 
@@ -175,7 +175,7 @@ impl ProfileBlocks for Best {
         _: &Entry,
         measurement: &Measurement,
         image: Image<'_>,
-        is_learning: bool,
+        updates_offsets: bool,
     ) -> ImageUpdate {
         let Some(estimate) = &measurement.markers else {
             return ImageUpdate::default();
@@ -183,14 +183,14 @@ impl ProfileBlocks for Best {
         let markers = self.filter.markers(image.features, image.covariance);
         let before = self.parameters();
         self.filter
-            .update(history, &markers, estimate, !is_learning);
-        if !is_learning {
+            .update(history, &markers, estimate, !updates_offsets);
+        if !updates_offsets {
             return ImageUpdate::default();
         }
         let after = self.parameters();
         self.law.rate_limit_mut().update(before, after);
-        let withheld = self.law.rate_limit().withheld();
-        let has_changed = withheld
+        let lag = self.law.rate_limit().lag();
+        let has_changed = lag
             .iter()
             .zip(self.change_limit)
             .any(|(w, limit)| *w > limit);

@@ -133,9 +133,9 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
         let outlier = self
             .monitors
             .enabled(Flags::when(has_outlier, Flag::Innovation));
-        let is_learning = outlier.is_empty() && self.monitors.permits_updates();
+        let updates_offsets = outlier.is_empty() && self.monitors.permits_updates();
         let mut motion = Flags::NONE;
-        if is_learning {
+        if updates_offsets {
             let play = self.play();
             motion = self.monitors.check_motion(
                 past.time,
@@ -149,7 +149,7 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
             raised: conspicuous,
         } = self
             .profile
-            .update(&self.history, past, measurement, image, is_learning);
+            .update(&self.history, past, measurement, image, updates_offsets);
         *raised = motion.union(
             self.monitors.enabled(
                 conspicuous

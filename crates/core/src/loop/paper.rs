@@ -157,13 +157,13 @@ impl ProfileBlocks for Paper {
         past: &Entry,
         measurement: &Measurement,
         _: Image<'_>,
-        is_learning: bool,
+        updates_offsets: bool,
     ) -> ImageUpdate {
         let estimate = &measurement.estimate;
         let std = step_deviation(past, estimate.state, measurement.state_deviation);
         self.prediction.update(past, estimate, std);
         let mut update = ImageUpdate::default();
-        if !is_learning {
+        if !updates_offsets {
             return update;
         }
         let signals = estimate

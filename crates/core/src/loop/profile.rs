@@ -86,14 +86,14 @@ pub(crate) trait ProfileBlocks: Law + Sized {
     /// The state estimate from an image of that time; None where a band is not visible.
     fn measure(&self, model: &FeatureModel, past: &Entry, image: Image<'_>) -> Option<Measurement>;
 
-    /// Updates the state prediction with an accepted image, and with `is_learning` the offsets.
+    /// Updates the state prediction with an accepted image, and with `updates_offsets` the offsets.
     fn update<S: AsRef<[Entry]> + AsMut<[Entry]>>(
         &mut self,
         history: &History<S>,
         past: &Entry,
         measurement: &Measurement,
         image: Image<'_>,
-        is_learning: bool,
+        updates_offsets: bool,
     ) -> ImageUpdate;
 
     /// Makes the state prediction less certain after an image without markers.

@@ -88,10 +88,10 @@ proptest! {
                 let most = rate * period * f64::from(ticks) + 1e-9;
                 prop_assert!((used.half_width[dof] - start.half_width[dof]).abs() <= most);
                 prop_assert!((used.centre[dof] - start.centre[dof]).abs() <= most);
-                let withheld = (estimate.half_width[dof] - used.half_width[dof])
+                let lag = (estimate.half_width[dof] - used.half_width[dof])
                     .abs()
                     .max((estimate.centre[dof] - used.centre[dof]).abs());
-                prop_assert!((limit.withheld()[dof] - withheld).abs() <= 1e-9);
+                prop_assert!((limit.lag()[dof] - lag).abs() <= 1e-9);
             }
         }
     }
