@@ -34,7 +34,7 @@ class StateEstimationConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_
     in common."""
     tip_walk: NonNegative = 0.012
     """Random walk of the tip [in half widths]."""
-    width_walk: NonNegative = 0.05
+    width_walk: NonNegative = 0.06
     """Random walk of the logarithm of the half width."""
     centre_walk: NonNegative = 0.012
     """Random walk of the centre [in half widths]."""

@@ -195,7 +195,7 @@ impl VectorLaw {
         let mut lead = self.lead;
         let gains = [self.free_gain, self.bending_gain];
         for (group, gain) in GROUPS.into_iter().zip(gains) {
-            let step = self.bounded_step(group, gain, wanted, motion, &used, filter);
+            let step = self.bounded_step(group, gain, wanted, motion, filter);
             let axes = step.into_iter().zip(motion).zip(group);
             // Without gain there is no compensation.
             let share = if gain > 1.0 { self.share } else { 0.0 };
@@ -231,7 +231,6 @@ impl VectorLaw {
         gain: f64,
         wanted: PerDof<f64>,
         motion: PerDof<f64>,
-        used: &Hysteresis,
         filter: &Filter,
     ) -> PerDof<f64> {
         let moved = self.norm(group, motion);
@@ -253,9 +252,13 @@ impl VectorLaw {
             share = share.min(limit / step.abs());
         }
         let nominal = filter.nominal();
-        // Where the tip may already be in contact.
+        // The contact may be nearer than estimated.
+        let mut near = nominal.hysteresis.half_width;
+        for (half, std) in near.iter_mut().zip(nominal.width_std) {
+            *half *= libm::exp(-std);
+        }
         let predicted = Hysteresis {
-            half_width: used.half_width,
+            half_width: near,
             ..nominal.hysteresis
         };
         let propagate = |position: &PlayPosition, command: PerDof<f64>| {

@@ -13,8 +13,24 @@ pub const MEMBERS: usize = 64;
 const COUNT: f64 = 64.0;
 /// Length of a member's state.
 pub const STATE: usize = 12;
-/// Number of the entries of a state that describe the position of the tip.
-const POSITION: usize = 5;
+/// What an entry of a state describes.
+#[derive(Debug, Clone, Copy)]
+enum Local {
+    /// Position of the tip.
+    Position,
+    /// Hysteresis of insertion with rotation.
+    Shaft,
+    /// Hysteresis of bending.
+    Bending,
+}
+/// What each entry of a state describes.
+const LOCAL: [Local; STATE] = {
+    use Local::{Bending, Position, Shaft};
+    [
+        Position, Position, Position, Position, Position, Shaft, Shaft, Bending, Shaft, Shaft,
+        Bending, Shaft,
+    ]
+};
 
 /// State of a member: output of the plays (3,) and of the shaft (2,), ln half width (3,), centre (3,) without the map, and
 /// logit of the share.
@@ -138,30 +154,54 @@ impl Ensemble {
     /// K = cov(x, y) / (var(y) + 1);   mean += K (value - mean(y));   x - mean -= K (y - mean(y)) / (1 + 1 / sqrt(var(y) + 1))
     /// ```
     ///
-    /// with y = row . x. With `is_position_only` the hysteresis stays as it is.
-    pub fn update(&mut self, measurement: &ScalarMeasurement, is_position_only: bool) {
-        let predicted: [f64; MEMBERS] = array::from_fn(|index| {
+    /// with y = row . x. Localised (Houtekamer, Mitchell, Monthly Weather Review 129, 2001), because few members have
+    /// correlations by chance: in K of the hysteresis of a group of DOFs y is the group's part of it. `shares` (shaft,
+    /// bending) multiplies these K.
+    pub fn update(&mut self, measurement: &ScalarMeasurement, shares: [f64; 2]) {
+        let parts: [[f64; 2]; MEMBERS] = array::from_fn(|index| {
             self.members
                 .get(index)
-                .map_or(0.0, |member| measurement.predict(member))
+                .map_or([0.0; 2], |member| measurement.predict(member))
         });
-        let mean_value = predicted.iter().sum::<f64>() / COUNT;
+        let mut mean_part = [0.0; 2];
+        for part in parts {
+            for (sum, value) in mean_part.iter_mut().zip(part) {
+                *sum += value / COUNT;
+            }
+        }
+        let [mean_shaft, mean_bending] = mean_part;
         let mean = self.mean();
         let (mut covariance, mut variance) = ([0.0; STATE], 0.0);
-        for (member, value) in self.members.iter().zip(predicted) {
-            let away = (value - mean_value) / (COUNT - 1.0);
-            variance += away * (value - mean_value);
-            for ((covariance, entry), mean) in covariance.iter_mut().zip(member).zip(mean) {
+        for (member, [shaft, bending]) in self.members.iter().zip(parts) {
+            let shaft = (shaft - mean_shaft) / (COUNT - 1.0);
+            let bending = (bending - mean_bending) / (COUNT - 1.0);
+            let all = shaft + bending;
+            variance += (COUNT - 1.0) * all * all;
+            let entries = covariance.iter_mut().zip(member).zip(mean).zip(LOCAL);
+            for (((covariance, entry), mean), local) in entries {
+                let away = match local {
+                    Local::Position => all,
+                    Local::Shaft => shaft,
+                    Local::Bending => bending,
+                };
                 *covariance += away * (entry - mean);
             }
         }
+        let [shaft_share, bending_share] = shares;
+        for (covariance, local) in covariance.iter_mut().zip(LOCAL) {
+            *covariance *= match local {
+                Local::Position => 1.0,
+                Local::Shaft => shaft_share,
+                Local::Bending => bending_share,
+            };
+        }
         let total = variance + 1.0;
         let reduced = 1.0 / (1.0 + 1.0 / libm::sqrt(total));
+        let mean_value = mean_shaft + mean_bending;
         let innovation = measurement.value - mean_value;
-        let count = if is_position_only { POSITION } else { STATE };
-        for (member, value) in self.members.iter_mut().zip(predicted) {
-            let step = (innovation - reduced * (value - mean_value)) / total;
-            for (entry, covariance) in member.iter_mut().zip(covariance).take(count) {
+        for (member, [shaft, bending]) in self.members.iter_mut().zip(parts) {
+            let step = (innovation - reduced * (shaft + bending - mean_value)) / total;
+            for (entry, covariance) in member.iter_mut().zip(covariance) {
                 *entry += covariance * step;
             }
         }
@@ -189,9 +229,10 @@ impl Ensemble {
 }
 
 impl ScalarMeasurement {
-    fn predict(&self, [q1, q2, q3, ..]: &State) -> f64 {
+    /// The parts of insertion with rotation, and of bending.
+    fn predict(&self, [q1, q2, q3, ..]: &State) -> [f64; 2] {
         let [a, b, c] = self.output;
-        a * q1 + b * q2 + c * q3
+        [a * q1 + b * q2, c * q3]
     }
 }
 

@@ -8,6 +8,7 @@ use crate::estimation::ensemble::{Ensemble, STATE, State, hysteresis, position};
 use crate::estimation::gain::GainEstimate;
 use crate::estimation::history::{Entry, History};
 use crate::estimation::nominal::Nominal;
+use crate::estimation::path::straight_pieces;
 use crate::estimation::posture::Belief;
 use crate::estimation::settings::StateEstimationSettings;
 use crate::model::hysteresis::{Hysteresis, PlayPosition};
@@ -245,6 +246,7 @@ impl Filter {
     /// Propagates the ensemble along commands with their references, from the last ones on.
     pub fn follow(&mut self, path: impl Iterator<Item = (PerDof<f64>, PerDof<f64>)> + Clone) {
         let commands = path.clone().map(|(command, _)| command);
+        let commands = straight_pieces(commands, self.command, self.unit);
         self.ensemble
             .propagate(&self.maps, self.radius, self.command, &commands);
         let mut walked = [0.0; 3];

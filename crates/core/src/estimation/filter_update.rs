@@ -17,6 +17,14 @@ const MISS: f64 = 0.03;
 /// Error of the feature model that a reset assumes, in `model_deviation`, and number of images over which it is adapted.
 const RESET_MODEL: f64 = 30.0;
 const MODEL_IMAGES: f64 = 200.0;
+/// Largest squared misfit of an image that it is adapted to, in variances: a wrong band is in one image, a wrong geometry in
+/// all.
+const MISFIT: f64 = 25.0;
+
+/// Travel of the reference, in half of `width_limit`, within which the tip deviates from its plays alike.
+const CORRELATED: f64 = 0.015;
+/// Share of the update of the hysteresis by an image at rest.
+const AT_REST: f64 = 0.1;
 
 impl Filter {
     /// Markers (4,) of an image in px, with their covariance (4, 4) in px^2.
@@ -44,10 +52,11 @@ impl Filter {
         let Some(rows) = markers.linearize(estimate, origin, gain, self.deviation()) else {
             return;
         };
-        self.update_with(&rows, estimate.state, is_position_only);
-        if let Some(misfit) = markers.misfit(estimate) {
+        self.update_with(&rows, estimate.measured, is_position_only);
+        if let Some(misfit) = estimate.misfit_squared {
+            // Four features determine three DOFs: what is left is the error of one.
             let variance = self.model_std * self.model_std;
-            let change = (misfit - variance) / MODEL_IMAGES;
+            let change = (misfit.min(MISFIT * variance) - variance) / MODEL_IMAGES;
             let least = self.settings.model_deviation;
             self.model_std = libm::sqrt(variance + change).max(least);
         }
@@ -62,8 +71,17 @@ impl Filter {
         tip: PerDof<f64>,
         is_position_only: bool,
     ) {
+        // Images within a short travel have the same error.
+        let [t1, t2, t3] = self.travel;
+        let shares = [libm::sqrt(t1 * t1 + t2 * t2), t3].map(|travel| {
+            if is_position_only {
+                0.0
+            } else {
+                (travel + AT_REST * CORRELATED) / (travel + CORRELATED)
+            }
+        });
         for row in rows {
-            self.ensemble.update(row, is_position_only);
+            self.ensemble.update(row, shares);
         }
         if !is_position_only {
             self.update_gain(tip);
@@ -108,14 +126,13 @@ impl Filter {
             gain_prior,
             ..
         } = self.settings;
-        let travels = self.travel.into_iter().zip(self.unit).zip(origin);
-        let outputs = self.uncorrected.output.into_iter().zip(tip);
+        let outputs = self.uncorrected.output.into_iter().zip(self.command);
+        let positions = outputs.zip(tip).zip(self.unit.into_iter().zip(origin));
         let gains = self.gain.iter_mut().zip(&mut self.nominal.gain);
-        for ((regression, gain), ((output, tip), ((travel, unit), origin))) in
-            gains.zip(outputs.zip(travels))
+        for ((regression, gain), (((output, command), tip), (unit, origin))) in gains.zip(positions)
         {
             let (x, y) = ((output - origin) / unit, (tip - origin) / unit);
-            regression.update(x, y, travel, gain_window);
+            regression.update(x, (command - output) / unit, y, gain_window);
             *gain = regression.value(gain_prior);
         }
     }

@@ -13,6 +13,8 @@ const STEPS: usize = 12;
 const HALVINGS: usize = 6;
 /// Step in standard deviations at which the iteration ends.
 const SMALL: f64 = 1e-4;
+/// Weight of the prediction in the tip by the markers alone.
+const ALONE: f64 = 0.04;
 /// States, in standard deviations from the prediction, from which the minimum is sought again where it is bad.
 const STARTS: [PerDof<f64>; 4] = [
     [0.0, 1.0, 0.0],
@@ -42,8 +44,12 @@ pub struct Markers {
 pub struct MarkerEstimate {
     /// Most probable tip (3,) [m, rad, rad].
     pub state: PerDof<f64>,
+    /// Tip by the markers alone (3,) [m, rad, rad], as far as they determine it.
+    pub measured: PerDof<f64>,
     /// Squared Mahalanobis distance of the innovation: what is minimised.
     pub distance_squared: f64,
+    /// Sum of the squares of the misfit of both markers in px^2, where neither is left out; None if not both were found.
+    pub misfit_squared: Option<f64>,
     /// Which markers were used.
     pub used: [bool; 2],
     /// Features predicted there and their interaction matrix.
@@ -116,7 +122,9 @@ impl Markers {
                 }
             }
         }
-        if seen == [true; 2] && best.distance_squared > price {
+        let is_both = seen == [true; 2];
+        let misfit_squared = is_both.then(|| self.misfit_squared(&best));
+        if is_both && best.distance_squared > price {
             let both = best.distance_squared;
             for used in [[true, false], [false, true]] {
                 if let Some(one) = problem(used).and_then(|one| one.minimum(model, [0.0; 3]))
@@ -127,15 +135,15 @@ impl Markers {
                 }
             }
         }
-        Some(best)
+        Some(MarkerEstimate {
+            misfit_squared,
+            ..best
+        })
     }
 
-    /// Mean square of the misfit of both markers to an estimate, in px^2; None if not both were used.
-    pub fn misfit(&self, estimate: &MarkerEstimate) -> Option<f64> {
+    fn misfit_squared(&self, estimate: &MarkerEstimate) -> f64 {
         let features = self.features.into_iter().zip(estimate.prediction.features);
-        let sum: f64 = features.map(|(measured, h)| square(measured - h)).sum();
-        // Four features determine three DOFs.
-        (estimate.used == [true; 2]).then_some(sum)
+        features.map(|(measured, h)| square(measured - h)).sum()
     }
 
     /// The markers used by an estimate as four independent measurements of standard deviation 1, linear about it; `gain`
@@ -254,9 +262,12 @@ impl<'a> Problem<'a> {
         }
         let (normal, _) = self.equations(x, &prediction);
         let std = self.std(normal)?;
+        let measured = self.state(with_weak_prediction(x, normal)?);
         cost.is_finite().then(|| MarkerEstimate {
             state: self.state(x),
+            measured,
             distance_squared: cost,
+            misfit_squared: None,
             used: self.used,
             prediction,
             std,
@@ -292,4 +303,15 @@ impl<'a> Problem<'a> {
         }
         (normal, right)
     }
+}
+
+/// Gauss-Newton step from the minimum x, with the normal matrix N there, to that with a prediction of the weight w in place
+/// of 1. At the minimum the markers pull by x against the prediction: the step is (N - (1 - w) I)^-1 (1 - w) x.
+fn with_weak_prediction(x: PerDof<f64>, mut normal: Matrix) -> Option<PerDof<f64>> {
+    let [[a, _, _], [_, b, _], [_, _, c]] = &mut normal;
+    for diagonal in [a, b, c] {
+        *diagonal -= 1.0 - ALONE;
+    }
+    let step = solve_symmetric(normal, x.map(|value| (1.0 - ALONE) * value))?;
+    Some(add(x, 1.0, step))
 }

@@ -9,6 +9,7 @@ pub(crate) mod gain;
 pub(crate) mod history;
 pub(crate) mod marker_measurement;
 pub(crate) mod nominal;
+pub(crate) mod path;
 pub(crate) mod posture;
 pub(crate) mod settings;
 pub(crate) mod state_prediction;

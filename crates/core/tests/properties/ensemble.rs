@@ -1,4 +1,4 @@
-//! The ensemble's update against a plain Kalman filter, and two ensembles with equal inputs.
+//! The ensemble's update against filters with matrices, and two ensembles with equal inputs.
 
 use crate::estimation::centre_map::CentreMap;
 use crate::estimation::ensemble::{Ensemble, STATE, ScalarMeasurement, State};
@@ -17,21 +17,56 @@ fn row(measurement: &ScalarMeasurement) -> State {
     row
 }
 
-/// The textbook: K = P y / (y' P y + 1), x += K (value - y . x), P -= K y' P.
-fn kalman(mean: &mut State, covariance: &mut Matrix, measurement: &ScalarMeasurement) {
+/// DOFs whose part of a measurement updates an entry: all of a position, the group's of the hysteresis.
+fn localised(index: usize, output: [f64; 3]) -> [f64; 3] {
+    let [a, b, c] = output;
+    match index {
+        0..=4 => [a, b, c],
+        7 | 10 => [0.0, 0.0, c],
+        _ => [a, b, 0.0],
+    }
+}
+
+/// The square root filter with matrices: K of each entry by its own part of the measurement, mean + K (value - y . x),
+/// and deviations multiplied by I - reduced K y'.
+fn square_root_filter(mean: &mut State, covariance: &mut Matrix, measurement: &ScalarMeasurement) {
     let y = row(measurement);
-    let product: Vec<f64> = covariance
-        .iter()
-        .map(|line| line.iter().zip(y).map(|(p, y)| p * y).sum())
-        .collect();
-    let variance: f64 = product.iter().zip(y).map(|(p, y)| p * y).sum();
-    let predicted: f64 = mean.iter().zip(y).map(|(x, y)| x * y).sum();
-    for (index, gain) in product.iter().map(|p| p / (variance + 1.0)).enumerate() {
-        mean[index] += gain * (measurement.value - predicted);
-        for (entry, p) in covariance[index].iter_mut().zip(&product) {
-            *entry -= gain * p;
+    let of =
+        |row: &State, output: [f64; 3]| row.iter().zip(output).map(|(x, y)| x * y).sum::<f64>();
+    let all: State = covariance.map(|line| of(&line, measurement.output));
+    let total = of(&all, measurement.output) + 1.0;
+    let mut gain = [0.0; STATE];
+    for (index, (gain, line)) in gain.iter_mut().zip(&*covariance).enumerate() {
+        *gain = of(line, localised(index, measurement.output)) / total;
+    }
+    let innovation = measurement.value - of(mean, measurement.output);
+    let reduced = 1.0 / (1.0 + 1.0 / total.sqrt());
+    for (mean, gain) in mean.iter_mut().zip(gain) {
+        *mean += gain * innovation;
+    }
+    let mut factor = [[0.0; STATE]; STATE];
+    for (index, (line, gain)) in factor.iter_mut().zip(gain).enumerate() {
+        *line = y.map(|y| -reduced * gain * y);
+        line[index] += 1.0;
+    }
+    let times = |a: &Matrix, b: &Matrix| {
+        a.map(|row| {
+            let mut product = [0.0; STATE];
+            for (entry, line) in row.iter().zip(b) {
+                for (sum, other) in product.iter_mut().zip(line) {
+                    *sum += entry * other;
+                }
+            }
+            product
+        })
+    };
+    let mut transposed = [[0.0; STATE]; STATE];
+    for (row, line) in factor.iter().enumerate() {
+        for (column, entry) in line.iter().enumerate() {
+            transposed[column][row] = *entry;
         }
     }
+    *covariance = times(&times(&factor, covariance), &transposed);
 }
 
 fn measurements() -> impl Strategy<Value = ScalarMeasurement> {
@@ -52,20 +87,32 @@ fn ensembles() -> impl Strategy<Value = Ensemble> {
 proptest! {
     #![proptest_config(config())]
 
-    /// In a linear problem mean and covariance are those of the Kalman filter that starts from the ensemble's.
+    /// In a linear problem mean and covariance are those of the filter with matrices that starts from the ensemble's; of
+    /// the position they are the Kalman filter's.
     #[test]
-    fn updates_are_those_of_the_kalman_filter(
-        mut ensemble in ensembles(), measurements in prop::collection::vec(measurements(), 1..8),
+    fn updates_are_those_of_the_square_root_filter(
+        mut ensemble in ensembles(), measurements in prop::collection::vec(measurements(), 1..4),
     ) {
         let (mut mean, mut covariance) = ensemble.covariance(|state| *state);
         for measurement in &measurements {
-            ensemble.update(measurement, false);
-            kalman(&mut mean, &mut covariance, measurement);
+            let (before, old) = (mean, covariance);
+            ensemble.update(measurement, [1.0; 2]);
+            square_root_filter(&mut mean, &mut covariance, measurement);
+            let y = row(measurement);
+            let product: Vec<f64> = old.iter().map(|line| (0..3).map(|dof| line[dof] * y[dof]).sum()).collect();
+            let total = 1.0 + (0..3).map(|dof| y[dof] * product[dof]).sum::<f64>();
+            let innovation = measurement.value - (0..3).map(|dof| y[dof] * before[dof]).sum::<f64>();
+            for k in 0..5 {
+                prop_assert!((mean[k] - before[k] - product[k] / total * innovation).abs() <= 1e-9);
+                for l in 0..5 {
+                    let kalman = old[k][l] - product[k] * product[l] / total;
+                    prop_assert!((covariance[k][l] - kalman).abs() <= 1e-9, "{k} {l}");
+                }
+            }
         }
         let (found, spread) = ensemble.covariance(|state| *state);
         for index in 0..STATE {
             prop_assert!((found[index] - mean[index]).abs() <= 1e-9);
-            prop_assert!((ensemble.mean()[index] - mean[index]).abs() <= 1e-9);
             for other in 0..STATE {
                 let off = spread[index][other] - covariance[index][other];
                 prop_assert!(off.abs() <= 1e-9, "{index} {other}: {off}");
@@ -73,15 +120,26 @@ proptest! {
         }
     }
 
-    /// Of the position only: what describes the hysteresis stays, to the last bit.
+    /// A share of 0 leaves the hysteresis of a group, to the last bit; and the mean moves in proportion to the share.
     #[test]
-    fn an_update_of_the_position_leaves_the_parameters(ensemble in ensembles(), measurement in measurements()) {
-        let (mut all, mut position) = (ensemble.clone(), ensemble.clone());
-        all.update(&measurement, false);
-        position.update(&measurement, true);
+    fn a_group_is_updated_by_its_share(
+        ensemble in ensembles(), measurement in measurements(), shares in prop::array::uniform2(0.0..1.0_f64),
+    ) {
+        let updated = |shares: [f64; 2]| {
+            let mut ensemble = ensemble.clone();
+            ensemble.update(&measurement, shares);
+            ensemble.mean()
+        };
+        let (before, all, none, some) = (ensemble.mean(), updated([1.0; 2]), updated([0.0; 2]), updated(shares));
         for index in 0..STATE {
-            let expected = if index < 5 { all.mean() } else { ensemble.mean() };
-            prop_assert_eq!(position.mean()[index], expected[index], "{}", index);
+            let share = match index {
+                0..=4 => 1.0,
+                7 | 10 => shares[1],
+                _ => shares[0],
+            };
+            let expected = before[index] + share * (all[index] - before[index]);
+            prop_assert!((some[index] - expected).abs() <= 1e-9, "{index}");
+            prop_assert_eq!(none[index], if index < 5 { all[index] } else { before[index] }, "{}", index);
         }
     }
 
@@ -113,7 +171,7 @@ proptest! {
             ensemble.disturb_position([0.1, 0.2, 0.3]);
             let path = [[0.1; 3], command].into_iter();
             ensemble.propagate(&NO_MAPS, 1.75, [0.0; 3], &path);
-            ensemble.update(&measurement, false);
+            ensemble.update(&measurement, [1.0, 0.5]);
             ensemble.add_noise(&[0.1; STATE]);
             ensemble.limit([0.1; 3], [2.0; 3]);
             ensemble

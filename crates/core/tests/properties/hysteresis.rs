@@ -2,6 +2,7 @@
 
 use crate::article::play::{Play, PlayState};
 use crate::dof::PerDof;
+use crate::estimation::path::straight_pieces;
 use crate::model::friction::slide;
 use crate::model::hysteresis::{Hysteresis, PlayPosition};
 use proptest::prelude::*;
@@ -43,6 +44,47 @@ fn run(
 
 proptest! {
     #![proptest_config(config())]
+
+    /// Straight pieces end at ticks of the path, at its end too, and the plays after them are those of every tick, but for
+    /// the distance of the path from its pieces.
+    #[test]
+    fn straight_pieces_move_the_plays_alike(
+        hysteresis in hystereses(0.0..1.0), commands in commands(), bent in prop::collection::vec(-1.0..1.0_f64, 20), ticks in 1..12_u32,
+    ) {
+        let unit = [6e-3, 1.3, 0.75];
+        // Each motion in ticks, along an arc that is up to a fifth of a unit from straight.
+        let (mut path, mut last) = (Vec::new(), [0.0; 3]);
+        for (command, bent) in commands.iter().zip(bent) {
+            for tick in 1..=ticks {
+                let share = f64::from(tick) / f64::from(ticks);
+                let side = 0.8 * bent * share * (1.0 - share);
+                path.push([0, 1, 2].map(|dof| {
+                    last[dof] + share * (command[dof] - last[dof]) + [side, -side, 0.0][dof] * unit[dof]
+                }));
+            }
+            last = *command;
+        }
+        let pieces: Vec<_> = straight_pieces(path.iter().copied(), [0.0; 3], unit).collect();
+        prop_assert_eq!(pieces.last(), path.last());
+        prop_assert!(pieces.iter().all(|end| path.contains(end)));
+        let (mut each, mut few) = (Vec::new(), Vec::new());
+        run(&hysteresis, &path, |_, position| each.push(*position));
+        run(&hysteresis, &pieces, |_, position| few.push(*position));
+        let (each, few) = (each[each.len() - 1], few[few.len() - 1]);
+        for (dof, unit) in unit.into_iter().enumerate() {
+            let off = (each.output[dof] - few.output[dof]).abs() / unit;
+            prop_assert!(off <= 0.01 * f64::from(u8::from(dof < 2)) + 1e-9, "{dof}: {off} after {} of {}", pieces.len(), path.len());
+        }
+    }
+
+    /// Of a straight line at any speed one piece remains.
+    #[test]
+    fn a_short_straight_line_is_one_piece(end in prop::array::uniform3(-0.05..0.05_f64), mut shares in prop::collection::vec(0.0..1.0_f64, 1..20)) {
+        shares.sort_by(f64::total_cmp);
+        let path: Vec<_> = shares.iter().map(|share| end.map(|end| share * end)).collect();
+        let pieces: Vec<_> = straight_pieces(path.iter().copied(), [0.0; 3], [1.0; 3]).collect();
+        prop_assert_eq!(pieces, vec![path[path.len() - 1]]);
+    }
 
     /// A share of 1: the deflection is that of the vector play, and the output is the shaft.
     #[test]

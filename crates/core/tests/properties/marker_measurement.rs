@@ -152,6 +152,39 @@ proptest! {
         }
     }
 
+    /// The tip by the markers alone is the estimate with a prediction of 1/0.04 times the variance, where the features are
+    /// linear.
+    #[test]
+    fn the_tip_by_the_markers_has_a_weak_prediction(
+        state in states(), away in prop::array::uniform3(-1.0..1.0_f64), covariance in covariances(),
+    ) {
+        let model = model();
+        let small = 1e-3;
+        let Some(seen) = model.predict(state) else { return Ok(()); };
+        let tiny = ImagePrediction {
+            covariance: diagonal(STD.map(|std| (small * std).powi(2))),
+            state: [0, 1, 2].map(|dof| state[dof] + small * away[dof] * STD[dof]),
+        };
+        let weak = ImagePrediction {
+            covariance: tiny.covariance.map(|row| row.map(|entry| entry / 0.04)),
+            ..tiny
+        };
+        let precise = covariance.map(|row| row.map(|entry| small * small * entry));
+        let settings = StateEstimationSettings {
+            model_deviation: 0.0,
+            sideways_deviation: 0.0,
+            ..estimation()
+        };
+        let markers = Markers::new(seen.features, Some(&precise), &settings, 0.0);
+        let [Some(one), Some(other)] = [tiny, weak].map(|prior| markers.estimate(&model, &prior, &settings)) else {
+            return Ok(());
+        };
+        for (dof, std) in STD.into_iter().enumerate() {
+            let off = (one.measured[dof] - other.state[dof]) / (small * std);
+            prop_assert!(off.abs() <= 0.02, "{dof}: {off}");
+        }
+    }
+
     /// The rows have the information of the markers: with R of markers, model and deviation of the tip, J of the features
     /// by the tip, and the gain g, their sum of a (value - a . output) is g J' R^-1 (s - h(tip)), and that of a a' is
     /// g J' R^-1 J g.
