@@ -7,9 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tautscope.config import Config, TransmissionConfig
+from tautscope.config import Config, FrictionConfig, TransmissionConfig
 from tautscope.dof import Dof
 from tautscope.report.metrics import loop_width
+from tautscope.twin.friction import (
+    CABLE_SPEED,
+    JOINT_SPEED,
+    SHAFT_SPEED,
+    FrictionVariation,
+)
 from tautscope.twin.plant import Plant
 from tautscope.twin.transmission import Transmission
 
@@ -194,6 +200,14 @@ def test_friction_over_time_changes_the_width() -> None:
     move(simulated, Dof.INSERTION, np.full(round(28 / PERIOD), START[0]))
     narrow = width(simulated, Dof.INSERTION, 0.0, 0.4, 6)
     assert wide / narrow == pytest.approx(1.3 / 0.7, rel=0.08)
+
+
+def test_friction_at_rest_falls_to_1_over_e_at_the_stated_speeds() -> None:
+    variation = FrictionVariation(FrictionConfig(stick=(0.4, 0.2)), CONFIG.experiment)
+    speeds = tuple(np.array([0.0, -v, 20 * v]) for v in (SHAFT_SPEED, JOINT_SPEED, CABLE_SPEED))
+    found = variation.factors(*START[[0, 2]], 0.0, speeds)
+    for factors, stick in zip(found, (0.4, 0.2, 0.2), strict=True):
+        np.testing.assert_allclose(factors, [1 + stick, 1 + stick / np.e, 1.0], atol=1e-6)
 
 
 @pytest.mark.parametrize("dof", [Dof.INSERTION, Dof.BENDING], ids=lambda dof: dof.label)
