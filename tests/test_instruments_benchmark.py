@@ -97,10 +97,14 @@ def test_the_twin_is_the_actual_and_the_loop_has_the_told_configuration(
 
 
 @pytest.mark.parametrize(
-    ("dof", "width", "gain"),
-    [(Dof.INSERTION, 0.5, 0.6), (Dof.ROTATION, 1.4, 1.2), (Dof.BENDING, 1.4, 0.6)],
+    ("dof", "width", "gain", "compliance"),
+    [
+        (Dof.INSERTION, 0.5, 0.6, 0.0),
+        (Dof.ROTATION, 1.4, 1.2, 0.0),
+        (Dof.BENDING, 1.2, 0.7, 0.05),
+    ],
 )
-def test_loops_are_as_wide_as_drawn_whatever_the_gain(dof: Dof, width: float, gain: float) -> None:
+def test_loops_are_as_wide_as_drawn(dof: Dof, width: float, gain: float, compliance: float) -> None:
     nominal = load_config()
     start = np.array([nominal.experiment[each].centre for each in Dof])
     sine = nominal.experiment[dof].amplitude * 1.5 * np.sin(2 * np.pi * np.arange(4000) / 2000)
@@ -116,7 +120,9 @@ def test_loops_are_as_wide_as_drawn_whatever_the_gain(dof: Dof, width: float, ga
             tips[k] = plant.true_state[dof]
         return loop_width(sine[2000:], tips[2000:]).mean
 
-    drawn = measured(**{f"width {dof.label}": width, f"gain {dof.label}": gain})
+    drawn = measured(
+        **{f"width {dof.label}": width, f"gain {dof.label}": gain, "compliance": compliance}
+    )
     assert drawn / measured() == pytest.approx(width, rel=0.06)
 
 
