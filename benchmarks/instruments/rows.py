@@ -75,6 +75,12 @@ def refused_shares(rows: Iterable[Row], motion: Motion, variant: Variant) -> Flo
     return np.array(found)
 
 
+def median_shift(rows: Iterable[Row], motion: Motion, variant: Variant) -> Floats:
+    """(3,) median size of the constant part of the tracking error [m, rad, rad]."""
+    found = [row["runs"][variant]["shift"] for row in rows if row["motion"] == motion]
+    return np.asarray(np.nanmedian(np.abs(found), axis=0))
+
+
 def summary_rows(rows: list[Row]) -> list[Row]:
     """The rows of `goal_row` with the goals of the operator's motion, per DOF."""
     best, paper = (reductions(rows, "hand", name) for name in ("best", "paper"))
@@ -123,13 +129,14 @@ def table(rows: list[Row], motion: Motion) -> str:
     best, paper = (reductions(rows, motion, name) for name in ("best", "paper"))
     lines = [
         "| variant | DOF | median | 5th percentile | worst (seed) | worse than none "
-        "| worse than paper by 3 points | images not used |",
-        "|---|---|--:|--:|--:|--:|--:|--:|",
+        "| worse than paper by 3 points | shift | images not used |",
+        "|---|---|--:|--:|--:|--:|--:|--:|--:|",
     ]
     seeds = [row["seed"] for row in rows if row["motion"] == motion]
     for variant in ("paper", "best", "best exact"):
         found = reductions(rows, motion, variant)
         shares = refused_shares(rows, motion, variant)
+        shift = median_shift(rows, motion, variant) if len(found) else np.zeros(3)
         for dof in Dof if len(found) else ():
             mine = 100 * found[:, dof]
             worse = "-"
@@ -144,6 +151,7 @@ def table(rows: list[Row], motion: Motion) -> str:
                 f"{mine.min():.0f} % ({seeds[int(mine.argmin())]})",
                 f"{(mine < 0).sum()}",
                 worse,
+                f"{dof.display_scale * shift[dof]:.2g} {dof.display_unit}",
                 f"{100 * shares.mean():.1f} %" if dof is Dof.INSERTION and len(shares) else "",
             )
             lines.append(f"| {' | '.join(cells)} |")

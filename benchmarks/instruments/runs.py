@@ -27,6 +27,9 @@ VARIANTS: tuple[Variant, ...] = ("none", "paper", "best", "best exact")
 """``none`` does not compensate; ``best exact`` is ``best`` told the geometry as it is."""
 LEAST_VISIBLE = 0.5
 """A band counts as visible if at least this share of it is."""
+LEAST_SEPARATION = 10.0
+"""And both count only if their centres are at least this far apart; nearer, the tip is seen from
+its end [px]."""
 SMALL = 4
 """With features, images are drawn with this part of the camera's resolution, for the truth."""
 PERIODS = 2
@@ -60,7 +63,7 @@ class Figures:
         spread: Standard deviation of (true tip - reference).
         shift: Mean of (true tip - reference).
         largest: Largest |true tip - reference - shift|.
-        visible: Number of images with both bands visible.
+        visible: Number of images with both bands visible and apart.
         statuses: Number of these images by the status of their update.
         stopped: Why the run ended early; None if it did not.
     """
@@ -143,14 +146,16 @@ class _Look:
     def __call__(self, loop: HysteresisReduction, frame: Frame) -> Report:
         assert frame.true_features is not None and frame.true_visible is not None
         is_visible = frame.true_visible >= LEAST_VISIBLE
+        truth = frame.true_features
+        if not self._has_images:
+            truth = (truth + 0.5) * SMALL - 0.5
         if self._has_images:
             report = loop.on_frame(frame)
         else:
-            features = (frame.true_features + 0.5) * SMALL - 0.5
-            features += NOISE * self._noise.standard_normal(4)
+            features = truth + NOISE * self._noise.standard_normal(4)
             features[~np.repeat(is_visible, 2)] = np.nan
             report = loop.on_features(features if is_visible.any() else None, frame.captured_at)
-        if is_visible.all():
+        if is_visible.all() and np.hypot(*(truth[2:] - truth[:2])) >= LEAST_SEPARATION:
             self._figures.visible += 1
             status = str(report.status)
             self._figures.statuses[status] = self._figures.statuses.get(status, 0) + 1
