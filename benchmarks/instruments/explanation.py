@@ -40,10 +40,10 @@ def explain(rows: list[Row], motion: Motion) -> str:
     parts = []
     for dof in Dof:
         reduction = 100 * found[:, dof]
-        forest = RandomForestRegressor(300, min_samples_leaf=3, random_state=0)
+        forest = RandomForestRegressor(100, min_samples_leaf=3, random_state=0)
         forest.fit(values, reduction)
         importance = permutation_importance(
-            forest, values, reduction, n_repeats=10, random_state=0
+            forest, values, reduction, n_repeats=5, random_state=0
         ).importances_mean
         lines = [f"{dof.label}: reduction in percent, most important properties"]
         for k in np.argsort(-importance)[:SHOWN]:
