@@ -18,7 +18,7 @@ from common.paths import ROOT
 from common.processes import add_arguments, run_parallel
 from instruments.explanation import explain
 from instruments.properties import markdown_table
-from instruments.rows import seed_rows, seed_table, summary_rows, table
+from instruments.rows import Row, seed_rows, seed_table, summary_rows, table
 from instruments.runs import VARIANTS, Figures, Run, simulate
 from tautscope.commands.progress import progress_bar
 
@@ -78,19 +78,31 @@ def measure(options: argparse.Namespace) -> dict[Run, Figures]:
     return found
 
 
+def results(options: argparse.Namespace, rows: list[Row]) -> str:
+    """Return the tables of all motions with their conditions, as Markdown."""
+    seeds = [row["seed"] for row in rows]
+    source = "true features with noise" if options.features else "camera images"
+    parts = []
+    for motion in options.motion or MOTIONS:
+        parts += [f"Motion `{motion}`, seeds {min(seeds)} to {max(seeds)}, {source}."]
+        parts += [table(rows, motion), f"```text\n{explain(rows, motion)}\n```"]
+    return "\n\n".join(parts)
+
+
 def main() -> None:
     options = arguments()
     rows = seed_rows(measure(options))
+    if not rows:
+        raise SystemExit("No instrument is finished.")
+    text = results(options, rows)
     if options.json:
         facts = {"images": not options.features, "instruments": rows}
         print(json.dumps({"rows": summary_rows(rows), **facts}))
-        return
+    else:
+        print(f"{seed_table(rows)}\n\n{text}")
     if options.write:
         insert(PAGE, "ranges", markdown_table())
-    print(seed_table(rows))
-    for motion in options.motion or MOTIONS:
-        text = table(rows, motion)
-        print(f"\n{motion}\n\n{text}\n\n{explain(rows, motion)}")
+        insert(PAGE, "results", text)
 
 
 if __name__ == "__main__":
