@@ -1,7 +1,8 @@
-"""Parallel runs in worker processes."""
+"""Parallel runs in worker processes, or on a Dask cluster."""
 
 from __future__ import annotations
 
+import argparse
 import multiprocessing
 import os
 from collections.abc import Callable, Iterable, Iterator
@@ -12,13 +13,37 @@ Job = TypeVar("Job")
 Result = TypeVar("Result")
 
 
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say where runs are computed."""
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="[all cores]")
+    parser.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="Dask scheduler that distributes the runs, as tcp://host:8786; local:N starts one "
+        "with N workers on this computer [processes without Dask]",
+    )
+
+
 def run_parallel(
-    function: Callable[[Job], Result], jobs: Iterable[Job], workers: int
+    function: Callable[[Job], Result],
+    jobs: Iterable[Job],
+    workers: int,
+    scheduler: str | None = None,
 ) -> Iterator[tuple[Job, Result]]:
-    """Yield each job with its result as soon as a worker process finishes it.
+    """Yield each job with its result as soon as a worker finishes it.
 
     Jobs start in the given order. An error, or Ctrl-C, cancels the jobs that have not started.
+
+    Args:
+        function: Importable by the workers, as are the types of jobs and results.
+        jobs: One argument each.
+        workers: Number of processes.
+        scheduler: Address of a Dask scheduler, or ``local:N``, in place of processes. Its workers
+            must have this package and `benchmarks` on their path.
     """
+    if scheduler is not None:
+        yield from _run_on_cluster(function, jobs, scheduler)
+        return
     with ProcessPoolExecutor(
         workers, mp_context=multiprocessing.get_context("spawn"), initializer=limit_threads
     ) as pool:
@@ -29,6 +54,39 @@ def run_parallel(
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
+
+
+def _run_on_cluster(
+    function: Callable[[Job], Result], jobs: Iterable[Job], scheduler: str
+) -> Iterator[tuple[Job, Result]]:
+    try:
+        from dask import distributed  # noqa: PLC0415  an extra
+    except ModuleNotFoundError:
+        raise SystemExit("--scheduler needs Dask: uv sync --extra cluster") from None
+    place, _, count = scheduler.partition(":")
+    if place == "local":
+        cluster = distributed.LocalCluster(
+            n_workers=int(count or os.cpu_count() or 1),
+            threads_per_worker=1,
+            dashboard_address=None,
+        )
+    else:
+        cluster = scheduler
+    with distributed.Client(cluster) as client:
+        try:
+            client.register_worker_callbacks(limit_threads)
+            # Not pure: equal jobs are not merged, and nothing is reused from another campaign.
+            running = {client.submit(function, job, pure=False): job for job in jobs}
+            try:
+                for finished in distributed.as_completed(list(running)):
+                    job, result = running.pop(finished), finished.result()
+                    finished.release()
+                    yield job, result
+            finally:
+                client.cancel(list(running))
+        finally:
+            if place == "local":
+                cluster.close()
 
 
 def limit_threads() -> None:

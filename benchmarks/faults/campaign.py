@@ -5,13 +5,12 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import os
 from collections.abc import Iterable, Sequence
 from functools import partial
 from pathlib import Path
 
 from common.paths import ROOT
-from common.processes import run_parallel
+from common.processes import add_arguments, run_parallel
 from faults import tables
 from faults.runs import run_seed, run_with_each_off
 from tautscope.commands.progress import progress_bar
@@ -51,7 +50,7 @@ def arguments() -> Options:
         help='detectors that are off, separated by commas; "each": each in turn; "all": all',
     )
     parser.add_argument("--shard", default="1/1", metavar="I/N", help="part I of N of the seeds")
-    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="[all cores]")
+    add_arguments(parser)
     parser.add_argument("--json", type=Path, metavar="FILE", help="save a row for every run")
     parser.add_argument(
         "--read", type=Path, nargs="+", metavar="FILE", help="read saved rows, simulate nothing"
@@ -72,7 +71,7 @@ def measure(options: Options) -> Found:
     found: dict[int, Found] = {}
     with progress_bar("faults") as show_progress:
         try:
-            for seed, rows in run_parallel(simulate, seeds, options.workers):
+            for seed, rows in run_parallel(simulate, seeds, options.workers, options.scheduler):
                 found[seed] = rows
                 show_progress(len(found) / len(seeds))
         except KeyboardInterrupt:

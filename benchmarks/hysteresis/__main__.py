@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import sys
 import tempfile
 from collections import defaultdict
@@ -18,6 +17,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from common.processes import add_arguments
 from hysteresis import ablation, tables
 from hysteresis.goals import GOALS
 from hysteresis.scenarios import SCENARIOS, Plan
@@ -80,7 +80,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument(
         "--ablation", action="store_true", help="profile best without each of its ideas in turn"
     )
-    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="[all cores]")
+    add_arguments(parser)
     parser.add_argument(
         "--cache", type=Path, metavar="DIR", help="store finished runs, and reuse them"
     )
@@ -118,7 +118,7 @@ def run(options: argparse.Namespace, store: Store) -> None:
     work = plan(configs, groups, seeds, images=not options.features)
     with progress_bar("hysteresis") as show_progress:
         runs = [each for part in work.values() for each in part.values()]
-        store.simulate(runs, options.workers, show_progress)
+        store.simulate(runs, options.workers, show_progress, options.scheduler)
     rows = tables.to_rows(measure(store, work))
     facts = {"images": not options.features, "seeds": list(seeds)}
     if options.ablation:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import io
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -31,17 +32,25 @@ class Store:
         self._code = code.digest()
 
     def simulate(
-        self, plan: Iterable[Simulation], workers: int, show_progress: Callable[[float], None]
+        self,
+        plan: Iterable[Simulation],
+        workers: int,
+        show_progress: Callable[[float], None],
+        scheduler: str | None = None,
     ) -> None:
-        """Simulate the runs that are not stored yet, the longest first."""
+        """Simulate the runs that are not stored yet, the longest first; see `run_parallel`."""
         files = {self._file(run): run for run in plan}
-        jobs = [(run, file) for file, run in files.items() if not file.exists()]
-        jobs.sort(key=lambda job: -job[0].work)
-        total, done = sum(run.work for run, _ in jobs), 0.0
+        jobs = [run for file, run in files.items() if not file.exists()]
+        jobs.sort(key=lambda run: -run.work)
+        total, done = sum(run.work for run in jobs), 0.0
         if not jobs:
             show_progress(1.0)
             return
-        for (run, _), _ in run_parallel(_simulate, jobs, min(workers, len(jobs))):
+        for run, packed in run_parallel(_simulate, jobs, min(workers, len(jobs)), scheduler):
+            file = self._file(run)
+            part = file.with_suffix(".part.npz")
+            part.write_bytes(packed)
+            part.replace(file)
             done += run.work
             show_progress(done / total)
 
@@ -78,9 +87,8 @@ class Recordings(Mapping[str, Recording]):
         return len(self._runs)
 
 
-def _simulate(job: tuple[Simulation, Path]) -> None:
-    run, file = job
-    recording = run.run()
-    part = file.with_suffix(".part.npz")
-    np.savez_compressed(part, trace=recording.trace, frames=recording.frames)
-    part.replace(file)
+def _simulate(run: Simulation) -> bytes:
+    """Simulate a run; the worker may have no access to the folder."""
+    recording, packed = run.run(), io.BytesIO()
+    np.savez_compressed(packed, trace=recording.trace, frames=recording.frames)
+    return packed.getvalue()

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,7 +17,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from common.doc_pages import insert
 from common.paths import ROOT
-from common.processes import run_parallel
+from common.processes import add_arguments, run_parallel
 from common.rows import goal_row
 from plants.simulated import PLANTS
 from plants.tracking import Job, reductions
@@ -71,7 +70,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=SEEDS, help="number of seeds [%(default)s]")
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help="[%(default)s]")
     parser.add_argument("--plant", choices=PLANTS, action="append", help="only this one [all]")
-    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="[all cores]")
+    add_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--write", action="store_true", help="update docs/plants.md")
     options = parser.parse_args()
@@ -79,7 +78,7 @@ def main() -> None:
         parser.error("--write updates the whole table: use it without --plant")
     seeds = range(options.first_seed, options.first_seed + options.seeds)
     jobs = [(plant, seed) for plant in options.plant or PLANTS for seed in seeds]
-    done = dict(run_parallel(reductions, jobs, options.workers))
+    done = dict(run_parallel(reductions, jobs, options.workers, options.scheduler))
     rows = to_rows({job: done[job] for job in jobs})
     shown = table(rows)
     print(json.dumps({"rows": rows, "seeds": list(seeds)}) if options.json else shown)

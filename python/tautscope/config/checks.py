@@ -85,6 +85,13 @@ def check_twin(twin: TwinConfig) -> None:
     """The relations in block ``twin``."""
     _require_at_most("twin", twin, "latency_jitter", "latency")
     _require_names("twin.disturb", twin.disturb, DISTURBANCES)
+    readout, frame_period = twin.sensor.readout, 1 / twin.frame_rate
+    _require(
+        readout <= frame_period,
+        "twin.sensor.readout",
+        readout,
+        f"at most one frame period, {frame_period:.3g}",
+    )
 
 
 def check_control(control: ControlConfig) -> None:

@@ -6,7 +6,9 @@ from typing import Annotated
 
 from msgspec import Meta, Struct, field
 
-from tautscope.config.fields import NonNegative, Positive
+from tautscope.config.fields import NonNegative, Positive, Vector3
+
+Slope = Annotated[float, Meta(gt=-1, lt=1)]
 
 DISTURBANCES = (
     "highlights",
@@ -85,6 +87,64 @@ class CableConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """Coulomb friction of each mass in the sheath [N]."""
     slack: NonNegative = 0.15e-3
     """Slack of each cable when drum and section are at the same angle [m]."""
+    curvature: tuple[Slope, Slope] = (0.0, 0.0)
+    """Linear and quadratic variation of the curvature along the section, in which friction aside it
+    is proportional to 1 + linear x + quadratic (3 x^2 - 1) / 2, but at least to 0.1; x from -1 at
+    the proximal to 1 at the distal end."""
+    plane: float = 0.0
+    """Angle of the plane of bending at zero rotation [rad]."""
+    compliance: NonNegative = 0.0
+    """Shortening of the section per tension of both cables [m/N]; the cables slacken with it."""
+
+
+class FrictionConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Variation of the friction of shaft and section, `tautscope.twin.friction`. All [ours]."""
+
+    over_position: tuple[Slope, Slope] = (0.0, 0.0)
+    """Of the shaft over insertion, of the section over bending [share]: amplitude of a sine with
+    one period over the stroke of the article's experiment."""
+    over_time: tuple[Slope, Slope] = (0.0, 0.0)
+    """Of shaft and section [share]: amplitude of a sine over time."""
+    time_period: Positive = 40.0
+    """Period of that sine [s]."""
+    stick: tuple[NonNegative, NonNegative] = (0.0, 0.0)
+    """Increase of the friction of shaft and section at rest [share], which falls with speed: parts
+    move by stick-slip."""
+
+
+class TransmissionConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """From the motors to the proximal ends of shaft and cables, `tautscope.twin.transmission`.
+
+    Values are for insertion, rotation, bending; the start posture is that of the experiment. All
+    [ours].
+    """
+
+    gain: tuple[Positive, Positive, Positive] = (1.0, 1.0, 1.0)
+    """Travel of the end over travel of the motor."""
+    offset: Vector3 = (0.0, 0.0, 0.0)
+    """Position of the end minus that of the motor in the start posture [m, rad, rad]: the contact
+    offsets become asymmetric."""
+    slack: tuple[NonNegative, NonNegative, NonNegative] = (0.0, 0.0, 0.0)
+    """Travel of the motor about the start posture, in mid-stroke, that moves nothing
+    [m, rad, rad]."""
+    lag: tuple[NonNegative, NonNegative, NonNegative] = (0.0, 0.0, 0.0)
+    """Time constant by which the end follows the motor [s]."""
+
+
+class SensorConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Timing, exposure and compression of the camera's images. All [ours]."""
+
+    stamp_error: float = 0.0
+    """Stamped minus true time of capture [s]."""
+    readout: NonNegative = 0.0
+    """Time from the capture of the first to that of the last row (rolling shutter) [s]; at most one
+    frame period. The stamp is the time of the middle row."""
+    exposure_time_constant: NonNegative = 0.0
+    """Time constant of the automatic exposure [s]; 0 for a constant exposure."""
+    exposure_target: Annotated[float, Meta(gt=0, lt=255)] = 105.0
+    """Mean grey level that the automatic exposure aims at."""
+    jpeg_quality: Annotated[int, Meta(ge=1, le=100)] | None = None
+    """Quality of the JPEG compression of each image (MJPEG); None for none."""
 
 
 class DriveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -117,4 +177,7 @@ class TwinConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Names of image disturbances; their order does not matter."""
     shaft: ShaftConfig = field(default_factory=ShaftConfig)
     cables: CableConfig = field(default_factory=CableConfig)
+    friction: FrictionConfig = field(default_factory=FrictionConfig)
+    transmission: TransmissionConfig = field(default_factory=TransmissionConfig)
     drives: DriveConfig = field(default_factory=DriveConfig)
+    sensor: SensorConfig = field(default_factory=SensorConfig)

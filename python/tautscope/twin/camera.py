@@ -6,6 +6,7 @@ It uses neither bending angles nor the loop's camera model: the physics gives th
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ from tautscope.config import Config
 from tautscope.errors import FieldError
 from tautscope.twin.bands import Bands
 from tautscope.twin.disturbances import Disturbances
+from tautscope.twin.sensor import AutomaticExposure, Centreline, compress
 from tautscope.twin.tissue import draw_mucosa, load_backgrounds
 
 FRAMES_PER_BACKGROUND = 25
@@ -46,7 +48,9 @@ class TwinCamera:
     Pinhole with OpenCV's distortion, Eq. (8), from ``config.camera``; two light guides beside the
     lens; Lambertian diffuse and Blinn-Phong specular reflection; Gaussian sensor noise of standard
     deviation ``config.twin.image_noise`` [grey levels], rounded to integers. The same
-    ``config.twin.seed`` and frame number give the same bytes, in whatever order frames are drawn.
+    ``config.twin.seed`` and frame number give the same bytes, in whatever order frames are drawn,
+    except with automatic exposure, which depends on the frames before. ``config.twin.sensor``
+    describes exposure, rolling shutter and compression.
     The disturbances of ``config.twin.disturb`` are described in `tautscope.twin.disturbances`.
 
     Wrong when parts are nearer than 2 mm to the camera (they are left out), when the instrument
@@ -79,10 +83,22 @@ class TwinCamera:
             seed=twin.seed % 2**64,
         )
         self._disturbances = Disturbances(twin.disturb, twin.seed)
+        self._twin = twin
+        self.reset()
+        self._jpeg_quality = twin.sensor.jpeg_quality
+        self._is_processed = (
+            self._disturbances.is_active
+            or twin.sensor.exposure_time_constant > 0
+            or self._jpeg_quality is not None
+        )
         if twin.background is None:
             self._backgrounds = [draw_mucosa(camera.width, camera.height, twin.seed)]
         else:
             self._backgrounds = load_backgrounds(twin.background, camera.width, camera.height)
+
+    def reset(self) -> None:
+        """Return to the exposure at the start of a run."""
+        self._exposure = AutomaticExposure(self._twin)
 
     def draw(self, points: ArrayLike, directions: ArrayLike, sequence: int) -> RenderedImage:
         """Draw the instrument along its centreline.
@@ -106,31 +122,45 @@ class TwinCamera:
         tangents = _checked("directions", directions)
         if centres.shape != tangents.shape:
             raise FieldError("directions", tangents.shape, f"as many as points, {centres.shape}")
+        return self.draw_strips([(centres, tangents)], sequence)
+
+    def draw_strips(self, strips: Sequence[Centreline], sequence: int) -> RenderedImage:
+        """Draw each strip of rows of equal height, from the top, with a centreline of its own.
+
+        Args:
+            strips: Points and tangents of the centreline in each strip, as for `draw`. The ground
+                truth is that of the middle one.
+            sequence: Frame number, as for `draw`.
+
+        Raises:
+            FieldError: The frame number is negative.
+        """
         if not 0 <= sequence < 2**63:
             raise FieldError("sequence", sequence, "a whole number from 0 to 2^63 - 1")
         background = self._backgrounds[sequence // FRAMES_PER_BACKGROUND % len(self._backgrounds)]
-        if self._disturbances.is_active:
-            return self._draw_disturbed(background, centres, tangents, sequence)
-        return RenderedImage(*self._renderer.draw(background, centres, tangents, sequence))
-
-    def _draw_disturbed(
-        self,
-        background: NDArray[np.uint8],
-        centres: NDArray[np.float64],
-        tangents: NDArray[np.float64],
-        sequence: int,
-    ) -> RenderedImage:
+        if len(strips) == 1 and not self._is_processed:
+            return RenderedImage(*self._renderer.draw(background, *strips[0], sequence))
         disturbances = self._disturbances
         if disturbances.hides_instrument:
-            centres = np.full_like(centres, np.nan)
+            strips = [(np.full_like(points, np.nan), tangents) for points, tangents in strips]
         tissue = disturbances.apply_to_background(background, sequence)
-        drawn, features, _, surface = self._renderer.draw_scene(tissue, centres, tangents)
+        drawn, features, visible, surface = self._renderer.draw_scene(
+            tissue, *strips[len(strips) // 2]
+        )
+        edges = np.linspace(0, len(drawn), len(strips) + 1).round().astype(int)
+        for k, strip in enumerate(strips):
+            if k != len(strips) // 2:
+                rows = slice(edges[k], edges[k + 1])
+                drawn[rows] = self._renderer.draw_scene(tissue, *strip)[0][rows]
         bands = Bands.from_surface(surface)
         image, hidden = disturbances.apply_to_scene(drawn, bands, sequence)
+        image = self._exposure.expose(image)
         self._renderer.add_noise(image, sequence)
         image, overlaid = disturbances.apply_to_output(image, bands, sequence)
-        visible = bands.visible_shares(hidden | overlaid)
-        features[np.repeat(visible, 2) == 0] = np.nan
+        image = compress(image, self._jpeg_quality)
+        if disturbances.is_active:
+            visible = bands.visible_shares(hidden | overlaid)
+            features[np.repeat(visible, 2) == 0] = np.nan
         return RenderedImage(image, features, visible)
 
 

@@ -14,6 +14,11 @@ of lumped masses with sheath friction, joined by springs that only pull.
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
 from tautscope.config import CableConfig, Config, ShaftConfig
 
 MAX_TIMESTEP = 0.005
@@ -31,6 +36,8 @@ _PRESS_MASS = 0.05
 _WALL_MASS = 3.0
 _LUMP_MASS = 2.0
 _SECTION_INERTIA = 6e-4
+_SHORTENING_MASS = 20.0
+_LEAST_CURVATURE = 0.1
 
 # Contacts and friction in MuJoCo are soft. These impedances make the creep below the friction limit
 # small compared with the hysteresis, without chatter in the normal direction. The segments are
@@ -106,13 +113,27 @@ def _segment(config: Config, index: int) -> str:
       {_section(config) if last else ""}</body>"""
 
 
+def curvature_shape(cables: CableConfig) -> NDArray[np.float64]:
+    """Curvature at each joint over its mean, `CableConfig.curvature`."""
+    (linear, quadratic), x = cables.curvature, np.linspace(-1, 1, cables.joints)
+    shape = np.maximum(1 + linear * x + quadratic * (3 * x**2 - 1) / 2, _LEAST_CURVATURE)
+    return np.asarray(shape / shape.mean())
+
+
 def _section(config: Config) -> str:
-    """A chain of hinges with half a rigid link at either end, then the rigid tip."""
+    """A chain of hinges with half a rigid link at either end, then the rigid tip.
+
+    Under a pure moment each hinge turns by moment over stiffness, so that the stiffness sets how
+    the curvature varies.
+    """
     cables, instrument = config.twin.cables, config.instrument
     link = instrument.bending_length / cables.joints
+    stiffness = cables.joint_stiffness / curvature_shape(cables)
+    axis = f"{0.0 - math.sin(cables.plane)} {math.cos(cables.plane)} 0"
     bodies = "".join(
         f"""<body name="joint_{j}" pos="0 0 {link if j else link / 2}">
-          <joint name="bend_{j}" type="hinge" axis="0 1 0" stiffness="{cables.joint_stiffness}"
+          {_shortening(cables, j)}
+          <joint name="bend_{j}" type="hinge" axis="{axis}" stiffness="{stiffness[j]}"
             damping="2e-4" armature="{_SECTION_INERTIA / cables.joints}"
             frictionloss="{cables.joint_friction}" {_FRICTION}/>
           <geom type="sphere" mass="1e-4" {_INERT}/>"""
@@ -121,6 +142,15 @@ def _section(config: Config) -> str:
     tip = f"""<body name="tip" pos="0 0 {link / 2}">
       <geom type="capsule" fromto="0 0 0 0 0 {instrument.tip_length}" {_INERT}/></body>"""
     return bodies + tip + "</body>" * cables.joints
+
+
+def _shortening(cables: CableConfig, index: int) -> str:
+    """A slide against a spring, by which tension shortens a link."""
+    if cables.compliance == 0:
+        return ""
+    stiffness = cables.joints / cables.compliance
+    return f"""<joint name="shorten_{index}" type="slide" axis="0 0 -1" stiffness="{stiffness}"
+      damping="{math.sqrt(stiffness * _SHORTENING_MASS)}" armature="{_SHORTENING_MASS}"/>"""
 
 
 def _lumps(cables: CableConfig, name: str) -> str:
@@ -150,6 +180,8 @@ def _cable(cables: CableConfig, name: str, sign: int) -> str:
     section = "".join(
         f'<joint joint="bend_{j}" coef="{-sign * cables.arm}"/>' for j in range(cables.joints)
     )
+    if cables.compliance:
+        section += "".join(f'<joint joint="shorten_{j}" coef="-1"/>' for j in range(cables.joints))
     starts = drum + [f'<joint joint="cable_{name}{i}" coef="1"/>' for i in range(cables.lumps)]
     ends = [f'<joint joint="cable_{name}{i}" coef="-1"/>' for i in range(cables.lumps)] + [section]
     slacks = [0.0] * cables.lumps + [cables.slack]

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from tautscope.config import Config
 from tautscope.dof import Dof
-from tautscope.twin.mjcf import MAX_TIMESTEP, SERVO_LAG, build
+from tautscope.twin.friction import FrictionVariation
+from tautscope.twin.mjcf import MAX_TIMESTEP, SERVO_LAG, build, curvature_shape
+from tautscope.twin.transmission import Transmission
 
 _SETTLING = 1.0
 """Settling time in the start posture before a run [s]."""
@@ -42,6 +44,9 @@ class Plant:
         self._turns = self._addresses(f"turn_{i}" for i in segments)
         self._hinges = self._addresses(f"bend_{j}" for j in range(cables.joints))
         self._motors = self._addresses(f"motor_{dof.label}" for dof in Dof)
+        self._lumps = {
+            name: self._addresses(f"cable_{name}{i}" for i in range(cables.lumps)) for name in "pn"
+        }
         self._base = self._model.body(f"segment_{shaft.segments - 1}").id
         self._links = [self._model.body(f"joint_{j}").id for j in range(cables.joints)]
         self._tip = self._model.body("tip").id
@@ -53,6 +58,9 @@ class Plant:
         self._speed_limit = np.array(config.twin.drives.speed_limit)
         self._encoder_step: NDArray[np.float64] = np.array(config.twin.drives.encoder_step)
         self._setpoint = np.array([config.experiment[dof].centre for dof in Dof])
+        self._transmission = Transmission(config.twin.transmission, self._setpoint)
+        self._variation = FrictionVariation(config.twin.friction, config.experiment)
+        self._time = -_SETTLING
         self.bends = config.twin.bends
         self.tip_force = 0.0
         self._start()
@@ -62,15 +70,36 @@ class Plant:
         data, shaft = self._data, self._config.twin.shaft
         load = shaft.straight_load + shaft.load_per_bend * self.bends
         data.qfrc_applied[self._presses] = -load * self._load_share
+        if not self._variation.is_constant:
+            self._vary_friction()
         data.qfrc_applied[self._slides[-1]] = self.tip_force
         limit = self._speed_limit * self._timestep
         for _ in range(self._substeps):
             travel = np.minimum(np.maximum(command - self._setpoint, -limit), limit)
             self._setpoint = self._setpoint + travel
-            data.ctrl[:] = self._setpoint + travel * (SERVO_LAG / self._timestep)
+            target, travel = self._transmission.step(self._setpoint, travel, self._timestep)
+            data.ctrl[:] = target + travel * (SERVO_LAG / self._timestep)
             angles = data.qpos[self._turns] - shaft.set_angle
             data.qfrc_applied[self._turns] = -shaft.set_torque * np.sin(angles)
             mujoco.mj_step(self._model, data)
+        self._time += self._config.control.period
+
+    def _vary_friction(self) -> None:
+        """Apply the factors of `FrictionVariation` to loads and frictions."""
+        config, model, speed = self._config, self._model, self._data.qvel
+        lumps = np.concatenate(list(self._lumps.values()))
+        around = config.instrument.diameter / 2 * speed[self._turns]
+        insertion, _, bending = self.true_state
+        shaft, joints, cables = self._variation.factors(
+            insertion,
+            bending,
+            self._time,
+            (np.hypot(speed[self._slides], around), speed[self._hinges], speed[lumps]),
+        )
+        self._data.qfrc_applied[self._presses] *= shaft
+        friction = self._section_friction * self._joint_friction
+        model.dof_frictionloss[self._hinges] = joints * friction
+        model.dof_frictionloss[lumps] = cables * config.twin.cables.friction
 
     @property
     def section_friction(self) -> float:
@@ -85,14 +114,15 @@ class Plant:
     @property
     def applied(self) -> NDArray[np.float64]:
         """Position (3,) [m, rad, rad] that the encoders measure, in whole counts."""
-        position = np.asarray(self._data.qpos[self._motors], dtype=np.float64)
+        ends = np.asarray(self._data.qpos[self._motors], dtype=np.float64)
+        position = ends + (self._setpoint - self._transmission.position)
         return self._encoder_step * np.round(position / self._encoder_step)
 
     @property
     def true_state(self) -> NDArray[np.float64]:
-        """(3,) [m, rad, rad]: insertion and rotation at the guide, angle across the section."""
-        q = self._data.qpos
-        return np.array([q[self._slides[-1]], q[self._turns[-1]], q[self._hinges].sum()])
+        """(3,) [m, rad, rad]: insertion at the guide, plane of bending, angle of the section."""
+        q, plane = self._data.qpos, self._config.twin.cables.plane
+        return np.array([q[self._slides[-1]], q[self._turns[-1]] + plane, q[self._hinges].sum()])
 
     def centreline(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Points [m] and unit tangents (n, 3) of the centreline in the guide's frame.
@@ -121,11 +151,10 @@ class Plant:
         start = self._setpoint
         insertion, rotation, bending = start
         q[self._slides], q[self._turns] = insertion, rotation
-        q[self._hinges] = bending / len(self._hinges)
+        q[self._hinges] = bending / len(self._hinges) * curvature_shape(config.twin.cables)
         q[self._motors] = start
         for name, sign in (("p", 1), ("n", -1)):
-            lumps = self._addresses(f"cable_{name}{i}" for i in range(config.twin.cables.lumps))
-            q[lumps] = sign * config.twin.cables.arm * bending
+            q[self._lumps[name]] = sign * config.twin.cables.arm * bending
         for _ in range(round(_SETTLING / config.control.period)):
             self.step(start)
 

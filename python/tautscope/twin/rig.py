@@ -12,6 +12,7 @@ from tautscope.errors import SignalError
 from tautscope.loop.rig import Frame, Sample
 from tautscope.twin.camera import TwinCamera
 from tautscope.twin.plant import Plant
+from tautscope.twin.sensor import Readout
 
 
 class Twin:
@@ -86,6 +87,9 @@ class Twin:
         self._ticks = 0
         self._sequence = 0
         self._in_transit: deque[tuple[float, Frame]] = deque()
+        self._readout = Readout(self._config.twin.sensor.readout)
+        if self._camera is not None:
+            self._camera.reset()
         return self._sample(self._plant)
 
     def step(self, command: ArrayLike) -> Sample:
@@ -119,12 +123,17 @@ class Twin:
 
     def _capture(self, camera: TwinCamera, plant: Plant, time: float) -> None:
         twin = self._config.twin
+        readout = twin.sensor.readout
+        if readout > 0:
+            self._readout.add(time, plant.centreline())
         # Half a tick of tolerance: n / frame_rate and n * period differ in the last digits.
         if time + self._period / 2 < self._sequence / twin.frame_rate:
             return
-        rendered = camera.draw(*plant.centreline(), self._sequence)
+        strips = self._readout.strips() if readout > 0 else [plant.centreline()]
+        rendered = camera.draw_strips(strips, self._sequence)
         truth = rendered.true_features, rendered.true_visible
-        frame = Frame(rendered.image, time, self._sequence, *truth)
+        stamp = time - readout / 2 + twin.sensor.stamp_error
+        frame = Frame(rendered.image, stamp, self._sequence, *truth)
         delay = twin.latency + twin.latency_jitter * self._timing.uniform(-1, 1)
         self._in_transit.append((time + delay, frame))
         self._sequence += 1

@@ -1,0 +1,109 @@
+"""Reduction of the tracking error on drawn instruments, about which the loop is told wrongly.
+
+`best`, `paper` and no compensation on N instruments; ranges of the draw in
+`instruments.properties`. `--seed S` repeats one instrument.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from common.doc_pages import insert
+from common.paths import ROOT
+from common.processes import add_arguments, run_parallel
+from instruments.explanation import explain
+from instruments.properties import markdown_table
+from instruments.rows import Row, seed_rows, seed_table, summary_rows, table
+from instruments.runs import VARIANTS, Figures, Run, simulate
+from tautscope.commands.progress import progress_bar
+
+MOTIONS = ("hand", "sines")
+INSTRUMENTS = 200
+PAGE = ROOT / "docs" / "instruments.md"
+
+
+def arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--instruments", type=int, default=INSTRUMENTS, help="[%(default)s]")
+    parser.add_argument("--first-seed", type=int, default=0, help="[%(default)s]")
+    parser.add_argument("--seed", type=int, help="only the instrument of this seed")
+    feedback = parser.add_mutually_exclusive_group()
+    feedback.add_argument("--images", action="store_true", help="camera images [default]")
+    feedback.add_argument(
+        "--features", action="store_true", help="true features with noise in place of images: fast"
+    )
+    parser.add_argument(
+        "--motion", choices=MOTIONS, action="append", help="only this motion [both]"
+    )
+    parser.add_argument(
+        "--variant", choices=VARIANTS, action="append", help="only this one, and none [all]"
+    )
+    parser.add_argument(
+        "--duration", type=float, default=120.0, help="of motion hand [%(default)s s]"
+    )
+    add_arguments(parser)
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument("--write", action="store_true", help=f"update {PAGE.relative_to(ROOT)}")
+    return parser.parse_args()
+
+
+def plan(options: argparse.Namespace) -> list[Run]:
+    """Return all runs, the longest first."""
+    seeds = range(options.first_seed, options.first_seed + options.instruments)
+    runs = [
+        Run(seed, motion, variant, not options.features, options.duration)
+        for seed in (seeds if options.seed is None else [options.seed])
+        for motion in options.motion or MOTIONS
+        for variant in VARIANTS
+        if variant in ("none", *(options.variant or VARIANTS))
+    ]
+    return sorted(runs, key=lambda run: run.variant == "none")
+
+
+def measure(options: argparse.Namespace) -> dict[Run, Figures]:
+    """Simulate; Ctrl-C ends with the runs that are finished."""
+    runs, found = plan(options), {}
+    with progress_bar("instruments") as show_progress:
+        try:
+            for run, figures in run_parallel(simulate, runs, options.workers, options.scheduler):
+                found[run] = figures
+                show_progress(len(found) / len(runs))
+        except KeyboardInterrupt:
+            pass
+    return found
+
+
+def results(options: argparse.Namespace, rows: list[Row]) -> str:
+    """Return the tables of all motions with their conditions, as Markdown."""
+    seeds = [row["seed"] for row in rows]
+    source = "true features with noise" if options.features else "camera images"
+    parts = []
+    for motion in options.motion or MOTIONS:
+        parts += [f"Motion `{motion}`, seeds {min(seeds)} to {max(seeds)}, {source}."]
+        parts += [table(rows, motion), f"```text\n{explain(rows, motion)}\n```"]
+    return "\n\n".join(parts)
+
+
+def main() -> None:
+    options = arguments()
+    rows = seed_rows(measure(options))
+    if not rows:
+        raise SystemExit("No instrument is finished.")
+    text = results(options, rows)
+    if options.json:
+        facts = {"images": not options.features, "instruments": rows}
+        print(json.dumps({"rows": summary_rows(rows), **facts}))
+    else:
+        print(f"{seed_table(rows)}\n\n{text}")
+    if options.write:
+        insert(PAGE, "ranges", markdown_table())
+        insert(PAGE, "results", text)
+
+
+if __name__ == "__main__":
+    main()
