@@ -10,6 +10,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 
+from conditions import first_sight
 from conditions.frames import Evaluation, Job, evaluate
 from conditions.rows import table, to_rows, wrong_accepted
 
@@ -18,7 +19,11 @@ STATE = np.array([22e-3, 0.3, 0.9])
 
 def test_rows_count_as_defined() -> None:
     names = ("clean", "debris", "no instrument")
-    frames = [each for name in names for each in evaluate(Job(name, seed=0, real=False, frames=4))]
+    frames = [
+        each
+        for name in names
+        for each in evaluate(Job(name, seed=0, background="procedural", frames=4))
+    ]
     assert len(frames) == 12
     rows = to_rows(frames)
     assert {row["profile"] for row in rows} == {*names, "all"}
@@ -37,7 +42,15 @@ def test_rows_count_as_defined() -> None:
     assert table(rows).count("\n") == 1 + len(names) + 1
     # A detection without an instrument is wrong.
     wrong = Evaluation(
-        "no instrument", 0, False, 0, STATE, 0.0, (True, False), (np.full(2, np.inf),) * 2
+        "no instrument", 0, "procedural", 0, STATE, 0.0, (True, False), (np.full(2, np.inf),) * 2
     )
     assert wrong.is_wrong(0) and not wrong.is_wrong(1)
     assert wrong_accepted([wrong], 0) == 100
+
+
+def test_clean_sequences_are_found_within_five_images() -> None:
+    job = Job("clean", seed=0, background="procedural", frames=3)
+    sequences = first_sight.evaluate(job)
+    assert len(sequences) == 3
+    for is_found, is_wrong, longest in sequences:
+        assert is_found and not is_wrong and longest > 0

@@ -19,7 +19,14 @@ LAYERS = {
         {"supervision"},
         {"loop"},
     ),
-    "vision": ({"math", "error", "settings"}, {"scan"}, {"recognition"}, {"blur"}, {"detector"}),
+    "vision": (
+        {"math", "error", "settings"},
+        {"scan"},
+        {"recognition"},
+        {"blur"},
+        {"frame_search"},
+        {"detector"},
+    ),
 }
 """From the lowest layer up; a file uses its own layer and those below."""
 TESTS = re.compile(r"#\[cfg\(test\)\]\s*mod \w+ \{.*", re.DOTALL)

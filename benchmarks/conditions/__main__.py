@@ -1,8 +1,8 @@
 """Detection of the markers under the image conditions of an operation, with exact truth.
 
-Images of the twin at random poses of the workspace, before real colon frames and procedural mucosa,
-one condition at a time. Each is evaluated twice: with a prediction as in the loop, and without.
-`--write` updates the table of docs/conditions.md, which defines the quantities.
+Images of the twin at random poses of the workspace, before real colon frames, random crops of them
+and procedural mucosa, one condition at a time. Each is evaluated twice: with a prediction as in the
+loop, and without. `--write` updates the table of docs/conditions.md, which defines the quantities.
 """
 
 from __future__ import annotations
@@ -22,19 +22,20 @@ import numpy as np
 from common.doc_pages import insert
 from common.paths import ROOT
 from common.processes import run_parallel
+from conditions.backgrounds import KINDS
 from conditions.frames import CONDITIONS, Evaluation, Job, evaluate, render
 from conditions.rows import table, to_rows
 from tautscope.commands.progress import progress_bar
 
 
-def jobs(frames: int, seeds: Sequence[int]) -> list[Job]:
-    """Divide the frames of each condition among all seeds and both kinds of background."""
-    each = max(1, round(frames / (2 * len(seeds))))
+def jobs(frames: int, seeds: Sequence[int], is_tuning: bool) -> list[Job]:
+    """Divide the frames of each condition among all seeds and kinds of background."""
+    each = max(1, round(frames / (len(KINDS) * len(seeds))))
     return [
-        Job(name, seed, real, each)
+        Job(name, seed, kind, each, is_tuning)
         for name in CONDITIONS
         for seed in seeds
-        for real in (True, False)
+        for kind in KINDS
     ]
 
 
@@ -54,8 +55,8 @@ def montage(path: Path, seed: int, columns: int = 6) -> None:
     strips = []
     for name in CONDITIONS:
         strip = []
-        for real in (True, False):
-            for _, _, sequence, rendered in render(Job(name, seed, real, columns // 2)):
+        for kind in KINDS:
+            for _, _, sequence, rendered in render(Job(name, seed, kind, columns // 3)):
                 image = rendered.image.copy()
                 for u, v in rendered.true_features.reshape(2, 2):
                     if np.isfinite(u + v):
@@ -81,6 +82,11 @@ def main() -> None:
     parser.add_argument(
         "--first-seed", type=int, default=0, help="first seed; use others for tuning [%(default)s]"
     )
+    parser.add_argument(
+        "--tuning",
+        action="store_true",
+        help="use the frames and crops for tuning; with other seeds",
+    )
     parser.add_argument("--workers", type=int, default=os.cpu_count(), help="[all cores]")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument(
@@ -91,12 +97,13 @@ def main() -> None:
     if options.montage is not None:
         montage(options.montage, seed=0)
         return
-    work = jobs(options.frames, range(options.first_seed, options.first_seed + options.seeds))
+    seeds = range(options.first_seed, options.first_seed + options.seeds)
+    work = jobs(options.frames, seeds, options.tuning)
     with progress_bar(f"{sum(job.frames for job in work)} frames") as show_progress:
         rows = to_rows(run(work, options.workers, show_progress))
     if options.write:
-        seeds = f"Seeds {options.first_seed} to {options.first_seed + options.seeds - 1}."
-        insert(ROOT / "docs" / "conditions.md", "conditions", f"{seeds}\n\n{table(rows)}")
+        named = f"Seeds {seeds[0]} to {seeds[-1]}."
+        insert(ROOT / "docs" / "conditions.md", "conditions", f"{named}\n\n{table(rows)}")
     print(json.dumps({"rows": rows}, allow_nan=False) if options.json else table(rows))
 
 

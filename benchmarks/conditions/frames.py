@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import cv2
 import numpy as np
-from common.paths import DATA
+from conditions.backgrounds import KINDS, write_backgrounds
 from numpy.typing import NDArray
 from tautscope.config import Config
 from tautscope.loop.construction import build_feature_model
@@ -73,12 +73,13 @@ MODES = ("with prediction", "without")
 
 @dataclass(frozen=True)
 class Job:
-    """Number of frames of one condition, seed and kind of background."""
+    """Number of frames of one condition, seed and kind of background, for tuning or for figures."""
 
     condition: str
     seed: int
-    real: bool
+    background: str
     frames: int
+    is_tuning: bool = False
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ class Evaluation:
     Attributes:
         condition: Key of `CONDITIONS`.
         seed: ``twin.seed``.
-        real: Whether the background is a real colon frame.
+        background: Kind of background.
         sequence: Sequence number of the frame.
         state: True state (3,) [m, rad, rad].
         visible: Smaller visible share of the two bands.
@@ -100,7 +101,7 @@ class Evaluation:
 
     condition: str
     seed: int
-    real: bool
+    background: str
     sequence: int
     state: Floats
     visible: float
@@ -130,24 +131,35 @@ def centreline(config: Config, state: Floats) -> tuple[Floats, Floats]:
 
 
 @lru_cache(maxsize=4)
-def camera_for(disturb: tuple[str, ...], seed: int, real: bool) -> tuple[Config, TwinCamera]:
+def camera_for(
+    disturb: tuple[str, ...], seed: int, background: str, is_tuning: bool
+) -> tuple[Config, TwinCamera]:
+    folder = write_backgrounds(background, is_tuning)
     config = Config().replace(
         **{
             "twin.seed": seed,
             "twin.disturb": disturb,
-            "twin.background": str(DATA / "colon_frames") if real else None,
+            "twin.background": None if folder is None else folder.name,
         }
     )
     return config, TwinCamera(config)
 
 
+def conditions_camera(job: Job) -> tuple[Config, TwinCamera, TwinCamera, np.random.Generator]:
+    """Return configuration, cameras with and without the disturbances, and random numbers."""
+    condition = CONDITIONS[job.condition]
+    kind = KINDS.index(job.background)
+    rng = np.random.default_rng([job.seed, kind, list(CONDITIONS).index(job.condition)])
+    others = rng.choice(TRAPS, condition.others, replace=False).tolist()
+    scene = (job.seed, job.background, job.is_tuning)
+    config, camera = camera_for((*condition.disturb, *others), *scene)
+    return config, camera, camera_for((), *scene)[1], rng
+
+
 def render(job: Job) -> Iterator[tuple[Config, Floats, int, RenderedImage]]:
     """Yield configuration, state, sequence number and image of each frame of a job."""
     condition = CONDITIONS[job.condition]
-    rng = np.random.default_rng([job.seed, job.real, list(CONDITIONS).index(job.condition)])
-    others = rng.choice(TRAPS, condition.others, replace=False).tolist()
-    config, camera = camera_for((*condition.disturb, *others), job.seed, job.real)
-    plain = camera_for((), job.seed, job.real)[1]
+    config, camera, plain, rng = conditions_camera(job)
     for _ in range(job.frames):
         # Far apart, so that every frame has another background and phase of a disturbance.
         sequence = int(rng.integers(0, 400 * FRAMES_PER_BACKGROUND))
@@ -205,7 +217,7 @@ def evaluate(job: Job) -> list[Evaluation]:
     """Render the frames of a job and evaluate the detector on them."""
     cv2.setNumThreads(1)
     evaluations: list[Evaluation] = []
-    rng = np.random.default_rng([job.seed, job.real, 1])
+    rng = np.random.default_rng([job.seed, KINDS.index(job.background), 1])
     detector = MarkerDetector(Config())
     model = build_feature_model(Config())
     for _, state, sequence, image in render(job):
@@ -225,7 +237,7 @@ def evaluate(job: Job) -> list[Evaluation]:
             Evaluation(
                 job.condition,
                 job.seed,
-                job.real,
+                job.background,
                 sequence,
                 state,
                 float(image.true_visible.min()),

@@ -202,6 +202,7 @@ class MarkerDetector:
         model: FeatureModel,
         pixel_format: str,
         settings: Mapping[str, object],
+        workspace: NDArray[np.float64],
     ) -> Self: ...
     def detect(
         self, image: NDArray[np.uint8], states: NDArray[np.float64], std: NDArray[np.float64]

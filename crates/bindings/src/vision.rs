@@ -43,6 +43,7 @@ impl MarkerDetector {
         model: &FeatureModel,
         pixel_format: &str,
         settings: Bound<'_, PyAny>,
+        workspace: Vec<[f64; 3]>,
     ) -> PyResult<Self> {
         let settings: Settings = from_mapping("vision", settings)?;
         let Settings {
@@ -53,16 +54,23 @@ impl MarkerDetector {
             ..
         } = settings;
         let discriminant = ColorDiscriminant::new(weights, threshold).map_err(rejected(py))?;
+        let postures = workspace
+            .iter()
+            .filter_map(|state| Some(model.0.bands(*state)?.each_ref().map(outline)));
         Ok(Self {
             format: PixelFormat::named(pixel_format).map_err(rejected(py))?,
             model: model.0,
             model_deviation,
             segmenter: Segmenter::new(discriminant, smoothing),
-            detector: Mutex::new(Detector::new(settings).map_err(rejected(py))?),
+            detector: Mutex::new(
+                Detector::new(settings)
+                    .map_err(rejected(py))?
+                    .with_workspace(postures),
+            ),
         })
     }
 
-    /// Features (4,), covariance (4, 4), scores (2, 9), a reason per marker, regions, index of the discriminant.
+    /// Features (4,), covariance (4, 4), scores (2, 10), a reason per marker, regions, index of the discriminant.
     ///
     /// `states` (n, 3): where the instrument may be, each with the standard deviations `std` (3,).
     fn detect<'py>(
@@ -80,6 +88,7 @@ impl MarkerDetector {
                 deviation: std,
                 model_deviation: self.model_deviation,
             },
+            state: None,
         };
         let (found, regions) = py.detach(|| {
             let mut detector = self.detector.lock().unwrap_or_else(PoisonError::into_inner);
@@ -99,6 +108,7 @@ impl MarkerDetector {
                 score.edges,
                 score.growth,
                 score.mahalanobis_squared,
+                score.pixels,
                 u,
                 v,
             ]
@@ -151,6 +161,14 @@ impl MarkerDetector {
     }
 }
 
+fn outline(band: &core::BandImage) -> Outline {
+    Outline {
+        corners: band.outline,
+        centroid: band.centroid,
+        area: band.area,
+    }
+}
+
 fn window([left, top, right, bottom]: [usize; 4]) -> Window {
     Window {
         left,
@@ -169,28 +187,53 @@ type Detected<'py> = (
     usize,
 );
 
+/// Standard deviations of a posture that was found in an image: those of the workspace over this.
+const NEAR: f64 = 8.0;
+
 /// Predicts the bands by the core's feature model.
 struct Predictor<'a> {
     model: &'a core::FeatureModel,
     beliefs: core::Beliefs<'a>,
+    /// The only state, where it was found in the image.
+    state: Option<[f64; 3]>,
+}
+
+impl Predictor<'_> {
+    fn beliefs(&self) -> core::Beliefs<'_> {
+        match &self.state {
+            Some(state) => core::Beliefs {
+                states: std::slice::from_ref(state),
+                ..self.beliefs
+            },
+            None => self.beliefs,
+        }
+    }
 }
 
 impl BandPredictor for Predictor<'_> {
     fn predict(&self, observed: [f64; 4], std: [f64; 4]) -> Option<BandPrediction> {
-        let expected = self.model.expect(&self.beliefs, observed, std)?;
+        let expected = self.model.expect(&self.beliefs(), observed, std)?;
         Some(BandPrediction {
             features: expected.features,
             covariance: expected.covariance,
-            outlines: expected.bands.map(|band| Outline {
-                corners: band.outline,
-                centroid: band.centroid,
-                area: band.area,
-            }),
+            outlines: expected.bands.each_ref().map(outline),
         })
     }
 
     fn is_located(&self) -> bool {
-        self.beliefs.states.len() <= 1
+        self.beliefs().states.len() <= 1
+    }
+
+    fn near(&self, observed: [f64; 4]) -> Option<Self> {
+        let state = self.model.expect(&self.beliefs, observed, [2.0; 4])?.state;
+        Some(Self {
+            state: Some(state),
+            beliefs: core::Beliefs {
+                deviation: self.beliefs.deviation.map(|std| std / NEAR),
+                ..self.beliefs
+            },
+            ..*self
+        })
     }
 }
 

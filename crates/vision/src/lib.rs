@@ -15,6 +15,7 @@ extern crate self as tautscope_vision;
 mod blur;
 mod detector;
 mod error;
+mod frame_search;
 mod math;
 mod recognition;
 mod scan;

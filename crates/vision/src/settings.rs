@@ -45,10 +45,13 @@ pub struct Settings {
     pub fit: FitSettings,
     /// Scores at which the search stops.
     pub clear: ClearSettings,
-    /// Stricter thresholds where the posture is not known.
+    /// Where the posture is not known.
     pub unlocated: UnlocatedSettings,
     /// Intensity fit of blurred bands.
     pub blur: BlurSettings,
+    /// Whether these are the thresholds for images of which the posture is not known.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    pub is_unlocated: bool,
 }
 
 /// Settings of the outline fit, `[vision.fit]`.
@@ -93,22 +96,22 @@ pub struct ClearSettings {
     pub largest_surprise: f64,
 }
 
-/// Least scores where the posture is not known, `[vision.unlocated]`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Settings where the posture is not known, `[vision.unlocated]`.
+#[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
     derive(serde::Deserialize),
     serde(deny_unknown_fields)
 )]
 pub struct UnlocatedSettings {
-    /// See [`Settings::least_inside`].
-    pub least_inside: f64,
-    /// See [`Settings::least_coverage`].
-    pub least_coverage: f64,
-    /// See [`Settings::least_edges`].
-    pub least_edges: f64,
+    /// Weights and thresholds that are tried after [`Settings::alternatives`].
+    pub alternatives: Vec<([f64; 3], f64)>,
+    /// Least edge share of each band at which no other candidate is tried.
+    pub certain_edges: f64,
     /// See [`Settings::least_edges_on_average`].
     pub least_edges_on_average: f64,
+    /// See [`BlurSettings::largest_deviation`].
+    pub largest_deviation: f64,
 }
 
 /// Settings of the intensity fit of blurred bands, `[vision.blur]`.
@@ -144,18 +147,19 @@ pub struct BlurSettings {
 }
 
 impl Settings {
-    /// The settings for images of which the instrument's posture is not known: only bands that are nearly
-    /// complete are accepted, and none alone.
+    /// The settings for images of which the instrument's posture is not known: no band is accepted alone.
     pub(crate) fn unlocated(&self) -> Self {
         let least = &self.unlocated;
+        let alternatives = self.alternatives.iter().chain(&least.alternatives);
         Self {
-            least_inside: self.least_inside.max(least.least_inside),
-            least_coverage: self.least_coverage.max(least.least_coverage),
-            least_edges: self.least_edges.max(least.least_edges),
-            least_edges_on_average: self
-                .least_edges_on_average
-                .max(least.least_edges_on_average),
+            alternatives: alternatives.copied().collect(),
+            least_edges_on_average: least.least_edges_on_average,
+            blur: BlurSettings {
+                largest_deviation: least.largest_deviation,
+                ..self.blur
+            },
             least_edges_alone: f64::INFINITY,
+            is_unlocated: true,
             ..self.clone()
         }
     }

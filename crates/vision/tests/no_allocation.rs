@@ -3,8 +3,8 @@
 mod support;
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
-use support::{Discs, SETTINGS};
-use tautscope_vision::{Detector, Image, PixelFormat, Settings};
+use support::{Anywhere, Discs, SETTINGS};
+use tautscope_vision::{BandPredictor, Detector, Image, PixelFormat, Settings};
 
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;
@@ -61,4 +61,50 @@ fn after_the_first_frame_nothing_is_allocated() {
             "only {found} bands were recognised with smoothing {smoothing}"
         );
     }
+}
+
+#[test]
+fn nothing_is_allocated_where_the_posture_is_not_known() {
+    // Discs on grey plastic in tissue, discs on tissue alone, and noise.
+    let is_disc = |u: usize, v: usize| {
+        [(30, 34), (30, 18)].iter().any(|(cu, cv)| {
+            let (du, dv) = (u.abs_diff(*cu), v.abs_diff(*cv));
+            du * du + dv * dv <= 25
+        })
+    };
+    let paint = |is_plastic: bool| -> Vec<u8> {
+        let pixels = (0..HEIGHT).flat_map(|v| (0..WIDTH).map(move |u| (u, v)));
+        let colour = |(u, v): (usize, usize)| match (is_disc(u, v), (24..37).contains(&u)) {
+            (true, _) => [70, 190, 60],
+            (false, true) if is_plastic && v > 12 => [120, 120, 120],
+            _ => [60, 70, 140],
+        };
+        pixels.flat_map(colour).collect()
+    };
+    let frames = [
+        paint(true),
+        paint(false),
+        image(|u, v| (u * 7919 + v * 104_729) % 5 < 2),
+    ];
+    let places = (0..8).flat_map(|v| (0..8).map(move |u| [8 * u, 6 * v].map(f64::from)));
+    let postures = places.filter_map(|[u, v]| {
+        let features = [u, v + 16.0, u, v];
+        let drawn = Discs::at(features).predict(features, [1.0; 4])?;
+        Some(drawn.outlines)
+    });
+    let mut detector = Detector::new(SETTINGS).unwrap().with_workspace(postures);
+    let mut found = [0; 3];
+    for repeat in 0..2 {
+        for (data, found) in frames.iter().zip(&mut found) {
+            let frame = Image::new(data, PixelFormat::Bgr, [WIDTH, HEIGHT], 3 * WIDTH).unwrap();
+            let mut detect = || detector.recognise(&frame, &Anywhere::new()).0.rejections;
+            let rejections = if repeat == 0 {
+                detect()
+            } else {
+                assert_no_alloc(detect)
+            };
+            *found += rejections.iter().filter(|one| one.is_none()).count();
+        }
+    }
+    assert_eq!(found, [4, 0, 0]);
 }

@@ -45,16 +45,17 @@ class ClearConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
 
 
 class UnlocatedConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Stricter thresholds for an image of which the posture is not known [all ours]."""
+    """Search in an image of which the posture is not known [all ours]."""
 
-    least_inside: Fraction = 0.9
-    """As `VisionConfig.least_inside`."""
-    least_coverage: Fraction = 0.75
-    """As `VisionConfig.least_coverage`."""
-    least_edges: Fraction = 0.75
-    """As `VisionConfig.least_edges`."""
-    least_edges_on_average: Fraction = 0.85
+    alternatives: tuple[tuple[Vector3, float], ...] = (((-0.5, 1.0, -0.5), 4.0),)
+    """Weights and threshold that are tried after `VisionConfig.alternatives`: for dark or smoky
+    images in which a band is hardly greener than grey."""
+    certain_edges: Fraction = 0.9
+    """No other candidate is tried if the edge share of each band is at least this."""
+    least_edges_on_average: Fraction = 0.67
     """As `VisionConfig.least_edges_on_average`."""
+    largest_deviation: Positive = 0.6
+    """As `BlurConfig.largest_deviation` [px]."""
 
 
 class BlurConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -55,6 +55,8 @@ class BandScore:
         growth: Growth of the outline along the band's axis [px].
         mahalanobis_squared: Squared Mahalanobis distance of both bands from their predicted
             positions.
+        pixels: Number of pixels of the markers' colour inside the outline, those inside the other
+            band's outline excluded [px].
         centroid: Centroid of the outline, u, v [px].
     """
 
@@ -65,6 +67,7 @@ class BandScore:
     edges: float
     growth: float
     mahalanobis_squared: float
+    pixels: float
     centroid: tuple[float, float]
 
 
@@ -78,7 +81,7 @@ class Detection:
         covariance: Covariance of the features (4, 4) [px^2]; NaN likewise.
         reasons: Why each band was not found; empty if it was.
         scores: Scores of each band.
-        regions: Regions of the markers' colour, the largest first, at most 16.
+        regions: Regions of the markers' colour, the largest first, at most 32.
         discriminant: Discriminant that was used: 0 is the trained one, `vision.weights` and
             `vision.threshold`; others count `vision.alternatives` from 1.
     """
@@ -136,7 +139,8 @@ class MarkerDetector:
     - With an expectation, the bands are searched near it.
     - With predicted features alone, near the posture that explains them, with half of each DOF's
       `start_deviation`.
-    - With neither, in the whole workspace of the experiment, with stricter thresholds.
+    - With neither, in the whole workspace of the experiment (decision 0034): both bands must be
+      found, with an instrument between them.
 
     The arithmetic is in fixed point. With the largest sum of weights of one sign s, a low-passed
     value is within (1.25 + smoothing) * 255 * s / 8190 of the exact one: 0.07 grey levels by
@@ -159,7 +163,10 @@ class MarkerDetector:
         self._starts = _starts(config)
         self._start_deviation = np.array([config[dof].start_deviation for dof in Dof])
         self._core = _core.MarkerDetector(
-            self._model, config.camera.pixel_format, msgspec.to_builtins(config.vision)
+            self._model,
+            config.camera.pixel_format,
+            msgspec.to_builtins(config.vision),
+            _workspace(config),
         )
 
     def detect(
@@ -228,7 +235,7 @@ class MarkerDetector:
                 is ignored.
 
         Returns:
-            The regions of all windows, the largest first, at most 16.
+            The regions of all windows, the largest first, at most 32.
 
         Raises:
             FrameError: As `detect`.
@@ -259,6 +266,16 @@ def _starts(config: Config) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return states, np.array([sine.amplitude for sine in sines])
 
 
+def _workspace(config: Config) -> NDArray[np.float64]:
+    """Postures (n, 3) that cover the workspace of the experiment."""
+    sines = [config.experiment[dof] for dof in Dof]
+    axes = (
+        sine.centre + 1.1 * sine.amplitude * np.linspace(-1, 1, n)
+        for sine, n in zip(sines, (13, 45, 23), strict=True)
+    )
+    return np.array(list(itertools.product(*axes)))
+
+
 def _checked_prediction(predicted: ArrayLike | None) -> NDArray[np.float64] | None:
     if predicted is None:
         return None
@@ -272,5 +289,7 @@ def _checked_prediction(predicted: ArrayLike | None) -> NDArray[np.float64] | No
 
 
 def _band_score(row: list[float]) -> BandScore:
-    inside, coverage, exclusive, spill, edges, growth, mahalanobis_squared, u, v = row
-    return BandScore(inside, coverage, exclusive, spill, edges, growth, mahalanobis_squared, (u, v))
+    inside, coverage, exclusive, spill, edges, growth, mahalanobis_squared, pixels, u, v = row
+    return BandScore(
+        inside, coverage, exclusive, spill, edges, growth, mahalanobis_squared, pixels, (u, v)
+    )

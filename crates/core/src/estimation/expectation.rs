@@ -27,7 +27,9 @@ pub struct Expected {
     pub features: [f64; 4],
     /// Their covariance (4, 4) (px^2).
     pub covariance: [[f64; 4]; 4],
-    /// The bands in the posture that best explains what was seen.
+    /// The posture that best explains what was seen (3,) [m, rad, rad].
+    pub state: PerDof<f64>,
+    /// The bands in it.
     pub bands: [BandImage; 2],
 }
 
@@ -73,6 +75,7 @@ impl FeatureModel {
         Some(Expected {
             features,
             covariance,
+            state: posture,
             bands,
         })
     }

@@ -61,11 +61,16 @@ impl BlurFit {
         Recognition {
             features: self.features,
             covariance: self.covariance,
-            scores: [[ua, va], [ub, vb]].map(|centroid| BandScore {
+            scores: [
+                [ua, va, self.outlines[0].area],
+                [ub, vb, self.outlines[1].area],
+            ]
+            .map(|[u, v, area]| BandScore {
+                pixels: area,
                 edges: self.explained,
                 growth: self.sigma,
                 mahalanobis_squared: self.mahalanobis_squared,
-                centroid,
+                centroid: [u, v],
                 ..BandScore::default()
             }),
             rejections: [None; 2],

@@ -1,10 +1,12 @@
 //! Result of the recognition of both bands.
 
 use super::fit::Fit;
+use super::outline::Outline;
 use super::prediction::BandPrediction;
 use super::rejection::Rejection;
 use super::score::{BandScore, score};
-use crate::scan::RunMap;
+use super::surroundings::is_instrument;
+use crate::scan::{Frame, RunMap};
 use crate::settings::Settings;
 
 /// Recognised bands, or why they are not.
@@ -22,6 +24,10 @@ pub struct Recognition {
     pub discriminant: usize,
 }
 
+/// Quality per unit of the logarithm of the explained marker pixels, to compare candidates in different places.
+const AREA_QUALITY: f64 = 0.5;
+/// Candidates nearer than this to each other are in the same place (px).
+const SAME_PLACE: f64 = 2.0;
 /// Features that are not known.
 pub const UNKNOWN: [f64; 4] = [f64::NAN; 4];
 
@@ -48,6 +54,31 @@ impl Recognition {
     pub(crate) fn is_clear(&self, settings: &Settings) -> bool {
         let mut bands = self.scores.iter().zip(&self.rejections);
         bands.all(|(score, rejection)| rejection.is_none() && score.is_clear(settings))
+    }
+
+    /// Whether it is so clear that no other candidate in the frame can be better.
+    pub(crate) fn is_certain(&self, settings: &Settings) -> bool {
+        let least = if settings.is_unlocated {
+            settings.unlocated.certain_edges
+        } else {
+            0.0
+        };
+        self.is_clear(settings) && self.scores.iter().all(|score| score.edges >= least)
+    }
+
+    /// Rejects bands with no instrument between them, and those whose surroundings do not show it unless they are clear.
+    pub(crate) fn require_instrument(
+        &mut self,
+        frame: &impl Frame,
+        outlines: &[Outline; 2],
+        settings: &Settings,
+    ) {
+        let is_accepted = self.rejections == [None; 2]
+            && is_instrument(frame, outlines).unwrap_or_else(|| self.is_clear(settings));
+        if self.rejections == [None; 2] && !is_accepted {
+            self.rejections = [Some(Rejection::NoInstrument); 2];
+            self.erase_rejected();
+        }
     }
 
     /// Sets the features of rejected bands to NaN.
@@ -86,18 +117,46 @@ impl Recognition {
     pub(crate) fn quality(&self, settings: &Settings) -> f64 {
         let bands = self.scores.iter().zip(&self.rejections);
         let quality = |(score, rejection): (&BandScore, &Option<Rejection>)| {
-            let is_located = match rejection {
-                None => true,
-                Some(Rejection::Outside { .. }) => score.is_clear(settings),
-                Some(_) => false,
-            };
-            if is_located {
+            if is_located(score, *rejection, settings) {
                 1.0 + score.edges - 0.02 * score.mahalanobis_squared
             } else {
                 0.1 * score.edges
             }
         };
         bands.map(quality).sum()
+    }
+
+    /// Whether this candidate is better than another one of the same frame.
+    ///
+    /// Where the other is clear and in the same place, the first that was found is kept. Elsewhere the logarithm of the
+    /// number of explained marker pixels counts too: parts of one band may look like two small ones.
+    pub(crate) fn is_better(&self, other: &Self, settings: &Settings) -> bool {
+        let is_same = self
+            .features
+            .iter()
+            .zip(other.features)
+            .all(|(one, other)| (one - other).abs() < SAME_PLACE);
+        if is_same {
+            return !other.is_clear(settings) && self.quality(settings) > other.quality(settings);
+        }
+        let quality = |one: &Self| {
+            let bands = one.scores.iter().zip(&one.rejections);
+            let pixels: f64 = bands
+                .filter(|(score, rejection)| is_located(score, **rejection, settings))
+                .map(|(score, _)| score.pixels)
+                .sum();
+            one.quality(settings) + AREA_QUALITY * f64::max(pixels, 1.0).ln()
+        };
+        quality(self) > quality(other)
+    }
+}
+
+/// Whether the place of a band is known, even if it is outside the image.
+fn is_located(score: &BandScore, rejection: Option<Rejection>, settings: &Settings) -> bool {
+    match rejection {
+        None => true,
+        Some(Rejection::Outside { .. }) => score.is_clear(settings),
+        Some(_) => false,
     }
 }
 

@@ -68,4 +68,14 @@ pub trait BandPredictor {
     fn is_located(&self) -> bool {
         true
     }
+
+    /// The predictor whose prior is the posture that best explains the features `observed` (4,) (px).
+    ///
+    /// None if the bands are not visible there, or if the prior is of one posture already.
+    fn near(&self, _observed: [f64; 4]) -> Option<Self>
+    where
+        Self: Sized,
+    {
+        None
+    }
 }

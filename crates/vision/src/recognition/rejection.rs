@@ -29,6 +29,8 @@ pub enum Rejection {
         /// Share of its outline that was.
         share: f64,
     },
+    /// There is tissue between the bands, or it is not seen that there is none.
+    NoInstrument,
     /// A band found alone may be either of the two.
     Ambiguous,
     /// The bands are too far from their predicted positions.
@@ -57,6 +59,7 @@ impl fmt::Display for Rejection {
             Self::MissingEdges { share } => {
                 write!(f, "only {:.0} % of its outline is there", percent(share))
             }
+            Self::NoInstrument => f.write_str("no instrument between the bands"),
             Self::Ambiguous => f.write_str("what could be it could be the other one"),
             Self::Elsewhere { distance } => {
                 write!(f, "{distance:.1} deviations from where it is expected")

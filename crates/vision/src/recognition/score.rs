@@ -23,6 +23,8 @@ pub struct BandScore {
     pub growth: f64,
     /// Squared Mahalanobis distance of both bands from their predicted positions.
     pub mahalanobis_squared: f64,
+    /// Marker pixels inside the outline that are not inside the other band's outline (px).
+    pub pixels: f64,
     /// Centroid of the outline, u, v (px).
     pub centroid: [f64; 2],
 }
@@ -96,6 +98,7 @@ pub fn score(
             edges: fit.edges[band],
             growth: fit.growth[band].rims,
             mahalanobis_squared: fit.mahalanobis_squared,
+            pixels: whole.marker - whole.shared,
             centroid: centroids[band],
         }
     });

@@ -2,36 +2,40 @@
 
 use super::fit::{COARSE, FINE, Fit, fit};
 use super::outcome::{Recognition, UNKNOWN};
-use super::pairing::{Pair, TRIALS, likely_pairs};
+use super::pairing::{TRIALS, likely_pairs};
+use super::posture_table::PostureTable;
 use super::prediction::{BandPrediction, BandPredictor};
 use super::rejection::Rejection;
-use crate::scan::{Region, RunMap};
+use super::starts::{SAME, centroids, uncut_centroids};
+use crate::scan::{Frame, Region, RunMap};
 use crate::settings::Settings;
 
 /// Outlines are fitted again at most this often, until they move by less than half of the accuracy of 0.2 px.
 const REPEATS: usize = 6;
 const CONVERGED: f64 = 0.1;
-/// A band that the border cuts is moved at most this often to match the centroid of its visible part.
-const SHIFTS: usize = 10;
-/// Positions nearer than this to each other lead to the same fit (px): it is within the tolerance of the edges.
-const SAME: f64 = 0.7;
 /// Standard deviation of the centroid of a region as a feature (px): part of the band may be hidden.
 const REGION_STD: [f64; 4] = [4.0; 4];
+/// Least sum of the edge shares of both bands in the coarse fit, without a prediction: it bounds the time.
+const PROMISING_EDGES: f64 = 0.5;
 /// A band found alone must be nearer to its predicted position than to the other's by this squared Mahalanobis distance:
 /// 3 standard deviations.
 const AMBIGUITY: f64 = 9.0;
 
 /// Search for both bands near their prediction.
-pub struct OutlineSearch<'a, P> {
+pub struct OutlineSearch<'a, F, P> {
+    /// The frame.
+    pub frame: &'a F,
     /// The marker pixels.
     pub map: &'a RunMap,
     /// The prediction.
     pub predictor: &'a P,
     /// Thresholds and the settings of the fit.
     pub settings: &'a Settings,
+    /// Postures that are compared where the prior is not of one posture.
+    pub postures: &'a PostureTable,
 }
 
-impl<P: BandPredictor> OutlineSearch<'_, P> {
+impl<F: Frame, P: BandPredictor> OutlineSearch<'_, F, P> {
     /// Recognises the bands among the regions.
     pub fn recognise(&self, regions: &[Region]) -> Recognition {
         let Some(prior) = self.predictor.predict(UNKNOWN, [f64::INFINITY; 4]) else {
@@ -40,13 +44,9 @@ impl<P: BandPredictor> OutlineSearch<'_, P> {
         if regions.is_empty() {
             return Recognition::none(Rejection::NoRegion);
         }
-        let mut best: Option<(f64, Recognition)> = None;
+        let mut best: Option<Recognition> = None;
         let mut tried = [UNKNOWN; 2 * TRIALS];
-        let pairs = likely_pairs(regions, &prior);
-        let starts = pairs.into_iter().flatten().flat_map(|pair| {
-            let observed = centroids(pair, &prior, regions);
-            [Some(observed), uncut_centroids(observed, &prior, self.map)]
-        });
+        let starts = self.starts(regions, &prior).into_iter();
         for (index, observed) in starts.flatten().enumerate() {
             let Some((_, first)) = self.fit(observed, REGION_STD, [true; 2], COARSE) else {
                 continue;
@@ -58,18 +58,20 @@ impl<P: BandPredictor> OutlineSearch<'_, P> {
                 continue;
             }
             tried[index] = first.features;
+            if !self.predictor.is_located() && first.edges[0] + first.edges[1] < PROMISING_EDGES {
+                continue;
+            }
             let Some(found) = self.refine(first) else {
                 continue;
             };
-            let quality = found.quality(self.settings);
-            if best.is_none_or(|(most, _)| quality > most) {
-                best = Some((quality, found));
+            if best.is_none_or(|other| found.is_better(&other, self.settings)) {
+                best = Some(found);
             }
-            if found.is_clear(self.settings) {
+            if found.is_certain(self.settings) {
                 break;
             }
         }
-        let Some((_, found)) = best else {
+        let Some(found) = best else {
             return Recognition::none(Rejection::NoRegion);
         };
         match found.rejections {
@@ -77,6 +79,37 @@ impl<P: BandPredictor> OutlineSearch<'_, P> {
             [Some(_), None] => self.check_single(found, 1, &prior, regions),
             _ => found,
         }
+    }
+
+    /// Centroids of the bands (px) from which outlines are fitted, the likeliest first.
+    fn starts(&self, regions: &[Region], prior: &BandPrediction) -> [Option<[f64; 4]>; 2 * TRIALS] {
+        let mut starts = [None; 2 * TRIALS];
+        let (places, _) = starts.as_chunks_mut::<2>();
+        if self.predictor.is_located() || self.postures.is_empty() {
+            let pairs = likely_pairs(regions, prior).into_iter().flatten();
+            for (place, pair) in places.iter_mut().zip(pairs) {
+                let observed = centroids(pair, prior, regions);
+                *place = [Some(observed), uncut_centroids(observed, prior, self.map)];
+            }
+            return starts;
+        }
+        let candidates = self.postures.likely_pairs(regions).into_iter().flatten();
+        for (place, candidate) in places.iter_mut().zip(candidates) {
+            let mut observed = candidate.features;
+            if candidate.pair[0] != candidate.pair[1] {
+                for (band, region) in candidate.pair.into_iter().enumerate() {
+                    if let Some(region) = region.and_then(|index| regions.get(index)) {
+                        [observed[2 * band], observed[2 * band + 1]] = region.centroid();
+                    }
+                }
+            }
+            let uncut = self
+                .predictor
+                .predict(observed, REGION_STD)
+                .and_then(|near| uncut_centroids(observed, &near, self.map));
+            *place = [Some(observed), uncut];
+        }
+        starts
     }
 
     /// Recognises the bands near features `observed` (4,) (px) with standard deviations `std` (4,) (px).
@@ -143,7 +176,17 @@ impl<P: BandPredictor> OutlineSearch<'_, P> {
                 break;
             }
         }
-        let result = Recognition::of(&last?, &found, self.map, self.settings);
+        let prediction = last?;
+        let mut result = Recognition::of(&prediction, &found, self.map, self.settings);
+        if self.settings.is_unlocated {
+            let [ua, va, ub, vb] = found.features;
+            let [a, b] = &prediction.outlines;
+            result.require_instrument(
+                self.frame,
+                &[a.moved_to([ua, va]), b.moved_to([ub, vb])],
+                self.settings,
+            );
+        }
         let rejections = result.rejections;
         let is_used = rejections.map(|rejection| rejection.is_none());
         if is_used[0] == is_used[1] {
@@ -184,50 +227,6 @@ impl<P: BandPredictor> OutlineSearch<'_, P> {
         let found = fit(&prediction, start, is_used, tolerances, self.map, settings)?;
         Some((prediction, found))
     }
-}
-
-/// Centroids of the bands if these regions are the bands.
-fn centroids(pair: Pair, prior: &BandPrediction, regions: &[Region]) -> [f64; 4] {
-    let mut observed = UNKNOWN;
-    for (band, region) in pair.into_iter().enumerate() {
-        if let Some(region) = region.and_then(|index| regions.get(index)) {
-            [observed[2 * band], observed[2 * band + 1]] = region.centroid();
-        }
-    }
-    if let [Some(one), Some(other)] = pair
-        && one == other
-    {
-        let [u, v] = prior.shift_to(regions[one].centroid());
-        let [ua, va, ub, vb] = prior.features;
-        observed = [ua + u, va + v, ub + u, vb + v];
-    }
-    observed
-}
-
-/// Centroids of the whole bands from those of their parts inside the image; None if the border cuts neither.
-fn uncut_centroids(
-    mut observed: [f64; 4],
-    prior: &BandPrediction,
-    map: &RunMap,
-) -> Option<[f64; 4]> {
-    let mut is_cut = false;
-    for (outline, centroid) in prior.outlines.iter().zip(observed.chunks_exact_mut(2)) {
-        let part = [centroid[0], centroid[1]];
-        let mut outline = outline.moved_to(part);
-        for _ in 0..SHIFTS {
-            let Some([u, v]) = outline.centroid_within(map) else {
-                break;
-            };
-            let [du, dv] = [part[0] - u, part[1] - v];
-            if du.hypot(dv) < SAME {
-                break;
-            }
-            is_cut = true;
-            outline = outline.moved([du, dv]);
-        }
-        centroid.copy_from_slice(&outline.centroid);
-    }
-    is_cut.then_some(observed)
 }
 
 /// Standard deviations of a fit's features for the next fit: twice its own plus 0.3 px, because the outlines were those of

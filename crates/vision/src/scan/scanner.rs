@@ -7,7 +7,7 @@ use super::run_map::RunMap;
 use super::segment::Segmenter;
 
 /// Only the largest regions, this many, are kept: it bounds the time on a noisy frame.
-pub const MAX_REGIONS: usize = 16;
+pub const MAX_REGIONS: usize = 32;
 
 /// Finds regions and runs of marker pixels, and keeps those of the last frame.
 #[derive(Clone, Debug)]
@@ -32,11 +32,6 @@ impl Scanner {
             map: RunMap::default(),
             regions: Vec::with_capacity(MAX_REGIONS),
         }
-    }
-
-    /// Number of discriminants.
-    pub fn discriminants(&self) -> usize {
-        self.segmenters.len()
     }
 
     /// Finds regions and runs in a window by one of the discriminants.

@@ -2,9 +2,11 @@
 
 #![allow(dead_code, unused_imports, reason = "each test uses a part")]
 
+mod anywhere;
 mod discs;
 mod settings;
 
+pub use anywhere::Anywhere;
 pub use discs::Discs;
 use proptest::prelude::*;
 pub use settings::SETTINGS;

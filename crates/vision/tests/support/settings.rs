@@ -35,11 +35,12 @@ pub const SETTINGS: Settings = Settings {
         largest_surprise: 8.0,
     },
     unlocated: UnlocatedSettings {
-        least_inside: 0.9,
-        least_coverage: 0.75,
-        least_edges: 0.75,
-        least_edges_on_average: 0.85,
+        alternatives: Vec::new(),
+        certain_edges: 0.9,
+        least_edges_on_average: 0.67,
+        largest_deviation: 0.6,
     },
+    is_unlocated: false,
     blur: BlurSettings {
         sigma: 2.5,
         sigma_deviation: 2.0,
