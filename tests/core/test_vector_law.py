@@ -86,3 +86,29 @@ def test_one_dof_alone_has_the_limited_gain_of_the_article(seed: int) -> None:
         most = CONFIG[dof].free_gain * travel[:, dof] ** 2
         rounding = 1e-15 * np.abs(travel[:, dof])
         assert np.all((product >= -rounding) & (product <= most * (1 + 1e-9) + rounding)), dof
+
+
+@SEEDS
+@pytest.mark.parametrize("deviation", [1e-6, 0.35])
+def test_the_tip_of_a_known_play_does_not_pass_the_reference(seed: int, deviation: float) -> None:
+    """Without images, bending alone: the tip is a play of the start values."""
+    half = 0.5
+    start = {"bending.delta_minus": -half, "bending.delta_plus": half}
+    config = CONFIG.replace(**start, **{"state_estimation.width_deviation": deviation})
+    rng = np.random.default_rng(seed)
+    loop = HysteresisReduction(config)
+    reference = np.array([config.experiment[each].centre for each in Dof])
+    # Speeds up to 1.2 rad/s that turn every 0.7 s or so.
+    speed = 1.2 * np.interp(np.arange(4000), np.arange(0, 4001, 70), rng.uniform(-1, 1, 58))
+    middle = reference[Dof.BENDING]
+    tip, last, passed, moved = middle, middle, 0.0, 0.0
+    for tick, travel in enumerate(speed * PERIOD):
+        now = last + travel
+        command = loop.step([*reference[:2], now], tick * PERIOD)[Dof.BENDING]
+        before, tip = tip, min(max(tip, command - half), command + half)
+        allowed = max(0.0, (before - last) * np.sign(travel))
+        passed = max(passed, (tip - now) * np.sign(travel) - allowed)
+        moved += abs(tip - before)
+        last = now
+    assert moved > 0.3 * np.abs(speed * PERIOD).sum(), "it does follow"
+    assert passed <= 1e-9, f"seed {seed}: {passed} rad"

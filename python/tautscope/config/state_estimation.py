@@ -29,17 +29,17 @@ class StateEstimationConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_
     """Standard deviation of the logarithm of the initial half width."""
     centre_deviation: NonNegative = 0.25
     """Standard deviation of the initial centre of the contact offsets [in half widths]."""
-    share_deviation: NonNegative = 1.5
-    """Standard deviation of the logit of the share of the friction that insertion and rotation have
-    in common."""
+    share_deviation: NonNegative = 0.35
+    """Standard deviation of the initial share of the friction that insertion and rotation have in
+    common."""
     tip_walk: NonNegative = 0.012
     """Random walk of the tip [in half widths]."""
     width_walk: NonNegative = 0.06
     """Random walk of the logarithm of the half width."""
     centre_walk: NonNegative = 0.012
     """Random walk of the centre [in half widths]."""
-    share_walk: NonNegative = 0.006
-    """Random walk of the logit of the share."""
+    share_walk: NonNegative = 0.01
+    """Random walk of the share."""
     map_rate: tuple[NonNegative, NonNegative, NonNegative] = (0.35, 0.35, 0.0)
     """Share of the centre that its map over the position takes over per travel of 1, for each
     DOF."""

@@ -25,7 +25,7 @@ const STEPS: usize = 5;
 /// ```text
 /// target    c* = u' + m(u') + f h w + (1 - f) h sign(w)         u': output of the plays at which the tip is at u
 /// command   dc towards c* - c,   |dc| <= K_b |du|,   dc . du >= 0,   each |dc| <= command_speed period
-/// contact   |dq| <= tip_gain |du| for the tip q that the estimate predicts
+/// contact   |dq| <= tip_gain |du| for the tip q that the estimate predicts, and q does not pass u along du
 /// ```
 ///
 /// of bending by itself. One DOF alone: 0 <= dc / du <= `K_b`, Eq. (2). Where insertion and rotation rest, neither command
@@ -195,7 +195,7 @@ impl VectorLaw {
         let mut lead = self.lead;
         let gains = [self.free_gain, self.bending_gain];
         for (group, gain) in GROUPS.into_iter().zip(gains) {
-            let step = self.bounded_step(group, gain, wanted, motion, filter);
+            let step = self.bounded_step(group, gain, wanted, motion, reference, filter);
             let axes = step.into_iter().zip(motion).zip(group);
             // Without gain there is no compensation.
             let share = if gain > 1.0 { self.share } else { 0.0 };
@@ -231,6 +231,7 @@ impl VectorLaw {
         gain: f64,
         wanted: PerDof<f64>,
         motion: PerDof<f64>,
+        reference: PerDof<f64>,
         filter: &Filter,
     ) -> PerDof<f64> {
         let moved = self.norm(group, motion);
@@ -252,7 +253,7 @@ impl VectorLaw {
             share = share.min(limit / step.abs());
         }
         let nominal = filter.nominal();
-        // The contact may be nearer than estimated.
+        // The contact may be a standard deviation nearer than estimated.
         let mut near = nominal.hysteresis.half_width;
         for (half, std) in near.iter_mut().zip(nominal.width_std) {
             *half *= libm::exp(-std);
@@ -266,17 +267,21 @@ impl VectorLaw {
         };
         let position = propagate(&nominal.position, self.command);
         let before = nominal.tip(position.output);
+        let ahead = |tip| self.product(group, subtract(tip, reference), motion) / moved;
+        let room = moved.max(-ahead(before));
         for _ in 0..STEPS {
             let mut command = self.command;
             for (command, step) in command.iter_mut().zip(step) {
                 *command += share * step;
             }
-            let there = propagate(&position, command);
-            let tip = self.norm(group, subtract(nominal.tip(there.output), before));
-            if tip <= self.tip_gain * moved {
+            let there = nominal.tip(propagate(&position, command).output);
+            let tip = self.norm(group, subtract(there, before));
+            let along = ahead(there) - ahead(before);
+            let excess = (tip / (self.tip_gain * moved)).max(along / room);
+            if excess <= 1.0 {
                 break;
             }
-            share *= (self.tip_gain * moved / tip).max(0.2);
+            share *= (1.0 / excess).max(0.2);
         }
         step.map(|step| share * step)
     }

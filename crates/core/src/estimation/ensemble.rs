@@ -33,7 +33,7 @@ const LOCAL: [Local; STATE] = {
 };
 
 /// State of a member: output of the plays (3,) and of the shaft (2,), ln half width (3,), centre (3,) without the map, and
-/// logit of the share.
+/// share of the friction that the DOFs have in common.
 pub type State = [f64; STATE];
 
 /// Hypotheses, each a complete state that the exact plays propagate.
@@ -207,14 +207,14 @@ impl Ensemble {
         }
     }
 
-    /// Keeps the parameters within the half widths (3,) `least` to `largest` and the share within 1 to 99 %.
+    /// Keeps the parameters within the half widths (3,) `least` to `largest` and the share within 0 to 1.
     pub fn limit(&mut self, least: PerDof<f64>, largest: PerDof<f64>) {
         let bounds = least.map(libm::log).into_iter().zip(largest.map(libm::log));
         for [_, _, _, _, _, h1, h2, h3, _, _, _, share] in &mut self.members {
             for (half, (least, largest)) in [h1, h2, h3].into_iter().zip(bounds.clone()) {
                 *half = half.max(least).min(largest);
             }
-            *share = share.clamp(-5.0, 5.0);
+            *share = share.clamp(0.0, 1.0);
         }
     }
 
@@ -261,6 +261,6 @@ pub fn hysteresis(state: &State, maps: &PerDof<CentreMap>, output: PerDof<f64>) 
     Hysteresis {
         half_width: [h1, h2, h3].map(libm::exp),
         centre,
-        shared: 1.0 / (1.0 + libm::exp(-share)),
+        shared: share,
     }
 }

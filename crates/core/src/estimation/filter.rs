@@ -15,6 +15,8 @@ use crate::model::hysteresis::{Hysteresis, PlayPosition};
 
 /// Initial half width of a slack of unknown width, and its bounds, in half of `width_limit`.
 const USUAL_WIDTH: f64 = 2.0 / 3.0;
+/// Initial share of the friction that insertion and rotation have in common.
+const USUAL_SHARE: f64 = 0.7;
 const LEAST_WIDTH: f64 = 0.02;
 const LARGEST_WIDTH: f64 = 1.2;
 /// Distance of the nodes of the centre's map over the position, in half of `width_limit`.
@@ -122,7 +124,7 @@ impl Filter {
                     half_width: start_plays.map(|play| play.width() / 2.0),
                     centre: start_plays
                         .map(|play| f64::midpoint(play.delta_minus(), play.delta_plus())),
-                    shared: 0.5,
+                    shared: USUAL_SHARE,
                 },
                 position: blank,
                 width_std: [0.0; 3],
@@ -167,7 +169,7 @@ impl Filter {
         let [d1, d2, d3] = self.start_std;
         let spread = self.settings.width_deviation;
         let offset = self.settings.centre_deviation;
-        let mean: State = [u1, u2, u3, u1, u2, l1, l2, l3, m1, m2, m3, 0.0];
+        let mean: State = [u1, u2, u3, u1, u2, l1, l2, l3, m1, m2, m3, USUAL_SHARE];
         let std: State = [
             d1,
             d2,

@@ -203,7 +203,7 @@ fn parameters_are_kept_within_their_limits() {
     for (index, least, largest) in [(5, 0.5_f64, 2.0_f64), (6, 0.6, 3.0), (7, 0.7, 4.0)] {
         seen(index, least.ln(), largest.ln());
     }
-    seen(11, -5.0, 5.0);
+    seen(11, 0.0, 1.0);
     let before = ensemble.mean();
     ensemble.shift_centres([0.1, 0.2, -0.3]);
     for (index, shift) in [(8, 0.1), (9, 0.2), (10, -0.3)] {
