@@ -94,7 +94,11 @@ def test_the_tip_of_a_known_play_does_not_pass_the_reference(seed: int, deviatio
     """Without images, bending alone: the tip is a play of the start values."""
     half = 0.5
     start = {"bending.delta_minus": -half, "bending.delta_plus": half}
-    config = CONFIG.replace(**start, **{"state_estimation.width_deviation": deviation})
+    known = dict.fromkeys(("centre_deviation", "tip_walk", "width_walk", "centre_walk"), 0.0)
+    known["width_deviation"] = deviation
+    config = CONFIG.replace(
+        **start, **{f"state_estimation.{name}": value for name, value in known.items()}
+    )
     rng = np.random.default_rng(seed)
     loop = HysteresisReduction(config)
     reference = np.array([config.experiment[each].centre for each in Dof])
