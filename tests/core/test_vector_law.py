@@ -89,23 +89,27 @@ def test_one_dof_alone_has_the_limited_gain_of_the_article(seed: int) -> None:
 
 
 @SEEDS
-@pytest.mark.parametrize("deviation", [1e-6, 0.35])
-def test_the_tip_of_a_known_play_does_not_pass_the_reference(seed: int, deviation: float) -> None:
-    """Without images, bending alone: the tip is a play of the start values."""
-    half = 0.5
-    start = {"bending.delta_minus": -half, "bending.delta_plus": half}
-    known = dict.fromkeys(("centre_deviation", "tip_walk", "width_walk", "centre_walk"), 0.0)
-    known["width_deviation"] = deviation
+def test_a_tip_with_less_slack_than_estimated_does_not_pass_the_reference(seed: int) -> None:
+    """Bending alone, without images: the tip's half width is one standard deviation below."""
+    known = {"delta_minus": -0.6, "delta_plus": 0.6}
+    known_estimate = {"centre_deviation": 0.0, "tip_walk": 0.0, "width_walk": 0.0}
     config = CONFIG.replace(
-        **start, **{f"state_estimation.{name}": value for name, value in known.items()}
+        **{f"bending.{name}": value for name, value in known.items()},
+        **{f"state_estimation.{name}": value for name, value in known_estimate.items()},
+        **{"state_estimation.centre_walk": 0.0},
     )
     rng = np.random.default_rng(seed)
     loop = HysteresisReduction(config)
     reference = np.array([config.experiment[each].centre for each in Dof])
     # Speeds up to 1.2 rad/s that turn every 0.7 s or so.
     speed = 1.2 * np.interp(np.arange(4000), np.arange(0, 4001, 70), rng.uniform(-1, 1, 58))
-    middle = reference[Dof.BENDING]
-    tip, last, passed, moved = middle, middle, 0.0, 0.0
+    tip = last = reference[Dof.BENDING]
+    loop.step(reference, -PERIOD)
+    estimate = loop.hysteresis
+    assert estimate is not None
+    half = float((estimate.half_width * np.exp(-estimate.width_std))[Dof.BENDING])
+    assert half < 0.5, "less than estimated"
+    passed, moved = 0.0, 0.0
     for tick, travel in enumerate(speed * PERIOD):
         now = last + travel
         command = loop.step([*reference[:2], now], tick * PERIOD)[Dof.BENDING]
