@@ -21,7 +21,7 @@ pub struct StateEstimationSettings {
     pub width_deviation: f64,
     /// Standard deviation of the initial centre of the contact offsets.
     pub centre_deviation: f64,
-    /// Standard deviation of the logit of the share of the friction that insertion and rotation have in common.
+    /// Standard deviation of the initial share of the friction that insertion and rotation have in common.
     pub share_deviation: f64,
     /// Standard deviation of the random walk of the tip over a travel of 1, in half widths.
     pub tip_walk: f64,
@@ -29,7 +29,7 @@ pub struct StateEstimationSettings {
     pub width_walk: f64,
     /// The same of the centre, in half widths.
     pub centre_walk: f64,
-    /// The same of the logit of the share.
+    /// The same of the share.
     pub share_walk: f64,
     /// Share of the centre that its map over the position takes over per travel 1, for each DOF.
     pub map_rate: PerDof<f64>,
