@@ -55,12 +55,14 @@ def run(
     delay: Callable[[float], float | None] = lambda time: 0.0,
     *,
     begin: float = BEGIN,
+    actual: Config | None = None,
 ) -> Run:
     """Run the loop along `reference`; from `begin` to END the fault changes the features.
 
-    `delay` gives the error of the capture time [s], None for a lost frame.
+    `delay` gives the error of the capture time [s], None for a lost frame; `actual` is the geometry
+    of camera and instrument [that of the settings].
     """
-    loop, model = HysteresisReduction(settings), build_feature_model(settings)
+    loop, model = HysteresisReduction(settings), build_feature_model(actual or settings)
     noise, generator = np.random.default_rng(seed), np.random.default_rng(seed + 1)
     tip, tips, commands, reports = REST.copy(), [], [], []
     frozen: Floats | None = None
