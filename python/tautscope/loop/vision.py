@@ -139,7 +139,7 @@ class MarkerDetector:
     - With an expectation, the bands are searched near it.
     - With predicted features alone, near the posture that explains them, with half of each DOF's
       `start_deviation`.
-    - With neither, in the whole workspace of the experiment (decision 0034): both bands must be
+    - With neither, in the whole workspace of the experiment (decision 0032): both bands must be
       found, with an instrument between them.
 
     The arithmetic is in fixed point. With the largest sum of weights of one sign s, a low-passed
