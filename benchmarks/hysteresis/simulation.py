@@ -55,7 +55,9 @@ class Sines:
         for dof, period in self.periods:
             phase = 2 * np.pi * min(time, self.rest_at) / period
             position[dof] += self.experiment[dof].amplitude * np.sin(phase)
-        oscillation = np.sin(2 * np.pi * self.tremor_frequency * time)
+        # It grows over its first periods: a start at full speed is a jump, which stops motion.
+        growth = min(0.2 * self.tremor_frequency * time, 1.0)
+        oscillation = growth * np.sin(2 * np.pi * self.tremor_frequency * time)
         position[Dof.INSERTION] += self.tremor * oscillation
         return position
 
