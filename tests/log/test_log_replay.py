@@ -32,8 +32,7 @@ def test_a_replay_is_identical(recorded: Recorded) -> None:
     ("profile", "share"),
     [
         ("paper", 1e-9),
-        # 5 %: the travel of the command adds more noise than that of the reference.
-        pytest.param("best", 0.01, marks=pytest.mark.xfail(strict=False, reason="5 %")),
+        ("best", 0.01),
     ],
 )
 def test_estimates_with_the_same_configuration_are_the_same(
