@@ -15,10 +15,10 @@ use crate::model::hysteresis::{Hysteresis, PlayPosition};
 
 /// Initial half width of a slack of unknown width, and its bounds, in half of `width_limit`.
 const USUAL_WIDTH: f64 = 2.0 / 3.0;
-/// Initial share of the friction that insertion and rotation have in common.
-const USUAL_SHARE: f64 = 0.7;
 const LEAST_WIDTH: f64 = 0.02;
 const LARGEST_WIDTH: f64 = 1.2;
+/// Initial share of the friction that insertion and rotation have in common.
+const USUAL_SHARE: f64 = 0.7;
 /// Distance of the nodes of the centre's map over the position, in half of `width_limit`.
 const MAP_SPACING: f64 = 0.7;
 
