@@ -31,7 +31,14 @@ type Report<'py> = (
 /// The loop with storage for its history on the heap.
 type Loop<P> = Box<core::HysteresisReduction<P, Vec<core::Entry>>>;
 
-type Hysteresis<'py> = (Floats<'py>, Floats<'py>, Floats<'py>, f64, Floats<'py>);
+type Hysteresis<'py> = (
+    Floats<'py>,
+    Floats<'py>,
+    Floats<'py>,
+    f64,
+    Floats<'py>,
+    Floats<'py>,
+);
 
 enum Profile {
     Paper(Loop<core::Paper>),
@@ -187,7 +194,7 @@ impl Reduction {
     }
 
     /// In profile `best`: half widths (3,), standard deviations of their logarithms (3,), centres (3,), share of the
-    /// friction in common, and gains (3,).
+    /// friction in common, gains (3,), and lags (3,).
     #[getter]
     fn hysteresis<'py>(&self, py: Python<'py>) -> Option<Hysteresis<'py>> {
         let Profile::Best(inner) = &self.0 else {
@@ -201,6 +208,7 @@ impl Reduction {
             floats(&found.centre),
             found.shared,
             floats(&found.gain),
+            floats(&found.lag),
         ))
     }
 

@@ -18,9 +18,9 @@ class StateEstimationConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_
     """Standard deviation of a marker without a covariance [px]."""
     model_deviation: NonNegative = 0.3
     """Standard deviation of the feature model beyond the markers' covariance [px]."""
-    sideways_deviation: NonNegative = 0.3e-3
-    """Standard deviation of the tip's displacement across the bend by uneven curvature of the
-    bending section [m]."""
+    shape_deviation: NonNegative = 0.3
+    """Standard deviation of the unevenness of the section's curvature: half of the difference of
+    its ends, over the mean."""
     outlier_distance: Positive = 4.0
     """Mahalanobis distance beyond which a marker is an outlier."""
     tip_deviation: Positive = 0.1
@@ -32,6 +32,10 @@ class StateEstimationConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_
     share_deviation: NonNegative = 0.35
     """Standard deviation of the initial share of the friction that insertion and rotation have in
     common."""
+    lag_deviation: NonNegative = 0.08
+    """Mean and standard deviation of the initial lag of the tip behind the plays [s]."""
+    lag_walk: NonNegative = 0.0
+    """Random walk of the lag [s]."""
     tip_walk: NonNegative = 0.012
     """Random walk of the tip [in half widths]."""
     width_walk: NonNegative = 0.06

@@ -98,6 +98,7 @@ class HysteresisEstimate:
         centre: (3,) centres of the contact offsets at the present position, input minus output.
         shared: Share of the friction that insertion and rotation have in common, 0 to 1.
         gain: (3,) travel of the tip over that of the command in contact.
+        lag: (3,) lag of the tip behind the plays [s].
     """
 
     half_width: NDArray[np.float64]
@@ -105,6 +106,7 @@ class HysteresisEstimate:
     centre: NDArray[np.float64]
     shared: float
     gain: NDArray[np.float64]
+    lag: NDArray[np.float64]
 
 
 class HysteresisReduction:

@@ -14,6 +14,8 @@ use crate::settings::{ControlSettings, DofSettings};
 const GROUPS: [PerDof<f64>; 2] = [[1.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 /// Share of `command_speed` that the law uses, so that rounding does not exceed it.
 const BELOW_LIMIT: f64 = 0.999;
+/// Time constant of the velocity of the reference in s.
+const VELOCITY_TIME: f64 = 0.05;
 /// Steps in search of the largest motion whose predicted tip is slow enough.
 const STEPS: usize = 5;
 
@@ -50,6 +52,9 @@ pub struct VectorLaw {
     lead: PerDof<f64>,
     command: PerDof<f64>,
     share: f64,
+    period: f64,
+    /// Smoothed velocity of the reference (3,).
+    velocity: PerDof<f64>,
 }
 
 impl VectorLaw {
@@ -109,6 +114,8 @@ impl VectorLaw {
             lead: [0.0; 3],
             command: [f64::NAN; 3],
             share: 1.0,
+            period: control.period,
+            velocity: [0.0; 3],
         })
     }
 
@@ -146,6 +153,10 @@ impl VectorLaw {
             *travel /= unit;
         }
         self.rate_limit.step(travel);
+        let kept = self.period / (VELOCITY_TIME + self.period);
+        for (velocity, motion) in self.velocity.iter_mut().zip(motion) {
+            *velocity += kept * (motion / self.period - *velocity);
+        }
         let lead = self.next_lead(reference, motion, filter);
         let command = limit(self.lawful(reference, motion, lead));
         self.lead = subtract(command, reference);
@@ -173,7 +184,7 @@ impl VectorLaw {
         let before = self.command;
         self.command = command;
         if all_finite(before) && all_finite(command) {
-            filter.step(before, command);
+            filter.step(before, command, self.period);
         }
     }
 
@@ -184,6 +195,11 @@ impl VectorLaw {
         motion: PerDof<f64>,
         filter: &Filter,
     ) -> PerDof<f64> {
+        let mut ahead = reference;
+        for ((ahead, velocity), lag) in ahead.iter_mut().zip(self.velocity).zip(filter.nominal().lag) {
+            *ahead += lag * velocity;
+        }
+        let reference = ahead;
         let output = filter.nominal().output(reference);
         let used = self.usable(filter, output);
         let deflection = used.steady_deflection(self.direction.value());

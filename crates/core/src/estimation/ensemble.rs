@@ -11,8 +11,10 @@ use crate::model::hysteresis::{Hysteresis, PlayPosition};
 pub const MEMBERS: usize = 64;
 /// [`MEMBERS`] in sums.
 const COUNT: f64 = 64.0;
+/// Largest lag in s.
+const LARGEST_LAG: f64 = 0.4;
 /// Length of a member's state.
-pub const STATE: usize = 12;
+pub const STATE: usize = 16;
 /// What an entry of a state describes.
 #[derive(Debug, Clone, Copy)]
 enum Local {
@@ -22,18 +24,21 @@ enum Local {
     Shaft,
     /// Hysteresis of bending.
     Bending,
+    /// Shape of the section.
+    Shape,
 }
 /// What each entry of a state describes.
 const LOCAL: [Local; STATE] = {
-    use Local::{Bending, Position, Shaft};
+    use Local::{Bending, Position, Shaft, Shape};
     [
         Position, Position, Position, Position, Position, Shaft, Shaft, Bending, Shaft, Shaft,
-        Bending, Shaft,
+        Bending, Shaft, Shaft, Shaft, Bending, Shape,
     ]
 };
 
-/// State of a member: output of the plays (3,) and of the shaft (2,), ln half width (3,), centre (3,) without the map, and
-/// share of the friction that the DOFs have in common.
+/// State of a member: output of the plays (3,) and of the shaft (2,), ln half width (3,), centre (3,) without the map,
+/// share of the friction that the DOFs have in common, lag (3,) of the tip behind the plays in s, and
+/// unevenness of the section.
 pub type State = [f64; STATE];
 
 /// Hypotheses, each a complete state that the exact plays propagate.
@@ -48,6 +53,10 @@ pub struct Ensemble {
 pub struct ScalarMeasurement {
     /// Derivative by the output of each DOF.
     pub output: PerDof<f64>,
+    /// Derivative by the lag of each DOF.
+    pub lag: PerDof<f64>,
+    /// Derivative by the unevenness of the section.
+    pub unevenness: f64,
     /// The measured value.
     pub value: f64,
 }
@@ -180,7 +189,7 @@ impl Ensemble {
             let entries = covariance.iter_mut().zip(member).zip(mean).zip(LOCAL);
             for (((covariance, entry), mean), local) in entries {
                 let away = match local {
-                    Local::Position => all,
+                    Local::Position | Local::Shape => all,
                     Local::Shaft => shaft,
                     Local::Bending => bending,
                 };
@@ -192,7 +201,7 @@ impl Ensemble {
             *covariance *= match local {
                 Local::Position => 1.0,
                 Local::Shaft => shaft_share,
-                Local::Bending => bending_share,
+                Local::Bending | Local::Shape => bending_share,
             };
         }
         let total = variance + 1.0;
@@ -207,20 +216,25 @@ impl Ensemble {
         }
     }
 
-    /// Keeps the parameters within the half widths (3,) `least` to `largest` and the share within 0 to 1.
+    /// Keeps the parameters within the half widths (3,) `least` to `largest`, the share within 0 to 1 and the lags
+    /// within 0 to [`LARGEST_LAG`].
     pub fn limit(&mut self, least: PerDof<f64>, largest: PerDof<f64>) {
         let bounds = least.map(libm::log).into_iter().zip(largest.map(libm::log));
-        for [_, _, _, _, _, h1, h2, h3, _, _, _, share] in &mut self.members {
+        for [_, _, _, _, _, h1, h2, h3, _, _, _, share, l1, l2, l3, uneven] in &mut self.members {
             for (half, (least, largest)) in [h1, h2, h3].into_iter().zip(bounds.clone()) {
                 *half = half.max(least).min(largest);
             }
             *share = share.clamp(0.0, 1.0);
+            for lag in [l1, l2, l3] {
+                *lag = lag.clamp(0.0, LARGEST_LAG);
+            }
+            *uneven = uneven.clamp(-1.0, 1.0);
         }
     }
 
     /// Subtracts `change` from the centre of every member.
     pub fn shift_centres(&mut self, [d1, d2, d3]: PerDof<f64>) {
-        for [_, _, _, _, _, _, _, _, m1, m2, m3, _] in &mut self.members {
+        for [_, _, _, _, _, _, _, _, m1, m2, m3, ..] in &mut self.members {
             *m1 -= d1;
             *m2 -= d2;
             *m3 -= d3;
@@ -230,9 +244,13 @@ impl Ensemble {
 
 impl ScalarMeasurement {
     /// The parts of insertion with rotation, and of bending.
-    fn predict(&self, [q1, q2, q3, ..]: &State) -> [f64; 2] {
-        let [a, b, c] = self.output;
-        [a * q1 + b * q2, c * q3]
+    fn predict(&self, state: &State) -> [f64; 2] {
+        let ([a, b, c], [d, e, f]) = (self.output, self.lag);
+        let ([q1, q2, q3, ..], [l1, l2, l3]) = (state, lag(state));
+        [
+            a * q1 + b * q2 + d * l1 + e * l2,
+            c * q3 + f * l3 + self.unevenness * unevenness(state),
+        ]
     }
 }
 
@@ -245,6 +263,18 @@ pub const fn position(state: &State) -> PlayPosition {
     }
 }
 
+/// Lags in a state, in s.
+pub const fn lag(state: &State) -> PerDof<f64> {
+    let [_, _, _, _, _, _, _, _, _, _, _, _, l1, l2, l3, _] = *state;
+    [l1, l2, l3]
+}
+
+/// Unevenness of the section in a state.
+pub const fn unevenness(state: &State) -> f64 {
+    let [.., unevenness] = *state;
+    unevenness
+}
+
 const fn set_position(state: &mut State, position: &PlayPosition) {
     let [q1, q2, q3, shaft1, shaft2, ..] = state;
     [*q1, *q2, *q3] = position.output;
@@ -253,7 +283,7 @@ const fn set_position(state: &mut State, position: &PlayPosition) {
 
 /// Hysteresis of a state where the output is at `output`.
 pub fn hysteresis(state: &State, maps: &PerDof<CentreMap>, output: PerDof<f64>) -> Hysteresis {
-    let [_, _, _, _, _, h1, h2, h3, m1, m2, m3, share] = *state;
+    let [_, _, _, _, _, h1, h2, h3, m1, m2, m3, share, ..] = *state;
     let mut centre = [m1, m2, m3];
     for ((centre, map), output) in centre.iter_mut().zip(maps).zip(output) {
         *centre += map.at(output);

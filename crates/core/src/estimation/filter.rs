@@ -4,7 +4,7 @@ use crate::article::play::Play;
 use crate::dof::PerDof;
 use crate::error::{ConfigError, require, require_non_negative, require_positive};
 use crate::estimation::centre_map::CentreMap;
-use crate::estimation::ensemble::{Ensemble, STATE, State, hysteresis, position};
+use crate::estimation::ensemble::{Ensemble, STATE, State, hysteresis, lag, position, unevenness};
 use crate::estimation::gain::GainEstimate;
 use crate::estimation::history::{Entry, History};
 use crate::estimation::nominal::Nominal;
@@ -53,6 +53,8 @@ pub struct Filter {
     pub(super) command: PerDof<f64>,
     pub(super) reference: PerDof<f64>,
     pub(super) travel: PerDof<f64>,
+    /// Velocity of the mean output with its lag at that time (3,).
+    pub(super) velocity: PerDof<f64>,
     pub(super) nominal: Nominal,
 }
 
@@ -80,9 +82,11 @@ impl Filter {
         }
         for (field, value) in [
             ("model_deviation", settings.model_deviation),
-            ("sideways_deviation", settings.sideways_deviation),
+            ("shape_deviation", settings.shape_deviation),
             ("centre_deviation", settings.centre_deviation),
             ("share_deviation", settings.share_deviation),
+            ("lag_deviation", settings.lag_deviation),
+            ("lag_walk", settings.lag_walk),
             ("tip_walk", settings.tip_walk),
             ("width_walk", settings.width_walk),
             ("centre_walk", settings.centre_walk),
@@ -119,6 +123,7 @@ impl Filter {
             command: [f64::NAN; 3],
             reference: [f64::NAN; 3],
             travel: [0.0; 3],
+            velocity: [0.0; 3],
             nominal: Nominal {
                 hysteresis: Hysteresis {
                     half_width: start_plays.map(|play| play.width() / 2.0),
@@ -130,6 +135,8 @@ impl Filter {
                 width_std: [0.0; 3],
                 gain: [1.0; 3],
                 origin: [f64::NAN; 3],
+                lag: [settings.lag_deviation; 3],
+                velocity: [0.0; 3],
             },
         })
     }
@@ -169,7 +176,10 @@ impl Filter {
         let [d1, d2, d3] = self.start_std;
         let spread = self.settings.width_deviation;
         let offset = self.settings.centre_deviation;
-        let mean: State = [u1, u2, u3, u1, u2, l1, l2, l3, m1, m2, m3, USUAL_SHARE];
+        let lag = self.settings.lag_deviation;
+        let mean: State = [
+            u1, u2, u3, u1, u2, l1, l2, l3, m1, m2, m3, USUAL_SHARE, lag, lag, lag, 0.0,
+        ];
         let std: State = [
             d1,
             d2,
@@ -183,6 +193,10 @@ impl Filter {
             offset * h2,
             offset * h3,
             self.settings.share_deviation,
+            lag,
+            lag,
+            lag,
+            self.settings.shape_deviation,
         ];
         self.ensemble = Ensemble::new(&mean, &std, 1);
         for ((map, middle), unit) in self.maps.iter_mut().zip(reference).zip(self.unit) {
@@ -196,11 +210,13 @@ impl Filter {
     }
 
     /// Follows the command of a control tick [m, rad, rad] with the prediction.
-    pub fn step(&mut self, from: PerDof<f64>, to: PerDof<f64>) {
+    pub fn step(&mut self, from: PerDof<f64>, to: PerDof<f64>, time: f64) {
         let nominal = &mut self.nominal;
+        let before = nominal.position.output;
         nominal.position = nominal
             .hysteresis
             .propagate(self.radius, &nominal.position, from, to);
+        nominal.follow(before, nominal.position.output, time);
     }
 
     /// Propagates the ensemble along the control ticks to a tick of the history, unless that is past already.
@@ -241,7 +257,15 @@ impl Filter {
             .since(self.time)
             .filter(|entry| entry.time < to.time);
         let path = path.chain(core::iter::once(to));
+        let before = position(&self.ensemble.mean()).output;
         self.follow(path.map(|entry| (entry.command, entry.reference)));
+        let after = position(&self.ensemble.mean()).output;
+        let mut nominal = Nominal {
+            velocity: self.velocity,
+            ..self.nominal
+        };
+        nominal.follow(before, after, to.time - self.time);
+        self.velocity = nominal.velocity;
         self.time = to.time;
     }
 
@@ -285,7 +309,7 @@ impl Filter {
             .disturb_position([tip * shaft * h1, tip * shaft * h2, tip * bending * h3]);
         let (width, centre) = (settings.width_walk, settings.centre_walk);
         let mut std = [0.0; STATE];
-        let [_, _, _, _, _, w1, w2, w3, c1, c2, c3, share] = &mut std;
+        let [_, _, _, _, _, w1, w2, w3, c1, c2, c3, share, lag1, lag2, lag3, _] = &mut std;
         (*w1, *w2, *w3) = (width * shaft, width * shaft, width * bending);
         (*c1, *c2, *c3) = (
             centre * shaft * h1,
@@ -293,6 +317,8 @@ impl Filter {
             centre * bending * h3,
         );
         *share = settings.share_walk * shaft;
+        let lag = settings.lag_walk;
+        (*lag1, *lag2, *lag3) = (lag * shaft, lag * shaft, lag * bending);
         self.ensemble.add_noise(&std);
     }
 
@@ -318,10 +344,13 @@ impl Filter {
 
     /// Mean and covariance of the tip, with its deviation from the plays.
     pub(super) fn tips(&self) -> ([f64; 3], [[f64; 3]; 3]) {
-        let nominal = &self.nominal;
+        let nominal = Nominal {
+            velocity: self.velocity,
+            ..self.nominal
+        };
         let (mean, [[v1, a, b], [c, v2, d], [e, f, v3]]) = self
             .ensemble
-            .covariance(|state| nominal.tip(position(state).output));
+            .covariance(|state| nominal.lagging_tip(position(state).output, lag(state)));
         let [d1, d2, d3] = self.deviation();
         let covariance = [
             [v1 + d1 * d1, a, b],
@@ -329,6 +358,12 @@ impl Filter {
             [e, f, v3 + d3 * d3],
         ];
         (mean, covariance)
+    }
+
+    /// Mean and standard deviation of the unevenness of the section.
+    pub fn unevenness(&self) -> (f64, f64) {
+        let ([mean], [[variance]]) = self.ensemble.covariance(|state| [unevenness(state)]);
+        (mean, libm::sqrt(variance))
     }
 
     /// Standard deviation of the tip from that of the plays (3,) [m, rad, rad].
@@ -352,6 +387,7 @@ impl Filter {
         let nominal = &mut self.nominal;
         nominal.width_std = [v1, v2, v3].map(libm::sqrt);
         nominal.hysteresis = hysteresis(&mean, &self.maps, at.output);
+        nominal.lag = lag(&mean);
         nominal.position =
             nominal
                 .hysteresis
@@ -360,10 +396,11 @@ impl Filter {
 
     /// Propagates the prediction from the time of the ensemble to now.
     pub(super) fn catch_up<S: AsRef<[Entry]> + AsMut<[Entry]>>(&mut self, history: &History<S>) {
-        let mut from = self.command;
+        let (mut from, mut time) = (self.command, self.time);
+        self.nominal.velocity = self.velocity;
         for entry in history.since(self.time) {
-            self.step(from, entry.command);
-            from = entry.command;
+            self.step(from, entry.command, entry.time - time);
+            (from, time) = (entry.command, entry.time);
         }
     }
 

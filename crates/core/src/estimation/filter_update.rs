@@ -35,9 +35,15 @@ impl Filter {
     /// The most probable tip for the markers of an image at the time of the ensemble; None where the model sees no band.
     pub fn measure(&self, model: &FeatureModel, markers: &Markers) -> Option<MarkerEstimate> {
         self.origin?;
+        let (unevenness, unevenness_std) = self.unevenness();
         let (state, covariance) = self.tips();
-        let prior = ImagePrediction { state, covariance };
-        markers.estimate(model, &prior, &self.settings)
+        let prior = ImagePrediction {
+            state,
+            covariance,
+            unevenness,
+            unevenness_std,
+        };
+        markers.estimate(model, &prior, self.settings.outlier_distance)
     }
 
     /// Updates the ensemble with the markers of an estimate by [`Filter::measure`]; with `is_position_only` only the tip.
@@ -49,7 +55,9 @@ impl Filter {
         is_position_only: bool,
     ) {
         let Nominal { origin, gain, .. } = self.nominal;
-        let Some(rows) = markers.linearize(estimate, origin, gain, self.deviation()) else {
+        let Some(rows) =
+            markers.linearize(estimate, origin, gain, self.velocity, self.deviation())
+        else {
             return;
         };
         self.update_with(&rows, estimate.measured, is_position_only);
@@ -117,7 +125,12 @@ impl Filter {
         self.ensemble.disturb_position(step);
     }
 
-    fn update_gain(&mut self, tip: PerDof<f64>) {
+    fn update_gain(&mut self, mut tip: PerDof<f64>) {
+        let Nominal { gain, lag, .. } = self.nominal;
+        let late = gain.into_iter().zip(lag).zip(self.velocity);
+        for (tip, ((gain, lag), velocity)) in tip.iter_mut().zip(late) {
+            *tip += gain * lag * velocity;
+        }
         let Some(origin) = self.origin else {
             return;
         };
@@ -140,7 +153,7 @@ impl Filter {
     /// Passes a share of the mean centre on to the map at the position of the tip.
     fn update_maps(&mut self) {
         let mean = self.ensemble.mean();
-        let [q1, q2, q3, _, _, _, _, _, m1, m2, m3, _] = mean;
+        let [q1, q2, q3, _, _, _, _, _, m1, m2, m3, ..] = mean;
         let rates = self.settings.map_rate.into_iter().zip(self.travel);
         let mut changes = [m1, m2, m3];
         let maps = self.maps.iter_mut().zip([q1, q2, q3]).zip(rates);

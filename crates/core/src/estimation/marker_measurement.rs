@@ -30,6 +30,9 @@ pub struct ImagePrediction {
     pub state: PerDof<f64>,
     /// Its covariance (3, 3).
     pub covariance: Matrix,
+    /// Unevenness of the section that the feature model has, and its standard deviation.
+    pub unevenness: f64,
+    pub unevenness_std: f64,
 }
 
 /// Markers (4,) of an image in px with their covariance (4, 4) in px^2.
@@ -52,6 +55,9 @@ pub struct MarkerEstimate {
     pub misfit_squared: Option<f64>,
     /// Which markers were used.
     pub used: [bool; 2],
+    /// Unevenness of the section, and derivative (4,) of the features by it.
+    pub unevenness: f64,
+    pub by_unevenness: Features,
     /// Features predicted there and their interaction matrix.
     pub prediction: FeaturePrediction,
     /// Standard deviations of the state (3,) [m, rad, rad].
@@ -96,21 +102,20 @@ impl Markers {
     /// argmin_q  (q - q0)' P^-1 (q - q0) + (s - h(q))' (R + g g')^-1 (s - h(q)) + outlier_distance^2 for each marker left out
     /// ```
     ///
-    /// with the prediction q0, P of the tip, R of the markers and the model, and g what a displacement of the tip across
-    /// the bend by its standard deviation does to the features.
+    /// with the prediction q0, P of the tip, R of the markers and the model, and g the derivative of the features by the
+    /// unevenness of the section times its standard deviation.
     ///
     /// None where the model sees no band.
     pub fn estimate(
         &self,
         model: &FeatureModel,
         prior: &ImagePrediction,
-        settings: &StateEstimationSettings,
+        outlier_distance: f64,
     ) -> Option<MarkerEstimate> {
         let seen = found(self.features);
-        let price = square(settings.outlier_distance);
-        let sideways = model
-            .sideways(prior.state)?
-            .map(|value| settings.sideways_deviation * value);
+        let price = square(outlier_distance);
+        let by_unevenness = model.by_unevenness(prior.state)?;
+        let sideways = by_unevenness.map(|value| prior.unevenness_std * value);
         let problem = |used: [bool; 2]| Problem::new(self, prior, used, sideways);
         let mut best = problem(seen)?.minimum(model, [0.0; 3])?;
         if best.distance_squared > price {
@@ -137,6 +142,8 @@ impl Markers {
         }
         Some(MarkerEstimate {
             misfit_squared,
+            unevenness: prior.unevenness,
+            by_unevenness,
             ..best
         })
     }
@@ -154,6 +161,7 @@ impl Markers {
         estimate: &MarkerEstimate,
         origin: PerDof<f64>,
         gain: PerDof<f64>,
+        velocity: PerDof<f64>,
         std: PerDof<f64>,
     ) -> Option<[ScalarMeasurement; 4]> {
         let FeaturePrediction { features, columns } = estimate.prediction;
@@ -176,17 +184,25 @@ impl Markers {
                 *value += by * constant;
             }
         }
+        for (value, by) in misfit.iter_mut().zip(estimate.by_unevenness) {
+            *value += by * estimate.unevenness;
+        }
         let misfit = whitener.apply(misfit);
+        let uneven = whitener.apply(estimate.by_unevenness);
         let [c1, c2, c3] = columns.map(|column| whitener.apply(column));
-        let [g1, g2, g3] = gain;
+        let ([g1, g2, g3], [v1, v2, v3]) = (gain, velocity);
         let mut rows = [ScalarMeasurement {
             output: [0.0; 3],
+            lag: [0.0; 3],
+            unevenness: 0.0,
             value: 0.0,
         }; 4];
-        let outputs = c1.into_iter().zip(c2).zip(c3);
-        for ((row, value), ((a, b), c)) in rows.iter_mut().zip(misfit).zip(outputs) {
+        let outputs = c1.into_iter().zip(c2).zip(c3.into_iter().zip(uneven));
+        for ((row, value), ((a, b), (c, unevenness))) in rows.iter_mut().zip(misfit).zip(outputs) {
             *row = ScalarMeasurement {
                 output: [g1 * a, g2 * b, g3 * c],
+                lag: [-g1 * a * v1, -g2 * b * v2, -g3 * c * v3],
+                unevenness,
                 value,
             };
         }
@@ -269,6 +285,8 @@ impl<'a> Problem<'a> {
             distance_squared: cost,
             misfit_squared: None,
             used: self.used,
+            unevenness: 0.0,
+            by_unevenness: [0.0; 4],
             prediction,
             std,
         })

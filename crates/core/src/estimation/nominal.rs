@@ -3,6 +3,9 @@
 use crate::dof::PerDof;
 use crate::model::hysteresis::{Hysteresis, PlayPosition};
 
+/// Least time constant of the velocity in s.
+const LEAST_LAG: f64 = 0.02;
+
 /// The mean of the ensemble, propagated to now.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Nominal {
@@ -16,6 +19,10 @@ pub struct Nominal {
     pub gain: PerDof<f64>,
     /// First reference [m, rad, rad].
     pub origin: PerDof<f64>,
+    /// Lag of the tip behind the plays (3,) in s.
+    pub lag: PerDof<f64>,
+    /// Velocity of the output with this lag (3,) [m/s, rad/s, rad/s].
+    pub velocity: PerDof<f64>,
 }
 
 impl Nominal {
@@ -26,6 +33,23 @@ impl Nominal {
             *tip = origin + gain * (*tip - origin);
         }
         tip
+    }
+
+    /// The tip for an output of the plays (3,) [m, rad, rad] that it lags behind.
+    pub fn lagging_tip(&self, mut output: PerDof<f64>, lag: PerDof<f64>) -> PerDof<f64> {
+        for ((output, lag), velocity) in output.iter_mut().zip(lag).zip(self.velocity) {
+            *output -= lag * velocity;
+        }
+        self.tip(output)
+    }
+
+    /// Follows the output `after` a time in s.
+    pub fn follow(&mut self, before: PerDof<f64>, after: PerDof<f64>, time: f64) {
+        let moved = after.into_iter().zip(before).zip(self.lag);
+        for (velocity, ((after, before), lag)) in self.velocity.iter_mut().zip(moved) {
+            let kept = libm::exp(-time / lag.max(LEAST_LAG));
+            *velocity = kept * *velocity + (1.0 - kept) * (after - before) / time;
+        }
     }
 
     /// The output of the plays for a tip (3,) [m, rad, rad].

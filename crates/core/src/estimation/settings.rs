@@ -11,8 +11,10 @@ pub struct StateEstimationSettings {
     pub marker_deviation: f64,
     /// Standard deviation in px of the feature model beyond the markers' covariance.
     pub model_deviation: f64,
-    /// Standard deviation in m of the tip's displacement across the bend by uneven curvature.
-    pub sideways_deviation: f64,
+    /// Standard deviation of the unevenness of the section's curvature, [`Instrument::with_unevenness`].
+    ///
+    /// [`Instrument::with_unevenness`]: crate::model::instrument::Instrument::with_unevenness
+    pub shape_deviation: f64,
     /// Mahalanobis distance beyond which a marker is an outlier.
     pub outlier_distance: f64,
     /// Standard deviation of the tip from the plays, by rounding of the loop and viscous friction.
@@ -23,6 +25,10 @@ pub struct StateEstimationSettings {
     pub centre_deviation: f64,
     /// Standard deviation of the initial share of the friction that insertion and rotation have in common.
     pub share_deviation: f64,
+    /// Mean and standard deviation in s of the initial lag of the tip behind the plays.
+    pub lag_deviation: f64,
+    /// Standard deviation in s of the random walk of the lag over a travel of 1.
+    pub lag_walk: f64,
     /// Standard deviation of the random walk of the tip over a travel of 1, in half widths.
     pub tip_walk: f64,
     /// The same of the logarithm of the half width.

@@ -40,7 +40,7 @@ impl TipFilter {
         match self.command.replace(command) {
             None => self.filter.start(all, all),
             Some(last) => {
-                self.filter.step([last, 0.0, 0.0], all);
+                self.filter.step([last, 0.0, 0.0], all, f64::INFINITY);
                 self.filter.follow(core::iter::once((all, all)));
             }
         }
@@ -58,6 +58,8 @@ impl TipFilter {
         let ([gain, ..], [origin, ..]) = (nominal.gain, nominal.origin);
         let row = ScalarMeasurement {
             output: [gain / self.std, 0.0, 0.0],
+            lag: [0.0; 3],
+            unevenness: 0.0,
             value: (tip - origin * (1.0 - gain)) / self.std,
         };
         self.filter.update_with(&[row], [tip, 0.0, 0.0], false);

@@ -95,7 +95,7 @@ impl ProfileBlocks for Best {
 
     fn predicted_state(&self) -> PerDof<f64> {
         let nominal = self.filter.nominal();
-        nominal.tip(nominal.position.output)
+        nominal.lagging_tip(nominal.position.output, nominal.lag)
     }
 
     fn corrected(&self) -> PerDof<f64> {
@@ -143,6 +143,7 @@ impl ProfileBlocks for Best {
     }
 
     fn measure(&self, model: &FeatureModel, _: &Entry, image: Image<'_>) -> Option<Measurement> {
+        let model = &self.feature_model(model);
         let markers = self.filter.markers(image.features, image.covariance);
         let estimate = self.filter.measure(model, &markers)?;
         let prior = self.filter.belief();
@@ -206,6 +207,11 @@ impl ProfileBlocks for Best {
         }
     }
 
+    fn feature_model(&self, told: &FeatureModel) -> FeatureModel {
+        let (unevenness, _) = self.filter.unevenness();
+        told.with_unevenness(unevenness)
+    }
+
     fn miss(&mut self, _: &Entry) {
         self.filter.miss();
     }
@@ -230,6 +236,7 @@ impl<S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<Best, S> {
             centre,
             shared,
             gain: nominal.gain,
+            lag: nominal.lag,
         }
     }
 }

@@ -91,7 +91,8 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
         let frames = &self.monitors.frames;
         let flags = frames.check_innovation(measurement.distance);
         let prior = self.profile.predict(&self.history, past);
-        let expected = self.feature_model.predict(prior.state);
+        let model = self.profile.feature_model(&self.feature_model);
+        let expected = model.predict(prior.state);
         let is_exchanged =
             expected.is_some_and(|expected| is_reversed(expected.features, image.features));
         if !is_exchanged && flags.is_empty() {
@@ -172,7 +173,8 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
     /// The report on a frame that updated nothing.
     fn report_unused(&self, status: Status, past: Option<Entry>) -> Report {
         let predicted_state = past.map_or([f64::NAN; 3], |past| past.predicted_state);
-        let prediction = self.feature_model.predict(predicted_state);
+        let model = self.profile.feature_model(&self.feature_model);
+        let prediction = model.predict(predicted_state);
         Report {
             status,
             predicted_state,

@@ -96,6 +96,11 @@ pub(crate) trait ProfileBlocks: Law + Sized {
         updates_offsets: bool,
     ) -> ImageUpdate;
 
+    /// The feature model as far as images have corrected it.
+    fn feature_model(&self, told: &FeatureModel) -> FeatureModel {
+        *told
+    }
+
     /// Makes the state prediction less certain after an image without markers.
     fn miss(&mut self, past: &Entry);
 

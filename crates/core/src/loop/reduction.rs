@@ -96,7 +96,8 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
     /// None beyond the history and where a band is not visible.
     pub fn predicted_features(&self, captured_at: f64) -> Option<[f64; 4]> {
         let past = self.history.at(captured_at)?;
-        let prediction = self.feature_model.predict(past.predicted_state)?;
+        let model = self.profile.feature_model(&self.feature_model);
+        let prediction = model.predict(past.predicted_state)?;
         Some(prediction.features)
     }
 

@@ -59,4 +59,6 @@ pub struct HysteresisEstimate {
     pub shared: f64,
     /// Travel of the tip over that of the command in contact (3,).
     pub gain: PerDof<f64>,
+    /// Lag of the tip behind the plays (3,) in s.
+    pub lag: PerDof<f64>,
 }

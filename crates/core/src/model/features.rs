@@ -103,11 +103,18 @@ impl FeatureModel {
         finite.then_some(prediction)
     }
 
-    /// Derivative (4,) in px/m of the features by a displacement of the tip across the bend, towards the side it bends
-    /// to and without a rotation, as by a section of uneven curvature.
+    /// The model of an instrument whose section bends unevenly, [`Instrument::with_unevenness`].
+    pub(crate) const fn with_unevenness(&self, unevenness: f64) -> Self {
+        Self {
+            instrument: self.instrument.with_unevenness(unevenness),
+            ..*self
+        }
+    }
+
+    /// Derivative (4,) in px of the features by the unevenness of the section.
     ///
     /// None where [`FeatureModel::predict`] is.
-    pub(crate) fn sideways(&self, state: PerDof<f64>) -> Option<[f64; 4]> {
+    pub(crate) fn by_unevenness(&self, state: PerDof<f64>) -> Option<[f64; 4]> {
         let [_, rotation, bending] = state;
         let (along, across) = (libm::sin(bending / 2.0), libm::cos(bending / 2.0));
         let direction = [
@@ -122,7 +129,8 @@ impl FeatureModel {
         });
         let (_, [[ua, _, _], [va, _, _]]) = self.centroid(&marker_a)?;
         let (_, [[ub, _, _], [vb, _, _]]) = self.centroid(&marker_b)?;
-        Some([ua, va, ub, vb])
+        let length = self.instrument.across(bending);
+        Some([ua, va, ub, vb].map(|by| length * by))
     }
 
     /// Radius and length of the bands in m.

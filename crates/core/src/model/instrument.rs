@@ -18,6 +18,7 @@ pub struct Instrument {
     markers: [f64; 2],
     radius: f64,
     band_length: f64,
+    unevenness: f64,
 }
 
 /// The centre of a marker band on the instrument's axis, its axis, and their derivatives by the state.
@@ -58,7 +59,43 @@ impl Instrument {
             markers: [marker_a, marker_b],
             radius,
             band_length,
+            unevenness: 0.0,
         })
+    }
+
+    /// The instrument whose curvature at the share x of its section, counted from the guide, is 1 + `unevenness` (2 x - 1)
+    /// times the mean, to first order: the tip is displaced across the chord of the section, towards the side it bends to, by
+    ///
+    /// ```text
+    /// unevenness bending_length sinc'(q3 / 2),    sinc(x) = sin(x) / x
+    /// ```
+    pub const fn with_unevenness(self, unevenness: f64) -> Self {
+        Self { unevenness, ..self }
+    }
+
+    /// Displacement of the tip per unevenness (radial, axial), and its derivative by q3 [m, m/rad].
+    fn displacement(&self, bending: f64) -> ([f64; 2], [f64; 2]) {
+        let half = bending / 2.0;
+        let (sin, cos) = libm::sincos(half);
+        let slope = sinc_slope(half);
+        let curve = if half == 0.0 {
+            -1.0 / 3.0
+        } else {
+            -sinc(half) - 2.0 * slope / half
+        };
+        let scale = self.bending_length;
+        (
+            [scale * slope * cos, -scale * slope * sin],
+            [
+                scale / 2.0 * (curve * cos - slope * sin),
+                -scale / 2.0 * (curve * sin + slope * cos),
+            ],
+        )
+    }
+
+    /// Length of the displacement of the tip across the chord per unevenness, in m.
+    pub(crate) fn across(&self, bending: f64) -> f64 {
+        self.bending_length * sinc_slope(bending / 2.0)
     }
 
     /// Radius of the tip in m.
@@ -93,12 +130,26 @@ impl Instrument {
             |radial: f64, axial: f64| [radial * cos_rotation, radial * sin_rotation, axial];
         let rotated = |radial: f64| [-radial * sin_rotation, radial * cos_rotation, 0.0];
 
+        let ([across_1, along_1], [across_2, along_2]) = self.displacement(bending);
+        let uneven = |value: f64, by: f64| {
+            if self.unevenness == 0.0 {
+                value
+            } else {
+                value + self.unevenness * by
+            }
+        };
         self.markers.map(|distance| {
             let length = self.bending_length;
-            let radial = length * across + distance * sin_bend;
-            let axial = insertion + length * sinc(bending) + distance * cos_bend;
-            let radial_slope = length * across_slope + distance * cos_bend;
-            let axial_slope = length * sinc_slope(bending) - distance * sin_bend;
+            let radial = uneven(length * across + distance * sin_bend, across_1);
+            let axial = uneven(
+                insertion + length * sinc(bending) + distance * cos_bend,
+                along_1,
+            );
+            let radial_slope = uneven(length * across_slope + distance * cos_bend, across_2);
+            let axial_slope = uneven(
+                length * sinc_slope(bending) - distance * sin_bend,
+                along_2,
+            );
             Marker {
                 position: in_plane(radial, axial),
                 axis: in_plane(sin_bend, cos_bend),

@@ -118,7 +118,7 @@ pub fn settings(safety: &SafetySettings) -> Settings {
         state_estimation: StateEstimationSettings {
             marker_deviation: 0.3,
             model_deviation: 0.3,
-            sideways_deviation: 0.3e-3,
+            shape_deviation: 0.3,
             outlier_distance: 4.0,
             tip_deviation: 0.1,
             width_deviation: 0.35,
@@ -128,6 +128,8 @@ pub fn settings(safety: &SafetySettings) -> Settings {
             width_walk: 0.06,
             centre_walk: 0.012,
             share_walk: 0.01,
+            lag_deviation: 0.08,
+            lag_walk: 0.0,
             map_rate: [0.35, 0.35, 0.0],
             gain_window: 25.0,
             gain_prior: 1.0,
