@@ -21,30 +21,31 @@ class StateEstimationConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_
     shape_deviation: NonNegative = 0.3
     """Standard deviation of the unevenness of the section's curvature: half of the difference of
     its ends, over the mean."""
+    image_deviation: NonNegative = 6.0
+    """Standard deviation of a shift of the image, by an error of the camera's pose or principal
+    point [px]."""
     outlier_distance: Positive = 4.0
     """Mahalanobis distance beyond which a marker is an outlier."""
-    tip_deviation: Positive = 0.1
+    tip_deviation: Positive = 0.08
     """Standard deviation of the tip from the plays, by round loops and viscous friction."""
     width_deviation: Positive = 0.35
     """Standard deviation of the logarithm of the initial half width."""
     centre_deviation: NonNegative = 0.25
     """Standard deviation of the initial centre of the contact offsets [in half widths]."""
-    share_deviation: NonNegative = 0.35
+    share_deviation: NonNegative = 0.25
     """Standard deviation of the initial share of the friction that insertion and rotation have in
     common."""
     lag_deviation: NonNegative = 0.08
     """Mean and standard deviation of the initial lag of the tip behind the plays [s]."""
-    lag_walk: NonNegative = 0.0
-    """Random walk of the lag [s]."""
     tip_walk: NonNegative = 0.012
     """Random walk of the tip [in half widths]."""
-    width_walk: NonNegative = 0.06
+    width_walk: NonNegative = 0.04
     """Random walk of the logarithm of the half width."""
     centre_walk: NonNegative = 0.012
     """Random walk of the centre [in half widths]."""
-    share_walk: NonNegative = 0.01
+    share_walk: NonNegative = 0.02
     """Random walk of the share."""
-    map_rate: tuple[NonNegative, NonNegative, NonNegative] = (0.35, 0.35, 0.0)
+    map_rate: tuple[NonNegative, NonNegative, NonNegative] = (0.25, 0.25, 0.0)
     """Share of the centre that its map over the position takes over per travel of 1, for each
     DOF."""
     gain_window: Positive = 25.0

@@ -196,7 +196,11 @@ impl VectorLaw {
         filter: &Filter,
     ) -> PerDof<f64> {
         let mut ahead = reference;
-        for ((ahead, velocity), lag) in ahead.iter_mut().zip(self.velocity).zip(filter.nominal().lag) {
+        for ((ahead, velocity), lag) in ahead
+            .iter_mut()
+            .zip(self.velocity)
+            .zip(filter.nominal().lag)
+        {
             *ahead += lag * velocity;
         }
         let reference = ahead;

@@ -4,13 +4,14 @@ use crate::article::play::Play;
 use crate::dof::PerDof;
 use crate::error::{ConfigError, require, require_non_negative, require_positive};
 use crate::estimation::centre_map::CentreMap;
-use crate::estimation::ensemble::{Ensemble, STATE, State, hysteresis, lag, position, unevenness};
+use crate::estimation::ensemble::{Ensemble, STATE, State, geometry, hysteresis, lag, position};
 use crate::estimation::gain::GainEstimate;
 use crate::estimation::history::{Entry, History};
 use crate::estimation::nominal::Nominal;
 use crate::estimation::path::straight_pieces;
 use crate::estimation::posture::Belief;
 use crate::estimation::settings::StateEstimationSettings;
+use crate::model::features::GEOMETRY;
 use crate::model::hysteresis::{Hysteresis, PlayPosition};
 
 /// Initial half width of a slack of unknown width, and its bounds, in half of `width_limit`.
@@ -83,10 +84,10 @@ impl Filter {
         for (field, value) in [
             ("model_deviation", settings.model_deviation),
             ("shape_deviation", settings.shape_deviation),
+            ("image_deviation", settings.image_deviation),
             ("centre_deviation", settings.centre_deviation),
             ("share_deviation", settings.share_deviation),
             ("lag_deviation", settings.lag_deviation),
-            ("lag_walk", settings.lag_walk),
             ("tip_walk", settings.tip_walk),
             ("width_walk", settings.width_walk),
             ("centre_walk", settings.centre_walk),
@@ -141,6 +142,11 @@ impl Filter {
         })
     }
 
+    /// Standard deviation of the tip at the start (3,) [m, rad, rad].
+    pub const fn start_std(&self) -> PerDof<f64> {
+        self.start_std
+    }
+
     /// The prediction now.
     pub const fn nominal(&self) -> &Nominal {
         &self.nominal
@@ -178,7 +184,24 @@ impl Filter {
         let offset = self.settings.centre_deviation;
         let lag = self.settings.lag_deviation;
         let mean: State = [
-            u1, u2, u3, u1, u2, l1, l2, l3, m1, m2, m3, USUAL_SHARE, lag, lag, lag, 0.0,
+            u1,
+            u2,
+            u3,
+            u1,
+            u2,
+            l1,
+            l2,
+            l3,
+            m1,
+            m2,
+            m3,
+            USUAL_SHARE,
+            lag,
+            lag,
+            lag,
+            0.0,
+            0.0,
+            0.0,
         ];
         let std: State = [
             d1,
@@ -197,6 +220,8 @@ impl Filter {
             lag,
             lag,
             self.settings.shape_deviation,
+            self.settings.image_deviation,
+            self.settings.image_deviation,
         ];
         self.ensemble = Ensemble::new(&mean, &std, 1);
         for ((map, middle), unit) in self.maps.iter_mut().zip(reference).zip(self.unit) {
@@ -309,7 +334,7 @@ impl Filter {
             .disturb_position([tip * shaft * h1, tip * shaft * h2, tip * bending * h3]);
         let (width, centre) = (settings.width_walk, settings.centre_walk);
         let mut std = [0.0; STATE];
-        let [_, _, _, _, _, w1, w2, w3, c1, c2, c3, share, lag1, lag2, lag3, _] = &mut std;
+        let [_, _, _, _, _, w1, w2, w3, c1, c2, c3, share, ..] = &mut std;
         (*w1, *w2, *w3) = (width * shaft, width * shaft, width * bending);
         (*c1, *c2, *c3) = (
             centre * shaft * h1,
@@ -317,8 +342,6 @@ impl Filter {
             centre * bending * h3,
         );
         *share = settings.share_walk * shaft;
-        let lag = settings.lag_walk;
-        (*lag1, *lag2, *lag3) = (lag * shaft, lag * shaft, lag * bending);
         self.ensemble.add_noise(&std);
     }
 
@@ -360,10 +383,9 @@ impl Filter {
         (mean, covariance)
     }
 
-    /// Mean and standard deviation of the unevenness of the section.
-    pub fn unevenness(&self) -> (f64, f64) {
-        let ([mean], [[variance]]) = self.ensemble.covariance(|state| [unevenness(state)]);
-        (mean, libm::sqrt(variance))
+    /// Mean and covariance of the geometry.
+    pub fn geometry(&self) -> ([f64; GEOMETRY], [[f64; GEOMETRY]; GEOMETRY]) {
+        self.ensemble.covariance(geometry)
     }
 
     /// Standard deviation of the tip from that of the plays (3,) [m, rad, rad].

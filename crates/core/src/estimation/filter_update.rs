@@ -22,7 +22,7 @@ const MODEL_IMAGES: f64 = 200.0;
 const MISFIT: f64 = 25.0;
 
 /// Travel of the reference, in half of `width_limit`, within which the tip deviates from its plays alike.
-const CORRELATED: f64 = 0.015;
+const CORRELATED: f64 = 0.03;
 /// Share of the update of the hysteresis by an image at rest.
 const AT_REST: f64 = 0.1;
 
@@ -35,13 +35,13 @@ impl Filter {
     /// The most probable tip for the markers of an image at the time of the ensemble; None where the model sees no band.
     pub fn measure(&self, model: &FeatureModel, markers: &Markers) -> Option<MarkerEstimate> {
         self.origin?;
-        let (unevenness, unevenness_std) = self.unevenness();
+        let (geometry, geometry_covariance) = self.geometry();
         let (state, covariance) = self.tips();
         let prior = ImagePrediction {
             state,
             covariance,
-            unevenness,
-            unevenness_std,
+            geometry,
+            geometry_covariance,
         };
         markers.estimate(model, &prior, self.settings.outlier_distance)
     }
@@ -55,8 +55,7 @@ impl Filter {
         is_position_only: bool,
     ) {
         let Nominal { origin, gain, .. } = self.nominal;
-        let Some(rows) =
-            markers.linearize(estimate, origin, gain, self.velocity, self.deviation())
+        let Some(rows) = markers.linearize(estimate, origin, gain, self.velocity, self.deviation())
         else {
             return;
         };
@@ -81,13 +80,19 @@ impl Filter {
     ) {
         // Images within a short travel have the same error.
         let [t1, t2, t3] = self.travel;
-        let shares = [libm::sqrt(t1 * t1 + t2 * t2), t3].map(|travel| {
+        let share = |travel: f64, at_rest: f64| {
             if is_position_only {
                 0.0
             } else {
-                (travel + AT_REST * CORRELATED) / (travel + CORRELATED)
+                (travel + at_rest * CORRELATED) / (travel + CORRELATED)
             }
-        });
+        };
+        // At one bend a wrong geometry looks like another position.
+        let shares = [
+            share(libm::sqrt(t1 * t1 + t2 * t2), AT_REST),
+            share(t3, AT_REST),
+            share(t3, 0.0),
+        ];
         for row in rows {
             self.ensemble.update(row, shares);
         }

@@ -6,7 +6,7 @@ use crate::estimation::ensemble::ScalarMeasurement;
 use crate::estimation::settings::StateEstimationSettings;
 use crate::math::linear::{Matrix, add, dot, solve_symmetric, square};
 use crate::math::whitening::{Features, Square, Whitener, add_product, diagonal, factor};
-use crate::model::features::{FeatureModel, FeaturePrediction};
+use crate::model::features::{FeatureModel, FeaturePrediction, GEOMETRY};
 
 /// Gauss-Newton steps at most, and halvings of each.
 const STEPS: usize = 12;
@@ -30,9 +30,10 @@ pub struct ImagePrediction {
     pub state: PerDof<f64>,
     /// Its covariance (3, 3).
     pub covariance: Matrix,
-    /// Unevenness of the section that the feature model has, and its standard deviation.
-    pub unevenness: f64,
-    pub unevenness_std: f64,
+    /// Geometry that the feature model has.
+    pub geometry: [f64; GEOMETRY],
+    /// Its covariance.
+    pub geometry_covariance: [[f64; GEOMETRY]; GEOMETRY],
 }
 
 /// Markers (4,) of an image in px with their covariance (4, 4) in px^2.
@@ -55,9 +56,10 @@ pub struct MarkerEstimate {
     pub misfit_squared: Option<f64>,
     /// Which markers were used.
     pub used: [bool; 2],
-    /// Unevenness of the section, and derivative (4,) of the features by it.
-    pub unevenness: f64,
-    pub by_unevenness: Features,
+    /// Geometry that the feature model has.
+    pub geometry: [f64; GEOMETRY],
+    /// Derivatives (4,) of the features by it.
+    pub by_geometry: [Features; GEOMETRY],
     /// Features predicted there and their interaction matrix.
     pub prediction: FeaturePrediction,
     /// Standard deviations of the state (3,) [m, rad, rad].
@@ -102,8 +104,8 @@ impl Markers {
     /// argmin_q  (q - q0)' P^-1 (q - q0) + (s - h(q))' (R + g g')^-1 (s - h(q)) + outlier_distance^2 for each marker left out
     /// ```
     ///
-    /// with the prediction q0, P of the tip, R of the markers and the model, and g the derivative of the features by the
-    /// unevenness of the section times its standard deviation.
+    /// with the prediction q0, P of the tip, R of the markers and the model, and g g' the covariance of the features by
+    /// that of the geometry.
     ///
     /// None where the model sees no band.
     pub fn estimate(
@@ -114,9 +116,18 @@ impl Markers {
     ) -> Option<MarkerEstimate> {
         let seen = found(self.features);
         let price = square(outlier_distance);
-        let by_unevenness = model.by_unevenness(prior.state)?;
-        let sideways = by_unevenness.map(|value| prior.unevenness_std * value);
-        let problem = |used: [bool; 2]| Problem::new(self, prior, used, sideways);
+        let by_geometry = model.by_geometry(prior.state)?;
+        let mut covariance = self.covariance;
+        for (column, row) in by_geometry.iter().zip(prior.geometry_covariance) {
+            for (other, cross) in by_geometry.iter().zip(row) {
+                for (line, value) in covariance.iter_mut().zip(column) {
+                    for (entry, with) in line.iter_mut().zip(other) {
+                        *entry += cross * value * with;
+                    }
+                }
+            }
+        }
+        let problem = |used: [bool; 2]| Problem::new(self, prior, used, covariance);
         let mut best = problem(seen)?.minimum(model, [0.0; 3])?;
         if best.distance_squared > price {
             for start in STARTS {
@@ -142,8 +153,8 @@ impl Markers {
         }
         Some(MarkerEstimate {
             misfit_squared,
-            unevenness: prior.unevenness,
-            by_unevenness,
+            geometry: prior.geometry,
+            by_geometry,
             ..best
         })
     }
@@ -184,25 +195,28 @@ impl Markers {
                 *value += by * constant;
             }
         }
-        for (value, by) in misfit.iter_mut().zip(estimate.by_unevenness) {
-            *value += by * estimate.unevenness;
+        for (column, geometry) in estimate.by_geometry.iter().zip(estimate.geometry) {
+            for (value, by) in misfit.iter_mut().zip(column) {
+                *value += by * geometry;
+            }
         }
         let misfit = whitener.apply(misfit);
-        let uneven = whitener.apply(estimate.by_unevenness);
+        let [e1, e2, e3] = estimate.by_geometry.map(|column| whitener.apply(column));
+        let by_geometry = e1.into_iter().zip(e2).zip(e3);
         let [c1, c2, c3] = columns.map(|column| whitener.apply(column));
         let ([g1, g2, g3], [v1, v2, v3]) = (gain, velocity);
         let mut rows = [ScalarMeasurement {
             output: [0.0; 3],
             lag: [0.0; 3],
-            unevenness: 0.0,
+            geometry: [0.0; GEOMETRY],
             value: 0.0,
         }; 4];
-        let outputs = c1.into_iter().zip(c2).zip(c3.into_iter().zip(uneven));
-        for ((row, value), ((a, b), (c, unevenness))) in rows.iter_mut().zip(misfit).zip(outputs) {
+        let outputs = c1.into_iter().zip(c2).zip(c3.into_iter().zip(by_geometry));
+        for ((row, value), ((a, b), (c, ((d, e), f)))) in rows.iter_mut().zip(misfit).zip(outputs) {
             *row = ScalarMeasurement {
                 output: [g1 * a, g2 * b, g3 * c],
                 lag: [-g1 * a * v1, -g2 * b * v2, -g3 * c * v3],
-                unevenness,
+                geometry: [d, e, f],
                 value,
             };
         }
@@ -224,10 +238,8 @@ impl<'a> Problem<'a> {
         markers: &'a Markers,
         prior: &'a ImagePrediction,
         used: [bool; 2],
-        sideways: Features,
+        covariance: Square,
     ) -> Option<Self> {
-        let mut covariance = markers.covariance;
-        add_product(&mut covariance, sideways);
         Some(Self {
             markers,
             prior,
@@ -285,8 +297,8 @@ impl<'a> Problem<'a> {
             distance_squared: cost,
             misfit_squared: None,
             used: self.used,
-            unevenness: 0.0,
-            by_unevenness: [0.0; 4],
+            geometry: [0.0; GEOMETRY],
+            by_geometry: [[0.0; 4]; GEOMETRY],
             prediction,
             std,
         })

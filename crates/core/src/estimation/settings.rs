@@ -15,6 +15,8 @@ pub struct StateEstimationSettings {
     ///
     /// [`Instrument::with_unevenness`]: crate::model::instrument::Instrument::with_unevenness
     pub shape_deviation: f64,
+    /// Standard deviation in px of a shift of the image, by an error of the camera's pose or principal point.
+    pub image_deviation: f64,
     /// Mahalanobis distance beyond which a marker is an outlier.
     pub outlier_distance: f64,
     /// Standard deviation of the tip from the plays, by rounding of the loop and viscous friction.
@@ -27,8 +29,6 @@ pub struct StateEstimationSettings {
     pub share_deviation: f64,
     /// Mean and standard deviation in s of the initial lag of the tip behind the plays.
     pub lag_deviation: f64,
-    /// Standard deviation in s of the random walk of the lag over a travel of 1.
-    pub lag_walk: f64,
     /// Standard deviation of the random walk of the tip over a travel of 1, in half widths.
     pub tip_walk: f64,
     /// The same of the logarithm of the half width.

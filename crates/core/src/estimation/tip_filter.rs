@@ -5,6 +5,7 @@ use crate::error::ConfigError;
 use crate::estimation::ensemble::ScalarMeasurement;
 use crate::estimation::filter::Filter;
 use crate::estimation::settings::StateEstimationSettings;
+use crate::model::features::GEOMETRY;
 
 /// Ensemble filter of one DOF with measurements of its tip, for records of other instruments.
 #[derive(Debug, Clone, PartialEq)]
@@ -59,7 +60,7 @@ impl TipFilter {
         let row = ScalarMeasurement {
             output: [gain / self.std, 0.0, 0.0],
             lag: [0.0; 3],
-            unevenness: 0.0,
+            geometry: [0.0; GEOMETRY],
             value: (tip - origin * (1.0 - gain)) / self.std,
         };
         self.filter.update_with(&[row], [tip, 0.0, 0.0], false);

@@ -25,6 +25,9 @@ use crate::supervision::monitors::Law;
 /// Deflection over the half width from which on a DOF counts as in contact.
 const CONTACT: f64 = 0.98;
 
+/// Standard deviation in px of the bands in an apparent state.
+const APPARENT: f64 = 0.1;
+
 /// Lag of the offsets in use behind the estimate, in half of `width_limit`, beyond which the slack has changed.
 const CHANGED: f64 = 0.1;
 
@@ -207,9 +210,21 @@ impl ProfileBlocks for Best {
         }
     }
 
-    fn feature_model(&self, told: &FeatureModel) -> FeatureModel {
-        let (unevenness, _) = self.filter.unevenness();
-        told.with_unevenness(unevenness)
+    fn feature_model(&self, configured: &FeatureModel) -> FeatureModel {
+        let (geometry, _) = self.filter.geometry();
+        configured.with_geometry(geometry)
+    }
+
+    fn apparent(&self, configured: &FeatureModel, belief: Belief) -> Belief {
+        let anywhere = Belief {
+            deviation: self.filter.start_std(),
+            ..belief
+        };
+        let corrected = self.feature_model(configured);
+        let nearest = corrected.predict(belief.state).and_then(|expected| {
+            configured.nearest_state(&anywhere, expected.features, [APPARENT; 4])
+        });
+        nearest.map_or(belief, |(state, _)| Belief { state, ..belief })
     }
 
     fn miss(&mut self, _: &Entry) {

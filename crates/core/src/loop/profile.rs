@@ -96,9 +96,16 @@ pub(crate) trait ProfileBlocks: Law + Sized {
         updates_offsets: bool,
     ) -> ImageUpdate;
 
-    /// The feature model as far as images have corrected it.
-    fn feature_model(&self, told: &FeatureModel) -> FeatureModel {
-        *told
+    /// The feature model as far as images have corrected the configured one.
+    fn feature_model(&self, configured: &FeatureModel) -> FeatureModel {
+        *configured
+    }
+
+    /// The state in which the configured feature model has the bands where the corrected one has them in the state of a
+    /// belief; where that finds none, the belief.
+    fn apparent(&self, configured: &FeatureModel, belief: Belief) -> Belief {
+        let _ = configured;
+        belief
     }
 
     /// Makes the state prediction less certain after an image without markers.

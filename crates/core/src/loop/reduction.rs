@@ -83,12 +83,16 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
     }
 
     /// The predicted state (3,) [m, rad, rad] at `captured_at` in s with its standard deviation: the prior of the marker
-    /// detection and of the weighted state estimation, corrected by the last images.
+    /// detection, corrected by the last images.
+    ///
+    /// It is the state in which the configured geometry has the bands where they are expected; where images have corrected
+    /// the geometry, the tip is elsewhere.
     ///
     /// None beyond the history.
     pub fn predict_state(&self, captured_at: f64) -> Option<Belief> {
         let past = self.history.at(captured_at)?;
-        Some(self.profile.predict(&self.history, &past))
+        let belief = self.profile.predict(&self.history, &past);
+        Some(self.profile.apparent(&self.feature_model, belief))
     }
 
     /// Predicted features (4,) in px of a frame captured at `captured_at` in s.

@@ -65,6 +65,15 @@ impl Camera {
         })
     }
 
+    /// The camera whose image is shifted by (u, v) px.
+    pub(crate) const fn with_shift(self, [u, v]: [f64; 2]) -> Self {
+        let [cx, cy] = self.centre;
+        Self {
+            centre: [cx + u, cy + v],
+            ..self
+        }
+    }
+
     /// g(p), Eq. (8): the image of a point in the camera frame, and its Jacobian.
     ///
     /// None at or behind the camera, and where the result is not finite.

@@ -9,6 +9,9 @@ use crate::model::camera::{Camera, Pose};
 use crate::model::instrument::{Instrument, Marker};
 use crate::model::settings::{CameraSettings, InstrumentSettings};
 
+/// Number of values in which the geometry may differ from the configured one.
+pub(crate) const GEOMETRY: usize = 3;
+
 /// h = g after f, Eqs. (9)-(11): from the state to the centroids of the two marker bands.
 ///
 /// Decision 0002: the camera sees the near half of a cylindrical band, so the centroid of its
@@ -103,18 +106,20 @@ impl FeatureModel {
         finite.then_some(prediction)
     }
 
-    /// The model of an instrument whose section bends unevenly, [`Instrument::with_unevenness`].
-    pub(crate) const fn with_unevenness(&self, unevenness: f64) -> Self {
+    /// The model of an instrument whose section bends unevenly, [`Instrument::with_unevenness`], in an image that is
+    /// shifted by (u, v) px.
+    pub(crate) const fn with_geometry(&self, [unevenness, u, v]: [f64; GEOMETRY]) -> Self {
         Self {
             instrument: self.instrument.with_unevenness(unevenness),
+            camera: self.camera.with_shift([u, v]),
             ..*self
         }
     }
 
-    /// Derivative (4,) in px of the features by the unevenness of the section.
+    /// Derivatives (4,) in px of the features by each geometry of [`FeatureModel::with_geometry`].
     ///
     /// None where [`FeatureModel::predict`] is.
-    pub(crate) fn by_unevenness(&self, state: PerDof<f64>) -> Option<[f64; 4]> {
+    pub(crate) fn by_geometry(&self, state: PerDof<f64>) -> Option<[[f64; 4]; GEOMETRY]> {
         let [_, rotation, bending] = state;
         let (along, across) = (libm::sin(bending / 2.0), libm::cos(bending / 2.0));
         let direction = [
@@ -130,7 +135,8 @@ impl FeatureModel {
         let (_, [[ua, _, _], [va, _, _]]) = self.centroid(&marker_a)?;
         let (_, [[ub, _, _], [vb, _, _]]) = self.centroid(&marker_b)?;
         let length = self.instrument.across(bending);
-        Some([ua, va, ub, vb].map(|by| length * by))
+        let unevenness = [ua, va, ub, vb].map(|by| length * by);
+        Some([unevenness, [1.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, 1.0]])
     }
 
     /// Radius and length of the bands in m.

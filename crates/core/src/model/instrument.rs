@@ -69,6 +69,7 @@ impl Instrument {
     /// ```text
     /// unevenness bending_length sinc'(q3 / 2),    sinc(x) = sin(x) / x
     /// ```
+    #[must_use]
     pub const fn with_unevenness(self, unevenness: f64) -> Self {
         Self { unevenness, ..self }
     }
@@ -146,10 +147,7 @@ impl Instrument {
                 along_1,
             );
             let radial_slope = uneven(length * across_slope + distance * cos_bend, across_2);
-            let axial_slope = uneven(
-                length * sinc_slope(bending) - distance * sin_bend,
-                along_2,
-            );
+            let axial_slope = uneven(length * sinc_slope(bending) - distance * sin_bend, along_2);
             Marker {
                 position: in_plane(radial, axial),
                 axis: in_plane(sin_bend, cos_bend),

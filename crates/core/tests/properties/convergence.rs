@@ -14,7 +14,7 @@ const UNIT: PerDof<f64> = [6e-3, 1.3, 0.75];
 const RADIUS: f64 = 1.75e-3;
 const NOISE: PerDof<f64> = [0.2e-3, 0.015, 0.015];
 /// Standard deviation that the loop assumes of the tip from the plays: `tip_deviation` of the defaults.
-const STD: PerDof<f64> = [0.6e-3, 0.13, 0.075];
+const STD: PerDof<f64> = [0.48e-3, 0.104, 0.06];
 
 fn new_filter() -> Filter {
     let none = Play::new(0.0, 0.0).unwrap();
@@ -48,7 +48,7 @@ fn run(truth: &Hysteresis, seconds: u32, seed: u64) -> (Filter, PerDof<f64>) {
     for tick in 1..seconds * 200 {
         let next = command(0.005 * f64::from(tick));
         position = truth.propagate(RADIUS, &position, last, next);
-        filter.step(last, next);
+        filter.step(last, next, 0.005);
         last = next;
         if tick % 8 == 0 {
             filter.follow(core::iter::once((next, next)));
@@ -60,6 +60,8 @@ fn run(truth: &Hysteresis, seconds: u32, seed: u64) -> (Filter, PerDof<f64>) {
                 output[dof] = gain / STD[dof];
                 ScalarMeasurement {
                     output,
+                    lag: [0.0; 3],
+                    geometry: [0.0; 3],
                     value: (seen[dof] - origin * (1.0 - gain)) / STD[dof],
                 }
             });

@@ -10,36 +10,54 @@ const NO_MAPS: [CentreMap; 3] = [CentreMap::new(0.0, 1.0); 3];
 
 type Matrix = [[f64; STATE]; STATE];
 
-/// All entries of a measurement's row: outputs first.
+/// All entries of a measurement's row.
 fn row(measurement: &ScalarMeasurement) -> State {
     let mut row = [0.0; STATE];
     row[..3].copy_from_slice(&measurement.output);
+    row[12..15].copy_from_slice(&measurement.lag);
+    row[15..].copy_from_slice(&measurement.geometry);
     row
 }
 
-/// DOFs whose part of a measurement updates an entry: all of a position, the group's of the hysteresis.
-fn localised(index: usize, output: [f64; 3]) -> [f64; 3] {
-    let [a, b, c] = output;
+/// Group of an entry: 0 position, 1 hysteresis of the shaft, 2 of bending, 3 geometry.
+const fn group(index: usize) -> usize {
     match index {
-        0..=4 => [a, b, c],
-        7 | 10 => [0.0, 0.0, c],
-        _ => [a, b, 0.0],
+        0..=4 => 0,
+        7 | 10 | 14 => 2,
+        15.. => 3,
+        _ => 1,
     }
+}
+
+/// The part of a row that updates an entry: all of it a position or the geometry, the group's the hysteresis.
+fn localised(index: usize, row: &State) -> State {
+    let own = group(index);
+    let mut part = *row;
+    for (entry, value) in part.iter_mut().enumerate() {
+        let of = match entry {
+            2 => 2,
+            0 | 1 => 1,
+            entry => group(entry),
+        };
+        if (own == 1 || own == 2) && of != own {
+            *value = 0.0;
+        }
+    }
+    part
 }
 
 /// The square root filter with matrices: K of each entry by its own part of the measurement, mean + K (value - y . x),
 /// and deviations multiplied by I - reduced K y'.
 fn square_root_filter(mean: &mut State, covariance: &mut Matrix, measurement: &ScalarMeasurement) {
     let y = row(measurement);
-    let of =
-        |row: &State, output: [f64; 3]| row.iter().zip(output).map(|(x, y)| x * y).sum::<f64>();
-    let all: State = covariance.map(|line| of(&line, measurement.output));
-    let total = of(&all, measurement.output) + 1.0;
+    let of = |row: &State, y: &State| row.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
+    let all: State = covariance.map(|line| of(&line, &y));
+    let total = of(&all, &y) + 1.0;
     let mut gain = [0.0; STATE];
     for (index, (gain, line)) in gain.iter_mut().zip(&*covariance).enumerate() {
-        *gain = of(line, localised(index, measurement.output)) / total;
+        *gain = of(line, &localised(index, &y)) / total;
     }
-    let innovation = measurement.value - of(mean, measurement.output);
+    let innovation = measurement.value - of(mean, &y);
     let reduced = 1.0 / (1.0 + 1.0 / total.sqrt());
     for (mean, gain) in mean.iter_mut().zip(gain) {
         *mean += gain * innovation;
@@ -70,15 +88,22 @@ fn square_root_filter(mean: &mut State, covariance: &mut Matrix, measurement: &S
 }
 
 fn measurements() -> impl Strategy<Value = ScalarMeasurement> {
-    (prop::array::uniform3(-2.0..2.0), -5.0..5.0)
-        .prop_map(|(output, value)| ScalarMeasurement { output, value })
+    let three = || prop::array::uniform3(-2.0..2.0);
+    (three(), three(), three(), -5.0..5.0).prop_map(|(output, lag, geometry, value)| {
+        ScalarMeasurement {
+            output,
+            lag,
+            geometry,
+            value,
+        }
+    })
 }
 
 /// Members about a mean, with what motion and noise make of their covariance.
 fn ensembles() -> impl Strategy<Value = Ensemble> {
     (
-        prop::array::uniform12(-1.0..1.0),
-        prop::array::uniform12(0.1..2.0),
+        prop::array::uniform18(-1.0..1.0),
+        prop::array::uniform18(0.1..2.0),
         1..u64::MAX,
     )
         .prop_map(|(mean, std, seed)| Ensemble::new(&mean, &std, seed))
@@ -96,12 +121,12 @@ proptest! {
         let (mut mean, mut covariance) = ensemble.covariance(|state| *state);
         for measurement in &measurements {
             let (before, old) = (mean, covariance);
-            ensemble.update(measurement, [1.0; 2]);
+            ensemble.update(measurement, [1.0; 3]);
             square_root_filter(&mut mean, &mut covariance, measurement);
             let y = row(measurement);
-            let product: Vec<f64> = old.iter().map(|line| (0..3).map(|dof| line[dof] * y[dof]).sum()).collect();
-            let total = 1.0 + (0..3).map(|dof| y[dof] * product[dof]).sum::<f64>();
-            let innovation = measurement.value - (0..3).map(|dof| y[dof] * before[dof]).sum::<f64>();
+            let product: Vec<f64> = old.iter().map(|line| (0..STATE).map(|k| line[k] * y[k]).sum()).collect();
+            let total = 1.0 + (0..STATE).map(|k| y[k] * product[k]).sum::<f64>();
+            let innovation = measurement.value - (0..STATE).map(|k| y[k] * before[k]).sum::<f64>();
             for k in 0..5 {
                 prop_assert!((mean[k] - before[k] - product[k] / total * innovation).abs() <= 1e-9);
                 for l in 0..5 {
@@ -120,37 +145,41 @@ proptest! {
         }
     }
 
-    /// A share of 0 leaves the hysteresis of a group, to the last bit; and the mean moves in proportion to the share.
+    /// A share of 0 leaves the hysteresis of a group, to the last bit; and the mean moves in proportion to the share. With a
+    /// share of 0 a geometry is a constant.
     #[test]
     fn a_group_is_updated_by_its_share(
         ensemble in ensembles(), measurement in measurements(), shares in prop::array::uniform2(0.0..1.0_f64),
+        has_geometry in any::<bool>(),
     ) {
-        let updated = |shares: [f64; 2]| {
+        let geometry = f64::from(u8::from(has_geometry));
+        let updated = |[shaft, bending]: [f64; 2]| {
             let mut ensemble = ensemble.clone();
-            ensemble.update(&measurement, shares);
+            ensemble.update(&measurement, [shaft, bending, geometry]);
             ensemble.mean()
         };
         let (before, all, none, some) = (ensemble.mean(), updated([1.0; 2]), updated([0.0; 2]), updated(shares));
         for index in 0..STATE {
-            let share = match index {
-                0..=4 => 1.0,
-                7 | 10 => shares[1],
-                _ => shares[0],
+            let share = match group(index) {
+                1 => shares[0],
+                2 => shares[1],
+                _ => 1.0,
             };
             let expected = before[index] + share * (all[index] - before[index]);
             prop_assert!((some[index] - expected).abs() <= 1e-9, "{index}");
-            prop_assert_eq!(none[index], if index < 5 { all[index] } else { before[index] }, "{}", index);
+            let has_share = group(index) == 0 || (group(index) == 3 && has_geometry);
+            prop_assert_eq!(none[index], if has_share { all[index] } else { before[index] }, "{}", index);
         }
     }
 
     /// Mean and variance are those that were asked for, as far as 64 members have them; the shaft is at the output.
     #[test]
     fn members_are_drawn_with_mean_and_standard_deviation(
-        mean in prop::array::uniform12(-1.0..1.0), std in prop::array::uniform12(0.1..2.0), seed in 1..u64::MAX,
+        mean in prop::array::uniform18(-1.0..1.0), std in prop::array::uniform18(0.1..2.0), seed in 1..u64::MAX,
     ) {
         let ensemble = Ensemble::new(&mean, &std, seed);
         let (found, covariance) = ensemble.covariance(|state| *state);
-        for index in [0, 1, 2, 5, 6, 7, 8, 9, 10, 11] {
+        for index in [0, 1, 2].into_iter().chain(5..STATE) {
             let off = (found[index] - mean[index]) / std[index];
             let ratio = covariance[index][index].sqrt() / std[index];
             // Five standard deviations of the mean and of the standard deviation of 64 numbers.
@@ -171,7 +200,7 @@ proptest! {
             ensemble.disturb_position([0.1, 0.2, 0.3]);
             let path = [[0.1; 3], command].into_iter();
             ensemble.propagate(&NO_MAPS, 1.75, [0.0; 3], &path);
-            ensemble.update(&measurement, [1.0, 0.5]);
+            ensemble.update(&measurement, [1.0, 0.5, 0.2]);
             ensemble.add_noise(&[0.1; STATE]);
             ensemble.limit([0.1; 3], [2.0; 3]);
             ensemble
@@ -204,6 +233,10 @@ fn parameters_are_kept_within_their_limits() {
         seen(index, least.ln(), largest.ln());
     }
     seen(11, 0.0, 1.0);
+    for index in 12..15 {
+        seen(index, 0.0, 0.4);
+    }
+    seen(15, -1.0, 1.0);
     let before = ensemble.mean();
     ensemble.shift_centres([0.1, 0.2, -0.3]);
     for (index, shift) in [(8, 0.1), (9, 0.2), (10, -0.3)] {

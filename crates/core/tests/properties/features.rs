@@ -119,9 +119,10 @@ proptest! {
         }
     }
 
-    /// A guide that is displaced across the chord of the section displaces the tip and does not turn it.
+    /// Uneven curvature displaces the tip across the chord of the section and does not turn it, and so does a displaced
+    /// guide; by how much is the integral of the angle that it adds along the section.
     #[test]
-    fn a_sideways_motion_is_that_of_a_displaced_guide(shape in shapes(), state in states()) {
+    fn uneven_curvature_displaces_the_tip(shape in shapes(), state in states()) {
         let [_, rotation, bend] = state;
         // The chord leaves the guide at half of the bend; its normal in the plane of the bend.
         let normal = bend / 2.0 + PI / 2.0;
@@ -132,11 +133,48 @@ proptest! {
             let place = [0, 1, 2].map(|k| TRANSLATION[k] + by * side[k]);
             model_at(shape, place).predict(state).map(|found| found.features)
         };
-        let Some(found) = model(shape).sideways(state) else { return Ok(()) };
-        let expected = slope(moved(-step), moved(step), step);
+        let Some([found, u, v]) = model(shape).by_geometry(state) else { return Ok(()) };
+        prop_assert_eq!((u, v), ([1.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, 1.0]));
+        // The angle bend x of the section's share x becomes bend (x + unevenness (x^2 - x)).
+        let parts = 2000;
+        let length: f64 = (0..parts).map(|part| {
+            let x = (f64::from(part) + 0.5) / f64::from(parts);
+            LENGTH * bend * (x * x - x) * (bend * x - bend / 2.0).cos() / f64::from(parts)
+        }).sum();
+        let expected = slope(moved(-step), moved(step), step).map(|by| length * by);
         let size = expected.iter().fold(1.0, |most: f64, value| most.max(value.abs()));
         for k in 0..4 {
             prop_assert!((found[k] - expected[k]).abs() <= 2e-6 * size, "{:?} {:?}", found, expected);
+        }
+    }
+
+    /// Features of a corrected geometry, and derivatives of these by the state and by the geometry.
+    #[test]
+    fn geometry_moves_the_features_by_its_derivative(
+        shape in shapes(), state in states(), unevenness in -0.5..0.5_f64, shift in prop::array::uniform2(-20.0..20.0_f64),
+    ) {
+        let [u, v] = shift;
+        let here = [unevenness, u, v];
+        let step = 1e-6;
+        let at = |by: f64| model(shape).with_geometry([unevenness + by, u, v]).predict(state).map(|found| found.features);
+        let corrected = model(shape).with_geometry(here);
+        let (Some(found), Some([by, ..]), Some(_), Some(_)) =
+            (corrected.predict(state), corrected.by_geometry(state), at(-step), at(step)) else { return Ok(()) };
+        let expected = slope(at(-step), at(step), step);
+        let bend = |by: f64| {
+            let [q1, q2, q3] = state;
+            corrected.predict([q1, q2, q3 + by]).map(|found| found.features)
+        };
+        prop_assume!(bend(-step).is_some() && bend(step).is_some());
+        let columns = slope(bend(-step), bend(step), step);
+        for k in 0..4 {
+            prop_assert!((by[k] - expected[k]).abs() <= 1e-5 * (1.0 + expected[k].abs()), "{by:?} {expected:?}");
+            let error = (found.columns[2][k] - columns[k]).abs();
+            prop_assert!(error <= 1e-5 * (1.0 + columns[k].abs()), "{:?} {columns:?}", found.columns[2]);
+        }
+        let plain = model(shape).with_geometry([unevenness, 0.0, 0.0]).predict(state).unwrap().features;
+        for (k, shift) in [u, v, u, v].into_iter().enumerate() {
+            prop_assert!((found.features[k] - plain[k] - shift).abs() <= 1e-9);
         }
     }
 
@@ -164,7 +202,7 @@ fn most_of_the_workspace_is_visible() {
     for bend in [-1.2, -0.4, 0.4, 1.2] {
         for rotation in [-3.0, 0.0, 1.5] {
             let state = [0.01, rotation, bend];
-            assert!(model.predict(state).is_some() && model.sideways(state).is_some());
+            assert!(model.predict(state).is_some() && model.by_geometry(state).is_some());
         }
     }
 }
@@ -238,7 +276,7 @@ fn what_cannot_be_projected_is_not_predicted() {
     // x (1 - 100 r2) folds beyond a radius of 0.058; the band is at 0.01 / 0.068.
     let folding = ahead(0.0015, 0.01, [-100.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
     let plain = ahead(0.0015, 0.01, [0.0; 8]);
-    assert!(plain.predict(straight).is_some() && plain.sideways(straight).is_some());
+    assert!(plain.predict(straight).is_some() && plain.by_geometry(straight).is_some());
     for (model, state) in [
         (plain, behind),
         (plain, [f64::NAN, 0.0, 0.0]),
@@ -247,7 +285,7 @@ fn what_cannot_be_projected_is_not_predicted() {
         (folding, straight),
     ] {
         assert!(model.predict(state).is_none(), "{state:?}");
-        assert!(model.sideways(state).is_none(), "{state:?}");
+        assert!(model.by_geometry(state).is_none(), "{state:?}");
         assert!(model.bands(state).is_none(), "{state:?}");
     }
 }

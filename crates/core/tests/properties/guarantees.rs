@@ -194,6 +194,8 @@ impl Watched {
         let tip = self.law.command()[dof] + UNITS[dof] * chance.within(-30.0, 30.0);
         let mut row = ScalarMeasurement {
             output: [0.0; 3],
+            lag: [0.0; 3],
+            geometry: [0.0; 3],
             value: tip / std,
         };
         row.output[dof] = 1.0 / std;

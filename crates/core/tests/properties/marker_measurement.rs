@@ -18,6 +18,9 @@ fn estimation() -> StateEstimationSettings {
     settings(&safety()).state_estimation
 }
 
+/// Geometry of the model: unevenness of the section, and shift of the image in px.
+const GEOMETRY: [f64; 3] = [0.1, 2.0, -3.0];
+
 fn states() -> impl Strategy<Value = [f64; 3]> {
     (20e-3..32e-3, -1.0..1.0, 0.4..1.2).prop_map(|(a, b, c)| [a, b, c])
 }
@@ -53,6 +56,8 @@ fn prediction(state: [f64; 3]) -> ImagePrediction {
     ImagePrediction {
         state,
         covariance: diagonal(STD.map(|std| std * std)),
+        geometry: GEOMETRY,
+        geometry_covariance: [[0.01, 0.05, -0.05], [0.05, 4.0, 0.5], [-0.05, 0.5, 9.0]],
     }
 }
 
@@ -85,13 +90,16 @@ fn cost(
     state: [f64; 3],
 ) -> f64 {
     let settings = estimation();
-    let sideways = model.sideways(prior.state).unwrap();
+    let by_geometry = model.by_geometry(prior.state).unwrap();
     let mut total = *covariance;
     for row in 0..4 {
         total[row][row] += settings.model_deviation.powi(2);
         for column in 0..4 {
-            total[row][column] +=
-                settings.sideways_deviation.powi(2) * sideways[row] * sideways[column];
+            for (by, line) in by_geometry.iter().zip(prior.geometry_covariance) {
+                for (other, entry) in by_geometry.iter().zip(line) {
+                    total[row][column] += by[row] * entry * other[column];
+                }
+            }
         }
     }
     let Some(seen) = model.predict(state) else {
@@ -118,7 +126,7 @@ fn estimate(
         &estimation(),
         estimation().model_deviation,
     );
-    let found = markers.estimate(model, prior, &estimation())?;
+    let found = markers.estimate(model, prior, estimation().outlier_distance)?;
     Some((markers, found))
 }
 
@@ -164,6 +172,8 @@ proptest! {
         let tiny = ImagePrediction {
             covariance: diagonal(STD.map(|std| (small * std).powi(2))),
             state: [0, 1, 2].map(|dof| state[dof] + small * away[dof] * STD[dof]),
+            geometry_covariance: [[0.0; 3]; 3],
+            geometry: GEOMETRY,
         };
         let weak = ImagePrediction {
             covariance: tiny.covariance.map(|row| row.map(|entry| entry / 0.04)),
@@ -172,11 +182,10 @@ proptest! {
         let precise = covariance.map(|row| row.map(|entry| small * small * entry));
         let settings = StateEstimationSettings {
             model_deviation: 0.0,
-            sideways_deviation: 0.0,
             ..estimation()
         };
         let markers = Markers::new(seen.features, Some(&precise), &settings, 0.0);
-        let [Some(one), Some(other)] = [tiny, weak].map(|prior| markers.estimate(&model, &prior, &settings)) else {
+        let [Some(one), Some(other)] = [tiny, weak].map(|prior| markers.estimate(&model, &prior, settings.outlier_distance)) else {
             return Ok(());
         };
         for (dof, std) in STD.into_iter().enumerate() {
@@ -186,13 +195,13 @@ proptest! {
     }
 
     /// The rows have the information of the markers: with R of markers, model and deviation of the tip, J of the features
-    /// by the tip, and the gain g, their sum of a (value - a . output) is g J' R^-1 (s - h(tip)), and that of a a' is
+    /// by the tip, and the gain g, their sum of a (value - a . output - what lag and geometry add) is g J' R^-1 (s - h(tip)), and that of a a' is
     /// g J' R^-1 J g.
     #[test]
     fn rows_have_the_information_of_the_markers(
         state in states(), covariance in covariances(), noise in prop::array::uniform4(-1.0..1.0_f64),
         small in prop::array::uniform3(-1.0..1.0_f64), gain in prop::array::uniform3(0.7..1.2_f64),
-        deviation in 0.0..0.5_f64,
+        deviation in 0.0..0.5_f64, lag in prop::array::uniform3(0.0..0.3_f64),
     ) {
         let model = model();
         let Some(seen) = model.predict(state) else { return Ok(()); };
@@ -203,9 +212,12 @@ proptest! {
         prop_assume!(found.used == [true; 2]);
         let origin = [0.02, 0.1, 0.5];
         let std = STD.map(|std| deviation * std);
-        let rows = markers.linearize(&found, origin, gain, std).unwrap();
+        let velocity = [5e-3, -0.4, 0.3];
+        let rows = markers.linearize(&found, origin, gain, velocity, std).unwrap();
         let tip = [0, 1, 2].map(|dof| found.state[dof] + 1e-3 * small[dof] * STD[dof]);
-        let output = [0, 1, 2].map(|dof| origin[dof] + (tip[dof] - origin[dof]) / gain[dof]);
+        let output = [0, 1, 2].map(|dof| {
+            origin[dof] + (tip[dof] - origin[dof]) / gain[dof] + lag[dof] * velocity[dof]
+        });
         let columns = found.prediction.columns;
         let mut total = covariance;
         for a in 0..4 {
@@ -219,7 +231,9 @@ proptest! {
         for dof in 0..3 {
             let scale = gain[dof] * STD[dof];
             let right: f64 = rows.iter().map(|row: &ScalarMeasurement| {
-                let rest = row.value - (0..3).map(|k| row.output[k] * output[k]).sum::<f64>();
+                let rest = row.value - (0..3).map(|k| {
+                    row.output[k] * output[k] + row.lag[k] * lag[k] + row.geometry[k] * GEOMETRY[k]
+                }).sum::<f64>();
                 row.output[dof] * rest
             }).sum();
             let direct: f64 = (0..4).map(|k| gain[dof] * columns[dof][k] * misfit[k]).sum();
@@ -246,9 +260,9 @@ proptest! {
             return Ok(());
         };
         prop_assert_eq!(found.used, [lost == 1, lost == 0]);
-        let rows = markers.linearize(&found, [0.0; 3], [1.0; 3], [0.0; 3]).unwrap();
+        let rows = markers.linearize(&found, [0.0; 3], [1.0; 3], [0.0; 3], [0.0; 3]).unwrap();
         for row in [rows[2 * lost], rows[2 * lost + 1]] {
-            prop_assert_eq!((row.output, row.value), ([0.0; 3], 0.0));
+            prop_assert_eq!((row.output, row.geometry, row.value), ([0.0; 3], [0.0; 3], 0.0));
         }
     }
 
