@@ -21,7 +21,9 @@ IDEAS: dict[str, dict[str, Any]] = {
         "state_estimation.share_walk": 0.0,
     },
     "deviation of the tip from the plays": {"state_estimation.tip_deviation": 1e-3},
-    "uneven curvature": {"state_estimation.sideways_deviation": 0.0},
+    "lag of the tip": {"state_estimation.lag_deviation": 0.0},
+    "uneven curvature": {"state_estimation.shape_deviation": 0.0},
+    "shift of the image": {"state_estimation.image_deviation": 0.0},
     "rejection of a marker": {"state_estimation.outlier_distance": 1e6},
 }
 """Name of each idea, and the configuration changes that disable it."""

@@ -26,7 +26,7 @@ DELAY_TICKS = 4
 ARTICLE = "article: one step"
 OURS = "best"
 VARIANTS: dict[str, dict[str, float]] = {
-    "best, even curvature": {"sideways_deviation": 0.0},
+    "best, exact geometry": {"shape_deviation": 0.0, "image_deviation": 0.0},
     "best, no marker rejected": {"outlier_distance": 1e9},
     OURS: {},
 }

@@ -170,7 +170,8 @@ def test_the_first_estimate_of_best_is_that_of_scipys_least_squares(seed: int) -
         profile="best",
         **{
             "state_estimation.model_deviation": 0.0,
-            "state_estimation.sideways_deviation": 0.0,
+            "state_estimation.shape_deviation": 0.0,
+            "state_estimation.image_deviation": 0.0,
             "state_estimation.outlier_distance": 1e6,
             "safety.off": ["innovation"],
         },

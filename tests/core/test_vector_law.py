@@ -92,7 +92,12 @@ def test_one_dof_alone_has_the_limited_gain_of_the_article(seed: int) -> None:
 def test_a_tip_with_less_slack_than_estimated_does_not_pass_the_reference(seed: int) -> None:
     """Bending alone, without images: the tip's half width is one standard deviation below."""
     known = {"delta_minus": -0.6, "delta_plus": 0.6}
-    known_estimate = {"centre_deviation": 0.0, "tip_walk": 0.0, "width_walk": 0.0}
+    known_estimate = {
+        "centre_deviation": 0.0,
+        "tip_walk": 0.0,
+        "width_walk": 0.0,
+        "lag_deviation": 0.0,
+    }
     config = CONFIG.replace(
         **{f"bending.{name}": value for name, value in known.items()},
         **{f"state_estimation.{name}": value for name, value in known_estimate.items()},

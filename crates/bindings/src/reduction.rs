@@ -38,6 +38,9 @@ type Hysteresis<'py> = (
     f64,
     Floats<'py>,
     Floats<'py>,
+    f64,
+    Floats<'py>,
+    Floats<'py>,
 );
 
 enum Profile {
@@ -194,7 +197,8 @@ impl Reduction {
     }
 
     /// In profile `best`: half widths (3,), standard deviations of their logarithms (3,), centres (3,), share of the
-    /// friction in common, gains (3,), and lags (3,).
+    /// friction in common, gains (3,), lags (3,), unevenness of the section, and shift of the image (2,) with standard
+    /// deviations (2,).
     #[getter]
     fn hysteresis<'py>(&self, py: Python<'py>) -> Option<Hysteresis<'py>> {
         let Profile::Best(inner) = &self.0 else {
@@ -209,6 +213,9 @@ impl Reduction {
             found.shared,
             floats(&found.gain),
             floats(&found.lag),
+            found.unevenness,
+            floats(&found.image_shift),
+            floats(&found.image_shift_std),
         ))
     }
 

@@ -35,11 +35,11 @@ class StateEstimationConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_
     share_deviation: NonNegative = 0.25
     """Standard deviation of the initial share of the friction that insertion and rotation have in
     common."""
-    lag_deviation: NonNegative = 0.08
+    lag_deviation: NonNegative = 0.05
     """Mean and standard deviation of the initial lag of the tip behind the plays [s]."""
     tip_walk: NonNegative = 0.012
     """Random walk of the tip [in half widths]."""
-    width_walk: NonNegative = 0.04
+    width_walk: NonNegative = 0.05
     """Random walk of the logarithm of the half width."""
     centre_walk: NonNegative = 0.012
     """Random walk of the centre [in half widths]."""

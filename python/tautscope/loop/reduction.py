@@ -99,6 +99,10 @@ class HysteresisEstimate:
         shared: Share of the friction that insertion and rotation have in common, 0 to 1.
         gain: (3,) travel of the tip over that of the command in contact.
         lag: (3,) lag of the tip behind the plays [s].
+        unevenness: Of the section's curvature: half of the difference of its ends, over the mean.
+        image_shift: (2,) shift of the image against the configured camera [px], from a wrong pose
+            or principal point; `camera.fx` px are about a radian.
+        image_shift_std: (2,) its standard deviations [px].
     """
 
     half_width: NDArray[np.float64]
@@ -107,6 +111,9 @@ class HysteresisEstimate:
     shared: float
     gain: NDArray[np.float64]
     lag: NDArray[np.float64]
+    unevenness: float
+    image_shift: NDArray[np.float64]
+    image_shift_std: NDArray[np.float64]
 
 
 class HysteresisReduction:

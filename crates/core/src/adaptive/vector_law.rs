@@ -30,7 +30,7 @@ const STEPS: usize = 5;
 /// contact   |dq| <= tip_gain |du| for the tip q that the estimate predicts, and q does not pass u along du
 /// ```
 ///
-/// of bending by itself. One DOF alone: 0 <= dc / du <= `K_b`, Eq. (2). Where insertion and rotation rest, neither command
+/// with u + lag du/dt for u, because the tip lags behind its plays; of bending by itself. One DOF alone: 0 <= dc / du <= `K_b`, Eq. (2). Where insertion and rotation rest, neither command
 /// moves, but each moves where the other does: while rotation turns, the friction that held the insertion is released.
 /// A share of the compensation s makes it dc = du + s (dc - du).
 ///
@@ -195,6 +195,7 @@ impl VectorLaw {
         motion: PerDof<f64>,
         filter: &Filter,
     ) -> PerDof<f64> {
+        // The tip lags behind the output, which therefore leads the reference.
         let mut ahead = reference;
         for ((ahead, velocity), lag) in ahead
             .iter_mut()

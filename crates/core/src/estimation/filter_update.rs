@@ -22,7 +22,9 @@ const MODEL_IMAGES: f64 = 200.0;
 const MISFIT: f64 = 25.0;
 
 /// Travel of the reference, in half of `width_limit`, within which the tip deviates from its plays alike.
-const CORRELATED: f64 = 0.03;
+const CORRELATED: f64 = 0.015;
+/// The same for the geometry, in travel of bending.
+const GEOMETRY_CORRELATED: f64 = 0.1;
 /// Share of the update of the hysteresis by an image at rest.
 const AT_REST: f64 = 0.1;
 
@@ -35,7 +37,12 @@ impl Filter {
     /// The most probable tip for the markers of an image at the time of the ensemble; None where the model sees no band.
     pub fn measure(&self, model: &FeatureModel, markers: &Markers) -> Option<MarkerEstimate> {
         self.origin?;
-        let (geometry, geometry_covariance) = self.geometry();
+        let (geometry, mut geometry_covariance) = self.geometry_of_a_known_output();
+        // At one bend the position has taken over what the geometry is wrong by.
+        let [_, _, bent] = self.travel;
+        for entry in geometry_covariance.iter_mut().flatten() {
+            *entry *= bent / (bent + GEOMETRY_CORRELATED);
+        }
         let (state, covariance) = self.tips();
         let prior = ImagePrediction {
             state,
@@ -80,18 +87,18 @@ impl Filter {
     ) {
         // Images within a short travel have the same error.
         let [t1, t2, t3] = self.travel;
-        let share = |travel: f64, at_rest: f64| {
+        let share = |travel: f64, correlated: f64, at_rest: f64| {
             if is_position_only {
                 0.0
             } else {
-                (travel + at_rest * CORRELATED) / (travel + CORRELATED)
+                (travel + at_rest * correlated) / (travel + correlated)
             }
         };
         // At one bend a wrong geometry looks like another position.
         let shares = [
-            share(libm::sqrt(t1 * t1 + t2 * t2), AT_REST),
-            share(t3, AT_REST),
-            share(t3, 0.0),
+            share(libm::sqrt(t1 * t1 + t2 * t2), CORRELATED, AT_REST),
+            share(t3, CORRELATED, AT_REST),
+            share(t3, GEOMETRY_CORRELATED, 0.0),
         ];
         for row in rows {
             self.ensemble.update(row, shares);

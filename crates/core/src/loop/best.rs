@@ -25,6 +25,11 @@ use crate::supervision::monitors::Law;
 /// Deflection over the half width from which on a DOF counts as in contact.
 const CONTACT: f64 = 0.98;
 
+/// Angle in rad by which the image seems shifted from which on the geometry counts as wrong, and the shift over its standard
+/// deviation.
+const GEOMETRY_OFF: f64 = 0.02;
+const CERTAIN: f64 = 3.0;
+
 /// Standard deviation in px of the bands in an apparent state.
 const APPARENT: f64 = 0.1;
 
@@ -40,6 +45,8 @@ pub struct Best {
     observability: StateEstimator,
     /// Largest lag of a half width or centre in use behind the estimate of a slack that has not changed.
     change_limit: PerDof<f64>,
+    /// Shorter focal length in px.
+    focal: f64,
 }
 
 impl Law for Best {
@@ -93,6 +100,7 @@ impl ProfileBlocks for Best {
             limits,
             observability: state_estimator(settings)?,
             change_limit: unit.map(|unit| CHANGED * unit),
+            focal: settings.camera.fx.min(settings.camera.fy),
         })
     }
 
@@ -206,7 +214,8 @@ impl ProfileBlocks for Best {
         ImageUpdate {
             triggers: self.triggers(),
             raised: Flags::when(is_limited, Flag::WidthLimit)
-                .union(Flags::when(has_changed, Flag::SlackChanged)),
+                .union(Flags::when(has_changed, Flag::SlackChanged))
+                .union(Flags::when(self.is_geometry_off(), Flag::GeometryOff)),
         }
     }
 
@@ -240,6 +249,8 @@ impl<S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<Best, S> {
     /// The estimated hysteresis.
     pub fn hysteresis(&self) -> HysteresisEstimate {
         let nominal = self.profile.filter.nominal();
+        let ([unevenness, u, v], [_, [_, u_variance, _], [_, _, v_variance]]) =
+            self.profile.filter.geometry();
         let Hysteresis {
             half_width,
             centre,
@@ -252,11 +263,21 @@ impl<S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<Best, S> {
             shared,
             gain: nominal.gain,
             lag: nominal.lag,
+            unevenness,
+            image_shift: [u, v],
+            image_shift_std: [u_variance, v_variance].map(libm::sqrt),
         }
     }
 }
 
 impl Best {
+    /// Whether the shift of the image is larger than [`GEOMETRY_OFF`], and than what images leave uncertain.
+    fn is_geometry_off(&self) -> bool {
+        let ([_, u, v], [_, [_, u_variance, _], [_, _, v_variance]]) = self.filter.geometry();
+        let shift = libm::hypot(u, v);
+        shift > GEOMETRY_OFF * self.focal && shift > CERTAIN * libm::sqrt(u_variance + v_variance)
+    }
+
     /// Half widths and centres where the tip is.
     fn parameters(&self) -> [PerDof<f64>; 2] {
         let hysteresis = &self.filter.nominal().hysteresis;

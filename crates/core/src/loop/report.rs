@@ -61,4 +61,10 @@ pub struct HysteresisEstimate {
     pub gain: PerDof<f64>,
     /// Lag of the tip behind the plays (3,) in s.
     pub lag: PerDof<f64>,
+    /// Unevenness of the section's curvature: half of the difference of its ends, over the mean.
+    pub unevenness: f64,
+    /// Shift of the image (2,) in px against the configured camera.
+    pub image_shift: [f64; 2],
+    /// Its standard deviations (2,) in px.
+    pub image_shift_std: [f64; 2],
 }

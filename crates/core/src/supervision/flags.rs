@@ -85,6 +85,8 @@ flags! {
     LimitCycle = "limit_cycle",
     /// The estimated slack changed after it had settled: the instrument has changed, or the images are wrong.
     SlackChanged = "slack_changed",
+    /// The images contradict the configured camera: its pose or principal point seems wrong by more than a degree.
+    GeometryOff = "geometry_off",
 }
 
 /// A set of flags.
