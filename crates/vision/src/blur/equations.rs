@@ -1,6 +1,5 @@
 //! Normal equations of the intensity fit, and its residuals.
 
-use super::fitter::DIFFERENCE;
 use super::mask::Mask;
 use super::patch::Patch;
 use crate::math::Square;
@@ -8,6 +7,8 @@ use crate::math::Square;
 /// Unknowns: steps of the four coordinates, brightness of A and B, background, step of sigma, and four of the change in
 /// the tissue's colour.
 pub const UNKNOWNS: usize = 12;
+/// Step of the numerical derivatives (px).
+pub const DIFFERENCE: f64 = 0.5;
 /// Index of the background.
 pub const BACKGROUND: usize = 6;
 /// Index of the step of sigma.

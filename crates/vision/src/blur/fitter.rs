@@ -2,7 +2,9 @@
 
 use std::f64::consts::PI;
 
-use super::equations::{BACKGROUND, NoiseModel, SIGMA, UNKNOWNS, normal_equations, residuals};
+use super::equations::{
+    BACKGROUND, DIFFERENCE, NoiseModel, SIGMA, UNKNOWNS, normal_equations, residuals,
+};
 use super::fit::BlurFit;
 use super::mask::Mask;
 use super::patch::{Patch, SIDE};
@@ -30,8 +32,6 @@ const TISSUE_UNEVENNESS: f64 = 0.05;
 /// Standard deviation of the positions whose posture the outlines are drawn in (px): at the start, and else.
 const START_STD: f64 = 3.0;
 const STEP_STD: f64 = 0.5;
-/// Step of the numerical derivatives (px).
-pub const DIFFERENCE: f64 = 0.5;
 /// Correlation of the model's errors of the two bands, which are 12 mm apart: an error of the camera's pose moves both.
 const MODEL_CORRELATION: f64 = 0.98;
 /// Bounds of a band's brightness: the largest, and the least that its ratio to the other's is computed from (grey levels).
