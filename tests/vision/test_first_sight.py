@@ -12,6 +12,9 @@ Image = NDArray[np.uint8]
 SCENES = scenes(8, seed=5)
 CUT = cut_scenes(12, seed=9)
 DETECTOR = MarkerDetector(CONFIG)
+TOUCHING = [
+    scene for scene in scenes(120, seed=3) if np.hypot(*(scene.truth[2:] - scene.truth[:2])) < 16
+]
 GREEN = (70, 190, 60)
 DEBRIS = (60, 90, 120)
 
@@ -71,3 +74,14 @@ def test_a_band_with_a_covered_corner_is_found_whole(number: int, band: int) -> 
     detection = DETECTOR.detect(image)
     assert detection.valid, (scene.state, detection.reason)
     assert error(detection.features, scene) < 2.5
+
+
+@pytest.mark.parametrize("number", range(len(TOUCHING)))
+def test_touching_bands_that_blur_has_merged_are_found(number: int) -> None:
+    scene = TOUCHING[number]
+    image = np.asarray(cv2.GaussianBlur(scene.image, (0, 0), 3.0), dtype=np.uint8)
+    noise = np.random.default_rng(number).normal(0, 1.5, image.shape)
+    image = np.clip(np.rint(image + noise), 0, 255).astype(np.uint8)
+    for detection in (DETECTOR.detect(image), DETECTOR.detect(image, None, scene.expectation(7))):
+        assert detection.valid, (scene.state, detection.reason)
+        assert error(detection.features, scene) < 1.5

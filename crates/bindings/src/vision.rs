@@ -14,7 +14,7 @@ use pyo3::prelude::*;
 use tautscope_core as core;
 use tautscope_vision::{
     BandPrediction, BandPredictor, ColorDiscriminant, Detector, Error, Frame, Labeller, MAX_SIDE,
-    Outline, PixelFormat, Segmenter, Settings, Window, each_run,
+    Outline, PixelFormat, SECTION_DISCS, SectionDisc, Segmenter, Settings, Window, each_run,
 };
 
 use crate::arrays::table;
@@ -218,6 +218,21 @@ impl BandPredictor for Predictor<'_> {
             covariance: expected.covariance,
             outlines: expected.bands.each_ref().map(outline),
         })
+    }
+
+    fn section(&self, observed: [f64; 4], std: [f64; 4]) -> [Option<SectionDisc>; SECTION_DISCS] {
+        self.model.expect(&self.beliefs(), observed, std).map_or(
+            [None; SECTION_DISCS],
+            |expected| {
+                self.model.section(expected.state).map(|disc| {
+                    disc.map(|disc| SectionDisc {
+                        centre: disc.centre,
+                        radius: disc.radius,
+                        is_nearer: disc.is_nearer,
+                    })
+                })
+            },
+        )
     }
 
     fn is_located(&self) -> bool {

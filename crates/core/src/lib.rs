@@ -84,6 +84,7 @@ pub use model::camera::{Camera, Pose};
 pub use model::features::{FeatureModel, FeaturePrediction};
 pub use model::instrument::Instrument;
 pub use model::outline::BandImage;
+pub use model::section::{SECTION_DISCS, SectionDisc};
 pub use model::settings::{CameraSettings, InstrumentSettings, PoseSettings};
 pub use settings::{ControlSettings, DofSettings};
 pub use supervision::flags::{Flag, Flags};

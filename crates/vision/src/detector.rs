@@ -3,7 +3,7 @@
 use crate::blur::BlurFitter;
 use crate::error::Error;
 use crate::frame_search::{FrameSearch, Memory};
-use crate::recognition::{BandPredictor, Outline, PostureTable, Recognition};
+use crate::recognition::{BandPredictor, BlobPostures, Outline, PostureTable, Recognition};
 use crate::scan::{ColorDiscriminant, Frame, Region, Scanner, Window};
 use crate::settings::Settings;
 
@@ -47,6 +47,7 @@ impl Detector {
                 scanner,
                 best,
                 first,
+                blobs: BlobPostures::default(),
                 blur: BlurFitter::default(),
             },
         })

@@ -2,13 +2,17 @@
 
 use crate::blur::{BlurFit, BlurFitter};
 use crate::recognition::{
-    BandPrediction, BandPredictor, OutlineSearch, PostureTable, Recognition, is_instrument,
+    BLOBS, BandPredictor, BlobPostures, LEAST_CONTRAST, OutlineSearch, PostureTable, Recognition,
+    SECTION_DISCS, SectionDisc, section_contrast,
 };
 use crate::scan::{Frame, Region, Scanner, Window};
 use crate::settings::Settings;
 
 /// Least sum of the edge shares of both bands for which the outlines are fitted again near them, without a prediction.
 const LEAST_EDGES: f64 = 1.0;
+
+/// Standard deviation of the positions whose posture the section is drawn in (px).
+const SECTION_STD: [f64; 4] = [0.5; 4];
 
 /// What a detector keeps between frames: memory, but no information.
 #[derive(Clone, Debug)]
@@ -19,6 +23,8 @@ pub struct Memory {
     pub best: Vec<Region>,
     /// Regions of the result in the whole frame.
     pub first: Vec<Region>,
+    /// Postures of bands that are one region of some discriminant.
+    pub blobs: BlobPostures,
     /// Fit of the intensity.
     pub blur: BlurFitter,
 }
@@ -43,6 +49,7 @@ impl<F: Frame, P: BandPredictor> FrameSearch<'_, F, P> {
         if self.predictor.is_located() {
             return self.near_prediction();
         }
+        self.memory.blobs = [None; BLOBS];
         let found = self.by_edges(Window::whole(self.frame));
         if found.is_clear(self.settings) {
             found
@@ -51,48 +58,90 @@ impl<F: Frame, P: BandPredictor> FrameSearch<'_, F, P> {
         }
     }
 
-    /// The best of a result without a prediction that is not clear, and of a search near it: the posture found there is the
-    /// prior.
+    /// The best of a result without a prediction that is not clear, of a search for edges near it, and of the intensity fit
+    /// from the likeliest of the postures that the regions allow.
     fn again(&mut self, found: &Recognition) -> Recognition {
-        let [[ua, va], [ub, vb]] = found.scores.map(|score| score.centroid);
-        let start = [ua, va, ub, vb];
-        if !start.iter().all(|value| value.is_finite()) {
-            return *found;
-        }
-        let Some(predictor) = self.predictor.near(start) else {
-            return *found;
-        };
-        let margin = self.settings.search_margin;
-        let prior = predictor.predict([0.0; 4], [f64::INFINITY; 4]);
-        let Some((prior, window)) =
-            prior.and_then(|prior| Some((prior, prior.window(self.frame, margin)?)))
-        else {
-            return *found;
-        };
-        let mut search = FrameSearch {
-            frame: self.frame,
-            predictor: &predictor,
-            settings: self.settings,
-            postures: self.postures,
-            memory: &mut *self.memory,
-        };
         let mut best = *found;
-        if found.scores[0].edges + found.scores[1].edges > LEAST_EDGES {
-            search.swap_first();
-            let near = search.by_edges(window);
-            if search.is_better(&near, found) {
+        let start = found.centroids();
+        if found.scores[0].edges + found.scores[1].edges > LEAST_EDGES
+            && let Some((predictor, window)) = self.near(start)
+        {
+            self.swap_first();
+            let near = self.with(&predictor).by_edges(window);
+            if self.is_better(&near, found) {
                 best = near;
             } else {
-                search.swap_first();
+                self.swap_first();
             }
-            if best.is_clear(search.settings) {
+            if best.is_clear(self.settings) {
                 return best;
             }
         }
-        match search.by_intensity(&prior, &best) {
+        let likeliest = if best.rejections == [None; 2] {
+            Some(best.features)
+        } else {
+            self.likeliest_blurred(start)
+        };
+        let Some((predictor, window)) = likeliest.and_then(|start| self.near(start)) else {
+            return best;
+        };
+        let mut search = self.with(&predictor);
+        match predictor
+            .predict([0.0; 4], [f64::INFINITY; 4])
+            .and_then(|prior| search.by_intensity([prior.features; 2]))
+        {
             Some(fit) => search.best_of(window, &best, &fit),
             None => best,
         }
+    }
+
+    /// The predictor with the posture at features `start` as prior, and the window around its bands.
+    fn near(&self, start: [f64; 4]) -> Option<(P, Window)> {
+        if !start.iter().all(|value| value.is_finite()) {
+            return None;
+        }
+        let predictor = self.predictor.near(start)?;
+        let prior = predictor.predict([0.0; 4], [f64::INFINITY; 4])?;
+        let window = prior.window(self.frame, self.settings.search_margin)?;
+        Some((predictor, window))
+    }
+
+    /// This search with another predictor.
+    fn with<'b>(&'b mut self, predictor: &'b P) -> FrameSearch<'b, F, P> {
+        FrameSearch {
+            frame: self.frame,
+            predictor,
+            settings: self.settings,
+            postures: self.postures,
+            memory: &mut *self.memory,
+        }
+    }
+
+    /// Features of the posture whose intensity and section explain the frame best, among `start` and those of both bands in
+    /// one region.
+    fn likeliest_blurred(&mut self, start: [f64; 4]) -> Option<[f64; 4]> {
+        let mut best: Option<(f64, [f64; 4])> = None;
+        let blobs = self.memory.blobs;
+        let blobs = blobs.iter().flatten().map(|(_, features)| *features);
+        for start in std::iter::once(start).chain(blobs) {
+            let Some((predictor, _)) = self.near(start) else {
+                continue;
+            };
+            let section = predictor.section(start, SECTION_STD);
+            if self.contrast(&section) < 0.5 * LEAST_CONTRAST {
+                continue;
+            }
+            let blur = &mut self.memory.blur;
+            let Some(fit) = blur.fit(self.frame, &predictor, start, true, self.settings) else {
+                continue;
+            };
+            let section = predictor.section(fit.features, SECTION_STD);
+            let score = fit.explained + self.contrast(&section);
+            if best.is_none_or(|(most, _)| score > most) {
+                best = Some((score, fit.features));
+            }
+        }
+        best.map(|(_, features)| features)
     }
 
     /// Searches in the window around the prediction first.
@@ -107,7 +156,7 @@ impl<F: Frame, P: BandPredictor> FrameSearch<'_, F, P> {
         }
         // Intensity is less reliable than edges: it is used only near a known position.
         if let Some((prior, window)) = near {
-            if let Some(fit) = self.by_intensity(&prior, &found) {
+            if let Some(fit) = self.by_intensity([found.centroids(), prior.features]) {
                 found = self.best_of(window, &found, &fit);
             }
             if found.rejections.iter().all(Option::is_some) {
@@ -147,26 +196,28 @@ impl<F: Frame, P: BandPredictor> FrameSearch<'_, F, P> {
 
     fn by_discriminant(&mut self, window: Window, index: usize) -> Recognition {
         self.memory.scanner.find(self.frame, window, index);
-        self.outlines().recognise(&self.memory.scanner.regions)
+        let mut blobs = self.memory.blobs;
+        let found = self
+            .outlines()
+            .recognise(&self.memory.scanner.regions, &mut blobs);
+        self.memory.blobs = blobs;
+        found
     }
 
-    /// An accepted fit of the intensity, from the outlines found so far or else from the prediction.
-    fn by_intensity(&mut self, prior: &BandPrediction, found: &Recognition) -> Option<BlurFit> {
+    /// An accepted fit of the intensity, from the first of the positions that leads to one.
+    fn by_intensity(&mut self, starts: [[f64; 4]; 2]) -> Option<BlurFit> {
         let Memory { scanner, blur, .. } = &mut *self.memory;
-        let [[ua, va], [ub, vb]] = found.scores.map(|score| score.centroid);
-        let starts = [[ua, va, ub, vb], prior.features];
         starts
             .into_iter()
             .filter(|start| start.iter().all(|value| value.is_finite()))
-            .filter_map(|start| {
-                let settings = &self.settings.blur;
-                blur.fit(self.frame, self.predictor, prior, start, settings)
-            })
+            .filter_map(|start| blur.fit(self.frame, self.predictor, start, false, self.settings))
             .find(|fit| {
                 fit.is_accepted(self.settings)
                     && fit.is_inside(&scanner.map, self.settings)
-                    && (!self.settings.is_unlocated
-                        || is_instrument(self.frame, &fit.outlines) == Some(true))
+                    && (!self.settings.is_unlocated || {
+                        let section = self.predictor.section(fit.features, SECTION_STD);
+                        section_contrast(self.frame, &section).unwrap_or_default() > LEAST_CONTRAST
+                    })
             })
     }
 
@@ -190,6 +241,10 @@ impl<F: Frame, P: BandPredictor> FrameSearch<'_, F, P> {
         } else {
             edges
         }
+    }
+
+    fn contrast(&self, section: &[Option<SectionDisc>; SECTION_DISCS]) -> f64 {
+        section_contrast(self.frame, section).unwrap_or_default()
     }
 
     fn outlines(&self) -> OutlineSearch<'_, F, P> {

@@ -25,6 +25,7 @@ pub use detector::Detector;
 pub use error::Error;
 pub use recognition::{
     BandPrediction, BandPredictor, BandScore, OUTLINE_CORNERS, Outline, Recognition, Rejection,
+    SECTION_DISCS, SectionDisc,
 };
 pub use scan::{
     ColorDiscriminant, Frame, Image, Labeller, MAX_REGIONS, MAX_SIDE, PixelFormat, Region, Runs,

@@ -110,8 +110,8 @@ pub struct UnlocatedSettings {
     pub certain_edges: f64,
     /// See [`Settings::least_edges_on_average`].
     pub least_edges_on_average: f64,
-    /// See [`BlurSettings::largest_deviation`].
-    pub largest_deviation: f64,
+    /// See [`BlurSettings::least_explained`].
+    pub least_explained: f64,
 }
 
 /// Settings of the intensity fit of blurred bands, `[vision.blur]`.
@@ -155,7 +155,7 @@ impl Settings {
             alternatives: alternatives.copied().collect(),
             least_edges_on_average: least.least_edges_on_average,
             blur: BlurSettings {
-                largest_deviation: least.largest_deviation,
+                least_explained: least.least_explained,
                 ..self.blur
             },
             least_edges_alone: f64::INFINITY,

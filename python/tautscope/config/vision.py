@@ -54,8 +54,8 @@ class UnlocatedConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     """No other candidate is tried if the edge share of each band is at least this."""
     least_edges_on_average: Fraction = 0.67
     """As `VisionConfig.least_edges_on_average`."""
-    largest_deviation: Positive = 0.6
-    """As `BlurConfig.largest_deviation` [px]."""
+    least_explained: Fraction = 0.84
+    """As `BlurConfig.least_explained`."""
 
 
 class BlurConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -69,7 +69,7 @@ class BlurConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Largest standard deviation of the blur kernel in a sharp image [px]."""
     margin: Positive = 14.0
     """Pixels up to this distance from the outlines are fitted [px]."""
-    brightness_ratio_deviation: Positive = 0.2
+    brightness_ratio_deviation: Positive = 0.1
     """Standard deviation of the logarithm of the ratio of the bands' brightnesses [1]."""
     unevenness: Positive = 0.015
     """Standard deviation of a band's brightness, and the least one of the tissue's colour, relative

@@ -152,6 +152,18 @@ impl FeatureModel {
         })
     }
 
+    /// Point and direction of the section's axis in the camera frame at a distance (m) from its distal end; None on the
+    /// shaft.
+    pub(crate) fn section_axis(
+        &self,
+        state: PerDof<f64>,
+        distance: f64,
+    ) -> Option<(Vector, Vector)> {
+        let (position, axis) = self.instrument.section(state, distance)?;
+        let pose = &self.camera_from_guide;
+        Some((pose.transform(position), pose.rotate(axis)))
+    }
+
     /// The image (u, v) in px of a point in the camera frame; None where it has none.
     pub(crate) fn project(&self, point: Vector) -> Option<[f64; 2]> {
         let projection = self.camera.project(point)?;

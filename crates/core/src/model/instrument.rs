@@ -109,6 +109,23 @@ impl Instrument {
         self.band_length
     }
 
+    /// Point and unit tangent of the section's axis in the guide frame at a distance (m) from its distal end; None if that is
+    /// not on the section.
+    pub(crate) fn section(
+        &self,
+        [insertion, rotation, bending]: PerDof<f64>,
+        distance: f64,
+    ) -> Option<(Vector, Vector)> {
+        let share = 1.0 - distance / self.bending_length;
+        let part = Self {
+            bending_length: share * self.bending_length,
+            markers: [0.0; 2],
+            ..*self
+        };
+        let [end, _] = part.markers([insertion, rotation, share * bending]);
+        (share > 0.0).then_some((end.position, end.axis))
+    }
+
     /// f(q), Eq. (7): bands A and B in the guide frame for the state q (3,) [m, rad, rad].
     ///
     /// ```text

@@ -6,4 +6,5 @@ pub(crate) mod friction;
 pub(crate) mod hysteresis;
 pub(crate) mod instrument;
 pub(crate) mod outline;
+pub(crate) mod section;
 pub(crate) mod settings;

@@ -7,6 +7,8 @@ use crate::math::Square;
 /// Unknowns: steps of the four coordinates, brightness of A and B, background, step of sigma, and four of the change in
 /// the tissue's colour.
 pub const UNKNOWNS: usize = 12;
+/// Step of the numerical derivatives (px).
+pub const DIFFERENCE: f64 = 0.5;
 /// Index of the background.
 pub const BACKGROUND: usize = 6;
 /// Index of the step of sigma.
@@ -42,10 +44,12 @@ pub struct Residuals {
     pub tissue_unevenness: f64,
 }
 
-/// The matrix and the right-hand side of the normal equations over all samples but those at the border of the patch.
+/// The matrix and the right-hand side of the normal equations over all samples but those at the border of the patch;
+/// `moved` are the masks where each coordinate is larger by [`DIFFERENCE`].
 pub fn normal_equations(
     patch: &Patch,
     masks: &[Mask; 2],
+    moved: &[[Mask; 2]; 4],
     brightness: [f64; 2],
     sigma: f64,
     noise: &NoiseModel,
@@ -66,8 +70,11 @@ pub fn normal_equations(
                     [at, at - 1, at + 1, at - columns, at + columns].map(|index| {
                         f64::from(mask.coverage.get(index).copied().unwrap_or_default())
                     });
-                row[2 * band] = -brightness[band] * (right - left) / (2.0 * step);
-                row[2 * band + 1] = -brightness[band] * (below - above) / (2.0 * step);
+                for (entry, masks) in row.iter_mut().zip(moved) {
+                    let there =
+                        f64::from(masks[band].coverage.get(at).copied().unwrap_or_default());
+                    *entry += brightness[band] * (there - here) / DIFFERENCE;
+                }
                 row[4 + band] = here;
                 // A Gaussian's derivative by sigma is sigma times its Laplacian.
                 row[SIGMA] +=

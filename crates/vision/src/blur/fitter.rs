@@ -2,17 +2,21 @@
 
 use std::f64::consts::PI;
 
-use super::equations::{BACKGROUND, NoiseModel, SIGMA, UNKNOWNS, normal_equations, residuals};
+use super::equations::{
+    BACKGROUND, DIFFERENCE, NoiseModel, SIGMA, UNKNOWNS, normal_equations, residuals,
+};
 use super::fit::BlurFit;
 use super::mask::Mask;
 use super::patch::{Patch, SIDE};
-use crate::math::{apply, floor, inverse, quadratic};
+use crate::math::{Square, apply, floor, inverse, quadratic};
 use crate::recognition::{BandPrediction, BandPredictor, Outline};
 use crate::scan::Frame;
-use crate::settings::BlurSettings;
+use crate::settings::Settings;
 
-/// Gauss-Newton steps; the outlines are drawn anew in each, the frame is read again after half of them.
+/// Gauss-Newton steps; the outlines are drawn anew in each. The first half is on means of 2 x 2 pixels, then the frame is
+/// read again.
 const STEPS: usize = 16;
+const COARSE: usize = 2;
 /// A fit that explains less than this share of the variance after the trial steps is given up: it bounds the time.
 const TRIAL_STEPS: usize = 4;
 const LEAST_TRIAL_EXPLAINED: f64 = 0.3;
@@ -25,11 +29,11 @@ const LARGEST_SIGMA_STEP: f64 = 0.5;
 const SIGMA_BOUNDS: [f64; 2] = [0.6, 8.0];
 /// Start of the tissue's unevenness, relative to its colour; each step estimates it anew.
 const TISSUE_UNEVENNESS: f64 = 0.05;
-/// Standard deviation of the positions that the outlines are drawn from (px): at the start, after half of the steps, and
-/// else.
+/// Standard deviation of the positions whose posture the outlines are drawn in (px): at the start, and else.
 const START_STD: f64 = 3.0;
-const HALFWAY_STD: f64 = 1.0;
-const STEP_STD: f64 = 2.0;
+const STEP_STD: f64 = 0.5;
+/// Correlation of the model's errors of the two bands, which are 12 mm apart: an error of the camera's pose moves both.
+const MODEL_CORRELATION: f64 = 0.98;
 /// Bounds of a band's brightness: the largest, and the least that its ratio to the other's is computed from (grey levels).
 const LARGEST_BRIGHTNESS: f64 = 400.0;
 const LEAST_BRIGHTNESS: f64 = 5.0;
@@ -43,6 +47,8 @@ const LEAST_SIDE: usize = 8;
 pub struct BlurFitter {
     patch: Patch,
     masks: [Mask; 2],
+    /// The masks where each coordinate is larger by [`DIFFERENCE`].
+    moved: [[Mask; 2]; 4],
     buffer: Vec<f32>,
 }
 
@@ -50,7 +56,8 @@ impl Default for BlurFitter {
     fn default() -> Self {
         Self {
             patch: Patch::default(),
-            masks: [Mask::default(), Mask::default()],
+            masks: std::array::from_fn(|_| Mask::default()),
+            moved: std::array::from_fn(|_| std::array::from_fn(|_| Mask::default())),
             buffer: Vec::with_capacity(SIDE * SIDE),
         }
     }
@@ -64,51 +71,49 @@ impl BlurFitter {
     /// ```
     ///
     /// with m the coverage of a sample by an outline and g a normal density. Least squares by Gauss-Newton steps, with
-    /// the prediction as prior of the positions, and priors of sigma and of the ratio of both brightnesses. None if the
-    /// fit does not converge or the bands are not visible.
+    /// the prediction as prior of the positions, and priors of sigma and of the ratio of both brightnesses. The shapes of
+    /// both outlines are those of the posture at the positions, so their derivatives, by differences of masks, contain
+    /// the change of shape; the prior is linearised there anew in each step. A trial ends after
+    /// a few steps. None if the fit does not converge or the bands are not visible.
     pub fn fit(
         &mut self,
         frame: &impl Frame,
         predictor: &impl BandPredictor,
-        prediction: &BandPrediction,
         start: [f64; 4],
-        settings: &BlurSettings,
+        is_trial: bool,
+        all_settings: &Settings,
     ) -> Option<BlurFit> {
-        let prior = inverse(prediction.covariance)?;
-        let draw = |position: [f64; 4], std: f64| {
-            let drawn = predictor.predict(position, [std; 4])?;
-            let [a, b] = &drawn.outlines;
-            let [ua, va, ub, vb] = position;
-            Some([a.moved_to([ua, va]), b.moved_to([ub, vb])])
-        };
+        let settings = &all_settings.blur;
         let mut position = start;
-        let mut outlines = draw(position, START_STD)?;
-        let mut sensor_variance = self.read(frame, &outlines, settings.margin)?;
+        let (_, mut outlines) = drawn(predictor, position, START_STD)?;
+        let mut sensor_variance = self.read(frame, &outlines, settings.margin, COARSE)?;
         let (mut brightness, mut sigma) = ([0.0; 2], settings.sigma);
         let mut tissue_unevenness = TISSUE_UNEVENNESS;
         let mut result = None;
-        for step in 0..STEPS {
+        for step in 0..if is_trial { TRIAL_STEPS + 1 } else { STEPS } {
             if step == STEPS / 2 {
-                outlines = draw(position, HALFWAY_STD)?;
-                sensor_variance = self.read(frame, &outlines, settings.margin)?;
-            } else if step > 0 {
-                outlines = draw(position, STEP_STD)?;
+                sensor_variance = self.read(frame, &outlines, settings.margin, 1)?;
             }
             let scaled_sigma = sigma / self.patch.step;
-            for (mask, outline) in self.masks.iter_mut().zip(&outlines) {
-                mask.draw(outline, &self.patch);
-                mask.blur(scaled_sigma, self.patch.columns, &mut self.buffer);
-            }
+            let prediction;
+            (prediction, outlines) = self.draw_masks(predictor, position, scaled_sigma)?;
+            let prior = inverse(correlated(&prediction, all_settings))?;
             let mean = f64::midpoint(brightness[0], brightness[1]);
             let noise = NoiseModel {
                 sensor_variance,
                 // Errors other than sensor noise are alike in neighbours: the area of the kernel counts as one sample.
-                correlated_samples: 4.0 * PI * scaled_sigma.max(1.0).powi(2),
+                correlated_samples: 2.0 * PI * scaled_sigma.max(1.0).powi(2),
                 band: settings.unevenness * mean,
                 tissue: tissue_unevenness,
             };
-            let (mut normal, mut right) =
-                normal_equations(&self.patch, &self.masks, brightness, sigma, &noise);
+            let (mut normal, mut right) = normal_equations(
+                &self.patch,
+                &self.masks,
+                &self.moved,
+                brightness,
+                sigma,
+                &noise,
+            );
             let offset: [f64; 4] = std::array::from_fn(|i| prediction.features[i] - position[i]);
             for (row, pull) in apply(&prior, offset).into_iter().enumerate() {
                 right[row] += pull;
@@ -174,8 +179,46 @@ impl BlurFitter {
         result
     }
 
+    /// Draws the blurred masks of the outlines at a position, and where each coordinate is larger by [`DIFFERENCE`], without
+    /// what the section hides. Returns the prediction in the posture there, and the outlines.
+    fn draw_masks(
+        &mut self,
+        predictor: &impl BandPredictor,
+        position: [f64; 4],
+        sigma: f64,
+    ) -> Option<(BandPrediction, [Outline; 2])> {
+        let Self {
+            patch,
+            masks,
+            moved,
+            buffer,
+        } = self;
+        let section = predictor.section(position, [STEP_STD; 4]);
+        let mut draw = |masks: &mut [Mask; 2], outlines: &[Outline; 2]| {
+            for (band, (mask, outline)) in masks.iter_mut().zip(outlines).enumerate() {
+                mask.draw(outline, patch);
+                mask.hide(&section, band, patch);
+                mask.blur(sigma, patch.columns, buffer);
+            }
+        };
+        for (index, masks) in moved.iter_mut().enumerate() {
+            let mut place = position;
+            place[index] += DIFFERENCE;
+            draw(masks, &drawn(predictor, place, STEP_STD)?.1);
+        }
+        let (prediction, outlines) = drawn(predictor, position, STEP_STD)?;
+        draw(masks, &outlines);
+        Some((prediction, outlines))
+    }
+
     /// Reads the pixels around the outlines; returns the variance of the sensor noise (grey levels squared).
-    fn read(&mut self, frame: &impl Frame, outlines: &[Outline; 2], margin: f64) -> Option<f64> {
+    fn read(
+        &mut self,
+        frame: &impl Frame,
+        outlines: &[Outline; 2],
+        margin: f64,
+        step: usize,
+    ) -> Option<f64> {
         let corners = || outlines.iter().flat_map(|outline| &outline.corners);
         let range = |axis: usize, size: usize| {
             let values = || corners().map(|corner| corner[axis]);
@@ -187,9 +230,32 @@ impl BlurFitter {
         if columns.len() < LEAST_SIDE || rows.len() < LEAST_SIDE {
             return None;
         }
-        self.patch.read(frame, columns, rows);
+        self.patch.read(frame, columns, rows, step);
         let grown = outlines.map(|outline| outline.grown(BAND_MARGIN));
         self.patch.remove_tissue_colour(&grown);
         Some(self.patch.sensor_variance())
     }
+}
+
+/// The prediction with outlines in the posture that best explains a position (px, standard deviation `std`), and these
+/// outlines moved there.
+fn drawn(
+    predictor: &impl BandPredictor,
+    position: [f64; 4],
+    std: f64,
+) -> Option<(BandPrediction, [Outline; 2])> {
+    let prediction = predictor.predict(position, [std; 4])?;
+    let [a, b] = &prediction.outlines;
+    let [ua, va, ub, vb] = position;
+    Some((prediction, [a.moved_to([ua, va]), b.moved_to([ub, vb])]))
+}
+
+/// The covariance of the predicted positions, with the model's errors of both bands correlated.
+fn correlated(prediction: &BandPrediction, settings: &Settings) -> Square<4> {
+    let shared = MODEL_CORRELATION * settings.model_deviation.powi(2);
+    let mut covariance = prediction.covariance;
+    for (row, column) in [(0, 2), (2, 0), (1, 3), (3, 1)] {
+        covariance[row][column] += shared;
+    }
+    covariance
 }

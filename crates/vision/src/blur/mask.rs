@@ -2,7 +2,7 @@
 
 use super::patch::{Patch, SIDE};
 use crate::math::{floor, real, single};
-use crate::recognition::Outline;
+use crate::recognition::{Outline, SECTION_DISCS, SectionDisc};
 
 /// Sub-rows in which the coverage of a sample is computed: its error is then below 1/8 at an edge, and blurred.
 const SUB_ROWS: usize = 4;
@@ -50,6 +50,33 @@ impl Mask {
         }
     }
 
+    /// Clears the samples of a band that the section hides.
+    pub fn hide(
+        &mut self,
+        section: &[Option<SectionDisc>; SECTION_DISCS],
+        band: usize,
+        patch: &Patch,
+    ) {
+        let nearer = section.iter().flatten().filter(|disc| disc.is_nearer[band]);
+        for disc in nearer {
+            let square = disc.radius.powi(2);
+            let [u0, v0] = disc.centre;
+            let rows = self.coverage.chunks_mut(patch.columns.max(1)).enumerate();
+            for (row, values) in rows {
+                let v = patch.origin[1] + real(row) * patch.step - v0;
+                if v * v >= square {
+                    continue;
+                }
+                let reach = (square - v * v).sqrt();
+                let [from, to] = [u0 - reach, u0 + reach]
+                    .map(|u| floor((u - patch.origin[0]) / patch.step + 1.0));
+                for value in values.iter_mut().take(to).skip(from) {
+                    *value = 0.0;
+                }
+            }
+        }
+    }
+
     /// Convolves the mask with a normal density of standard deviation `sigma` (samples), cut at 3 sigma.
     pub fn blur(&mut self, sigma: f64, columns: usize, buffer: &mut Vec<f32>) {
         let mut kernel = [0.0_f32; SIDE / 2];
@@ -92,6 +119,35 @@ impl Mask {
                 for (target, value) in into.zip(row) {
                     *target += weight * value;
                 }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_section_hides_what_is_within_its_radius_of_the_band_that_is_farther() {
+        let columns = 12;
+        let mut patch = Patch::default();
+        (patch.origin, patch.step, patch.columns) = ([100.5, 50.5], 2.0, columns);
+        let disc = SectionDisc {
+            centre: [109.0, 60.0],
+            radius: 5.0,
+            is_nearer: [true, false],
+        };
+        let mut section = [None; SECTION_DISCS];
+        section[2] = Some(disc);
+        let mut mask = Mask::default();
+        for band in [0, 1] {
+            mask.coverage = vec![1.0; columns * columns];
+            mask.hide(&section, band, &patch);
+            for (index, value) in mask.coverage.iter().enumerate() {
+                let [u, v] = patch.coordinates(index);
+                let is_hidden = band == 0 && (u - 109.0).hypot(v - 60.0) < 5.0;
+                assert_eq!(*value < 0.5, is_hidden, "{band} {u} {v}");
             }
         }
     }

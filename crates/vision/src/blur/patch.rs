@@ -44,24 +44,38 @@ impl Default for Patch {
 }
 
 impl Patch {
-    /// Samples columns and rows of a frame, as densely as there is room for. Does not allocate.
-    pub fn read(&mut self, frame: &impl Frame, columns: Range<usize>, rows: Range<usize>) {
-        let step = columns.len().max(rows.len()).div_ceil(SIDE).max(1);
-        self.origin = [columns.start, rows.start].map(real);
+    /// Samples columns and rows of a frame, as densely as there is room for, and at most every `least_step` pixels. A
+    /// sample is the mean of its pixels. Does not allocate.
+    pub fn read(
+        &mut self,
+        frame: &impl Frame,
+        columns: Range<usize>,
+        rows: Range<usize>,
+        least_step: usize,
+    ) {
+        let step = columns.len().max(rows.len()).div_ceil(SIDE).max(least_step);
+        let centre = (real(step) - 1.0) / 2.0;
+        self.origin = [columns.start, rows.start].map(|first| real(first) + centre);
         self.step = real(step);
-        self.columns = columns.len().div_ceil(step);
+        self.columns = columns.len() / step;
+        let columns = columns.start..columns.start + self.columns * step;
+        let count = self.columns * (rows.len() / step);
         self.differences.clear();
+        self.differences.resize(count, [0.0; 2]);
         let format = frame.format();
-        let channels = DIFFERENCES.map(|weights| Affine::new(weights, format));
+        let share = 1.0 / (self.step * self.step);
+        let channels = DIFFERENCES.map(|weights| Affine::new(weights.map(|w| share * w), format));
         let groups = format.whole_groups(columns.clone());
-        for v in rows.step_by(step) {
-            Row::of(frame, v, groups.clone()).feed(Sample {
-                channels,
-                skip: columns.start - groups.start,
-                step,
-                count: self.columns,
-                into: &mut self.differences,
-            });
+        let means = self.differences.chunks_mut(self.columns.max(1));
+        for (row, into) in means.enumerate() {
+            for v in (0..step).map(|offset| rows.start + row * step + offset) {
+                Row::of(frame, v, groups.clone()).feed(Sample {
+                    channels,
+                    skip: columns.start - groups.start,
+                    step,
+                    into: &mut *into,
+                });
+            }
         }
     }
 
@@ -150,8 +164,7 @@ struct Sample<'a> {
     channels: [Affine; 2],
     skip: usize,
     step: usize,
-    count: usize,
-    into: &'a mut Vec<[f32; 2]>,
+    into: &'a mut [[f32; 2]],
 }
 
 impl Consumer for Sample<'_> {
@@ -159,15 +172,18 @@ impl Consumer for Sample<'_> {
 
     fn consume<const P: usize, G: Group<P>>(self, groups: impl Iterator<Item = G>) {
         let pixels = groups.flat_map(|group| (0..P).map(move |pixel| (group, pixel)));
-        let wanted = pixels.skip(self.skip).step_by(self.step).take(self.count);
-        self.into.extend(wanted.map(|(group, pixel)| {
-            self.channels.map(|Affine { weights, constant }| {
-                let sum: f64 = (weights.iter().enumerate())
+        let wanted = pixels.skip(self.skip).take(self.step * self.into.len());
+        for (index, (group, pixel)) in wanted.enumerate() {
+            let Some(sums) = self.into.get_mut(index / self.step) else {
+                break;
+            };
+            for (sum, Affine { weights, constant }) in sums.iter_mut().zip(&self.channels) {
+                let value: f64 = (weights.iter().enumerate())
                     .map(|(channel, weight)| weight * f64::from(group.channel(pixel, channel)))
                     .sum();
-                single(sum + constant)
-            })
-        }));
+                *sum += single(value + constant);
+            }
+        }
     }
 }
 
@@ -210,7 +226,7 @@ mod tests {
             area: 70.0 * 18.0,
         };
         let mut patch = Patch::default();
-        patch.read(&frame, 0..width, 0..height);
+        patch.read(&frame, 0..width, 0..height, 1);
         patch.remove_tissue_colour(&[outline; 2]);
         let at = |u: f64| {
             let index = (0..patch.green.len()).find(|index| {

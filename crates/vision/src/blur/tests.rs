@@ -6,7 +6,7 @@ mod discs;
 mod settings;
 
 use super::{BlurFit, BlurFitter};
-use crate::{BandPredictor, Image, PixelFormat};
+use crate::{Image, PixelFormat};
 use discs::Discs;
 use settings::SETTINGS;
 
@@ -57,8 +57,7 @@ fn draw(positions: [f64; 4], sigma: f64, brightness: f64) -> Vec<u8> {
 fn fit(data: &[u8]) -> Option<BlurFit> {
     let frame = Image::new(data, PixelFormat::Bgr, [SIDE, SIDE], 3 * SIDE).unwrap();
     let discs = Discs::at(PREDICTED);
-    let prior = discs.predict([f64::NAN; 4], [f64::INFINITY; 4]).unwrap();
-    BlurFitter::default().fit(&frame, &discs, &prior, PREDICTED, &SETTINGS.blur)
+    BlurFitter::default().fit(&frame, &discs, PREDICTED, false, &SETTINGS)
 }
 
 #[test]

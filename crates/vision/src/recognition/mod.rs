@@ -15,9 +15,9 @@ mod surroundings;
 
 pub use outcome::Recognition;
 pub use outline::{OUTLINE_CORNERS, Outline};
-pub(crate) use posture_table::PostureTable;
-pub use prediction::{BandPrediction, BandPredictor};
+pub(crate) use posture_table::{BLOBS, BlobPostures, PostureTable};
+pub use prediction::{BandPrediction, BandPredictor, SECTION_DISCS, SectionDisc};
 pub use rejection::Rejection;
 pub use score::BandScore;
 pub(crate) use search::OutlineSearch;
-pub(crate) use surroundings::is_instrument;
+pub(crate) use surroundings::{LEAST_CONTRAST, section_contrast};

@@ -3,9 +3,10 @@
 use super::fit::Fit;
 use super::outline::Outline;
 use super::prediction::BandPrediction;
+use super::prediction::{SECTION_DISCS, SectionDisc};
 use super::rejection::Rejection;
 use super::score::{BandScore, score};
-use super::surroundings::is_instrument;
+use super::surroundings::{LEAST_CONTRAST, is_instrument, section_contrast};
 use crate::scan::{Frame, RunMap};
 use crate::settings::Settings;
 
@@ -50,6 +51,12 @@ impl Recognition {
         result
     }
 
+    /// Centroids of the outlines that were found last `[u_A, v_A, u_B, v_B]` (px), rejected ones included.
+    pub(crate) fn centroids(&self) -> [f64; 4] {
+        let [[ua, va], [ub, vb]] = self.scores.map(|score| score.centroid);
+        [ua, va, ub, vb]
+    }
+
     /// Whether no other candidate needs to be tried.
     pub(crate) fn is_clear(&self, settings: &Settings) -> bool {
         let mut bands = self.scores.iter().zip(&self.rejections);
@@ -66,16 +73,25 @@ impl Recognition {
         self.is_clear(settings) && self.scores.iter().all(|score| score.edges >= least)
     }
 
-    /// Rejects bands with no instrument between them, and those whose surroundings do not show it unless they are clear.
+    /// Rejects bands with no instrument between them or next to them, and those whose surroundings do not show it unless they
+    /// are certain.
     pub(crate) fn require_instrument(
         &mut self,
         frame: &impl Frame,
         outlines: &[Outline; 2],
+        section: &[Option<SectionDisc>; SECTION_DISCS],
         settings: &Settings,
     ) {
-        let is_accepted = self.rejections == [None; 2]
-            && is_instrument(frame, outlines).unwrap_or_else(|| self.is_clear(settings));
-        if self.rejections == [None; 2] && !is_accepted {
+        if self.rejections != [None; 2] {
+            return;
+        }
+        let is_section = section_contrast(frame, section).map(|value| value > LEAST_CONTRAST);
+        let is_accepted = match (is_instrument(frame, outlines), is_section) {
+            (Some(between), Some(section)) => between && section,
+            (None, None) => self.is_certain(settings),
+            (Some(known), None) | (None, Some(known)) => known,
+        };
+        if !is_accepted {
             self.rejections = [Some(Rejection::NoInstrument); 2];
             self.erase_rejected();
         }

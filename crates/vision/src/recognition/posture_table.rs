@@ -45,6 +45,14 @@ struct Shape {
     sides: [f32; 2],
 }
 
+/// Postures that are kept of bands in one region.
+pub const BLOBS: usize = 6;
+/// Postures whose features differ by less than this are the same (px).
+const BLOB_DISTANCE: f64 = 5.0;
+
+/// Likeliest postures of bands that are one region, the likeliest first, with their costs.
+pub type BlobPostures = [Option<(f32, [f64; 4])>; BLOBS];
+
 /// Regions that may be the bands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Candidate {
@@ -52,6 +60,16 @@ pub struct Candidate {
     pub pair: Pair,
     /// Features of the posture, moved to the regions (px).
     pub features: [f64; 4],
+}
+
+impl Posture {
+    /// Features of the posture, moved by `offset` (px).
+    fn features(&self, offset: [f32; 2]) -> [f64; 4] {
+        let [a, b] = self
+            .bands
+            .map(|band| [0, 1].map(|axis| f64::from(band.centroid[axis] + offset[axis])));
+        [a[0], a[1], b[0], b[1]]
+    }
 }
 
 impl Shape {
@@ -124,7 +142,13 @@ impl PostureTable {
     }
 
     /// The likeliest pairs of regions, the likeliest first.
-    pub fn likely_pairs(&self, regions: &[Region]) -> [Option<Candidate>; TRIALS] {
+    ///
+    /// Postures of both bands in one region are kept in `blobs` too.
+    pub fn likely_pairs(
+        &self,
+        regions: &[Region],
+        blobs: &mut BlobPostures,
+    ) -> [Option<Candidate>; TRIALS] {
         let mut kept: [Option<(f32, Candidate)>; TRIALS] = [None; TRIALS];
         let mut shapes = [None; crate::scan::MAX_REGIONS];
         for (shape, region) in shapes.iter_mut().zip(regions) {
@@ -170,6 +194,7 @@ impl PostureTable {
                     let cost = square(offset) / (POSITION_STD * POSITION_STD)
                         + shape.size_cost(&posture.both);
                     keep(&mut kept, cost, [Some(index); 2], posture, offset);
+                    keep_blob(blobs, cost, posture, offset);
                 }
             }
         }
@@ -200,9 +225,30 @@ fn keep(
         .position(|one| one.is_none_or(|(less, _)| cost < less))
         .unwrap_or(last);
     kept[rank..=last].rotate_right(1);
-    let [a, b] = posture
-        .bands
-        .map(|band| [0, 1].map(|axis| f64::from(band.centroid[axis] + offset[axis])));
-    let features = [a[0], a[1], b[0], b[1]];
+    let features = posture.features(offset);
     kept[rank] = Some((cost, Candidate { pair, features }));
+}
+
+/// Keeps the best of postures that are nearly the same.
+fn keep_blob(kept: &mut BlobPostures, cost: f32, posture: &Posture, offset: [f32; 2]) {
+    if kept[BLOBS - 1].is_some_and(|(most, _)| cost >= most) {
+        return;
+    }
+    let features = posture.features(offset);
+    let is_same = |other: &[f64; 4]| {
+        (0..4).all(|index| (features[index] - other[index]).abs() < BLOB_DISTANCE)
+    };
+    let same = kept
+        .iter()
+        .position(|one| one.is_some_and(|(_, other)| is_same(&other)));
+    if same.is_some_and(|index| kept[index].is_some_and(|(less, _)| less <= cost)) {
+        return;
+    }
+    let last = same.unwrap_or(BLOBS - 1);
+    let rank = kept
+        .iter()
+        .position(|one| one.is_none_or(|(less, _)| cost < less))
+        .unwrap_or(last);
+    kept[rank..=last].rotate_right(1);
+    kept[rank] = Some((cost, features));
 }

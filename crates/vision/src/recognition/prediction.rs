@@ -56,6 +56,20 @@ impl BandPrediction {
     }
 }
 
+/// Discs along the section next to the tip.
+pub const SECTION_DISCS: usize = 8;
+
+/// The image of a short piece of the section next to the tip.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SectionDisc {
+    /// Centre u, v (px).
+    pub centre: [f64; 2],
+    /// Radius (px).
+    pub radius: f64,
+    /// Whether it hides what it covers of band A and of band B.
+    pub is_nearer: [bool; 2],
+}
+
 /// Predicts the bands from the instrument model and the prior of its posture.
 pub trait BandPredictor {
     /// The prediction, with outlines in the posture that best explains the features `observed` (4,) (px)
@@ -63,6 +77,12 @@ pub trait BandPredictor {
     ///
     /// None if the bands are not visible.
     fn predict(&self, observed: [f64; 4], std: [f64; 4]) -> Option<BandPrediction>;
+
+    /// Discs along the section, from the tip inwards, in the posture that best explains the features `observed` (4,) (px)
+    /// with standard deviations `std` (4,) (px); None for a disc that has no image.
+    fn section(&self, _observed: [f64; 4], _std: [f64; 4]) -> [Option<SectionDisc>; SECTION_DISCS] {
+        [None; SECTION_DISCS]
+    }
 
     /// Whether the prior is of one posture, and not of several that cover the whole workspace.
     fn is_located(&self) -> bool {

@@ -3,7 +3,7 @@
 use super::fit::{COARSE, FINE, Fit, fit};
 use super::outcome::{Recognition, UNKNOWN};
 use super::pairing::{TRIALS, likely_pairs};
-use super::posture_table::PostureTable;
+use super::posture_table::{BlobPostures, PostureTable};
 use super::prediction::{BandPrediction, BandPredictor};
 use super::rejection::Rejection;
 use super::starts::{SAME, centroids, uncut_centroids};
@@ -36,8 +36,8 @@ pub struct OutlineSearch<'a, F, P> {
 }
 
 impl<F: Frame, P: BandPredictor> OutlineSearch<'_, F, P> {
-    /// Recognises the bands among the regions.
-    pub fn recognise(&self, regions: &[Region]) -> Recognition {
+    /// Recognises the bands among the regions. Without a prediction, postures of both bands in one region are added to `blobs`.
+    pub fn recognise(&self, regions: &[Region], blobs: &mut BlobPostures) -> Recognition {
         let Some(prior) = self.predictor.predict(UNKNOWN, [f64::INFINITY; 4]) else {
             return Recognition::none(Rejection::NotPredicted);
         };
@@ -46,7 +46,7 @@ impl<F: Frame, P: BandPredictor> OutlineSearch<'_, F, P> {
         }
         let mut best: Option<Recognition> = None;
         let mut tried = [UNKNOWN; 2 * TRIALS];
-        let starts = self.starts(regions, &prior).into_iter();
+        let starts = self.starts(regions, &prior, blobs).into_iter();
         for (index, observed) in starts.flatten().enumerate() {
             let Some((_, first)) = self.fit(observed, REGION_STD, [true; 2], COARSE) else {
                 continue;
@@ -82,7 +82,12 @@ impl<F: Frame, P: BandPredictor> OutlineSearch<'_, F, P> {
     }
 
     /// Centroids of the bands (px) from which outlines are fitted, the likeliest first.
-    fn starts(&self, regions: &[Region], prior: &BandPrediction) -> [Option<[f64; 4]>; 2 * TRIALS] {
+    fn starts(
+        &self,
+        regions: &[Region],
+        prior: &BandPrediction,
+        blobs: &mut BlobPostures,
+    ) -> [Option<[f64; 4]>; 2 * TRIALS] {
         let mut starts = [None; 2 * TRIALS];
         let (places, _) = starts.as_chunks_mut::<2>();
         if self.predictor.is_located() || self.postures.is_empty() {
@@ -93,7 +98,11 @@ impl<F: Frame, P: BandPredictor> OutlineSearch<'_, F, P> {
             }
             return starts;
         }
-        let candidates = self.postures.likely_pairs(regions).into_iter().flatten();
+        let candidates = self
+            .postures
+            .likely_pairs(regions, blobs)
+            .into_iter()
+            .flatten();
         for (place, candidate) in places.iter_mut().zip(candidates) {
             let mut observed = candidate.features;
             if candidate.pair[0] != candidate.pair[1] {
@@ -184,6 +193,7 @@ impl<F: Frame, P: BandPredictor> OutlineSearch<'_, F, P> {
             result.require_instrument(
                 self.frame,
                 &[a.moved_to([ua, va]), b.moved_to([ub, vb])],
+                &self.predictor.section(found.features, [0.5; 4]),
                 self.settings,
             );
         }

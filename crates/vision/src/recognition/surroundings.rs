@@ -1,6 +1,7 @@
 //! What is between the bands and beside them: between the bands of an instrument is the instrument, not tissue.
 
 use super::outline::{OUTLINE_CORNERS, Outline};
+use super::prediction::{SECTION_DISCS, SectionDisc};
 use crate::scan::{Affine, Frame, weighted_sum};
 
 /// Weights of B, G, R for green minus red: about 0 for grey or black plastic, far below 0 for tissue, above 0 for a band.
@@ -11,6 +12,8 @@ const BAND: f64 = 8.0;
 const LEAST_REDNESS: f64 = 10.0;
 /// Instrument has at most this share of the redness of the tissue beside it.
 const LARGEST_SHARE: f64 = 0.6;
+/// Least [`section_contrast`] of an instrument.
+pub const LEAST_CONTRAST: f64 = 0.4;
 /// With fewer samples than this nothing is decided.
 const LEAST_SAMPLES: f64 = 6.0;
 /// Places of samples between the bands, as shares of the way from A to B, and beyond A.
@@ -63,6 +66,39 @@ pub fn is_instrument(frame: &impl Frame, [a, b]: &[Outline; 2]) -> Option<bool> 
     let tissue = sides.iter().filter_map(Mean::value).fold(0.0, f64::min);
     let inner = inner.value()?;
     (tissue < -LEAST_REDNESS).then_some(inner > LARGEST_SHARE * tissue)
+}
+
+/// By how much less red the section next to the tip is than the tissue beside it, as a share of that: about 1 for plastic, 0
+/// for tissue; None where the image does not show it.
+pub fn section_contrast(
+    frame: &impl Frame,
+    section: &[Option<SectionDisc>; SECTION_DISCS],
+) -> Option<f64> {
+    let affine = Affine::new(GREEN_MINUS_RED, frame.format());
+    let sample = |at: [f64; 2]| weighted_sum(frame, &affine, at);
+    let mut inner = Mean::default();
+    let mut sides = [Mean::default(); 2];
+    for pair in section.windows(2) {
+        let [Some(one), Some(next)] = pair else {
+            continue;
+        };
+        let [u, v] = one.centre;
+        let [du, dv] = [next.centre[0] - u, next.centre[1] - v];
+        let length = du.hypot(dv).max(1e-6);
+        for share in [-0.5, 0.0, 0.5] {
+            let reach = share * one.radius / length;
+            inner.add(sample([u - reach * dv, v + reach * du]));
+        }
+        for (side, sign) in sides.iter_mut().zip([1.0, -1.0]) {
+            for distance in BESIDE {
+                let reach = sign * (one.radius + distance) / length;
+                side.add(sample([u - reach * dv, v + reach * du]));
+            }
+        }
+    }
+    let tissue = sides.iter().filter_map(Mean::value).fold(0.0, f64::min);
+    let inner = inner.value()?;
+    (tissue < -LEAST_REDNESS).then_some(1.0 - inner / tissue)
 }
 
 fn along([u0, v0]: [f64; 2], [u1, v1]: [f64; 2], share: f64) -> [f64; 2] {

@@ -38,7 +38,7 @@ pub const SETTINGS: Settings = Settings {
         alternatives: Vec::new(),
         certain_edges: 0.9,
         least_edges_on_average: 0.67,
-        largest_deviation: 0.6,
+        least_explained: 0.84,
     },
     is_unlocated: false,
     blur: BlurSettings {
@@ -46,7 +46,7 @@ pub const SETTINGS: Settings = Settings {
         sigma_deviation: 2.0,
         sharp_sigma: 1.0,
         margin: 14.0,
-        brightness_ratio_deviation: 0.2,
+        brightness_ratio_deviation: 0.1,
         unevenness: 0.015,
         model_deviation: 0.25,
         least_explained: 0.8,
