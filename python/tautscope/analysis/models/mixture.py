@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
+
 import numpy as np
 
 from tautscope.analysis.models import last_tip, linear_fit, online
@@ -70,16 +72,10 @@ def mix(components: list[Component], signals: Signals) -> tuple[Floats, dict[str
     ends = np.cumsum([component.predicted.shape[1] for component in components])
     tips = signals.measured[signals.at]
     errors = np.nan_to_num(variants[signals.at] - tips[:, None])
-    fits = {
-        refit.count: [
-            (slice(end - each.errors.shape[1], end), each)
-            for component, end in zip(components, ends, strict=True)
-            for each in component.refits
-            if each.count == refit.count
-        ]
-        for component in components
-        for refit in component.refits
-    }
+    fits = defaultdict(list)
+    for component, end in zip(components, ends, strict=True):
+        for refit in component.refits:
+            fits[refit.count].append((slice(end - refit.errors.shape[1], end), refit))
     discounts = np.array(MEMORIES)
     forgotten = 1  # there is no prediction of the first tip
     losses, counts = np.zeros((len(MEMORIES), errors.shape[1])), np.zeros(len(MEMORIES))
@@ -98,7 +94,7 @@ def mix(components: list[Component], signals: Signals) -> tuple[Floats, dict[str
                 forgotten = max(1, refit.forgotten)
             past = discounts[:, None] ** np.arange(j - forgotten, -1, -1.0)
             counts = past.sum(axis=1)
-            losses = past @ errors[forgotten : j + 1] ** 2 + counts[:, None] * FLOOR**2
+            losses = past @ (errors[forgotten : j + 1] ** 2) + counts[:, None] * FLOOR**2
         else:
             counts = discounts * counts + 1
             losses = discounts[:, None] * losses + errors[j] ** 2 + FLOOR**2
