@@ -21,8 +21,9 @@ RADII = 0.5 * (np.arange(12) / 12) ** 1.5
 """Radii of the plays; small ones are closer to each other."""
 KNOTS = (-0.25, 0.0, 0.25)
 """Where the generalised operator bends the output of every second play."""
-SPREAD, REFIT_SPREAD = 0.5, 0.1
-"""Prior standard deviation of a coefficient: of a play, and of the scale of a fitted model."""
+SPREAD, BENT_SPREAD, REFIT_SPREAD = 0.5, 0.2, 0.1
+"""Prior standard deviation of a coefficient: of the plays; of plays and their bent outputs, more of
+them than few tips determine; and of the scale of a fitted model."""
 WALKS = np.array([(d, w) for d in (0.003, 0.03, 0.3) for w in (0.0, 0.1)])
 REFIT_WALKS = np.array([(d, 0.0) for d in (0.003, 0.01, 0.03, 0.1, 0.3)])
 """Random walks of disturbance and coefficients, see `track`."""
@@ -97,12 +98,12 @@ def adaptive_operators(signals: Signals) -> Iterator[Component]:
     """
     plain = prandtl_ishlinskii.operators(signals.command, tuple(RADII.tolist()))
     bent = [np.maximum(plain[:, ::2] - knot, 0) for knot in KNOTS]
-    for name, features in (
-        ("adaptive_plays", plain),
-        ("adaptive_bent_plays", np.column_stack([plain, *bent])),
+    for name, features, spread in (
+        ("adaptive_plays", plain, SPREAD),
+        ("adaptive_bent_plays", np.column_stack([plain, *bent]), BENT_SPREAD),
     ):
         predicted = track(
-            features, signals.travel, signals.measured, signals.at, spread=SPREAD, walks=WALKS
+            features, signals.travel, signals.measured, signals.at, spread=spread, walks=WALKS
         )
         yield Component(name, predicted)
 
