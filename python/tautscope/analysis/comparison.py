@@ -2,19 +2,38 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.analysis.models.registry import LINEAR_FIT, MODELS, Model
-from tautscope.analysis.models.task import Prediction, Task
+from tautscope.analysis.models.task import Floats, Prediction, Task, continued
 from tautscope.config import Config
 from tautscope.errors import RecordError
 from tautscope.report import metrics
 from tautscope.report.tables import finite_or_none
 from tautscope.runs.records import Record
+
+HORIZONS = (0.01, 0.03, 0.10)
+"""Travel of the command between two sights, as a share of its range."""
+LEAST_SIGHTS = 8
+"""In each half of the record; with fewer a horizon is left out."""
+
+
+@dataclass(frozen=True)
+class HorizonError:
+    """Error of a model that gets the tip only at sights, NaN if there are too few of them.
+
+    Attributes:
+        rmse: RMS error over the scored samples [tip's unit]. A model that is fitted off-line
+            predicts the change since the last sight.
+        alone: The same of an off-line model's output from the command alone; NaN for others.
+    """
+
+    rmse: float
+    alone: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,11 +44,13 @@ class Entry:
         model: The model.
         prediction: Its prediction.
         rmse: RMS error over the scored samples [tip's unit].
+        horizons: Errors with sights at the distances `HORIZONS`.
     """
 
     model: Model
     prediction: Prediction
     rmse: float
+    horizons: tuple[HorizonError, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,11 +61,13 @@ class Analysis:
         record: The record.
         half: First sample of the second half; both halves have equally many measured tips.
         entries: One per model, in the order of the registry.
+        sights: Number of sights at the distances `HORIZONS`.
     """
 
     record: Record
     half: int
     entries: tuple[Entry, ...]
+    sights: tuple[int, ...]
 
     @property
     def scored(self) -> NDArray[np.bool_]:
@@ -62,6 +85,10 @@ class Analysis:
             "samples": len(self.record.rows),
             "scored": int(np.count_nonzero(self.scored)),
             "cleaning": asdict(self.record.cleaning),
+            "horizons": [
+                {"share": share, "sights": sights}
+                for share, sights in zip(HORIZONS, self.sights, strict=True)
+            ],
             "models": [
                 {
                     "name": entry.model.name,
@@ -69,6 +96,14 @@ class Analysis:
                     "learns": entry.model.fitted_to,
                     "rmse": finite_or_none(entry.rmse),
                     "share_of_no_model": finite_or_none(self.share(entry)),
+                    "horizons": [
+                        {
+                            "share": share,
+                            "rmse": finite_or_none(error.rmse),
+                            "rmse_command_alone": finite_or_none(error.alone),
+                        }
+                        for share, error in zip(HORIZONS, entry.horizons, strict=True)
+                    ],
                     "parameters": dict(entry.prediction.parameters),
                 }
                 for entry in self.entries
@@ -83,7 +118,10 @@ def analyze(
     gain: float | None = None,
     models: tuple[Model, ...] = MODELS,
 ) -> Analysis:
-    """Fit every model to a record, and compute its error over the second half.
+    """Fit every model to a record, and compute its errors over the second half.
+
+    The errors are those with every measured tip, and those with the tip seen at `HORIZONS` only,
+    where fits also get no more than the sights.
 
     Args:
         record: Actuator and tip, each in any unit.
@@ -108,9 +146,49 @@ def analyze(
     task = Task(record.command, record.measured, half, gain, update_distance, config)
     scored = with_tip[with_tip >= half]
 
+    masked = [seen_at(task, share) for share in HORIZONS]
+
     def entry(model: Model) -> Entry:
         prediction = model.run(task)
-        errors = (prediction.tip - record.measured)[scored]
-        return Entry(model, prediction, metrics.rms(errors))
+        return Entry(
+            model,
+            prediction,
+            _rmse(prediction.tip, task, scored),
+            tuple(_horizon_error(model, seen, task, scored) for seen in masked),
+        )
 
-    return Analysis(record, half, tuple(entry(model) for model in models))
+    counts = tuple(int(np.isfinite(seen.measured).sum()) for seen in masked)
+    return Analysis(record, half, tuple(entry(model) for model in models), counts)
+
+
+def seen_at(task: Task, share: float) -> Task:
+    """The task with the tip at sights only: the other measured tips become NaN.
+
+    The first measured tip is a sight, and then each one before which the command has travelled
+    `share` of its range since the last sight.
+    """
+    travel = np.cumsum(np.abs(np.diff(task.command, prepend=task.command[0])))
+    step = share * float(np.ptp(task.command)) * (1 - 1e-9)
+    sights = np.full(len(task.measured), np.nan)
+    due = -np.inf
+    for k in np.flatnonzero(np.isfinite(task.measured)):
+        if travel[k] >= due:
+            sights[k] = task.measured[k]
+            due = travel[k] + step
+    return replace(task, measured=sights)
+
+
+def _horizon_error(model: Model, seen: Task, task: Task, scored: NDArray[np.intp]) -> HorizonError:
+    halves = np.isfinite(seen.measured[: seen.half]), np.isfinite(seen.measured[seen.half :])
+    if min(np.count_nonzero(half) for half in halves) < LEAST_SIGHTS:
+        return HorizonError(np.nan, np.nan)
+    tip = model.run(seen).tip
+    if model.uses_sights:
+        return HorizonError(_rmse(tip, task, scored), np.nan)
+    return HorizonError(
+        _rmse(continued(tip, seen.measured), task, scored), _rmse(tip, task, scored)
+    )
+
+
+def _rmse(tip: Floats, task: Task, scored: NDArray[np.intp]) -> float:
+    return metrics.rms((tip - task.measured)[scored])

@@ -5,10 +5,10 @@ from __future__ import annotations
 from os import PathLike
 
 import numpy as np
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 from numpy.typing import NDArray
 
-from tautscope.analysis.comparison import Analysis
+from tautscope.analysis.comparison import HORIZONS, Analysis
 from tautscope.analysis.models.registry import LINEAR_FIT
 from tautscope.analysis.models.task import Floats
 from tautscope.report.figures import BLUE, GREY, PAGE, style
@@ -50,7 +50,41 @@ def _columns(analysis: Analysis) -> dict[str, Floats | NDArray[np.int64]]:
 
 
 def analysis_figure(analysis: Analysis) -> Figure:
-    """A row per model: its error over the record, and its loop over the measured one.
+    """Errors over the horizons; below, a row per model: error over the record, and loop."""
+    with style():
+        rows = 1.15 * len(analysis.entries) + 0.5
+        figure = Figure(figsize=(PAGE, rows + 2.6), layout="constrained")
+        parts = figure.subfigures(2, 1, squeeze=False, height_ratios=(2.6, rows))
+        _draw_horizons(parts[0, 0], analysis)
+        _draw_models(parts[1, 0], analysis)
+    return figure
+
+
+def _draw_horizons(figure: SubFigure, analysis: Analysis) -> None:
+    """RMS error of each model over the distance of the sights."""
+    axes = figure.subplots()
+    shares = 100 * np.array(HORIZONS)
+    for number, entry in enumerate(analysis.entries):
+        is_best = entry.model.name == "best"
+        axes.loglog(
+            shares,
+            [error.rmse for error in entry.horizons],
+            marker="osv^D<>Px"[number % 9],
+            markersize=4,
+            color=BLUE if is_best else f"C{number % 9 + 1}",
+            linewidth=2 if is_best else 0.8,
+            label=entry.model.title,
+        )
+    axes.set_xticks(shares, [f"{share:.0f} %" for share in shares], minor=False)
+    axes.minorticks_off()
+    axes.set_xlabel("travel of the command between sights, share of its range")
+    axes.set_ylabel("RMS error")
+    axes.set_title("RMS over the second half; tip seen only at sights")
+    figure.legend(loc="outside right upper")
+
+
+def _draw_models(figure: SubFigure, analysis: Analysis) -> None:
+    """A row per model: its error with every tip over the record, and its loop over the measured.
 
     The horizontal axis is the record's time if it was read, else the sample number. Loops are of
     the second half. All errors have one scale, set by their 99th percentiles; only the linear fit,
@@ -65,35 +99,32 @@ def analysis_figure(analysis: Analysis) -> Figure:
     common = max(
         (limit for limit, own in zip(limits, is_linear, strict=True) if not own), default=0.0
     )
-    with style():
-        count = len(analysis.entries)
-        figure = Figure(figsize=(PAGE, 1.15 * count + 0.5), layout="constrained")
-        axes = figure.subplots(count, 2, sharex="col", squeeze=False, width_ratios=(3.2, 1))
-        for row, entry in enumerate(analysis.entries):
-            strip, loop = axes[row]
-            strip.axvspan(at[0], at[analysis.half], color="#f0f0f0", linewidth=0)
-            strip.axhline(0, color=GREY, linewidth=0.5)
-            strip.plot(at[measured], errors[row][measured], color=BLUE, linewidth=0.7)
-            if not np.isfinite(errors[row][: analysis.half]).any():
-                middle = (at[0] + at[analysis.half]) / 2
-                strip.text(middle, 0, "calibration: no prediction", ha="center", va="bottom")
-            strip.set_title(f"{entry.model.title}: {entry.rmse:.3g}")
-            strip.set_ylabel("error")
-            limit = limits[row] if is_linear[row] else common
-            if limit > 0:
-                strip.set_ylim(-limit, limit)
-            command = record.command[analysis.scored]
-            for values, colour, width in (
-                (record.measured, GREY, 1.6),
-                (entry.prediction.tip, BLUE, 0.7),
-            ):
-                loop.plot(command, values[analysis.scored], color=colour, linewidth=width)
-            loop.set_ylabel("tip")
-            loop.locator_params(axis="x", nbins=3)
-        axes[0, 0].set_xlim(at[0], at[-1])
-        axes[-1, 0].set_xlabel("sample" if record.time is None else "time [s]")
-        axes[-1, 1].set_xlabel("command")
-        axes[0, 0].set_title("RMS over the second half (white)", loc="right", fontweight="normal")
-        axes[0, 1].set_title("measured", color=GREY, loc="left")
-        axes[0, 1].set_title("model", color=BLUE, loc="right", fontweight="bold")
-    return figure
+    count = len(analysis.entries)
+    axes = figure.subplots(count, 2, sharex="col", squeeze=False, width_ratios=(3.2, 1))
+    for row, entry in enumerate(analysis.entries):
+        strip, loop = axes[row]
+        strip.axvspan(at[0], at[analysis.half], color="#f0f0f0", linewidth=0)
+        strip.axhline(0, color=GREY, linewidth=0.5)
+        strip.plot(at[measured], errors[row][measured], color=BLUE, linewidth=0.7)
+        if not np.isfinite(errors[row][: analysis.half]).any():
+            middle = (at[0] + at[analysis.half]) / 2
+            strip.text(middle, 0, "calibration: no prediction", ha="center", va="bottom")
+        strip.set_title(f"{entry.model.title}: {entry.rmse:.3g}")
+        strip.set_ylabel("error")
+        limit = limits[row] if is_linear[row] else common
+        if limit > 0:
+            strip.set_ylim(-limit, limit)
+        command = record.command[analysis.scored]
+        for values, colour, width in (
+            (record.measured, GREY, 1.6),
+            (entry.prediction.tip, BLUE, 0.7),
+        ):
+            loop.plot(command, values[analysis.scored], color=colour, linewidth=width)
+        loop.set_ylabel("tip")
+        loop.locator_params(axis="x", nbins=3)
+    axes[0, 0].set_xlim(at[0], at[-1])
+    axes[-1, 0].set_xlabel("sample" if record.time is None else "time [s]")
+    axes[-1, 1].set_xlabel("command")
+    axes[0, 0].set_title("RMS over the second half (white)", loc="right", fontweight="normal")
+    axes[0, 1].set_title("measured", color=GREY, loc="left")
+    axes[0, 1].set_title("model", color=BLUE, loc="right", fontweight="bold")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,8 +22,9 @@ def add_parser(verbs: arguments.Verbs) -> None:
         help="compare models of hysteresis on a recorded file",
         description="Compare models of hysteresis on a CSV file with the positions of an actuator "
         "and its tip, each in any unit. Prints the RMS error of the predicted tip over the second "
-        "half. On-line estimators predict each sample before they use it. Lines without a command "
-        "are removed, with --time duplicate lines too; the counts are printed.",
+        "half: with every measured tip, and with the tip seen only after each 1, 3 and 10 % of the "
+        "command's range. On-line models predict each sample before they use it. Lines without a "
+        "command are removed, with --time duplicate lines too; the counts are printed.",
     )
     analyze.add_argument("file", type=Path, metavar="FILE.csv", help="CSV with a header line")
     analyze.add_argument(
@@ -75,20 +75,22 @@ def _run(options: argparse.Namespace) -> None:
 def _print(analysis: Analysis, folder: Path) -> None:
     from rich.table import Table  # noqa: PLC0415
 
+    from tautscope.analysis.comparison import HORIZONS  # noqa: PLC0415
+
     table = Table(box=None, pad_edge=False, title_justify="left", title_style="bold")
     table.title = "Error of the predicted tip, RMS over the second half [tip's unit]"
     table.add_column("model", no_wrap=True)
     table.add_column("fitted to", no_wrap=True)
-    for heading in ("RMS", "of linear fit", "gain", "width"):
+    horizons = [f"{100 * share:.0f} %" for share in HORIZONS]
+    for heading in ("every tip", *horizons, "gain", "width"):
         table.add_column(heading, justify="right", no_wrap=True)
     for entry in analysis.entries:
         parameters = entry.prediction.parameters
-        share = analysis.share(entry)
         table.add_row(
             entry.model.title,
             entry.model.fitted_to,
             f"{entry.rmse:.4g}",
-            "" if math.isnan(share) else f"{100 * share:.1f} %",
+            *(f"{error.rmse:.4g}" for error in entry.horizons),
             *(
                 f"{parameters[name]:.4g}" if name in parameters else ""
                 for name in ("gain", "width")
@@ -96,7 +98,12 @@ def _print(analysis: Analysis, folder: Path) -> None:
         )
     screen = console()
     screen.print(table)
-    screen.print(f"\n{_cleaning(analysis)}", soft_wrap=True)
+    screen.print(
+        "\nevery tip: models fitted off-line get the command alone. 1 % ...: the tip is seen only "
+        "after this share of the command's range; off-line models continue from the last tip seen.",
+        soft_wrap=True,
+    )
+    screen.print(_cleaning(analysis), soft_wrap=True)
     screen.print(f"Figure and samples: {folder / 'analyze.png'}", soft_wrap=True)
 
 

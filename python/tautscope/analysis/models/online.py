@@ -71,23 +71,34 @@ def predict(task: Task, make: Make) -> Prediction:
 
     The contact offsets are relative to gain * command.
     """
-    scale = input_scale(task)
-    distance = task.update_distance
-    if distance is None:
-        distance = UPDATE_SHARE * abs(scale.gain) * float(np.ptp(task.first_half[0]))
-    estimator = make(task.config, distance)
-    scaled = scale.gain * task.command + scale.offset
-    tip, minus, plus = estimator.run(scaled, task.measured)
+    scale, tip, minus, plus = run_estimator(task, make)
     tip[: scale.used] = np.nan
-    minus, plus = minus - scale.offset, plus - scale.offset
     parameters = {
         "gain": scale.gain,
-        "update_distance": distance,
+        "update_distance": update_distance(task, scale),
         "delta_minus": float(minus[-1]),
         "delta_plus": float(plus[-1]),
         "width": float(plus[-1] - minus[-1]),
     }
     return Prediction(tip, parameters, {"delta_minus": minus, "delta_plus": plus})
+
+
+def run_estimator(task: Task, make: Make) -> tuple[InputScale, Floats, Floats, Floats]:
+    """Scale of the input, and (n,) each: tip, delta_minus and delta_plus.
+
+    The tip of the samples that the scale was fitted to is no prediction.
+    """
+    scale = input_scale(task)
+    estimator = make(task.config, update_distance(task, scale))
+    tip, minus, plus = estimator.run(scale.gain * task.command + scale.offset, task.measured)
+    return scale, tip, minus - scale.offset, plus - scale.offset
+
+
+def update_distance(task: Task, scale: InputScale) -> float:
+    """Distance tau [tip's unit]: given, or `UPDATE_SHARE` of the scaled command's range."""
+    if task.update_distance is not None:
+        return task.update_distance
+    return UPDATE_SHARE * abs(scale.gain) * float(np.ptp(task.first_half[0]))
 
 
 def paper(config: Config, update_distance: float) -> OnlineEstimator:
@@ -102,7 +113,7 @@ def paper(config: Config, update_distance: float) -> OnlineEstimator:
     )
 
 
-def best(config: Config, update_distance: float) -> OnlineEstimator:
-    """The estimator of profile ``best``."""
+def ensemble(config: Config, update_distance: float) -> OnlineEstimator:
+    """The ensemble filter of profile ``best``."""
     unit = HALF_WIDTH * update_distance
     return TipFilter(core_settings(config), unit=unit, std=TIP_STD * update_distance)

@@ -33,7 +33,7 @@ class PrandtlIshlinskii:
 
     def predict(self, command: Floats) -> Floats:
         """Tip (n,) for a command (n,)."""
-        outputs = _operators(command, self.radii)
+        outputs = operators(command, self.radii)
         tip: Floats = self.offset + self.direction * (outputs @ np.array(self.weights))
         return tip
 
@@ -58,7 +58,7 @@ def fit(
         radii = tuple(largest * i / OPERATORS for i in range(OPERATORS))
     where = fit_samples(command, measured)
     target = measured[where]
-    outputs = _operators(command, radii)[where]
+    outputs = operators(command, radii)[where]
     means = outputs.mean(axis=0)
     centred = np.column_stack([outputs - means, target - target.mean()])
     small = np.asarray(np.linalg.qr(centred, mode="r"))
@@ -68,7 +68,8 @@ def fit(
     return PrandtlIshlinskii(radii, tuple(weights.tolist()), direction, offset)
 
 
-def _operators(command: Floats, radii: tuple[float, ...]) -> Floats:
+def operators(command: Floats, radii: tuple[float, ...]) -> Floats:
+    """Outputs (n, m) of plays of m radii, each started in the middle of its backlash."""
     return np.column_stack([operator(command, radius, 0.0) for radius in radii])
 
 

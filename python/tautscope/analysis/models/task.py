@@ -58,6 +58,21 @@ class Prediction:
     traces: Mapping[str, Floats] = field(default_factory=dict)
 
 
+def last_seen(measured: Floats) -> NDArray[np.intp]:
+    """(n,) index of the last measured tip before each sample; -1 if there is none."""
+    at = np.where(np.isfinite(measured), np.arange(len(measured)), -1)
+    return np.concatenate([[-1], np.maximum.accumulate(at)[:-1]])
+
+
+def continued(predicted: Floats, measured: Floats) -> Floats:
+    """Last measured tip plus the change of a prediction since then, (n,).
+
+    Before the first measured tip the prediction is unchanged.
+    """
+    at = last_seen(measured)
+    return predicted + np.where(at >= 0, (measured - predicted)[at], 0.0)
+
+
 def fit_samples(command: Floats, measured: Floats) -> NDArray[np.bool_]:
     """(n,) the samples for an off-line fit of hysteresis: tip measured, start forgotten.
 

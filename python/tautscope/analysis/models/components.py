@@ -1,0 +1,164 @@
+"""Components of the weighted mixture: predictions of the tip by different models of a record.
+
+All quantities are normalised: the command's range in the first half is 1 with 0 in its middle, and
+so is the tip's, whose direction is that of the command.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tautscope.analysis.models import constant_play, prandtl_ishlinskii
+from tautscope.analysis.models.task import Floats, continued, fit_samples
+from tautscope.analysis.models.tracked_regression import track
+
+RADII = 0.5 * (np.arange(12) / 12) ** 1.5
+"""Radii of the plays; small ones are closer to each other."""
+KNOTS = (-0.25, 0.0, 0.25)
+"""Where the generalised operator bends the output of every second play."""
+SPREAD, BENT_SPREAD, REFIT_SPREAD = 0.5, 0.2, 0.1
+"""Prior standard deviation of a coefficient: of the plays; of plays and their bent outputs, more of
+them than few tips determine; and of the scale of a fitted model."""
+WALKS = np.array([(d, w) for d in (0.003, 0.03, 0.3) for w in (0.0, 0.1)])
+REFIT_WALKS = np.array([(d, 0.0) for d in (0.003, 0.01, 0.03, 0.1, 0.3)])
+"""Random walks of disturbance and coefficients, see `track`."""
+FIRST_FIT, GROWTH = 8, 1.25
+"""Measured tips of the first fit, and factor to the next."""
+
+
+@dataclass(frozen=True, eq=False)
+class Refit:
+    """Errors of a component over past tips, computed anew after a fit.
+
+    Attributes:
+        count: Number of tips of the fit, which are also those of `errors`.
+        forgotten: The first tips, at which motion before the record still has an effect.
+        errors: (count, k) predicted minus measured, scaled for the parameters fitted to them.
+    """
+
+    count: int
+    forgotten: int
+    errors: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Component:
+    """Predictions by variants of one model.
+
+    Attributes:
+        name: Name in files and JSON.
+        predicted: (n, k) tip; sample j uses the tips measured before j. NaN without a prediction.
+        refits: In the order of time.
+    """
+
+    name: str
+    predicted: Floats
+    refits: list[Refit] = field(default_factory=list)
+
+
+class Fitted(Protocol):
+    """Parameters of a model of hysteresis."""
+
+    def predict(self, command: Floats) -> Floats:
+        """Tip (n,) for a command (n,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Signals:
+    """Normalised signals of a record.
+
+    Attributes:
+        command: (n,).
+        measured: (n,) tip, NaN where it was not measured.
+        at: (s,) the samples with a measured tip.
+        travel: (n,) travel of the command since the start.
+    """
+
+    command: Floats
+    measured: Floats
+    at: NDArray[np.intp] = field(init=False)
+    travel: Floats = field(init=False)
+
+    def __post_init__(self) -> None:
+        moved = np.abs(np.diff(self.command, prepend=self.command[0]))
+        object.__setattr__(self, "at", np.flatnonzero(np.isfinite(self.measured)))
+        object.__setattr__(self, "travel", np.cumsum(moved))
+
+
+def adaptive_operators(signals: Signals) -> Iterator[Component]:
+    """Prandtl-Ishlinskii operators whose weights are tracked on-line.
+
+    Plain: the weights of the plays. Generalised: besides, those of max(P_i - knot, 0), which bend
+    the output of a play, so that gain and slack may depend on position.
+    """
+    plain = prandtl_ishlinskii.operators(signals.command, tuple(RADII.tolist()))
+    bent = [np.maximum(plain[:, ::2] - knot, 0) for knot in KNOTS]
+    for name, features, spread in (
+        ("adaptive_plays", plain, SPREAD),
+        ("adaptive_bent_plays", np.column_stack([plain, *bent]), BENT_SPREAD),
+    ):
+        predicted = track(
+            features, signals.travel, signals.measured, signals.at, spread=spread, walks=WALKS
+        )
+        yield Component(name, predicted)
+
+
+def refitted_models(signals: Signals) -> Iterator[Component]:
+    """A constant play and a Prandtl-Ishlinskii operator, fitted to all past tips ever again."""
+    yield _refitted(
+        "refitted_play",
+        signals,
+        lambda command, measured: (constant_play.fit(command, measured), 4),
+    )
+    yield _refitted("refitted_prandtl_ishlinskii", signals, _fit_prandtl_ishlinskii)
+
+
+def _fit_prandtl_ishlinskii(command: Floats, measured: Floats) -> tuple[Fitted, int]:
+    found = prandtl_ishlinskii.fit(command, measured)
+    return found, 1 + sum(weight > 0 for weight in found.weights)
+
+
+def _refitted(
+    name: str, signals: Signals, fit: Callable[[Floats, Floats], tuple[Fitted, int]]
+) -> Component:
+    """A model that is fitted to all tips so far whenever their number has grown by `GROWTH`.
+
+    Variants: its output; its output with a scale and a disturbance that are tracked; and its change
+    since the last tip. At a fit, the errors over past tips become those of the new parameters.
+    They are optimistic, so they are scaled by Akaike's final prediction error (1969),
+    sqrt((N + p) / (N - p)) for p parameters fitted to N tips.
+    """
+    command, measured, at = signals.command, signals.measured, signals.at
+    variants = 2 + len(REFIT_WALKS)
+    predicted = np.full((len(command), variants), np.nan)
+    refits: list[Refit] = []
+    count = FIRST_FIT
+    while count < len(at):
+        following = int(np.ceil(GROWTH * count))
+        begin = at[count - 1] + 1
+        end = at[following - 1] + 1 if following < len(at) else len(command)
+        past = command[:begin]
+        model, parameters = fit(past, measured[:begin])
+        output = model.predict(command[:end])
+        tracked = track(
+            (output - output[:begin].mean())[:, None],
+            signals.travel[:end],
+            measured,
+            at[at < end],
+            spread=REFIT_SPREAD,
+            walks=REFIT_WALKS,
+        )
+        found = np.column_stack([output, tracked, continued(output, measured[:end])])
+        predicted[begin:end] = found[begin:end]
+        forgotten = int(np.argmax(fit_samples(past, measured[:begin])[at[:count]]))
+        used = count - forgotten
+        inflation = (used + parameters) / (used - parameters) if used > parameters + 2 else 9.0
+        errors = found[at[:count]] - measured[at[:count]][:, None]
+        refits.append(Refit(count, forgotten, np.nan_to_num(errors) * np.sqrt(inflation)))
+        count = following
+    return Component(name, predicted, refits)

@@ -1,0 +1,67 @@
+"""Linear regression of the tip whose coefficients are tracked by Kalman filters."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tautscope.analysis.models.task import Floats
+
+NOISE = 1e-3
+"""Standard deviation of a measured tip."""
+UNKNOWN = 10.0
+"""Prior standard deviation of the disturbance."""
+
+
+def track(
+    features: Floats,
+    travel: Floats,
+    tips: Floats,
+    at: NDArray[np.intp],
+    *,
+    spread: float,
+    walks: Floats,
+) -> Floats:
+    """Predict the tip by filters that differ in their process noise.
+
+        y_k = f_k^T w_k + d_k + v_k,   v_k ~ N(0, NOISE^2)
+        w, d: random walks in the travel of the command
+
+    f are the features, w their coefficients, d the disturbance: what the features do not explain.
+
+    Args:
+        features: (n, m).
+        travel: (n,) travel of the command since the start.
+        tips: (n,) the tip; read only at the samples `at`.
+        at: (s,) samples with a measured tip.
+        spread: Prior standard deviation of each coefficient; the prior mean of the first is 1, that
+            of the others 0.
+        walks: (k, 2) standard deviation after a travel of 1 of disturbance and coefficients, the
+            latter as a share of `spread`; one row per filter.
+
+    Returns:
+        (n, k) predicted tip; NaN up to the first measured tip. Sample j uses the tips before j.
+    """
+    samples, size = features.shape
+    rows = np.column_stack([features, np.ones(samples)])
+    diagonal = np.arange(size + 1)
+    state = np.zeros((len(walks), size + 1))
+    state[:, 0] = 1
+    covariance = np.zeros((len(walks), size + 1, size + 1))
+    covariance[:, diagonal, diagonal] = spread**2
+    covariance[:, size, size] = UNKNOWN**2
+    growth = np.empty((len(walks), size + 1))
+    growth[:, :size] = (walks[:, 1:] * spread) ** 2
+    growth[:, size] = walks[:, 0] ** 2
+    predicted = np.full((samples, len(walks)), np.nan)
+    moved = np.diff(travel[at], prepend=travel[at[0]])
+    for j, k in enumerate(at):
+        row = rows[k]
+        covariance[:, diagonal, diagonal] += growth * moved[j]
+        projected = covariance @ row
+        weight = projected / (projected @ row + NOISE**2)[:, None]
+        state += weight * (tips[k] - state @ row)[:, None]
+        covariance -= weight[:, :, None] * projected[:, None, :]
+        until = at[j + 1] + 1 if j + 1 < len(at) else samples
+        predicted[k + 1 : until] = rows[k + 1 : until] @ state.T
+    return predicted
