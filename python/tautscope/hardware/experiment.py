@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-import sys
+import logging
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -13,7 +13,7 @@ from typing import Any
 
 from tautscope.config import Config
 from tautscope.dof import Dof
-from tautscope.errors import DriveError, OutputError, TautscopeError
+from tautscope.errors import STOPPED, DriveError, OutputError, TautscopeError
 from tautscope.hardware.plausibility import PlausibilityMonitor
 from tautscope.hardware.realtime import (
     OTHERS,
@@ -38,6 +38,7 @@ from tautscope.runs.output_folder import check_free
 from tautscope.runs.recording import Floats, Recording, Table
 
 RigMaker = Callable[[Config], HardwareRig]
+_LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -187,11 +188,12 @@ def _run(
     with LogWriter(path, config, compensate=compensate, segments=reference.segments) as log:
 
         def warn(text: str) -> None:
-            print(f"warning: {text}", file=sys.stderr, flush=True)
+            _LOG.warning("%s", text)
             log.warn(text)
 
         rig.warn = warn
         executor = ThreadPoolExecutor(1, "vision", set_realtime_priority, (VISION,))
+        monitored = _MonitoredLog(log, config)
         try:
             recording = run_experiment(
                 rig,
@@ -199,13 +201,15 @@ def _run(
                 config,
                 compensate,
                 lambda elapsed, duration: progress(min(elapsed / duration, 1.0)),
-                log=_MonitoredLog(log, config),
+                log=monitored,
                 executor=executor,
                 watch=lambda supervision: _apply_reaction(rig, supervision),
             )
         except BaseException as error:
             log.warn(f"{type(error).__name__}: {error}")
             error.add_note(f"The log of the run is {path}")
+            if isinstance(error, TautscopeError) and monitored.has_begun:
+                error.exit_status = STOPPED
             raise
         finally:
             rig.close()
@@ -244,6 +248,11 @@ class _MonitoredLog:
         self._log = log
         self._config = config
         self._monitor: PlausibilityMonitor | None = None
+
+    @property
+    def has_begun(self) -> bool:
+        """Whether the loop has commanded the motors."""
+        return self._monitor is not None
 
     def tick(
         self, sample: Sample, reference: Floats, command: Floats, made_at: float | None = None

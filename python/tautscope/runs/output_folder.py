@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from tautscope.errors import OutputError
 
@@ -17,12 +18,42 @@ def check_free(path: str | PathLike[str]) -> Path:
     """Return the path if a new folder can be made there: nothing exists, or an empty folder.
 
     Raises:
-        OutputError: The path is taken.
+        OutputError: The path is taken, or cannot be written.
     """
     target = Path(path)
     if target.exists() and not (target.is_dir() and not any(target.iterdir())):
         raise OutputError("out", str(target), "a folder that is empty or does not exist yet")
+    check_writable(target)
     return target
+
+
+def check_free_file(path: str | PathLike[str]) -> Path:
+    """Return the path if a new file can be made there, in a folder that exists.
+
+    Raises:
+        OutputError: The path is taken, or cannot be written.
+    """
+    target = Path(path)
+    if target.exists():
+        raise OutputError("out", str(target), "a file that does not exist yet")
+    if not target.absolute().parent.is_dir():
+        raise OutputError("out", str(target), "a file in a folder that exists")
+    check_writable(target)
+    return target
+
+
+def check_writable(path: Path) -> None:
+    """Check that something can be made at a path, by making and removing a folder above it.
+
+    Raises:
+        OutputError: It cannot.
+    """
+    above = next(folder for folder in path.absolute().parents if folder.exists())
+    try:
+        with TemporaryDirectory(prefix=".tautscope-", dir=above):
+            pass
+    except OSError as error:
+        raise OutputError("out", str(path), f"a place that can be written ({error})") from None
 
 
 def default_folder(verb: str) -> Path:

@@ -1,0 +1,46 @@
+"""Types and ranges of configuration values in words."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec.inspect as types
+
+
+def allowed_values(kind: types.Type) -> str:
+    """The allowed values of a type in words: ``a number above 0``, ``"paper" or "best"``."""
+    match kind:
+        case types.LiteralType(values=values):
+            text = " or ".join(f'"{one}"' if isinstance(one, str) else str(one) for one in values)
+        case types.FloatType() | types.IntType():
+            text = (
+                "a number" if isinstance(kind, types.FloatType) else "a whole number"
+            ) + _bounds(kind)
+        case types.StrType():
+            text = "a text"
+        case types.BoolType():
+            text = "true or false"
+        case types.TupleType(item_types=items) if all(item == items[0] for item in items):
+            text = f"{len(items)} values, each {allowed_values(items[0])}"
+        case types.TupleType(item_types=items):
+            text = "a list of " + " and ".join(map(allowed_values, items))
+        case types.VarTupleType(item_type=item):
+            text = f"a list, each item {allowed_values(item)}"
+        case types.DictType(value_type=value):
+            text = f"a table, each value {allowed_values(value)}"
+        case types.UnionType(types=members):
+            some = (one for one in members if not isinstance(one, types.NoneType))
+            text = " or ".join(map(allowed_values, some))
+        case _:
+            text = "a table"
+    return text
+
+
+def _bounds(kind: Any) -> str:
+    low = f"above {kind.gt:,.12g}" if kind.gt is not None else ""
+    low = f"of at least {kind.ge:,.12g}" if kind.ge is not None else low
+    high = f"below {kind.lt:,.12g}" if kind.lt is not None else ""
+    high = f"of at most {kind.le:,.12g}" if kind.le is not None else high
+    if kind.ge is not None and kind.le is not None:
+        return f" from {kind.ge:,.12g} to {kind.le:,.12g}"
+    return "".join(f" {part}" for part in (low, "and" if low and high else "", high) if part)
