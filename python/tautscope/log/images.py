@@ -18,7 +18,7 @@ Image = NDArray[np.uint8]
 
 # Filtered and not compressed: the log's chunks are compressed, which is faster. OpenCV before 4.12
 # cannot choose the filter, and writes larger logs.
-_PNG = (cv2.IMWRITE_PNG_COMPRESSION, 0)
+_PNG: tuple[int, ...] = (cv2.IMWRITE_PNG_COMPRESSION, 0)
 if hasattr(cv2, "IMWRITE_PNG_FILTER"):
     _PNG += (cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_SUB)
 # JPEG's default subsampling of colour would remove most of the markers' contrast.
