@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from tautscope.commands import arguments
 from tautscope.commands.printing import print_json
 from tautscope.config import Config, load_config
-from tautscope.errors import FieldError
+from tautscope.errors import USAGE, CameraError, FieldError
 
 if TYPE_CHECKING:
     from tautscope.log.mcap_records import Damage
@@ -211,7 +211,11 @@ def _estimate_from_video(options: argparse.Namespace) -> int:
     config: Config = load_config(options.config, options.profile)
     folder = _folder(options)
     frames = read_video(options.video, config.camera, options.video_start)
-    replayed = estimate_from_video(frames, options.motors, config)
+    try:
+        replayed = estimate_from_video(frames, options.motors, config)
+    except CameraError as error:  # of a file, not of a rig
+        error.exit_status = USAGE
+        raise
     write_estimates(folder, replayed, None, as_json=options.json)
     if not options.json:
         images, motors = replayed.frames["captured_at"], replayed.trace["time"]
