@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import msgspec.inspect as types
@@ -34,6 +35,30 @@ def allowed_values(kind: types.Type) -> str:
         case _:
             text = "a table"
     return text
+
+
+def allowed_at(kind: Any, keys: Sequence[str]) -> str:
+    """The allowed values at a path of keys and indices within an annotation."""
+    place = types.type_info(kind)
+    for key in keys:
+        place = _member(place, key)
+    return allowed_values(place)
+
+
+def _member(kind: types.Type, key: str) -> Any:
+    """The type at a key of a section, list or table; the type itself if it has no members."""
+    match kind:
+        case types.StructType(fields=fields):
+            return next((field.type for field in fields if field.name == key), kind)
+        case types.TupleType(item_types=items) if key.isdecimal():
+            return items[min(int(key), len(items) - 1)]
+        case types.VarTupleType(item_type=item):
+            return item
+        case types.DictType(value_type=value):
+            return value
+        case types.UnionType(types=members):
+            return next((found for one in members if (found := _member(one, key)) is not one), kind)
+    return kind
 
 
 def _bounds(kind: Any) -> str:

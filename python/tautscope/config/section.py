@@ -9,10 +9,8 @@ from functools import cache
 from typing import Any, TypeVar, get_type_hints
 
 import msgspec
-import msgspec.inspect
 from msgspec import Struct
 
-from tautscope.config.ranges import allowed_values
 from tautscope.errors import ConfigError
 
 S = TypeVar("S")
@@ -104,9 +102,9 @@ def _config_error(
     for match in (unknown, missing):
         if match:
             path = _joined(path, match[1])
-    value, place = document, msgspec.inspect.type_info(kind)
-    for key in re.findall(r"[^.\[\]]+", path):
-        place = _member(place, key)
+    value: Any = document
+    keys = re.findall(r"[^.\[\]]+", path)
+    for key in keys:
         try:
             value = value[int(key)] if isinstance(value, list | tuple) else value[key]
         except (KeyError, TypeError, IndexError, ValueError):
@@ -117,24 +115,10 @@ def _config_error(
     elif missing:
         allowed = "a value: it has no default"
     else:
-        allowed = allowed_values(place)
+        from tautscope.config.ranges import allowed_at  # noqa: PLC0415  only errors need it
+
+        allowed = allowed_at(kind, keys)
     return ConfigError(_joined(prefix, path) or "config", value, allowed)
-
-
-def _member(kind: msgspec.inspect.Type | None, key: str) -> Any:
-    """The type at a key of a section, list or table; the type itself if it has no members."""
-    match kind:
-        case msgspec.inspect.StructType(fields=fields):
-            return next((field.type for field in fields if field.name == key), kind)
-        case msgspec.inspect.TupleType(item_types=items) if key.isdecimal():
-            return items[min(int(key), len(items) - 1)]
-        case msgspec.inspect.VarTupleType(item_type=item):
-            return item
-        case msgspec.inspect.DictType(value_type=value):
-            return value
-        case msgspec.inspect.UnionType(types=members):
-            return next((found for one in members if (found := _member(one, key)) is not one), kind)
-    return kind
 
 
 def _joined(*parts: str) -> str:

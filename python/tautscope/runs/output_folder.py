@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from tautscope.errors import OutputError
 
@@ -48,6 +47,8 @@ def check_writable(path: Path) -> None:
     Raises:
         OutputError: It cannot.
     """
+    from tempfile import TemporaryDirectory  # noqa: PLC0415  a tenth of the time to import the loop
+
     above = next(folder for folder in path.absolute().parents if folder.exists())
     try:
         with TemporaryDirectory(prefix=".tautscope-", dir=above):
