@@ -132,6 +132,7 @@ def test_a_bench_that_does_not_run_is_named(capsys: Capture, tmp_path: Path) -> 
     err = capsys.readouterr().err
     assert "1 run: about 1.5 min" in err  # three DOFs, three periods of 10 s
     assert f"error: No rig answers on unix:{tmp_path}/bench.video: start `tautscope bench`" in err
+    assert list(tmp_path.iterdir()) == [file]
 
 
 def test_verbose_prints_the_log(capsys: Capture, tmp_path: Path) -> None:

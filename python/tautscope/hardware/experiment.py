@@ -7,6 +7,7 @@ import logging
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -107,6 +108,7 @@ def run_on_hardware(
     """Run the article's protocol on the configured drives and camera, and log every run.
 
     The motors are quick-stopped and the log is closed on every exit, also after SIGTERM and SIGHUP.
+    A run that is refused before the loop begins leaves no log and no folder.
 
     Args:
         config: With a section ``drives``.
@@ -207,9 +209,15 @@ def _run(
             )
         except BaseException as error:
             log.warn(f"{type(error).__name__}: {error}")
-            error.add_note(f"The log of the run is {path}")
-            if isinstance(error, TautscopeError) and monitored.has_begun:
-                error.exit_status = STOPPED
+            if monitored.has_begun:
+                error.add_note(f"The log of the run is {path}")
+                if isinstance(error, TautscopeError):
+                    error.exit_status = STOPPED
+            else:  # nothing to keep: the same folder can be used again
+                log.close()
+                path.unlink()
+                with suppress(OSError):
+                    path.parent.rmdir()
             raise
         finally:
             rig.close()

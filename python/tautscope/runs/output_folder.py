@@ -54,7 +54,8 @@ def check_writable(path: Path) -> None:
         with TemporaryDirectory(prefix=".tautscope-", dir=above):
             pass
     except OSError as error:
-        raise OutputError("out", str(path), f"a place that can be written ({error})") from None
+        allowed = f"a place that can be written ({error.strerror})"
+        raise OutputError("out", str(path), allowed) from None
 
 
 def default_folder(verb: str) -> Path:
