@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import shutil
 import time
@@ -11,6 +12,8 @@ from os import PathLike
 from pathlib import Path
 
 from tautscope.errors import OutputError
+
+_LOG = logging.getLogger(__name__)
 
 
 def check_free(path: str | PathLike[str]) -> Path:
@@ -85,6 +88,7 @@ def new_folder(path: str | PathLike[str]) -> Iterator[Path]:
         if check_free(target).exists():
             target.rmdir()
         partial.rename(target)
+        _LOG.info("written: %s", target)
     except BaseException:
         shutil.rmtree(partial, ignore_errors=True)
         raise
