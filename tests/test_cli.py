@@ -82,7 +82,10 @@ def test_demo_writes_a_run_folder_and_prints_one_json_object(
     assert "8 runs: 100 %" in captured.err
     assert captured.out.count("\n") == 1
     found = json.loads(captured.out)
-    assert list(found) == ["profile", "seeds", "dof", "hand", "sim_seconds", "wall_seconds"]
+    assert list(found) == [
+        "folder", "profile", "seeds", "dof", "hand", "sim_seconds", "wall_seconds",
+    ]  # fmt: skip
+    assert found["folder"] == str(out)
     assert found["profile"] == "paper"
     assert found["seeds"] == [3, 4]
     assert list(found["dof"]) == ["insertion", "rotation", "bending"]
@@ -183,7 +186,7 @@ def test_a_failed_run_leaves_no_folder(
     monkeypatch.setattr(demo, "run_demo", partial(demo.run_demo, make_rig=make_bad_frame_rig))
     out = tmp_path / "run"
     assert main(["demo", "--config", config_file, "--out", str(out)]) == 2
-    assert "error: " in capsys.readouterr().err
+    assert "\nerror: " in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["short.toml"]
 
 
@@ -195,7 +198,7 @@ def test_a_run_in_which_motion_is_held_keeps_what_was_recorded(
 ) -> None:
     monkeypatch.setattr(demo, "run_demo", partial(demo.run_demo, make_rig=make_stalling_rig))
     out = tmp_path / "run"
-    assert main(["demo", "--config", config_file, "--out", str(out)]) == 2
+    assert main(["demo", "--config", config_file, "--out", str(out)]) == 4
     message = capsys.readouterr().err
     assert "error: Motion stopped at 1.510 s (hold_motion: late_tick" in message
     assert f"What was recorded until then: {out}" in message
@@ -206,8 +209,8 @@ def test_a_run_in_which_motion_is_held_keeps_what_was_recorded(
 
 def test_demo_names_an_invalid_input(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     nowhere = str(tmp_path / "nowhere")
-    assert "twin.background: got" in failed(capsys, "demo", "--background", nowhere)
-    assert "config: got" in failed(capsys, "demo", "--config", nowhere)
+    assert f"Folder not found: {nowhere}" in failed(capsys, "demo", "--background", nowhere)
+    assert f"File not found: {nowhere}" in failed(capsys, "demo", "--config", nowhere)
     (tmp_path / "notes.txt").write_text("mine")
     err = failed(capsys, "demo", "--out", str(tmp_path))
     assert f"out: got '{tmp_path}', expected a folder that is empty" in err
@@ -244,7 +247,13 @@ def test_a_bad_argument_is_named(
     assert message in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("verb", ["", "demo", "config", "analyze"])
+@pytest.mark.parametrize(
+    "verb",
+    [
+        "", "demo", "config", "analyze", "recover", "export", "replay", "run", "bench", "doctor",
+        "calibrate", "jog",
+    ],
+)  # fmt: skip
 def test_every_verb_has_help(capsys: pytest.CaptureFixture[str], verb: str) -> None:
     with pytest.raises(SystemExit) as stop:
         main([verb, "--help"] if verb else ["--help"])

@@ -1,10 +1,24 @@
 """Configuration: defaults, files, and errors that name the key."""
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
-from tautscope.config import Config, dump_config, from_document, load_config
+from tautscope.config import (
+    Config,
+    ControlConfig,
+    DofConfig,
+    ExperimentConfig,
+    InstrumentConfig,
+    Sine,
+    TwinConfig,
+    VisionConfig,
+    dump_config,
+    from_document,
+    load_config,
+)
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError, MissingPathError
 
@@ -100,7 +114,7 @@ def test_a_bad_value_is_named(tmp_path: Path, text: str, field: str, value: obje
 def test_a_missing_or_invalid_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"config: got '.*config\.toml', expected TOML"):
         loaded(tmp_path, "insertion = [")
-    with pytest.raises(MissingPathError, match=r"config: got '.*none\.toml'"):
+    with pytest.raises(MissingPathError, match=r"File not found: .*none\.toml"):
         load_config(tmp_path / "none.toml")
     with pytest.raises(MissingPathError):
         load_config(tmp_path)
@@ -117,3 +131,56 @@ def test_replace_checks_and_does_not_change_the_original() -> None:
 
 def test_an_empty_document_is_the_default() -> None:
     assert from_document({}) == Config()
+
+
+@pytest.mark.parametrize(
+    ("make", "field"),
+    [
+        (lambda: Config(profile="nope"), "profile"),
+        (lambda: Config(insertion=3), "insertion"),
+        (lambda: Config(drives={"node": 1}), "drives.node"),
+        (lambda: TwinConfig(image_noise=math.inf), "image_noise"),
+        (lambda: TwinConfig(latency=0.0), "latency_jitter"),
+        (lambda: VisionConfig(weights=(1.0, 2.0)), "weights"),
+        (lambda: VisionConfig(weights=(1.0, 2.0, "a")), "weights[2]"),
+        (lambda: InstrumentConfig(marker_a=14e-3), "marker_a"),
+        (lambda: ControlConfig(period=1e-4), "history"),
+        (
+            lambda: DofConfig(
+                update_distance=1.0, observable_deviation=1.0, start_deviation=1.0, free_gain=6.0
+            ),
+            "free_gain",
+        ),
+        (
+            lambda: Config(
+                experiment=ExperimentConfig(bending=Sine(centre=0.9, amplitude=0.9, period=2.0))
+            ),
+            "experiment.bending.period",
+        ),
+    ],
+)
+def test_a_constructor_checks_as_a_file_does(make: Callable[[], object], field: str) -> None:
+    with pytest.raises(ConfigError) as error:
+        make()
+    assert error.value.field == field
+    assert error.value.allowed
+
+
+def test_numpy_numbers_become_pythons() -> None:
+    vision = VisionConfig(weights=np.array([1, 2, 3]), smoothing=np.int64(2))  # type: ignore[arg-type]
+    assert vision == VisionConfig(weights=(1.0, 2.0, 3.0), smoothing=2)
+    assert [type(weight) for weight in vision.weights] == [float, float, float]
+    changes = {"twin.seed": np.uint8(7), "camera.distortion": np.zeros(8), "insertion.free_gain": 3}
+    config = Config().replace(**changes)
+    assert config == Config().replace(
+        **{"twin.seed": 7, "camera.distortion": (0.0,) * 8, "insertion.free_gain": 3.0}
+    )
+    with pytest.raises(ConfigError, match=r"insertion\.free_gain"):
+        Config().replace(**{"insertion.free_gain": np.float64(0.5)})
+
+
+def test_shipped_configurations_have_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert load_config("bench") == load_config(CONFIGS / "bench.toml")
+    monkeypatch.chdir(tmp_path)
+    Path("bench").write_text("profile = 'paper'")
+    assert load_config("bench").profile == "paper"

@@ -78,6 +78,10 @@ def __getattr__(name: str) -> Any:
         return import_module(f"tautscope.{name}")
     if name not in _LOCATIONS:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    if name == "Twin":
+        from tautscope.extras import require_extras  # noqa: PLC0415
+
+        require_extras("tautscope.Twin", ["twin"])
     value = getattr(import_module(f"tautscope.{_LOCATIONS[name]}"), name)
     globals()[name] = value
     return value

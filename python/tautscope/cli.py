@@ -3,60 +3,111 @@
 from __future__ import annotations
 
 import argparse
+import logging
+import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 from tautscope._core import __version__
-from tautscope.commands import analyze, arguments, bench, demo, doctor, hardware, log
-from tautscope.config import dump_config, load_config
+from tautscope.commands import (
+    analyze,
+    arguments,
+    bench,
+    calibrate,
+    config,
+    demo,
+    doctor,
+    hardware,
+    jog,
+    log,
+)
 from tautscope.errors import TautscopeError
+from tautscope.extras import require_extras
+
+INTERRUPTED, CLOSED_PIPE = 128 + 2, 128 + 13
+"""Exit status after SIGINT and SIGPIPE, as of a shell."""
+_STATUS = """exit status:
+  0    success
+  1    the result is negative: replay differs, doctor found something missing
+  2    bad input: options, files, configuration, a missing extra
+  3    refused by the rig: bus, drive or camera; nothing moved
+  4    stopped for safety: the motors are stopped, or motion of the loop is held
+  130  interrupted, 141 output pipe closed, 143 terminated
+"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command. Exit status: 0 success, 2 an error of the user, 130 interrupted.
-
-    `replay` returns 1 if an output differs from the recorded one, `doctor` if something is missing.
-    """
-    options = _parser().parse_args(arguments)
+    """Run the command line; its exit status, see ``tautscope --help``."""
     try:
-        return options.run(options) or 0
+        try:
+            return _main(arguments)
+        finally:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        # The interpreter flushes again when it ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return CLOSED_PIPE
+
+
+def _main(arguments: Sequence[str] | None) -> int:
+    parser = _parser()
+    if "_ARGCOMPLETE" in os.environ:
+        import argcomplete  # noqa: PLC0415  only the shell's completion needs it
+
+        argcomplete.autocomplete(parser)
+    options = parser.parse_args(arguments)
+    try:
+        with _logging(options.verbose):
+            require_extras(f"tautscope {options.verb}", options.extras)
+            return options.run(options) or 0
     except TautscopeError as error:
         print("\n".join([f"error: {error}", *getattr(error, "__notes__", ())]), file=sys.stderr)
-        return 2
+        return error.exit_status
     except KeyboardInterrupt:
         print("interrupted; nothing was written", file=sys.stderr)
-        return 130
+        return INTERRUPTED
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="tautscope",
         description="Hysteresis compensation for robotic flexible endoscopic instruments, from the "
-        "endoscope's own images. Research software, not a medical device.",
+        "endoscope's own images.\nResearch software, not a medical device.",
+        epilog=_STATUS,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
     parser.add_argument("--version", action="version", version=f"tautscope {__version__}")
+    arguments.add_verbose(parser)
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
     demo.add_parser(verbs)
-    _add_config_parser(verbs)
+    config.add_parser(verbs)
     analyze.add_parser(verbs)
     log.add_parsers(verbs)
     hardware.add_parser(verbs)
     bench.add_parser(verbs)
     doctor.add_parser(verbs)
+    calibrate.add_parser(verbs)
+    jog.add_parser(verbs)
     return parser
 
 
-def _add_config_parser(verbs: arguments.Verbs) -> None:
-    config = verbs.add_parser(
-        "config",
-        allow_abbrev=False,
-        help="print the configuration",
-        description="Print the configuration as TOML, with all defaults.",
-    )
-    arguments.add_config(config)
-    config.set_defaults(run=_config)
+@contextmanager
+def _logging(verbosity: int) -> Iterator[None]:
+    """Print the log of the package on stderr: warnings, with ``-v`` more."""
 
+    class Formatter(logging.Formatter):
+        def format(self, record: logging.LogRecord) -> str:
+            return f"{record.levelname.lower()}: {record.getMessage()}"
 
-def _config(options: argparse.Namespace) -> None:
-    print(dump_config(load_config(options.config)), end="")
+    logger, handler = logging.getLogger("tautscope"), logging.StreamHandler()
+    handler.setFormatter(Formatter())
+    level = logger.level
+    logger.addHandler(handler)
+    logger.setLevel((logging.WARNING, logging.INFO, logging.DEBUG)[min(verbosity, 2)])
+    try:
+        yield
+    finally:
+        logger.removeHandler(handler)
+        logger.setLevel(level)

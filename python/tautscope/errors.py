@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
+
+USAGE, REFUSED, STOPPED = 2, 3, 4
+"""Exit status of the command line: bad input; refused by the rig; stopped for safety."""
 
 
 class TautscopeError(Exception):
-    """Base class of all errors of this package."""
+    """Base class of all errors of this package.
+
+    Attributes:
+        exit_status: Exit status of a command that ends with it.
+    """
+
+    exit_status = USAGE
 
 
 class FieldError(TautscopeError, ValueError):
@@ -47,9 +57,38 @@ class RecordError(FieldError):
 class MissingPathError(FieldError):
     """A file or folder does not exist, or has no usable content."""
 
+    def __str__(self) -> str:
+        if Path(str(self.value)).exists():
+            return super().__str__()
+        kind = "Folder" if "folder" in self.allowed else "File"
+        return f"{kind} not found: {self.value}. Expected {self.allowed}"
+
 
 class OutputError(FieldError):
     """A result cannot be written to the given place."""
+
+
+class MissingExtraError(TautscopeError, ImportError):
+    """An optional dependency is not installed.
+
+    Args:
+        what: What needs it.
+        modules: The missing modules.
+        extras: The extras of this package that install them.
+    """
+
+    def __init__(self, what: str, modules: tuple[str, ...], extras: tuple[str, ...]) -> None:
+        self.what = what
+        self.modules = modules
+        self.extras = extras
+        super().__init__(what, modules, extras)
+
+    def __str__(self) -> str:
+        extras = ",".join(self.extras)
+        return (
+            f"{self.what} needs {', '.join(self.modules)}; type: "
+            f'python -m pip install "tautscope[{extras}]"'
+        )
 
 
 class MotionHeldError(TautscopeError):
@@ -63,6 +102,8 @@ class MotionHeldError(TautscopeError):
     Attributes:
         recording: `tautscope.runs.recording.Recording` of the run up to its end, if there is one.
     """
+
+    exit_status = STOPPED
 
     def __init__(self, time: float, reaction: str, flags: tuple[str, ...]) -> None:
         self.time = time
@@ -87,6 +128,8 @@ class DriveError(TautscopeError):
         what: What happened.
         remedy: What to do.
     """
+
+    exit_status = REFUSED
 
     def __init__(self, node: str, what: str, remedy: str) -> None:
         self.node = node
@@ -136,6 +179,15 @@ class FollowingError(DriveError):
 
 class CameraError(FieldError):
     """A camera is missing, or does not deliver usable images."""
+
+    exit_status = REFUSED
+
+
+class NoRigError(CameraError):
+    """Nothing answers on the sockets of the bench."""
+
+    def __str__(self) -> str:
+        return f"No rig answers on {self.value}: start `tautscope bench`"
 
 
 class CameraMismatchError(CameraError):

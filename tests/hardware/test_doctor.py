@@ -55,7 +55,7 @@ def doctor(
     if found is not None:
         file = folder / "rig.toml"
         file.write_text(dump_config(from_document(found)), encoding="utf-8")
-        arguments.append(str(file))
+        arguments += ["--config", str(file)]
     status = main(arguments)
     output = json.loads(capsys.readouterr().out)
     assert output["complete"] == (status == 0)
@@ -137,7 +137,7 @@ def test_interlaced_dv_is_reported_as_fields(
     assert source["data"]["interlaced"] is True
     assert source["data"]["rate"] == pytest.approx(50, rel=0.5)
     assert status == 1
-    assert "configs/article_rig.toml" in found["configuration"]["todo"]
+    assert "article_rig" in found["configuration"]["todo"]
 
 
 def test_missing_camera_and_bus(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -170,13 +170,13 @@ def test_text_output_contains_the_remedy(
     monkeypatch.setattr(os, "sched_setscheduler", refuse)
     file = tmp_path / "rig.toml"
     file.write_text("[camera.source]\nurl = '/dev/video99'\n")
-    assert main(["doctor", str(file)]) == 1
+    assert main(["doctor", "--config", str(file)]) == 1
     output = capsys.readouterr().out
     assert "MISSING real-time priority: SCHED_FIFO is not permitted" in output
     assert "rtprio 60" in output
     assert "memlock unlimited" in output
     assert output.endswith("3 missing. No motor was enabled.\n")
-    assert main(["doctor", str(tmp_path / "none.toml")]) == 2
+    assert main(["doctor", "--config", str(tmp_path / "none.toml")]) == 2
 
 
 def missing(findings: list[CheckResult]) -> dict[str, CheckResult]:

@@ -16,15 +16,16 @@ if TYPE_CHECKING:
 
 def add_parser(verbs: arguments.Verbs) -> None:
     """Add the verb ``analyze``."""
-    analyze = verbs.add_parser(
+    analyze = arguments.add_verb(
+        verbs,
         "analyze",
-        allow_abbrev=False,
         help="compare models of hysteresis on a recorded file",
         description="Compare models of hysteresis on a CSV file with the positions of an actuator "
         "and its tip, each in any unit. Prints the RMS error of the predicted tip over the second "
         "half: with every measured tip, and with the tip seen only after each 1, 3 and 10 % of the "
         "command's range. On-line models predict each sample before they use it. Lines without a "
         "command are removed, with --time duplicate lines too; the counts are printed.",
+        extras=["analysis"],
     )
     analyze.add_argument("file", type=Path, metavar="FILE.csv", help="CSV with a header line")
     analyze.add_argument(
@@ -67,7 +68,7 @@ def _run(options: argparse.Namespace) -> None:
     analysis = analyze(record, config, options.update_distance, options.gain)
     write_analysis(analysis, folder)
     if options.json:
-        print_json(analysis.to_json())
+        print_json({"folder": str(folder), **analysis.to_json()})
     else:
         _print(analysis, folder)
 

@@ -4,18 +4,56 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TypeAlias, get_args
 
-from tautscope.config import Profile
+from tautscope.config import RIGS, Profile
 
 Verbs: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 
-def add_config(parser: argparse.ArgumentParser) -> None:
-    """``--config``."""
+def add_verb(
+    verbs: Verbs, name: str, *, help: str, description: str, extras: Sequence[str] = ()
+) -> argparse.ArgumentParser:
+    """Add a verb to the command line.
+
+    Args:
+        verbs: The verbs so far.
+        name: Its name.
+        help: One line for the list of verbs.
+        description: Text of its own ``--help``.
+        extras: Extras of the package that it needs; `tautscope.cli.main` checks them first.
+    """
+    parser = verbs.add_parser(name, allow_abbrev=False, help=help, description=description)
+    parser.set_defaults(extras=tuple(extras))
+    add_verbose(parser, default=argparse.SUPPRESS)
+    return parser
+
+
+def add_verbose(parser: argparse.ArgumentParser, default: int | str = 0) -> None:
+    """``-v``, before or after the verb."""
     parser.add_argument(
-        "--config", metavar="FILE", help="TOML file; missing keys have their defaults"
+        "-v",
+        "--verbose",
+        action="count",
+        default=default,
+        help="print what is done; -vv prints details",
+    )
+
+
+def add_config(
+    parser: argparse.ArgumentParser, *, required: bool = False, default: str | None = None
+) -> None:
+    """``--config``."""
+    shown = "" if default is None else " [%(default)s]"
+    parser.add_argument(
+        "--config",
+        required=required,
+        default=default,
+        metavar="FILE",
+        help="TOML file, or the name of a shipped one: "
+        f"{', '.join(RIGS)}; missing keys have their defaults{shown}",
     )
 
 
@@ -38,7 +76,9 @@ def add_out(parser: argparse.ArgumentParser, verb: str) -> None:
 
 def add_json(parser: argparse.ArgumentParser) -> None:
     """``--json``."""
-    parser.add_argument("--json", action="store_true", help="print one JSON object only")
+    parser.add_argument(
+        "--json", action="store_true", help="print one JSON object only, in one line"
+    )
 
 
 def natural(text: str) -> int:

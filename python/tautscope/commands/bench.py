@@ -17,22 +17,21 @@ from tautscope.errors import ConfigError
 if TYPE_CHECKING:
     from tautscope.bench.rig import Bench
 
-BENCH = "configs/bench.toml"
-
 
 def add_parser(verbs: arguments.Verbs) -> None:
     """Add the command to the parser."""
-    bench = verbs.add_parser(
+    bench = arguments.add_verb(
+        verbs,
         "bench",
-        allow_abbrev=False,
         help="run a simulated rig: drives and a camera for `tautscope run`",
         description="Run a simulated rig for another process: the simulated instrument behind "
         "three CiA 402 drives on a CAN bus and a camera stream, in real time. Ends with its input, "
         "or Ctrl-C. A line of input injects a fault: KIND PART, with the part insertion, rotation, "
         "bending (drop, delay, fault, freeze, heartbeat, refuse) or camera (drop, delay, fault: "
         "unplugged, freeze); clear PART ends it. Events are written as JSON lines.",
+        extras=["hardware", "twin"],
     )
-    bench.add_argument("--config", default=BENCH, metavar="FILE", help="TOML file [%(default)s]")
+    arguments.add_config(bench, default="bench")
     bench.add_argument(
         "--faults",
         nargs="+",

@@ -3,29 +3,40 @@
 from __future__ import annotations
 
 import argparse
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tautscope.commands import arguments
 from tautscope.commands.held_run import recording_saved
-from tautscope.commands.printing import console, print_json
+from tautscope.commands.printing import announce, console, print_json
 from tautscope.config import DISTURBANCES, Config, load_config
 from tautscope.errors import MissingPathError
+from tautscope.loop.references import SineSequence
 
 if TYPE_CHECKING:
     from tautscope.report.demo import Demo
+    from tautscope.runs.trials import Trial
+
+SPEED = 12.0
+"""Simulated seconds per second and processor, measured on two shared cores in 2026."""
+START_TIME = 5.0
+"""Time for the start of the processes and for figures [s]."""
+BYTES_PER_SECOND = 80e3
+"""Size of the run folder per simulated second of the first seed [byte/s]."""
 
 
 def add_parser(verbs: arguments.Verbs) -> None:
     """Add the verb ``demo``."""
-    demo = verbs.add_parser(
+    demo = arguments.add_verb(
+        verbs,
         "demo",
-        allow_abbrev=False,
         help="run the article's experiment on the simulated instrument",
         description="Run the article's experiment and an operator motion on the simulated "
         "instrument, each with and without compensation, with camera images as the only feedback. "
         "Prints Table 1 with the article's values and the tracking error of the operator motion, "
         "and writes a run folder with tables, traces, figures and a report.",
+        extras=["twin"],
     )
     arguments.add_profile(
         demo, "compensation scheme: the article's alone (paper), or also our own (best)"
@@ -34,14 +45,14 @@ def add_parser(verbs: arguments.Verbs) -> None:
         "--seed",
         type=arguments.natural,
         metavar="N",
-        help="first seed [twin.seed of the configuration]",
+        help="seed of the instrument, or of the first one [twin.seed of the configuration]",
     )
     demo.add_argument(
         "--seeds",
         type=arguments.positive,
         default=1,
         metavar="N",
-        help="number of seeds [%(default)s]",
+        help="number of instruments, with seeds N, N+1, ...; tables are of all [%(default)s]",
     )
     demo.add_argument(
         "--background", metavar="DIR", help="folder of images to use as tissue [procedural mucosa]"
@@ -66,26 +77,39 @@ def _run(options: argparse.Namespace) -> None:
     folder = check_free(options.out or default_folder("demo"))
     first = config.twin.seed
     seeds = range(first, first + options.seeds)
-    runs = len(seeds) * len(demo.demo_trials(config))
+    trials = demo.demo_trials(config)
+    runs = len(seeds) * len(trials)
+    seconds = sum(map(_duration, trials))
+    processors = min(os.cpu_count() or 1, runs)
+    announce(
+        f"{runs} runs with {'seeds' if len(seeds) > 1 else 'seed'} {', '.join(map(str, seeds))}",
+        len(seeds) * seconds / SPEED / processors + START_TIME,
+        seconds * BYTES_PER_SECOND,
+        folder,
+    )
     with recording_saved(folder), progress_bar(f"{runs} runs") as progress:
         found = demo.run_demo(config, seeds, progress)
     demo.write_run_folder(found, folder)
     if options.json:
-        print_json(
-            tables.to_json(
-                config.profile,
-                seeds,
-                found.results,
-                found.operator_results,
-                sim_seconds=found.sim_seconds,
-                wall_seconds=found.wall_seconds,
-                article_results=found.article_results,
-            )
+        document = tables.to_json(
+            config.profile,
+            seeds,
+            found.results,
+            found.operator_results,
+            sim_seconds=found.sim_seconds,
+            wall_seconds=found.wall_seconds,
+            article_results=found.article_results,
         )
+        print_json({"folder": str(folder), **document})
     else:
         _print_table1(found)
         _print_operator_motion(found)
         _print_facts(found, folder)
+
+
+def _duration(trial: Trial) -> float:
+    """Simulated time of a run [s]."""
+    return (trial.motion or SineSequence(trial.config.experiment)).duration
 
 
 def _load(options: argparse.Namespace) -> Config:

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import itertools
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
 from tautscope.commands.printing import print_json
 from tautscope.config import load_config
+from tautscope.config.placeholders import MARK, placeholders
+from tautscope.extras import missing_modules
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from tautscope.config import Config
     from tautscope.hardware.doctor.check_result import CheckResult
@@ -19,15 +22,15 @@ if TYPE_CHECKING:
 
 def add_parser(verbs: arguments.Verbs) -> None:
     """Add the command to the parser."""
-    doctor = verbs.add_parser(
+    doctor = arguments.add_verb(
+        verbs,
         "doctor",
-        allow_abbrev=False,
         help="check a rig, and say what is missing and what to do",
         description="Check the computer, its cameras and CAN interfaces; with a configuration, "
         "open its camera, configure its drives and read the settings back. No motor is enabled. "
         "Exit status 0 if nothing is missing, else 1.",
     )
-    doctor.add_argument("config", nargs="?", metavar="CONFIG", help="TOML file of a rig")
+    arguments.add_config(doctor)
     arguments.add_json(doctor)
     doctor.set_defaults(run=_doctor)
 
@@ -47,13 +50,17 @@ def run_checks(config: Config, *, is_rig: bool, folder: Path) -> Iterator[CheckR
     yield computer.check_disk(config, folder)
     yield camera.check_devices(needed=not is_rig)
     yield drives.check_interfaces(needed=not is_rig)
+    if missing_modules("hardware"):
+        return
     if not is_rig:
-        todo = "uv run tautscope doctor CONFIG; start from configs/article_rig.toml"
+        todo = (
+            "tautscope doctor --config rig.toml; start from `tautscope config --config article_rig`"
+        )
         yield CheckResult("drives", "configuration", "note", "none: no device was opened", todo)
         return
     yield from camera.check_source(config.camera)
     if config.drives is None:
-        todo = "Add a section [drives] as in configs/article_rig.toml; docs/hardware.md explains it"
+        todo = "Add a section [drives] as in `tautscope config --config article_rig`"
         yield CheckResult("drives", "configuration", "missing", "no section [drives]", todo)
         return
     if config.control.period != config.drives.cycle:
@@ -67,9 +74,11 @@ def _doctor(options: argparse.Namespace) -> int:
     from tautscope.hardware.signals import exit_on_signals  # noqa: PLC0415
 
     config = load_config(options.config)
+    marked = placeholders(options.config)
     findings: list[CheckResult] = []
     with exit_on_signals():
-        for found in run_checks(config, is_rig=options.config is not None, folder=Path.cwd()):
+        checks = run_checks(config, is_rig=options.config is not None, folder=Path.cwd())
+        for found in itertools.chain(_check_placeholders(marked), checks):
             findings.append(found)
             if not options.json:
                 _print(found)
@@ -81,6 +90,15 @@ def _doctor(options: argparse.Namespace) -> int:
     else:
         print("\nAll there. No motor was enabled.")
     return 1 if missing else 0
+
+
+def _check_placeholders(marked: Sequence[str]) -> Iterator[CheckResult]:
+    from tautscope.hardware.doctor.check_result import CheckResult  # noqa: PLC0415
+
+    if marked:
+        todo = f"Replace each value, then delete the word {MARK} beside it"
+        found = f"not replaced: {', '.join(marked)}"
+        yield CheckResult("configuration", "placeholders", "missing", found, todo)
 
 
 def _print(found: CheckResult) -> None:

@@ -24,7 +24,11 @@ def write_estimates(
     after = estimation_quality(replayed, recorded)
     before = None if recorded is None else estimation_quality(recorded)
     if as_json:
-        document: dict[str, Any] = {"images": len(replayed.frames), "dof": {}}
+        document: dict[str, Any] = {
+            "folder": str(folder),
+            "images": len(replayed.frames),
+            "dof": {},
+        }
         for dof, figures in after.items():
             entry = {"replayed": _finite(figures)}
             if before is not None:

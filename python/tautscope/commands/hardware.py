@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
 from tautscope.commands.held_run import recording_saved
-from tautscope.commands.printing import print_json
+from tautscope.commands.printing import announce, print_json
 from tautscope.config import load_config
+from tautscope.config.placeholders import refuse_placeholders
 from tautscope.dof import Dof
+from tautscope.loop.references import SineSequence
 
 if TYPE_CHECKING:
     from tautscope.report.results import DofResult
@@ -19,21 +21,28 @@ if TYPE_CHECKING:
 
 def add_parser(verbs: arguments.Verbs) -> None:
     """Add the command to the parser."""
-    run = verbs.add_parser(
+    run = arguments.add_verb(
+        verbs,
         "run",
-        allow_abbrev=False,
         help="run the article's experiment on the drives and camera of a configuration",
         description="Run the article's experiment on the drives and the camera of a configuration. "
         "THE MOTORS MOVE. Writes a folder with the log, tables, a timing figure and a report. On "
         "every exit the motors are quick-stopped. Research software, not a medical device; have an "
         "emergency stop within reach.",
+        extras=["hardware"],
     )
-    run.add_argument("config", metavar="CONFIG.toml", help="configuration of the rig")
+    arguments.add_config(run, required=True)
     arguments.add_profile(run, "how slack is compensated")
     run.add_argument(
         "--compare",
         action="store_true",
         help="run without compensation first, and print Table 1 from the state estimates",
+    )
+    run.add_argument(
+        "--periods",
+        type=arguments.positive,
+        metavar="N",
+        help="periods of the reference per DOF [experiment.periods of the configuration]",
     )
     arguments.add_out(run, "run")
     arguments.add_json(run)
@@ -42,11 +51,18 @@ def add_parser(verbs: arguments.Verbs) -> None:
 
 def _run(options: argparse.Namespace) -> int:
     from tautscope.commands.progress import progress_bar  # noqa: PLC0415
+    from tautscope.hardware.doctor.computer import bytes_per_second  # noqa: PLC0415
     from tautscope.hardware.experiment import run_on_hardware, write_run_folder  # noqa: PLC0415
-    from tautscope.runs.output_folder import default_folder  # noqa: PLC0415
+    from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
 
     config = load_config(options.config, options.profile)
-    folder = options.out or default_folder("run")
+    refuse_placeholders(options.config)
+    if options.periods is not None:
+        config = config.replace(**{"experiment.periods": options.periods})
+    folder = check_free(options.out or default_folder("run"))
+    runs = 2 if options.compare else 1
+    seconds = runs * SineSequence(config.experiment).duration
+    announce(f"{runs} run{'s' * (runs > 1)}", seconds, seconds * bytes_per_second(config), folder)
     try:
         with recording_saved(folder), progress_bar("run") as progress:
             found = run_on_hardware(config, folder, progress, compare=options.compare)
@@ -56,7 +72,7 @@ def _run(options: argparse.Namespace) -> int:
         return 130
     write_run_folder(found, folder)
     if options.json:
-        print_json(found.to_json())
+        print_json({"folder": str(folder), **found.to_json()})
         return 0
     timing = found.compensated.timing.summary()
     print(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from tautscope.commands import arguments
 from tautscope.commands.printing import print_json
 from tautscope.config import Config, load_config
-from tautscope.errors import FieldError
+from tautscope.errors import USAGE, CameraError, FieldError
 
 if TYPE_CHECKING:
     from tautscope.log.mcap_records import Damage
@@ -19,25 +19,28 @@ if TYPE_CHECKING:
 
 def add_parsers(verbs: arguments.Verbs) -> None:
     """Add the three commands."""
-    recover = verbs.add_parser(
+    recover = arguments.add_verb(
+        verbs,
         "recover",
-        allow_abbrev=False,
         help="repair a truncated log",
         description="Copy the undamaged messages of a log into a new file that every MCAP reader "
         "can open. The old file is not changed.",
+        extras=["hardware"],
     )
     recover.add_argument("file", type=Path, metavar="FILE.mcap")
     recover.add_argument(
         "--out", type=Path, metavar="FILE", help="new file [FILE-recovered.mcap beside it]"
     )
+    arguments.add_json(recover)
     recover.set_defaults(run=_recover)
 
-    export = verbs.add_parser(
+    export = arguments.add_verb(
+        verbs,
         "export",
-        allow_abbrev=False,
         help="export a log as CSV or as a rosbag2 folder",
         description="Export a log, complete or truncated, as CSV (one line per tick, one line per "
         "image) or as a rosbag2 folder.",
+        extras=["hardware"],
     )
     export.add_argument("file", type=Path, metavar="FILE.mcap")
     kinds = export.add_mutually_exclusive_group(required=True)
@@ -50,16 +53,18 @@ def add_parsers(verbs: arguments.Verbs) -> None:
         help="folder, new or empty [FILE-csv beside it]",
     )
     kinds.add_argument("--rosbag", type=Path, metavar="DIR", help="folder, new or empty")
+    arguments.add_json(export)
     export.set_defaults(run=_export)
 
-    replay = verbs.add_parser(
+    replay = arguments.add_verb(
+        verbs,
         "replay",
-        allow_abbrev=False,
         help="replay a log, or a video with motor positions",
         description="Replay the inputs of a log through the loop. With the log's configuration the "
         "outputs must be identical, bit for bit (exit status 1 if not). With another "
         "configuration, or from a video and a CSV of motor positions with columns time [s], "
         "insertion [m], rotation and bending [rad], estimate states and offsets only.",
+        extras=["hardware"],
     )
     replay.add_argument("file", type=Path, nargs="?", metavar="FILE.mcap")
     replay.add_argument("--video", metavar="FILE", help="video instead of a log; needs --motors")
@@ -84,6 +89,16 @@ def _recover(options: argparse.Namespace) -> None:
     file: Path = options.file
     recovery = recover(file, options.out or file.with_name(f"{file.stem}-recovered.mcap"))
     duration = (recovery.last - recovery.first) / 1e9
+    if options.json:
+        print_json(
+            {
+                "file": str(recovery.path),
+                "messages": recovery.messages,
+                "seconds": duration,
+                "damage": _damage(recovery.damage),
+            }
+        )
+        return
     print(f"{recovery.path}: {sum(recovery.messages.values())} messages over {duration:.1f} s.")
     if not recovery.damage:
         print(f"{file} was complete.")
@@ -96,13 +111,25 @@ def _export(options: argparse.Namespace) -> None:
     file: Path = options.file
     if options.rosbag is not None:
         recovery = export_rosbag(file, options.rosbag)
+        if options.json:
+            damage = _damage(recovery.damage)
+            bag = str(options.rosbag)
+            print_json({"folder": bag, "messages": recovery.messages, "damage": damage})
+            return
         print(f"{options.rosbag}: {sum(recovery.messages.values())} messages.")
         _print_damage(file, recovery.damage)
         return
     folder = options.csv if options.csv != Path() else file.with_name(f"{file.stem}-csv")
-    damage = export_csv(file, folder)
+    found = export_csv(file, folder)
+    if options.json:
+        print_json({"folder": str(folder), "damage": _damage(found)})
+        return
     print(f"{folder}: trace.csv, frames.csv, recording.toml, config.toml.")
-    _print_damage(file, damage)
+    _print_damage(file, found)
+
+
+def _damage(damage: Damage) -> dict[str, int]:
+    return {"lost_bytes": damage.lost_bytes, "bad_chunks": damage.bad_chunks}
 
 
 def _print_damage(file: Path, damage: Damage) -> None:
@@ -139,7 +166,9 @@ def _replay_same(options: argparse.Namespace, log: Log) -> int:
     if options.out is not None:
         write_replay(options.out, replayed, log.recording())
     if options.json:
-        print_json({"identical": comparison.is_identical, **asdict(comparison)})
+        folder = None if options.out is None else str(options.out)
+        identical = comparison.is_identical
+        print_json({"folder": folder, "identical": identical, **asdict(comparison)})
     else:
         print(
             f"{comparison.same_ticks} of {comparison.ticks} commands and "
@@ -182,7 +211,11 @@ def _estimate_from_video(options: argparse.Namespace) -> int:
     config: Config = load_config(options.config, options.profile)
     folder = _folder(options)
     frames = read_video(options.video, config.camera, options.video_start)
-    replayed = estimate_from_video(frames, options.motors, config)
+    try:
+        replayed = estimate_from_video(frames, options.motors, config)
+    except CameraError as error:  # of a file, not of a rig
+        error.exit_status = USAGE
+        raise
     write_estimates(folder, replayed, None, as_json=options.json)
     if not options.json:
         images, motors = replayed.frames["captured_at"], replayed.trace["time"]

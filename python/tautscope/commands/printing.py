@@ -3,16 +3,40 @@
 from __future__ import annotations
 
 import json
+import logging
+import shutil
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+_LOG = logging.getLogger(__name__)
+
 
 def print_json(document: dict[str, Any]) -> None:
     """Print a document in one line; it must not contain NaN."""
     print(json.dumps(document, allow_nan=False))
+
+
+def announce(what: str, seconds: float, size: float, folder: Path) -> None:
+    """Say on stderr what a command will take.
+
+    Args:
+        what: What runs.
+        seconds: Estimated duration [s].
+        size: Estimated, or largest size of the files [byte].
+        folder: Where they will be.
+    """
+    above = next(each for each in folder.absolute().parents if each.exists())
+    free = shutil.disk_usage(above).free
+    duration = f"{seconds:.0f} s" if seconds < 90 else f"{seconds / 60:.1f} min"
+    unit, scale = ("MB", 1e6) if size < 1e9 else ("GB", 1e9)
+    text = f"{what}: about {duration}, up to {size / scale:.2g} {unit} in {folder}"
+    print(f"{text} ({free / 1e9:.0f} GB free)", file=sys.stderr, flush=True)
+    if size > free:
+        _LOG.warning("the disk may become full: df -h %s", above)
 
 
 def console() -> Console:

@@ -1,8 +1,8 @@
 """Configuration: frozen structures read from TOML; the only place of a default.
 
-Each key has its unit and, in brackets, the origin of its default: [paper] is Reilink et al. 2013,
-[ours] is chosen here, [geometry] is a plausible instrument that no publication describes.
-Units are SI: m, rad, s; px for images.
+Units are SI: m, rad, s; px for images. Brackets have the unit of a key and the origin of its
+default: [paper] is Reilink et al. 2013, [ours] is chosen here, [geometry] is a plausible instrument
+that no publication describes. Missing keys have their defaults.
 """
 
 from tautscope.config.adaptive import AdaptiveConfig
@@ -27,7 +27,7 @@ from tautscope.config.fields import (
     Vector3,
 )
 from tautscope.config.instrument import InstrumentConfig
-from tautscope.config.load import dump_config, load_config
+from tautscope.config.load import RIGS, config_file, dump_config, load_config
 from tautscope.config.recording import ImageFormat, RecordingConfig
 from tautscope.config.root import Config, Profile, from_document, to_document
 from tautscope.config.safety import SafetyConfig
@@ -46,6 +46,7 @@ from tautscope.config.vision import VisionConfig
 
 __all__ = [
     "DISTURBANCES",
+    "RIGS",
     "AdaptiveConfig",
     "AxisConfig",
     "CableConfig",
@@ -80,6 +81,7 @@ __all__ = [
     "Vector3",
     "Vector8",
     "VisionConfig",
+    "config_file",
     "dump_config",
     "from_document",
     "load_config",

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from msgspec import Struct
-
 from tautscope.config.fields import Gain, NonNegative, PerDof, Positive
+from tautscope.config.section import Section
 
 
-class AdaptiveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class AdaptiveConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Vector law of profile ``best``, decision 0029. All [ours].
 
     Travels and half widths are in halves of the DOF's safety.width_limit, so that one set serves

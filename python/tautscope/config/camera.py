@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from msgspec import Meta, Struct, field
+from msgspec import Meta, field
 
 from tautscope.config.fields import NonNegative, Positive, Vector3
+from tautscope.config.section import Section
 
 PixelFormat = Literal["bgr", "rgb", "bgra", "yuyv", "uyvy", "nv12", "i420"]
 Deinterlace = Literal["bwdif", "none"]
@@ -14,7 +15,7 @@ CameraClock = Literal["stream", "device", "arrival"]
 Vector8 = tuple[float, float, float, float, float, float, float, float]
 
 
-class PoseConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class PoseConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Pose of the guide, where the instrument leaves the scope, in the camera frame."""
 
     translation: Vector3 = (13.5e-3, 14e-3, 15e-3)
@@ -24,7 +25,7 @@ class PoseConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     is the axis of the channel, outwards [ours]."""
 
 
-class SourceConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class SourceConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The source of a camera's images, in FFmpeg's terms. All [ours]."""
 
     url: str = "/dev/video0"
@@ -56,13 +57,13 @@ class SourceConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """An image without a pixel above this is black [grey levels]; video black is 16."""
 
 
-class CameraConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class CameraConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Pinhole camera with OpenCV's distortion model, Eq. (8)."""
 
     width: Annotated[int, Meta(ge=1, le=8192)] = 720
-    """[px], PAL DV [paper]."""
+    """Width of the images [px], PAL DV [paper]."""
     height: Annotated[int, Meta(ge=1, le=8192)] = 576
-    """[px], PAL DV [paper]."""
+    """Height of the images [px], PAL DV [paper]."""
     pixel_format: PixelFormat = "bgr"
     """Layout of the 8-bit pixels. The YUV formats are BT.601 with limited range and need an even
     width, nv12 and i420 also an even height."""
@@ -71,9 +72,9 @@ class CameraConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     fy: Positive = 454.0
     """Focal length along y [px]; DV pixels are not square."""
     cx: float = 349.6
-    """Principal point [px]."""
+    """Principal point, u [px]."""
     cy: float = 285.0
-    """Principal point [px]."""
+    """Principal point, v [px]."""
     distortion: Vector8 = (-0.18, 0.05, 0.0, 0.0, -0.005, 0.0, 0.0, 0.0)
     """k1, k2, p1, p2, k3, k4, k5, k6, as in OpenCV [ours]."""
     source: SourceConfig = field(default_factory=SourceConfig)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from msgspec import Struct
-
 from tautscope.config.fields import Positive
+from tautscope.config.section import Section
 
 
-class ControlConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class ControlConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Period and history of the control loop."""
 
     period: Positive = 0.005

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from msgspec import Meta, Struct
+from msgspec import Meta
 
 from tautscope.config.fields import Fraction, Gain, Positive
+from tautscope.config.section import Section
 
 
-class DofConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class DofConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """One degree of freedom: its compensator, Eqs. (2)-(3), and estimator, Eqs. (4)-(6)."""
 
     update_distance: Positive

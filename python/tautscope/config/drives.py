@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from msgspec import Meta, Struct, field
+from msgspec import Meta, field
 
 from tautscope.config.fields import Fraction, Positive
+from tautscope.config.section import Section
 from tautscope.dof import Dof
 
 
-class AxisConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class AxisConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """One motor and its drive. Values without a default depend on the rig."""
 
     node: Annotated[int, Meta(ge=1, le=127)]
@@ -34,7 +35,7 @@ class AxisConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The drive's EDS file, relative to the TOML file; without it, the default types of CiA 402."""
 
 
-class DrivesConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class DrivesConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Drives on a fieldbus; only a physical rig and the bench have this section.
 
     The default times are [ours].
@@ -44,6 +45,7 @@ class DrivesConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     rotation: AxisConfig
     bending: AxisConfig
     protocol: Literal["canopen", "ethercat"] = "canopen"
+    """Protocol of the fieldbus."""
     interface: str = "socketcan"
     """Name of a python-can interface that does not receive its own frames."""
     channel: str = "can0"

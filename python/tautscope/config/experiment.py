@@ -4,24 +4,25 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from msgspec import Meta, Struct, field
+from msgspec import Meta, field
 
 from tautscope.config.fields import Positive
+from tautscope.config.section import Section
 from tautscope.dof import Dof
 
 
-class Sine(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Sine(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Reference of one DOF: centre + amplitude sin(2 pi t / period)."""
 
     centre: float
     """Position of the DOF while the others move [m or rad]."""
     amplitude: Positive
-    """[m or rad]."""
+    """Amplitude [m or rad]."""
     period: Positive = 10.0
-    """[s]."""
+    """Period [s]."""
 
 
-class ExperimentConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class ExperimentConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Section 5: a sine on each DOF in succession.
 
     Amplitudes are [ours]: the article gives them only in a figure.

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from msgspec import Struct
-
 from tautscope.config.fields import NonNegative, Positive
+from tautscope.config.section import Section
 
 
-class InstrumentConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class InstrumentConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Dimensions of the instrument, Fig. 4. All [geometry]."""
 
     diameter: Positive = 3.5e-3

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from msgspec import Meta, Struct
+from msgspec import Meta
 
 from tautscope.config.fields import Positive
+from tautscope.config.section import Section
 
 ImageFormat = Literal["png", "jpeg"]
 
 
-class RecordingConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class RecordingConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Image format and buffers of the log. All [ours]."""
 
     image_format: ImageFormat = "png"

@@ -5,20 +5,11 @@ from __future__ import annotations
 from typing import Any, Literal
 
 import msgspec
-from msgspec import Struct, field
+from msgspec import field
 
 from tautscope.config.adaptive import AdaptiveConfig
 from tautscope.config.camera import CameraConfig
-from tautscope.config.checks import (
-    check_control,
-    check_dof,
-    check_drives,
-    check_finite,
-    check_instrument,
-    check_safety,
-    check_twin,
-    config_error,
-)
+from tautscope.config.checks import check_references
 from tautscope.config.control import ControlConfig
 from tautscope.config.dof import DofConfig
 from tautscope.config.drives import DrivesConfig
@@ -26,6 +17,7 @@ from tautscope.config.experiment import ExperimentConfig
 from tautscope.config.instrument import InstrumentConfig
 from tautscope.config.recording import RecordingConfig
 from tautscope.config.safety import SafetyConfig
+from tautscope.config.section import Section, converted_value, without_numpy
 from tautscope.config.state_estimation import StateEstimationConfig
 from tautscope.config.twin import TwinConfig
 from tautscope.config.vision import VisionConfig
@@ -34,7 +26,7 @@ from tautscope.dof import Dof
 Profile = Literal["paper", "best"]
 
 
-class Config(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Config(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """All settings of a run. The defaults are the article's experiment with profile ``best``."""
 
     profile: Profile = "best"
@@ -68,6 +60,10 @@ class Config(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     drives: DrivesConfig | None = None
     """Motors of a rig; they have no default."""
 
+    def __post_init__(self) -> None:
+        Section.__post_init__(self)
+        check_references(self.safety, self.experiment, {dof: self[dof] for dof in Dof})
+
     def __getitem__(self, dof: Dof) -> DofConfig:
         """The settings of one DOF."""
         settings: DofConfig = getattr(self, dof.label)
@@ -95,20 +91,8 @@ def from_document(document: dict[str, Any]) -> Config:
     Raises:
         ConfigError: As `load_config`.
     """
-    document = _merged(to_document(Config()), document)
-    try:
-        config = msgspec.convert(document, Config)
-    except msgspec.ValidationError as error:
-        raise config_error(error, document) from None
-    check_finite(msgspec.to_builtins(config), "")
-    for dof in Dof:
-        check_dof(dof, config[dof])
-    check_instrument(config.instrument)
-    check_twin(config.twin)
-    check_control(config.control)
-    check_safety(config.safety, config.experiment, {dof: config[dof] for dof in Dof})
-    if config.drives is not None:
-        check_drives(config.drives)
+    document = _merged(to_document(Config()), without_numpy(document))
+    config: Config = converted_value("", document, Config)
     return config
 
 

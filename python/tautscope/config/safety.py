@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from msgspec import Meta, Struct
+from msgspec import Meta
 
 from tautscope.config.fields import NonNegative, PerDof, Positive, Vector3
+from tautscope.config.section import Section
 
 Range = tuple[float, float]
 Count = Annotated[int, Meta(ge=1, le=1_000_000)]
 SmoothingFactor = Annotated[float, Meta(gt=0, le=1)]
 
 
-class SafetyConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class SafetyConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Supervision of the loop [ours]; docs/safety.md lists the reaction to each flag.
 
     Three values are those of insertion, rotation and bending, in [m, rad, rad] or those per second.

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from msgspec import Struct
-
 from tautscope.config.fields import NonNegative, Positive
+from tautscope.config.section import Section
 
 
-class StateEstimationConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class StateEstimationConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Ensemble filter of profile ``best``, decision 0030. All [ours].
 
     Half widths, centres and travels are in halves of the DOF's safety.width_limit, so that one set

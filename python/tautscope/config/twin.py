@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from msgspec import Meta, Struct, field
+from msgspec import Meta, field
 
 from tautscope.config.fields import NonNegative, Positive, Vector3
+from tautscope.config.section import Section
 
 Slope = Annotated[float, Meta(gt=-1, lt=1)]
 
@@ -27,7 +28,7 @@ DISTURBANCES = (
 """Values of `twin.disturb`, described in `tautscope.twin.disturbances`."""
 
 
-class ShaftConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class ShaftConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The simulated shaft in the scope's channel.
 
     All [ours], chosen so that the hysteresis loops have the article's widths (Table 1).
@@ -63,7 +64,7 @@ class ShaftConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """Angle at which that torque is zero [rad]."""
 
 
-class CableConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class CableConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The simulated bending section with its two antagonistic cables. All [ours]."""
 
     joints: Annotated[int, Meta(ge=10, le=64)] = 12
@@ -97,7 +98,7 @@ class CableConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """Shortening of the section per tension of both cables [m/N]; the cables slacken with it."""
 
 
-class FrictionConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class FrictionConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Variation of the friction of shaft and section, `tautscope.twin.friction`. All [ours]."""
 
     over_position: tuple[Slope, Slope] = (0.0, 0.0)
@@ -112,7 +113,7 @@ class FrictionConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     move by stick-slip."""
 
 
-class TransmissionConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class TransmissionConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """From the motors to the proximal ends of shaft and cables, `tautscope.twin.transmission`.
 
     Values are for insertion, rotation, bending; the start posture is that of the experiment. All
@@ -131,7 +132,7 @@ class TransmissionConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     """Time constant by which the end follows the motor [s]."""
 
 
-class SensorConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class SensorConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Timing, exposure and compression of the camera's images. All [ours]."""
 
     stamp_error: float = 0.0
@@ -147,7 +148,7 @@ class SensorConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """Quality of the JPEG compression of each image (MJPEG); None for none."""
 
 
-class DriveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class DriveConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The simulated position servos. All [ours]."""
 
     speed_limit: tuple[Positive, Positive, Positive] = (0.15, 20.0, 10.0)
@@ -156,7 +157,7 @@ class DriveConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """Travel per encoder count at the instrument [m, rad, rad]."""
 
 
-class TwinConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class TwinConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The digital twin: plant, drives and camera of the simulated rig. All [ours]."""
 
     seed: Annotated[int, Meta(ge=0)] = 0

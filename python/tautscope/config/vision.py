@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from msgspec import Meta, Struct, field
+from msgspec import Meta, field
 
 from tautscope.config.fields import Fraction, Positive, Vector3
+from tautscope.config.section import Section
 
 
-class OutlineFitConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class OutlineFitConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Fit of the bands' outlines to the edges of the marker pixels [all ours]."""
 
     edge_deviation: Positive = 0.5
@@ -32,7 +33,7 @@ class OutlineFitConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     the variance with all edges; in proportion to the missing share [1]."""
 
 
-class ClearConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class ClearConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Scores of both bands at which the search for better candidates stops [all ours]."""
 
     least_edges: Fraction = 0.75
@@ -44,7 +45,7 @@ class ClearConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """Squared Mahalanobis distance from the predicted positions."""
 
 
-class UnlocatedConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class UnlocatedConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Search in an image of which the posture is not known [all ours]."""
 
     alternatives: tuple[tuple[Vector3, float], ...] = (((-0.5, 1.0, -0.5), 4.0),)
@@ -58,7 +59,7 @@ class UnlocatedConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     """As `BlurConfig.least_explained`."""
 
 
-class BlurConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class BlurConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Fit of the image intensity where blur has left no edges [all ours]."""
 
     sigma: Positive = 2.5
@@ -86,7 +87,7 @@ class BlurConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Or if the standard deviation of a position exceeds this [px]."""
 
 
-class VisionConfig(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class VisionConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Marker detection, Eq. (12) and Fig. 5."""
 
     weights: Vector3 = (-0.525, 1.0, -0.648)

@@ -6,12 +6,13 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from pathlib import Path
 from threading import Event, Lock, Thread
 
 import numpy as np
 
 from tautscope.config import CameraConfig
-from tautscope.errors import CameraError, CameraMismatchError
+from tautscope.errors import CameraError, CameraMismatchError, NoRigError
 from tautscope.hardware.stream_clock import JUMP, StreamClock
 from tautscope.hardware.video import DecodedFrame, Decoder, Image, open_source
 from tautscope.loop.rig import Frame
@@ -97,6 +98,9 @@ class Camera:
         Raises:
             CameraError: The source does not open, or its frames cannot be used; it is closed.
         """
+        url = self._source.url
+        if url.startswith("unix:") and not Path(url.removeprefix("unix:")).exists():
+            raise NoRigError("camera.source.url", url, "a running bench")
         self._thread.start()
         self._is_tested.wait(self._source.start_timeout)
         try:

@@ -243,6 +243,10 @@ def open_bus(config: DrivesConfig) -> can.BusABC:
     try:
         return can.Bus(interface=config.interface, channel=config.channel, **options)
     except (can.CanError, OSError, ValueError, TypeError) as error:
+        if config.interface == "tautscope":
+            channel = config.channel
+            hint = "Start `tautscope bench`, or check drives.channel"
+            raise BusError("CAN bus", f"no rig answers on {channel}", hint) from error
         hint = (
             f"sudo ip link set {config.channel} up type can bitrate {config.bitrate}"
             if config.interface == "socketcan"

@@ -7,6 +7,7 @@ use the default units of CiA 402: positions in counts, velocities in counts per 
 
 from __future__ import annotations
 
+import logging
 import time
 from dataclasses import dataclass
 
@@ -19,6 +20,7 @@ from tautscope.hardware.cia402 import Mode, Scale
 from tautscope.hardware.fieldbus import AbsentError, Fieldbus, verify_setting
 from tautscope.hardware.object_dictionary import Entry
 
+_LOG = logging.getLogger(__name__)
 WAIVABLE = ("6007", "605A", "607D")
 """Objects that `drives.waive` may name."""
 CIA_402 = 402
@@ -65,6 +67,7 @@ def commission(bus: Fieldbus, config: DrivesConfig, dof: Dof) -> CommissionedDri
     setup.set_protections()
     setup.set_limits()
     mode = setup.enter_mode()
+    _LOG.info("%s: mode %d, settings read back", bus.name(dof), mode)
     return CommissionedDrive(
         bus.name(dof),
         setup.read_or(objects.VENDOR_ID, 0),

@@ -19,7 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from tautscope.config import DrivesConfig
 from tautscope.dof import Dof
-from tautscope.errors import BusError, DriveError, SignalError, StateError
+from tautscope.errors import DriveError, SignalError, StateError
+from tautscope.extras import require_extras
 from tautscope.hardware.cia402 import Scale
 from tautscope.hardware.commissioning import commission
 from tautscope.hardware.drive_monitor import BusStatistics, DriveMonitor
@@ -43,6 +44,7 @@ def open_fieldbus(config: DrivesConfig) -> Fieldbus:
 
     Raises:
         ConfigError: An EDS file is missing, unreadable or describes another drive.
+        MissingExtraError: The library of the bus is not installed.
         BusError: The bus cannot be opened.
         DriveError: A drive does not answer, or there is another master.
     """
@@ -50,10 +52,9 @@ def open_fieldbus(config: DrivesConfig) -> Fieldbus:
         from tautscope.hardware.ethercat_fieldbus import EthercatFieldbus  # noqa: PLC0415
 
         return EthercatFieldbus(config)
-    try:
-        from tautscope.hardware.canopen_fieldbus import CanopenFieldbus  # noqa: PLC0415
-    except ImportError as error:
-        raise BusError("CAN bus", str(error), "pip install 'tautscope[hardware]'") from None
+    require_extras("CANopen", ["hardware"])
+    from tautscope.hardware.canopen_fieldbus import CanopenFieldbus  # noqa: PLC0415
+
     return CanopenFieldbus(config)
 
 

@@ -24,6 +24,7 @@ from tautscope.errors import (
     SilentDriveError,
     StateError,
 )
+from tautscope.extras import require_extras
 from tautscope.hardware import cia402
 from tautscope.hardware import object_dictionary as objects
 from tautscope.hardware.cia402 import Mode, State
@@ -59,7 +60,8 @@ class EthercatFieldbus:
         pysoem: Replaces the library of that name in tests.
 
     Raises:
-        BusError: The library, the adapter or a drive is missing.
+        MissingExtraError: The library is not installed.
+        BusError: The adapter or a drive is missing.
     """
 
     def __init__(self, config: DrivesConfig, pysoem: Any = None) -> None:
@@ -253,10 +255,7 @@ class EthercatFieldbus:
 
 
 def _load_library() -> Any:
-    try:
-        import pysoem  # noqa: PLC0415
-    except ImportError as error:
-        raise BusError(
-            "EtherCAT", f"pysoem is not installed ({error})", "pip install 'tautscope[ethercat]'"
-        ) from None
+    require_extras("EtherCAT", ["ethercat"])
+    import pysoem  # noqa: PLC0415
+
     return pysoem

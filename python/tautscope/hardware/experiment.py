@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import json
-import sys
+import logging
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from tautscope.config import Config
 from tautscope.dof import Dof
-from tautscope.errors import DriveError, OutputError, TautscopeError
+from tautscope.errors import STOPPED, DriveError, OutputError, TautscopeError
 from tautscope.hardware.plausibility import PlausibilityMonitor
 from tautscope.hardware.realtime import (
     OTHERS,
@@ -38,6 +39,7 @@ from tautscope.runs.output_folder import check_free
 from tautscope.runs.recording import Floats, Recording, Table
 
 RigMaker = Callable[[Config], HardwareRig]
+_LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -106,6 +108,7 @@ def run_on_hardware(
     """Run the article's protocol on the configured drives and camera, and log every run.
 
     The motors are quick-stopped and the log is closed on every exit, also after SIGTERM and SIGHUP.
+    A run that is refused before the loop begins leaves no log and no folder.
 
     Args:
         config: With a section ``drives``.
@@ -187,11 +190,12 @@ def _run(
     with LogWriter(path, config, compensate=compensate, segments=reference.segments) as log:
 
         def warn(text: str) -> None:
-            print(f"warning: {text}", file=sys.stderr, flush=True)
+            _LOG.warning("%s", text)
             log.warn(text)
 
         rig.warn = warn
         executor = ThreadPoolExecutor(1, "vision", set_realtime_priority, (VISION,))
+        monitored = _MonitoredLog(log, config)
         try:
             recording = run_experiment(
                 rig,
@@ -199,13 +203,21 @@ def _run(
                 config,
                 compensate,
                 lambda elapsed, duration: progress(min(elapsed / duration, 1.0)),
-                log=_MonitoredLog(log, config),
+                log=monitored,
                 executor=executor,
                 watch=lambda supervision: _apply_reaction(rig, supervision),
             )
         except BaseException as error:
             log.warn(f"{type(error).__name__}: {error}")
-            error.add_note(f"The log of the run is {path}")
+            if monitored.has_begun:
+                error.add_note(f"The log of the run is {path}")
+                if isinstance(error, TautscopeError):
+                    error.exit_status = STOPPED
+            else:  # nothing to keep: the same folder can be used again
+                log.close()
+                path.unlink()
+                with suppress(OSError):
+                    path.parent.rmdir()
             raise
         finally:
             rig.close()
@@ -244,6 +256,11 @@ class _MonitoredLog:
         self._log = log
         self._config = config
         self._monitor: PlausibilityMonitor | None = None
+
+    @property
+    def has_begun(self) -> bool:
+        """Whether the loop has commanded the motors."""
+        return self._monitor is not None
 
     def tick(
         self, sample: Sample, reference: Floats, command: Floats, made_at: float | None = None

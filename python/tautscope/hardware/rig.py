@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import sys
+import logging
 import time
 from bisect import bisect_right
 from collections import deque
@@ -23,6 +23,8 @@ from tautscope.hardware.setpoint_thread import Motors, SetpointThread
 from tautscope.hardware.timing import Timing
 from tautscope.loop.rig import Frame, Sample
 
+_LOG = logging.getLogger(__name__)
+
 
 class FrameSource(AbstractContextManager["FrameSource"], Protocol):
     """The part of `tautscope.hardware.cameras.Camera` that the rig uses."""
@@ -35,10 +37,6 @@ class FrameSource(AbstractContextManager["FrameSource"], Protocol):
     def newest(self) -> Capture | None:
         """The newest frame not taken before, with times of the monotonic clock; else None."""
         ...
-
-
-def _print_warning(text: str) -> None:
-    print(f"warning: {text}", file=sys.stderr, flush=True)
 
 
 class HardwareRig:
@@ -70,7 +68,7 @@ class HardwareRig:
         *,
         motors: Callable[[DrivesConfig], Motors] = open_drives,
         camera: Callable[[Config], FrameSource] | None = None,
-        warn: Callable[[str], None] = _print_warning,
+        warn: Callable[[str], None] = _LOG.warning,
     ) -> None:
         self._drives = require_drives(config)
         self._config = config
@@ -110,7 +108,9 @@ class HardwareRig:
                 self._drives, lambda: self._open_motors(self._drives), start, self.timing
             )
             self._resources.callback(self._setpoints.stop)
+            _LOG.info("camera %s: frames arrive", self._config.camera.source.url)
             applied = self._setpoints.start()
+            _LOG.info("motors enabled and at the start")
             self._resources.enter_context(short_switch_interval())
             self._resources.enter_context(realtime(LOOP))
         except BaseException:

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.config import CameraConfig
-from tautscope.errors import CameraError, CameraMismatchError, MissingPathError
+from tautscope.errors import CameraError, CameraMismatchError, MissingPathError, NoRigError
+from tautscope.extras import require_extras
 from tautscope.loop.frame_layout import FrameLayout
 from tautscope.loop.rig import Frame
 
@@ -62,15 +63,14 @@ def open_source(
     """Open a source for the block.
 
     Raises:
-        CameraMismatchError: PyAV is not installed, or the source has no video.
+        MissingExtraError: PyAV is not installed.
+        CameraMismatchError: The source has no video.
         CameraError: The source cannot be opened or read.
+        NoRigError: It is the socket of a bench that is not running.
     """
-    try:
-        import av  # noqa: PLC0415  optional, takes 0.1 s
-    except ImportError:
-        raise CameraMismatchError(
-            "camera.source", "no PyAV", "it installed: pip install 'tautscope[hardware]'"
-        ) from None
+    require_extras("the camera", ["hardware"])
+    import av  # noqa: PLC0415  takes 0.1 s
+
     try:
         with av.open(url, format=format_name, options=options or {}, timeout=timeout) as container:
             if not container.streams.video:
@@ -79,6 +79,8 @@ def open_source(
     except av.error.FFmpegError as error:
         if Path(url).is_file():
             raise CameraError("video", url, f"a video file that FFmpeg reads ({error})") from None
+        if url.startswith("unix:"):
+            raise NoRigError("camera.source.url", url, "a running bench") from None
         hint = (
             "a source that can be opened and read; is it connected, and used by no other program?"
         )

@@ -11,7 +11,7 @@ from tautscope.log import topics
 from tautscope.log.mcap_file import McapFile
 from tautscope.log.mcap_records import Damage, read_messages
 from tautscope.log.reader import read_log
-from tautscope.runs.output_folder import new_folder
+from tautscope.runs.output_folder import check_free, check_free_file, new_folder
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,12 +41,10 @@ def recover(path: str | PathLike[str], out: str | PathLike[str]) -> Recovery:
         RecordError: The file is not MCAP.
         OutputError: `out` exists already, or cannot be written.
     """
-    source, target = Path(path), Path(out)
+    source, target = Path(path), check_free_file(out)
     damage = Damage()
     first = last = 0
     partial = target.with_name(f".{target.name}.partial")
-    if target.exists():
-        raise OutputError("out", str(target), "a file that does not exist yet")
     messages = read_messages(source, damage)
     try:
         with partial.open("wb") as file:
@@ -76,6 +74,7 @@ def export_csv(path: str | PathLike[str], folder: str | PathLike[str]) -> Damage
         MissingPathError, RecordError, ConfigError: As `read_log`.
         OutputError: The folder is not empty, or cannot be written.
     """
+    check_free(folder)
     log = read_log(path)
     log.recording().save(folder)
     return log.damage

@@ -16,11 +16,11 @@ from tautscope.loop.frame_layout import FrameLayout
 
 Image = NDArray[np.uint8]
 
-# Filtered and not compressed: the log's chunks are compressed, which is faster.
-_PNG = (
-    *(cv2.IMWRITE_PNG_COMPRESSION, 0),
-    *(cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_SUB),
-)
+# Filtered and not compressed: the log's chunks are compressed, which is faster. OpenCV before 4.12
+# cannot choose the filter, and writes larger logs.
+_PNG: tuple[int, ...] = (cv2.IMWRITE_PNG_COMPRESSION, 0)
+if hasattr(cv2, "IMWRITE_PNG_FILTER"):
+    _PNG += (cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_SUB)
 # JPEG's default subsampling of colour would remove most of the markers' contrast.
 _JPEG = (cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444)
 

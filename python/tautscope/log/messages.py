@@ -15,7 +15,7 @@ from importlib.metadata import version
 from typing import Any
 
 import numpy as np
-import tomli_w
+import tomlkit
 from numpy.typing import NDArray
 
 from tautscope._core import __version__
@@ -101,7 +101,7 @@ def header_messages(info: RunInfo, stamp: int) -> Messages:
     return _encoded(
         {
             topics.CONFIG: {"data": dump_config(config)},
-            topics.RUN: {"data": tomli_w.dumps(run)},
+            topics.RUN: {"data": tomlkit.dumps(run)},
             topics.VERSIONS: {"data": json.dumps(versions)},
             topics.CAMERA_INFO: camera_info,
         }

@@ -6,7 +6,7 @@ dropped and counted. A failing disk ends the recording, not the run.
 
 from __future__ import annotations
 
-import sys
+import logging
 import time
 from collections import deque
 from collections.abc import Callable, Iterable
@@ -23,6 +23,8 @@ from tautscope.log.journal import POLL_PERIOD, Journal
 from tautscope.loop.reduction import Report
 from tautscope.loop.references import Segment
 from tautscope.loop.rig import Frame, Sample
+
+_LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,10 +55,6 @@ class LogSummary:
         return not (self.dropped or self.dropped_images or self.failure)
 
 
-def _print_warning(text: str) -> None:
-    print(f"warning: {text}", file=sys.stderr, flush=True)
-
-
 class LogWriter:
     """Writes the log of a run as an MCAP file; a context manager.
 
@@ -69,8 +67,8 @@ class LogWriter:
         compensate: Whether the loop compensates.
         segments: Which DOF moves when, if known.
         wait: Make the caller wait for a full queue instead of dropping; for simulated rigs.
-        on_warning: Called from a background thread, once per kind of problem; by default it prints
-            to stderr.
+        on_warning: Called from a background thread, once per kind of problem; by default the
+            package's logger warns.
 
     Raises:
         OutputError: The file exists already, or cannot be created.
@@ -84,7 +82,7 @@ class LogWriter:
         compensate: bool = True,
         segments: Iterable[Segment] = (),
         wait: bool = False,
-        on_warning: Callable[[str], None] = _print_warning,
+        on_warning: Callable[[str], None] = _LOG.warning,
     ) -> None:
         self._settings = config.recording
         self._wait = wait

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import shutil
 import time
@@ -12,17 +13,52 @@ from pathlib import Path
 
 from tautscope.errors import OutputError
 
+_LOG = logging.getLogger(__name__)
+
 
 def check_free(path: str | PathLike[str]) -> Path:
     """Return the path if a new folder can be made there: nothing exists, or an empty folder.
 
     Raises:
-        OutputError: The path is taken.
+        OutputError: The path is taken, or cannot be written.
     """
     target = Path(path)
     if target.exists() and not (target.is_dir() and not any(target.iterdir())):
         raise OutputError("out", str(target), "a folder that is empty or does not exist yet")
+    check_writable(target)
     return target
+
+
+def check_free_file(path: str | PathLike[str]) -> Path:
+    """Return the path if a new file can be made there, in a folder that exists.
+
+    Raises:
+        OutputError: The path is taken, or cannot be written.
+    """
+    target = Path(path)
+    if target.exists():
+        raise OutputError("out", str(target), "a file that does not exist yet")
+    if not target.absolute().parent.is_dir():
+        raise OutputError("out", str(target), "a file in a folder that exists")
+    check_writable(target)
+    return target
+
+
+def check_writable(path: Path) -> None:
+    """Check that something can be made at a path, by making and removing a folder above it.
+
+    Raises:
+        OutputError: It cannot.
+    """
+    from tempfile import TemporaryDirectory  # noqa: PLC0415  a tenth of the time to import the loop
+
+    above = next(folder for folder in path.absolute().parents if folder.exists())
+    try:
+        with TemporaryDirectory(prefix=".tautscope-", dir=above):
+            pass
+    except OSError as error:
+        allowed = f"a place that can be written ({error.strerror})"
+        raise OutputError("out", str(path), allowed) from None
 
 
 def default_folder(verb: str) -> Path:
@@ -52,6 +88,7 @@ def new_folder(path: str | PathLike[str]) -> Iterator[Path]:
         if check_free(target).exists():
             target.rmdir()
         partial.rename(target)
+        _LOG.info("written: %s", target)
     except BaseException:
         shutil.rmtree(partial, ignore_errors=True)
         raise

@@ -8,7 +8,6 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
-import tomli_w
 from numpy.typing import NDArray
 
 from tautscope.config import Config, dump_config, load_config
@@ -123,6 +122,8 @@ class Recording:
 
     def write(self, folder: Path, suffix: str = "") -> None:
         """Write the files of `save` into an existing folder, with a suffix to their names."""
+        import tomlkit  # noqa: PLC0415  only writing needs it
+
         write_csv(folder / f"trace{suffix}.csv", self.trace)
         write_csv(folder / f"frames{suffix}.csv", self.frames)
         segments = [
@@ -134,7 +135,7 @@ class Recording:
             }
             for segment in self.segments
         ]
-        facts = tomli_w.dumps({"compensated": self.compensated, "segments": segments})
+        facts = tomlkit.dumps({"compensated": self.compensated, "segments": segments})
         (folder / f"recording{suffix}.toml").write_text(facts, encoding="utf-8")
         (folder / "config.toml").write_text(dump_config(self.config), encoding="utf-8")
 

@@ -123,7 +123,7 @@ def fit(command: Floats, measured: Floats) -> BoucWen:
     def solved(parameters: Floats) -> tuple[Floats, Floats]:
         w = hysteretic_variable(command, *shape(parameters))[where]
         columns = np.column_stack([command[where], w, np.ones(len(w))])
-        weights = np.linalg.lstsq(columns, target)[0].astype(np.float64)
+        weights = np.linalg.lstsq(columns, target, rcond=None)[0].astype(np.float64)
         error: Floats = columns @ weights - target
         return weights, error
 

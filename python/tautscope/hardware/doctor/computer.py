@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import os
 import platform
 import shutil
 import tempfile
 import time
-from importlib.util import find_spec
 from pathlib import Path
 
 from tautscope._core import __version__
 from tautscope.config import Config
+from tautscope.extras import MODULES, missing_modules
 from tautscope.hardware.doctor.check_result import CheckResult
 from tautscope.hardware.realtime import REMEDY, SETPOINTS, locked_memory, realtime
 from tautscope.loop.frame_layout import FrameLayout
@@ -37,19 +38,22 @@ def check_computer(config: Config) -> list[CheckResult]:
     is_ethercat = config.drives is not None and config.drives.protocol == "ethercat"
     return [
         CheckResult("computer", "system", "note", f"{system}, {cores}"),
-        _extra("hardware", ("av", "can", "canopen")),
-        *([_extra("ethercat", ("pysoem",))] if is_ethercat else []),
+        _extra("hardware"),
+        *([_extra("ethercat")] if is_ethercat else []),
         _priority(),
         _memory(),
     ]
 
 
+def bytes_per_second(config: Config) -> float:
+    """Largest data rate of a log: images at the field rate of PAL."""
+    frame = math.prod(FrameLayout(config.camera).shape)
+    return frame * FRAME_RATE * COMPRESSION[config.recording.image_format]
+
+
 def check_disk(config: Config, folder: Path) -> CheckResult:
     """Check free space and write speed in `folder` against the data rate of the camera."""
-    frame = 1
-    for length in FrameLayout(config.camera).shape:
-        frame *= length
-    needed = frame * FRAME_RATE * COMPRESSION[config.recording.image_format]
+    needed = bytes_per_second(config)
     try:
         free = shutil.disk_usage(folder).free
         speed = _speed(folder, min(_PROBE_SIZE, free // 4))
@@ -72,13 +76,12 @@ def check_disk(config: Config, folder: Path) -> CheckResult:
     return CheckResult("recording", "disk", "ok", found, data=data)
 
 
-def _extra(name: str, modules: tuple[str, ...]) -> CheckResult:
-    missing = [module for module in modules if find_spec(module) is None]
-    what = f"extra '{name}'"
+def _extra(name: str) -> CheckResult:
+    what, missing = f"extra '{name}'", missing_modules(name)
     if missing:
-        todo = f"pip install 'tautscope[{name}]'"
+        todo = f'python -m pip install "tautscope[{name}]"'
         return CheckResult("computer", what, "missing", f"no {', '.join(missing)}", todo)
-    return CheckResult("computer", what, "ok", ", ".join(modules))
+    return CheckResult("computer", what, "ok", ", ".join(MODULES[name]))
 
 
 def _priority() -> CheckResult:

@@ -1,0 +1,33 @@
+"""The command ``tautscope config``."""
+
+from __future__ import annotations
+
+import argparse
+
+from tautscope.commands import arguments
+from tautscope.commands.printing import print_json
+from tautscope.config import load_config, to_document
+
+
+def add_parser(verbs: arguments.Verbs) -> None:
+    """Add the command to the parser."""
+    config = arguments.add_verb(
+        verbs,
+        "config",
+        help="print the configuration",
+        description="Print the configuration as TOML: every key with its meaning, unit and range.",
+    )
+    arguments.add_config(config)
+    arguments.add_json(config)
+    config.set_defaults(run=_config)
+
+
+def _config(options: argparse.Namespace) -> None:
+    from tautscope.config.placeholders import placeholders  # noqa: PLC0415
+    from tautscope.config.template import template  # noqa: PLC0415
+
+    config = load_config(options.config)
+    if options.json:
+        print_json(to_document(config))
+    else:
+        print(template(config, placeholders(options.config)), end="")

@@ -1,0 +1,135 @@
+"""Descriptions of all configuration keys, from the docstrings and types of the sections.
+
+The commented template (`tautscope config`) and the reference page (docs/configuration.md) both
+come from here.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import re
+import sys
+import textwrap
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from types import UnionType
+from typing import Any, Union, get_args, get_origin, get_type_hints
+
+import msgspec
+import msgspec.inspect
+
+from tautscope.config.ranges import allowed_values
+from tautscope.config.root import Config
+from tautscope.config.section import Section
+
+_UNIT = re.compile(
+    r"\[((?:in )?(?:m|rad|s|half|px|N|bit|grey|share|shares|1|standard|update_distance|width_limit|"
+    r"ahead_limit|control)\b[^\]]*)\]"
+)
+
+
+@dataclass(frozen=True)
+class Key:
+    """One key of a section.
+
+    Attributes:
+        name: Its name.
+        text: Meaning, from the docstring.
+        unit: Unit, from the brackets in the docstring; empty without one.
+        allowed: Type and range in words.
+        default: Default value; None without one.
+        is_required: Whether it must be given.
+        section: Type of the section that it is, else None.
+    """
+
+    name: str
+    text: str
+    unit: str
+    allowed: str
+    default: Any
+    is_required: bool
+    section: type[Section] | None
+
+
+def package_text() -> str:
+    """Units of a configuration, and what brackets mean: the end of the package's docstring."""
+    text = _plain(inspect.cleandoc(sys.modules["tautscope.config"].__doc__ or ""))
+    return text.partition("\n\n")[2]
+
+
+@cache
+def section_text(section: type[Section]) -> str:
+    """The docstring of a section, without indentation and markup."""
+    return _plain(inspect.cleandoc(section.__doc__ or ""))
+
+
+def keys(section: type[Section]) -> Iterator[Key]:
+    """The keys of a section in the order of their definition, sections last."""
+    texts = _docstrings(section.__module__)[section.__name__]
+    hints = get_type_hints(section)
+    found = []
+    for field in msgspec.structs.fields(section):
+        kind = msgspec.inspect.type_info(field.type)
+        text = texts.get(field.name, "")
+        unit = _UNIT.search(text)
+        is_required = field.default is msgspec.NODEFAULT is field.default_factory
+        default = field.default
+        if default is msgspec.NODEFAULT:
+            default = None if is_required else field.default_factory()
+        found.append(
+            Key(
+                field.name,
+                _plain(text),
+                "" if unit is None else unit[1],
+                allowed_values(kind),
+                default,
+                is_required,
+                _section(hints[field.name]),
+            )
+        )
+    yield from (key for key in found if key.section is None)
+    yield from (key for key in found if key.section is not None)
+
+
+def all_sections(
+    section: type[Section] = Config, path: str = ""
+) -> Iterator[tuple[str, type[Section]]]:
+    """Dotted path and type of every section, a section before those in it."""
+    yield path, section
+    for key in keys(section):
+        if key.section is not None:
+            yield from all_sections(key.section, f"{path}.{key.name}".lstrip("."))
+
+
+@cache
+def _docstrings(module: str) -> dict[str, dict[str, str]]:
+    """Class -> field -> text after the field, in a module."""
+    tree = ast.parse(inspect.getsource(sys.modules[module]))
+    return {
+        node.name: {
+            field.target.id: textwrap.dedent(text.value.value)
+            for field, text in zip(node.body, node.body[1:], strict=False)
+            if isinstance(field, ast.AnnAssign)
+            and isinstance(field.target, ast.Name)
+            and isinstance(text, ast.Expr)
+            and isinstance(text.value, ast.Constant)
+            and isinstance(text.value.value, str)
+        }
+        for node in tree.body
+        if isinstance(node, ast.ClassDef)
+    }
+
+
+def _plain(text: str) -> str:
+    """One line per paragraph, without backquotes."""
+    paragraphs = re.split(r"\n\s*\n", text.replace("`", "").strip())
+    return "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
+
+
+def _section(kind: Any) -> type[Section] | None:
+    members = get_args(kind) if get_origin(kind) in (Union, UnionType) else (kind,)
+    return next(
+        (one for one in members if isinstance(one, type) and issubclass(one, Section)), None
+    )

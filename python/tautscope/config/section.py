@@ -1,0 +1,137 @@
+"""Base of the sections of a configuration: every constructor checks its values."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from functools import cache
+from typing import Any, TypeVar, get_type_hints
+
+import msgspec
+from msgspec import Struct
+
+from tautscope.errors import ConfigError
+
+S = TypeVar("S")
+_relations: dict[type, Callable[[Any], None]] = {}
+
+
+class Section(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A section of a configuration, with typed and checked values.
+
+    NumPy numbers and arrays become Python's.
+
+    Raises:
+        ConfigError: A value has the wrong type, is out of range or not finite, or contradicts
+            another one of the section.
+    """
+
+    def __post_init__(self) -> None:
+        for name, kind in _types(type(self)).items():
+            value = getattr(self, name)
+            converted = converted_value(name, value, kind)
+            if converted is not value:
+                msgspec.structs.force_setattr(self, name, converted)
+        check = _relations.get(type(self))
+        if check is not None:
+            check(self)
+
+
+def relation(section: type[S]) -> Callable[[Callable[[S], None]], Callable[[S], None]]:
+    """Register a function that checks the relations between the values of a section.
+
+    It raises `ConfigError` with the key relative to the section.
+    """
+
+    def register(check: Callable[[S], None]) -> Callable[[S], None]:
+        _relations[section] = check
+        return check
+
+    return register
+
+
+def converted_value(path: str, value: Any, kind: Any) -> Any:
+    """Convert a value to a type of the configuration, and check type, range and finiteness.
+
+    Args:
+        path: Dotted path of the value, for the error; empty for a whole configuration.
+        value: Numbers, texts, lists, dictionaries, sections; also NumPy's.
+        kind: Type with ranges as in ``msgspec.Meta``.
+
+    Raises:
+        ConfigError: The value is not of this type; the error names it by its dotted path.
+    """
+    value = without_numpy(value)
+    try:
+        converted = msgspec.convert(value, kind)
+    except msgspec.ValidationError as error:
+        raise _config_error(error, value, path, kind) from None
+    _check_finite(converted, path)
+    return converted
+
+
+def without_numpy(value: Any) -> Any:
+    """A nested value with NumPy's numbers and arrays replaced by Python's."""
+    if isinstance(value, dict):
+        return {key: without_numpy(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return type(value)(map(without_numpy, value))
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
+@cache
+def _types(section: type[Section]) -> dict[str, Any]:
+    return get_type_hints(section, include_extras=True)
+
+
+def _config_error(
+    error: msgspec.ValidationError, document: Any, prefix: str, kind: Any
+) -> ConfigError:
+    """Translate an error of msgspec, which names the key but not its value."""
+    message = str(error)
+    expected, _, path = (
+        message.rpartition(" - at `$") if " - at `$" in message else (message, "", "")
+    )
+    path = path.rstrip("`").lstrip(".")
+    cause = error.__cause__
+    if isinstance(cause, ConfigError):  # of a section's own constructor
+        return ConfigError(_joined(prefix, path, cause.field), cause.value, cause.allowed)
+    unknown = re.search(r"unknown field `([^`]*)`", expected)
+    missing = re.search(r"missing required field `([^`]*)`", expected)
+    for match in (unknown, missing):
+        if match:
+            path = _joined(path, match[1])
+    value: Any = document
+    keys = re.findall(r"[^.\[\]]+", path)
+    for key in keys:
+        try:
+            value = value[int(key)] if isinstance(value, list | tuple) else value[key]
+        except (KeyError, TypeError, IndexError, ValueError):
+            value = None
+            break
+    if unknown:
+        allowed = "no such key; `tautscope config` prints all keys"
+    elif missing:
+        allowed = "a value: it has no default"
+    else:
+        from tautscope.config.ranges import allowed_at  # noqa: PLC0415  only errors need it
+
+        allowed = allowed_at(kind, keys)
+    return ConfigError(_joined(prefix, path) or "config", value, allowed)
+
+
+def _joined(*parts: str) -> str:
+    return ".".join(part for part in parts if part).replace(".[", "[")
+
+
+def _check_finite(value: Any, path: str) -> None:
+    """Reject nan and inf, which TOML allows and ranges do not exclude."""
+    if isinstance(value, dict):
+        for key, item in value.items():
+            _check_finite(item, _joined(path, str(key)))
+    elif isinstance(value, list | tuple):
+        for index, item in enumerate(value):
+            _check_finite(item, f"{path}[{index}]")
+    elif isinstance(value, float) and not math.isfinite(value):
+        raise ConfigError(path, value, "a finite number")

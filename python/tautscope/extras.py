@@ -1,0 +1,38 @@
+"""Optional dependencies: the modules of each extra, and the error if one is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from importlib.util import find_spec
+
+from tautscope.errors import MissingExtraError
+
+MODULES = {
+    "analysis": ("matplotlib", "rich", "scipy"),
+    "twin": ("cv2", "matplotlib", "mujoco", "rich"),
+    "hardware": ("av", "can", "canopen", "cv2", "matplotlib", "mcap", "rich"),
+    "ethercat": ("pysoem",),
+    "cluster": ("dask", "distributed"),
+}
+"""Extra -> modules that it installs for import."""
+
+
+def missing_modules(extra: str) -> list[str]:
+    """The modules of an extra that are not installed."""
+    return [name for name in MODULES[extra] if find_spec(name) is None]
+
+
+def require_extras(what: str, extras: Iterable[str]) -> None:
+    """Check that extras are installed.
+
+    Args:
+        what: What needs them, for the error: ``tautscope bench``.
+        extras: Names of extras.
+
+    Raises:
+        MissingExtraError: A module of an extra is not installed.
+    """
+    incomplete = {extra: names for extra in extras if (names := missing_modules(extra))}
+    if incomplete:
+        modules = tuple(dict.fromkeys(name for names in incomplete.values() for name in names))
+        raise MissingExtraError(what, modules, tuple(incomplete))

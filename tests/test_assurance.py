@@ -1,0 +1,54 @@
+"""The pages for whoever assesses risks: traceability, software of others, known anomalies."""
+
+import re
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCS = ROOT / "docs"
+sys.path.insert(0, str(DOCS))
+
+import assurance  # noqa: E402
+
+SAFETY = (DOCS / "safety.md").read_text(encoding="utf-8")
+
+
+def test_the_traceability_is_up_to_date() -> None:
+    page = (DOCS / "traceability.md").read_text(encoding="utf-8")
+    assert page == assurance.traceability(), "run `uv run docs/assurance.py`"
+
+
+@pytest.mark.skipif(shutil.which("cargo") is None, reason="cargo lists the crates")
+def test_the_list_of_software_is_up_to_date() -> None:
+    page = (DOCS / "soup.md").read_text(encoding="utf-8")
+    assert page == assurance.soup(), "run `uv run docs/assurance.py`"
+    assert "| numpy | " in page
+    assert "| pyo3 | " in page
+
+
+def test_every_hazard_has_a_control_in_a_file() -> None:
+    found = list(assurance.hazards(SAFETY))
+    assert len(found) == len(re.findall(r"^\| [VECDPL]\d+ \|", SAFETY, re.MULTILINE)) > 40
+    for name, _, response, _ in found:
+        files = assurance.control_files(name, response)
+        assert files, f"{name}: no file implements its control"
+        for file in files:
+            assert (ROOT / file).is_file(), (name, file)
+    assert set(assurance.CONTROLS) <= {name for name, *_ in found}
+
+
+def test_a_flag_is_traced_to_the_files_that_raise_it() -> None:
+    for file in assurance.control_files("none", "`frozen`: holds the estimate"):
+        assert "Flag::Frozen" in (ROOT / file).read_text(encoding="utf-8")
+    assert assurance.control_files("none", "`no_such_flag`") == []
+
+
+def test_every_missed_goal_is_a_known_anomaly() -> None:
+    anomalies = (DOCS / "anomalies.md").read_text(encoding="utf-8")
+    missed = re.findall(r"^\| (G\d+[b-d]?) \|.*, missed \|", SAFETY, re.MULTILINE)
+    assert missed
+    for goal in missed:
+        assert re.search(rf"\b{goal}\b", anomalies), goal

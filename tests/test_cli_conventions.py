@@ -1,0 +1,194 @@
+"""What all commands have in common: options, exit status, messages, pipes, extras."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from importlib.metadata import packages_distributions
+from pathlib import Path
+
+import pytest
+from refused import failed
+from tautscope.cli import _parser, main
+from tautscope.errors import (
+    BusError,
+    CameraError,
+    ConfigError,
+    DriveError,
+    MissingExtraError,
+    MotionHeldError,
+)
+from tautscope.extras import MODULES, require_extras
+
+Capture = pytest.CaptureFixture[str]
+ROOT = Path(__file__).resolve().parents[1]
+COMMAND = [sys.executable, "-W", "error", "-m", "tautscope"]
+
+
+def verbs() -> dict[str, argparse.ArgumentParser]:
+    """Every command that does something, by its words."""
+    found: dict[str, argparse.ArgumentParser] = {}
+
+    def collect(parser: argparse.ArgumentParser, words: str) -> None:
+        inner = [a for a in parser._actions if isinstance(a, argparse._SubParsersAction)]
+        for action in inner:
+            for name, each in action.choices.items():
+                collect(each, f"{words} {name}".strip())
+        if not inner:
+            found[words] = parser
+
+    collect(_parser(), "")
+    return found
+
+
+def test_options_have_one_meaning() -> None:
+    for words, parser in verbs().items():
+        options = {name for action in parser._actions for name in action.option_strings}
+        assert {"-v", "--verbose", "--help"} <= options, words
+        if words != "bench":  # its output is lines of JSON
+            assert "--json" in options, words
+        if words not in ("recover", "export", "calibrate colour"):
+            assert "--config" in options, words
+        assert "config" not in {a.dest for a in parser._actions if not a.option_strings}, words
+
+
+def test_errors_have_the_documented_exit_status() -> None:
+    help_text = _parser().format_help()
+    for error, status in (
+        (ConfigError("a", 1, "b"), 2),
+        (MissingExtraError("a", ("b",), ("c",)), 2),
+        (BusError("a", "b", "c"), 3),
+        (CameraError("a", 1, "b"), 3),
+        (DriveError("a", "b", "c"), 3),
+        (MotionHeldError(0.0, "hold_motion", ()), 4),
+    ):
+        assert error.exit_status == status
+        assert re.search(rf"^  {status} ", help_text, re.MULTILINE)
+
+
+def test_the_module_runs_as_a_command() -> None:
+    found = subprocess.run([*COMMAND, "--version"], capture_output=True, text=True, check=True)
+    assert re.fullmatch(r"tautscope \d+\.\d+\.\d+\n", found.stdout)
+
+
+@pytest.mark.parametrize("arguments", [["config"], ["config", "--json"]])
+def test_a_closed_pipe_is_no_traceback(arguments: list[str]) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    try:
+        found = subprocess.run(
+            [*COMMAND, *arguments], stdout=writer, stderr=subprocess.PIPE, text=True, check=False
+        )
+    finally:
+        os.close(writer)
+    assert found.stderr == ""
+    assert found.returncode == 141
+
+
+def test_a_missing_file_is_named(capsys: Capture) -> None:
+    columns = ["--command", "a", "--measured", "b"]
+    assert "File not found: nope.csv." in failed(capsys, "analyze", "nope.csv", *columns)
+    for verb in ("config", "demo", "run", "doctor", "bench"):
+        assert "File not found: nope.toml." in failed(capsys, verb, "--config", "nope.toml"), verb
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["demo"],
+        ["run", "--config", "bench"],
+        ["analyze", "{record}", "--command", "a", "--measured", "b"],
+    ],
+    ids=lambda arguments: arguments[0],
+)
+def test_an_output_folder_is_checked_first(
+    capsys: Capture, tmp_path: Path, arguments: list[str]
+) -> None:
+    record = tmp_path / "record.csv"
+    record.write_text("a,b\n" + "".join(f"{k % 7},{k % 7}\n" for k in range(99)))
+    words = [word.format(record=record) for word in arguments]
+    err = failed(capsys, *words, "--out", "/proc/nowhere/out")
+    assert "out: got '/proc/nowhere/out', expected a place that can be written" in err
+
+
+def test_a_rig_with_placeholders_is_refused_by_name(capsys: Capture, tmp_path: Path) -> None:
+    err = failed(capsys, "run", "--config", "article_rig", "--out", str(tmp_path / "run"))
+    assert "drives.insertion.counts_per_unit, drives.insertion.sign" in err
+    assert "placeholders of" in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_bench_that_does_not_run_is_named(capsys: Capture, tmp_path: Path) -> None:
+    file = tmp_path / "rig.toml"
+    bench = (ROOT / "configs" / "bench.toml").read_text(encoding="utf-8")
+    file.write_text(bench.replace("/tmp/tautscope-bench", f"{tmp_path}/bench"), encoding="utf-8")
+    arguments = ["run", "--config", str(file), "--out", str(tmp_path / "run"), "--periods", "3"]
+    assert main(arguments) == 3
+    err = capsys.readouterr().err
+    assert "1 run: about 1.5 min" in err  # three DOFs, three periods of 10 s
+    assert f"error: No rig answers on unix:{tmp_path}/bench.video: start `tautscope bench`" in err
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_verbose_prints_the_log(capsys: Capture, tmp_path: Path) -> None:
+    file = tmp_path / "rig.toml"
+    file.touch()
+    for arguments, shown in (
+        (["-v", "config"], True),
+        (["config", "-v"], True),
+        (["config"], False),
+    ):
+        assert main([*arguments, "--config", str(file)]) == 0
+        assert (f"info: configuration: {file}" in capsys.readouterr().err) is shown
+    assert not logging.getLogger("tautscope").handlers
+
+
+def test_the_shell_completes() -> None:
+    """As a shell asks: the words so far in COMP_LINE, the answers on file descriptor 8."""
+    line = "tautscope co"
+    environment = os.environ | {
+        "_ARGCOMPLETE": "1",
+        "COMP_LINE": line,
+        "COMP_POINT": str(len(line)),
+        "_ARGCOMPLETE_IFS": "\n",
+        "_ARGCOMPLETE_STDOUT_FILENAME": "/dev/stdout",
+        "_ARGCOMPLETE_SUPPRESS_SPACE": "1",
+    }
+    found = subprocess.run(
+        [sys.executable, "-m", "tautscope"], env=environment, capture_output=True, text=True,
+        check=False,
+    )  # fmt: skip
+    assert found.stdout.split() == ["config"]
+
+
+def test_a_missing_extra_is_one_line(capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(MODULES, "twin", ("cv2", "no_such_module"))
+    err = failed(capsys, "demo")
+    assert err == (
+        "error: tautscope demo needs no_such_module; type: "
+        'python -m pip install "tautscope[twin]"\n'
+    )
+    with pytest.raises(ImportError, match="no_such_module"):
+        require_extras("anything", ["hardware", "twin"])
+
+
+def test_extras_install_the_modules_that_are_checked() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    installed = packages_distributions()
+    for extra, modules in MODULES.items():
+        wanted = {
+            re.split(r"[\[<>=]", requirement)[0].lower()
+            for requirement in project["optional-dependencies"][extra]
+            if not requirement.startswith("tautscope")
+        }
+        known = {name: {one.lower() for one in installed.get(name, [name])} for name in modules}
+        for name in wanted - {"pyserial"}:
+            assert any(name in names for names in known.values()), (extra, name)
+        for module, names in known.items():
+            own = module == "distributed" and "dask" in wanted
+            assert own or names & wanted, (extra, module)

@@ -1,0 +1,80 @@
+"""Template and reference page of the configuration."""
+
+import re
+import sys
+import tomllib
+from pathlib import Path
+
+import msgspec
+import pytest
+from tautscope.config import RIGS, Config, config_file, load_config
+from tautscope.config.descriptions import all_sections, keys
+from tautscope.config.placeholders import placeholders, refuse_placeholders
+from tautscope.config.template import template
+from tautscope.errors import ConfigError
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "docs"))
+
+import configuration  # noqa: E402
+
+CONFIGS = [None, *RIGS]
+
+
+@pytest.mark.parametrize("name", CONFIGS)
+def test_the_template_reads_back_equal(name: str | None, tmp_path: Path) -> None:
+    config = load_config(name)
+    file = tmp_path / "template.toml"
+    file.write_text(template(config, placeholders(name)), encoding="utf-8")
+    assert load_config(file) == config
+    assert set(placeholders(file)) == set(placeholders(name))
+
+
+def test_every_key_of_the_template_has_its_meaning_and_range() -> None:
+    text = template(Config())
+    flat = re.sub(r"\n(# )+", " ", text)
+    for path, section in all_sections():
+        for key in keys(section):
+            if key.section is None:
+                assert len(key.text) > 5, f"{path}.{key.name}"
+                assert f"{key.text} Allowed: {key.allowed}." in flat, f"{path}.{key.name}"
+    assert all(len(line) <= 140 for line in text.splitlines())
+
+
+def test_uncommented_drives_need_only_what_is_required() -> None:
+    lines = template(Config()).splitlines()
+    start = lines.index("# [drives]")
+    text = "\n".join(line.removeprefix("# ") for line in lines[start:])
+    values = {"node": "", "travel": "[0, 1]", "counts_per_unit": "1e4"}
+    nodes = iter(range(1, 4))
+    text = re.sub(
+        r"^(\w+) = \.\.\.  # required$",
+        lambda match: f"{match[1]} = {values.get(match[1], '1') or next(nodes)}",
+        text,
+        flags=re.MULTILINE,
+    )
+    drives = tomllib.loads(re.sub(r"^eds =$", "", text, flags=re.MULTILINE))
+    config = msgspec.convert(drives["drives"], type(load_config("bench").drives))
+    assert (
+        config.cycle
+        == type(config)(
+            insertion=config.insertion, rotation=config.rotation, bending=config.bending
+        ).cycle
+    )
+
+
+def test_the_page_is_up_to_date() -> None:
+    assert configuration.PAGE.read_text(encoding="utf-8") == configuration.page(), (
+        "run `uv run docs/configuration.py`"
+    )
+
+
+def test_placeholders_are_refused_by_name() -> None:
+    with pytest.raises(ConfigError) as found:
+        refuse_placeholders("article_rig")
+    text = config_file("article_rig").read_text(encoding="utf-8")
+    assert len(found.value.field.split(", ")) == sum(
+        "REPLACE" in line and not line.startswith("#") for line in text.splitlines()
+    )
+    assert "drives.insertion.counts_per_unit" in found.value.field
+    refuse_placeholders("bench")
