@@ -34,6 +34,12 @@ def colon_folder() -> Path:
 
 
 @pytest.fixture(scope="session")
+def tool_folder() -> Path:
+    """The folder of the records of real cable-driven tools."""
+    return shared_data("davinci_tools")
+
+
+@pytest.fixture(scope="session")
 def uncompensated() -> Recording:
     """The article's experiment, shortened, on the drawn rig, without compensation."""
     return _run(compensate=False)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import shared_data
 from numpy.typing import NDArray
 from play_model import play
 from tautscope.analysis.comparison import HORIZONS, analyze, seen_at
@@ -155,9 +155,10 @@ def test_a_changed_slack_is_followed_within_two_strokes(share: float) -> None:
     assert max(strokes[2:]) < 0.15 * (4.5 - 2)
 
 
-def test_the_mixture_is_at_most_5_percent_worse_than_any_model_on_a_real_tool() -> None:
-    path = shared_data("davinci_tools", "tool4_R5_run10.csv")
-    found = analyze(read_record(path, "motor_deg", "jaw_deg"), CONFIG)
+def test_the_mixture_is_at_most_5_percent_worse_than_any_model_on_a_real_tool(
+    tool_folder: Path,
+) -> None:
+    found = analyze(read_record(tool_folder / "tool4_R5_run10.csv", "motor_deg", "jaw_deg"), CONFIG)
     errors = {entry.model.name: entry.horizons for entry in found.entries}
     best = errors.pop("best")
     for at, share in enumerate(HORIZONS):

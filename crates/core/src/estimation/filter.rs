@@ -336,12 +336,10 @@ impl Filter {
         let (width, centre) = (settings.width_walk, settings.centre_walk);
         let mut std = [0.0; STATE];
         let [_, _, _, _, _, w1, w2, w3, c1, c2, c3, share, ..] = &mut std;
-        (*w1, *w2, *w3) = (width * shaft, width * shaft, width * bending);
-        (*c1, *c2, *c3) = (
-            centre * shaft * h1,
-            centre * shaft * h2,
-            centre * bending * h3,
-        );
+        let own = [t1, t2, t3].map(libm::sqrt);
+        [*w1, *w2, *w3] = own.map(|travel| width * travel);
+        let [r1, r2, r3] = own.map(|travel| centre * travel);
+        (*c1, *c2, *c3) = (r1 * h1, r2 * h2, r3 * h3);
         *share = settings.share_walk * shaft;
         self.ensemble.add_noise(&std);
     }
