@@ -56,8 +56,9 @@ def run(
     *,
     begin: float = BEGIN,
     actual: Config | None = None,
+    motion: Callable[[float], Floats] = reference,
 ) -> Run:
-    """Run the loop along `reference`; from `begin` to END the fault changes the features.
+    """Run the loop along `motion`; from `begin` to END the fault changes the features.
 
     `delay` gives the error of the capture time [s], None for a lost frame; `actual` is the geometry
     of camera and instrument [that of the settings].
@@ -68,7 +69,7 @@ def run(
     frozen: Floats | None = None
     for tick in range(round(until / PERIOD)):
         time = tick * PERIOD
-        command = loop.step(reference(time), time)
+        command = loop.step(motion(time), time)
         tip = np.clip(tip, command - WIDTHS / 2, command + WIDTHS / 2)
         tips.append(tip)
         commands.append(command)
@@ -76,8 +77,8 @@ def run(
         if captured < 0 or captured % 8:
             continue
         prediction = model.predict(tips[captured])
-        assert prediction is not None
-        measured: Floats | None = prediction[0] + noise.normal(0.0, NOISE, 4)
+        seen = noise.normal(0.0, NOISE, 4)
+        measured: Floats | None = None if prediction is None else prediction[0] + seen
         at = captured * PERIOD
         if begin <= at < END:
             assert measured is not None

@@ -26,11 +26,12 @@ const MAP_SPACING: f64 = 0.7;
 
 /// Ensemble filter over tip and hysteresis.
 ///
-/// Each member has the outputs of the plays, half widths, centres, and the share of the friction that insertion and rotation
-/// have in common. Between images each is propagated by the exact plays along
-/// the commands; the travel of the reference adds a random walk. The image of a time updates the members at that time.
-/// The mean, propagated to now, is the prediction that the compensation uses. A camera pose or section that is not as
-/// configured is an error of the feature model, which adapts to the misfit of the markers: an image is not refused for it.
+/// Each member has the outputs of the plays, half widths, centres, the share of the friction that insertion and rotation have
+/// in common, how far the tip lags behind the plays, and by how much the geometry differs from the configured one. Between
+/// images each is propagated by the exact plays along the commands; the travel of the reference adds a random walk. The
+/// image of a time updates the members at that time. The mean, propagated to now, is the prediction that the compensation
+/// uses. What else of camera and instrument is not as configured is an error of the feature model, which adapts to the
+/// misfit of the markers: an image is not refused for it.
 ///
 /// Wrong where an instrument is no play: by the rounding of its loop.
 #[derive(Debug, Clone, PartialEq)]
