@@ -1,7 +1,7 @@
 //! Update of the filter with an image, and what makes it less certain.
 
 use crate::dof::PerDof;
-use crate::estimation::ensemble::ScalarMeasurement;
+use crate::estimation::ensemble::{STATE, ScalarMeasurement};
 use crate::estimation::filter::Filter;
 use crate::estimation::history::{Entry, History};
 use crate::estimation::marker_measurement::{ImagePrediction, MarkerEstimate, Markers};
@@ -111,8 +111,8 @@ impl Filter {
         self.settle();
     }
 
-    /// Makes the tip as uncertain as at the start, about its mean, and the feature model uncertain by many px, so that the
-    /// next images determine both.
+    /// Makes tip and centres as uncertain as at the start, about their means, and the feature model uncertain by many px, so
+    /// that the next images determine them: a tip that was pushed has another centre.
     pub fn reset_position(&mut self) {
         let Belief { deviation, .. } = self.belief();
         let mut missing = self.start_std;
@@ -120,6 +120,12 @@ impl Filter {
             *missing = libm::sqrt((*missing * *missing - std * std).max(0.0));
         }
         self.ensemble.disturb_position(missing);
+        let [h1, h2, h3] = self.nominal.hysteresis.half_width;
+        let offset = self.settings.centre_deviation;
+        let mut std = [0.0; STATE];
+        let [_, _, _, _, _, _, _, _, c1, c2, c3, ..] = &mut std;
+        (*c1, *c2, *c3) = (offset * h1, offset * h2, offset * h3);
+        self.ensemble.add_noise(&std);
         self.model_std = RESET_MODEL * self.settings.model_deviation;
     }
 
