@@ -34,7 +34,7 @@ const CERTAIN: f64 = 3.0;
 const APPARENT: f64 = 0.1;
 
 /// Lag of the offsets in use behind the estimate, in half of `width_limit`, beyond which the slack has changed.
-const CHANGED: f64 = 0.25;
+const CHANGED: f64 = 0.15;
 
 /// Profile `best`.
 #[derive(Debug, Clone, PartialEq)]
