@@ -30,8 +30,9 @@ const STEPS: usize = 5;
 /// contact   |dq| <= tip_gain |du| for the tip q that the estimate predicts, and q does not pass u along du
 /// ```
 ///
-/// with u + lag du/dt for u, because the tip lags behind its plays; of bending by itself. One DOF alone: 0 <= dc / du <= `K_b`, Eq. (2). Where insertion and rotation rest, neither command
-/// moves, but each moves where the other does: while rotation turns, the friction that held the insertion is released.
+/// of bending by itself; in target and contact u is u + lag du/dt, because the tip lags behind its plays. One DOF alone:
+/// 0 <= dc / du <= `K_b`, Eq. (2). Where insertion and rotation rest, neither command moves, but each moves where the other
+/// does: while rotation turns, the friction that held the insertion is released.
 /// A share of the compensation s makes it dc = du + s (dc - du).
 ///
 /// Wrong as far as the estimate is.

@@ -43,8 +43,13 @@ impl Nominal {
         self.tip(output)
     }
 
-    /// Follows the output `after` a time in s.
+    /// Updates the velocity with a motion of the output (3,) from `before` to `after` within a time in s.
+    ///
+    /// Times that are not above 0, of a clock that stands or is set back, say nothing of a velocity.
     pub fn follow(&mut self, before: PerDof<f64>, after: PerDof<f64>, time: f64) {
+        if time.is_nan() || time <= 0.0 {
+            return;
+        }
         let moved = after.into_iter().zip(before).zip(self.lag);
         for (velocity, ((after, before), lag)) in self.velocity.iter_mut().zip(moved) {
             let kept = libm::exp(-time / lag.max(LEAST_LAG));
@@ -59,5 +64,53 @@ impl Nominal {
             *output = origin + (*output - origin) / gain;
         }
         output
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn moving() -> Nominal {
+        let start = PlayPosition::at([0.0; 3]);
+        let hysteresis = Hysteresis {
+            half_width: [1.0; 3],
+            centre: [0.0; 3],
+            shared: 0.5,
+        };
+        Nominal {
+            hysteresis,
+            position: start,
+            width_std: [0.0; 3],
+            gain: [1.0; 3],
+            origin: [0.0; 3],
+            lag: [0.1; 3],
+            velocity: [1.0, -2.0, 3.0],
+        }
+    }
+
+    #[test]
+    fn a_clock_that_stands_or_goes_back_does_not_change_the_velocity() {
+        for time in [0.0, -1.0, f64::NAN] {
+            let mut nominal = moving();
+            nominal.follow([0.0; 3], [0.0, 1.0, 2.0], time);
+            assert_eq!(nominal, moving(), "{time}");
+        }
+    }
+
+    /// A constant velocity v is reached as v (1 - exp(-t / lag)).
+    #[test]
+    fn the_velocity_follows_with_the_lag() {
+        let mut nominal = moving();
+        nominal.velocity = [0.0; 3];
+        for _ in 0..20 {
+            nominal.follow([0.0; 3], [0.01, 0.02, -0.01], 0.005);
+        }
+        for (found, v) in nominal.velocity.into_iter().zip([2.0, 4.0, -2.0]) {
+            assert!(
+                (found - v * (1.0 - libm::exp(-1.0))).abs() < 1e-12,
+                "{found}"
+            );
+        }
     }
 }
