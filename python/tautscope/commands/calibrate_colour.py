@@ -1,4 +1,4 @@
-"""The command ``tautscope calibrate``."""
+"""The command ``tautscope calibrate colour``."""
 
 from __future__ import annotations
 
@@ -15,15 +15,8 @@ from tautscope.errors import FieldError, MissingPathError
 Pixels = NDArray[np.uint8]
 
 
-def add_parser(verbs: arguments.Verbs) -> None:
-    """Add the command to the parser."""
-    calibrate = arguments.add_verb(
-        verbs,
-        "calibrate",
-        help="find settings of a rig from images",
-        description="Find settings of a rig from images, and print them as TOML.",
-    )
-    kinds = calibrate.add_subparsers(dest="kind", required=True, metavar="WHAT")
+def add_parser(kinds: arguments.Verbs) -> None:
+    """Add the command to the parser of ``tautscope calibrate``."""
     colour = arguments.add_verb(
         kinds,
         "colour",
@@ -41,10 +34,10 @@ def add_parser(verbs: arguments.Verbs) -> None:
         help="pairs of an image and its mask, of the same size",
     )
     arguments.add_json(colour)
-    colour.set_defaults(run=_colour)
+    colour.set_defaults(run=_run)
 
 
-def _colour(options: argparse.Namespace) -> None:
+def _run(options: argparse.Namespace) -> None:
     from tautscope.calibration.colour import ColorDiscriminant  # noqa: PLC0415
 
     files: list[Path] = options.files
