@@ -1,0 +1,17 @@
+"""The command ``tautscope calibrate``: one file per kind of calibration."""
+
+from __future__ import annotations
+
+from tautscope.commands import arguments, calibrate_colour
+
+
+def add_parser(verbs: arguments.Verbs) -> None:
+    """Add the command to the parser."""
+    calibrate = arguments.add_verb(
+        verbs,
+        "calibrate",
+        help="find settings of a rig from images and motions",
+        description="Find settings of a rig from images and motions, and print them as TOML.",
+    )
+    kinds = calibrate.add_subparsers(dest="kind", required=True, metavar="WHAT")
+    calibrate_colour.add_parser(kinds)
