@@ -125,7 +125,7 @@ class Model:
         rounding = min(TYPICAL_ROUNDING * float(np.exp(value[INDEX["rounding"]])), 0.9)
         shared = float(np.clip(_SHARED + value[INDEX["shared friction"]], 0.0, 1.0))
         data = self.data
-        plays = (
+        plays = [
             _core.Hysteresis(
                 half_width=share * half_width,
                 centre=(0.0, 0.0, 0.0),
@@ -133,8 +133,8 @@ class Model:
                 radius=self._radius,
             ).run(data.motors)
             for share in (1 - rounding, 1 + rounding)
-        )
-        tip = sum(plays) / 2
+        ]
+        tip = np.mean(plays, axis=0)
         lags = value[INDEX["camera.source.delay"]] + TYPICAL_LAG * np.exp(of("lag"))
         at = [np.interp(data.captured_at - lags[dof], data.time, tip[:, dof]) for dof in Dof]
         start = data.motors[0]

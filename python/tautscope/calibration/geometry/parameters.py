@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -150,8 +150,8 @@ class Geometry:
             rotation=self.rotation,
         )
 
-    def values(self) -> dict[str, object]:
-        """The changed values by dotted path, as for `Config.replace`."""
+    def values(self) -> dict[str, Any]:
+        """The values by dotted path, as for `Config.replace`."""
         instrument = self._config.instrument
         end = self.marker_b + instrument.band_length / 2
         return {
