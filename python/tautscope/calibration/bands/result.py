@@ -140,7 +140,7 @@ def _figure(fit: ColourFit, images: Sequence[LabelledImage]) -> Figure:
         right.hist(values, bins=120, weights=share, label=name, color=colour, alpha=0.7)
     right.axvline(fit.discriminant.threshold, color="k", linewidth=1, label="threshold")
     right.set(xlabel="w . x [grey levels]", ylabel="share of the pixels", yscale="log")
-    right.legend(frameon=False)
+    right.legend(frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
     return figure
 
 

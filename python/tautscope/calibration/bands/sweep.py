@@ -8,13 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tautscope.calibration.geometry.sweep import OF_IMAGES
 from tautscope.calibration.images import to_bgr
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import CameraError, MotionHeldError, SignalError
 from tautscope.loop.reduction import HysteresisReduction
 from tautscope.loop.rig import Rig
-from tautscope.loop.safety import DETECTORS, Reaction
+from tautscope.loop.safety import Reaction
 
 Floats = NDArray[np.float64]
 Image = NDArray[np.uint8]
@@ -27,7 +28,6 @@ _SHARE = (1.0, 0.0, 0.6)
 """Amplitude relative to that of the experiment."""
 _TURNS = (1, 1, 2)
 """Periods in the motion."""
-_OF_TICKS = ("reference_fast", "reference_jump", "command_speed", "command_travel", "not_finite")
 _HELD_TIME = 1.0
 
 
@@ -64,8 +64,7 @@ def record_motion(
         SignalError: The rig's clock does not advance.
         TautscopeError: Errors of the rig.
     """
-    of_images = [name for name in DETECTORS if name not in _OF_TICKS]
-    off = tuple(dict.fromkeys([*config.safety.off, *of_images]))
+    off = tuple(dict.fromkeys([*config.safety.off, *OF_IMAGES]))
     loop = HysteresisReduction(config.replace(**{"safety.off": off}), compensate=False)
     ticks: list[tuple[float, Floats]] = []
     frames: list[tuple[float, Image]] = []

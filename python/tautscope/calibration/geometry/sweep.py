@@ -24,7 +24,7 @@ _PERIODS = (5.0, 6.1, 4.1)
 _SPEED_SHARE = 0.5
 _GROWTH_TIME = 2.0
 _HELD_TIME = 1.0
-_OF_IMAGES = (
+OF_IMAGES = (
     "frozen",
     "late",
     "duplicate",
@@ -110,7 +110,7 @@ def sweep(
         FrameError: An image is not what the configured camera gives.
         TautscopeError: Errors of the rig.
     """
-    off = tuple(dict.fromkeys([*config.safety.off, *_OF_IMAGES]))
+    off = tuple(dict.fromkeys([*config.safety.off, *OF_IMAGES]))
     loop = HysteresisReduction(config.replace(**{"safety.off": off}), compensate=False)
     reference = SweepReference(config, duration)
     recorder = Recorder(config)
