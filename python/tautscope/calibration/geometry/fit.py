@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.calibration.geometry.checks import LARGEST_RESIDUAL, check_record, find_doubts
 from tautscope.calibration.geometry.model import FEATURE_STD, TIP_STD, Data, Model
-from tautscope.calibration.geometry.parameters import (
-    INDEX,
-    PARAMETERS,
-    PRIOR_STD,
-    Geometry,
-    Intrinsics,
-    estimated,
-)
+from tautscope.calibration.geometry.parameters import Intrinsics, estimated
 from tautscope.calibration.geometry.recording import Recording, generic
 from tautscope.calibration.geometry.solver import Solution, solve
+from tautscope.calibration.geometry.values import (
+    Value,
+    changed_keys,
+    estimated_values,
+    key_stds,
+)
 from tautscope.config import Config
 from tautscope.errors import FieldError
 from tautscope.loop.state_prediction import StatePrediction
@@ -31,38 +31,16 @@ FEATURE_STD_RANGE = (0.15, 1.0)
 """Standard deviation of a feature that the residuals may lead to [px]."""
 
 
-@dataclass(frozen=True, slots=True)
-class Value:
-    """An estimated value.
-
-    Attributes:
-        name: Parameter.
-        before: Value of the configuration, in SI units.
-        after: Estimated value.
-        prior_std: Standard deviation of `before` that the fit assumed.
-        std: Standard deviation of `after`.
-        shown: Factor to the shown unit.
-        unit: Shown unit.
-    """
-
-    name: str
-    before: float
-    after: float
-    prior_std: float
-    std: float
-    shown: float
-    unit: str
-
-
 @dataclass(frozen=True, eq=False)
 class GeometryFit:
     """Result of the geometry calibration.
 
     Attributes:
         config: The configuration with the estimated geometry and delay.
-        std: Parameter -> standard deviation in SI units: `camera.camera_from_guide.translation.x`
-            [m], `.rotation.x` [rad, about the camera's axes], `instrument.bending_length` [m],
-            `camera.focal` [1], `camera.source.delay` [s], ...
+        changes: Dotted key -> value of `config`, for `Config.replace`: what was estimated.
+        std: Key -> standard deviation in the unit of the key:
+            `camera.camera_from_guide.translation[0]` [m], `.rotation[0]` [rad, about the camera's
+            axes], `instrument.bending_length` [m], `camera.fx` [px], `camera.source.delay` [s], ...
         residual_px: Root mean square of the residuals [px], of the images that are explained.
         warnings: What the user has to know; empty in the normal case.
         is_plausible: Whether the model explains the record; if not, do not use `config`.
@@ -75,6 +53,7 @@ class GeometryFit:
     """
 
     config: Config
+    changes: dict[str, Any]
     std: dict[str, float]
     residual_px: float
     warnings: tuple[str, ...]
@@ -134,7 +113,7 @@ def fit(
     model = _model(recording, config, band_distance, feature_std)
     solution = solve(model, active, solution.z)
     free = solve(model, active, solution.z, free_states=True)
-    return _result(recording, config, model, solution, free, active)
+    return _result(recording, config, model, (solution, free), active)
 
 
 def _model(
@@ -181,23 +160,19 @@ def _result(
     recording: Recording,
     config: Config,
     model: Model,
-    solution: Solution,
-    free: Solution,
+    solutions: tuple[Solution, Solution],
     active: NDArray[np.bool_],
 ) -> GeometryFit:
-    geometry = model.geometry(solution.z)
-    changes = geometry.values()
-    delay = config.camera.source.delay + float(
-        solution.z[INDEX["camera.source.delay"]] * PRIOR_STD[INDEX["camera.source.delay"]]
-    )
-    changes["camera.source.delay"] = max(delay, 0.0)
-    doubts, warnings = find_doubts(model, solution, free, active)
+    solution, _ = solutions
+    doubts, warnings = find_doubts(model, *solutions, active)
+    values = estimated_values(config, model.geometry(solution.z), solution, active)
+    changes = changed_keys(config, model.geometry(solution.z), values)
+    delay = next(value.after for value in values if value.name == "camera.source.delay")
     if delay < 0:
         warnings.append(
             f"Images are stamped {-delay * 1e3:.0f} ms before the motors' clock: "
             "camera.source.delay is set to 0, which cannot express it"
         )
-    values = _values(config, geometry, delay, solution, active)
 
     def per_image(table: Floats) -> Floats:
         whole = np.full((len(recording.captured_at), table.shape[1]), np.nan)
@@ -206,7 +181,8 @@ def _result(
 
     return GeometryFit(
         config=config.replace(**changes),
-        std={value.name: value.std for value in values},
+        changes=changes,
+        std=key_stds(values, changes),
         residual_px=_rms(solution.residuals),
         warnings=(*doubts, *warnings),
         is_plausible=not doubts,
@@ -223,62 +199,3 @@ def _rms(residuals: Floats) -> float:
     """Root mean square of the residuals of explained images [px]; NaN if there is none."""
     explained = residuals[np.abs(residuals).max(axis=1) < LARGEST_RESIDUAL]
     return float(np.sqrt(np.mean(explained**2))) if len(explained) else float("nan")
-
-
-def _values(
-    config: Config,
-    geometry: Geometry,
-    delay: float,
-    solution: Solution,
-    active: NDArray[np.bool_],
-) -> tuple[Value, ...]:
-    """The estimated parameters; lengths in m, focal lengths as a factor."""
-    instrument, camera = config.instrument, config.camera
-    before = {
-        "instrument.bending_length": instrument.bending_length,
-        "instrument.marker_a": instrument.marker_a,
-        "instrument.marker_b": instrument.marker_b,
-        "camera.cx": camera.cx,
-        "camera.cy": camera.cy,
-        "camera.distortion.k1": camera.distortion[0],
-        "camera.focal": 1.0,
-        "camera.fy over fx": 1.0,
-        "camera.source.delay": camera.source.delay,
-    }
-    after = {
-        "instrument.bending_length": geometry.bending_length,
-        "instrument.marker_a": geometry.marker_a,
-        "instrument.marker_b": geometry.marker_b,
-        "camera.source.delay": delay,
-    }
-    for axis, old, new in zip(
-        "xyz", camera.camera_from_guide.translation, geometry.translation, strict=True
-    ):
-        name = f"camera.camera_from_guide.translation.{axis}"
-        before[name], after[name] = old, new
-    for axis, old, new in zip(
-        "xyz", camera.camera_from_guide.rotation, geometry.rotation, strict=True
-    ):
-        name = f"camera.camera_from_guide.rotation.{axis}"
-        before[name], after[name] = old, new
-    std = np.sqrt(np.diag(solution.covariance))
-    found = []
-    for index in np.flatnonzero(active):
-        parameter = PARAMETERS[index]
-        old = before.get(parameter.name, 0.0)
-        difference = float(solution.z[index] * parameter.std)
-        scale, shown, unit = 1.0, parameter.shown, parameter.unit
-        if parameter.name == "instrument.bending_length":
-            scale, shown, unit = geometry.bending_length, 1e3, "mm"
-        found.append(
-            Value(
-                parameter.name,
-                float(old),
-                float(after.get(parameter.name, old + difference)),
-                float(scale * parameter.std),
-                float(scale * std[index] * parameter.std),
-                shown,
-                unit,
-            )
-        )
-    return tuple(found)

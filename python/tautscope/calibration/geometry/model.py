@@ -14,6 +14,7 @@ from tautscope.calibration.geometry.parameters import (
     PARAMETERS,
     PRIOR_STD,
     TYPICAL_LAG,
+    TYPICAL_ROUNDING,
     Geometry,
 )
 from tautscope.config import Config
@@ -120,14 +121,20 @@ class Model:
         def of(name: str) -> Floats:
             return np.array([value[INDEX[f"{name} {dof.label}"]] for dof in Dof])
 
-        play = _core.Hysteresis(
-            half_width=_HALF_WIDTH * self.width_limit * np.exp(of("half width")),
-            centre=(0.0, 0.0, 0.0),
-            shared=float(np.clip(_SHARED + value[INDEX["shared friction"]], 0.0, 1.0)),
-            radius=self._radius,
-        )
+        half_width = _HALF_WIDTH * self.width_limit * np.exp(of("half width"))
+        rounding = min(TYPICAL_ROUNDING * float(np.exp(value[INDEX["rounding"]])), 0.9)
+        shared = float(np.clip(_SHARED + value[INDEX["shared friction"]], 0.0, 1.0))
         data = self.data
-        tip = play.run(data.motors)
+        plays = [
+            _core.Hysteresis(
+                half_width=share * half_width,
+                centre=(0.0, 0.0, 0.0),
+                shared=shared,
+                radius=self._radius,
+            ).run(data.motors)
+            for share in (1 - rounding, 1 + rounding)
+        ]
+        tip = np.mean(plays, axis=0)
         lags = value[INDEX["camera.source.delay"]] + TYPICAL_LAG * np.exp(of("lag"))
         at = [np.interp(data.captured_at - lags[dof], data.time, tip[:, dof]) for dof in Dof]
         start = data.motors[0]

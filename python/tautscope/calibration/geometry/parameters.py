@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,6 +63,7 @@ _TIMES = (
 )
 _PLAY = (
     *(Parameter(f"half width {dof.label}", 0.5, 1, "log") for dof in Dof),
+    Parameter("rounding", 0.7, 1, "log"),
     Parameter("shared friction", 0.25, 1, "1"),
     *(Parameter(f"gain {dof.label}", 0.2, 100, "%") for dof in Dof),
     Parameter("zero insertion", 1e-3, 1e3, "mm"),
@@ -75,6 +76,8 @@ INDEX = {name: index for index, name in enumerate(NAMES)}
 PRIOR_STD: Floats = np.array([parameter.std for parameter in PARAMETERS])
 IMAGE = slice(0, INDEX["unevenness over bending"] + 1)
 """The parameters that the features depend on; the others are of the motion of the tip."""
+TYPICAL_ROUNDING = 0.15
+"""Median of the prior of the rounding of the loops."""
 TYPICAL_LAG = 0.03
 """Median of the prior of the lag of the tip behind the motors [s]."""
 
@@ -147,8 +150,8 @@ class Geometry:
             rotation=self.rotation,
         )
 
-    def values(self) -> dict[str, object]:
-        """The changed values by dotted path, as for `Config.replace`."""
+    def values(self) -> dict[str, Any]:
+        """The values by dotted path, as for `Config.replace`."""
         instrument = self._config.instrument
         end = self.marker_b + instrument.band_length / 2
         return {

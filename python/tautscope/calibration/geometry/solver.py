@@ -156,7 +156,10 @@ def _covariance(information: Floats, scores: Floats, captured_at: Floats) -> Flo
 
 
 def _whitened(model: Model, z: Floats, states: Floats) -> tuple[Floats, Floats]:
-    """Residuals (n, 4) and Jacobians (n, 4, 4) by the states over `Model.feature_std`; 0: not visible."""
+    """Residuals (n, 4) and Jacobians (n, 4, 4) by the states over the features' std.
+
+    0 where a band is not visible.
+    """
     predicted, by_state = model.features(z, states)
     residuals = (model.data.features - predicted) / model.feature_std
     is_bad = ~(np.isfinite(residuals).all(axis=1) & np.isfinite(by_state).all(axis=(1, 2)))
