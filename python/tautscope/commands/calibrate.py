@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope.commands import arguments
+from tautscope.commands import arguments, calibrate_latency
 from tautscope.commands.printing import print_json
 from tautscope.errors import FieldError, MissingPathError
 
@@ -42,6 +42,7 @@ def add_parser(verbs: arguments.Verbs) -> None:
     )
     arguments.add_json(colour)
     colour.set_defaults(run=_colour)
+    calibrate_latency.add_parser(kinds)
 
 
 def _colour(options: argparse.Namespace) -> None:
