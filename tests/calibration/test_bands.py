@@ -176,3 +176,6 @@ def test_overexposed_pixels_are_ignored() -> None:
     each = labelled(image, bands)
     assert not (each.labels == BAND_A).any()
     assert (each.labels == BAND_B).any()
+    image[bands[1] > 0] = 255
+    with pytest.raises(CalibrationError, match="overexposed"):
+        fit_colour([labelled(image, bands)])

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from tautscope.commands.calibration_session import CalibrationSession
     from tautscope.commands.calibration_steps import Step
 
-_NAMES = ("camera", "colour", "geometry", "doctor", "motion")
+_NAMES = ("camera", "colour", "geometry", "latency", "doctor", "motion")
 _INCOMPLETE = 1
 
 

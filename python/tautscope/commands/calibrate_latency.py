@@ -3,23 +3,30 @@
 from __future__ import annotations
 
 import argparse
+import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
 from tautscope.commands.align import NO_ANSWER, print_delay
+from tautscope.commands.calibration_output import add_options, check_options, finish
+from tautscope.commands.calibration_rig import add_rig_options, confirm_motion, rig_for_calibration
 from tautscope.commands.printing import print_json
 from tautscope.config import Config, load_config
-from tautscope.config.placeholders import refuse_placeholders
 from tautscope.dof import Dof
-from tautscope.errors import ConfigError
+from tautscope.errors import CalibrationError, ConfigError
 
 if TYPE_CHECKING:
+    from tautscope.calibration.delay import DelayEstimate
+    from tautscope.calibration.result import CalibrationResult
     from tautscope.runs.recording import Recording
 
 SHARE = 0.8
 """Amplitude and period of the motion over those of the experiment: the speed is the same."""
 PERIODS = 3
+DISAGREEMENT = 3.0
+"""Largest difference from the delay of the geometry over its standard deviation."""
 
 
 def add_parser(kinds: arguments.Verbs) -> None:
@@ -37,62 +44,135 @@ def add_parser(kinds: arguments.Verbs) -> None:
     latency.add_argument(
         "file", type=Path, nargs="?", metavar="FILE.mcap", help="log of a run instead of a motion"
     )
-    latency.add_argument("--twin", action="store_true", help="move the simulated instrument")
-    arguments.add_out(latency, "latency")
-    arguments.add_config(latency)
-    arguments.add_json(latency)
+    latency.add_argument(
+        "--log",
+        type=Path,
+        metavar="DIR",
+        help="folder of the log of a motion on a rig, new or empty [runs/<date-time>-latency]",
+    )
+    add_rig_options(latency)
+    add_options(latency)
     latency.set_defaults(run=_run)
 
 
 def _run(options: argparse.Namespace) -> int:
     from tautscope.log.alignment import align_recording  # noqa: PLC0415
 
-    recording = _recording(options)
+    check_options(options)
+    recording, serial_numbers = _recording(options)
     found = align_recording(recording)
-    delay = recording.config.camera.source.delay + found.delay
-    if options.json:
-        print_json({**found.to_json(), "camera_delay": delay if found.is_known else None})
-    else:
+    if not found.is_known:
+        if options.json:
+            print_json({**found.to_json(), "camera_delay": None})
+        else:
+            print_delay(found)
+        return NO_ANSWER
+    if not options.json:
         print_delay(found)
-        if found.is_known and delay >= 0:
-            print(f"\n[camera.source]\ndelay = {delay:.4f}")
-        elif found.is_known:
-            print("The images are stamped before they are captured: check camera.source.clock.")
-    return 0 if found.is_known else NO_ANSWER
+    finish(options, result(found, recording.config, serial_numbers))
+    return 0
 
 
-def _recording(options: argparse.Namespace) -> Recording:
-    """The recording of the log, or of a motion."""
-    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
+def result(
+    found: DelayEstimate, config: Config, serial_numbers: Mapping[str, str]
+) -> CalibrationResult:
+    """The delay in the form that all calibrations have.
 
+    The calibration of the geometry has estimated it too. The value with the smaller standard
+    deviation is kept; if both disagree, there is no answer.
+
+    Raises:
+        CalibrationError: There is no answer, or the images are stamped before they are captured.
+    """
+    from tautscope.calibration.result import CalibrationResult  # noqa: PLC0415
+
+    if not found.is_known:
+        remedy = "Give camera.source.delay yourself, or leave out this step: docs/recordings.md"
+        raise CalibrationError(f"The delay is unknown: {found.reason}", remedy)
+    delay = config.camera.source.delay + found.delay
+    if delay < 0:
+        what = f"The images are stamped {-1e3 * delay:.0f} ms before they are captured"
+        raise CalibrationError(what, "Check camera.source.clock")
+    key, before = "camera.source.delay", config.camera.source.delay
+    std = found.delay_std
+    shown = f"delay {1e3 * delay:.1f} ms, standard deviation {1e3 * std:.1f} ms"
+    notes = (f"{shown}; it was {1e3 * before:.1f} ms",)
+    geometry = config.calibration.geometry
+    other = None if geometry is None else geometry.std.get(key)
+    if other is not None:
+        by_geometry = f"{1e3 * before:.1f} ms, standard deviation {1e3 * other:.1f} ms"
+        if abs(found.delay) > DISAGREEMENT * math.hypot(std, other):
+            what = f"The motion gives a {shown}, the calibration of the geometry {by_geometry}"
+            raise CalibrationError(what, "Repeat both, with the instrument free and in view")
+        if other < std:
+            delay, std = before, other
+            notes = (f"{shown}; kept: that of the geometry, {by_geometry}",)
+    return CalibrationResult(
+        "latency",
+        {key: delay},
+        {key: std},
+        serial_numbers=serial_numbers,
+        notes=notes,
+        data={**found.to_json(), "camera_delay": delay},
+    )
+
+
+def _recording(options: argparse.Namespace) -> tuple[Recording, Mapping[str, str]]:
+    """The recording of the log, or of a motion, and the devices that took part."""
     if options.file is not None:
         from tautscope.log.reader import read_log  # noqa: PLC0415
 
-        return read_log(options.file).recording()
-    config = _slow(load_config(options.config))
-    if options.twin:
-        from tautscope import Twin  # noqa: PLC0415
-        from tautscope.loop.references import SineSequence  # noqa: PLC0415
-        from tautscope.runs.experiment import run_experiment  # noqa: PLC0415
-
-        with progress_bar("motion") as progress:
-            return run_experiment(
-                Twin(config),
-                SineSequence(config.experiment),
-                config,
-                compensate=False,
-                progress=lambda elapsed, duration: progress(elapsed / duration),
-            )
-    if config.drives is None:
-        allowed = "a section [drives] that names the motors, a log, or --twin"
-        raise ConfigError("drives", None, allowed)
-    refuse_placeholders(options.config)
-    from tautscope.hardware.experiment import run_on_hardware  # noqa: PLC0415
+        return read_log(options.file).recording(), {}
+    config = load_config(options.config)
+    if not options.twin:
+        if config.drives is None:
+            allowed = "a section [drives] that names the motors, a log, or --twin"
+            raise ConfigError("drives", None, allowed)
+        confirm_motion(options)
     from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
 
-    folder = check_free(options.out or default_folder("latency"))
+    return record(options, config, check_free(options.log or default_folder("latency")))
+
+
+def record(
+    options: argparse.Namespace, config: Config, folder: Path
+) -> tuple[Recording, Mapping[str, str]]:
+    """Move the rig or the twin without compensation.
+
+    Args:
+        options: With those of `add_rig_options`.
+        config: Of the rig.
+        folder: For the log of a rig.
+
+    Returns:
+        The recording, and the devices that took part.
+
+    Raises:
+        TautscopeError: Errors of the rig.
+    """
+    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
+
+    config = _slow(config)
     with progress_bar("motion") as progress:
-        return run_on_hardware(config, folder, progress).compensated.recording
+        if options.twin:
+            from tautscope.loop.references import SineSequence  # noqa: PLC0415
+            from tautscope.runs.experiment import run_experiment  # noqa: PLC0415
+
+            with rig_for_calibration(options) as setup:
+                recording = run_experiment(
+                    setup.rig,
+                    SineSequence(config.experiment),
+                    config,
+                    compensate=False,
+                    progress=lambda elapsed, duration: progress(elapsed / duration),
+                )
+            return recording, {}
+        from tautscope.hardware.experiment import run_on_hardware  # noqa: PLC0415
+        from tautscope.hardware.serial_numbers import read_serial_numbers  # noqa: PLC0415
+
+        serial_numbers = read_serial_numbers(config)
+        run = run_on_hardware(config, folder, progress)
+        return run.compensated.recording, serial_numbers
 
 
 def _slow(config: Config) -> Config:

@@ -11,7 +11,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tautscope.calibration.result import CalibrationResult
-from tautscope.commands import calibrate_camera, calibrate_colour, calibrate_geometry
+from tautscope.commands import (
+    calibrate_camera,
+    calibrate_colour,
+    calibrate_geometry,
+    calibrate_latency,
+)
 from tautscope.commands.calibration_rig import actual_rig, rig_for_calibration
 from tautscope.config import Config
 from tautscope.errors import CalibrationError
@@ -77,9 +82,17 @@ def _geometry(options: argparse.Namespace, config: Config, folder: Path) -> Cali
     found = fit(
         recording, config, intrinsics="focal" if config.calibration.camera is None else "none"
     )
-    result = calibrate_geometry.result(found)
-    notes = (f"residual {found.residual_px:.2g} px", *result.notes)
-    return replace(result, serial_numbers=serial_numbers, notes=notes)
+    result = calibrate_geometry.result(found, serial_numbers)
+    return replace(result, notes=(f"residual {found.residual_px:.2g} px", *result.notes))
+
+
+def _latency(options: argparse.Namespace, config: Config, folder: Path) -> CalibrationResult:
+    from tautscope.log.alignment import align_recording  # noqa: PLC0415
+
+    recording, serial_numbers = calibrate_latency.record(
+        options, config, _unused(folder, "latency")
+    )
+    return calibrate_latency.result(align_recording(recording), config, serial_numbers)
 
 
 def _doctor(options: argparse.Namespace, config: Config, folder: Path) -> CalibrationResult:
@@ -106,9 +119,7 @@ def _motion(options: argparse.Namespace, config: Config, folder: Path) -> Calibr
     from tautscope.report.results import evaluate  # noqa: PLC0415
 
     config = config.replace(**{"experiment.periods": MOTION_PERIODS})
-    # A run that failed has left its log in a folder.
-    names = (folder / (f"{MOTION}-{k}" if k else MOTION) for k in itertools.count())
-    place = next(each for each in names if not each.exists())
+    place = _unused(folder, MOTION)
     with progress_bar("first compensated motion") as progress:
         if options.twin:
             from tautscope.loop.references import SineSequence  # noqa: PLC0415
@@ -150,6 +161,12 @@ def _motion(options: argparse.Namespace, config: Config, folder: Path) -> Calibr
     return CalibrationResult(MOTION, {}, notes=(*notes, *warnings), figures=((figure, caption),))
 
 
+def _unused(folder: Path, name: str) -> Path:
+    """A folder that does not exist; a motion that failed has left its log in one."""
+    names = (folder / (f"{name}-{k}" if k else name) for k in itertools.count())
+    return next(each for each in names if not each.exists())
+
+
 STEPS = (
     Step(
         "camera",
@@ -170,6 +187,12 @@ STEPS = (
         "Geometry",
         "The same. ALL MOTORS MOVE for a minute; the tip must be free.",
         _geometry,
+    ),
+    Step(
+        "latency",
+        "Delay of the images",
+        "The same. ALL MOTORS MOVE in turn, for 72 s with the default experiment.",
+        _latency,
     ),
     Step("doctor", "Check of the rig", "No motor is enabled.", _doctor),
     Step(

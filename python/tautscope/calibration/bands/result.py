@@ -26,6 +26,7 @@ LEAST_HITS = 0.8
 """Share of the pixels of each band that must be classified as marker."""
 LARGEST_ERRORS = 0.02
 """Largest share of the other pixels."""
+LEAST_SPLIT = 10
 _MOST_PIXELS = 400_000
 _CAPTION = (
     "Left: pixels labelled as bands (outlined). Right: distribution of the discriminant w . x on "
@@ -51,16 +52,23 @@ class ColourFit:
 
 
 def fit_colour(images: Sequence[LabelledImage]) -> ColourFit:
-    """Fit the discriminant to every other image, and check it on the others; one serves for both.
+    """Fit the discriminant to every other image, and check it on the others.
+
+    Fewer than `LEAST_SPLIT` images serve for both.
 
     Raises:
         FieldError: As `fit_discriminant`.
         CalibrationError: A band, or everything else, is not classified as it should.
     """
-    train, check = (images[::2], images[1::2]) if len(images) > 1 else (images, images)
+    train, check = (images[::2], images[1::2]) if len(images) >= LEAST_SPLIT else (images, images)
+    labels = [label for label in (BAND_A, BAND_B) if any((i.labels == label).any() for i in check)]
+    if not labels:
+        raise CalibrationError(
+            "No pixel of the bands is left: they are overexposed, or smaller than their edges",
+            "Reduce the light or the exposure, and bring the bands closer",
+        )
     marker = np.concatenate([_of(train, BAND_A), _of(train, BAND_B)])
     colour = ColorDiscriminant.fit(marker, _of(train, BACKGROUND))
-    labels = [label for label in (BAND_A, BAND_B) if any((i.labels == label).any() for i in check)]
     bands = [_of(check, label) for label in labels]
     others = _of(check, BACKGROUND)
     hits = tuple(float(colour.is_marker(band).mean()) for band in bands)
