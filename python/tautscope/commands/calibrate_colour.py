@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from tautscope.commands import arguments
 from tautscope.commands.calibration_output import add_options, check_options, finish
 from tautscope.commands.calibration_rig import add_rig_options, rig_for_calibration
+from tautscope.commands.printing import print_json
 from tautscope.config import load_config
 from tautscope.errors import FieldError
 
@@ -48,6 +49,12 @@ def add_parser(kinds: arguments.Verbs) -> None:
         help="a pixel on a band, from the left and from the top; give it twice",
     )
     colour.add_argument(
+        "--page",
+        type=Path,
+        metavar="FILE.html",
+        help="only write a page of the image that makes the command from clicks",
+    )
+    colour.add_argument(
         "--motors", type=Path, metavar="FILE.csv", help="motor positions of a video"
     )
     colour.add_argument(
@@ -70,9 +77,12 @@ def _pixel(text: str) -> tuple[int, int]:
 
 
 def _run(options: argparse.Namespace) -> None:
+    files: list[Path] = options.files
+    if options.page is not None:
+        _write_page(options, files)
+        return
     check_options(options)
     serial_numbers: Mapping[str, str] = {}
-    files: list[Path] = options.files
     if options.click:
         images = _clicked(files, options.click)
     elif not files:
@@ -83,6 +93,18 @@ def _run(options: argparse.Namespace) -> None:
     else:
         images = _masked(files)
     finish(options, result(images, serial_numbers))
+
+
+def _write_page(options: argparse.Namespace, files: Sequence[Path]) -> None:
+    from tautscope.commands.click_page import write_click_page  # noqa: PLC0415
+
+    if len(files) != 1:
+        raise FieldError("files", len(files), "one image, with --page")
+    write_click_page(files[0], options.page)
+    if options.json:
+        print_json({"file": str(options.page)})
+    else:
+        print(f"Open {options.page} in a browser, and click on the bands.")
 
 
 def calibrate(options: argparse.Namespace) -> CalibrationResult:
