@@ -11,7 +11,7 @@ import pytest
 from matplotlib.figure import Figure
 from tautscope.calibration.result import CalibrationResult
 from tautscope.cli import main
-from tautscope.commands import calibration_steps
+from tautscope.commands import calibration_steps, question
 from tautscope.commands.calibration_steps import Step
 from tautscope.config import Config, load_config
 from tautscope.config.load import config_file
@@ -99,6 +99,22 @@ def test_a_person_can_skip_repeat_and_stop(
     assert answer("y\n") == 1  # the input ends
     assert answer("y\n") == 0
     assert [name for name, _ in steps.seen] == ["colour", "colour", "motion"]
+
+
+def test_the_terminal_answers_while_the_camera_has_the_input(
+    steps: Steps, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = Path("rig.toml").read_text().replace('url = "unix:', 'url = "pipe:0" # "')
+    Path("rig.toml").write_text(text)
+    monkeypatch.setattr("sys.stdin", io.StringIO("video\n"))
+    monkeypatch.setattr(question, "TERMINAL", tmp_path / "none")
+    assert main([*COMMAND, "--out", "a"]) == 1  # nobody answers
+    assert not steps.seen
+    terminal = tmp_path / "terminal"
+    terminal.write_text("Y\n")
+    monkeypatch.setattr(question, "TERMINAL", terminal)
+    assert main([*COMMAND, "--out", "b"]) == 0
+    assert len(steps.seen) == 3
 
 
 def test_another_rig_and_a_damaged_state_are_refused(steps: Steps, capsys: Capture) -> None:

@@ -11,6 +11,8 @@ from tautscope.commands import arguments
 from tautscope.commands.calibrate_camera import add_board_options
 from tautscope.commands.calibration_rig import add_rig_options, refuse_wrong_limits
 from tautscope.commands.printing import print_json
+from tautscope.commands.question import ask
+from tautscope.config import Config, load_config
 from tautscope.errors import TautscopeError
 
 if TYPE_CHECKING:
@@ -51,7 +53,6 @@ def add_parser(kinds: arguments.Verbs) -> None:
 def _run(options: argparse.Namespace) -> int:
     from tautscope.commands.calibration_session import CalibrationSession  # noqa: PLC0415
     from tautscope.commands.calibration_steps import STEPS  # noqa: PLC0415
-    from tautscope.config import load_config  # noqa: PLC0415
     from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
 
     config = load_config(options.config)
@@ -85,7 +86,7 @@ def _do(step: Step, session: CalibrationSession, options: argparse.Namespace) ->
     """Do or skip a step; False if the user stops."""
     result: CalibrationResult | None = None
     while True:
-        answer = "s" if step.name in options.skip else _answer(options)
+        answer = "s" if step.name in options.skip else _answer(options, session.config)
         if answer == "q":
             return False
         if answer == "s":
@@ -105,16 +106,15 @@ def _do(step: Step, session: CalibrationSession, options: argparse.Namespace) ->
     return True
 
 
-def _answer(options: argparse.Namespace) -> str:
+def _answer(options: argparse.Namespace, config: Config) -> str:
     """``y`` to do the step, ``s`` to skip it, ``q`` to stop."""
     if options.yes or options.twin:
         return "y"
-    print("Type y to start, s to skip, q to stop: ", end="", file=sys.stderr, flush=True)
-    line = sys.stdin.readline()
-    answer = line.strip().lower()[:1]
-    return (
-        answer if answer in ("y", "s") else "q" if answer == "q" or not line else _answer(options)
-    )
+    while True:
+        line = ask("Type y to start, s to skip, q to stop: ", config.camera)
+        answer = line.strip()[:1] if line else "q"
+        if answer in ("y", "s", "q"):
+            return answer
 
 
 def _say(text: str) -> None:

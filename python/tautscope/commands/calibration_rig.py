@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
+from tautscope.commands.question import ask
 from tautscope.config import Config, load_config
 from tautscope.config.placeholders import placeholders
 from tautscope.errors import ConfigError, FieldError
@@ -130,6 +130,5 @@ def confirm_motion(options: argparse.Namespace) -> None:
         "THE MOTORS WILL MOVE, in the range of [experiment]. Hold the scope still, keep tissue and "
         "hands away, the emergency stop within reach. Type y to start: "
     )
-    print(question, end="", file=sys.stderr, flush=True)
-    if sys.stdin.readline().strip().lower() not in ("y", "yes"):
+    if ask(question, load_config(options.config).camera).strip() not in ("y", "yes"):
         raise FieldError("answer", "no", "y, or the option --yes; nothing moved")
