@@ -33,8 +33,12 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--images", action="store_true", help="find the bands in images")
     parser.add_argument("--band-distance", action="store_true", help="with a measured distance")
     parser.add_argument("--instrument", choices=INSTRUMENTS, default="nominal")
-    parser.add_argument("--loop", action="store_true", help="run the loop with the result")
-    parser.add_argument("--alarms", action="store_true", help="also contradictory records")
+    parser.add_argument(
+        "--loop", type=int, default=0, metavar="N", help="twins whose loop is run with the result"
+    )
+    parser.add_argument(
+        "--alarms", type=int, default=0, metavar="N", help="twins with contradictory records too"
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--write", metavar="NAME", help=f"update this part of {PAGE.name}")
     add_arguments(parser)
@@ -48,10 +52,10 @@ def measure(options: argparse.Namespace) -> dict[int, Outcome]:
         Job(
             Case(seed, options.instrument, options.images),
             options.band_distance,
-            options.loop,
-            options.alarms,
+            index < options.loop,
+            index < options.alarms,
         )
-        for seed in seeds
+        for index, seed in enumerate(seeds)
     ]
     found: dict[int, Outcome] = {}
     with progress_bar("calibrations") as show_progress:
@@ -74,9 +78,9 @@ def report(options: argparse.Namespace, found: dict[int, Outcome]) -> str:
         error_table(outcomes),
     ]
     if options.loop:
-        parts.append(loop_table(outcomes))
+        parts.append(loop_table([each for each in outcomes if each.hand]))
     if options.alarms:
-        parts.append(alarm_table(outcomes))
+        parts.append(alarm_table([each for each in outcomes if each.alarms]))
     return "\n\n".join(parts)
 
 

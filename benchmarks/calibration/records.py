@@ -138,7 +138,6 @@ def contradictory(recording: Recording, config: Config) -> Iterator[tuple[str, R
     for name, order in (
         ("insertion and rotation exchanged", [1, 0, 2]),
         ("rotation and bending exchanged", [0, 2, 1]),
-        ("insertion and bending exchanged", [2, 1, 0]),
     ):
         scaled = middle + half * ((motors - middle) / half)[:, order]
         yield name, replace(recording, motors=scaled)

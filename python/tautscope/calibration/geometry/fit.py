@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.calibration.geometry.checks import LARGEST_RESIDUAL, check_record, find_doubts
-from tautscope.calibration.geometry.model import FEATURE_STD, TIP_STD, Data, Model
+from tautscope.calibration.geometry.model import TIP_STD, Data, Model
 from tautscope.calibration.geometry.parameters import Intrinsics, estimated
 from tautscope.calibration.geometry.recording import Recording, generic
 from tautscope.calibration.geometry.solver import Solution, solve
@@ -27,8 +27,6 @@ from tautscope.loop.vision import MarkerDetector
 Floats = NDArray[np.float64]
 DETECTIONS = 2
 """How often the bands are searched again with the geometry found so far."""
-FEATURE_STD_RANGE = (0.15, 1.0)
-"""Standard deviation of a feature that the residuals may lead to [px]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,27 +106,16 @@ def fit(
         check_record(recording, config)
         model = _model(recording, config, band_distance)
         solution = solve(model, active, solution.z)
-    # Of the four features of an image, the state takes up three.
-    feature_std = float(
-        np.clip(np.nan_to_num(2 * _rms(solution.residuals), nan=1.0), *FEATURE_STD_RANGE)
-    )
-    model = _model(recording, config, band_distance, feature_std)
-    solution = solve(model, active, solution.z)
     free = solve(model, active, solution.z, free_states=True)
     return _result(recording, config, model, (solution, free), active)
 
 
-def _model(
-    recording: Recording,
-    config: Config,
-    band_distance: float | None,
-    feature_std: float = FEATURE_STD,
-) -> Model:
+def _model(recording: Recording, config: Config, band_distance: float | None) -> Model:
     found = recording.found
     data = Data(
         recording.time, recording.motors, recording.captured_at[found], recording.features[found]
     )
-    return Model(config, data, band_distance, feature_std)
+    return Model(config, data, band_distance)
 
 
 def _detect_again(

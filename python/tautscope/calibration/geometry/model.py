@@ -22,10 +22,10 @@ from tautscope.dof import Dof
 
 Floats = NDArray[np.float64]
 FEATURE_STD = 0.5
-"""Standard deviation of a feature before residuals are known [px]."""
+"""Standard deviation of a feature, with what the model does not describe [px]."""
 TIP_STD = np.array([0.04, 0.08, 0.04])
 """Standard deviations (3,) of the tip about its expectation, as shares of `safety.width_limit`."""
-UNEVENNESS_STD = 0.05
+UNEVENNESS_STD = 0.2
 """Standard deviation of the unevenness of an image's section about its line over the bending."""
 _HALF_WIDTH = 0.375
 """Median of the prior of a half width, as a share of `safety.width_limit`."""
@@ -74,17 +74,9 @@ class Model:
         config: The configuration that the parameters are differences from.
         data: The record.
         band_distance: Measured distance of the bands [m], or None.
-        feature_std: Standard deviation of a feature [px].
     """
 
-    def __init__(
-        self,
-        config: Config,
-        data: Data,
-        band_distance: float | None,
-        feature_std: float = FEATURE_STD,
-    ) -> None:
-        self.feature_std = feature_std
+    def __init__(self, config: Config, data: Data, band_distance: float | None) -> None:
         self.data = data.thinned()
         self.count = len(data.captured_at)
         self._config, self._band_distance = config, band_distance

@@ -81,7 +81,7 @@ TYPICAL_LAG = 0.03
 """Median of the prior of the lag of the tip behind the motors [s]."""
 
 
-SCALE_STD = 0.02
+SCALE_STD = 0.01
 """Prior standard deviation of the gain of insertion, where it is the scale of all lengths."""
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope.calibration.geometry.model import Model
+from tautscope.calibration.geometry.model import FEATURE_STD, Model
 
 Floats = NDArray[np.float64]
 TOLERANCE = 0.02
@@ -129,7 +129,7 @@ def _equations(
     residuals, jacobian = _whitened(model, z, states)
     about = np.column_stack([states[:, :3], np.zeros(model.count)])
     _, at = _whitened(model, z, about)
-    by_parameters = np.nan_to_num(model.by_parameters(z, about, active)) / model.feature_std
+    by_parameters = np.nan_to_num(model.by_parameters(z, about, active)) / FEATURE_STD
     residuals = residuals + np.einsum("nij,nj->ni", jacobian, states - model.expected(z))
     spread = model.state_std**2 / images.state_weights
     covariance = (at * spread[:, None, :]) @ at.transpose(0, 2, 1)
@@ -160,10 +160,10 @@ def _whitened(model: Model, z: Floats, states: Floats) -> tuple[Floats, Floats]:
     0 where a band is not visible.
     """
     predicted, by_state = model.features(z, states)
-    residuals = (model.data.features - predicted) / model.feature_std
+    residuals = (model.data.features - predicted) / FEATURE_STD
     is_bad = ~(np.isfinite(residuals).all(axis=1) & np.isfinite(by_state).all(axis=(1, 2)))
     residuals[is_bad], by_state[is_bad] = 0.0, 0.0
-    return residuals, by_state / model.feature_std
+    return residuals, by_state / FEATURE_STD
 
 
 def _soft_l1(residuals: Floats) -> Floats:
