@@ -23,7 +23,7 @@ class AdaptiveConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=T
     [s]."""
     direction_travel: Positive = 0.01
     """Travel of the reference over which its direction is averaged."""
-    change_rate: PerDof = (0.12, 0.12, 100.0)
+    change_rate: PerDof = (0.07, 0.07, 100.0)
     """Rate limit of half width and centre in the compensation, per second of motion, for each DOF.
     That of bending bounds nothing: where one of its cables takes over from the other, offsets
     change within a stroke faster than by any motion of the endoscope."""
