@@ -6,6 +6,7 @@ use tautscope_core as core;
 
 use crate::arrays::{Vector, columns, fixed, table};
 use crate::camera::Camera;
+use crate::description::described;
 use crate::errors;
 use crate::instrument::Instrument;
 
@@ -85,6 +86,10 @@ impl FeatureModel {
             self.0
                 .nearest_state(&prior, fixed("features", &features)?, fixed("std", &std)?);
         Ok(found.map(|(state, misfit)| (PyArray1::from_slice(py, &state), misfit)))
+    }
+
+    fn __repr__(&self) -> String {
+        described(&self.0)
     }
 }
 

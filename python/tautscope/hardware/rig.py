@@ -87,6 +87,10 @@ class HardwareRig:
         self._trouble = ""
         self._is_frozen = False
 
+    def __repr__(self) -> str:
+        state = "closed" if self._setpoints is None else f"open, {self._ticks} cycles"
+        return f"<HardwareRig: cycle {1e3 * self._drives.cycle:g} ms, {state}>"
+
     @property
     def control_period(self) -> float:
         """Time from one command to the next [s]."""

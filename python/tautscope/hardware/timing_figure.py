@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tautscope.hardware.timing import Timing
-from tautscope.report.figures import BLUE, ORANGE, PAGE, style
+from tautscope.report.style import BLUE, ORANGE, PAGE, style
 
 
 def timing_figure(timing: Timing) -> Figure:

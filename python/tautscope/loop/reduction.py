@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tautscope.config import Config
+from tautscope.dof import display_text
 from tautscope.loop.construction import build_loop
 from tautscope.loop.rig import Frame
 from tautscope.loop.safety import Reaction, Supervision, checksum, disabled_monitors
@@ -87,6 +88,14 @@ class Report:
     reaction: Reaction
     warnings: tuple[str, ...]
 
+    def __repr__(self) -> str:
+        warnings = f", warnings {', '.join(self.warnings)}" if self.warnings else ""
+        return (
+            f"<Report of {self.captured_at:.3f} s: {self.status}, "
+            f"tip at {display_text(self.state_estimate)}, "
+            f"slack {display_text(self.delta_plus - self.delta_minus)}{warnings}>"
+        )
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HysteresisEstimate:
@@ -135,6 +144,13 @@ class HysteresisReduction:
         self.on_event: Callable[[str], None] | None = None
         self._disabled = disabled_monitors(config)
         self._loop = build_loop(config, compensate)
+
+    def __repr__(self) -> str:
+        return (
+            f"<HysteresisReduction: profile {self._config.profile}, {self.updates} image updates, "
+            f"reaction {self.supervision.reaction}, "
+            f"slack {display_text(self.delta_plus - self.delta_minus)}>"
+        )
 
     def step(
         self, reference: ArrayLike, time: float | None = None, made_at: float | None = None

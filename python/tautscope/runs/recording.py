@@ -100,6 +100,15 @@ class Recording:
     snapshot: Snapshot | None = None
     warnings: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        time = self.trace["time"]
+        seconds = time[-1] - time[0] if len(time) else 0.0
+        compensated = "with" if self.compensated else "without"
+        return (
+            f"<Recording: {len(time)} ticks in {seconds:g} s, {len(self.frames)} images, "
+            f"profile {self.config.profile}, {compensated} compensation>"
+        )
+
     def during(self, segment: Segment, first: float, last: float) -> NDArray[np.bool_]:
         """(ticks,) rows of the trace in periods `first` to `last` of a segment."""
         return _between(self.trace["time"], self._start_of(segment), segment, first, last)
