@@ -13,7 +13,7 @@ class AdaptiveConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=T
     all three. free_gain, gain_limit, delta_minus and delta_plus are those of `DofConfig`.
     """
 
-    tip_gain: Gain = 1.9
+    tip_gain: Gain = 1.85
     """Largest speed of the predicted tip over that of the reference."""
     caution: NonNegative = 0.3
     """Standard deviations of the half width by which less of it is compensated than estimated: an

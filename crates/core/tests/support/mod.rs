@@ -108,7 +108,7 @@ pub fn settings(safety: &SafetySettings) -> Settings {
         },
         safety: *safety,
         adaptive: AdaptiveSettings {
-            tip_gain: 1.9,
+            tip_gain: 1.85,
             caution: 0.3,
             tremor_time: 0.15,
             direction_travel: 0.01,
