@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tautscope.commands import arguments, calibrate_colour
+from tautscope.commands import arguments, calibrate_camera, calibrate_colour
 
 
 def add_parser(verbs: arguments.Verbs) -> None:
@@ -14,4 +14,5 @@ def add_parser(verbs: arguments.Verbs) -> None:
         description="Find settings of a rig from images and motions, and print them as TOML.",
     )
     kinds = calibrate.add_subparsers(dest="kind", required=True, metavar="WHAT")
+    calibrate_camera.add_parser(kinds)
     calibrate_colour.add_parser(kinds)
