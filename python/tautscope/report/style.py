@@ -31,7 +31,9 @@ _STYLE: dict[str, Any] = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.linewidth": 0.6,
-    "axes.prop_cycle": cycler(color=[BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER, BLACK, GREY]),
+    "axes.prop_cycle": cycler(
+        color=[BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER, BLACK, GREY, "#bbbbbb"]
+    ),
     "xtick.labelsize": 7,
     "ytick.labelsize": 7,
     "xtick.major.width": 0.6,
