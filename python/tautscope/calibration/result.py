@@ -24,6 +24,7 @@ class CalibrationResult:
         serial_numbers: Serial numbers of the devices that took part: camera, insertion, ...
         notes: What a person should know, a sentence each.
         figures: Figures with their captions.
+        data: Further results, for scripts.
     """
 
     kind: str
@@ -33,6 +34,7 @@ class CalibrationResult:
     serial_numbers: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     figures: tuple[tuple[Figure, str], ...] = ()
+    data: Mapping[str, Any] = field(default_factory=dict)
 
     def changes(self, at: datetime | None = None) -> dict[str, Any]:
         """The values and the record of the calibration, for `write_values` and `Config.replace`.

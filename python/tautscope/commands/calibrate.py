@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from tautscope.commands import arguments, calibrate_camera, calibrate_colour
+from tautscope.commands import (
+    arguments,
+    calibrate_camera,
+    calibrate_colour,
+    calibrate_geometry,
+)
 
 
 def add_parser(verbs: arguments.Verbs) -> None:
@@ -16,3 +21,4 @@ def add_parser(verbs: arguments.Verbs) -> None:
     kinds = calibrate.add_subparsers(dest="kind", required=True, metavar="WHAT")
     calibrate_camera.add_parser(kinds)
     calibrate_colour.add_parser(kinds)
+    calibrate_geometry.add_parser(kinds)

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
-from tautscope.commands.printing import print_json
-from tautscope.errors import FieldError, MissingPathError
+from tautscope.commands.calibration_output import add_options, check_options, finish
+from tautscope.commands.calibration_rig import add_rig_options, rig_for_calibration
+from tautscope.config import load_config
+from tautscope.errors import FieldError
 
-Pixels = NDArray[np.uint8]
+if TYPE_CHECKING:
+    from tautscope.calibration.bands.labels import LabelledImage
+    from tautscope.calibration.result import CalibrationResult
 
 
 def add_parser(kinds: arguments.Verbs) -> None:
@@ -20,68 +23,123 @@ def add_parser(kinds: arguments.Verbs) -> None:
     colour = arguments.add_verb(
         kinds,
         "colour",
-        help="colour of the bands, from images and masks",
-        description="Fit the colour of the bands to images and masks, and print the section "
-        "[vision] of a configuration. A mask is white on the bands, black elsewhere, and grey "
-        "where pixels are to be ignored: edges of the bands, overexposed pixels.",
+        help="colour of the bands, from their motion, clicks or masks",
+        description="Fit the colour of the bands, and print the section [vision]. Without files, "
+        "the rig of --config or the twin moves insertion and bending for 10 s, and the bands are "
+        "the two regions of one colour that move with the motors; THE MOTORS MOVE. A log, or a "
+        "video with motor positions, does the same. Or give one image with a click on each band, "
+        "or pairs of an image and its mask: white on the bands, black elsewhere, grey where pixels "
+        "are to be ignored.",
         extras=["hardware"],
     )
     colour.add_argument(
         "files",
-        nargs="+",
+        nargs="*",
         type=Path,
-        metavar="IMAGE MASK",
-        help="pairs of an image and its mask, of the same size",
+        metavar="FILE",
+        help="pairs IMAGE MASK; one IMAGE with --click; a log; a video with --motors",
     )
-    arguments.add_json(colour)
+    colour.add_argument(
+        "--click",
+        action="append",
+        type=_pixel,
+        default=[],
+        metavar="U,V",
+        help="a pixel on a band, from the left and from the top; give it twice",
+    )
+    colour.add_argument(
+        "--motors", type=Path, metavar="FILE.csv", help="motor positions of a video"
+    )
+    colour.add_argument(
+        "--video-start",
+        type=arguments.seconds,
+        default=0.0,
+        metavar="S",
+        help="time of the video's first frame in the CSV's [s] [%(default)s]",
+    )
+    add_rig_options(colour)
+    add_options(colour)
     colour.set_defaults(run=_run)
 
 
-def _run(options: argparse.Namespace) -> None:
-    from tautscope.calibration.colour import ColorDiscriminant  # noqa: PLC0415
+def _pixel(text: str) -> tuple[int, int]:
+    u, _, v = text.partition(",")
+    if not (u.strip().isdecimal() and v.strip().isdecimal()):
+        raise argparse.ArgumentTypeError(f"got {text!r}, expected U,V: two whole numbers")
+    return int(u), int(v)
 
+
+def _run(options: argparse.Namespace) -> None:
+    check_options(options)
+    serial_numbers: Mapping[str, str] = {}
     files: list[Path] = options.files
+    if options.click:
+        images = _clicked(files, options.click)
+    elif not files:
+        finish(options, calibrate(options))
+        return
+    elif len(files) == 1:
+        images = _moving(options, files[0])
+    else:
+        images = _masked(files)
+    finish(options, result(images, serial_numbers))
+
+
+def calibrate(options: argparse.Namespace) -> CalibrationResult:
+    """Move the rig or the twin, and fit the colour of what moves with the motors."""
+    from tautscope.calibration.bands.motion import find_moving_bands  # noqa: PLC0415
+    from tautscope.calibration.bands.sweep import record_motion  # noqa: PLC0415
+    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
+
+    with rig_for_calibration(options) as setup, progress_bar("motion") as progress:
+        found = record_motion(setup.rig, setup.config, progress)
+        serial_numbers = setup.serial_numbers()
+    images = find_moving_bands(found.images, found.times, found.positions)
+    return result(images, serial_numbers)
+
+
+def result(images: Sequence[LabelledImage], serial_numbers: Mapping[str, str]) -> CalibrationResult:
+    """Fit the colour to labelled images, and check it."""
+    from tautscope.calibration.bands.result import colour_result, fit_colour  # noqa: PLC0415
+
+    return colour_result(fit_colour(images), images, serial_numbers)
+
+
+def _clicked(files: Sequence[Path], clicks: Sequence[tuple[int, int]]) -> list[LabelledImage]:
+    from tautscope.calibration.bands.click import label_clicks  # noqa: PLC0415
+    from tautscope.calibration.images import read_image  # noqa: PLC0415
+
+    if len(files) != 1:
+        raise FieldError("files", len(files), "one image, with --click")
+    return [label_clicks(read_image(files[0]), clicks)]
+
+
+def _masked(files: Sequence[Path]) -> list[LabelledImage]:
+    from tautscope.calibration.bands.result import from_mask  # noqa: PLC0415
+    from tautscope.calibration.images import read_image  # noqa: PLC0415
+
     if len(files) % 2:
         raise FieldError("files", len(files), "pairs of an image and its mask")
-    pairs = zip(files[::2], files[1::2], strict=True)
-    labelled = [_labelled_pixels(*pair) for pair in pairs]
-    bands, background = (np.concatenate(pixels) for pixels in zip(*labelled, strict=True))
-    colour = ColorDiscriminant.fit(bands, background)
-    weights, threshold = [float(weight) for weight in colour.weights], float(colour.threshold)
-    hits, errors = (float(colour.is_marker(pixels).mean()) for pixels in (bands, background))
-    if options.json:
-        print_json(
-            {
-                "vision": {"weights": weights, "threshold": threshold},
-                "bands_classified_as_marker": hits,
-                "background_classified_as_marker": errors,
-            }
-        )
-        return
-    print("[vision]")
-    print(f"weights = [{', '.join(f'{weight:.3f}' for weight in weights)}]")
-    print(f"threshold = {threshold:.1f}")
-    print(f"# classified as marker: {hits:.1%} of the bands, {errors:.2%} of the background")
+    images = []
+    for frame_file, mask_file in zip(files[::2], files[1::2], strict=True):
+        frame, mask = read_image(frame_file), read_image(mask_file, is_grey=True)
+        if frame.shape[:2] != mask.shape:
+            sizes = f"{frame.shape[1]} x {frame.shape[0]} and {mask.shape[1]} x {mask.shape[0]}"
+            raise FieldError(f"{frame_file}, {mask_file}", sizes, "two images of the same size")
+        images.append(from_mask(frame, mask))
+    return images
 
 
-def _labelled_pixels(frame_file: Path, mask_file: Path) -> tuple[Pixels, Pixels]:
-    """Pixels of the bands and of the background, (n, 3) B, G, R."""
-    import cv2  # noqa: PLC0415
+def _moving(options: argparse.Namespace, file: Path) -> list[LabelledImage]:
+    from tautscope.calibration.bands.motion import find_moving_bands  # noqa: PLC0415
+    from tautscope.commands.recorded_motion import log_motion, video_motion  # noqa: PLC0415
 
-    frame = _read_image(frame_file, cv2.IMREAD_COLOR)
-    mask = _read_image(mask_file, cv2.IMREAD_GRAYSCALE)
-    if frame.shape[:2] != mask.shape:
-        sizes = f"{frame.shape[1]} x {frame.shape[0]} and {mask.shape[1]} x {mask.shape[0]}"
-        raise FieldError(f"{frame_file}, {mask_file}", sizes, "two images of the same size")
-    return frame[mask > 250], frame[mask < 5]
-
-
-def _read_image(file: Path, kind: int) -> Pixels:
-    import cv2  # noqa: PLC0415
-
-    if not file.is_file():
-        raise MissingPathError("image", str(file), "an image file")
-    image = cv2.imread(str(file), kind)
-    if image is None:
-        raise FieldError("image", str(file), "an image that OpenCV reads: PNG, JPEG, TIFF, ...")
-    return np.asarray(image, dtype=np.uint8)
+    if file.suffix == ".mcap":
+        found = log_motion(file)
+    elif options.motors is not None:
+        config = load_config(options.config)
+        found = video_motion(file, options.motors, options.video_start, config.camera)
+    else:
+        allowed = "a log (.mcap), a video with --motors, an image with --click, IMAGE MASK ..."
+        raise FieldError("files", str(file), allowed)
+    return find_moving_bands(found.images, found.times, found.positions)

@@ -83,4 +83,4 @@ def _write_folder(folder: Path, result: CalibrationResult, text: str) -> None:
 def _document(result: CalibrationResult, changes: Mapping[str, Any]) -> dict[str, Any]:
     values = {key: value for key, value in changes.items() if not key.startswith("calibration.")}
     record = changes[f"calibration.{result.kind}"]
-    return {"values": values, **record, "notes": list(result.notes)}
+    return {"values": values, **record, **result.data, "notes": list(result.notes)}

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tautscope.config import CameraConfig
+from tautscope.config import CameraConfig, Config
 from tautscope.dof import Dof
+from tautscope.errors import ConfigError
 from tautscope.hardware import object_dictionary as objects
+from tautscope.hardware.drives import open_fieldbus
 from tautscope.hardware.fieldbus import AbsentError, Fieldbus
 
 CAMERA = "camera"
@@ -41,3 +43,20 @@ def drive_serial_numbers(fieldbus: Fieldbus) -> dict[str, str]:
         if number:
             found[dof.label] = f"{number:08X}"
     return found
+
+
+def read_serial_numbers(config: Config) -> dict[str, str]:
+    """The serial numbers of camera and drives of a configuration, where they have one.
+
+    Raises:
+        ConfigError: The section ``drives`` is missing.
+        DriveError: A drive does not answer.
+    """
+    if config.drives is None:
+        raise ConfigError("drives", None, "a section [drives] that names the motors")
+    fieldbus = open_fieldbus(config.drives)
+    try:
+        drives = drive_serial_numbers(fieldbus)
+    finally:
+        fieldbus.close()
+    return camera_serial_number(config.camera) | drives

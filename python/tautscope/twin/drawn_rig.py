@@ -59,3 +59,20 @@ def draw_rig(config: Config, seed: int) -> Config:
             "twin.seed": seed,
         }
     )
+
+
+def draw_geometry(config: Config, seed: int) -> Config:
+    """The rig of `draw_rig` with a calibrated camera, apart from its focal lengths.
+
+    The images are stamped late by the error of the latency.
+    """
+    drawn = draw_rig(config, seed)
+    return drawn.replace(
+        **{
+            "camera.cx": config.camera.cx,
+            "camera.cy": config.camera.cy,
+            "camera.distortion": config.camera.distortion,
+            "twin.latency": config.twin.latency,
+            "twin.sensor.stamp_error": drawn.twin.latency - config.twin.latency,
+        }
+    )
