@@ -25,6 +25,7 @@ def log_motion(file: Path) -> ImageSequence:
     from tautscope.calibration.bands.sweep import ImageSequence  # noqa: PLC0415
     from tautscope.calibration.images import to_bgr  # noqa: PLC0415
     from tautscope.log.reader import Tick, Update, read_log  # noqa: PLC0415
+    from tautscope.runs.recording import FRAME_COLUMNS  # noqa: PLC0415
 
     log = read_log(file)
     ticks = [event.sample for event in log.events.values() if isinstance(event, Tick)]
@@ -35,8 +36,9 @@ def log_motion(file: Path) -> ImageSequence:
     ]
     if not ticks or not updates:
         raise RecordError(str(file), f"{len(ticks)} ticks, {len(updates)} images", "both")
+    column = (FRAME_COLUMNS.names or ()).index("captured_at")
     chosen = [updates[k] for k in _evenly(len(updates))]
-    stamps = np.array([event.row.captured_at for _, event in chosen])
+    stamps = np.array([event.row[column] for _, event in chosen])
     at = np.array([tick.time for tick in ticks])
     applied = np.array([tick.applied for tick in ticks])
     positions = np.column_stack([np.interp(stamps, at, dof) for dof in applied.T])

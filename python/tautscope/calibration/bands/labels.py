@@ -34,7 +34,7 @@ class LabelledImage:
 
     def pixels(self, label: int) -> Image:
         """The pixels (n, 3) with a label."""
-        return self.image[self.labels == label]
+        return np.asarray(self.image[self.labels == label], np.uint8)
 
 
 def labelled(image: Image, bands: Sequence[Mask]) -> LabelledImage:
