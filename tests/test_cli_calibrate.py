@@ -34,14 +34,15 @@ def test_a_colour_is_fitted_to_a_frame_and_its_mask(capsys: Capture, files: list
     assert green > 0 > red
     assert main(["calibrate", "colour", *files, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
-    assert found["vision"]["weights"] == pytest.approx(vision.weights, abs=1e-3)
+    assert found["values"]["vision.weights"] == pytest.approx(vision.weights, abs=1e-3)
     assert found["bands_classified_as_marker"] > 0.99
     assert found["background_classified_as_marker"] < 0.01
 
 
 def test_bad_files_are_named(capsys: Capture, files: list[str], tmp_path: Path) -> None:
     frame, mask = files
-    assert "pairs of an image" in failed(capsys, "calibrate", "colour", frame)
+    assert "pairs of an image" in failed(capsys, "calibrate", "colour", frame, mask, frame)
+    assert "--motors" in failed(capsys, "calibrate", "colour", frame)
     missing = str(tmp_path / "none.png")
     assert f"File not found: {missing}" in failed(capsys, "calibrate", "colour", frame, missing)
     text = tmp_path / "text.png"

@@ -52,9 +52,18 @@ def test_options_have_one_meaning() -> None:
         assert {"-v", "--verbose", "--help"} <= options, words
         if words != "bench":  # its output is lines of JSON
             assert "--json" in options, words
-        if words not in ("recover", "export", "calibrate colour"):
+        if words not in ("recover", "export"):
             assert "--config" in options, words
         assert "config" not in {a.dest for a in parser._actions if not a.option_strings}, words
+
+
+@pytest.mark.parametrize("words", ["demo", "config", "calibrate colour image.png mask.png"])
+def test_an_unknown_option_shows_the_usage_of_its_verb(capsys: Capture, words: str) -> None:
+    with pytest.raises(SystemExit) as stop:
+        main([*words.split(), "--output"])
+    verb, shown = words.partition(" image")[0], capsys.readouterr().err
+    assert stop.value.code == 2
+    assert shown.startswith(f"usage: tautscope {verb} [") and "arguments: --output" in shown
 
 
 def test_errors_have_the_documented_exit_status() -> None:

@@ -11,6 +11,7 @@ __all__ = [
     "Compensator",
     "Estimator",
     "FeatureModel",
+    "Hysteresis",
     "Instrument",
     "MarkerDetector",
     "Play",
@@ -105,6 +106,7 @@ class Instrument:
         marker_b: float,
         radius: float,
         band_length: float,
+        unevenness: float = 0.0,
     ) -> Instrument: ...
     def markers(self, state: ArrayLike) -> _Floats: ...
     def jacobian(self, state: ArrayLike) -> _Floats: ...
@@ -123,6 +125,7 @@ class FeatureModel:
         cls, instrument: Instrument, camera: Camera, *, translation: _Vector3, rotation: _Vector3
     ) -> FeatureModel: ...
     def predict(self, state: ArrayLike) -> tuple[_Floats, _Floats] | None: ...
+    def predict_all(self, states: ArrayLike, unevenness: ArrayLike) -> tuple[_Floats, _Floats]: ...
     def bands(self, state: ArrayLike) -> tuple[_Band, _Band] | None: ...
     def nearest_state(
         self,
@@ -131,6 +134,13 @@ class FeatureModel:
         features: ArrayLike,
         std: ArrayLike,
     ) -> tuple[_Floats, float] | None: ...
+
+@final
+class Hysteresis:
+    def __new__(
+        cls, *, half_width: ArrayLike, centre: ArrayLike, shared: float, radius: float
+    ) -> Hysteresis: ...
+    def run(self, commands: ArrayLike) -> _Floats: ...
 
 @final
 class StateEstimator:

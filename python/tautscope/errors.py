@@ -68,6 +68,23 @@ class OutputError(FieldError):
     """A result cannot be written to the given place."""
 
 
+class CalibrationError(TautscopeError):
+    """Images or motions do not determine what is to be calibrated.
+
+    Args:
+        what: What was found.
+        remedy: What to do.
+    """
+
+    def __init__(self, what: str, remedy: str) -> None:
+        self.what = what
+        self.remedy = remedy
+        super().__init__(what, remedy)
+
+    def __str__(self) -> str:
+        return f"{self.what}. {self.remedy}"
+
+
 class MissingExtraError(TautscopeError, ImportError):
     """An optional dependency is not installed.
 

@@ -1,15 +1,16 @@
 //! `FeatureModel`.
 
-use numpy::{PyArray1, PyArray2};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use tautscope_core as core;
 
-use crate::arrays::{Vector, columns, fixed, table};
+use crate::arrays::{Table, Vector, columns, fixed, rows, same_length, table};
 use crate::camera::Camera;
 use crate::description::described;
 use crate::errors;
 use crate::instrument::Instrument;
 
+type Predictions<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>);
 type Prediction<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>);
 
 /// The feature model h: from the state to the centroids of the two marker bands, Eqs. (9)-(11).
@@ -47,6 +48,31 @@ impl FeatureModel {
         };
         let features = PyArray1::from_slice(py, &prediction.features);
         Ok(Some((features, columns(py, &prediction.columns)?)))
+    }
+
+    /// Features (n, 4) in px and interaction matrices (n, 4, 3) for states (n, 3) [m, rad, rad].
+    ///
+    /// `unevenness` (n,) is half of the difference of the section's curvatures at its ends, over their mean. NaN where a
+    /// band is not visible.
+    fn predict_all<'py>(
+        &self,
+        py: Python<'py>,
+        states: Table<'py>,
+        unevenness: Vector<'py>,
+    ) -> PyResult<Predictions<'py>> {
+        let (states, unevenness) = (rows::<3>("states", &states)?, unevenness.as_array());
+        same_length(py, "unevenness", unevenness.len(), states.len())?;
+        let mut features = Vec::with_capacity(states.len());
+        let mut matrices = Vec::with_capacity(4 * states.len());
+        for (state, unevenness) in states.into_iter().zip(unevenness) {
+            let found = self.0.with_unevenness(*unevenness).predict(state);
+            features.push(found.map_or([f64::NAN; 4], |found| found.features));
+            let columns = found.map_or([[f64::NAN; 4]; 3], |found| found.columns);
+            matrices.extend((0..4).map(|row| columns.map(|column| column[row])));
+        }
+        let matrices = PyArray1::from_slice(py, matrices.as_flattened());
+        let matrices = matrices.reshape([features.len(), 4, 3])?;
+        Ok((table(py, &features)?, matrices))
     }
 
     /// Per band area in px^2, centroid (2,) in px, second moments (2, 2) in px^2 and outline (26, 2) in px.

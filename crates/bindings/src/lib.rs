@@ -12,6 +12,7 @@ mod estimator;
 mod features;
 mod flags;
 mod frame;
+mod hysteresis;
 mod instrument;
 mod play;
 mod reduction;
@@ -37,6 +38,8 @@ mod _core {
     use super::estimator::Estimator;
     #[pymodule_export]
     use super::features::FeatureModel;
+    #[pymodule_export]
+    use super::hysteresis::Hysteresis;
     #[pymodule_export]
     use super::instrument::Instrument;
     #[pymodule_export]

@@ -82,6 +82,7 @@ pub use r#loop::report::{HysteresisEstimate, Report, Status};
 pub use r#loop::settings::Settings;
 pub use model::camera::{Camera, Pose};
 pub use model::features::{FeatureModel, FeaturePrediction};
+pub use model::hysteresis::{Hysteresis, PlayPosition};
 pub use model::instrument::Instrument;
 pub use model::outline::BandImage;
 pub use model::section::{SECTION_DISCS, SectionDisc};

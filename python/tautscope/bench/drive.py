@@ -24,6 +24,10 @@ OVERHEATED = 0x4310
 """Emergency code: excess temperature of the drive."""
 
 
+SERIAL_NUMBERS = 0x7A00_0000
+"""Serial number of a simulated drive, minus its node id."""
+
+
 class SimulatedDrive(CanopenNode):
     """A drive with the CiA 402 state machine, modes 7 and 8, limits and quick stop.
 
@@ -65,6 +69,8 @@ class SimulatedDrive(CanopenNode):
         super().boot(now)
         self.values[0x6502, 0] = sum(1 << (mode - 1) for mode in self._modes)
         self.values[0x6064, 0] = actual
+        if (0x1018, 4) in self.entries:
+            self.values[0x1018, 4] = SERIAL_NUMBERS + self.node
         self.demand = actual
         self._enter(State.SWITCH_ON_DISABLED, now)
 

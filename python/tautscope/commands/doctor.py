@@ -52,6 +52,9 @@ def run_checks(config: Config, *, is_rig: bool, folder: Path) -> Iterator[CheckR
     yield drives.check_interfaces(needed=not is_rig)
     if missing_modules("hardware"):
         return
+    from tautscope.hardware.doctor.calibration import check_calibration  # noqa: PLC0415
+    from tautscope.hardware.serial_numbers import camera_serial_number  # noqa: PLC0415
+
     if not is_rig:
         todo = (
             "tautscope doctor --config rig.toml; start from `tautscope config --config article_rig`"
@@ -60,6 +63,7 @@ def run_checks(config: Config, *, is_rig: bool, folder: Path) -> Iterator[CheckR
         return
     yield from camera.check_source(config.camera)
     if config.drives is None:
+        yield from check_calibration(config.calibration, camera_serial_number(config.camera))
         todo = "Add a section [drives] as in `tautscope config --config article_rig`"
         yield CheckResult("drives", "configuration", "missing", "no section [drives]", todo)
         return
@@ -67,7 +71,14 @@ def run_checks(config: Config, *, is_rig: bool, folder: Path) -> Iterator[CheckR
         found = f"control.period {config.control.period} s, drives.cycle {config.drives.cycle} s"
         todo = "Make them equal: every tick of the loop sends a set-point"
         yield CheckResult("drives", "pace", "missing", found, todo)
-    yield from drives.check_drives(config.drives)
+    of_drives = drives.check_drives(config.drives)
+    yield from of_drives
+    serial_numbers = camera_serial_number(config.camera) | {
+        each.data["dof"]: each.data["serial_number"]
+        for each in of_drives
+        if each.data.get("serial_number")
+    }
+    yield from check_calibration(config.calibration, serial_numbers)
 
 
 def _doctor(options: argparse.Namespace) -> int:

@@ -6,6 +6,7 @@ that no publication describes. Missing keys have their defaults.
 """
 
 from tautscope.config.adaptive import AdaptiveConfig
+from tautscope.config.calibration import CalibrationConfig, CalibrationRecord
 from tautscope.config.camera import (
     CameraClock,
     CameraConfig,
@@ -50,6 +51,8 @@ __all__ = [
     "AdaptiveConfig",
     "AxisConfig",
     "CableConfig",
+    "CalibrationConfig",
+    "CalibrationRecord",
     "CameraClock",
     "CameraConfig",
     "Config",

@@ -44,7 +44,7 @@ class SourceConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     """Window of ``clock = "stream"`` [s]."""
     delay: NonNegative = 0.0
     """Time from exposure to time stamp for ``device``, otherwise lowest time from exposure to
-    arrival [s]; it has to be measured."""
+    arrival [s]; `tautscope calibrate geometry` measures it."""
     timeout: Positive = 2.0
     """Time without a frame after which the source is lost and opened again [s]."""
     reconnect_period: Positive = 0.5

@@ -8,6 +8,7 @@ import msgspec
 from msgspec import field
 
 from tautscope.config.adaptive import AdaptiveConfig
+from tautscope.config.calibration import CalibrationConfig
 from tautscope.config.camera import CameraConfig
 from tautscope.config.checks import check_references
 from tautscope.config.control import ControlConfig
@@ -57,6 +58,7 @@ class Config(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     recording: RecordingConfig = field(default_factory=RecordingConfig)
     experiment: ExperimentConfig = field(default_factory=ExperimentConfig)
     twin: TwinConfig = field(default_factory=TwinConfig)
+    calibration: CalibrationConfig = field(default_factory=CalibrationConfig)
     drives: DrivesConfig | None = None
     """Motors of a rig; they have no default."""
 

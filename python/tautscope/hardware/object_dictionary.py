@@ -74,6 +74,7 @@ CONSUMER_HEARTBEAT = Entry(0x1016, 1, "Consumer heartbeat time", 4)
 PRODUCER_HEARTBEAT = Entry(0x1017, 0, "Producer heartbeat time", 2)
 VENDOR_ID = Entry(0x1018, 1, "Vendor id", 4, access="const")
 PRODUCT_CODE = Entry(0x1018, 2, "Product code", 4, access="const")
+SERIAL_NUMBER = Entry(0x1018, 4, "Serial number", 4, access="const")
 ABORT_CONNECTION_OPTION = Entry(
     0x6007, 0, "Abort connection option code", 2, signed=True, default=1
 )

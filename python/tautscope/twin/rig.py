@@ -137,7 +137,7 @@ class Twin:
         strips = self._readout.strips() if readout > 0 else [plant.centreline()]
         rendered = camera.draw_strips(strips, self._sequence)
         truth = rendered.true_features, rendered.true_visible
-        stamp = time - readout / 2 + twin.sensor.stamp_error
+        stamp = time - readout / 2 + twin.sensor.stamp_error - self._config.camera.source.delay
         frame = Frame(rendered.image, stamp, self._sequence, *truth)
         delay = twin.latency + twin.latency_jitter * self._timing.uniform(-1, 1)
         self._in_transit.append((time + delay, frame))

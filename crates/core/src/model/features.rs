@@ -106,6 +106,12 @@ impl FeatureModel {
         finite.then_some(prediction)
     }
 
+    /// The model of an instrument whose section bends unevenly, [`Instrument::with_unevenness`].
+    #[must_use]
+    pub const fn with_unevenness(&self, unevenness: f64) -> Self {
+        self.with_geometry([unevenness, 0.0, 0.0])
+    }
+
     /// The model of an instrument whose section bends unevenly, [`Instrument::with_unevenness`], in an image that is
     /// shifted by (u, v) px.
     pub(crate) const fn with_geometry(&self, [unevenness, u, v]: [f64; GEOMETRY]) -> Self {

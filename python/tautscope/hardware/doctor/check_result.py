@@ -15,7 +15,7 @@ class CheckResult:
     """The result of one check.
 
     Attributes:
-        group: ``computer``, ``camera``, ``drives`` or ``recording``.
+        group: ``computer``, ``camera``, ``drives``, ``calibration`` or ``recording``.
         what: The object of the check.
         status: ``ok``; ``missing`` if a run needs it; ``note`` for information.
         found: The result in words.

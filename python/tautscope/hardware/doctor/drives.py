@@ -113,7 +113,8 @@ def _check_drive(fieldbus: Fieldbus, config: DrivesConfig, dof: Dof) -> CheckRes
         position = Scale(config[dof], dof.label).to_position(
             fieldbus.read(dof, objects.POSITION_ACTUAL)
         )
-        vendor = _or_zero(fieldbus, dof)
+        vendor = _or_zero(fieldbus, dof, objects.VENDOR_ID)
+        serial_number = _or_zero(fieldbus, dof, objects.SERIAL_NUMBER)
     except DriveError as error:
         return from_error("drives", what, error)
     modes = [number for number in MODES if supported >> (number - 1) & 1]
@@ -126,6 +127,7 @@ def _check_drive(fieldbus: Fieldbus, config: DrivesConfig, dof: Dof) -> CheckRes
     data = {
         "dof": dof.label,
         "vendor": vendor,
+        "serial_number": f"{serial_number:08X}" if serial_number else None,
         "state": state.value if state else None,
         "position": position,
         "modes": modes,
@@ -147,9 +149,9 @@ def _check_drive(fieldbus: Fieldbus, config: DrivesConfig, dof: Dof) -> CheckRes
     return CheckResult("drives", what, "missing", found, todo, data)
 
 
-def _or_zero(fieldbus: Fieldbus, dof: Dof) -> int:
+def _or_zero(fieldbus: Fieldbus, dof: Dof, entry: objects.Entry) -> int:
     try:
-        return fieldbus.read(dof, objects.VENDOR_ID)
+        return fieldbus.read(dof, entry)
     except AbsentError:
         return 0
 

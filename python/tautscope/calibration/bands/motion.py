@@ -1,0 +1,286 @@
+"""Bands found by their motion: two regions of one colour that move with the motors."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tautscope.calibration.bands.labels import Image, LabelledImage, Mask, labelled
+from tautscope.calibration.colour import fit_discriminant
+from tautscope.errors import CalibrationError, FieldError
+
+Floats = NDArray[np.float64]
+
+LEAST_IMAGES = 20
+LEAST_CHANGE = 24.0
+"""A pixel has changed if a channel differs from its median by more [grey levels]."""
+LEAST_SHARE = 0.6
+"""Two bands must be found in at least this share of the images."""
+LEAST_FOLLOWING = 0.5
+"""Share of the variance of their position that the motors must explain."""
+_CLUSTERS = 6
+_SHARE_OF_TISSUE = 1e-6
+"""A colour is tissue if its cell of the colour space has more of the unmoved pixels."""
+_CELL = 8
+"""Size of a cell of the colour space [grey levels]."""
+_ITERATIONS = 2
+"""Repetitions of the fit with the regions of the fit before."""
+_MOST_ALIKE = 4.0
+"""Largest ratio of the areas of the bands."""
+_LEAST_SOLIDITY = 0.6
+"""Least area of a band relative to its convex hull; bands are arcs in the image."""
+_LEAST_AREA = 40
+"""[px]."""
+_LEAST_DISTANCE = 1.2
+"""Least distance of the bands relative to the root of their mean area."""
+_MOST_PIXELS = 40_000
+"""Largest number of pixels that are clustered."""
+_LEAST_TISSUE = 0.3
+"""Least share of the pixels that never change."""
+_REMAINDER = 0.35
+"""Largest area of all other regions relative to the bands."""
+_LAGS = (0.0, 0.5, 1.0)
+"""Delays of the motors that may explain the position: slack delays the tip [s]."""
+
+
+@dataclass(frozen=True)
+class _Candidate:
+    """A colour, and the two regions that it has in each image; None where it has none."""
+
+    weights: tuple[float, float, float]
+    threshold: float
+    bands: tuple[tuple[Mask, Mask] | None, ...]
+    following: float
+
+    @property
+    def share(self) -> float:
+        """Share of the images with two bands."""
+        return sum(each is not None for each in self.bands) / len(self.bands)
+
+    @property
+    def score(self) -> float:
+        return self.share * self.following
+
+
+def find_moving_bands(
+    images: Sequence[Image], times: ArrayLike, positions: ArrayLike
+) -> list[LabelledImage]:
+    """Label the images of a sweep.
+
+    Pixels that differ from their median over time, in colours that unmoved pixels do not have, are
+    of the instrument. They are clustered by colour. The bands are the cluster whose discriminant
+    leaves two compact regions of similar size, and nothing else, in most images, and whose position
+    follows the motors. No geometry is used.
+
+    Wrong when the scope moves against the tissue, or another part of the instrument has two patches
+    of a colour of its own.
+
+    Args:
+        images: (n) B, G, R of one camera, `LEAST_IMAGES` or more.
+        times: (n,) when they were captured [s].
+        positions: (n, 3) positions of the motors then [m, rad, rad].
+
+    Returns:
+        The images in which both bands were found.
+
+    Raises:
+        FieldError: Numbers of images, times and positions differ, or are too few.
+        CalibrationError: Nothing moved, or no two bands were found.
+    """
+    stamps, motors = np.asarray(times, np.float64), np.asarray(positions, np.float64)
+    if len(images) < LEAST_IMAGES:
+        raise FieldError("images", len(images), f"at least {LEAST_IMAGES}")
+    if stamps.shape != (len(images),) or motors.shape != (len(images), 3):
+        raise FieldError("positions", motors.shape, f"({len(images)}, 3), one row per image")
+    moving, tissue = _split(images)
+    regressors = _regressors(stamps, motors)
+    some = slice(None, None, 2)
+    candidates = [
+        _candidate(images[some], own, np.concatenate([tissue, others]), regressors[some])
+        for own, others in _clusters(moving)
+    ]
+    best = max(candidates, key=lambda each: each.score)
+    if best.share < LEAST_SHARE:
+        raise CalibrationError(
+            "No colour of the moving pixels has two bands in most images; the best has them in "
+            f"{best.share:.0%}",
+            "Are both bands in view all the time, matt, and of a colour of their own? Else use "
+            "--click, or masks",
+        )
+    if best.following < LEAST_FOLLOWING:
+        raise CalibrationError(
+            f"The motors explain only {best.following:.0%} of the motion of the bands",
+            "Does the instrument follow its motors, and do images and positions belong together?",
+        )
+    best = _evaluate(images, best.weights, best.threshold, regressors)
+    for _ in range(_ITERATIONS):
+        found = _labelled(images, best)
+        marker = np.concatenate(
+            [np.concatenate([each.pixels(1), each.pixels(2)]) for each in found]
+        )
+        background = np.concatenate([each.pixels(0)[::31] for each in found])
+        refined = _evaluate(images, *fit_discriminant(marker, background), regressors)
+        if refined.score < best.score:
+            break
+        best = refined
+    return _labelled(images, best)
+
+
+def _labelled(images: Sequence[Image], candidate: _Candidate) -> list[LabelledImage]:
+    pairs = zip(images, candidate.bands, strict=True)
+    return [labelled(image, bands) for image, bands in pairs if bands is not None]
+
+
+def _split(images: Sequence[Image]) -> tuple[Image, Image]:
+    """Pixels (n, 3) of what moved, in colours that what did not move has not; and the latter."""
+    small = np.stack([_halved(image) for image in images])
+    small = np.stack([_matched(image, small[len(small) // 2]) for image in small])
+    median = np.median(small[::2], axis=0).astype(np.int16)
+    changed = (np.abs(small.astype(np.int16) - median) > LEAST_CHANGE).any(axis=3)
+    ever = cv2.dilate(changed.any(axis=0).astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+    if ever.mean() > 1 - _LEAST_TISSUE:
+        raise CalibrationError(
+            f"{ever.mean():.0%} of the image changes during the sweep",
+            "Hold the scope still, and switch off automatic exposure. Else use --click, or masks",
+        )
+    tissue = small[::5][:, ~ever].reshape(-1, 3)
+    size = 256 // _CELL
+    counts = np.zeros((size + 2,) * 3)
+    np.add.at(counts, tuple((tissue // _CELL + 1).T.astype(int)), 1)
+    # Neighbouring cells too: a colour is not unlike tissue because of its noise.
+    near = counts.copy()
+    for shift in itertools.product((-1, 0, 1), repeat=3):
+        np.maximum(near, np.roll(counts, shift, axis=(0, 1, 2)), out=near)
+    moving = small[changed]
+    cells = tuple((moving // _CELL + 1).T.astype(int))
+    own = moving[near[cells] <= _SHARE_OF_TISSUE * len(tissue)]
+    if len(own) < _LEAST_AREA * len(images) / 4:
+        raise CalibrationError(
+            f"Hardly anything in the images moves: {changed.mean():.2%} of the pixels, of which "
+            f"{len(own) / max(len(moving), 1):.0%} have a colour that the tissue has not",
+            "Is the instrument in view, are the motors coupled to it, and is the image not "
+            "overexposed? Else use --click, or masks",
+        )
+    own = own[:: max(len(own) // _MOST_PIXELS, 1)]
+    return own, tissue[:: max(len(tissue) // (5 * _MOST_PIXELS), 1)]
+
+
+def _matched(image: Image, other: Image) -> Image:
+    """The image with the brightness of another: the exposure may be automatic."""
+    gain = np.median((other.sum(axis=2) + 10.0) / (image.sum(axis=2) + 10.0))
+    return np.asarray(cv2.convertScaleAbs(image, alpha=float(gain)), np.uint8)
+
+
+def _halved(image: Image) -> Image:
+    height, width = image.shape[:2]
+    half = cv2.resize(image, (width // 2, height // 2), interpolation=cv2.INTER_AREA)
+    return np.asarray(half, np.uint8)
+
+
+def _clusters(pixels: Image) -> list[tuple[Image, Image]]:
+    """The pixels of each cluster of colours, nearly independent of brightness, and the others."""
+    values = pixels.astype(np.float32)
+    total = values.sum(axis=1, keepdims=True) + 10
+    colours = np.hstack([3 * values / total, 0.15 * np.log(total / 100)]).astype(np.float32)
+    cv2.setRNGSeed(0)
+    criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 50, 1e-4)
+    nothing = np.empty(0, np.int32)
+    count = min(_CLUSTERS, len(colours))
+    _, names, _ = cv2.kmeans(colours, count, nothing, criteria, 4, cv2.KMEANS_PP_CENTERS)
+    members = [names.ravel() == k for k in range(count)]
+    return [(pixels[own], pixels[~own]) for own in members if own.sum() > _LEAST_AREA]
+
+
+def _candidate(
+    images: Sequence[Image], own: Image, others: Image, regressors: Floats
+) -> _Candidate:
+    try:
+        weights, threshold = fit_discriminant(own, others)
+    except FieldError:  # all pixels of one colour
+        return _Candidate((0.0, 0.0, 0.0), 0.0, (None,) * len(images), 0.0)
+    return _evaluate(images, weights, threshold, regressors)
+
+
+def _evaluate(
+    images: Sequence[Image],
+    weights: tuple[float, float, float],
+    threshold: float,
+    regressors: Floats,
+) -> _Candidate:
+    bands = tuple(two_bands(image, weights, threshold) for image in images)
+    is_found = np.array([each is not None for each in bands])
+    if is_found.mean() < LEAST_SHARE / 2:
+        return _Candidate(weights, threshold, bands, 0.0)
+    middle = np.array([_centre(each) for each in bands if each is not None])
+    rows = regressors[is_found]
+    solution, *_ = np.linalg.lstsq(rows, middle, rcond=None)
+    variance = middle.var(axis=0).sum()
+    left = (middle - rows @ solution).var(axis=0).sum()
+    following = 1 - left / variance if variance > 1 else 0.0
+    return _Candidate(weights, threshold, bands, float(following))
+
+
+def two_bands(image: Image, weights: Sequence[float], threshold: float) -> tuple[Mask, Mask] | None:
+    """The two compact regions of a colour, if it has no others of their size."""
+    kernel = np.array([weights], np.float32)
+    values = cv2.transform(image.astype(np.float32), kernel)
+    values = cv2.GaussianBlur(values, (0, 0), 1.0)
+    mask = (values > threshold).astype(np.uint8)
+    mask = np.asarray(cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), np.uint8)
+    count, names, stats, _ = cv2.connectedComponentsWithStats(mask)
+    if count < 3:
+        return None
+    areas = stats[1:, cv2.CC_STAT_AREA]
+    first, second = np.argsort(areas)[::-1][:2]
+    larger, smaller = int(areas[first]), int(areas[second])
+    if smaller < _LEAST_AREA or larger > _MOST_ALIKE * smaller:
+        return None
+    if areas.sum() - larger - smaller > _REMAINDER * (larger + smaller):
+        return None
+    bands = [(names == name + 1).astype(np.uint8) for name in (first, second)]
+    if any(_touches_border(band) or _solidity(band) < _LEAST_SOLIDITY for band in bands):
+        return None
+    distance = np.linalg.norm(np.subtract(*(_centroid(band) for band in bands)))
+    if distance < _LEAST_DISTANCE * np.sqrt((larger + smaller) / 2):
+        return None
+    return bands[0], bands[1]
+
+
+def _touches_border(mask: Mask) -> bool:
+    return bool(mask[0].any() or mask[-1].any() or mask[:, 0].any() or mask[:, -1].any())
+
+
+def _solidity(mask: Mask) -> float:
+    points = cv2.findNonZero(mask)
+    hull = cv2.convexHull(points)
+    # The area of a hull is that between pixel centres.
+    around = cv2.contourArea(hull) + cv2.arcLength(hull, True) / 2 + 1
+    return float(len(points) / around)
+
+
+def _centroid(mask: Mask) -> Floats:
+    return np.asarray(cv2.findNonZero(mask).reshape(-1, 2).mean(axis=0), np.float64)
+
+
+def _centre(bands: tuple[Mask, Mask]) -> Floats:
+    """Mean of the centroids of both bands, which does not depend on their order [px]."""
+    return np.asarray(np.mean([_centroid(band) for band in bands], axis=0), np.float64)
+
+
+def _regressors(times: Floats, positions: Floats) -> Floats:
+    """The positions now and before, and their squares: (n, columns), with a constant."""
+    spread = np.ptp(positions, axis=0)
+    moved = positions[:, spread > 0] / np.where(spread > 0, spread, 1)[spread > 0]
+    if not moved.shape[1]:
+        raise CalibrationError("The motors did not move", "Are the drives enabled?")
+    columns = [np.ones(len(times))]
+    for lag in _LAGS:
+        for dof in moved.T:
+            delayed = np.interp(times - lag, times, dof)
+            columns += [delayed, delayed**2]
+    return np.column_stack(columns)

@@ -1,0 +1,1 @@
+"""Calibration of the camera's intrinsics with a ChArUco board."""

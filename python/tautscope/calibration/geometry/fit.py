@@ -1,0 +1,201 @@
+"""Fit of the geometry to a calibration record."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tautscope.calibration.geometry.checks import LARGEST_RESIDUAL, check_record, find_doubts
+from tautscope.calibration.geometry.model import FEATURE_STD, TIP_STD, Data, Model
+from tautscope.calibration.geometry.parameters import Intrinsics, estimated
+from tautscope.calibration.geometry.recording import Recording, generic
+from tautscope.calibration.geometry.solver import Solution, solve
+from tautscope.calibration.geometry.values import (
+    Value,
+    changed_keys,
+    estimated_values,
+    key_stds,
+)
+from tautscope.config import Config
+from tautscope.errors import FieldError
+from tautscope.loop.state_prediction import StatePrediction
+from tautscope.loop.vision import MarkerDetector
+
+Floats = NDArray[np.float64]
+DETECTIONS = 2
+"""How often the bands are searched again with the geometry found so far."""
+FEATURE_STD_RANGE = (0.15, 1.0)
+"""Standard deviation of a feature that the residuals may lead to [px]."""
+
+
+@dataclass(frozen=True, eq=False)
+class GeometryFit:
+    """Result of the geometry calibration.
+
+    Attributes:
+        config: The configuration with the estimated geometry and delay.
+        changes: Dotted key -> value of `config`, for `Config.replace`: what was estimated.
+        std: Key -> standard deviation in the unit of the key:
+            `camera.camera_from_guide.translation[0]` [m], `.rotation[0]` [rad, about the camera's
+            axes], `instrument.bending_length` [m], `camera.fx` [px], `camera.source.delay` [s], ...
+        residual_px: Root mean square of the residuals [px], of the images that are explained.
+        warnings: What the user has to know; empty in the normal case.
+        is_plausible: Whether the model explains the record; if not, do not use `config`.
+        values: Estimated values, before and after.
+        found_share: Share of the images in which both bands were found at last.
+        recording: The record, with the features of the last detection.
+        states: (images, 3) most probable tip [m, rad, rad]; NaN without both bands.
+        residuals: (images, 4) measured minus predicted features [px]; NaN likewise.
+        expected: (images, 3) tip that the motors let expect [m, rad, rad]; NaN likewise.
+    """
+
+    config: Config
+    changes: dict[str, Any]
+    std: dict[str, float]
+    residual_px: float
+    warnings: tuple[str, ...]
+    is_plausible: bool
+    values: tuple[Value, ...]
+    found_share: float
+    recording: Recording
+    states: Floats
+    residuals: Floats
+    expected: Floats
+
+
+def fit(
+    recording: Recording,
+    config: Config,
+    *,
+    intrinsics: Intrinsics = "focal",
+    band_distance: float | None = None,
+) -> GeometryFit:
+    """Estimate pose, lengths, intrinsics and delay from a calibration motion.
+
+    The parameters are estimated together with the state of every image; hysteresis is a loose
+    expectation of it. Images, if there are any, are searched again with the geometry found.
+    Decision 0041 has the equations, docs/calibration.md what is determined.
+
+    Three directions are free and fixed by convention: insertion and rotation are 0 where the
+    drives are, and lengths are those of the insertion drive or of `band_distance`.
+
+    Args:
+        recording: From `sweep`, or of your own motors and features.
+        config: The configuration with a rough geometry, within about 5 mm and 5 deg.
+        intrinsics: ``none``, ``focal`` (one factor of both focal lengths) or ``all``.
+        band_distance: Measured distance of the bands' centres [m], in place of the drive's scale.
+
+    Raises:
+        RecordError: The record does not determine the geometry: too few bands, over-exposed images,
+            too little motion.
+        FieldError: An option has a value that is not allowed.
+    """
+    if band_distance is not None and not (
+        np.isfinite(band_distance) and band_distance > config.instrument.band_length
+    ):
+        raise FieldError("band_distance", band_distance, "a length above instrument.band_length")
+    active = estimated(intrinsics, by_band_distance=band_distance is not None)
+    check_record(recording, config)
+    model = _model(recording, config, band_distance)
+    solution = solve(model, active)
+    for _ in range(DETECTIONS if recording.patches else 0):
+        recording = _detect_again(recording, config, model, solution, band_distance)
+        check_record(recording, config)
+        model = _model(recording, config, band_distance)
+        solution = solve(model, active, solution.z)
+    # Of the four features of an image, the state takes up three.
+    feature_std = float(
+        np.clip(np.nan_to_num(2 * _rms(solution.residuals), nan=1.0), *FEATURE_STD_RANGE)
+    )
+    model = _model(recording, config, band_distance, feature_std)
+    solution = solve(model, active, solution.z)
+    free = solve(model, active, solution.z, free_states=True)
+    return _result(recording, config, model, (solution, free), active)
+
+
+def _model(
+    recording: Recording,
+    config: Config,
+    band_distance: float | None,
+    feature_std: float = FEATURE_STD,
+) -> Model:
+    found = recording.found
+    data = Data(
+        recording.time, recording.motors, recording.captured_at[found], recording.features[found]
+    )
+    return Model(config, data, band_distance, feature_std)
+
+
+def _detect_again(
+    recording: Recording,
+    config: Config,
+    model: Model,
+    solution: Solution,
+    band_distance: float | None,
+) -> Recording:
+    """The record with the bands searched near the fitted or expected tip of every image."""
+    found, everywhere = (
+        recording.found,
+        Data(recording.time, recording.motors, recording.captured_at, recording.features),
+    )
+    tips = Model(config, everywhere, band_distance).expected(solution.z)[:, :3]
+    tips[found] = solution.states[:, :3]
+    fitted = config.replace(**model.geometry(solution.z).values())
+    detector, std = MarkerDetector(fitted), TIP_STD * np.array(config.safety.width_limit)
+    features, reasons = np.full_like(recording.features, np.nan), dict[str, int]()
+    for index, (patch, tip) in enumerate(zip(recording.patches, tips, strict=True)):
+        detection = detector.detect(patch.image(config.camera), None, StatePrediction(tip, std))
+        if detection.valid:
+            features[index] = detection.features
+        else:
+            reason = generic(detection.reason)
+            reasons[reason] = reasons.get(reason, 0) + 1
+    return replace(recording, features=features, reasons=reasons)
+
+
+def _result(
+    recording: Recording,
+    config: Config,
+    model: Model,
+    solutions: tuple[Solution, Solution],
+    active: NDArray[np.bool_],
+) -> GeometryFit:
+    solution, _ = solutions
+    doubts, warnings = find_doubts(model, *solutions, active)
+    values = estimated_values(config, model.geometry(solution.z), solution, active)
+    changes = changed_keys(config, model.geometry(solution.z), values)
+    delay = next(value.after for value in values if value.name == "camera.source.delay")
+    if delay < 0:
+        warnings.append(
+            f"Images are stamped {-delay * 1e3:.0f} ms before the motors' clock: "
+            "camera.source.delay is set to 0, which cannot express it"
+        )
+
+    def per_image(table: Floats) -> Floats:
+        whole = np.full((len(recording.captured_at), table.shape[1]), np.nan)
+        whole[recording.found] = table
+        return whole
+
+    return GeometryFit(
+        config=config.replace(**changes),
+        changes=changes,
+        std=key_stds(values, changes),
+        residual_px=_rms(solution.residuals),
+        warnings=(*doubts, *warnings),
+        is_plausible=not doubts,
+        values=values,
+        found_share=float(recording.found.mean()),
+        recording=recording,
+        states=per_image(solution.states[:, :3]),
+        residuals=per_image(solution.residuals),
+        expected=per_image(solution.expected[:, :3]),
+    )
+
+
+def _rms(residuals: Floats) -> float:
+    """Root mean square of the residuals of explained images [px]; NaN if there is none."""
+    explained = residuals[np.abs(residuals).max(axis=1) < LARGEST_RESIDUAL]
+    return float(np.sqrt(np.mean(explained**2))) if len(explained) else float("nan")

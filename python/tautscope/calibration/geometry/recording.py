@@ -1,0 +1,170 @@
+"""Record of a calibration motion: motor positions, and the bands in the images."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tautscope.config import CameraConfig, Config
+from tautscope.errors import RecordError, SignalError
+from tautscope.loop.frame_layout import FrameLayout
+from tautscope.loop.vision import Detection, MarkerDetector
+
+Floats = NDArray[np.float64]
+Image = NDArray[np.uint8]
+MARGIN = 60
+"""Pixels that are kept around the regions of the markers' colour [px]: tissue beside the bands."""
+
+
+@dataclass(frozen=True, slots=True)
+class Patch:
+    """The part of an image in which the bands are.
+
+    Attributes:
+        left: Column of its first pixel in the image [px].
+        top: Row of its first pixel.
+        pixels: The pixels; the whole image in a format without one element per pixel.
+    """
+
+    left: int
+    top: int
+    pixels: Image
+
+    def image(self, camera: CameraConfig) -> Image:
+        """The image with black in place of the pixels that were not kept."""
+        shape = FrameLayout(camera).shape
+        if self.pixels.shape == shape:
+            return self.pixels
+        whole = np.zeros(shape, np.uint8)
+        height, width = self.pixels.shape[:2]
+        whole[self.top : self.top + height, self.left : self.left + width] = self.pixels
+        return whole
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A calibration motion of the motors, and the features of the bands.
+
+    Attributes:
+        time: (n,) [s], increasing.
+        motors: (n, 3) positions of the drives at these times [m, rad, rad].
+        captured_at: (images,) stamped capture times [s, the same clock], in order.
+        features: (images, 4) u and v of bands A and B [px]; NaN where a band was not found.
+        patches: The images, for a second detection with the fitted geometry; empty without images.
+        reasons: Why bands were not found: text -> number of images.
+        saturated: Median share of saturated pixels (a channel at 255) around the bands.
+    """
+
+    time: Floats
+    motors: Floats
+    captured_at: Floats
+    features: Floats
+    patches: tuple[Patch, ...] = ()
+    reasons: dict[str, int] = field(default_factory=dict)
+    saturated: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check shapes and numbers.
+
+        Raises:
+            SignalError: An array has another shape, motors or times are not finite, or the time
+                does not increase.
+        """
+        ticks, images = len(self.time), len(self.captured_at)
+        for name, shape in (
+            ("time", (ticks,)),
+            ("motors", (ticks, 3)),
+            ("captured_at", (images,)),
+            ("features", (images, 4)),
+        ):
+            found = np.shape(getattr(self, name))
+            if found != shape:
+                raise SignalError(name, f"an array {found}", f"shape {shape}")
+        for name in ("time", "motors", "captured_at"):
+            if not np.isfinite(getattr(self, name)).all():
+                raise SignalError(name, "a number that is not finite", "finite numbers")
+        if (np.diff(self.time) <= 0).any():
+            raise SignalError("time", "a time that does not increase", "increasing times")
+        if self.patches and len(self.patches) != images:
+            raise SignalError("patches", f"{len(self.patches)} patches", f"{images}, one per image")
+
+    @property
+    def found(self) -> NDArray[np.bool_]:
+        """(images,) whether both bands were found."""
+        return np.asarray(np.isfinite(self.features).all(axis=1))
+
+
+class Recorder:
+    """Collects a `Recording`: motor positions, and images in which the bands are searched.
+
+    The bands are searched without a prediction, because the configured geometry is what is unknown.
+
+    Args:
+        config: Camera, instrument and vision.
+    """
+
+    def __init__(self, config: Config) -> None:
+        self._camera = config.camera
+        self._detector = MarkerDetector(config)
+        self._ticks: list[tuple[float, Floats]] = []
+        self._images: list[tuple[float, Floats, Patch, float]] = []
+        self._reasons: dict[str, int] = {}
+
+    def add_tick(self, time: float, motors: Floats) -> None:
+        """Add the positions (3,) of the drives at a time."""
+        self._ticks.append((time, np.array(motors, dtype=np.float64)))
+
+    def add_image(self, image: Image, captured_at: float) -> Detection:
+        """Search the bands in an image, and keep its features and its pixels around the bands.
+
+        Raises:
+            FrameError: The image is not what the configured camera gives.
+        """
+        detection = self._detector.detect(image)
+        if not detection.valid:
+            reason = generic(detection.reason)
+            self._reasons[reason] = self._reasons.get(reason, 0) + 1
+        features = detection.features if detection.valid else np.full(4, np.nan)
+        patch = self._patch(image, detection)
+        is_saturated = patch.pixels.max(axis=-1) == 255 if patch.pixels.size else np.zeros(1)
+        self._images.append((captured_at, features, patch, float(np.mean(is_saturated))))
+        return detection
+
+    def recording(self) -> Recording:
+        """What was collected, in the order of capture.
+
+        Raises:
+            RecordError: There is no motor position or no image.
+        """
+        if not self._ticks or not self._images:
+            found = f"{len(self._ticks)} motor positions and {len(self._images)} images"
+            raise RecordError("recording", found, "both, of the same motion")
+        times, motors = zip(*self._ticks, strict=True)
+        images = sorted(self._images, key=lambda each: each[0])
+        captured_at, features, patches, saturated = zip(*images, strict=True)
+        return Recording(
+            np.array(times),
+            np.array(motors),
+            np.array(captured_at),
+            np.array(features),
+            patches,
+            dict(sorted(self._reasons.items(), key=lambda each: -each[1])),
+            float(np.median(saturated)),
+        )
+
+    def _patch(self, image: Image, detection: Detection) -> Patch:
+        camera = self._camera
+        if image.shape[:2] != (camera.height, camera.width) or not detection.regions:
+            return Patch(0, 0, image.copy())
+        boxes = np.array([region.box for region in detection.regions])
+        left, top = np.maximum(boxes[:, :2].min(axis=0) - MARGIN, 0)
+        right, bottom = (boxes[:, :2] + boxes[:, 2:]).max(axis=0) + MARGIN
+        return Patch(int(left), int(top), image[top:bottom, left:right].copy())
+
+
+def generic(reason: str) -> str:
+    """The reason why bands were not found, without its numbers."""
+    return re.sub(r"[\d.]+", "N", reason)

@@ -1,0 +1,168 @@
+"""The calibration motion: all degrees of freedom at once, under the supervision of the loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass
+
+import numpy as np
+
+from tautscope.calibration.geometry.recording import Floats, Recorder, Recording
+from tautscope.config import Config
+from tautscope.dof import Dof
+from tautscope.errors import MotionHeldError, SignalError
+from tautscope.loop.reduction import HysteresisReduction
+from tautscope.loop.rig import Frame, Rig
+from tautscope.loop.safety import Reaction
+
+DURATION = 60.0
+"""Duration of the motion [s]."""
+IMAGE_PERIOD = 0.08
+"""Least time between two images that are used [s]; neighbouring ones tell the same."""
+_PERIODS = (5.0, 6.1, 4.1)
+_SPEED_SHARE = 0.5
+_GROWTH_TIME = 2.0
+_HELD_TIME = 1.0
+OF_IMAGES = (
+    "frozen",
+    "late",
+    "duplicate",
+    "innovation",
+    "swapped",
+    "merged",
+    "lost",
+    "unobservable",
+    "overcompensation",
+    "slack_changed",
+    "geometry_off",
+    "width_limit",
+)
+
+
+@dataclass(frozen=True)
+class SweepReference:
+    """Sines of all degrees of freedom at once, with periods that do not repeat within the motion.
+
+    For each DOF, with centre and amplitude a of the experiment,
+
+        u = centre + a min(t / 2 s, 1) sin(2 pi t / T),    2 pi a / T <= reference_speed / 2
+
+    Attributes:
+        config: Its `experiment` has centres and amplitudes; the speed is at most half of
+            `safety.reference_speed` and of the drives' speed limits.
+        duration: [s].
+    """
+
+    config: Config
+    duration: float = DURATION
+
+    @property
+    def periods(self) -> Floats:
+        """(3,) periods [s]."""
+        config = self.config
+        speed = np.array(config.safety.reference_speed)
+        if config.drives is not None:
+            speed = np.minimum(speed, [config.drives[dof].speed_limit for dof in Dof])
+        least = 2 * np.pi * self._amplitudes / (_SPEED_SHARE * speed)
+        return np.maximum(_PERIODS, least)
+
+    @property
+    def _amplitudes(self) -> Floats:
+        return np.array([self.config.experiment[dof].amplitude for dof in Dof])
+
+    def __call__(self, time: float) -> Floats:
+        """(3,) [m, rad, rad] at `time` [s from the start]."""
+        centre = np.array([self.config.experiment[dof].centre for dof in Dof])
+        growth = min(time / _GROWTH_TIME, 1.0)
+        return np.asarray(
+            centre + growth * self._amplitudes * np.sin(2 * np.pi * time / self.periods)
+        )
+
+
+def sweep(
+    rig: Rig,
+    config: Config,
+    *,
+    duration: float = DURATION,
+    executor: Executor | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Recording:
+    """Move all degrees of freedom of a rig at once, and record motors and images.
+
+    The motion is within the range of `config.experiment`. Gate, limits of travel and speed,
+    monitors of tick and camera and the rig's own protections are those of an experiment. Images
+    update no estimate, and the detectors that compare images with the configured geometry are off,
+    because it is what is unknown: the command is the reference.
+
+    Args:
+        rig: It is reset first; the caller closes it.
+        config: Configuration of the rig.
+        duration: [s].
+        executor: Searches the bands in the background while control ticks continue; of the images
+            that arrive meanwhile only the newest is used. For a rig that runs in real time.
+        progress: Called with the share of the motion done, 0 to 1, once per second.
+
+    Raises:
+        MotionHeldError: Motion was held for a second: nobody can re-engage it.
+        RecordError: No image arrived.
+        SignalError: The rig's clock does not advance.
+        FrameError: An image is not what the configured camera gives.
+        TautscopeError: Errors of the rig.
+    """
+    off = tuple(dict.fromkeys([*config.safety.off, *OF_IMAGES]))
+    loop = HysteresisReduction(config.replace(**{"safety.off": off}), compensate=False)
+    reference = SweepReference(config, duration)
+    recorder = Recorder(config)
+    images = _ImageQueue(recorder, executor)
+    sample = rig.reset()
+    start, held = sample.time, 0
+    while (elapsed := sample.time - start) < duration:
+        command = loop.step(reference(elapsed), time=sample.time)
+        recorder.add_tick(sample.time, sample.applied)
+        if sample.frame is not None:
+            images.add(sample.frame)
+            # Only its arrival counts: its stamp may be wrong by the delay that is to be found.
+            loop.on_features(None, sample.time)
+        held = held + 1 if loop.supervision.reaction.rank >= Reaction.HOLD_MOTION.rank else 0
+        if held * rig.control_period > _HELD_TIME:
+            now = loop.supervision
+            raise MotionHeldError(sample.time, str(now.reaction), now.flags)
+        before, sample = sample, rig.step(command)
+        if not sample.time > before.time:
+            raise SignalError("sample.time", sample.time, f"later than the last, {before.time}")
+        if progress is not None and int(sample.time - start) > int(elapsed):
+            progress(min((sample.time - start) / duration, 1.0))
+    images.finish()
+    return recorder.recording()
+
+
+class _ImageQueue:
+    """Passes images to a recorder: every one that is due, or the newest with an executor."""
+
+    def __init__(self, recorder: Recorder, executor: Executor | None) -> None:
+        self._recorder, self._executor = recorder, executor
+        self._due = -np.inf
+        self._next: Frame | None = None
+        self._running: Future[object] | None = None
+
+    def add(self, frame: Frame) -> None:
+        if frame.captured_at < self._due:
+            return
+        if self._executor is None:
+            self._due = frame.captured_at + IMAGE_PERIOD - 1e-9
+            self._recorder.add_image(frame.image, frame.captured_at)
+            return
+        self._next = frame
+        if self._running is None or self._running.done():
+            self.finish()
+            frame, self._next = self._next, None
+            self._due = frame.captured_at + IMAGE_PERIOD - 1e-9
+            self._running = self._executor.submit(
+                self._recorder.add_image, frame.image, frame.captured_at
+            )
+
+    def finish(self) -> None:
+        """Wait for the image in work; its error is raised here."""
+        if self._running is not None:
+            self._running.result()

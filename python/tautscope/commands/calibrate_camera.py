@@ -1,0 +1,161 @@
+"""The command ``tautscope calibrate camera``."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from tautscope.commands import arguments
+from tautscope.commands.board_images import BoardImages, file_images, live_images, twin_images
+from tautscope.commands.calibration_output import add_options, check_options, finish
+from tautscope.commands.printing import print_json
+from tautscope.config import load_config
+from tautscope.errors import FieldError
+
+if TYPE_CHECKING:
+    from tautscope.calibration.camera.board import Board
+    from tautscope.calibration.result import CalibrationResult
+
+_MODELS = ("pinhole", "fisheye")
+
+
+def add_parser(kinds: arguments.Verbs) -> None:
+    """Add the command to the parser of ``tautscope calibrate``."""
+    camera = arguments.add_verb(
+        kinds,
+        "camera",
+        help="intrinsics of the camera, with a ChArUco board",
+        description="Calibrate the camera with a ChArUco board, from images, a video, the live "
+        "camera of --config, or a ROS camera_info file; print the section [camera]. Live and in a "
+        "video, hold the board still in each pose; the program says what to show next, and ends "
+        "when the views suffice.",
+        extras=["hardware"],
+    )
+    camera.add_argument(
+        "files",
+        nargs="*",
+        type=Path,
+        metavar="FILE",
+        help="images, one video, or one camera_info.yaml [the camera of --config]",
+    )
+    camera.add_argument(
+        "--board", type=Path, metavar="FILE.pdf", help="only write the board, to print on A4"
+    )
+    camera.add_argument(
+        "--columns", type=arguments.positive, default=9, help="squares [%(default)s]"
+    )
+    camera.add_argument("--rows", type=arguments.positive, default=7, help="squares [%(default)s]")
+    camera.add_argument(
+        "--square",
+        type=arguments.above_zero,
+        default=4e-3,
+        metavar="M",
+        help="side of a square, measured on the print [%(default)s m]",
+    )
+    camera.add_argument(
+        "--model", choices=_MODELS, default="pinhole", help="lens model of OpenCV [%(default)s]"
+    )
+    camera.add_argument(
+        "--seconds",
+        type=arguments.above_zero,
+        default=180.0,
+        metavar="S",
+        help="time limit of the live camera [%(default)s]",
+    )
+    camera.add_argument(
+        "--ros", type=Path, metavar="FILE", help="also write a ROS camera_info file"
+    )
+    camera.add_argument(
+        "--twin", action="store_true", help="show a simulated board to the twin's camera"
+    )
+    camera.add_argument(
+        "--seed",
+        type=arguments.natural,
+        metavar="N",
+        help="seed of the twin [twin.seed of the configuration]",
+    )
+    add_options(camera)
+    camera.set_defaults(run=_run)
+
+
+def _run(options: argparse.Namespace) -> None:
+    from tautscope.calibration.camera.board import Board  # noqa: PLC0415
+    from tautscope.runs.output_folder import check_free_file  # noqa: PLC0415
+
+    board = Board(options.columns, options.rows, options.square)
+    if options.board is not None:
+        board.write_pdf(check_free_file(options.board))
+        if options.json:
+            print_json({"file": str(options.board)})
+        else:
+            print(f"Print {options.board} at 100 %, and measure its ruler and squares.")
+        return
+    check_options(options)
+    if options.ros is not None:
+        check_free_file(options.ros)
+    if len(options.files) == 1 and options.files[0].suffix in (".yaml", ".yml"):
+        finish(options, _import(options.files[0]))
+        return
+    result, info = calibrate(_images(options, board), board, options.model)
+    if options.ros is not None:
+        options.ros.write_text(info, encoding="utf-8")
+    finish(options, result)
+
+
+def calibrate(
+    images: BoardImages, board: Board, model: Literal["pinhole", "fisheye"]
+) -> tuple[CalibrationResult, str]:
+    """Collect views until they suffice, or the images end, and fit the camera.
+
+    Returns:
+        The result, and the text of a ROS camera_info file.
+
+    Raises:
+        CalibrationError: The views do not suffice.
+    """
+    from tautscope.calibration.camera.camera_info import camera_info  # noqa: PLC0415
+    from tautscope.calibration.camera.collector import ViewCollector  # noqa: PLC0415
+    from tautscope.calibration.camera.intrinsics import fit_intrinsics  # noqa: PLC0415
+    from tautscope.calibration.camera.result import camera_result  # noqa: PLC0415
+
+    collector = ViewCollector(board, images.size, is_stream=images.is_stream)
+    try:
+        for image in images.images:
+            if collector.offer(image):
+                print(collector.status(), file=sys.stderr, flush=True)
+            if images.is_live and collector.coverage.is_complete:
+                break
+    finally:
+        images.images.close()
+    collector.check()
+    fit = fit_intrinsics(collector.views, images.size, model)
+    result = camera_result(fit, collector.coverage, images.serial_numbers)
+    return result, camera_info(fit.intrinsics)
+
+
+def _images(options: argparse.Namespace, board: Board) -> BoardImages:
+    if options.files and options.twin:
+        raise FieldError("--twin", True, "files or --twin, not both")
+    if options.files:
+        return file_images(options.files)
+    config = load_config(options.config)
+    if options.twin:
+        from tautscope.twin.drawn_rig import draw_rig  # noqa: PLC0415
+
+        seed = config.twin.seed if options.seed is None else options.seed
+        return twin_images(draw_rig(config, seed), board)
+    if options.config is None:
+        raise FieldError("files", None, "images, a video, --config FILE of a rig, or --twin")
+    return live_images(config, options.seconds)
+
+
+def _import(file: Path) -> CalibrationResult:
+    """The camera of a ROS camera_info file."""
+    from tautscope.calibration.camera.camera_info import read_camera_info  # noqa: PLC0415
+    from tautscope.calibration.camera.result import camera_values  # noqa: PLC0415
+    from tautscope.calibration.result import CalibrationResult  # noqa: PLC0415
+
+    values, notes = camera_values(read_camera_info(file))
+    return CalibrationResult("camera", values, notes=(f"from {file}", *notes))

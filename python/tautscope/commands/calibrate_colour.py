@@ -1,0 +1,145 @@
+"""The command ``tautscope calibrate colour``."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tautscope.commands import arguments
+from tautscope.commands.calibration_output import add_options, check_options, finish
+from tautscope.commands.calibration_rig import add_rig_options, rig_for_calibration
+from tautscope.config import load_config
+from tautscope.errors import FieldError
+
+if TYPE_CHECKING:
+    from tautscope.calibration.bands.labels import LabelledImage
+    from tautscope.calibration.result import CalibrationResult
+
+
+def add_parser(kinds: arguments.Verbs) -> None:
+    """Add the command to the parser of ``tautscope calibrate``."""
+    colour = arguments.add_verb(
+        kinds,
+        "colour",
+        help="colour of the bands, from their motion, clicks or masks",
+        description="Fit the colour of the bands, and print the section [vision]. Without files, "
+        "the rig of --config or the twin moves insertion and bending for 10 s, and the bands are "
+        "the two regions of one colour that move with the motors; THE MOTORS MOVE. A log, or a "
+        "video with motor positions, does the same. Or give one image with a click on each band, "
+        "or pairs of an image and its mask: white on the bands, black elsewhere, grey where pixels "
+        "are to be ignored.",
+        extras=["hardware"],
+    )
+    colour.add_argument(
+        "files",
+        nargs="*",
+        type=Path,
+        metavar="FILE",
+        help="pairs IMAGE MASK; one IMAGE with --click; a log; a video with --motors",
+    )
+    colour.add_argument(
+        "--click",
+        action="append",
+        type=_pixel,
+        default=[],
+        metavar="U,V",
+        help="a pixel on a band, from the left and from the top; give it twice",
+    )
+    colour.add_argument(
+        "--motors", type=Path, metavar="FILE.csv", help="motor positions of a video"
+    )
+    colour.add_argument(
+        "--video-start",
+        type=arguments.seconds,
+        default=0.0,
+        metavar="S",
+        help="time of the video's first frame in the CSV's [s] [%(default)s]",
+    )
+    add_rig_options(colour)
+    add_options(colour)
+    colour.set_defaults(run=_run)
+
+
+def _pixel(text: str) -> tuple[int, int]:
+    u, _, v = text.partition(",")
+    if not (u.strip().isdecimal() and v.strip().isdecimal()):
+        raise argparse.ArgumentTypeError(f"got {text!r}, expected U,V: two whole numbers")
+    return int(u), int(v)
+
+
+def _run(options: argparse.Namespace) -> None:
+    check_options(options)
+    serial_numbers: Mapping[str, str] = {}
+    files: list[Path] = options.files
+    if options.click:
+        images = _clicked(files, options.click)
+    elif not files:
+        finish(options, calibrate(options))
+        return
+    elif len(files) == 1:
+        images = _moving(options, files[0])
+    else:
+        images = _masked(files)
+    finish(options, result(images, serial_numbers))
+
+
+def calibrate(options: argparse.Namespace) -> CalibrationResult:
+    """Move the rig or the twin, and fit the colour of what moves with the motors."""
+    from tautscope.calibration.bands.motion import find_moving_bands  # noqa: PLC0415
+    from tautscope.calibration.bands.sweep import record_motion  # noqa: PLC0415
+    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
+
+    with rig_for_calibration(options) as setup, progress_bar("motion") as progress:
+        found = record_motion(setup.rig, setup.config, progress)
+        serial_numbers = setup.serial_numbers()
+    images = find_moving_bands(found.images, found.times, found.positions)
+    return result(images, serial_numbers)
+
+
+def result(images: Sequence[LabelledImage], serial_numbers: Mapping[str, str]) -> CalibrationResult:
+    """Fit the colour to labelled images, and check it."""
+    from tautscope.calibration.bands.result import colour_result, fit_colour  # noqa: PLC0415
+
+    return colour_result(fit_colour(images), images, serial_numbers)
+
+
+def _clicked(files: Sequence[Path], clicks: Sequence[tuple[int, int]]) -> list[LabelledImage]:
+    from tautscope.calibration.bands.click import label_clicks  # noqa: PLC0415
+    from tautscope.calibration.images import read_image  # noqa: PLC0415
+
+    if len(files) != 1:
+        raise FieldError("files", len(files), "one image, with --click")
+    return [label_clicks(read_image(files[0]), clicks)]
+
+
+def _masked(files: Sequence[Path]) -> list[LabelledImage]:
+    from tautscope.calibration.bands.result import from_mask  # noqa: PLC0415
+    from tautscope.calibration.images import read_image  # noqa: PLC0415
+
+    if len(files) % 2:
+        raise FieldError("files", len(files), "pairs of an image and its mask")
+    images = []
+    for frame_file, mask_file in zip(files[::2], files[1::2], strict=True):
+        frame, mask = read_image(frame_file), read_image(mask_file, is_grey=True)
+        if frame.shape[:2] != mask.shape:
+            sizes = f"{frame.shape[1]} x {frame.shape[0]} and {mask.shape[1]} x {mask.shape[0]}"
+            raise FieldError(f"{frame_file}, {mask_file}", sizes, "two images of the same size")
+        images.append(from_mask(frame, mask))
+    return images
+
+
+def _moving(options: argparse.Namespace, file: Path) -> list[LabelledImage]:
+    from tautscope.calibration.bands.motion import find_moving_bands  # noqa: PLC0415
+    from tautscope.commands.recorded_motion import log_motion, video_motion  # noqa: PLC0415
+
+    if file.suffix == ".mcap":
+        found = log_motion(file)
+    elif options.motors is not None:
+        config = load_config(options.config)
+        found = video_motion(file, options.motors, options.video_start, config.camera)
+    else:
+        allowed = "a log (.mcap), a video with --motors, an image with --click, IMAGE MASK ..."
+        raise FieldError("files", str(file), allowed)
+    return find_moving_bands(found.images, found.times, found.positions)

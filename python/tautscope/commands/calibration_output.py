@@ -1,0 +1,86 @@
+"""Options that every kind of ``tautscope calibrate`` has, and the output of its result."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tautscope.commands import arguments
+from tautscope.commands.printing import print_json
+from tautscope.config.edit import edited_text, writable_file, write_values
+from tautscope.errors import FieldError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from tautscope.calibration.result import CalibrationResult
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """``--config``, ``--write``, ``--out``, ``--json``."""
+    arguments.add_config(parser)
+    parser.add_argument(
+        "--write",
+        action="store_true",
+        help="write the values into the file of --config, with date, serial numbers and standard "
+        "deviations; without it they are printed",
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="also write a folder, new or empty, with values.toml and the figures",
+    )
+    arguments.add_json(parser)
+
+
+def check_options(options: argparse.Namespace) -> None:
+    """Check before anything runs that the results can be written.
+
+    Raises:
+        FieldError: ``--write`` without ``--config``.
+        OutputError: The folder is taken or cannot be written.
+    """
+    from tautscope.runs.output_folder import check_free, check_writable  # noqa: PLC0415
+
+    if options.write:
+        if options.config is None:
+            raise FieldError("--write", True, "also --config FILE, the file to write to")
+        check_writable(writable_file(options.config))
+    if options.out is not None:
+        check_free(options.out)
+
+
+def finish(options: argparse.Namespace, result: CalibrationResult) -> None:
+    """Write and print a result as the options say."""
+    changes = result.changes()
+    text = edited_text("", changes)
+    if options.write:
+        write_values(options.config, changes)
+    if options.out is not None:
+        _write_folder(options.out, result, text)
+    if options.json:
+        print_json(_document(result, changes))
+        return
+    print(text, end="")
+    for note in result.notes:
+        print(f"# {note}")
+    if options.write:
+        print(f"# written: {options.config}")
+
+
+def _write_folder(folder: Path, result: CalibrationResult, text: str) -> None:
+    from tautscope.runs.output_folder import new_folder  # noqa: PLC0415
+
+    with new_folder(folder) as partial:
+        (partial / "values.toml").write_text(text, encoding="utf-8")
+        for k, (figure, _) in enumerate(result.figures):
+            number = f"_{k + 1}" if len(result.figures) > 1 else ""
+            figure.savefig(partial / f"{result.kind}{number}.png", dpi=150)
+
+
+def _document(result: CalibrationResult, changes: Mapping[str, Any]) -> dict[str, Any]:
+    values = {key: value for key, value in changes.items() if not key.startswith("calibration.")}
+    record = changes[f"calibration.{result.kind}"]
+    return {"values": values, **record, **result.data, "notes": list(result.notes)}

@@ -1,0 +1,126 @@
+"""The rig that a calibration moves: drives and camera of a configuration, or the twin."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from tautscope.commands import arguments
+from tautscope.config import Config, load_config
+from tautscope.config.placeholders import placeholders
+from tautscope.errors import ConfigError, FieldError
+from tautscope.extras import require_extras
+
+if TYPE_CHECKING:
+    from tautscope.loop.rig import Rig
+
+
+@dataclass(frozen=True)
+class Setup:
+    """A rig and its configuration.
+
+    Attributes:
+        rig: To be moved; it is closed with the block.
+        config: What is known of it.
+    """
+
+    rig: Rig
+    config: Config
+    serials: Mapping[str, str]
+
+    def serial_numbers(self) -> Mapping[str, str]:
+        """Serial numbers of camera and drives, where they have one."""
+        return self.serials
+
+
+def add_rig_options(parser: argparse.ArgumentParser) -> None:
+    """``--twin``, ``--seed``, ``--yes``."""
+    parser.add_argument(
+        "--twin",
+        action="store_true",
+        help="calibrate a simulated rig that differs from --config, see --seed",
+    )
+    parser.add_argument(
+        "--seed",
+        type=arguments.natural,
+        metavar="N",
+        help="seed of the twin and of its differences [twin.seed of the configuration]",
+    )
+    parser.add_argument("--yes", action="store_true", help="move the motors without asking")
+
+
+def actual_rig(config: Config, seed: int | None) -> Config:
+    """The configuration of the twin: it differs from `config` as drawn with the seed."""
+    from tautscope.twin.drawn_rig import draw_rig  # noqa: PLC0415
+
+    return draw_rig(config, config.twin.seed if seed is None else seed)
+
+
+@contextmanager
+def rig_for_calibration(options: argparse.Namespace) -> Iterator[Setup]:
+    """Open the rig of the options, and close it at the end.
+
+    Raises:
+        FieldError: Neither ``--config`` with drives nor ``--twin`` is given, or the question
+            whether the motors may move is not answered with y.
+        TautscopeError: Errors of the rig.
+    """
+    config = load_config(options.config)
+    if options.twin:
+        require_extras("--twin", ["twin"])
+        from tautscope.twin.rig import Twin  # noqa: PLC0415
+
+        twin = Twin(actual_rig(config, options.seed))
+        try:
+            yield Setup(twin, config, {})
+        finally:
+            twin.close()
+        return
+    if options.config is None:
+        raise FieldError("files", None, "files, --config FILE of a rig, or --twin")
+    confirm_motion(options)
+    with open_rig(config) as setup:
+        yield setup
+
+
+@contextmanager
+def open_rig(config: Config) -> Iterator[Setup]:
+    """Open drives and camera; on every exit the motors are quick-stopped."""
+    from tautscope.hardware.rig import HardwareRig, require_drives  # noqa: PLC0415
+    from tautscope.hardware.serial_numbers import read_serial_numbers  # noqa: PLC0415
+    from tautscope.hardware.signals import exit_on_signals  # noqa: PLC0415
+
+    require_drives(config)
+    with exit_on_signals():
+        serials = read_serial_numbers(config)
+        rig = HardwareRig(config)
+        try:
+            yield Setup(rig, config, serials)
+        finally:
+            rig.close()
+
+
+def confirm_motion(options: argparse.Namespace) -> None:
+    """Ask whether the motors may move, unless ``--yes``.
+
+    Raises:
+        ConfigError: The limits of the drives are placeholders.
+        FieldError: The answer is not y.
+    """
+    marked = [key for key in placeholders(options.config) if key.startswith("drives.")]
+    if marked:
+        allowed = "your values: the motors would move with wrong limits"
+        raise ConfigError(", ".join(marked), f"placeholders of {options.config}", allowed)
+    if options.yes:
+        return
+    question = (
+        "THE MOTORS WILL MOVE, in the range of [experiment]. Hold the scope still, keep tissue and "
+        "hands away, the emergency stop within reach. Type y to start: "
+    )
+    print(question, end="", file=sys.stderr, flush=True)
+    if sys.stdin.readline().strip().lower() not in ("y", "yes"):
+        raise FieldError("answer", "no", "y, or the option --yes; nothing moved")

@@ -1,0 +1,119 @@
+"""Changing values in a TOML file in place: comments and order stay."""
+
+from __future__ import annotations
+
+import os
+import re
+import tomllib
+from collections.abc import Mapping
+from contextlib import suppress
+from os import PathLike
+from pathlib import Path
+from tempfile import NamedTemporaryFile
+from typing import Any
+
+import tomlkit
+from tomlkit.items import Item, Table
+
+from tautscope.config.load import RIGS
+from tautscope.config.placeholders import MARK
+from tautscope.config.root import from_document
+from tautscope.config.section import without_numpy
+from tautscope.errors import ConfigError, MissingPathError, OutputError
+
+_PLACEHOLDER = re.compile(rf"\s*{MARK}\b[,:]?")
+
+
+def write_values(path: str | PathLike[str], values: Mapping[str, Any]) -> None:
+    """Change values in a TOML file; it is replaced in one step, or not at all.
+
+    Args:
+        path: The file; the word REPLACE beside a changed value is removed.
+        values: Dotted path -> value, as for `Config.replace`.
+
+    Raises:
+        MissingPathError: The file does not exist.
+        ConfigError: It is a shipped configuration, or the result would not be valid.
+        OutputError: It cannot be written.
+    """
+    file = writable_file(path)
+    text = edited_text(file.read_text(encoding="utf-8"), values)
+    try:
+        with NamedTemporaryFile(
+            "w", encoding="utf-8", dir=file.parent, prefix=f".{file.name}.", delete=False
+        ) as partial:
+            partial.write(text)
+            partial.flush()
+            os.fsync(partial.fileno())
+        Path(partial.name).chmod(file.stat().st_mode)
+        Path(partial.name).replace(file)
+    except OSError as error:
+        with suppress(OSError, UnboundLocalError):
+            Path(partial.name).unlink()
+        allowed = f"a file in a folder that can be written ({error.strerror})"
+        raise OutputError("config", str(file), allowed) from None
+
+
+def writable_file(path: str | PathLike[str]) -> Path:
+    """The file of a configuration that may be changed.
+
+    Raises:
+        MissingPathError: The file does not exist.
+        ConfigError: It is a shipped configuration.
+    """
+    file = Path(path)
+    if file.is_file():
+        return file
+    if str(path) in RIGS:
+        remedy = f"a file of your own: tautscope config --config {path} > rig.toml"
+        raise ConfigError("config", str(path), remedy)
+    raise MissingPathError("config", str(file), "a TOML file")
+
+
+def edited_text(text: str, values: Mapping[str, Any]) -> str:
+    """The text of a TOML file with changed values; the result is checked.
+
+    Raises:
+        ConfigError: The text is not TOML, or the result would not be a valid configuration.
+    """
+    try:
+        document = tomlkit.parse(text)
+    except tomlkit.exceptions.TOMLKitError as error:
+        raise ConfigError("config", text.partition("\n")[0], f"TOML ({error})") from None
+    for path, value in values.items():
+        *sections, key = path.split(".")
+        place: Any = document
+        for section in sections:
+            if section not in place:
+                # A table without values of its own has no header.
+                is_super = isinstance(value, dict) or section != sections[-1]
+                place[section] = tomlkit.table(is_super_table=is_super)
+            place = place[section]
+        _set(place, key, without_numpy(value))
+    edited = tomlkit.dumps(document)
+    from_document(tomllib.loads(edited))
+    return edited
+
+
+def _set(place: Any, key: str, value: Any) -> None:
+    if isinstance(value, dict):
+        table: Any = tomlkit.table() if isinstance(place, Table) else tomlkit.inline_table()
+        for name, item in value.items():
+            table[name] = _inline(item)
+        place[key] = table
+        return
+    place[key] = _inline(value)
+    item = place.item(key) if hasattr(place, "item") else place[key]
+    if isinstance(item, Item) and MARK in item.trivia.comment:
+        comment = _PLACEHOLDER.sub("", item.trivia.comment)
+        is_empty = not comment.strip("# ")
+        item.trivia.comment = "" if is_empty else comment
+        item.trivia.comment_ws = "" if is_empty else item.trivia.comment_ws
+
+
+def _inline(value: Any) -> Any:
+    if isinstance(value, dict):
+        table = tomlkit.inline_table()
+        table.update(value)
+        return table
+    return list(value) if isinstance(value, tuple) else value

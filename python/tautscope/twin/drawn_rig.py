@@ -1,0 +1,78 @@
+"""A simulated rig that differs from its configuration, as a rig does before it is calibrated."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from tautscope.config import Config
+
+TILT = np.radians(5.0)
+"""Largest angle between the configured and the actual guide, about a random axis [rad]."""
+SHIFT = 5e-3
+"""Largest distance, in a random direction [m]."""
+FOCAL_LENGTH, SECTION = 0.03, 0.1
+"""Largest errors of the focal lengths and of the length of the section [share]."""
+CENTRE = 5.0
+"""Of the principal point [px]."""
+DISTORTION = 0.02
+"""Of k1 [1]."""
+BAND = 1e-3
+"""Of the position of a band [m]."""
+LATENCY = 0.2
+"""Largest error of the latency of the images [s]."""
+_DOMAIN = 18
+
+
+def draw_rig(config: Config, seed: int) -> Config:
+    """The configuration of an actual rig, uniformly distributed about the configured one.
+
+    Pose of the guide, focal lengths, principal point, k1, length of the section, positions of the
+    bands and latency differ; `twin.seed` is the seed. The same seed gives the same rig.
+    """
+    random = np.random.default_rng([_DOMAIN, seed])
+    camera, instrument = config.camera, config.instrument
+    pose = camera.camera_from_guide
+    axis, direction = (each / np.linalg.norm(each) for each in random.standard_normal((2, 3)))
+    turn, _ = cv2.Rodrigues(random.uniform(0, TILT) * axis)
+    nominal, _ = cv2.Rodrigues(np.array(pose.rotation))
+    scale = 1 + random.uniform(-FOCAL_LENGTH, FOCAL_LENGTH)
+    k1, *others = camera.distortion
+    half = instrument.band_length / 2
+    marker_a = max(instrument.marker_a + random.uniform(-BAND, BAND), half)
+    marker_b = instrument.marker_b + random.uniform(-BAND, BAND)
+    return config.replace(
+        **{
+            "camera.fx": camera.fx * scale,
+            "camera.fy": camera.fy * scale,
+            "camera.cx": camera.cx + random.uniform(-CENTRE, CENTRE),
+            "camera.cy": camera.cy + random.uniform(-CENTRE, CENTRE),
+            "camera.distortion": (k1 + random.uniform(-DISTORTION, DISTORTION), *others),
+            "camera.camera_from_guide.rotation": cv2.Rodrigues(turn @ nominal)[0].ravel(),
+            "camera.camera_from_guide.translation": pose.translation
+            + random.uniform(0, SHIFT) * direction,
+            "instrument.bending_length": instrument.bending_length
+            * (1 + random.uniform(-SECTION, SECTION)),
+            "instrument.marker_a": marker_a,
+            "instrument.marker_b": min(marker_b, instrument.tip_length - half),
+            "twin.latency": config.twin.latency + random.uniform(0, LATENCY),
+            "twin.seed": seed,
+        }
+    )
+
+
+def draw_geometry(config: Config, seed: int) -> Config:
+    """The rig of `draw_rig` with a calibrated camera, apart from its focal lengths.
+
+    The images are stamped late by the error of the latency.
+    """
+    drawn = draw_rig(config, seed)
+    return drawn.replace(
+        **{
+            "camera.cx": config.camera.cx,
+            "camera.cy": config.camera.cy,
+            "camera.distortion": config.camera.distortion,
+            "twin.latency": config.twin.latency,
+            "twin.sensor.stamp_error": drawn.twin.latency - config.twin.latency,
+        }
+    )
