@@ -19,6 +19,7 @@ from tautscope.dof import Dof, display_text
 from tautscope.loop.references import OperatorMotion, SineSequence
 from tautscope.loop.rig import Frame, Sample
 from tautscope.loop.vision import MarkerDetector
+from tautscope.metrics import loop_width
 from tautscope.runs.recording import Recording
 
 NAMES = {name: getattr(config, name) for name in config.__all__}
@@ -105,6 +106,13 @@ def test_a_recording_prints_its_length(compensated: Recording) -> None:
     ticks, images = len(compensated.trace), len(compensated.frames)
     assert f"{ticks} ticks" in repr(compensated) and f"{images} images" in repr(compensated)
     assert "with compensation" in repr(compensated)
+
+
+def test_a_width_and_a_snapshot_print_no_arrays(compensated: Recording) -> None:
+    width = loop_width([0, 1, 1, 0, 0], [0, 0, 1, 1, 0])
+    assert repr(width) == "<LoopWidth: mean 1, largest 1, 41 of 41 levels>"
+    assert compensated.snapshot is not None
+    assert "720 x 576" in repr(compensated.snapshot)
 
 
 def test_values_are_printed_in_their_display_units() -> None:

@@ -70,6 +70,10 @@ class Snapshot:
     features: Floats
     predicted_features: Floats
 
+    def __repr__(self) -> str:
+        height, width = self.image.shape[:2]
+        return f"<Snapshot: {width} x {height}, captured at {self.captured_at:.3f} s>"
+
 
 @dataclass(frozen=True, eq=False)
 class Recording:
