@@ -64,6 +64,7 @@ PURPOSE = {
     "argcomplete": "completion in the shell",
     "scipy": "fits of `analyze`; not in the loop",
     "matplotlib": "figures",
+    "polars": "tables of recorded positions; not in the loop",
     "rich": "tables and progress in a terminal",
     "mujoco": "physics of the twin; not in the loop",
     "opencv-python-headless": "images of the twin; PNG and JPEG of logs",

@@ -12,6 +12,7 @@ from refused import failed
 from tautscope.analysis.comparison import HORIZONS
 from tautscope.analysis.models.registry import MODELS
 from tautscope.cli import main
+from tautscope.config import load_config
 
 
 def write_record(file: Path) -> None:
@@ -176,3 +177,52 @@ def test_analyze_names_an_invalid_input(capsys: pytest.CaptureFixture[str], tmp_
     file.write_text("c,m\n" + "".join(f"{c},7\n" for c in range(9)))
     assert "measured: got '7 throughout the first half'" in failed(capsys, *arguments, "m", *out)
     assert [path.name for path in tmp_path.iterdir()] == ["log.csv"]
+
+
+def test_analyze_suggests_settings(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """The play of the record has offsets of -3 and 5 mm; the file names the unit."""
+    file, rig = tmp_path / "log.csv", tmp_path / "rig.toml"
+    write_record(file)
+    file.write_text(file.read_text().replace("t,motor,tip", "t,motor [mm],tip [mm]"))
+    settings = analyzed(capsys, file, tmp_path / "a")["settings"]
+    assert settings["unit"] == "m"
+    assert settings["dofs"] == ["insertion"]
+    assert settings["notes"] == []
+    columns = ["--command", "motor", "--measured", "tip"]
+    assert main(["analyze", str(file), *columns, "--out", str(tmp_path / "b")]) == 0
+    out, err = capsys.readouterr()
+    assert "fits: 100 %" in err
+    rig.write_text(out.split("To paste into a configuration:")[1])
+    insertion = load_config(rig).insertion
+    assert insertion.delta_minus == pytest.approx(-3e-3, abs=3e-4)
+    assert insertion.delta_plus == pytest.approx(5e-3, abs=3e-4)
+    assert insertion.start_deviation == pytest.approx(4e-3, rel=0.05)
+    assert insertion.update_distance == pytest.approx(0.3e-3, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("title", "gain", "dofs", "note"),
+    [
+        ("tip", 1.0, ["insertion", "rotation", "bending"], "the file does not name"),
+        ("tip_deg", 0.5, ["rotation", "bending"], "the tip moves 0.5 times as far as the motor"),
+    ],
+)
+def test_suggested_settings_say_what_to_check(
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    *,
+    title: str,
+    gain: float,
+    dofs: list[str],
+    note: str,
+) -> None:
+    file = tmp_path / "log.csv"
+    command = 15 * np.sin(np.arange(1000) / 50)
+    measured = gain * play(command, -3.0, 5.0)
+    lines = [f"{c:.5f},{m:.5f}\n" for c, m in zip(command, measured, strict=True)]
+    file.write_text(f"motor,{title}\n" + "".join(lines))
+    columns = ["--command", "motor", "--measured", "tip", "--out", str(tmp_path / "out")]
+    assert main(["analyze", str(file), *columns, "--json"]) == 0
+    settings = json.loads(capsys.readouterr().out)["settings"]
+    assert settings["dofs"] == dofs
+    assert any(note in each for each in settings["notes"])

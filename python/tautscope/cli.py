@@ -11,6 +11,7 @@ from contextlib import contextmanager
 
 from tautscope._core import __version__
 from tautscope.commands import (
+    align,
     analyze,
     arguments,
     bench,
@@ -29,7 +30,7 @@ INTERRUPTED, CLOSED_PIPE = 128 + 2, 128 + 13
 """Exit status after SIGINT and SIGPIPE, as of a shell."""
 _STATUS = """exit status:
   0    success
-  1    the result is negative: replay differs, doctor found something missing
+  1    the result is negative: replay differs, align has no answer, doctor found something missing
   2    bad input: options, files, configuration, a missing extra
   3    refused by the rig: bus, drive or camera; nothing moved
   4    stopped for safety: the motors are stopped, or motion of the loop is held
@@ -88,6 +89,7 @@ def _parser() -> argparse.ArgumentParser:
     config.add_parser(verbs)
     analyze.add_parser(verbs)
     log.add_parsers(verbs)
+    align.add_parser(verbs)
     hardware.add_parser(verbs)
     bench.add_parser(verbs)
     doctor.add_parser(verbs)

@@ -8,9 +8,9 @@ from importlib.util import find_spec
 from tautscope.errors import MissingExtraError
 
 MODULES = {
-    "analysis": ("matplotlib", "rich", "scipy"),
+    "analysis": ("matplotlib", "polars", "rich", "scipy"),
     "twin": ("cv2", "matplotlib", "mujoco", "rich"),
-    "hardware": ("av", "can", "canopen", "cv2", "matplotlib", "mcap", "rich"),
+    "hardware": ("av", "can", "canopen", "cv2", "matplotlib", "mcap", "polars", "rich"),
     "ethercat": ("pysoem",),
     "cluster": ("dask", "distributed"),
 }

@@ -8,6 +8,7 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
+from drawn import BACKLASH
 from recorded import record
 from rosbags.highlevel import AnyReader
 from tautscope.cli import main
@@ -159,6 +160,93 @@ def test_replay_of_a_video_and_motor_positions(
     )
 
 
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory, config: Config) -> tuple[Path, Recording]:
+    """The whole protocol, in which each motor turns six times."""
+    path = tmp_path_factory.mktemp("whole") / "run.mcap"
+    recording, _ = record(path, config, 36.0)
+    return path, recording
+
+
+def test_align_finds_the_delay_of_a_log(
+    capsys: Capture, whole: tuple[Path, Recording], recorded: Recorded
+) -> None:
+    """The drawn rig has no delay; the run of six seconds is too short for an answer."""
+    for words in (["align"], ["calibrate", "latency"]):
+        assert main([*words, str(whole[0]), "--json"]) == 0
+        found = json.loads(capsys.readouterr().out)
+        assert found["is_known"]
+        assert found["camera_delay"] == pytest.approx(0, abs=0.03)
+        assert found["drift"] == 0
+    assert main(["align", str(whole[0])]) == 0
+    out = capsys.readouterr().out
+    assert "To correct it, set camera.source.delay = " in out
+    assert "turning points:" in out
+    assert main(["align", str(recorded[0]), "--json"]) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert not found["is_known"]
+    assert found["delay"] is None
+    assert main(["align", str(recorded[0])]) == 1
+    assert "No answer: " in capsys.readouterr().out
+
+
+def test_a_late_video_is_aligned(
+    capsys: Capture, whole: tuple[Path, Recording], tmp_path: Path
+) -> None:
+    """The video begins 0.6 s after the motors, whose table is in mm and degrees."""
+    path, recording = whole
+    log = read_log(path)
+    events = [
+        (index, event)
+        for index, event in log.events.items()
+        if isinstance(event, Update) and float(event.row[0]) >= 0.6
+    ]
+    video, motors = tmp_path / "clip.mkv", tmp_path / "motors.csv"
+    with av.open(str(video), "w") as container:
+        stream = container.add_stream("mjpeg", rate=25)
+        stream.width, stream.height, stream.pix_fmt = 720, 576, "yuvj444p"
+        for number, (index, _) in enumerate(events):
+            frame = av.VideoFrame.from_ndarray(log.image(index), format="bgr24")
+            frame = frame.reformat(format="yuvj444p")
+            frame.pts = number
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))
+    positions = per_dof(recording.trace, "command") * [1e3, 180 / np.pi, 180 / np.pi]
+    titles = "time,insertion_mm,rotation_deg,bending_deg"
+    table = np.column_stack([recording.trace["time"], positions])
+    np.savetxt(motors, table, "%.9g", delimiter=",", header=titles, comments="")
+    config = tmp_path / "rig.toml"
+    config.write_text(dump_config(log.config), encoding="utf-8")
+    arguments = ["--video", str(video), "--motors", str(motors), "--config", str(config)]
+    out = ["--out", str(tmp_path / "found"), "--json"]
+    assert main(["replay", *arguments, *out]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["video_start"] == pytest.approx(0.6, abs=0.03)
+    width = found["dof"]["insertion"]["replayed"]["width"]
+    assert width == pytest.approx(BACKLASH[0], rel=0.1)
+    caplog_out = ["--out", str(tmp_path / "given"), "--video-start", "0"]
+    assert main(["replay", *arguments, *caplog_out]) == 0
+    captured = capsys.readouterr()
+    assert "warning: with --video-start 0 the images are 0.6" in captured.err
+    assert "leave it out" in captured.err
+
+
+def test_a_dof_without_motion_is_unknown(
+    capsys: Capture, recorded: Recorded, tmp_path: Path
+) -> None:
+    """In the first six seconds insertion moves alone for four."""
+    path, recording, _ = recorded
+    moved = np.ptp(per_dof(recording.trace, "command"), axis=0) > 0
+    out = ["--profile", "best", "--out", str(tmp_path / "found")]
+    assert main(["replay", str(path), *out, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["dof"]
+    assert not moved[2]
+    assert found["bending"]["replayed"]["width"] is None
+    assert found["insertion"]["replayed"]["width"] is not None
+    assert main(["replay", str(path), "--profile", "best", "--out", str(tmp_path / "b")]) == 0
+    assert "unknown" in capsys.readouterr().out
+
+
 def test_replay_rejects_unusable_input(capsys: Capture, recorded: Recorded, tmp_path: Path) -> None:
     path = str(recorded[0])
     assert "got 'neither'" in failed(capsys, "replay")
@@ -169,7 +257,9 @@ def test_replay_rejects_unusable_input(capsys: Capture, recorded: Recorded, tmp_
     table.write_text("time,insertion,rotation\n0,1,2\n")
     video = ["replay", "--video", str(table), "--motors", str(table)]
     assert "bending: got 'no such column'" in failed(capsys, *video)
-    table.write_text("time,insertion,rotation,bending\n0,1,2,3\n0,1,2,3\n")
+    table.write_text("time,insertion,rotation,bending\n0,0.01,2,3\n0,0.01,2,3\n")
     assert "line 3, column time: got 0.0, expected later than 0.0" in failed(capsys, *video)
-    table.write_text("time,insertion,rotation,bending\n0,1,2,3\n1,1,2,3\n")
+    table.write_text("time,insertion,rotation,bending\n0,20,2,3\n1,30,2,3\n")
+    assert "if the column is in mm, type --units insertion=mm" in failed(capsys, *video)
+    table.write_text("time,insertion,rotation,bending\n0,0.01,2,3\n1,0.01,2,3\n")
     assert "m.csv" in failed(capsys, *video)  # not a video

@@ -12,6 +12,7 @@ from tautscope.log.reader import Log, Update, read_log
 from tautscope.log.replay import estimate_from_log, estimate_from_video, replay_same
 from tautscope.log.writer import LogSummary
 from tautscope.loop.rig import Frame
+from tautscope.replay import read_motors
 from tautscope.runs.recording import Recording, per_dof
 
 Recorded = tuple[Path, Recording, LogSummary]
@@ -130,7 +131,7 @@ def test_estimates_from_video_and_motor_positions(recorded: Recorded, tmp_path: 
     ):
         lines.append(f"{bending!r},{time!r},{insertion!r},{rotation!r}".replace("np.float64", ""))
     table.write_text("\n".join(lines).replace("(", "").replace(")", "") + "\n")
-    replayed = estimate_from_video(frames, table, log.config)
+    replayed = estimate_from_video(frames, *read_motors(table), log.config)
     kept = slice(0, len(replayed.frames))
     np.testing.assert_allclose(
         per_dof(replayed.frames, "estimate"), per_dof(recording.frames, "estimate")[kept], atol=1e-9
@@ -149,7 +150,7 @@ def test_sparse_motor_positions_are_not_taken_for_a_held_reference(
     rows = np.column_stack([recording.trace["time"], held])
     table = tmp_path / "motors.csv"
     np.savetxt(table, rows, "%.17g", delimiter=",", header=names, comments="")
-    replayed = estimate_from_video(frames_of(log), table, log.config)
+    replayed = estimate_from_video(frames_of(log), *read_motors(table), log.config)
     predicted = per_dof(replayed.frames, "predicted")
     error = np.abs(predicted - per_dof(recording.frames, "predicted")[: len(predicted)])
     assert (error.max(axis=0) <= 1.5 * np.abs(held - commands).max(axis=0) + 1e-9).all()

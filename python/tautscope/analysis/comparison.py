@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -117,6 +118,8 @@ def analyze(
     update_distance: float | None = None,
     gain: float | None = None,
     models: tuple[Model, ...] = MODELS,
+    *,
+    progress: Callable[[float], None] | None = None,
 ) -> Analysis:
     """Fit every model to a record, and compute its errors over the second half.
 
@@ -131,6 +134,7 @@ def analyze(
         gain: Tip travel per command travel in contact, 1 if their units are equal; by default
             estimated from the first half.
         models: The models to compare.
+        progress: Called with the share of the fits that are done.
 
     Raises:
         RecordError: Command or tip does not move in the first half.
@@ -148,14 +152,22 @@ def analyze(
 
     masked = [seen_at(task, share) for share in HORIZONS]
 
+    done, total = 0, len(models) * (1 + len(masked))
+
+    def count_fit() -> None:
+        nonlocal done
+        done += 1
+        if progress is not None:
+            progress(done / total)
+
     def entry(model: Model) -> Entry:
         prediction = model.run(task)
-        return Entry(
-            model,
-            prediction,
-            _rmse(prediction.tip, task, scored),
-            tuple(_horizon_error(model, seen, task, scored) for seen in masked),
-        )
+        count_fit()
+        errors = []
+        for seen in masked:
+            errors.append(_horizon_error(model, seen, task, scored))
+            count_fit()
+        return Entry(model, prediction, _rmse(prediction.tip, task, scored), tuple(errors))
 
     counts = tuple(int(np.isfinite(seen.measured).sum()) for seen in masked)
     return Analysis(record, half, tuple(entry(model) for model in models), counts)

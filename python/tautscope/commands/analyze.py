@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,14 +21,17 @@ def add_parser(verbs: arguments.Verbs) -> None:
         verbs,
         "analyze",
         help="compare models of hysteresis on a recorded file",
-        description="Compare models of hysteresis on a CSV file with the positions of an actuator "
-        "and its tip, each in any unit. Prints the RMS error of the predicted tip over the second "
+        description="Compare models of hysteresis on a CSV or Parquet file with the positions of "
+        "an actuator and its tip, each in any unit. Delimiter, decimal comma, comments and a line "
+        "of units are recognised. Prints the RMS error of the predicted tip over the second "
         "half: with every measured tip, and with the tip seen only after each 1, 3 and 10 % of the "
         "command's range. On-line models predict each sample before they use it. Lines without a "
         "command are removed, with --time duplicate lines too; the counts are printed.",
         extras=["analysis"],
     )
-    analyze.add_argument("file", type=Path, metavar="FILE.csv", help="CSV with a header line")
+    analyze.add_argument(
+        "file", metavar="FILE", help="CSV with a header line, or Parquet; - reads standard input"
+    )
     analyze.add_argument(
         "--command", required=True, metavar="COL", help="column of the actuator position"
     )
@@ -35,7 +39,9 @@ def add_parser(verbs: arguments.Verbs) -> None:
         "--measured", required=True, metavar="COL", help="column of the tip position"
     )
     analyze.add_argument(
-        "--time", metavar="COL", help="column of the time, for cleaning and figures"
+        "--time",
+        metavar="COL",
+        help="column of the time, in s or ISO 8601, for cleaning and figures",
     )
     analyze.add_argument(
         "--update-distance",
@@ -59,18 +65,25 @@ def add_parser(verbs: arguments.Verbs) -> None:
 def _run(options: argparse.Namespace) -> None:
     from tautscope.analysis.comparison import analyze  # noqa: PLC0415
     from tautscope.analysis.output import write_analysis  # noqa: PLC0415
+    from tautscope.analysis.suggestion import suggest_settings  # noqa: PLC0415
+    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
     from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
     from tautscope.runs.records import read_record  # noqa: PLC0415
 
     config = load_config(options.config)
     folder = check_free(options.out or default_folder("analyze"))
     record = read_record(options.file, options.command, options.measured, options.time)
-    analysis = analyze(record, config, options.update_distance, options.gain)
+    with progress_bar("fits") as progress:
+        analysis = analyze(record, config, options.update_distance, options.gain, progress=progress)
     write_analysis(analysis, folder)
+    settings = suggest_settings(analysis)
     if options.json:
-        print_json({"folder": str(folder), **analysis.to_json()})
-    else:
-        _print(analysis, folder)
+        suggested = None if settings is None else asdict(settings)
+        print_json({"folder": str(folder), **analysis.to_json(), "settings": suggested})
+        return
+    _print(analysis, folder)
+    if settings is not None:
+        print(f"\nTo paste into a configuration:\n\n{settings.to_toml()}")
 
 
 def _print(analysis: Analysis, folder: Path) -> None:

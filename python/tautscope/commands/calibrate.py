@@ -8,6 +8,7 @@ from tautscope.commands import (
     calibrate_camera,
     calibrate_colour,
     calibrate_geometry,
+    calibrate_latency,
 )
 
 
@@ -24,3 +25,4 @@ def add_parser(verbs: arguments.Verbs) -> None:
     calibrate_camera.add_parser(kinds)
     calibrate_colour.add_parser(kinds)
     calibrate_geometry.add_parser(kinds)
+    calibrate_latency.add_parser(kinds)

@@ -59,10 +59,12 @@ def _run(options: argparse.Namespace) -> int:
         options.seed = config.twin.seed if options.seed is None else options.seed
     else:
         refuse_wrong_limits(options.config)
-    folder = check_free(options.out or default_folder("calibrate"))
+    folder = options.out or default_folder("calibrate")
     seed = options.seed if options.twin else None
     session = CalibrationSession.open(Path(options.config), folder, seed, restart=options.restart)
-    if session.state.done:
+    if not session.state.done:
+        check_free(session.folder)
+    else:
         _say(f"Resumed; done: {', '.join(session.state.done)}. Folder: {session.folder}")
     for number, step in enumerate(STEPS, 1):
         if step.name in session.state.done:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from rich.table import Table
@@ -17,9 +19,22 @@ from tautscope.runs.recording import Recording
 
 
 def write_estimates(
-    folder: Path, replayed: Recording, recorded: Recording | None, *, as_json: bool
+    folder: Path,
+    replayed: Recording,
+    recorded: Recording | None,
+    *,
+    as_json: bool,
+    facts: Mapping[str, Any] = MappingProxyType({}),
 ) -> None:
-    """Write the folder of a replay, and print its estimates beside the recorded ones."""
+    """Write the folder of a replay, and print its estimates beside the recorded ones.
+
+    Args:
+        folder: The new folder.
+        replayed: The estimates.
+        recorded: Those of the run, if there was one.
+        as_json: Whether to print JSON.
+        facts: Further entries of the JSON object.
+    """
     write_replay(folder, replayed, recorded)
     after = estimation_quality(replayed, recorded)
     before = None if recorded is None else estimation_quality(recorded)
@@ -27,6 +42,7 @@ def write_estimates(
         document: dict[str, Any] = {
             "folder": str(folder),
             "images": len(replayed.frames),
+            **facts,
             "dof": {},
         }
         for dof, figures in after.items():
@@ -70,7 +86,7 @@ def _print_table(
 
 def _cell(value: float, name: str, scale: float) -> str:
     if math.isnan(value):
-        return ""
+        return "unknown" if name == "width" else ""
     return f"{100 * value:.0f} %" if name == "seen" else f"{scale * value:.3g}"
 
 

@@ -3,18 +3,29 @@
 from __future__ import annotations
 
 import argparse
+import logging
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
 from tautscope.commands.printing import print_json
+from tautscope.commands.video_options import (
+    add_video_options,
+    align_video_options,
+    check_video_options,
+    read_motor_options,
+)
 from tautscope.config import Config, load_config
 from tautscope.errors import USAGE, CameraError, FieldError
 
 if TYPE_CHECKING:
     from tautscope.log.mcap_records import Damage
     from tautscope.log.reader import Log
+
+_LOG = logging.getLogger(__name__)
+TOLERANCE = 0.1
+"""Error of a given ``--video-start`` above which a warning is printed [s]."""
 
 
 def add_parsers(verbs: arguments.Verbs) -> None:
@@ -62,19 +73,12 @@ def add_parsers(verbs: arguments.Verbs) -> None:
         help="replay a log, or a video with motor positions",
         description="Replay the inputs of a log through the loop. With the log's configuration the "
         "outputs must be identical, bit for bit (exit status 1 if not). With another "
-        "configuration, or from a video and a CSV of motor positions with columns time [s], "
-        "insertion [m], rotation and bending [rad], estimate states and offsets only.",
+        "configuration, or from a video and a table of motor positions, estimate states and "
+        "offsets only. The delay of the video is estimated from the record.",
         extras=["hardware"],
     )
-    replay.add_argument("file", type=Path, nargs="?", metavar="FILE.mcap")
-    replay.add_argument("--video", metavar="FILE", help="video instead of a log; needs --motors")
-    replay.add_argument("--motors", type=Path, metavar="FILE.csv", help="motor positions")
-    replay.add_argument(
-        "--video-start",
-        type=arguments.seconds,
-        default=0.0,
-        metavar="S",
-        help="time of the video's first frame in the CSV's [s] [%(default)s]",
+    add_video_options(
+        replay, "time of the video's first frame in the motors' [s] [estimated, see `align`]"
     )
     arguments.add_config(replay)
     arguments.add_profile(replay, "how the backlash is estimated")
@@ -140,11 +144,7 @@ def _print_damage(file: Path, damage: Damage) -> None:
 
 
 def _replay(options: argparse.Namespace) -> int:
-    if (options.file is None) == (options.video is None):
-        given = "neither" if options.file is None else "both"
-        raise FieldError("replay", given, "a log, or --video with --motors")
-    if (options.video is None) != (options.motors is None):
-        raise FieldError("--motors", options.motors, "a CSV file together with --video")
+    check_video_options(options)
     if options.video is not None:
         return _estimate_from_video(options)
     from tautscope.log.reader import read_log  # noqa: PLC0415
@@ -205,23 +205,54 @@ def _estimate_from_log(options: argparse.Namespace, log: Log) -> int:
 
 def _estimate_from_video(options: argparse.Namespace) -> int:
     from tautscope.commands.estimate_report import write_estimates  # noqa: PLC0415
+    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
     from tautscope.hardware.video import read_video  # noqa: PLC0415
-    from tautscope.log.replay import estimate_from_video  # noqa: PLC0415
+    from tautscope.log.alignment import implausible_motors  # noqa: PLC0415
+    from tautscope.log.replay import estimate_from_video, retimed  # noqa: PLC0415
 
     config: Config = load_config(options.config, options.profile)
     folder = _folder(options)
-    frames = read_video(options.video, config.camera, options.video_start)
+    motors = read_motor_options(options, config)
     try:
-        replayed = estimate_from_video(frames, options.motors, config)
+        found, stamps = align_video_options(options, config, motors)
+        for note in implausible_motors(found):
+            _LOG.warning("%s", note)
+        start = float(stamps[0]) - (found.delay if found.is_known else 0.0)
+        frames = read_video(options.video, config.camera, float(stamps[0]))
+        if options.video_start is None:
+            if not found.is_known:
+                allowed = (
+                    "the time of the video's first frame in the motors' [s], because it could not "
+                    f"be estimated ({found.reason}). If both began together, type --video-start "
+                    f"{stamps[0]:g}"
+                )
+                raise FieldError("--video-start", None, allowed)
+            frames = retimed(frames, found)
+        elif not found.is_known:
+            _LOG.warning("--video-start was not checked: %s", found.reason)
+        elif abs(found.delay) > max(TOLERANCE, 3 * found.delay_std):
+            _LOG.warning(
+                "with --video-start %g the images are %.2f s %s, which is estimated as slack; "
+                "type --video-start %.3f, or leave it out",
+                options.video_start,
+                abs(found.delay),
+                "late" if found.delay > 0 else "early",
+                start,
+            )
+        with progress_bar("estimation") as progress:
+            replayed = estimate_from_video(frames, *motors, config, progress)
     except CameraError as error:  # of a file, not of a rig
         error.exit_status = USAGE
         raise
-    write_estimates(folder, replayed, None, as_json=options.json)
+    used = start if options.video_start is None else options.video_start
+    facts = {"video_start": used, "delay": found.to_json()}
+    write_estimates(folder, replayed, None, as_json=options.json, facts=facts)
     if not options.json:
-        images, motors = replayed.frames["captured_at"], replayed.trace["time"]
+        images, times = replayed.frames["captured_at"], replayed.trace["time"]
+        how = "estimated" if options.video_start is None else "given"
         print(
-            f"Images cover {images[0]:.2f} to {images[-1]:.2f} s of the motor positions' "
-            f"{motors[0]:.2f} to {motors[-1]:.2f} s; if this is wrong, set --video-start."
+            f"The video begins at {used:.3f} s of the motor positions ({how}); images cover "
+            f"{images[0]:.2f} to {images[-1]:.2f} s of their {times[0]:.2f} to {times[-1]:.2f} s."
         )
     return 0
 

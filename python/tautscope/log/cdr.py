@@ -102,9 +102,9 @@ def encode(kind: str, message: Message) -> bytes:
         kind: A type of `DEFINITIONS`.
         message: Field -> number, text, bytes (for ``uint8[]``), sequence or message.
     """
-    out = bytearray()
+    out = bytearray(_HEADER)
     _write_message(out, kind, message)
-    return _HEADER + bytes(out)
+    return bytes(out)
 
 
 def _write_message(out: bytearray, kind: str, message: Message) -> None:
@@ -124,7 +124,7 @@ def _write_message(out: bytearray, kind: str, message: Message) -> None:
 def _write(out: bytearray, base: str, values: Sequence[Any]) -> None:
     code = _CODES.get(base)
     if code is not None:
-        out += bytes(-len(out) % struct.calcsize(code))
+        out += bytes((len(_HEADER) - len(out)) % struct.calcsize(code))
         out += struct.pack(f"<{len(values)}{code}", *values)
         return
     for value in values:

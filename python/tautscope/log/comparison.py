@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NAN = float("nan")
+LEAST_SEEN = 10
+"""Images in which a DOF was observable, below which its backlash is unknown."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +27,8 @@ class EstimationQuality:
     """Quality of the estimates of one DOF in a run [m or rad]; NaN where unknown.
 
     Attributes:
-        width: Backlash width at the end, delta_plus - delta_minus.
+        width: Backlash width at the end, delta_plus - delta_minus; NaN if the motor travelled less
+            than `update_distance`, or fewer than `LEAST_SEEN` images showed the DOF.
         seen: Share of the images in which the DOF was observable.
         state_rms: RMS error of the estimate over these images, if the true state is known.
         change_rms: RMS difference from the estimate of the other run, over the images in which the
@@ -61,8 +64,13 @@ def _quality(run: Recording, other: Recording | None, dof: Dof) -> EstimationQua
             for table, rows in ((frames, mine), (other.frames, theirs))
         ]
         change = values[0] - values[1]
+    is_known = (
+        len(run.trace) > 0
+        and float(np.ptp(run.trace[f"command_{name}"])) >= run.config[dof].update_distance
+        and np.count_nonzero(seen) >= LEAST_SEEN
+    )
     return EstimationQuality(
-        width=float(_width(run.trace[-1:], name)[0]) if len(run.trace) else NAN,
+        width=float(_width(run.trace[-1:], name)[0]) if is_known else NAN,
         seen=float(np.mean(seen)) if len(seen) else NAN,
         state_rms=metrics.rms(error) if len(error) else NAN,
         change_rms=metrics.rms(change) if len(change) else NAN,

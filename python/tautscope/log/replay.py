@@ -7,13 +7,13 @@ recorded commands and images. They cannot tell how the instrument would have mov
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
-from os import PathLike
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tautscope.calibration.delay import DelayEstimate
 from tautscope.config import Config
 from tautscope.errors import RecordError
 from tautscope.log import messages as msg
@@ -23,7 +23,6 @@ from tautscope.loop.reduction import HysteresisReduction
 from tautscope.loop.rig import Frame, Sample
 from tautscope.loop.safety import DETECTORS
 from tautscope.runs.recording import FEATURES, FRAME_COLUMNS, Recording
-from tautscope.runs.records import read_motors
 from tautscope.runs.run_recorder import RunRecorder, frame_row
 
 Floats = NDArray[np.float64]
@@ -157,25 +156,38 @@ def estimate_from_log(log: Log, config: Config) -> tuple[Recording, int]:
 
 
 def estimate_from_video(
-    frames: Iterable[Frame], motors: str | PathLike[str], config: Config
+    frames: Iterable[Frame],
+    times: Floats,
+    positions: Floats,
+    config: Config,
+    progress: Callable[[float], None] | None = None,
 ) -> Recording:
-    """Estimate states and offsets from a video and a table of motor positions.
+    """Estimate states and offsets from a video and motor positions.
 
     Args:
-        frames: Frames in order, captured on the clock of the table.
-        motors: CSV file, see `tautscope.runs.replay.read_motors`.
+        frames: Frames in order, captured on the clock of the motors.
+        times: (n,) of the motor positions [s], increasing.
+        positions: (n, 3) motor positions [m, rad, rad], `tautscope.replay.read_motors`.
         config: Configuration of instrument, camera and loop.
+        progress: Called with the share of the motors' time that is done.
 
     Raises:
-        MissingPathError, RecordError: As `read_motors`; or no frame is within the table's time.
+        RecordError: No frame is within the time of the motor positions.
         FrameError: The video is not from the configured camera.
     """
-    times, positions = read_motors(motors)
-    run = _estimate(_video_inputs(frames, times, positions), config, False)
+    run = _estimate(_video_inputs(frames, times, positions, progress), config, False)
     if not len(run.frames):
-        span = f"frames between {times[0]:g} and {times[-1]:g} s, the time of {motors}"
+        span = f"frames between {times[0]:g} and {times[-1]:g} s, the time of the motor positions"
         raise RecordError("video", "no frame in that time", span)
     return run
+
+
+def retimed(frames: Iterable[Frame], delay: DelayEstimate) -> Iterator[Frame]:
+    """Frames with their capture times on the clock of the motors."""
+    first: float | None = None
+    for frame in frames:
+        first = frame.captured_at if first is None else first
+        yield replace(frame, captured_at=float(delay.motor_time(frame.captured_at, first)))
 
 
 def _log_inputs(log: Log) -> Inputs:
@@ -187,7 +199,12 @@ def _log_inputs(log: Log) -> Inputs:
             yield _frame(log, index, event)
 
 
-def _video_inputs(frames: Iterable[Frame], times: Floats, positions: Floats) -> Inputs:
+def _video_inputs(
+    frames: Iterable[Frame],
+    times: Floats,
+    positions: Floats,
+    progress: Callable[[float], None] | None,
+) -> Inputs:
     ticks = [
         Tick(Sample(float(time), position), position, position, None, {})
         for time, position in zip(times, positions, strict=True)
@@ -201,6 +218,8 @@ def _video_inputs(frames: Iterable[Frame], times: Floats, positions: Floats) -> 
             return  # the motor positions after the end of the table are unknown
         if at:
             yield frame.captured_at, frame
+        if progress is not None:
+            progress(at / len(ticks))
     yield from ticks[at:]
 
 

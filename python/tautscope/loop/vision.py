@@ -167,7 +167,7 @@ class MarkerDetector:
     def __init__(self, config: Config) -> None:
         self._layout = FrameLayout(config.camera)
         self._model = build_feature_model(config)
-        self._starts = _starts(config)
+        self._starts = workspace_starts(config)
         self._start_deviation = np.array([config[dof].start_deviation for dof in Dof])
         self._core = _core.MarkerDetector(
             self._model,
@@ -262,7 +262,7 @@ class MarkerDetector:
         return self._core.mask(self._layout.checked(image))
 
 
-def _starts(config: Config) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def workspace_starts(config: Config) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """States that cover the workspace of the experiment, and standard deviations in between."""
     sines = [config.experiment[dof] for dof in Dof]
     grid = itertools.product(

@@ -1,20 +1,19 @@
-"""Records of actuator and tip positions: reading of CSV files, and cleaning."""
+"""Records of actuator and tip positions: reading of tables, and cleaning."""
 
 from __future__ import annotations
 
-import csv
-import math
 from bisect import bisect_left
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from os import PathLike
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.dof import Dof
-from tautscope.errors import MissingPathError, RecordError
+from tautscope.errors import RecordError
+from tautscope.runs.tables import read_table
+from tautscope.runs.units import TIMES, units_of
 
 Floats = NDArray[np.float64]
 
@@ -56,6 +55,7 @@ class Record:
         time: (n,) [s], never decreasing, if a column was named; no model uses it.
         rows: (n,) line of the file of each sample.
         cleaning: What the cleaning did.
+        units: Units of command and measured, as the file names them; empty where it does not.
     """
 
     command: Floats
@@ -63,83 +63,98 @@ class Record:
     time: Floats | None
     rows: NDArray[np.int64]
     cleaning: Cleaning
+    units: tuple[str, str] = ("", "")
 
 
 def read_record(
     path: str | PathLike[str], command: str, measured: str, time: str | None = None
 ) -> Record:
-    """Read columns of a CSV file with a header line, and clean them.
+    """Read columns of a CSV or Parquet file, and clean them.
 
     A blank or NaN cell is a missing value. A line without a command is removed; one without a tip
     is kept, because the play moves with its command. Any other text is an error. With a time
     column, duplicates are removed and lines sorted, see `Cleaning`; without one the order of the
     file is kept.
 
+    Args:
+        path: The file, see `tautscope.runs.tables.read_table`; ``-`` is standard input.
+        command: Column of the actuator position.
+        measured: Column of the tip position.
+        time: Column of the time, in s or the unit of its title, or ISO 8601.
+
     Raises:
+        MissingExtraError: Polars is not installed.
         MissingPathError: The file does not exist.
         RecordError: A column is missing, a cell is not a number, or fewer than two samples have a
             tip; the error names file, line and column.
     """
-    file = Path(path)
     names = [command, measured] + ([] if time is None else [time])
-    samples: list[list[float]] = []
-    rows: list[int] = []
-    blank = 0
-    for number, values in _lines(file, names):
-        if any(math.isnan(value) for value in values[:1] + values[2:]):
-            blank += 1
-            continue
-        samples.append(values)
-        rows.append(number)
-    table = np.array(samples).reshape(-1, len(names))
+    found = read_table(path, names)
+    table = np.stack([found.columns[name] for name in names], axis=1)
+    if time is not None:
+        table[:, 2] *= TIMES.get(found.units.get(time, "s"), 1.0)
+    is_blank = np.isnan(np.delete(table, 1, axis=1)).any(axis=1)
+    table, rows = table[~is_blank], found.rows[~is_blank]
     count = int(np.count_nonzero(np.isfinite(table[:, 1])))
     if count < 2:
-        raise RecordError(str(file), f"{count} samples", "at least 2")
-    return _clean(table, np.array(rows, dtype=np.int64), blank)
+        raise RecordError(str(path), f"{count} samples", "at least 2")
+    units = found.units.get(command, ""), found.units.get(measured, "")
+    return replace(_clean(table, rows, int(np.count_nonzero(is_blank))), units=units)
 
 
-def read_motors(path: str | PathLike[str]) -> tuple[Floats, Floats]:
-    """Read motor positions: a CSV file with columns time, insertion, rotation and bending.
+def read_motors(
+    path: str | PathLike[str], units: Mapping[str, str] | None = None, largest: Floats | None = None
+) -> tuple[Floats, Floats]:
+    """Read motor positions: a CSV or Parquet file with time, insertion, rotation and bending.
+
+    The unit of a column is the given one, else that of its title (``insertion [mm]``,
+    ``bending_deg``) or of a line of units, else s, m, rad, rad.
+
+    Args:
+        path: The file, see `tautscope.runs.tables.read_table`; ``-`` is standard input.
+        units: Column -> unit, `tautscope.runs.units.parse_units`.
+        largest: (3,) [m, rad, rad] magnitude above which positions whose unit nobody named are
+            implausible.
 
     Returns:
         Time (n,) [s], increasing, and positions (n, 3) [m, rad, rad]. Lines with a blank cell are
         skipped.
 
     Raises:
+        MissingExtraError: Polars is not installed.
         MissingPathError: The file does not exist.
-        RecordError: A column is missing, a cell is not a number, the time does not increase, or no
-            line is complete; the error names file, line and column.
+        RecordError: A column is missing, a cell is not a number, the time does not increase, a
+            unit is implausible, or no line is complete; the error names file, line and column.
     """
-    file = Path(path)
-    table: list[list[float]] = []
-    for number, values in _lines(file, ["time", *(dof.label for dof in Dof)]):
-        if any(math.isnan(value) for value in values):
-            continue
-        if table and values[0] <= table[-1][0]:
+    names = ["time", *(dof.label for dof in Dof)]
+    found = read_table(path, names, "motor positions")
+    named = found.units | dict(units or {})
+    table = np.stack([found.columns[name] for name in names], axis=1)
+    is_complete = ~np.isnan(table).any(axis=1)
+    table, rows = table[is_complete], found.rows[is_complete]
+    if not len(table):
+        raise RecordError(str(path), "no line with all columns", "at least one")
+    for column, (name, known) in enumerate(zip(names, (TIMES, *map(units_of, Dof)), strict=True)):
+        if name in named and named[name] not in known:
+            allowed = f"one of {', '.join(known)}; type --units {name}=UNIT"
+            raise RecordError(f"{path}, column {name}", f"unit {named[name]}", allowed)
+        table[:, column] *= known[named[name]] if name in named else 1.0
+    for dof in Dof:
+        size = float(np.abs(table[:, 1 + dof]).max())
+        if largest is not None and dof.label not in named and size > largest[dof]:
+            likely, unit = ("mm", "m") if dof is Dof.INSERTION else ("deg", "rad")
             raise RecordError(
-                f"{file}, line {number}, column time", values[0], f"later than {table[-1][0]}"
+                f"{path}, column {dof.label}",
+                f"{size:.4g} {unit}",
+                f"at most {largest[dof]:.3g} {unit}; if the column is in {likely}, type "
+                f"--units {dof.label}={likely}, or write its title as {dof.label}_{likely}",
             )
-        table.append(values)
-    if not table:
-        raise RecordError(str(file), "no line with all columns", "at least one")
-    array = np.array(table)
-    return array[:, 0], array[:, 1:]
-
-
-def _lines(file: Path, names: Sequence[str]) -> Iterator[tuple[int, list[float]]]:
-    """Number and cells of each line, NaN where blank, of a CSV file with a header line."""
-    try:
-        with file.open(newline="", encoding="utf-8-sig") as stream:
-            reader = csv.reader(stream)
-            header = [name.strip() for name in next(reader, [])]
-            columns = [_column(file, header, name) for name in names]
-            for line in reader:
-                if line:
-                    yield reader.line_num, _numbers(file, reader.line_num, line, columns, names)
-    except (FileNotFoundError, IsADirectoryError):
-        raise MissingPathError("record", str(file), "a CSV file with a header line") from None
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise RecordError(str(file), str(error), "a CSV file with a header line") from None
+    backward = np.flatnonzero(np.diff(table[:, 0]) <= 0)
+    if len(backward):
+        line = rows[backward[0] + 1]
+        before, after = (float(value) for value in table[backward[0] : backward[0] + 2, 0])
+        raise RecordError(f"{path}, line {line}, column time", after, f"later than {before}")
+    return table[:, 0], table[:, 1:]
 
 
 def _clean(table: Floats, rows: NDArray[np.int64], blank: int) -> Record:
@@ -147,8 +162,11 @@ def _clean(table: Floats, rows: NDArray[np.int64], blank: int) -> Record:
     if table.shape[1] == 2:
         unseen = int(np.count_nonzero(np.isnan(table[:, 1])))
         return Record(table[:, 0], table[:, 1], None, rows, Cleaning(blank=blank, unseen=unseen))
-    comparable = np.where(np.isnan(table), np.inf, table)  # NaN does not equal itself
-    kept = np.sort(np.unique(comparable, axis=0, return_index=True)[1])
+    if np.all(np.diff(table[:, 2]) > 0):
+        kept = np.arange(len(table))
+    else:
+        comparable = np.where(np.isnan(table), np.inf, table)  # NaN does not equal itself
+        kept = np.sort(np.unique(comparable, axis=0, return_index=True)[1])
     duplicates = len(table) - len(kept)
     order, time, reordered, clock_steps = _sort(table[kept, 2], table[kept, 0])
     rows, table = rows[kept][order], table[kept][order]
@@ -206,30 +224,3 @@ def _count_moved(by_time: NDArray[np.intp]) -> int:
         at = bisect_left(tails, index)
         tails[at : at + 1] = [index]
     return len(by_time) - len(tails)
-
-
-def _column(file: Path, header: Sequence[str], name: str) -> int:
-    matches = [index for index, title in enumerate(header) if title == name.strip()]
-    if len(matches) != 1:
-        what = "no such column" if not matches else f"{len(matches)} columns of this name"
-        known = f"the header has {', '.join(header)}" if header else "there is no header"
-        raise RecordError(f"{file}: {name}", what, f"one; {known}")
-    return matches[0]
-
-
-def _numbers(
-    file: Path, number: int, line: Sequence[str], columns: Sequence[int], names: Sequence[str]
-) -> list[float]:
-    """The named cells of a line as numbers, NaN where blank."""
-    values = []
-    for column, name in zip(columns, names, strict=True):
-        text = line[column].strip() if column < len(line) else ""
-        try:
-            value = float(text) if text else math.nan
-        except ValueError:
-            value = math.inf
-        if math.isinf(value):
-            where = f"{file}, line {number}, column {name}"
-            raise RecordError(where, text, "a finite number, or blank or NaN for none")
-        values.append(value)
-    return values

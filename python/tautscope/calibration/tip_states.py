@@ -1,0 +1,55 @@
+"""The tip's state from the bands of one image, without motors and without earlier images."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tautscope.config import Config
+from tautscope.dof import Dof
+from tautscope.loop.construction import build_feature_model
+from tautscope.loop.vision import workspace_starts
+
+Floats = NDArray[np.float64]
+
+_PIXELS = np.full(4, 0.5)  # standard deviation of a feature for the fit [px]
+_BROAD = 3.0  # standard deviation of the start, in distances of the starts
+
+
+def tip_states(features: ArrayLike, config: Config) -> Floats:
+    """States whose features, Eq. (9), are nearest to measured ones, image by image.
+
+    Args:
+        features: (n, 4) u and v of bands A and B [px]; NaN where they were not found.
+        config: Instrument, camera, and workspace of the experiment, from which the search starts.
+
+    Returns:
+        (n, 3) [m, rad, rad]; NaN for images without both bands, and for a DOF whose standard
+        deviation for 1 px of noise exceeds its `observable_deviation`: the rotation of a straight
+        instrument.
+    """
+    model = build_feature_model(config)
+    starts, spread = workspace_starts(config)
+    spread = _BROAD * spread
+    limits = np.array([config[dof].observable_deviation for dof in Dof])
+    values = np.asarray(features, dtype=np.float64)
+    states = np.full((len(values), 3), np.nan)
+    for row, measured in zip(states, values, strict=True):
+        if not np.isfinite(measured).all():
+            continue
+        fits = [
+            fit
+            for start in starts
+            if (fit := model.nearest_state(start, spread, measured, _PIXELS)) is not None
+        ]
+        if not fits:
+            continue
+        state, _ = min(fits, key=lambda fit: fit[1])
+        predicted = model.predict(state)
+        if predicted is None:
+            continue
+        _, jacobian = predicted
+        information = jacobian.T @ jacobian + np.diag(spread**-2)
+        std = np.sqrt(np.diag(np.linalg.inv(information)))
+        row[:] = np.where(std <= limits, state, np.nan)
+    return states

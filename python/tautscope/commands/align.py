@@ -1,0 +1,108 @@
+"""The command ``tautscope align``: delay between motors and images of a record."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+from tautscope.commands import arguments
+from tautscope.commands.printing import print_json
+from tautscope.commands.video_options import (
+    add_video_options,
+    align_video_options,
+    check_video_options,
+    read_motor_options,
+)
+from tautscope.config import load_config
+from tautscope.errors import USAGE, CameraError
+
+if TYPE_CHECKING:
+    from tautscope.calibration.delay import DelayEstimate, Probe
+
+NO_ANSWER = 1
+
+
+def add_parser(verbs: arguments.Verbs) -> None:
+    """Add the command to the parser."""
+    align = arguments.add_verb(
+        verbs,
+        "align",
+        help="delay between motors and images of a log, or of a video with motor positions",
+        description="Estimate the delay of the images behind the motors, and the drift of their "
+        "clocks, from a log or from a video with motor positions. Two probes must agree; without "
+        "an answer the exit status is 1. The motors must have stopped or turned several times.",
+        extras=["hardware"],
+    )
+    add_video_options(align, "about the time of the video's first frame in the motors' [s]")
+    align.add_argument(
+        "--within",
+        type=arguments.above_zero,
+        default=5.0,
+        metavar="S",
+        help="largest delay that is searched [s] [%(default)s]",
+    )
+    arguments.add_config(align)
+    arguments.add_json(align)
+    align.set_defaults(run=_run)
+
+
+def _run(options: argparse.Namespace) -> int:
+    from tautscope.log.alignment import align_log, implausible_motors  # noqa: PLC0415
+    from tautscope.log.reader import read_log  # noqa: PLC0415
+
+    check_video_options(options)
+    document: dict[str, Any] = {}
+    if options.video is None:
+        log = read_log(options.file)
+        found = align_log(log, options.within)
+        camera_delay = log.config.camera.source.delay + found.delay
+        document["camera_delay"] = camera_delay if found.is_known else None
+        remedy = f"To correct it, set camera.source.delay = {camera_delay:.3f}"
+    else:
+        config = load_config(options.config)
+        motors = read_motor_options(options, config)
+        try:
+            found, stamps = align_video_options(options, config, motors, limit=options.within)
+        except CameraError as error:  # of a file, not of a rig
+            error.exit_status = USAGE
+            raise
+        start = float(stamps[0]) - found.delay
+        document["video_start"] = start if found.is_known else None
+        remedy = f"The first image shows the motors at {start:.3f} s: --video-start {start:.3f}"
+    notes = list(implausible_motors(found))
+    if options.json:
+        print_json({**found.to_json(), **document, "notes": notes})
+    else:
+        print_delay(found)
+        if found.is_known:
+            print(f"{remedy}.")
+        for note in notes:
+            print(f"Warning: {note}.")
+    return 0 if found.is_known else NO_ANSWER
+
+
+def print_delay(found: DelayEstimate) -> None:
+    """Print the estimate and its probes, or why there is none."""
+    if found.is_known:
+        early = "late" if found.delay >= 0 else "early"
+        print(f"Images are {abs(found.delay):.3f} s {early} (std {found.delay_std:.3f} s).")
+        if found.drift:
+            print(
+                f"Their clock drifts by {1e6 * found.drift:.0f} ppm "
+                f"(std {1e6 * found.drift_std:.0f} ppm); the delay is that of the first image."
+            )
+        else:
+            print(f"No drift of the clocks was found (std {1e6 * found.drift_std:.0f} ppm).")
+    else:
+        print(f"No answer: {found.reason}.")
+    for name, probe in (("model", found.model), ("turning points", found.turning_points)):
+        if probe is not None:
+            print(_probe_line(name, probe))
+
+
+def _probe_line(name: str, probe: Probe) -> str:
+    return (
+        f"  {name}: {probe.middle:.3f} s in the middle of the record (std {probe.delay_std:.3f} s),"
+        f" drift {1e6 * probe.drift:.0f} ppm (std {1e6 * probe.drift_std:.0f} ppm),"
+        f" from {probe.parts} parts"
+    )

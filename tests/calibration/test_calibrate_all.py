@@ -1,0 +1,141 @@
+"""The command `tautscope calibrate all`: sequence, resumption, report."""
+
+from __future__ import annotations
+
+import argparse
+import io
+import json
+from pathlib import Path
+
+import pytest
+from matplotlib.figure import Figure
+from tautscope.calibration.result import CalibrationResult
+from tautscope.cli import main
+from tautscope.commands import calibration_steps
+from tautscope.commands.calibration_steps import Step
+from tautscope.config import Config, load_config
+from tautscope.config.load import config_file
+from tautscope.errors import CalibrationError
+from tautscope.twin.drawn_rig import draw_rig
+
+Capture = pytest.CaptureFixture[str]
+COMMAND = ("calibrate", "all", "--config", "rig.toml")
+
+
+class Steps:
+    """Steps that finish at once; those named in `failing` raise an error."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.failing: set[str] = set()
+        self.seen: list[tuple[str, float]] = []
+        names = ("camera", "colour", "motion")
+        steps = tuple(Step(name, f"The {name}", "Nothing.", self._of(name)) for name in names)
+        monkeypatch.setattr(calibration_steps, "STEPS", steps)
+
+    def _of(self, name: str):  # type: ignore[no-untyped-def]
+        def run(options: argparse.Namespace, config: Config, folder: Path) -> CalibrationResult:
+            self.seen.append((name, config.camera.fx))
+            if name in self.failing:
+                raise CalibrationError(f"{name} failed", "Try again")
+            figure = Figure()
+            figure.subplots().plot([0, 1])
+            if name == "motion":
+                return CalibrationResult(name, {}, notes=("it moved",), figures=((figure, "F<1>"),))
+            value = 400.0 + len(self.seen)
+            return CalibrationResult(
+                name, {"camera.fx": value}, {"camera.fx": 0.5}, 0.1, notes=(f"{name} is known",)
+            )
+
+        return run
+
+
+@pytest.fixture
+def steps(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Steps:
+    monkeypatch.chdir(tmp_path)
+    Path("rig.toml").write_text(config_file("bench").read_text())
+    return Steps(monkeypatch)
+
+
+def test_an_interrupted_sequence_is_resumed(steps: Steps, capsys: Capture) -> None:
+    steps.failing = {"colour"}
+    assert main([*COMMAND, "--yes", "--out", "out"]) == 2
+    assert "colour failed" in capsys.readouterr().err
+    assert load_config("rig.toml").camera.fx == 401
+    assert load_config("rig.toml").calibration.colour is None
+    steps.failing = set()
+    assert main([*COMMAND, "--yes", "--json"]) == 0
+    printed = capsys.readouterr()
+    assert "Resumed; done: camera" in printed.err
+    assert json.loads(printed.out) == {"folder": "out", "done": ["camera", "colour", "motion"]}
+    # Each step gets the configuration that the steps before have written.
+    assert steps.seen == [("camera", 424), ("colour", 401), ("colour", 401), ("motion", 403)]
+    config = load_config("rig.toml")
+    assert config.camera.fx == 403
+    assert config.calibration.camera is not None
+    assert config.calibration.colour is not None
+    assert config.calibration.colour.std == {"camera.fx": 0.5}
+    report = Path("out/report.html").read_text()
+    for text in ("camera is known", "colour is known", "it moved", "F&lt;1&gt;", "data:image/png"):
+        assert text in report
+    # A finished sequence is not resumed.
+    assert main([*COMMAND, "--yes", "--out", "again"]) == 0
+    assert len(steps.seen) == 7
+
+
+def test_a_person_can_skip_repeat_and_stop(
+    steps: Steps, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def answer(text: str) -> int:
+        monkeypatch.setattr("sys.stdin", io.StringIO(text))
+        return main(list(COMMAND))
+
+    steps.failing = {"colour"}
+    assert answer("what\ns\ny\nq\n") == 1
+    err = capsys.readouterr().err
+    assert "skipped" in err
+    assert "error: colour failed. Try again" in err
+    assert "To resume: tautscope calibrate all --config rig.toml" in err
+    steps.failing = set()
+    assert answer("y\n") == 1  # the input ends
+    assert answer("y\n") == 0
+    assert [name for name, _ in steps.seen] == ["colour", "colour", "motion"]
+
+
+def test_another_rig_and_a_damaged_state_are_refused(steps: Steps, capsys: Capture) -> None:
+    steps.failing = {"colour"}
+    assert main([*COMMAND, "--yes"]) == 2
+    assert main([*COMMAND, "--twin", "--seed", "3"]) == 2
+    assert "--restart" in capsys.readouterr().err
+    assert (
+        main([*COMMAND, "--twin", "--seed", "3", "--restart", "--skip", "colour", "--out", "b"])
+        == 0
+    )
+    Path("rig.calibration.json").write_text("{}")
+    assert main([*COMMAND, "--yes"]) == 2
+    assert "--restart" in capsys.readouterr().err
+    assert main(["calibrate", "all", "--config", "bench", "--yes"]) == 2
+    assert "a file of your own" in capsys.readouterr().err
+    Path("rig.toml").write_text(config_file("article_rig").read_text())
+    assert main([*COMMAND, "--yes", "--restart"]) == 2
+    assert "drives.insertion.travel" in capsys.readouterr().err
+
+
+def test_the_twin_is_calibrated_from_camera_to_motion(
+    capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("rig.toml").write_text(config_file("article_rig").read_text())
+    told = load_config("rig.toml")
+    assert main([*COMMAND, "--twin", "--seed", "7", "--out", "out"]) == 0
+    config, actual = load_config("rig.toml"), draw_rig(told, 7)
+    for kind in ("camera", "colour", "geometry"):
+        assert getattr(config.calibration, kind) is not None
+    assert abs(config.camera.fx - actual.camera.fx) < 1
+    assert abs(config.camera.source.delay - actual.twin.sensor.stamp_error) < 0.05
+    notes = json.loads(Path("out/motion.json").read_text())["notes"]
+    true = [float(note.split()[3]) for note in notes if "true slack" in note]
+    # Without compensation: about 10 mm, 1.8 rad and 1.1 rad.
+    assert true[0] < 4
+    assert true[1] < 0.6
+    assert true[2] < 0.4
+    assert Path("out/report.html").stat().st_size > 100_000
