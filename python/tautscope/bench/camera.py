@@ -22,13 +22,15 @@ import numpy as np
 from av.container import OutputContainer
 from numpy.typing import NDArray
 
+from tautscope.bench.board import MovedBoard
 from tautscope.config import Config
 from tautscope.errors import ConfigError
 from tautscope.hardware.realtime import OTHERS, lower_realtime_priority
 from tautscope.twin.camera import TwinCamera
 
-CameraFault = Literal["drop", "delay", "fault", "freeze"]
-"""drop: no frames. delay: later frames. fault: unplugged. freeze: one image, new time stamps."""
+CameraFault = Literal["drop", "delay", "fault", "freeze", "board"]
+"""drop: no frames. delay: later frames. fault: unplugged. freeze: one image, new time stamps.
+board: a calibration board in front of the lens, held still in one pose after the other."""
 
 Centreline = tuple[NDArray[np.float64], NDArray[np.float64]]
 _MICROSECOND = Fraction(1, 1_000_000)
@@ -69,6 +71,7 @@ class CameraStream:
         self._sequence = 0
         self._faults: dict[CameraFault, float] = {}
         self._frozen_image: NDArray[np.uint8] | None = None
+        self._board: MovedBoard | None = None
         self._server: socket.socket | None = None
         self._client: _Client | None = None
         self._stopping = threading.Event()
@@ -140,7 +143,11 @@ class CameraStream:
 
     def _render(self, at: float, centreline: Centreline) -> None:
         twin, faults = self._config.twin, self._faults
-        image = self._camera.draw(*centreline, self._sequence).image
+        if "board" in faults:
+            self._board = self._board or MovedBoard(self._config)
+            image = self._board.draw(at, self._sequence)
+        else:
+            image = self._camera.draw(*centreline, self._sequence).image
         self._sequence += 1
         delay = twin.latency + twin.latency_jitter * self._random.uniform(-1, 1)
         if "freeze" in faults:
@@ -149,7 +156,9 @@ class CameraStream:
         else:
             self._frozen_image = None
         if "drop" not in faults:
-            self._pending.append((at + delay + faults.get("delay", 0.0), at, image))
+            stamp = at + twin.sensor.stamp_error
+            due = max(at, stamp) + delay + faults.get("delay", 0.0)
+            self._pending.append((due, stamp, image))
 
     def _listen(self) -> socket.socket:
         self._path.unlink(missing_ok=True)

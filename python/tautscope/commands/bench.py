@@ -28,7 +28,8 @@ def add_parser(verbs: arguments.Verbs) -> None:
         "three CiA 402 drives on a CAN bus and a camera stream, in real time. Ends with its input, "
         "or Ctrl-C. A line of input injects a fault: KIND PART, with the part insertion, rotation, "
         "bending (drop, delay, fault, freeze, heartbeat, refuse) or camera (drop, delay, fault: "
-        "unplugged, freeze); clear PART ends it. Events are written as JSON lines.",
+        "unplugged, freeze, board: a calibration board is shown); clear PART ends it. Events are "
+        "written as JSON lines.",
         extras=["hardware", "twin"],
     )
     arguments.add_config(bench, default="bench")
@@ -42,6 +43,12 @@ def add_parser(verbs: arguments.Verbs) -> None:
     )
     bench.add_argument(
         "--truth", type=Path, metavar="FILE.csv", help="write the true tip state, for evaluation"
+    )
+    bench.add_argument(
+        "--drawn",
+        type=arguments.natural,
+        metavar="SEED",
+        help="simulate a rig that differs from its configuration, as `calibrate --twin`",
     )
     bench.add_argument(
         "--modes",
@@ -75,6 +82,11 @@ def _bench(options: argparse.Namespace) -> None:
     from tautscope.hardware.signals import exit_on_signals  # noqa: PLC0415
 
     config = load_config(options.config)
+    if options.drawn is not None:
+        from tautscope.twin.drawn_rig import draw_rig  # noqa: PLC0415
+
+        # The stream's clock subtracts the configured delay.
+        config = draw_rig(config.replace(**{"camera.source.delay": 0.0}), options.drawn)
     with (
         exit_on_signals(),
         short_switch_interval(),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from tautscope.commands import (
     arguments,
+    calibrate_all,
     calibrate_camera,
     calibrate_colour,
     calibrate_geometry,
@@ -19,6 +20,7 @@ def add_parser(verbs: arguments.Verbs) -> None:
         description="Find settings of a rig from images and motions, and print them as TOML.",
     )
     kinds = calibrate.add_subparsers(dest="kind", required=True, metavar="WHAT")
+    calibrate_all.add_parser(kinds)
     calibrate_camera.add_parser(kinds)
     calibrate_colour.add_parser(kinds)
     calibrate_geometry.add_parser(kinds)

@@ -43,27 +43,7 @@ def add_parser(kinds: arguments.Verbs) -> None:
     camera.add_argument(
         "--board", type=Path, metavar="FILE.pdf", help="only write the board, to print on A4"
     )
-    camera.add_argument(
-        "--columns", type=arguments.positive, default=9, help="squares [%(default)s]"
-    )
-    camera.add_argument("--rows", type=arguments.positive, default=7, help="squares [%(default)s]")
-    camera.add_argument(
-        "--square",
-        type=arguments.above_zero,
-        default=4e-3,
-        metavar="M",
-        help="side of a square, measured on the print [%(default)s m]",
-    )
-    camera.add_argument(
-        "--model", choices=_MODELS, default="pinhole", help="lens model of OpenCV [%(default)s]"
-    )
-    camera.add_argument(
-        "--seconds",
-        type=arguments.above_zero,
-        default=180.0,
-        metavar="S",
-        help="time limit of the live camera [%(default)s]",
-    )
+    add_board_options(camera)
     camera.add_argument(
         "--ros", type=Path, metavar="FILE", help="also write a ROS camera_info file"
     )
@@ -78,6 +58,31 @@ def add_parser(kinds: arguments.Verbs) -> None:
     )
     add_options(camera)
     camera.set_defaults(run=_run)
+
+
+def add_board_options(parser: argparse.ArgumentParser) -> None:
+    """The board, the lens model, and the time limit of the live camera."""
+    parser.add_argument(
+        "--columns", type=arguments.positive, default=9, help="squares [%(default)s]"
+    )
+    parser.add_argument("--rows", type=arguments.positive, default=7, help="squares [%(default)s]")
+    parser.add_argument(
+        "--square",
+        type=arguments.above_zero,
+        default=4e-3,
+        metavar="M",
+        help="side of a square, measured on the print [%(default)s m]",
+    )
+    parser.add_argument(
+        "--model", choices=_MODELS, default="pinhole", help="lens model of OpenCV [%(default)s]"
+    )
+    parser.add_argument(
+        "--seconds",
+        type=arguments.above_zero,
+        default=180.0,
+        metavar="S",
+        help="time limit of the live camera [%(default)s]",
+    )
 
 
 def _run(options: argparse.Namespace) -> None:

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
 from tautscope.commands.calibration_output import add_options, check_options, finish
+from tautscope.commands.calibration_rig import add_rig_options, confirm_motion, open_rig
 from tautscope.commands.printing import print_json
 from tautscope.config import Config, load_config
-from tautscope.config.placeholders import MARK, placeholders
-from tautscope.errors import ConfigError, FieldError, RecordError
+from tautscope.errors import FieldError, RecordError
 from tautscope.extras import require_extras
 
 if TYPE_CHECKING:
@@ -24,14 +25,14 @@ if TYPE_CHECKING:
     from tautscope.calibration.geometry import GeometryFit, Recording
     from tautscope.calibration.result import CalibrationResult
 
-FOUND_HERE = (
-    "camera.fx",
-    "camera.fy",
-    "camera.camera_from_guide",
-    "camera.source.delay",
-    "instrument",
-)
-"""Sections and keys that may be placeholders: rough values of them suffice."""
+
+@dataclass(frozen=True)
+class _Source:
+    """A recorded motion, the configuration before, and the devices that took part."""
+
+    recording: Recording
+    config: Config
+    serial_numbers: Mapping[str, str] = field(default_factory=dict)
 
 
 def add_parser(kinds: arguments.Verbs) -> None:
@@ -41,30 +42,27 @@ def add_parser(kinds: arguments.Verbs) -> None:
         "geometry",
         help="pose of the channel, lengths and delay, from the instrument's own motion",
         description="Estimate the pose of the channel in the camera frame, the lengths of section "
-        "and bands, focal length and delay of the images, with standard deviations. Moves all "
-        "three motors at once for a minute within the range of [experiment]: THE MOTORS MOVE; or "
-        "takes a log, or a video with motor positions. The tip must be free and in view.",
+        "and bands, focal length and delay of the images, with standard deviations. Without a "
+        "file, the rig of --config or the twin moves all three motors at once for a minute within "
+        "the range of [experiment]; THE MOTORS MOVE. The tip must be free and in view.",
         extras=["hardware"],
     )
-    source = geometry.add_mutually_exclusive_group()
-    source.add_argument("--log", type=Path, metavar="FILE.mcap", help="use the images of a log")
-    source.add_argument("--video", metavar="FILE", help="use a video; needs --motors")
-    source.add_argument(
-        "--twin", action="store_true", help="calibrate a simulated rig that differs from --config"
+    geometry.add_argument(
+        "file",
+        nargs="?",
+        type=Path,
+        metavar="FILE",
+        help="a log (.mcap), or a video with --motors",
     )
-    geometry.add_argument("--motors", type=Path, metavar="FILE.csv", help="motor positions")
+    geometry.add_argument(
+        "--motors", type=Path, metavar="FILE.csv", help="motor positions of a video"
+    )
     geometry.add_argument(
         "--video-start",
         type=arguments.seconds,
         default=0.0,
         metavar="S",
         help="time of the video's first frame in the CSV's [s] [%(default)s]",
-    )
-    geometry.add_argument(
-        "--seed",
-        type=arguments.natural,
-        metavar="N",
-        help="seed of the twin and of its differences [twin.seed of the configuration]",
     )
     geometry.add_argument(
         "--intrinsics",
@@ -80,7 +78,7 @@ def add_parser(kinds: arguments.Verbs) -> None:
         help="measured distance of the bands' centres, as the scale of all lengths [the travel of "
         "the insertion drive]",
     )
-    geometry.add_argument("--yes", action="store_true", help="move the motors without asking")
+    add_rig_options(geometry)
     add_options(geometry)
     geometry.set_defaults(run=_run)
 
@@ -89,137 +87,100 @@ def _run(options: argparse.Namespace) -> int:
     from tautscope.calibration.geometry import fit  # noqa: PLC0415
 
     check_options(options)
-    if (options.video is None) != (options.motors is None):
-        raise FieldError("--motors", options.motors, "a CSV file together with --video")
-    config, recording = _record(options)
+    source = _source(options)
     distance = None if options.band_distance is None else options.band_distance * 1e-3
-    found = fit(recording, config, intrinsics=options.intrinsics, band_distance=distance)
+    found = fit(
+        source.recording, source.config, intrinsics=options.intrinsics, band_distance=distance
+    )
     if not found.is_plausible:
         return _refuse(options, found)
     if not options.json:
         print("\n".join(f"# {line}" for line in table(found)))
-    with _overlay(options, found, config):
-        finish(options, result(found, with_figures=options.out is not None))
+    with _overlay(options, found, source.config):
+        with_figures = options.out is not None
+        finish(options, result(found, source.serial_numbers, with_figures=with_figures))
     return 0
 
 
-def _record(options: argparse.Namespace) -> tuple[Config, Recording]:
-    """The configuration before, and the motion from the source that the options name."""
-    if options.log is not None:
+def _source(options: argparse.Namespace) -> _Source:
+    file: Path | None = options.file
+    if file is None:
+        return _from_twin(options) if options.twin else _from_hardware(options)
+    if file.suffix == ".mcap":
         return _from_log(options)
-    config = load_config(options.config)
-    if options.video is not None:
-        return config, _from_video(options, config)
-    if options.twin:
-        return config, _from_twin(options, config)
-    return config, _from_hardware(options, config)
+    if options.motors is None:
+        raise FieldError("file", str(file), "a log (.mcap), or a video with --motors")
+    return _from_video(options)
 
 
-def _from_log(options: argparse.Namespace) -> tuple[Config, Recording]:
+def _from_log(options: argparse.Namespace) -> _Source:
     from tautscope.calibration.geometry import Recorder  # noqa: PLC0415
-    from tautscope.calibration.geometry.sweep import IMAGE_PERIOD  # noqa: PLC0415
     from tautscope.log.reader import Tick, Update, read_log  # noqa: PLC0415
     from tautscope.runs.recording import FRAME_COLUMNS  # noqa: PLC0415
 
-    log = read_log(options.log)
+    log = read_log(options.file)
     config = log.config if options.config is None else load_config(options.config)
-    recorder, due = Recorder(config), -float("inf")
+    recorder = Recorder(config)
     captured = (FRAME_COLUMNS.names or ()).index("captured_at")
     for index, event in log.events.items():
         if isinstance(event, Tick):
             recorder.add_tick(event.sample.time, event.sample.applied)
         elif isinstance(event, Update) and log.has_image(index):
-            at = float(event.row[captured])  # type: ignore[arg-type]
-            if at >= due:
-                recorder.add_image(log.image(index), at)
-                due = at + IMAGE_PERIOD - 1e-9
-    return config, recorder.recording()
+            captured_at = float(event.row[captured])  # type: ignore[arg-type]
+            if recorder.is_due(captured_at):
+                recorder.add_image(log.image(index), captured_at)
+    return _Source(recorder.recording(), config)
 
 
-def _from_video(options: argparse.Namespace, config: Config) -> Recording:
+def _from_video(options: argparse.Namespace) -> _Source:
     from tautscope.calibration.geometry import Recorder  # noqa: PLC0415
-    from tautscope.calibration.geometry.sweep import IMAGE_PERIOD  # noqa: PLC0415
     from tautscope.hardware.video import read_video  # noqa: PLC0415
     from tautscope.runs.records import read_motors  # noqa: PLC0415
 
+    config = load_config(options.config)
     times, positions = read_motors(options.motors)
-    recorder, due = Recorder(config), -float("inf")
+    recorder = Recorder(config)
     for time, position in zip(times, positions, strict=True):
         recorder.add_tick(float(time), position)
-    for frame in read_video(options.video, config.camera, options.video_start):
-        if times[0] <= frame.captured_at <= times[-1] and frame.captured_at >= due:
+    for frame in read_video(str(options.file), config.camera, options.video_start):
+        if times[0] <= frame.captured_at <= times[-1] and recorder.is_due(frame.captured_at):
             recorder.add_image(frame.image, frame.captured_at)
-            due = frame.captured_at + IMAGE_PERIOD - 1e-9
-    return recorder.recording()
+    return _Source(recorder.recording(), config)
 
 
-def _from_twin(options: argparse.Namespace, config: Config) -> Recording:
+def _from_twin(options: argparse.Namespace) -> _Source:
     require_extras("--twin", ["twin"])
     from tautscope.calibration.geometry import sweep  # noqa: PLC0415
     from tautscope.commands.progress import progress_bar  # noqa: PLC0415
     from tautscope.twin import Twin  # noqa: PLC0415
     from tautscope.twin.drawn_rig import draw_geometry  # noqa: PLC0415
 
+    config = load_config(options.config)
     seed = config.twin.seed if options.seed is None else options.seed
     rig = Twin(draw_geometry(config, seed))
     try:
         with progress_bar("sweep") as progress:
-            return sweep(rig, config, progress=progress)
+            return _Source(sweep(rig, config, progress=progress), config)
     finally:
         rig.close()
 
 
-def _from_hardware(options: argparse.Namespace, config: Config) -> Recording:
+def _from_hardware(options: argparse.Namespace) -> _Source:
     from tautscope.calibration.geometry import sweep  # noqa: PLC0415
     from tautscope.commands.progress import progress_bar  # noqa: PLC0415
-    from tautscope.hardware.realtime import (  # noqa: PLC0415
-        OTHERS,
-        VISION,
-        limited_garbage_collection,
-        locked_memory,
-        realtime,
-        set_realtime_priority,
-    )
-    from tautscope.hardware.rig import HardwareRig  # noqa: PLC0415
-    from tautscope.hardware.signals import exit_on_signals  # noqa: PLC0415
+    from tautscope.hardware.realtime import VISION, set_realtime_priority  # noqa: PLC0415
 
     if options.config is None:
-        raise FieldError("--config", None, "the configuration of a rig; or --twin, --log, --video")
-    _refuse_other_placeholders(options.config)
-    rig = HardwareRig(config)
-    if not options.yes:
-        question = (
-            "All three motors will move at once for a minute, within the range of [experiment]. "
-            "Type y to start: "
-        )
-        print(question, end="", file=sys.stderr, flush=True)
-        if sys.stdin.readline().strip().lower() not in ("y", "yes"):
-            raise FieldError("answer", "no", "y, or the option --yes; nothing moved")
-    with ExitStack() as stack:
-        for context in (
-            exit_on_signals(),
-            limited_garbage_collection(),
-            locked_memory(),
-            realtime(OTHERS),
-        ):
-            stack.enter_context(context)
-        executor = ThreadPoolExecutor(1, "vision", set_realtime_priority, (VISION,))
-        stack.callback(executor.shutdown)
-        stack.callback(rig.close)
-        progress = stack.enter_context(progress_bar("sweep"))
-        return sweep(rig, config, executor=executor, progress=progress)
-
-
-def _refuse_other_placeholders(path: str) -> None:
-    """Refuse placeholders of values that are not found here.
-
-    Raises:
-        ConfigError: Names the keys.
-    """
-    others = [key for key in placeholders(path) if not key.startswith(FOUND_HERE)]
-    if others:
-        allowed = f"your values, and lines without the word {MARK}"
-        raise ConfigError(", ".join(others), f"placeholders of {path}", allowed)
+        raise FieldError("--config", None, "the configuration of a rig; or a file, or --twin")
+    config = load_config(options.config)
+    confirm_motion(options)
+    with (
+        ThreadPoolExecutor(1, "vision", set_realtime_priority, (VISION,)) as executor,
+        open_rig(config) as setup,
+        progress_bar("sweep") as progress,
+    ):
+        recording = sweep(setup.rig, config, executor=executor, progress=progress)
+        return _Source(recording, config, setup.serial_numbers())
 
 
 def _refuse(options: argparse.Namespace, found: GeometryFit) -> int:
@@ -259,7 +220,9 @@ def table(found: GeometryFit) -> list[str]:
     return lines
 
 
-def result(found: GeometryFit, *, with_figures: bool = True) -> CalibrationResult:
+def result(
+    found: GeometryFit, serial_numbers: Mapping[str, str], *, with_figures: bool = True
+) -> CalibrationResult:
     """The result in the form that all calibrations have.
 
     Raises:
@@ -282,6 +245,7 @@ def result(found: GeometryFit, *, with_figures: bool = True) -> CalibrationResul
         found.changes,
         std=found.std,
         residual=found.residual_px,
+        serial_numbers=serial_numbers,
         notes=found.warnings,
         figures=figures,
         data={

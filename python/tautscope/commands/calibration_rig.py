@@ -104,6 +104,18 @@ def open_rig(config: Config) -> Iterator[Setup]:
             rig.close()
 
 
+def refuse_wrong_limits(config: str) -> None:
+    """Refuse a configuration in which values of the drives are placeholders.
+
+    Raises:
+        ConfigError: Names the keys.
+    """
+    marked = [key for key in placeholders(config) if key.startswith("drives.")]
+    if marked:
+        allowed = "your values: the motors would move with wrong limits"
+        raise ConfigError(", ".join(marked), f"placeholders of {config}", allowed)
+
+
 def confirm_motion(options: argparse.Namespace) -> None:
     """Ask whether the motors may move, unless ``--yes``.
 
@@ -111,10 +123,7 @@ def confirm_motion(options: argparse.Namespace) -> None:
         ConfigError: The limits of the drives are placeholders.
         FieldError: The answer is not y.
     """
-    marked = [key for key in placeholders(options.config) if key.startswith("drives.")]
-    if marked:
-        allowed = "your values: the motors would move with wrong limits"
-        raise ConfigError(", ".join(marked), f"placeholders of {options.config}", allowed)
+    refuse_wrong_limits(options.config)
     if options.yes:
         return
     question = (

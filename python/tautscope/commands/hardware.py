@@ -81,14 +81,14 @@ def _run(options: argparse.Namespace) -> int:
         f"{timing['frame_age_ms']['median']:.3g} ms (median)."
     )
     for dof, result in found.results.items():
-        print(_summary(dof, result))
+        print(summary_line(dof, result))
     for warning in found.compensated.recording.warnings:
         print(f"Warning: {warning}.")
     print(f"Report, figures and traces: {folder / 'report.html'}")
     return 0
 
 
-def _summary(dof: Dof, result: DofResult) -> str:
+def summary_line(dof: Dof, result: DofResult) -> str:
     """One line of results of a DOF from its state estimates; a dash for unknown values."""
 
     def shown(value: float) -> str:

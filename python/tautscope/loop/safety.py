@@ -18,6 +18,9 @@ DETECTORS: tuple[str, ...] = _core.DETECTORS
 MEANINGS: dict[str, str] = dict(zip(DETECTORS, _core.MEANINGS, strict=True))
 """The meaning of each flag, in one sentence."""
 
+REMEDIES: dict[str, str] = {"geometry_off": "tautscope calibrate geometry finds the geometry"}
+"""What to do about a flag, where a command helps."""
+
 _ROW_STEP = 8
 
 

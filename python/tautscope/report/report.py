@@ -87,18 +87,27 @@ article&rsquo;s figures are of its own rig.</p>
 def page(where: str, body: str, facts: dict[str, str], config: Config) -> str:
     """The page around a body, with the facts of the run and its configuration."""
     facts_list = "".join(f"<dt>{escape(k)}</dt><dd>{escape(v)}</dd>" for k, v in facts.items())
-    return f"""<!doctype html>
-<html lang="en"><head><meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>tautscope: hysteresis reduction</title><style>{_STYLE}</style></head><body>
-<h1>Hysteresis reduction from the endoscope&rsquo;s images</h1>
-<p class="lead">The experiment of Reilink, Stramigioli and Misra (Mechatronics 23, 2013, 652, doi
-10.1016/j.mechatronics.2013.06.006) {where}.</p>
-{body}
+    return document(
+        "Hysteresis reduction from the endoscope\u2019s images",
+        f"""The experiment of Reilink, Stramigioli and Misra (Mechatronics 23, 2013, 652, doi
+10.1016/j.mechatronics.2013.06.006) {where}.""",
+        f"""{body}
 <h2>Run</h2>
 <dl>{facts_list}</dl>
 <h2>Configuration</h2>
-<pre>{escape(dump_config(config))}</pre>
+<pre>{escape(dump_config(config))}</pre>""",
+    )
+
+
+def document(title: str, lead: str, body: str) -> str:
+    """A self-contained page: title and lead as text, body as HTML."""
+    return f"""<!doctype html>
+<html lang="en"><head><meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>tautscope: {escape(title)}</title><style>{_STYLE}</style></head><body>
+<h1>{escape(title)}</h1>
+<p class="lead">{escape(lead)}</p>
+{body}
 </body></html>
 """
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tautscope.loop.reduction import Report
-from tautscope.loop.safety import MEANINGS, Reaction
+from tautscope.loop.safety import MEANINGS, REMEDIES, Reaction
 
 _CONSEQUENCES = {
     Reaction.NONE: "the loop continued",
@@ -53,10 +53,11 @@ class FlagSummary:
     def _line(self, name: str) -> str:
         meaning = MEANINGS[name].rstrip(".").replace("`", "")
         flag = f"{name} ({meaning[0].lower()}{meaning[1:]})"
+        remedy = f"; {REMEDIES[name]}" if name in REMEDIES else ""
         count = self._counts.get(name)
         if count is None:
-            return f"{flag} between two images"
+            return f"{flag} between two images{remedy}"
         return (
             f"{flag} at {count.images} of {self._images} images, first {count.first:.1f} s into "
-            f"the run; {_CONSEQUENCES[count.reaction]}"
+            f"the run; {_CONSEQUENCES[count.reaction]}{remedy}"
         )

@@ -19,19 +19,26 @@ DISTORTION = 0.02
 """Of k1 [1]."""
 BAND = 1e-3
 """Of the position of a band [m]."""
-LATENCY = 0.2
-"""Largest error of the latency of the images [s]."""
+DELAY = 0.2
+"""Largest delay from the capture of an image to its stamp [s]."""
 _DOMAIN = 18
 
 
 def draw_rig(config: Config, seed: int) -> Config:
-    """The configuration of an actual rig, uniformly distributed about the configured one.
+    """The configuration of an actual rig, drawn about the default geometry.
 
-    Pose of the guide, focal lengths, principal point, k1, length of the section, positions of the
-    bands and latency differ; `twin.seed` is the seed. The same seed gives the same rig.
+    Focal lengths, principal point, k1, pose of the guide, length of the section and positions of
+    the bands differ uniformly from the defaults, whatever `config` has: the rig stays the same
+    while its configuration is calibrated step by step. Images are stamped late by a drawn delay
+    minus ``camera.source.delay``, as a camera does.
+
+    Args:
+        config: All other values are its.
+        seed: Of the draw and `twin.seed`; the same seed gives the same rig.
     """
     random = np.random.default_rng([_DOMAIN, seed])
-    camera, instrument = config.camera, config.instrument
+    default = Config()
+    camera, instrument = default.camera, default.instrument
     pose = camera.camera_from_guide
     axis, direction = (each / np.linalg.norm(each) for each in random.standard_normal((2, 3)))
     turn, _ = cv2.Rodrigues(random.uniform(0, TILT) * axis)
@@ -43,6 +50,8 @@ def draw_rig(config: Config, seed: int) -> Config:
     marker_b = instrument.marker_b + random.uniform(-BAND, BAND)
     return config.replace(
         **{
+            "camera.width": camera.width,
+            "camera.height": camera.height,
             "camera.fx": camera.fx * scale,
             "camera.fy": camera.fy * scale,
             "camera.cx": camera.cx + random.uniform(-CENTRE, CENTRE),
@@ -55,24 +64,19 @@ def draw_rig(config: Config, seed: int) -> Config:
             * (1 + random.uniform(-SECTION, SECTION)),
             "instrument.marker_a": marker_a,
             "instrument.marker_b": min(marker_b, instrument.tip_length - half),
-            "twin.latency": config.twin.latency + random.uniform(0, LATENCY),
+            "twin.sensor.stamp_error": random.uniform(0, DELAY) - config.camera.source.delay,
             "twin.seed": seed,
         }
     )
 
 
 def draw_geometry(config: Config, seed: int) -> Config:
-    """The rig of `draw_rig` with a calibrated camera, apart from its focal lengths.
-
-    The images are stamped late by the error of the latency.
-    """
-    drawn = draw_rig(config, seed)
-    return drawn.replace(
+    """The rig of `draw_rig` with a calibrated camera, apart from its focal lengths."""
+    camera = config.camera
+    return draw_rig(config, seed).replace(
         **{
-            "camera.cx": config.camera.cx,
-            "camera.cy": config.camera.cy,
-            "camera.distortion": config.camera.distortion,
-            "twin.latency": config.twin.latency,
-            "twin.sensor.stamp_error": drawn.twin.latency - config.twin.latency,
+            "camera.cx": camera.cx,
+            "camera.cy": camera.cy,
+            "camera.distortion": camera.distortion,
         }
     )

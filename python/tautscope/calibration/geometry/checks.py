@@ -32,6 +32,8 @@ LARGEST_DEVIATION = 0.12
 """Root mean square deviation of the tip from its expectation, as a share of `width_limit`."""
 LARGEST_DIFFERENCE = 4.0
 """From the configuration, and between the fit and that with free states [standard deviations]."""
+LARGEST_LAST_STEP = 0.5
+"""Of the solver [standard deviations]."""
 UNDETERMINED = 0.9
 """Ratio of a standard deviation to that before the fit above which a value is not determined."""
 
@@ -100,14 +102,15 @@ def find_doubts(
                 f"{scale * deviation[dof]:.2g} {unit} RMS: are the motors in the order insertion, "
                 "rotation, bending, with the right signs, and all coupled?"
             )
-    if not solution.converged:
+    if solution.last_step > LARGEST_LAST_STEP:
         doubts.append("The fit did not converge")
     std = np.sqrt(np.diag(solution.covariance))
     for index in np.flatnonzero(active):
         parameter, size = PARAMETERS[index], abs(float(solution.z[index]))
+        change = size * model.prior_std[index] * parameter.shown
         if size > LARGEST_DIFFERENCE and IMAGE.start <= index < IMAGE.stop:
             doubts.append(
-                f"{parameter.name} would change by {size * parameter.std * parameter.shown:.3g} "
+                f"{parameter.name} would change by {change:.3g} "
                 f"{parameter.unit}, {size:.1f} standard deviations of what is plausible"
             )
         elif parameter.name.startswith("camera.camera") and std[index] > UNDETERMINED:

@@ -41,6 +41,7 @@ class GeometryFit:
         std: Key -> standard deviation in the unit of the key:
             `camera.camera_from_guide.translation[0]` [m], `.rotation[0]` [rad, about the camera's
             axes], `instrument.bending_length` [m], `camera.fx` [px], `camera.source.delay` [s], ...
+        pose_covariance: (6, 6) of translation [m] and rotation about the camera's axes [rad].
         residual_px: Root mean square of the residuals [px], of the images that are explained.
         warnings: What the user has to know; empty in the normal case.
         is_plausible: Whether the model explains the record; if not, do not use `config`.
@@ -55,6 +56,7 @@ class GeometryFit:
     config: Config
     changes: dict[str, Any]
     std: dict[str, float]
+    pose_covariance: Floats
     residual_px: float
     warnings: tuple[str, ...]
     is_plausible: bool
@@ -165,10 +167,12 @@ def _result(
 ) -> GeometryFit:
     solution, _ = solutions
     doubts, warnings = find_doubts(model, *solutions, active)
-    values = estimated_values(config, model.geometry(solution.z), solution, active)
+    values = estimated_values(config, model, solution, active)
     changes = changed_keys(config, model.geometry(solution.z), values)
-    delay = next(value.after for value in values if value.name == "camera.source.delay")
-    if delay < 0:
+    delay, std = next(
+        (value.after, value.std) for value in values if value.name == "camera.source.delay"
+    )
+    if delay < -2 * std:
         warnings.append(
             f"Images are stamped {-delay * 1e3:.0f} ms before the motors' clock: "
             "camera.source.delay is set to 0, which cannot express it"
@@ -183,6 +187,7 @@ def _result(
         config=config.replace(**changes),
         changes=changes,
         std=key_stds(values, changes),
+        pose_covariance=(solution.covariance * np.outer(model.prior_std, model.prior_std))[:6, :6],
         residual_px=_rms(solution.residuals),
         warnings=(*doubts, *warnings),
         is_plausible=not doubts,

@@ -12,10 +12,10 @@ from tautscope.calibration.geometry.parameters import (
     IMAGE,
     INDEX,
     PARAMETERS,
-    PRIOR_STD,
     TYPICAL_LAG,
     TYPICAL_ROUNDING,
     Geometry,
+    prior_std,
 )
 from tautscope.config import Config
 from tautscope.dof import Dof
@@ -29,7 +29,8 @@ UNEVENNESS_STD = 0.05
 """Standard deviation of the unevenness of an image's section about its line over the bending."""
 _HALF_WIDTH = 0.375
 """Median of the prior of a half width, as a share of `safety.width_limit`."""
-_SHARED = 0.8
+_SHARED = 1.4
+"""Median of the prior of the logit of the share of friction that the shaft has in common."""
 _TICK = 0.02
 """Motor positions are interpolated straight over this time [s]."""
 _STEP = 1e-3
@@ -87,6 +88,7 @@ class Model:
         self.data = data.thinned()
         self.count = len(data.captured_at)
         self._config, self._band_distance = config, band_distance
+        self.prior_std = prior_std(by_band_distance=band_distance is not None)
         self._radius = config.instrument.diameter / 2
         self.width_limit = np.array(config.safety.width_limit)
         self._centre = config.experiment.bending.centre
@@ -94,14 +96,14 @@ class Model:
 
     def geometry(self, z: Floats) -> Geometry:
         """Geometry for parameters z in standard deviations of their priors."""
-        return Geometry(self._config, self._band_distance, z * PRIOR_STD)
+        return Geometry(self._config, self._band_distance, z * self.prior_std)
 
     def features(self, z: Floats, states: Floats) -> tuple[Floats, Floats]:
         """Features (n, 4) and their derivatives (n, 4, 4) by the states (n, 4).
 
         NaN where a band is not visible.
         """
-        slope = (z * PRIOR_STD)[INDEX["unevenness over bending"]]
+        slope = (z * self.prior_std)[INDEX["unevenness over bending"]]
         model = self.geometry(z).feature_model()
         predicted, by_q = model.predict_all(states[:, :3], self._unevenness(z, states))
         shift = np.array([0.0, 0.0, 0.0, _STEP])
@@ -116,14 +118,14 @@ class Model:
 
     def expected(self, z: Floats) -> Floats:
         """Expected states (n, 4): the tip of the play model, and an unevenness of 0."""
-        value = z * PRIOR_STD
+        value = z * self.prior_std
 
         def of(name: str) -> Floats:
             return np.array([value[INDEX[f"{name} {dof.label}"]] for dof in Dof])
 
         half_width = _HALF_WIDTH * self.width_limit * np.exp(of("half width"))
         rounding = min(TYPICAL_ROUNDING * float(np.exp(value[INDEX["rounding"]])), 0.9)
-        shared = float(np.clip(_SHARED + value[INDEX["shared friction"]], 0.0, 1.0))
+        shared = float(1 / (1 + np.exp(-_SHARED - value[INDEX["shared friction"]])))
         data = self.data
         plays = [
             _core.Hysteresis(
@@ -164,6 +166,6 @@ class Model:
         return self.geometry(z).feature_model().predict_all(states[:, :3], unevenness)[0]
 
     def _unevenness(self, z: Floats, states: Floats) -> Floats:
-        value = z * PRIOR_STD
+        value = z * self.prior_std
         constant, slope = value[INDEX["unevenness"]], value[INDEX["unevenness over bending"]]
         return np.asarray(constant + slope * (states[:, 2] - self._centre) + states[:, 3])

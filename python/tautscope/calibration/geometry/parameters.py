@@ -27,7 +27,7 @@ class Parameter:
 
     Attributes:
         name: Unique; dotted as in TOML where there is such a key.
-        std: Prior standard deviation of the difference, in SI units.
+        std: Prior standard deviation of the difference, in SI units; `prior_std` has the exception.
         shown: Factor to the shown unit.
         unit: Shown unit.
     """
@@ -64,7 +64,7 @@ _TIMES = (
 _PLAY = (
     *(Parameter(f"half width {dof.label}", 0.5, 1, "log") for dof in Dof),
     Parameter("rounding", 0.7, 1, "log"),
-    Parameter("shared friction", 0.25, 1, "1"),
+    Parameter("shared friction", 1.5, 1, "logit"),
     *(Parameter(f"gain {dof.label}", 0.2, 100, "%") for dof in Dof),
     Parameter("zero insertion", 1e-3, 1e3, "mm"),
     Parameter("zero rotation", 0.2, 180 / np.pi, "deg"),
@@ -73,7 +73,6 @@ _PLAY = (
 PARAMETERS = (*_TRANSLATION, *_ROTATION, *_LENGTHS, *_CAMERA, *_SHAPE, *_TIMES, *_PLAY)
 NAMES = tuple(parameter.name for parameter in PARAMETERS)
 INDEX = {name: index for index, name in enumerate(NAMES)}
-PRIOR_STD: Floats = np.array([parameter.std for parameter in PARAMETERS])
 IMAGE = slice(0, INDEX["unevenness over bending"] + 1)
 """The parameters that the features depend on; the others are of the motion of the tip."""
 TYPICAL_ROUNDING = 0.15
@@ -82,12 +81,24 @@ TYPICAL_LAG = 0.03
 """Median of the prior of the lag of the tip behind the motors [s]."""
 
 
+SCALE_STD = 0.02
+"""Prior standard deviation of the gain of insertion, where it is the scale of all lengths."""
+
+
+def prior_std(*, by_band_distance: bool) -> Floats:
+    """Prior standard deviations (parameters,) in SI units."""
+    std = np.array([parameter.std for parameter in PARAMETERS])
+    if not by_band_distance:
+        std[INDEX["gain insertion"]] = SCALE_STD
+    return std
+
+
 def estimated(intrinsics: Intrinsics, *, by_band_distance: bool) -> NDArray[np.bool_]:
     """Which parameters are estimated, with the three free directions fixed.
 
     The zeros of insertion and rotation are those of the drives. The metric scale is that of the
-    insertion drive or of the measured distance of the bands; with the latter, the difference of
-    `marker_b` is that of `marker_a`.
+    insertion drive, to `SCALE_STD`, or of the measured distance of the bands; with the latter, the
+    difference of `marker_b` is that of `marker_a`.
 
     Raises:
         FieldError: `intrinsics` is none of `INTRINSICS`.
@@ -95,7 +106,8 @@ def estimated(intrinsics: Intrinsics, *, by_band_distance: bool) -> NDArray[np.b
     if intrinsics not in INTRINSICS:
         raise FieldError("intrinsics", intrinsics, ", ".join(INTRINSICS))
     fixed = {"zero insertion", "zero rotation"}
-    fixed.add("instrument.marker_b" if by_band_distance else "gain insertion")
+    if by_band_distance:
+        fixed.add("instrument.marker_b")
     if intrinsics != "all":
         fixed |= {parameter.name for parameter in _CAMERA[1:]}
     if intrinsics == "none":

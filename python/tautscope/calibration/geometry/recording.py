@@ -15,6 +15,8 @@ from tautscope.loop.vision import Detection, MarkerDetector
 
 Floats = NDArray[np.float64]
 Image = NDArray[np.uint8]
+IMAGE_PERIOD = 0.08
+"""Least time between two images that are used [s]; neighbouring ones tell the same."""
 MARGIN = 60
 """Pixels that are kept around the regions of the markers' colour [px]: tissue beside the bands."""
 
@@ -112,10 +114,15 @@ class Recorder:
         self._ticks: list[tuple[float, Floats]] = []
         self._images: list[tuple[float, Floats, Patch, float]] = []
         self._reasons: dict[str, int] = {}
+        self._due = -np.inf
 
     def add_tick(self, time: float, motors: Floats) -> None:
         """Add the positions (3,) of the drives at a time."""
         self._ticks.append((time, np.array(motors, dtype=np.float64)))
+
+    def is_due(self, captured_at: float) -> bool:
+        """Whether an image of this capture time is needed."""
+        return captured_at >= self._due
 
     def add_image(self, image: Image, captured_at: float) -> Detection:
         """Search the bands in an image, and keep its features and its pixels around the bands.
@@ -123,6 +130,7 @@ class Recorder:
         Raises:
             FrameError: The image is not what the configured camera gives.
         """
+        self._due = captured_at + IMAGE_PERIOD - 1e-9
         detection = self._detector.detect(image)
         if not detection.valid:
             reason = generic(detection.reason)

@@ -14,7 +14,7 @@ TOLERANCE = 0.02
 """Largest last step of a parameter, in its standard deviations."""
 BLOCK = 2.0
 """Images within this time are not independent [s]."""
-_ITERATIONS = 20
+_ITERATIONS = 25
 _DEGREES = 4.0
 """Where the soft-L1 loss leaves the quadratic, squared."""
 _LARGEST_STEP = 2.0
@@ -32,7 +32,7 @@ class Solution:
         states: (images, 4) most probable state and unevenness of each image.
         residuals: (images, 4) measured minus predicted features [px]; NaN where not visible.
         expected: (images, 4) states that the motors let expect.
-        converged: Whether the last step was below `TOLERANCE`.
+        last_step: Largest part of the last step, in standard deviations.
     """
 
     z: Floats
@@ -40,7 +40,7 @@ class Solution:
     states: Floats
     residuals: Floats
     expected: Floats
-    converged: bool
+    last_step: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +79,7 @@ def solve(
     """
     z = np.zeros(len(active)) if start is None else start.copy()
     images = _Images(model.expected(z), np.ones((model.count, 4)), np.ones((model.count, 4)))
-    damping, last, converged = 1.0, np.inf, False
+    damping, last = 1.0, np.inf
     pick = np.ix_(active, active)
     for _ in range(_ITERATIONS):
         images = _most_probable(model, z, images, free_states)
@@ -92,15 +92,14 @@ def solve(
         damping = damping if size < 0.9 * last else max(damping / 2, 0.1)
         last = size
         z = z + step * damping * min(1.0, _LARGEST_STEP / max(float(np.abs(step).max()), 1e-12))
-        converged = size * damping < TOLERANCE
-        if converged:
+        if size < TOLERANCE:
             break
     images = _most_probable(model, z, images, free_states)
     information, scores = _equations(model, z, images, active, free_states)
     covariance = np.zeros_like(information)
     covariance[pick] = _covariance(information[pick], scores[:, active], model.data.captured_at)
     residuals = model.data.features - model.features(z, images.states)[0]
-    return Solution(z, covariance, images.states, residuals, model.expected(z), converged)
+    return Solution(z, covariance, images.states, residuals, model.expected(z), last)
 
 
 def _most_probable(model: Model, z: Floats, images: _Images, free_states: bool) -> _Images:

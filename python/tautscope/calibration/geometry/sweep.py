@@ -18,8 +18,6 @@ from tautscope.loop.safety import Reaction
 
 DURATION = 60.0
 """Duration of the motion [s]."""
-IMAGE_PERIOD = 0.08
-"""Least time between two images that are used [s]; neighbouring ones tell the same."""
 _PERIODS = (5.0, 6.1, 4.1)
 _SPEED_SHARE = 0.5
 _GROWTH_TIME = 2.0
@@ -99,8 +97,8 @@ def sweep(
         rig: It is reset first; the caller closes it.
         config: Configuration of the rig.
         duration: [s].
-        executor: Searches the bands in the background while control ticks continue; of the images
-            that arrive meanwhile only the newest is used. For a rig that runs in real time.
+        executor: Searches the bands in the background while control ticks continue; images that
+            arrive meanwhile are not used. For a rig that runs in real time.
         progress: Called with the share of the motion done, 0 to 1, once per second.
 
     Raises:
@@ -138,26 +136,19 @@ def sweep(
 
 
 class _ImageQueue:
-    """Passes images to a recorder: every one that is due, or the newest with an executor."""
+    """Passes images that are due to a recorder; with an executor, while none is in work."""
 
     def __init__(self, recorder: Recorder, executor: Executor | None) -> None:
         self._recorder, self._executor = recorder, executor
-        self._due = -np.inf
-        self._next: Frame | None = None
         self._running: Future[object] | None = None
 
     def add(self, frame: Frame) -> None:
-        if frame.captured_at < self._due:
+        if not self._recorder.is_due(frame.captured_at):
             return
         if self._executor is None:
-            self._due = frame.captured_at + IMAGE_PERIOD - 1e-9
             self._recorder.add_image(frame.image, frame.captured_at)
-            return
-        self._next = frame
-        if self._running is None or self._running.done():
+        elif self._running is None or self._running.done():
             self.finish()
-            frame, self._next = self._next, None
-            self._due = frame.captured_at + IMAGE_PERIOD - 1e-9
             self._running = self._executor.submit(
                 self._recorder.add_image, frame.image, frame.captured_at
             )

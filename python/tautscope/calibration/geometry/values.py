@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tautscope.calibration.geometry.model import Model
 from tautscope.calibration.geometry.parameters import PARAMETERS, Geometry
 from tautscope.calibration.geometry.solver import Solution
 from tautscope.config import Config
@@ -39,10 +40,10 @@ class Value:
 
 
 def estimated_values(
-    config: Config, geometry: Geometry, solution: Solution, active: NDArray[np.bool_]
+    config: Config, model: Model, solution: Solution, active: NDArray[np.bool_]
 ) -> tuple[Value, ...]:
     """The estimated parameters; without a key of their own they are differences from 0."""
-    instrument, camera = config.instrument, config.camera
+    instrument, camera, geometry = config.instrument, config.camera, model.geometry(solution.z)
     pose = camera.camera_from_guide
     known = {
         "instrument.bending_length": (instrument.bending_length, geometry.bending_length),
@@ -62,13 +63,13 @@ def estimated_values(
     for index in np.flatnonzero(active):
         parameter = PARAMETERS[index]
         before = camera.source.delay if parameter.name == "camera.source.delay" else 0.0
-        after = before + float(solution.z[index] * parameter.std)
+        after = before + float(solution.z[index] * model.prior_std[index])
         before, after = known.get(parameter.name, (before, after))
         # The length of the section is estimated as a factor.
         is_length = parameter.name == "instrument.bending_length"
         scale = geometry.bending_length if is_length else 1.0
         shown, unit = (1e3, "mm") if is_length else (parameter.shown, parameter.unit)
-        prior = scale * parameter.std
+        prior = scale * model.prior_std[index]
         found.append(
             Value(
                 parameter.name,

@@ -1,0 +1,101 @@
+"""Calibration of the geometry on simulated rigs that differ from their configuration.
+
+N twins whose loop is told wrong (pose to 5 deg and 5 mm, section 10 %, bands 1 mm, focal length
+3 %, delay to 200 ms), on features with 0.5 px of noise or on images; other instruments; the loop
+with the result; records that the model cannot explain.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from dataclasses import asdict
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from calibration.evaluation import Job, Outcome, evaluate
+from calibration.records import INSTRUMENTS, Case
+from calibration.tables import alarm_table, error_table, loop_table
+from common.doc_pages import insert
+from common.paths import ROOT
+from common.processes import add_arguments, run_parallel
+from tautscope.commands.progress import progress_bar
+
+PAGE = ROOT / "docs" / "calibration.md"
+
+
+def arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--twins", type=int, default=50, help="[%(default)s]")
+    parser.add_argument("--first-seed", type=int, default=0, help="[%(default)s]")
+    parser.add_argument("--images", action="store_true", help="find the bands in images")
+    parser.add_argument("--band-distance", action="store_true", help="with a measured distance")
+    parser.add_argument("--instrument", choices=INSTRUMENTS, default="nominal")
+    parser.add_argument("--loop", action="store_true", help="run the loop with the result")
+    parser.add_argument("--alarms", action="store_true", help="also contradictory records")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument("--write", metavar="NAME", help=f"update this part of {PAGE.name}")
+    add_arguments(parser)
+    return parser.parse_args()
+
+
+def measure(options: argparse.Namespace) -> dict[int, Outcome]:
+    """Calibrate every twin; Ctrl-C ends with those that are finished."""
+    seeds = range(options.first_seed, options.first_seed + options.twins)
+    jobs = [
+        Job(
+            Case(seed, options.instrument, options.images),
+            options.band_distance,
+            options.loop,
+            options.alarms,
+        )
+        for seed in seeds
+    ]
+    found: dict[int, Outcome] = {}
+    with progress_bar("calibrations") as show_progress:
+        try:
+            for job, outcome in run_parallel(evaluate, jobs, options.workers, options.scheduler):
+                found[job.case.seed] = outcome
+                show_progress(len(found) / len(jobs))
+        except KeyboardInterrupt:
+            pass
+    return dict(sorted(found.items()))
+
+
+def report(options: argparse.Namespace, found: dict[int, Outcome]) -> str:
+    """The tables with their conditions, as Markdown."""
+    outcomes = list(found.values())
+    source = "images" if options.images else "true features with 0.5 px of noise"
+    scale = ", measured distance of the bands" if options.band_distance else ""
+    parts = [
+        f"Instrument `{options.instrument}`, seeds {min(found)} to {max(found)}, {source}{scale}.",
+        error_table(outcomes),
+    ]
+    if options.loop:
+        parts.append(loop_table(outcomes))
+    if options.alarms:
+        parts.append(alarm_table(outcomes))
+    return "\n\n".join(parts)
+
+
+def main() -> None:
+    options = arguments()
+    found = measure(options)
+    if not found:
+        raise SystemExit("No calibration is finished.")
+    text = report(options, found)
+    if options.json:
+        print(json.dumps({seed: asdict(outcome) for seed, outcome in found.items()}))
+    else:
+        for seed, outcome in found.items():
+            shown = {name: round(value, 2) for name, value in outcome.errors.items()}
+            print(seed, "" if outcome.is_plausible else "NOT PLAUSIBLE", shown, *outcome.warnings)
+        print(text)
+    if options.write:
+        insert(PAGE, options.write, text)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,76 @@
+"""Tables of the calibration benchmark, as Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from calibration.evaluation import Outcome, column
+from tautscope.dof import Dof
+
+
+def error_table(outcomes: Sequence[Outcome]) -> str:
+    """Median and worst error of each quantity, and the share of images with both bands."""
+    lines = ["| error | median | 90th percentile | worst |", "|---|--:|--:|--:|"]
+    for name in outcomes[0].errors:
+        sizes = np.abs([each.errors[name] for each in outcomes])
+        values = np.median(sizes), np.percentile(sizes, 90), sizes.max()
+        lines.append(f"| {name} | " + " | ".join(f"{value:.2g}" for value in values) + " |")
+    first, last = np.array([each.found for each in outcomes]).T
+    plausible = sum(each.is_plausible for each in outcomes)
+    seconds = [each.seconds for each in outcomes]
+    lines += [
+        "",
+        f"Plausible: {plausible} of {len(outcomes)}. Truth in the 95 % interval: "
+        f"{coverage(outcomes):.0%} ({_coverages(outcomes)}). Both bands in {np.median(first):.0%} "
+        f"of the images (least {first.min():.0%}), at last in {np.median(last):.0%} (least "
+        f"{last.min():.0%}). Fit: {np.median(seconds):.1f} s, at most {max(seconds):.1f} s of "
+        "processor time.",
+    ]
+    return "\n".join(lines)
+
+
+def coverage(outcomes: Sequence[Outcome]) -> float:
+    """Share of the truths in their 95 % intervals."""
+    return float(np.mean([list(each.inside.values()) for each in outcomes]))
+
+
+def _coverages(outcomes: Sequence[Outcome]) -> str:
+    names = outcomes[0].inside
+    shares = {name: np.mean([each.inside[name] for each in outcomes]) for name in names}
+    return ", ".join(f"{name} {share:.0%}" for name, share in shares.items())
+
+
+def loop_table(outcomes: Sequence[Outcome]) -> str:
+    """State error and tracking error of the loop by what it is told."""
+    lines = [
+        "| DOF | state error, calibrated over exact: median (worst) | told over exact | reduction "
+        "of the tracking RMS, calibrated | exact | told | loss in points: median (worst) |",
+        "|---|--:|--:|--:|--:|--:|--:|",
+    ]
+    for dof in Dof:
+        exact = column(outcomes, "state", "exact", dof)
+        ratio = column(outcomes, "state", "calibrated", dof) / exact
+        before = column(outcomes, "state", "told", dof) / exact
+        plain = column(outcomes, "hand", "none", dof)
+        left = {
+            name: 100 * (1 - column(outcomes, "hand", name, dof) / plain)
+            for name in ("calibrated", "exact", "told")
+        }
+        loss = left["exact"] - left["calibrated"]
+        lines.append(
+            f"| {dof.label} | {np.nanmedian(ratio):.2f} ({np.nanmax(ratio):.2f}) | "
+            f"{np.nanmedian(before):.2f} | {np.nanmedian(left['calibrated']):.0f} % | "
+            f"{np.nanmedian(left['exact']):.0f} % | {np.nanmedian(left['told']):.0f} % | "
+            f"{np.nanmedian(loss):.1f} ({np.nanmax(loss):.1f}) |"
+        )
+    return "\n".join(lines)
+
+
+def alarm_table(outcomes: Sequence[Outcome]) -> str:
+    """How often each contradiction was recognised."""
+    lines = ["| record | recognised |", "|---|--:|"]
+    for name in outcomes[0].alarms:
+        rings = sum(each.alarms[name] for each in outcomes)
+        lines.append(f"| {name} | {rings} of {len(outcomes)} |")
+    return "\n".join(lines)

@@ -1,0 +1,119 @@
+"""The command ``tautscope calibrate all``."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tautscope.commands import arguments
+from tautscope.commands.calibrate_camera import add_board_options
+from tautscope.commands.calibration_rig import add_rig_options, refuse_wrong_limits
+from tautscope.commands.printing import print_json
+from tautscope.errors import TautscopeError
+
+if TYPE_CHECKING:
+    from tautscope.calibration.result import CalibrationResult
+    from tautscope.commands.calibration_session import CalibrationSession
+    from tautscope.commands.calibration_steps import Step
+
+_NAMES = ("camera", "colour", "geometry", "doctor", "motion")
+_INCOMPLETE = 1
+
+
+def add_parser(kinds: arguments.Verbs) -> None:
+    """Add the command to the parser of ``tautscope calibrate``."""
+    every = arguments.add_verb(
+        kinds,
+        "all",
+        help="all calibrations in turn, then a check and a first compensated motion",
+        description="Calibrate the camera, the colour of the bands and the geometry, check the rig "
+        "as doctor, and run a first compensated motion. Each result is written into the "
+        "configuration at once; an interrupted sequence is resumed by the same command. THE MOTORS "
+        "MOVE, after a question. Writes a folder with a report.",
+        extras=["hardware"],
+    )
+    arguments.add_config(every, required=True)
+    add_board_options(every)
+    add_rig_options(every)
+    every.add_argument(
+        "--skip", action="append", choices=_NAMES, default=[], help="leave out a step; repeatable"
+    )
+    every.add_argument(
+        "--restart", action="store_true", help="begin anew instead of resuming the last sequence"
+    )
+    arguments.add_out(every, "calibrate")
+    arguments.add_json(every)
+    every.set_defaults(run=_run)
+
+
+def _run(options: argparse.Namespace) -> int:
+    from tautscope.commands.calibration_session import CalibrationSession  # noqa: PLC0415
+    from tautscope.commands.calibration_steps import STEPS  # noqa: PLC0415
+    from tautscope.config import load_config  # noqa: PLC0415
+    from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
+
+    config = load_config(options.config)
+    if options.twin:
+        options.seed = config.twin.seed if options.seed is None else options.seed
+    else:
+        refuse_wrong_limits(options.config)
+    folder = check_free(options.out or default_folder("calibrate"))
+    seed = options.seed if options.twin else None
+    session = CalibrationSession.open(Path(options.config), folder, seed, restart=options.restart)
+    if session.state.done:
+        _say(f"Resumed; done: {', '.join(session.state.done)}. Folder: {session.folder}")
+    for number, step in enumerate(STEPS, 1):
+        if step.name in session.state.done:
+            continue
+        _say(f"\nStep {number} of {len(STEPS)}: {step.title}. {step.todo}")
+        if not _do(step, session, options):
+            _say(f"Stopped. To resume: tautscope calibrate all --config {options.config}")
+            return _INCOMPLETE
+    report = session.finish({step.name: step.title for step in STEPS})
+    if options.json:
+        print_json({"folder": str(session.folder), "done": session.state.done})
+    else:
+        print(f"Calibrated: {options.config}. Report: {report}")
+    return 0
+
+
+def _do(step: Step, session: CalibrationSession, options: argparse.Namespace) -> bool:
+    """Do or skip a step; False if the user stops."""
+    result: CalibrationResult | None = None
+    while True:
+        answer = "s" if step.name in options.skip else _answer(options)
+        if answer == "q":
+            return False
+        if answer == "s":
+            break
+        try:
+            # The answer was the question whether the motors may move.
+            confirmed = argparse.Namespace(**{**vars(options), "yes": True})
+            result = step.run(confirmed, session.config, session.folder)
+            break
+        except TautscopeError as error:
+            if options.yes:
+                raise
+            _say(f"error: {error}")
+    session.finish_step(step.name, result)
+    for note in result.notes if result is not None else ("skipped",):
+        _say(f"  {note}")
+    return True
+
+
+def _answer(options: argparse.Namespace) -> str:
+    """``y`` to do the step, ``s`` to skip it, ``q`` to stop."""
+    if options.yes or options.twin:
+        return "y"
+    print("Type y to start, s to skip, q to stop: ", end="", file=sys.stderr, flush=True)
+    line = sys.stdin.readline()
+    answer = line.strip().lower()[:1]
+    return (
+        answer if answer in ("y", "s") else "q" if answer == "q" or not line else _answer(options)
+    )
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)

@@ -1,0 +1,169 @@
+"""A calibration of all kinds in sequence: its state, which survives an interruption, and report."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from tautscope.config import Config, dump_config, load_config
+from tautscope.config.edit import writable_file, write_values
+from tautscope.errors import ConfigError
+
+if TYPE_CHECKING:
+    from tautscope.calibration.result import CalibrationResult
+
+
+class SessionState(msgspec.Struct, forbid_unknown_fields=True):
+    """The state file beside the configuration.
+
+    Attributes:
+        folder: Folder of the report.
+        seed: Seed of the twin, None on a rig.
+        done: Names of the steps done or skipped.
+        is_finished: Whether all were done.
+    """
+
+    folder: str
+    seed: int | None = None
+    done: list[str] = msgspec.field(default_factory=list)
+    is_finished: bool = False
+
+
+@dataclass
+class CalibrationSession:
+    """A sequence of calibrations of one configuration file.
+
+    Attributes:
+        file: The configuration.
+        state: What is done.
+    """
+
+    file: Path
+    state: SessionState
+
+    @staticmethod
+    def state_file(file: Path) -> Path:
+        """The state file of a configuration."""
+        return file.with_suffix(".calibration.json")
+
+    @classmethod
+    def open(
+        cls, file: Path, folder: Path, seed: int | None, *, restart: bool
+    ) -> CalibrationSession:
+        """Resume the session of a configuration, or begin one.
+
+        Raises:
+            MissingPathError, ConfigError: The file is missing or shipped, its state is damaged, or
+                the session to be resumed is of another rig.
+        """
+        path = cls.state_file(writable_file(file))
+        state = None if restart else _read(path)
+        if state is None or state.is_finished:
+            return cls(file, SessionState(str(folder), seed))
+        if state.seed != seed:
+            names = [
+                "the rig" if one is None else f"--twin --seed {one}" for one in (state.seed, seed)
+            ]
+            allowed = f"{names[0]}, whose calibration is unfinished; or --restart"
+            raise ConfigError("session", names[1], allowed)
+        return cls(file, state)
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the report."""
+        return Path(self.state.folder)
+
+    @property
+    def config(self) -> Config:
+        """The configuration as it is now."""
+        return load_config(self.file)
+
+    def finish_step(self, name: str, result: CalibrationResult | None) -> None:
+        """Write the values, figures and notes of a step, then note it as done.
+
+        A result of None is a step that was skipped.
+        """
+        if result is not None:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            pictures = []
+            for k, (figure, caption) in enumerate(result.figures):
+                picture = f"{name}_{k + 1}.png"
+                figure.savefig(self.folder / picture, dpi=130)
+                pictures.append([picture, caption])
+            values = result.rounded_values()
+            document = {"values": values, "notes": list(result.notes), "figures": pictures}
+            document["std"] = dict(result.std)
+            _write(self.folder / f"{name}.json", document)
+            if values:
+                write_values(self.file, result.changes())
+        self.state.done.append(name)
+        _write(self.state_file(self.file), msgspec.to_builtins(self.state))
+
+    def finish(self, titles: Mapping[str, str]) -> Path:
+        """Write the report, and note that all is done; the path of the report."""
+        report = self.folder / "report.html"
+        report.write_text(self._page(titles), encoding="utf-8")
+        self.state.is_finished = True
+        _write(self.state_file(self.file), msgspec.to_builtins(self.state))
+        return report
+
+    def _page(self, titles: Mapping[str, str]) -> str:
+        from tautscope.report.report import document  # noqa: PLC0415
+
+        parts = []
+        for name, title in titles.items():
+            file = self.folder / f"{name}.json"
+            parts.append(f"<h2>{escape(title)}</h2>")
+            if not file.exists():
+                parts.append('<p class="note">Skipped.</p>')
+                continue
+            found = json.loads(file.read_text(encoding="utf-8"))
+            parts += [f"<p>{escape(note)}</p>" for note in found["notes"]]
+            if found["values"]:
+                parts.append(_table(found["values"], found["std"]))
+            for picture, caption in found["figures"]:
+                code = base64.b64encode((self.folder / picture).read_bytes()).decode()
+                parts.append(
+                    f'<figure><img alt="{escape(caption)}" src="data:image/png;base64,{code}">'
+                    f"<figcaption>{escape(caption)}</figcaption></figure>"
+                )
+        parts.append(f"<h2>Configuration</h2><pre>{escape(dump_config(self.config))}</pre>")
+        kind = "a simulated rig" if self.state.seed is not None else "the rig"
+        return document("Calibration", f"Calibration of {kind} of {self.file}.", "\n".join(parts))
+
+
+def _table(values: Mapping[str, Any], std: Mapping[str, float]) -> str:
+    rows = []
+    for key, value in values.items():
+        items = value if isinstance(value, list) else [value]
+        shown = ", ".join(f"{item:g}" if isinstance(item, float) else str(item) for item in items)
+        known = [std[name] for name in (key, *(f"{key}[{k}]" for k in range(8))) if name in std]
+        spread = ", ".join(f"{each:.2g}" for each in known)
+        rows.append(f"<tr><td>{escape(key)}</td><td>{shown}</td><td>{spread}</td></tr>")
+    head = "<tr><th>key</th><th>value</th><th>standard deviation</th></tr>"
+    table = f"<table><thead>{head}</thead><tbody>{''.join(rows)}</tbody></table>"
+    return f'<div class="wide">{table}</div>'
+
+
+def _read(path: Path) -> SessionState | None:
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=SessionState)
+    except FileNotFoundError:
+        return None
+    except msgspec.MsgspecError as error:
+        allowed = f"a state of `tautscope calibrate all` ({error}); or --restart"
+        raise ConfigError("session", str(path), allowed) from None
+
+
+def _write(path: Path, document: object) -> None:
+    """Replace a file in one step."""
+    partial = path.with_name(f".{path.name}.partial")
+    partial.write_text(json.dumps(document, indent=1), encoding="utf-8")
+    partial.replace(path)

@@ -1,0 +1,182 @@
+"""The steps of ``tautscope calibrate all``: each turns a configuration into a result."""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from tautscope.calibration.result import CalibrationResult
+from tautscope.commands import calibrate_camera, calibrate_colour, calibrate_geometry
+from tautscope.commands.calibration_rig import actual_rig, rig_for_calibration
+from tautscope.config import Config
+from tautscope.errors import CalibrationError
+
+MOTION_PERIODS = 3
+"""Periods per DOF of the first compensated motion."""
+MOTION = "motion"
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step.
+
+    Attributes:
+        name: ``camera``, ``colour``, ...
+        title: For the report.
+        todo: What the user has to prepare.
+        run: Takes the options of the command, the configuration as it is then, and a folder for
+            its own files; the result has no values if it only checks.
+    """
+
+    name: str
+    title: str
+    todo: str
+    run: Callable[[argparse.Namespace, Config, Path], CalibrationResult]
+
+
+def _camera(options: argparse.Namespace, config: Config, folder: Path) -> CalibrationResult:
+    from tautscope.calibration.camera.board import Board  # noqa: PLC0415
+    from tautscope.commands.board_images import live_images, twin_images  # noqa: PLC0415
+
+    board = Board(options.columns, options.rows, options.square)
+    if options.twin:
+        images = twin_images(actual_rig(config, options.seed), board)
+    else:
+        images = live_images(config, options.seconds)
+    result, info = calibrate_camera.calibrate(images, board, options.model)
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "camera_info.yaml").write_text(info, encoding="utf-8")
+    return result
+
+
+def _colour(options: argparse.Namespace, config: Config, folder: Path) -> CalibrationResult:
+    return calibrate_colour.calibrate(options)
+
+
+def _geometry(options: argparse.Namespace, config: Config, folder: Path) -> CalibrationResult:
+    from tautscope.calibration.geometry import fit, sweep  # noqa: PLC0415
+    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
+    from tautscope.hardware.realtime import VISION, set_realtime_priority  # noqa: PLC0415
+
+    with ExitStack() as resources:
+        setup = resources.enter_context(rig_for_calibration(options))
+        executor = None
+        if not options.twin:
+            executor = resources.enter_context(
+                ThreadPoolExecutor(1, "vision", set_realtime_priority, (VISION,))
+            )
+        progress = resources.enter_context(progress_bar("sweep"))
+        recording = sweep(setup.rig, config, executor=executor, progress=progress)
+        serial_numbers = setup.serial_numbers()
+    # A board determines the intrinsics better than the instrument.
+    found = fit(
+        recording, config, intrinsics="focal" if config.calibration.camera is None else "none"
+    )
+    result = calibrate_geometry.result(found)
+    notes = (f"residual {found.residual_px:.2g} px", *result.notes)
+    return replace(result, serial_numbers=serial_numbers, notes=notes)
+
+
+def _doctor(options: argparse.Namespace, config: Config, folder: Path) -> CalibrationResult:
+    from tautscope.commands.doctor import run_checks  # noqa: PLC0415
+    from tautscope.hardware.doctor.calibration import check_calibration  # noqa: PLC0415
+
+    if options.twin:
+        findings = check_calibration(config.calibration, {})
+    else:
+        findings = list(run_checks(config, is_rig=True, folder=Path.cwd()))
+    lines = [f"{each.status}: {each.what}: {each.found}" for each in findings]
+    missing = [each for each in findings if each.status == "missing"]
+    if missing:
+        what = "; ".join(f"{each.what}: {each.found}" for each in missing)
+        remedy = "; ".join(each.todo for each in missing if each.todo)
+        raise CalibrationError(f"doctor does not approve the rig: {what}", remedy)
+    return CalibrationResult("doctor", {}, notes=tuple(lines))
+
+
+def _motion(options: argparse.Namespace, config: Config, folder: Path) -> CalibrationResult:
+    from tautscope.commands.hardware import summary_line  # noqa: PLC0415
+    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
+    from tautscope.report import figures  # noqa: PLC0415
+    from tautscope.report.results import evaluate  # noqa: PLC0415
+
+    config = config.replace(**{"experiment.periods": MOTION_PERIODS})
+    # A run that failed has left its log in a folder.
+    names = (folder / (f"{MOTION}-{k}" if k else MOTION) for k in itertools.count())
+    place = next(each for each in names if not each.exists())
+    with progress_bar("first compensated motion") as progress:
+        if options.twin:
+            from tautscope.loop.references import SineSequence  # noqa: PLC0415
+            from tautscope.runs.experiment import run_experiment  # noqa: PLC0415
+
+            with rig_for_calibration(options) as setup:
+                recording = run_experiment(
+                    setup.rig,
+                    SineSequence(config.experiment),
+                    config,
+                    progress=lambda elapsed, duration: progress(elapsed / duration),
+                )
+            place.mkdir(parents=True)
+            recording.write(place)
+        else:
+            from tautscope.hardware.experiment import (  # noqa: PLC0415
+                run_on_hardware,
+                write_run_folder,
+            )
+
+            run = run_on_hardware(config, place, progress)
+            write_run_folder(run, place)
+            recording = run.compensated.recording
+    results = evaluate(None, recording)
+    with figures.style():
+        figure = figures.figure9(None, recording)
+    notes = [summary_line(dof, result) for dof, result in results.items()]
+    if options.twin:
+        notes += [
+            f"{dof.label}: true slack {dof.display_scale * result.compensated:.3g} "
+            f"{dof.display_unit}"
+            for dof, result in results.items()
+        ]
+    caption = (
+        "First compensated motion: reference, command, estimate and contact offsets; below, the "
+        "loops of the estimate over the reference."
+    )
+    warnings = tuple(f"Warning: {each}" for each in recording.warnings)
+    return CalibrationResult(MOTION, {}, notes=(*notes, *warnings), figures=((figure, caption),))
+
+
+STEPS = (
+    Step(
+        "camera",
+        "Camera",
+        "Show the printed board (`tautscope calibrate camera --board board.pdf`) to the camera, in "
+        "all parts of the image, tilted to all sides; hold it still in each pose.",
+        _camera,
+    ),
+    Step(
+        "colour",
+        "Colour of the bands",
+        "Bring the instrument with both bands into view, and hold the scope still. THE MOTORS OF "
+        "INSERTION AND BENDING MOVE for 10 s.",
+        _colour,
+    ),
+    Step(
+        "geometry",
+        "Geometry",
+        "The same. ALL MOTORS MOVE for a minute; the tip must be free.",
+        _geometry,
+    ),
+    Step("doctor", "Check of the rig", "No motor is enabled.", _doctor),
+    Step(
+        MOTION,
+        "First compensated motion",
+        "ALL MOTORS MOVE in turn, for 90 s with the default experiment; a hand at the emergency "
+        "stop.",
+        _motion,
+    ),
+)
