@@ -10,7 +10,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
-from tautscope.report import style
+from tautscope import figure_style as style
 
 ROOT = Path(__file__).resolve().parents[1]
 PALETTE = [
@@ -65,7 +65,7 @@ def test_red_and_green_would_not_pass() -> None:
         file.relative_to(ROOT).as_posix()
         for folder in ("python", "benchmarks", "docs", "examples")
         for file in sorted((ROOT / folder).rglob("*.py"))
-        if "matplotlib" in file.read_text(encoding="utf-8") and file.name != "style.py"
+        if "matplotlib" in file.read_text(encoding="utf-8") and file.name != "figure_style.py"
     ],
 )
 def test_every_figure_has_its_colours_from_the_palette(file: str) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from tautscope.dof import Dof
+from tautscope.figure_style import BLUE, ORANGE
 from tautscope.report import figures, tables
 from tautscope.report.demo import Demo, demo_report
 from tautscope.report.operator_figure import draw_operator_motion
@@ -19,7 +20,6 @@ from tautscope.report.operator_motion import OperatorResult
 from tautscope.report.report import CaptionedFigure, run_report
 from tautscope.report.results import DofResult, evaluate
 from tautscope.report.rows import ARTICLE, OPERATOR_ROWS, ROWS
-from tautscope.report.style import BLUE, ORANGE
 from tautscope.report.tables import article_cell, cell
 from tautscope.runs.recording import Recording
 

@@ -12,8 +12,8 @@ from hysteresis.measures import fold_reduction, uncompensated_width
 from hysteresis.scenarios import CHANGING_PERIODS, REST_FOR, STRAIGHT
 from matplotlib.figure import Figure
 from tautscope.dof import Dof
+from tautscope.figure_style import BLACK, BLUE, GREEN, GREY, ORANGE, save_png, style
 from tautscope.report.results import evaluate
-from tautscope.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, save_png, style
 
 DOF_COLOURS = (BLUE, ORANGE, GREEN)
 

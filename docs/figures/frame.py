@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 from tautscope import Frame, HysteresisReduction, Report, Twin, load_config
+from tautscope.figure_style import YELLOW, style
 from tautscope.references import SineSequence
-from tautscope.report.style import YELLOW, style
 
 Floats = NDArray[np.float64]
 

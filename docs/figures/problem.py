@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from tautscope import Compensator, Play
-from tautscope.report.style import AMBER, BLACK, BLUE, GREY, ORANGE, save_png, style
+from tautscope.figure_style import AMBER, BLACK, BLUE, GREY, ORANGE, save_png, style
 
 Floats = NDArray[np.float64]
 

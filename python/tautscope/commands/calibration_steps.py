@@ -77,9 +77,9 @@ def _geometry(options: argparse.Namespace, config: Config, folder: Path) -> Cali
     found = fit(
         recording, config, intrinsics="focal" if config.calibration.camera is None else "none"
     )
-    result = calibrate_geometry.result(found)
+    result = calibrate_geometry.result(found, serial_numbers)
     notes = (f"residual {found.residual_px:.2g} px", *result.notes)
-    return replace(result, serial_numbers=serial_numbers, notes=notes)
+    return replace(result, notes=notes)
 
 
 def _doctor(options: argparse.Namespace, config: Config, folder: Path) -> CalibrationResult:
@@ -133,8 +133,7 @@ def _motion(options: argparse.Namespace, config: Config, folder: Path) -> Calibr
             write_run_folder(run, place)
             recording = run.compensated.recording
     results = evaluate(None, recording)
-    with figures.style():
-        figure = figures.figure9(None, recording)
+    figure = figures.figure9(None, recording)
     notes = [summary_line(dof, result) for dof, result in results.items()]
     if options.twin:
         notes += [

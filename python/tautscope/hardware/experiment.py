@@ -141,9 +141,9 @@ def run_on_hardware(
 
 def write_run_folder(run: HardwareRun, folder: Path) -> None:
     """Write tables, timing, figures and report into the folder of the logs."""
+    from tautscope.figure_style import style  # noqa: PLC0415
     from tautscope.hardware.timing_figure import timing_figure  # noqa: PLC0415  matplotlib
     from tautscope.report import figures, report, tables  # noqa: PLC0415  matplotlib takes half a second
-    from tautscope.report.style import style  # noqa: PLC0415
 
     first, results = run.compensated, run.results
     first.recording.write(folder)

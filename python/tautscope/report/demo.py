@@ -162,9 +162,9 @@ def write_run_folder(demo: Demo, folder: str | PathLike[str]) -> None:
         OutputError: The folder is not empty, or cannot be written.
     """
     # Matplotlib takes half a second to import.
+    from tautscope.figure_style import style  # noqa: PLC0415
     from tautscope.report import figures  # noqa: PLC0415
     from tautscope.report.operator_figure import draw_operator_motion  # noqa: PLC0415
-    from tautscope.report.style import style  # noqa: PLC0415
 
     figure9 = figures.figure9(demo.uncompensated, demo.compensated, demo.article)
     captioned = [CaptionedFigure(figure9, _figure9_caption(demo))]

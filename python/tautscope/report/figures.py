@@ -13,10 +13,7 @@ from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from tautscope.config import Config
-from tautscope.loop.references import Segment
-from tautscope.loop.vision import MarkerDetector
-from tautscope.report.results import estimated_loop, true_loop, used_frames
-from tautscope.report.style import (
+from tautscope.figure_style import (
     BLACK,
     BLUE,
     GREEN,
@@ -28,6 +25,9 @@ from tautscope.report.style import (
     YELLOW,
     style,
 )
+from tautscope.loop.references import Segment
+from tautscope.loop.vision import MarkerDetector
+from tautscope.report.results import estimated_loop, true_loop, used_frames
 from tautscope.runs.recording import Recording, Snapshot
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from tautscope.dof import Dof
+from tautscope.figure_style import BLACK, BLUE, GREY, ORANGE, PAGE, style
 from tautscope.report.operator_motion import EVALUATED_AFTER
-from tautscope.report.style import BLACK, BLUE, GREY, ORANGE, PAGE, style
 from tautscope.runs.recording import Recording
 
 if TYPE_CHECKING:
