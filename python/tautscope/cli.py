@@ -16,6 +16,7 @@ from tautscope.commands import (
     bench,
     calibrate,
     config,
+    console,
     demo,
     doctor,
     hardware,
@@ -86,6 +87,7 @@ def _parser() -> argparse.ArgumentParser:
     analyze.add_parser(verbs)
     log.add_parsers(verbs)
     hardware.add_parser(verbs)
+    console.add_parser(verbs)
     bench.add_parser(verbs)
     doctor.add_parser(verbs)
     calibrate.add_parser(verbs)
