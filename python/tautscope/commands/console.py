@@ -46,7 +46,9 @@ def _console(options: argparse.Namespace) -> int:
         require_extras("tautscope console --replay", ["hardware"])
         from tautscope.console.log_player import play  # noqa: PLC0415
 
-        return play(options.replay, options.port, lambda url: _announce(options.json, url, "replay"))
+        return play(
+            options.replay, options.port, lambda url: _announce(options.json, url, "replay")
+        )
     require_extras("tautscope console", ["twin" if options.twin else "hardware"])
     from tautscope.console.start import start_console  # noqa: PLC0415
     from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
@@ -59,7 +61,10 @@ def _console(options: argparse.Namespace) -> int:
     folder = check_free(options.out or default_folder("console"))
     what = "the twin" if options.twin else f"REAL MOTORS of {options.config}"
     return start_console(
-        config, folder, options.port, lambda url: _announce(options.json, url, what),
+        config,
+        folder,
+        options.port,
+        lambda url: _announce(options.json, url, what),
         is_twin=options.twin,
     )
 

@@ -160,5 +160,3 @@ def _described(message: msg.Request) -> str:
         dof = f" {message.dof}" if message.name != "compensation" else ""
         return f"{message.name}{dof} {message.value:g}"
     return f"{message.name} {message.text}".strip()
-
-

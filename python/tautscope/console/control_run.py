@@ -78,9 +78,11 @@ class ControlRun:
         rig: LiveRig,
         sample: Sample,
         operator: OperatorInput,
+        *,
         path: Path,
         executor: Executor,
     ) -> None:
+        self.sample = sample
         self.loop = HysteresisReduction(config)
         self.path = path
         self.log = LogWriter(path, config)
@@ -90,7 +92,6 @@ class ControlRun:
         self._arrivals: deque[tuple[int, float]] = deque(maxlen=16)
         self._last_frame: int | None = None
         self._began = 0.0
-        self.sample = sample
         self.reference = self.command = operator.reference.copy()
         self.report: Report | None = None
         self.ticks = self.late = self.unused = 0

@@ -75,7 +75,9 @@ class StateFeed:
                         lambda: self._number != number or bool(replies)  # noqa: B023
                     )
                 while replies:
-                    await connection.send(f'{{"type":"reply","reply":{replies.popleft().decode()}}}')
+                    await connection.send(
+                        f'{{"type":"reply","reply":{replies.popleft().decode()}}}'
+                    )
                 if self._number != number:
                     number = self._number
                     latency = msg.encode(self._latency()).decode()

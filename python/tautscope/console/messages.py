@@ -10,15 +10,12 @@ from typing import Annotated, Any, Literal, TypeAlias
 import msgspec
 from msgspec import Meta, Struct
 
-from tautscope.dof import Dof
-
 Count = Annotated[int, Meta(ge=0, lt=2**53)]
 """An integer that JavaScript represents exactly."""
 Axis = Annotated[float, Meta(ge=-1, le=1)]
 Share = Annotated[float, Meta(ge=0, le=1)]
 Text = Annotated[str, Meta(max_length=200)]
 DofName = Literal["insertion", "rotation", "bending"]
-assert DofName.__args__ == tuple(dof.label for dof in Dof)
 ActionName = Literal[
     "acknowledge",
     "enable",

@@ -16,7 +16,6 @@ from tautscope.console.shared import ImageChannel, Overlay
 from tautscope.console.state import LogState
 from tautscope.hardware.realtime import OTHERS, set_realtime_priority
 from tautscope.loop.construction import build_feature_model
-from tautscope.loop.reduction import Report
 from tautscope.loop.rig import Frame
 
 Floats = NDArray[np.float64]
@@ -31,14 +30,18 @@ class Update:
     Attributes:
         sequence: Of the image, as in `tautscope.console.lease.ImageTimes`.
         frame: The frame.
-        report: Its report; None in a replay without estimates.
+        estimate: State estimate (3,) [m, rad, rad].
+        predicted: Predicted state (3,) [m, rad, rad].
+        found: Which bands were found.
         reference: (3,) [m, rad, rad].
         arrived_at: When the control loop got the frame [s, monotonic clock].
     """
 
     sequence: int
     frame: Frame
-    report: Report
+    estimate: Floats
+    predicted: Floats
+    found: tuple[bool, bool]
     reference: Floats
     arrived_at: float
 
@@ -95,13 +98,11 @@ class Publisher:
                 self._check_log(checked)
 
     def _overlay(self, update: Update) -> Overlay:
-        report = update.report
         overlay = Overlay(update.sequence, update.arrived_at, *self._size)
-        found = (False, False) if report.detection is None else report.detection.found
-        measured = self._outlines(report.state_estimate)
-        overlay.measured = [outline for outline, is_found in zip(measured, found) if is_found]
-        overlay.predicted = self._outlines(report.predicted_state)
-        overlay.tip = self._tip(report.state_estimate)
+        measured = zip(self._outlines(update.estimate), update.found, strict=False)
+        overlay.measured = [outline for outline, is_found in measured if is_found]
+        overlay.predicted = self._outlines(update.predicted)
+        overlay.tip = self._tip(update.estimate)
         overlay.target = self._tip(update.reference)
         return overlay
 

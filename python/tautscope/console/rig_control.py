@@ -130,7 +130,9 @@ class RigControl:
     def _start_run(self, sample: Sample) -> None:
         self._runs += 1
         path = self.folder / f"console-{self._runs}.mcap"
-        self.run = ControlRun(self.config, self._rig, sample, self.operator, path, self._executor)
+        self.run = ControlRun(
+            self.config, self._rig, sample, self.operator, path=path, executor=self._executor
+        )
         if self.compensation != 1:
             self.run.loop.set_compensation(self.compensation)
 

@@ -23,7 +23,6 @@ from websockets.http11 import Request, Response
 
 from tautscope.console import messages as msg
 from tautscope.console.access import (
-    ADDRESS,
     LARGEST_CONNECTIONS,
     LARGEST_MESSAGE,
     TOKEN_TIME,
@@ -87,9 +86,7 @@ class Server:
             "server_header": None,
         }
         async with serve(self._handle, **address, **options) as server:
-            feeding = [
-                asyncio.create_task(feed.run()) for feed in (self._states, self._images)
-            ]
+            feeding = [asyncio.create_task(feed.run()) for feed in (self._states, self._images)]
             try:
                 yield server
             finally:

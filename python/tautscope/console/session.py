@@ -71,7 +71,11 @@ class Session:
         self._publisher.log_path = run.path
         for frame, report, arrived_at in run.tick():
             sequence = control.images.add(arrived_at)
-            self._publisher.submit(Update(sequence, frame, report, run.reference, arrived_at))
+            detection = report.detection
+            found = (False, False) if detection is None else detection.found
+            states = report.state_estimate, report.predicted_state
+            update = Update(sequence, frame, *states, found, run.reference, arrived_at)
+            self._publisher.submit(update)
         supervision = run.loop.supervision
         if supervision.reaction.rank >= Reaction.QUICK_STOP.rank and control.is_hardware:
             reason = f"{supervision.reaction}: {', '.join(supervision.flags)}"

@@ -77,31 +77,32 @@ def _motion(control: RigControl) -> tuple[str, str]:
     """The kind of motion, and what is in force and why, in one line."""
     operator, run = control.operator, control.run
     if control.is_opening:
-        return "opening", "The drives are being enabled and move to the start position."
-    if operator.stopped_by:
-        return "stopped", f"{operator.stopped_by}. Motion is stopped until it is enabled."
-    if run is None:
-        if control.fault:
-            return "off", f"The drives are off: {control.fault}"
-        return "off", "The drives are off. Enabling moves the motors to the start position."
-    supervision = run.loop.supervision
-    reaction = supervision.reaction
+        found = "opening", "The drives are being enabled and move to the start position."
+    elif operator.stopped_by:
+        found = "stopped", f"{operator.stopped_by}. Motion is stopped until it is enabled."
+    elif run is not None:
+        found = _reaction(control, run)
+    elif control.fault:
+        found = "off", f"The drives are off: {control.fault}"
+    else:
+        found = "off", "The drives are off. Enabling moves the motors to the start position."
+    return found
+
+
+def _reaction(control: RigControl, run: ControlRun) -> tuple[str, str]:
+    supervision, program = run.loop.supervision, control.operator.program
+    motion = "moving" if control.operator.is_moving else "ready"
     why = "; ".join(MEANINGS[name] for name in supervision.flags)
-    if reaction in _EFFECTS:
-        text = f"{_EFFECTS[reaction]}: {why}"
-        return ("held" if run.is_held else _moving(control)), text
-    if why:
-        return _moving(control), f"Compensating; warning: {why}"
-    if operator.program is not None:
-        return "moving", f"Running: {operator.program.name}"
+    if supervision.reaction in _EFFECTS:
+        text = f"{_EFFECTS[supervision.reaction]}: {why}"
+        return ("held" if run.is_held else motion), text
     if control.compensation == 0:
-        return _moving(control), "Compensation is off; the command follows the reference."
-    share = control.compensation * supervision.lead
-    return _moving(control), f"Compensating, {share:.0%} of the free gain"
-
-
-def _moving(control: RigControl) -> str:
-    return "moving" if control.operator.is_moving else "ready"
+        text = "Compensation is off; the command follows the reference"
+    else:
+        text = f"Compensating with {control.compensation * supervision.lead:.0%} of the gain"
+    if program is not None:
+        text += f"; running: {program.name}"
+    return motion, f"{text}. Warning: {why}" if why else f"{text}."
 
 
 def _drives(control: RigControl) -> str:

@@ -126,7 +126,8 @@ class HysteresisReduction:
     Attributes:
         updates: Number of image updates so far.
         on_event: Called at every `engage`, `acknowledge`, `set_compensation` and `raise_flag` with
-            the name of the call (and the share or the flag): a replay needs these beside references and images.
+            the name of the call (and the share or the flag): a replay needs these beside references
+            and images.
     """
 
     def __init__(self, config: Config, compensate: bool = True) -> None:
