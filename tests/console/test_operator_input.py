@@ -233,7 +233,7 @@ EVENTS = st.lists(
 
 @settings(max_examples=500, deadline=None)
 @given(EVENTS)
-def test_any_sequence_of_events_moves_only_what_the_operator_holds(events) -> None:
+def test_any_sequence_of_events_moves_only_what_is_held(events) -> None:  # noqa: PLR0912
     desk, oracle = Desk(), Oracle()
     accepted_at = -np.inf
     desk.lease.take(1)

@@ -97,6 +97,9 @@ class Server:
         """Answer requests for pages; None lets the connection become a socket."""
         if not self._access.is_host(request.headers.get_all("Host")):
             return self._pages.plain(HTTPStatus.FORBIDDEN, "Forbidden")
+        # Older versions of websockets refuse other methods themselves.
+        if getattr(request, "method", "GET") != "GET":
+            return self._pages.plain(HTTPStatus.METHOD_NOT_ALLOWED, "Method Not Allowed")
         if request.path not in (CONTROL, VIDEO):
             return self._pages.response(request.path)
         if self._connections >= LARGEST_CONNECTIONS:
