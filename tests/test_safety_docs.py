@@ -12,7 +12,7 @@ from tautscope.loop.safety import DETECTORS, Reaction
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs" / "safety.md").read_text(encoding="utf-8")
-HAZARDS = {"V": 17, "E": 8, "C": 9, "D": 6, "P": 5, "L": 4}
+HAZARDS = {"V": 17, "E": 8, "C": 9, "D": 6, "P": 5, "L": 4, "N": 5, "M": 2, "U": 1}
 TEST = re.compile(r"`([\w./-]+\.(?:py|rs))::(\w+)`")
 
 

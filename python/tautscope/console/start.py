@@ -12,6 +12,7 @@ from pathlib import Path
 
 from tautscope.config import CameraConfig, Config
 from tautscope.console.access import ADDRESS, new_token
+from tautscope.console.control_run import LiveRig
 from tautscope.console.rig_control import RigControl
 from tautscope.console.server import run_server
 from tautscope.console.session import Session
@@ -50,13 +51,7 @@ def start_console(
     Raises:
         ConfigError: The port is taken, or the configuration does not describe a rig.
     """
-    if is_twin:
-        config = config.replace(drives=None)
-        from tautscope.console.live_twin import LiveTwin  # noqa: PLC0415  MuJoCo
-
-        rig: LiveTwin | HardwareRig = LiveTwin(config)
-    else:
-        rig = HardwareRig(config)
+    rig, config = make_rig(config, is_twin=is_twin)
     with exit_on_signals(), web_server(config.camera, port) as (server, channels, url):
         announce(url)
         with (
@@ -71,6 +66,20 @@ def start_console(
             except KeyboardInterrupt:
                 return 0
     return 1
+
+
+def make_rig(config: Config, *, is_twin: bool) -> tuple[LiveRig, Config]:
+    """The simulated instrument, or the drives and camera of a configuration; with its settings.
+
+    Raises:
+        ConfigError: The configuration does not describe a rig.
+    """
+    if not is_twin:
+        return HardwareRig(config), config
+    from tautscope.console.live_twin import LiveTwin  # noqa: PLC0415  MuJoCo
+
+    config = config.replace(drives=None)
+    return LiveTwin(config), config
 
 
 @contextmanager
