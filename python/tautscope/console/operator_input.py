@@ -87,11 +87,13 @@ class OperatorInput:
         """Take a deflection of the input device, unless the lease refuses it."""
         servo = received.message
         assert isinstance(servo, Servo)
-        # Its age counts from the arrival, also if the control loop reads it late.
-        reason = self._lease.refusal(received.client, servo, now, needs_image=True)
+        # While a rig opens there are no images yet; then only the page's presence counts.
+        moves = servo.is_holding or self.program is not None
+        reason = self._lease.refusal(received.client, servo, now, needs_image=moves)
         if reason:
             self.refused[reason] += 1
             return
+        # Its age counts from the arrival, also if the control loop reads it late.
         self._accepted_at = min(received.at, now)
         if not servo.is_holding:
             self._must_release = False

@@ -16,6 +16,7 @@ from tautscope.errors import TautscopeError
 from tautscope.hardware.rig import HardwareRig
 from tautscope.loop.rig import Sample
 
+INTERRUPTED = "STOP, or the page was away, while they were being enabled"
 _IDLE_PERIOD = 0.005
 """Time between two calls of `while_opening` [s]."""
 
@@ -57,6 +58,7 @@ class RigControl:
         self.while_opening: Callable[[], None] = lambda: None
         self._rig, self._executor = rig, executor
         self._runs = 0
+        self._was_interrupted = False
         self._endings: list[threading.Thread] = []
 
     @property
@@ -66,13 +68,13 @@ class RigControl:
 
     def open(self) -> None:
         """Enable the rig and start a run; a STOP, or a page that is gone, interrupts it."""
-        self.fault, self.is_opening = "", True
+        self.fault, self.is_opening, self._was_interrupted = "", True, False
         watching = threading.Thread(target=self._watch_opening, name="opening")
         watching.start()
         try:
             sample = self._rig.reset()
         except TautscopeError as error:
-            self.fault = str(error)
+            self.fault = INTERRUPTED if self._was_interrupted else str(error)
             return
         finally:
             self.is_opening = False
@@ -149,5 +151,6 @@ class RigControl:
             operator = self.operator
             is_wanted = not operator.stopped_by and operator.is_present(time.monotonic())
             if isinstance(self._rig, HardwareRig) and not is_wanted:
+                self._was_interrupted = True
                 self._rig.interrupt()
             time.sleep(_IDLE_PERIOD)
