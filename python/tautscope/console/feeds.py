@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import statistics
 import time
 from collections import deque
 from collections.abc import Callable
@@ -28,13 +27,14 @@ class StateFeed:
 
     Args:
         channels: Views of the shared memory.
-        latency: Returns the time from an image's arrival until it was drawn [s], if it is known.
+        latency: Returns median and 95th percentile of the time from an image's arrival until it
+            was drawn [s], if they are known.
 
     Attributes:
         holder: The connection that holds the lease, as of the newest state.
     """
 
-    def __init__(self, channels: Channels, latency: Callable[[], float | None]) -> None:
+    def __init__(self, channels: Channels, latency: Callable[[], tuple[float, float] | None]) -> None:
         self._channels = channels
         self._latency = latency
         self._newest = b""
@@ -115,7 +115,7 @@ class ImageFeed:
 
     Attributes:
         latencies: Times from the arrival of an image in the control process until a page reported
-            that it was drawn [s], the newest of all pages.
+            that it was drawn [s], the newest 250 of all pages.
     """
 
     def __init__(self, channel: ImageChannel, pixel_format: str) -> None:
@@ -125,7 +125,7 @@ class ImageFeed:
         self._newest = b""
         self._sequence = 0
         self._arrived_at = 0.0
-        self.latencies: deque[float] = deque(maxlen=2000)
+        self.latencies: deque[float] = deque(maxlen=250)
 
     async def run(self) -> None:
         """Poll the shared memory; encode an image if somebody sees it."""
@@ -161,9 +161,10 @@ class ImageFeed:
             pass
 
     @property
-    def latency(self) -> float | None:
-        """Median of the last 50 latencies [s]; None if nothing was drawn."""
-        return statistics.median(list(self.latencies)[-50:]) if self.latencies else None
+    def latency(self) -> tuple[float, float] | None:
+        """Median and 95th percentile of the latencies [s]; None if nothing was drawn."""
+        found = sorted(self.latencies)
+        return (found[len(found) // 2], found[19 * len(found) // 20]) if found else None
 
     def acknowledge(self, connection: ServerConnection, sequence: int) -> None:
         """A page has drawn an image, and with it those sent before."""

@@ -119,7 +119,7 @@ function facts() {
     profile: state.profile,
     images: `${view.rate.toFixed(1)}/s, ${image.status}`,
     "capture to estimate": `${(1000 * image.age).toFixed(0)} ms`,
-    "image to screen": state.latency === null ? "–" : `${(1000 * state.latency).toFixed(0)} ms`,
+    "image to screen": state.latency ? `${state.latency.map((time) => (1000 * time).toFixed(0)).join(" ms, 95 %: ")} ms` : "–",
     "images dropped": image.dropped,
     drives: state.drives,
     "late ticks": late[1] ? `${late[0]} of ${late[1]}` : "–",
