@@ -102,7 +102,7 @@ def test_a_closed_pipe_is_no_traceback(arguments: list[str]) -> None:
 def test_a_missing_file_is_named(capsys: Capture) -> None:
     columns = ["--command", "a", "--measured", "b"]
     assert "File not found: nope.csv." in failed(capsys, "analyze", "nope.csv", *columns)
-    for verb in ("config", "demo", "run", "doctor", "bench"):
+    for verb in ("config", "console", "demo", "run", "doctor", "bench"):
         assert "File not found: nope.toml." in failed(capsys, verb, "--config", "nope.toml"), verb
 
 
@@ -111,6 +111,7 @@ def test_a_missing_file_is_named(capsys: Capture) -> None:
     [
         ["demo"],
         ["run", "--config", "bench"],
+        ["console", "--twin"],
         ["analyze", "{record}", "--command", "a", "--measured", "b"],
     ],
     ids=lambda arguments: arguments[0],
@@ -172,7 +173,7 @@ def test_the_shell_completes() -> None:
         [sys.executable, "-m", "tautscope"], env=environment, capture_output=True, text=True,
         check=False,
     )  # fmt: skip
-    assert found.stdout.split() == ["config"]
+    assert found.stdout.split() == ["config", "console"]
 
 
 def test_a_missing_extra_is_one_line(capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -17,6 +17,7 @@ from tautscope.commands import (
     bench,
     calibrate,
     config,
+    console,
     demo,
     doctor,
     hardware,
@@ -91,6 +92,7 @@ def _parser() -> argparse.ArgumentParser:
     log.add_parsers(verbs)
     align.add_parser(verbs)
     hardware.add_parser(verbs)
+    console.add_parser(verbs)
     bench.add_parser(verbs)
     doctor.add_parser(verbs)
     calibrate.add_parser(verbs)

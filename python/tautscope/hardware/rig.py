@@ -148,6 +148,14 @@ class HardwareRig:
             raise
         return Sample(self._ticks * self.control_period, applied, frame)
 
+    def interrupt(self) -> None:
+        """Quick-stop the motors; for any thread, also during `reset` and `step`.
+
+        These raise `StateError` if one of them runs. Call `close` afterwards.
+        """
+        if (setpoints := self._setpoints) is not None:
+            setpoints.interrupt()
+
     def close(self) -> None:
         """Quick-stop the motors, release bus and camera; a second call does nothing.
 

@@ -134,8 +134,9 @@ class HysteresisReduction:
 
     Attributes:
         updates: Number of image updates so far.
-        on_event: Called at every `engage`, `acknowledge` and `raise_flag` with the name of the call
-            (and of the flag): a replay needs these beside references and images.
+        on_event: Called at every `engage`, `acknowledge`, `set_compensation` and `raise_flag` with
+            the name of the call (and the share or the flag): a replay needs these beside references
+            and images.
     """
 
     def __init__(self, config: Config, compensate: bool = True) -> None:
@@ -249,6 +250,17 @@ class HysteresisReduction:
         """
         self._loop.acknowledge()
         self._notify("acknowledge")
+
+    def set_compensation(self, share: float) -> None:
+        """Use a share of the compensation: all with 1, none with 0.
+
+        Bumpless: the command moves only with the reference. The supervisor uses a share of it.
+
+        Raises:
+            ConfigError: The share is not from 0 to 1; the loop is unchanged.
+        """
+        self._loop.set_compensation(float(share))
+        self._notify(f"set_compensation {float(share)!r}")
 
     def raise_flag(self, name: str) -> None:
         """Raise a flag that only the rig can detect: ``drive_fault``, ``following_error``.
