@@ -55,6 +55,14 @@ CONTROLS = {
     "L2": ["python/tautscope/log/mcap_records.py"],
     "L3": ["python/tautscope/log/cdr.py", "python/tautscope/log/mcap_records.py"],
     "L4": ["python/tautscope/config/section.py"],
+    "N1": ["python/tautscope/console/access.py", "python/tautscope/console/server.py"],
+    "N2": ["python/tautscope/console/access.py", "python/tautscope/console/pages.py"],
+    "N3": ["python/tautscope/console/operator_input.py"],
+    "N4": ["python/tautscope/console/session.py", "python/tautscope/console/rig_control.py"],
+    "N5": ["python/tautscope/console/lease.py"],
+    "M1": ["python/tautscope/hardware/rig_lock.py", "python/tautscope/console/lease.py"],
+    "M2": ["python/tautscope/commands/console.py", "python/tautscope/twin/faults.py"],
+    "U1": ["python/tautscope/console/session_state.py"],
 }
 """Hazard -> files of its control beyond those that raise the flags of its response."""
 PURPOSE = {
@@ -74,6 +82,7 @@ PURPOSE = {
     "python-can": "CAN frames: set-points, heartbeats, quick stop",
     "pysoem": "EtherCAT master",
     "dask": "benchmarks on a cluster",
+    "websockets": "web server of the console, in a process of its own",
 }
 """Python package -> what this software uses it for."""
 LICENCES = {"pysoem": "MIT License"}
@@ -122,7 +131,7 @@ def traceability() -> str:
 
 def hazards(page: str) -> Iterator[tuple[str, str, str, str]]:
     """Name, cause, response and tests of each hazard in docs/safety.md."""
-    for row in re.findall(r"^\| ([VECDPL]\d+) \| (.*) \|$", page, re.MULTILINE):
+    for row in re.findall(r"^\| ([VECDPLNMU]\d+) \| (.*) \|$", page, re.MULTILINE):
         cause, response, shown = re.split(r" (?<!\\)\| ", row[1], maxsplit=2)
         yield row[0], cause, response, shown
 

@@ -57,6 +57,15 @@ def test_options_have_one_meaning() -> None:
         assert "config" not in {a.dest for a in parser._actions if not a.option_strings}, words
 
 
+@pytest.mark.parametrize("words", ["demo", "config", "calibrate colour image.png mask.png"])
+def test_an_unknown_option_shows_the_usage_of_its_verb(capsys: Capture, words: str) -> None:
+    with pytest.raises(SystemExit) as stop:
+        main([*words.split(), "--output"])
+    verb, shown = words.partition(" image")[0], capsys.readouterr().err
+    assert stop.value.code == 2
+    assert shown.startswith(f"usage: tautscope {verb} [") and "arguments: --output" in shown
+
+
 def test_errors_have_the_documented_exit_status() -> None:
     help_text = _parser().format_help()
     for error, status in (
@@ -93,7 +102,7 @@ def test_a_closed_pipe_is_no_traceback(arguments: list[str]) -> None:
 def test_a_missing_file_is_named(capsys: Capture) -> None:
     columns = ["--command", "a", "--measured", "b"]
     assert "File not found: nope.csv." in failed(capsys, "analyze", "nope.csv", *columns)
-    for verb in ("config", "demo", "run", "doctor", "bench"):
+    for verb in ("config", "console", "demo", "run", "doctor", "bench"):
         assert "File not found: nope.toml." in failed(capsys, verb, "--config", "nope.toml"), verb
 
 
@@ -102,6 +111,7 @@ def test_a_missing_file_is_named(capsys: Capture) -> None:
     [
         ["demo"],
         ["run", "--config", "bench"],
+        ["console", "--twin"],
         ["analyze", "{record}", "--command", "a", "--measured", "b"],
     ],
     ids=lambda arguments: arguments[0],
@@ -163,7 +173,7 @@ def test_the_shell_completes() -> None:
         [sys.executable, "-m", "tautscope"], env=environment, capture_output=True, text=True,
         check=False,
     )  # fmt: skip
-    assert found.stdout.split() == ["config"]
+    assert found.stdout.split() == ["config", "console"]
 
 
 def test_a_missing_extra_is_one_line(capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,8 +15,9 @@ from tautscope.report.metrics import loop_width
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
 
-from plants.__main__ import GOAL, WORST_GOAL, table, to_rows
+from plants.__main__ import ESTIMATE_GOAL, GOAL, WORST_GOAL, table, to_rows
 from plants.simulated import GAIN, HALF, PlantRig
+from plants.tracking import Outcome
 from tautscope.config import load_config
 
 Floats = NDArray[np.float64]
@@ -62,9 +63,14 @@ def test_the_widths_of_the_other_instruments() -> None:
 
 
 def test_a_table_shows_the_missed_goals() -> None:
-    rows = to_rows({("gain 0.8", 0): [0.9, 0.81, 0.79], ("gain 0.8", 1): [0.9, 0.6, 0.79]})
-    assert [row["goal"] for row in rows] == [GOAL, WORST_GOAL] * 3
-    assert (
-        table(rows).splitlines()[-1]
-        == "| gain 0.8 | 90 (90) | 70 (60) | 79 (79) | rotation, bending |"
+    outcomes = {
+        ("gain 0.8", 0): Outcome([0.9, 0.81, 0.79], [0.8, 0.95, 0.8], 0.3),
+        ("gain 0.8", 1): Outcome([0.9, 0.6, 0.79], [0.85, 0.95, 0.8], 0.02),
+    }
+    rows = to_rows(outcomes)
+    goals = [GOAL, WORST_GOAL, ESTIMATE_GOAL]
+    assert [row["goal"] for row in rows] == goals * 3 + [ESTIMATE_GOAL]
+    assert table(rows).splitlines()[-1] == (
+        "| gain 0.8 | 90 (90) | 70 (60) | 79 (79) | 0.15 (0.15) | 0.16 (0.30) "
+        "| rotation, rotation gain, bending, share |"
     )

@@ -1,24 +1,29 @@
 """Report and figures: self-contained page, no global state."""
 
 import base64
+import importlib
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
+from pathlib import Path
 
 import matplotlib
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from tautscope.dof import Dof
+from tautscope.figure_style import BLUE, ORANGE
 from tautscope.report import figures, tables
 from tautscope.report.demo import Demo, demo_report
 from tautscope.report.operator_figure import draw_operator_motion
 from tautscope.report.operator_motion import OperatorResult
 from tautscope.report.report import CaptionedFigure, run_report
 from tautscope.report.results import DofResult, evaluate
-from tautscope.report.tables import OPERATOR_ROWS, ROWS, article_cell, cell
+from tautscope.report.rows import ARTICLE, OPERATOR_ROWS, ROWS
+from tautscope.report.tables import article_cell, cell
 from tautscope.runs.recording import Recording
 
+ROOT = Path(__file__).resolve().parents[1]
 VOID = {"meta", "img", "br"}
 
 
@@ -164,16 +169,49 @@ def test_figures_do_not_change_global_state(runs: tuple[Recording, Recording]) -
     assert np.nanmax(command.get_ydata()) > 40  # mm, and beyond the reference's 40
 
 
+def test_figure9_has_both_profiles_and_the_true_tip(runs: tuple[Recording, Recording]) -> None:
+    """A shift of the true tip of one run shows in its own row and loop."""
+    free, run = runs
+    article = replace(
+        run, config=run.config.replace(profile="paper"), trace=run.trace.copy()
+    )  # another drawn run
+    best = replace(run, config=run.config.replace(profile="best"))
+    shift = 3e-3
+    article.trace["true_insertion"] += shift
+    axes = figures.figure9(free, best, article).axes
+    assert [axis.get_title(loc="left")[:3] for axis in axes] == [f"({k})" for k in "abcdefghi"]
+    titles = [axis.get_title(loc="left") for axis in axes[::3]]
+    assert titles == [
+        "(a) insertion, profile best",
+        "(d) insertion, profile paper",
+        "(g) insertion",
+    ]
+    ours, theirs = (
+        next(line for line in axis.lines if line.get_label() == "true tip").get_ydata()
+        for axis in (axes[0], axes[3])
+    )
+    np.testing.assert_allclose(theirs - ours, 1e3 * shift)
+    loops = {line.get_color(): line.get_ydata() for line in axes[6].lines[::3][:3]}
+    np.testing.assert_allclose(loops[ORANGE] - loops[BLUE], 1e3 * shift)
+    unknown = replace(best, trace=best.trace.copy())
+    unknown.trace["true_insertion"] = np.nan
+    labels = [line.get_label() for line in figures.figure9(None, unknown).axes[0].lines]
+    assert "true tip" not in labels and "estimate q̂" in labels
+
+
 def test_the_uncompensated_loop_is_drawn_wider(runs: tuple[Recording, Recording]) -> None:
     axis = figures.figure9(*runs).axes[4]
-    before, after, first = (np.ptp(line.get_xdata() - line.get_ydata()) for line in axis.lines[:3])
+    drawn = [np.ptp(line.get_xdata() - line.get_ydata()) for line in axis.lines[:6]]
+    (before, _, _), (after, first, _) = drawn[:3], drawn[3:6]
     assert before > after > 0
     assert first > after, "the first period, before the offsets are estimated, is wider"
 
 
 def test_a_loop_without_measurements_is_labelled(runs: tuple[Recording, Recording]) -> None:
-    recording = replace(runs[1], frames=runs[1].frames.copy())
+    recording = replace(runs[1], frames=runs[1].frames.copy(), trace=runs[1].trace.copy())
     recording.frames["observable_rotation"] = False
+    for dof in Dof:
+        recording.trace[f"true_{dof.label}"] = np.nan
     for index, axis in enumerate(figures.figure9(None, recording).axes[3:]):
         assert [text.get_text() for text in axis.texts] == ["not measured"] * (index == 1)
 
@@ -207,6 +245,14 @@ def test_figure5_labels_the_markers_at_their_features(runs: tuple[Recording, Rec
     labels = {text.get_text(): text.xy for text in figure.axes[2].texts}
     np.testing.assert_array_equal([*labels["A"], *labels["B"]], snapshot.features)
     assert figure.axes[1].images[0].get_array().any()
+    legends = [axes.get_legend() for axes in figure.axes]
+    texts = [legend and [text.get_text() for text in legend.get_texts()] for legend in legends]
+    assert texts == [
+        None,
+        ["above the threshold"],
+        ["region of the mask", "measured marker"],
+        ["predicted s", "measured s*"],
+    ]
 
 
 @pytest.mark.parametrize(
@@ -227,15 +273,58 @@ def test_figures_are_rounded(name: str, value: float, text: str) -> None:
 
 
 def test_the_articles_values_are_those_of_its_table() -> None:
-    columns = [
-        [article_cell(row, dof) for row in ROWS if row.name in tables.ARTICLE] for dof in Dof
-    ]
+    columns = [[article_cell(row, dof) for row in ROWS if row.name in ARTICLE] for dof in Dof]
     assert columns == [["10", "2.5", "75 %"], ["1.8", "0.4", "78 %"], ["1.1", "0.3", "73 %"]]
 
 
 def test_every_figure_has_a_row() -> None:
     assert {row.name for row in ROWS} == set(DofResult.__dataclass_fields__)
     assert [row.name for row in OPERATOR_ROWS] == list(OperatorResult.__dataclass_fields__)
+
+
+def test_every_row_is_explained_and_a_missed_goal_is_named(demo: Demo) -> None:
+    best = {
+        dof: replace(each, reduction=0.9496, tip_overspeed=2.0 + 1e-12, reduction_max=0.9)
+        for dof, each in demo.results[0].items()
+    }
+    best[Dof.ROTATION] = replace(best[Dof.ROTATION], reduction=0.95)
+    text = demo_report(
+        replace(demo, config=demo.config.replace(profile="best"), results=(best, best)), []
+    )
+    page = Page(text)
+    for row in (*ROWS, *OPERATOR_ROWS):
+        assert row.meaning in page.text
+    assert "<b>missed: insertion 95.0 %, bending 95.0 %</b>" in text
+    assert "<td>at most 2</td><td>holds</td>" in text
+    assert "<td>at least 90 %</td><td>holds</td>" in text
+    assert "<td>at most 2 mm, 0.5 rad, 0.25 rad</td><td>holds</td>" in text
+    assert "missed" not in demo_report(demo, []), "the goals are not those of profile paper"
+
+
+def test_the_goals_are_those_of_the_benchmark(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    goals = importlib.import_module("hysteresis.goals").GOALS
+    names = {
+        "reduction": "reduction of mean width",
+        "reduction_max": "reduction of max width",
+        "start_periods": "start",
+        "tip_overspeed": "tip overspeed",
+        "actuator_gain": "actuator gain",
+    }
+    operator_names = {
+        "reduction": "operator: reduction of tracking error",
+        "largest": "operator: largest error",
+        "overspeed": "operator: tip overspeed",
+        "creep": "operator: creep",
+    }
+    for rows, found in ((ROWS, names), (OPERATOR_ROWS, operator_names)):
+        assert {row.name for row in rows if row.goal is not None} == set(found)
+        for row in rows:
+            for dof in Dof:
+                if (limit := row.limit(dof)) is not None:
+                    goal = goals[found[row.name]]
+                    assert tables.in_display_unit(row, dof, limit) == pytest.approx(goal.limit(dof))
+                    assert row.worst == goal.sense
 
 
 def test_an_unknown_figure_is_null_in_json(demo: Demo) -> None:

@@ -12,7 +12,7 @@ from hysteresis.measures import fold_reduction, uncompensated_width
 from hysteresis.scenarios import CHANGING_PERIODS, REST_FOR, STRAIGHT
 from matplotlib.figure import Figure
 from tautscope.dof import Dof
-from tautscope.report.figures import BLACK, BLUE, GREEN, GREY, ORANGE, style
+from tautscope.figure_style import BLACK, BLUE, GREEN, GREY, ORANGE, save_png, style
 from tautscope.report.results import evaluate
 
 DOF_COLOURS = (BLUE, ORANGE, GREEN)
@@ -171,6 +171,6 @@ def draw(folder: Path, groups: Collection[str], load: Callable[[str], Finished])
     for name, (group, _, make) in FIGURES.items():
         if group in groups:
             with style():
-                make(load(group)).savefig(folder / f"{name}.png", dpi=120)
+                save_png(make(load(group)), folder / f"{name}.png", dpi=240)
             drawn.append(name)
     return drawn

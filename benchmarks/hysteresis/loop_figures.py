@@ -12,8 +12,8 @@ from hysteresis.store import Recordings
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from tautscope.dof import Dof
+from tautscope.figure_style import BLACK, BLUE, GREY, ORANGE, PAGE
 from tautscope.report import metrics
-from tautscope.report.figures import BLACK, BLUE, GREY, ORANGE, PAGE
 from tautscope.report.results import evaluate, true_loop
 
 UNCOMPENSATED = "without"

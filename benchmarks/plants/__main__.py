@@ -19,49 +19,73 @@ from common.doc_pages import insert
 from common.paths import ROOT
 from common.processes import add_arguments, run_parallel
 from common.rows import goal_row
-from plants.simulated import PLANTS
-from plants.tracking import Job, reductions
+from plants.simulated import GAIN, PLANTS
+from plants.tracking import Job, Outcome, simulate
 from tautscope.dof import Dof
 
 FIRST_SEED, SEEDS = 300, 5
 GOAL, WORST_GOAL = 0.80, 0.65
 """Least reduction of the tracking error: median and worst seed."""
+ESTIMATE_GOAL = 0.1
+"""Largest error of the estimated gains, and of the share of the friction in common, which is 0."""
 
 
-def to_rows(found: dict[Job, list[float]]) -> list[dict[str, Any]]:
-    """Two rows per plant and DOF: the median with its goal, and the worst seed with its own."""
+def to_rows(found: dict[Job, Outcome]) -> list[dict[str, Any]]:
+    """Rows of each plant: reductions per DOF, median and worst seed, errors of gains and share."""
     rows = []
     for plant in dict.fromkeys(plant for plant, _ in found):
+        runs = [each for (name, _), each in found.items() if name == plant]
+        gain = GAIN if plant == "gain 0.8" else 1.0
         for dof in Dof:
-            values = [each[dof] for (name, _), each in found.items() if name == plant]
-            for what, shown, goal in (
-                (plant, values, GOAL),
-                (f"{plant}, worst seed", [min(values)], WORST_GOAL),
+            values = [run.reductions[dof] for run in runs]
+            errors = [abs(run.gains[dof] - gain) for run in runs]
+            for what, shown, goal, sense in (
+                (plant, values, GOAL, "min"),
+                (f"{plant}, worst seed", [min(values)], WORST_GOAL, "min"),
+                (f"{plant}, gain", errors, ESTIMATE_GOAL, "max"),
             ):
+                unit = "1" if sense == "max" else "share"
                 row = goal_row(
-                    what, "share", shown, goal, "min", dof=dof.label, profile="best", n=len(values)
+                    what, unit, shown, goal, sense, dof=dof.label, profile="best", n=len(runs)
                 )
-                rows.append(row)
+                rows.append({**row, "plant": plant})
+        shares = [abs(run.shared) for run in runs]
+        row = goal_row(f"{plant}, share", "1", shares, ESTIMATE_GOAL, profile="best", n=len(runs))
+        rows.append({**row, "plant": plant})
     return rows
 
 
 def table(rows: Sequence[dict[str, Any]]) -> str:
-    """Return a Markdown table: a line per plant, median (worst) in percent."""
+    """Return a Markdown table: a line per plant, median (worst), reductions in percent."""
     lines = [
-        "| instrument | insertion | rotation | bending | goals missed |",
-        "|---|--:|--:|--:|---|",
+        "| instrument | insertion | rotation | bending | gain off by | share off by "
+        "| goals missed |",
+        "|---|--:|--:|--:|--:|--:|---|",
     ]
-    for plant in dict.fromkeys(row["what"].removesuffix(", worst seed") for row in rows):
-        cells, missed = [], []
-        for dof in Dof:
-            middle, worst = (
-                row
-                for row in rows
-                if row["dof"] == dof.label and row["what"].removesuffix(", worst seed") == plant
-            )
-            cells.append(f"{100 * middle['median']:.0f} ({100 * worst['median']:.0f})")
-            missed += [] if middle["holds"] and worst["holds"] else [dof.label]
-        lines.append(f"| {plant} | {' | '.join(cells)} | {', '.join(missed)} |")
+    for plant in dict.fromkeys(row["plant"] for row in rows):
+        own = {
+            (row["what"].removeprefix(plant), row["dof"]): row
+            for row in rows
+            if row["plant"] == plant
+        }
+        reductions = [
+            f"{100 * own['', dof.label]['median']:.0f} ({100 * own['', dof.label]['worst']:.0f})"
+            for dof in Dof
+        ]
+        gains = [own[", gain", dof.label] for dof in Dof]
+        share = own[", share", None]
+        gain = (max(row[key] for row in gains) for key in ("median", "worst"))
+        estimates = [
+            "{:.2f} ({:.2f})".format(*gain),
+            f"{share['median']:.2f} ({share['worst']:.2f})",
+        ]
+        missed = dict.fromkeys(
+            (row["dof"] or "") + what.removesuffix("worst seed").rstrip(", ").replace(",", "")
+            for (what, _), row in own.items()
+            if not row["holds"]
+        )
+        cells = [plant, *reductions, *estimates, ", ".join(each.strip() for each in missed)]
+        lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
 
 
@@ -78,7 +102,7 @@ def main() -> None:
         parser.error("--write updates the whole table: use it without --plant")
     seeds = range(options.first_seed, options.first_seed + options.seeds)
     jobs = [(plant, seed) for plant in options.plant or PLANTS for seed in seeds]
-    done = dict(run_parallel(reductions, jobs, options.workers, options.scheduler))
+    done = dict(run_parallel(simulate, jobs, options.workers, options.scheduler))
     rows = to_rows({job: done[job] for job in jobs})
     shown = table(rows)
     print(json.dumps({"rows": rows, "seeds": list(seeds)}) if options.json else shown)

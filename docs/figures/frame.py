@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 from tautscope import Frame, HysteresisReduction, Report, Twin, load_config
+from tautscope.figure_style import YELLOW, style
 from tautscope.references import SineSequence
-from tautscope.report.figures import style
 
 Floats = NDArray[np.float64]
 
@@ -23,7 +23,7 @@ STOP = 14.4
 """Time of the frame [s]."""
 CUT = 78.0
 """Half the width of the magnified part [px]."""
-SEEN, EXPECTED = "#f0e442", "#ffffff"
+MEASURED, PREDICTED = YELLOW, "#ffffff"
 
 
 def main() -> None:
@@ -41,7 +41,7 @@ def main() -> None:
         whole, part = figure.subplots(1, 2)
         whole.imshow(picture)
         whole.add_patch(
-            Rectangle(tuple(middle - half), *(2 * half), fill=False, color=EXPECTED, linewidth=0.8)
+            Rectangle(tuple(middle - half), *(2 * half), fill=False, color=PREDICTED, linewidth=0.8)
         )
         whole.set_title("(a) the camera's image")
         part.imshow(picture, interpolation="nearest")
@@ -52,7 +52,7 @@ def main() -> None:
         for axes in (whole, part):
             axes.set_axis_off()
         target = Path(__file__).with_suffix(".jpg")
-        figure.savefig(target, dpi=160, pil_kwargs={"quality": 85})
+        figure.savefig(target, dpi=320, pil_kwargs={"quality": 80})
 
 
 def newest_frame(stop: float) -> tuple[Frame, Report]:
@@ -72,11 +72,11 @@ def newest_frame(stop: float) -> tuple[Frame, Report]:
 
 def draw_features(axes: Axes, measured: Floats, predicted: Floats) -> None:
     """Measured and predicted centroids [px]."""
-    axes.plot(*predicted.T, "x", color=EXPECTED, markersize=8, label="predicted from the command")
+    axes.plot(*predicted.T, "x", color=PREDICTED, markersize=8, label="predicted from the command")
     axes.plot(
         *measured.T,
         "o",
-        color=SEEN,
+        color=MEASURED,
         fillstyle="none",
         markeredgewidth=1.5,
         markersize=9,
@@ -89,7 +89,7 @@ def draw_features(axes: Axes, measured: Floats, predicted: Floats) -> None:
             xytext=(0, 9),
             textcoords="offset points",
             ha="center",
-            color=SEEN,
+            color=MEASURED,
             fontweight="bold",
         )
     axes.legend(loc="lower right", frameon=True, facecolor="#333333", labelcolor="white")

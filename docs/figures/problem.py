@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from tautscope import Compensator, Play
-from tautscope.report.figures import BLACK, BLUE, GREY, ORANGE, style
+from tautscope.figure_style import AMBER, BLACK, BLUE, GREY, ORANGE, save_png, style
 
 Floats = NDArray[np.float64]
 
@@ -21,7 +21,6 @@ PERIOD, STROKE = 10.0, 15.0
 """Period and stroke of the reference [s, mm]."""
 OFFSETS = {"delta_minus": -5.0, "delta_plus": 5.0}
 """Of the slack [mm]: 10 mm wide, the insertion of the article's Table 1."""
-SHADE = "#f0e6cc"
 
 
 def main() -> None:
@@ -46,11 +45,11 @@ def main() -> None:
         draw_loops(loop, reference, plain, compensated)
         lines, labels = below.get_legend_handles_labels()
         figure.legend(lines, labels, loc="outside lower left", ncols=4)
-        figure.savefig(Path(__file__).with_suffix(".png"), dpi=160)
+        save_png(figure, Path(__file__).with_suffix(".png"), dpi=320)
 
 
 def draw_signals(axes: Axes, time: Floats, reference: Floats, motor: Floats, tip: Floats) -> None:
-    """Hand, motor and tip over time [mm]; shaded where the motor moves and the tip does not."""
+    """Reference, motor and tip over time [mm]; shaded where only the motor moves."""
     shown = time >= PERIOD / 4
     time, reference, motor, tip = (
         values[shown] for values in (time - PERIOD / 4, reference, motor, tip)
@@ -62,7 +61,8 @@ def draw_signals(axes: Axes, time: Floats, reference: Floats, motor: Floats, tip
         1,
         where=stuck.tolist(),
         transform=axes.get_xaxis_transform(),
-        color=SHADE,
+        color=AMBER,
+        alpha=0.2,
         linewidth=0,
         label="motor moves, tip does not",
     )

@@ -17,6 +17,7 @@ from tautscope.commands import (
     bench,
     calibrate,
     config,
+    console,
     demo,
     doctor,
     hardware,
@@ -57,7 +58,10 @@ def _main(arguments: Sequence[str] | None) -> int:
         import argcomplete  # noqa: PLC0415  only the shell's completion needs it
 
         argcomplete.autocomplete(parser)
-    options = parser.parse_args(arguments)
+    options, unknown = parser.parse_known_args(arguments)
+    if unknown:
+        # The verb's own usage lists its options; the parser above it would list the verbs.
+        options.usage_error(f"unrecognized arguments: {' '.join(unknown)}")
     try:
         with _logging(options.verbose):
             require_extras(f"tautscope {options.verb}", options.extras)
@@ -88,6 +92,7 @@ def _parser() -> argparse.ArgumentParser:
     log.add_parsers(verbs)
     align.add_parser(verbs)
     hardware.add_parser(verbs)
+    console.add_parser(verbs)
     bench.add_parser(verbs)
     doctor.add_parser(verbs)
     calibrate.add_parser(verbs)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from enum import IntEnum
 
 
@@ -26,3 +27,11 @@ class Dof(IntEnum):
     def display_scale(self) -> float:
         """Factor from m or rad to `display_unit`."""
         return 1e3 if self is Dof.INSERTION else 1.0
+
+
+def display_text(values: Iterable[float]) -> str:
+    """Values (3,) [m, rad, rad] with their display units: ``9.81 mm, 1.76 rad, 1.02 rad``."""
+    return ", ".join(
+        f"{value * dof.display_scale:.3g} {dof.display_unit}"
+        for dof, value in zip(Dof, values, strict=True)
+    )

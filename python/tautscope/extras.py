@@ -10,6 +10,7 @@ from tautscope.errors import MissingExtraError
 MODULES = {
     "analysis": ("matplotlib", "polars", "rich", "scipy"),
     "twin": ("cv2", "matplotlib", "mujoco", "rich"),
+    "console": ("cv2", "mcap", "websockets"),
     "hardware": ("av", "can", "canopen", "cv2", "matplotlib", "mcap", "polars", "rich"),
     "ethercat": ("pysoem",),
     "cluster": ("dask", "distributed"),

@@ -5,6 +5,7 @@ use pyo3::prelude::*;
 use tautscope_core as core;
 
 use crate::arrays::{Table, Vector, fixed, rows, table};
+use crate::description::described;
 use crate::errors;
 
 /// Pinhole camera with `OpenCV`'s distortion k1, k2, p1, p2, k3, k4, k5, k6, Eq. (8). Raises `ConfigError`.
@@ -51,5 +52,9 @@ impl Camera {
         let invisible = [[f64::NAN; 3]; 2];
         let image = self.0.project(fixed("point", &point)?);
         table(py, &image.map_or(invisible, |image| image.pixel_by_point))
+    }
+
+    fn __repr__(&self) -> String {
+        described(&self.0)
     }
 }

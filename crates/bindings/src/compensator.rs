@@ -5,6 +5,7 @@ use pyo3::prelude::*;
 use tautscope_core as core;
 
 use crate::arrays::Vector;
+use crate::description::{described, described_with};
 use crate::errors;
 
 /// The limited-gain inverse of one DOF's play, Eqs. (2)-(3), Fig. 2.
@@ -98,5 +99,14 @@ impl Compensator {
     #[getter]
     fn delta_plus(&self) -> f64 {
         self.state.play().delta_plus()
+    }
+
+    fn __repr__(&self) -> String {
+        let (text, command) = (
+            described_with(&self.inner, &self.state.play()),
+            self.command(),
+        );
+        let command = described(&command);
+        format!("{}, command={command})", text.trim_end_matches(')'))
     }
 }

@@ -5,6 +5,7 @@ use pyo3::prelude::*;
 use tautscope_core as core;
 
 use crate::arrays::{Vector, same_length};
+use crate::description::described_with;
 use crate::errors;
 
 type Series<'py> = Bound<'py, PyArray1<f64>>;
@@ -100,6 +101,10 @@ impl Estimator {
     #[getter]
     fn delta_plus(&self) -> f64 {
         self.state.play().delta_plus()
+    }
+
+    fn __repr__(&self) -> String {
+        described_with(&self.inner, &self.state.play())
     }
 }
 

@@ -6,6 +6,7 @@ use tautscope_core as core;
 
 use crate::arrays::{Table, Vector, columns, fixed, rows, same_length, table};
 use crate::camera::Camera;
+use crate::description::described;
 use crate::errors;
 use crate::instrument::Instrument;
 
@@ -111,6 +112,10 @@ impl FeatureModel {
             self.0
                 .nearest_state(&prior, fixed("features", &features)?, fixed("std", &std)?);
         Ok(found.map(|(state, misfit)| (PyArray1::from_slice(py, &state), misfit)))
+    }
+
+    fn __repr__(&self) -> String {
+        described(&self.0)
     }
 }
 

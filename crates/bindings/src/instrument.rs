@@ -5,6 +5,7 @@ use pyo3::prelude::*;
 use tautscope_core as core;
 
 use crate::arrays::{Vector, columns, fixed, table};
+use crate::description::described;
 use crate::errors;
 
 /// Kinematics of the instrument, Eq. (7), Fig. 4. Lengths in m.
@@ -51,5 +52,9 @@ impl Instrument {
         let joined = |[a, b]: [[f64; 3]; 2]| [a, b].as_flattened().to_vec();
         let ([a0, a1, a2], [b0, b1, b2]) = (a.position_by_dof, b.position_by_dof);
         columns(py, &[joined([a0, b0]), joined([a1, b1]), joined([a2, b2])])
+    }
+
+    fn __repr__(&self) -> String {
+        described(&self.0)
     }
 }

@@ -6,6 +6,7 @@
 mod arrays;
 mod camera;
 mod compensator;
+mod description;
 mod errors;
 mod estimator;
 mod features;

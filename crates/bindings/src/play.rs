@@ -5,6 +5,7 @@ use pyo3::prelude::*;
 use tautscope_core as core;
 
 use crate::arrays::Vector;
+use crate::description::described_with;
 use crate::errors;
 
 /// The play (backlash) operator, Eq. (1): the output lags the input between two contacts.
@@ -62,5 +63,9 @@ impl Play {
     #[getter]
     fn width(&self) -> f64 {
         self.play.width()
+    }
+
+    fn __repr__(&self) -> String {
+        described_with(&self.play, &self.state)
     }
 }

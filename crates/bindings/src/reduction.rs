@@ -166,6 +166,11 @@ impl Reduction {
         on_loop!(&mut self.0, inner => inner.acknowledge());
     }
 
+    /// Uses this share of the compensation, from 0 to 1.
+    fn set_compensation(&mut self, py: Python<'_>, share: f64) -> PyResult<()> {
+        on_loop!(&mut self.0, inner => inner.set_compensation(share)).map_err(errors::config(py))
+    }
+
     /// Raises a flag that only the rig can detect, by its name.
     fn raise_flag(&mut self, py: Python<'_>, name: &str) -> PyResult<()> {
         let flag = flags::flag(py, "flag", name)?;

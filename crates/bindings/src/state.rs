@@ -5,6 +5,7 @@ use pyo3::prelude::*;
 use tautscope_core as core;
 
 use crate::arrays::{Table, Vector, fixed, four, rows, same_length, table};
+use crate::description::described;
 use crate::errors;
 use crate::features::FeatureModel;
 
@@ -84,5 +85,9 @@ impl StateEstimator {
             })
             .unzip();
         Ok((table(py, &estimates)?, table(py, &observable)?))
+    }
+
+    fn __repr__(&self) -> String {
+        described(&self.0)
     }
 }

@@ -5,6 +5,7 @@ use pyo3::prelude::*;
 use tautscope_core as core;
 
 use crate::arrays::{Vector, same_length};
+use crate::description::described;
 use crate::errors;
 use crate::settings::from_mapping;
 
@@ -59,5 +60,10 @@ impl TipFilter {
     #[getter]
     fn gain(&self) -> f64 {
         self.0.gain()
+    }
+
+    fn __repr__(&self) -> String {
+        let gain = described(&self.gain());
+        described(&self.0.play()).replace("Play(", &format!("TipFilter(gain={gain}, "))
     }
 }

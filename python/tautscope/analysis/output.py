@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tautscope.analysis.comparison import HORIZONS, Analysis
 from tautscope.analysis.models.registry import LINEAR_FIT
 from tautscope.analysis.models.task import Floats
-from tautscope.report.figures import BLUE, GREY, PAGE, style
+from tautscope.figure_style import BLUE, GREY, PAGE, style
 from tautscope.runs.output_folder import new_folder
 
 

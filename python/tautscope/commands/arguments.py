@@ -26,7 +26,7 @@ def add_verb(
         extras: Extras of the package that it needs; `tautscope.cli.main` checks them first.
     """
     parser = verbs.add_parser(name, allow_abbrev=False, help=help, description=description)
-    parser.set_defaults(extras=tuple(extras))
+    parser.set_defaults(extras=tuple(extras), usage_error=parser.error)
     add_verbose(parser, default=argparse.SUPPRESS)
     return parser
 

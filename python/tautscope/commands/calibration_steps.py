@@ -144,8 +144,7 @@ def _motion(options: argparse.Namespace, config: Config, folder: Path) -> Calibr
             write_run_folder(run, place)
             recording = run.compensated.recording
     results = evaluate(None, recording)
-    with figures.style():
-        figure = figures.figure9(None, recording)
+    figure = figures.figure9(None, recording)
     notes = [summary_line(dof, result) for dof, result in results.items()]
     if options.twin:
         notes += [

@@ -132,6 +132,7 @@ def _print_table1(demo: Demo) -> None:
     from rich.table import Table  # noqa: PLC0415
 
     from tautscope.report import tables  # noqa: PLC0415
+    from tautscope.report.rows import ROWS  # noqa: PLC0415
 
     profiles = demo.by_profile
     several = len(demo.seeds) > 1
@@ -149,7 +150,7 @@ def _print_table1(demo: Demo) -> None:
         )
         for name in profiles:
             table.add_column(f"\n{name}", justify="right")
-    for row in tables.ROWS:
+    for row in ROWS:
         cells = []
         for dof in demo.results[0]:
             cells.append(tables.article_cell(row, dof))
@@ -167,6 +168,7 @@ def _print_operator_motion(demo: Demo) -> None:
     from rich.table import Table  # noqa: PLC0415
 
     from tautscope.report import tables  # noqa: PLC0415
+    from tautscope.report.rows import OPERATOR_ROWS  # noqa: PLC0415
 
     results = demo.operator_results
     several = len(results) > 1
@@ -175,10 +177,10 @@ def _print_operator_motion(demo: Demo) -> None:
     )
     table = Table(title=title, box=None, title_justify="left", title_style="bold", pad_edge=False)
     table.add_column("", no_wrap=True)
-    middle, bad = tables.median(results), tables.worst(results, tables.OPERATOR_ROWS)
+    middle, bad = tables.median(results), tables.worst(results, OPERATOR_ROWS)
     for dof in middle:
         table.add_column(tables.heading(dof), justify="right", no_wrap=True)
-    for row in tables.OPERATOR_ROWS:
+    for row in OPERATOR_ROWS:
         cells = []
         for dof in middle:
             ours = tables.cell(row, dof, getattr(middle[dof], row.name))

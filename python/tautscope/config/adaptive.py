@@ -13,7 +13,7 @@ class AdaptiveConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=T
     all three. free_gain, gain_limit, delta_minus and delta_plus are those of `DofConfig`.
     """
 
-    tip_gain: Gain = 1.9
+    tip_gain: Gain = 1.85
     """Largest speed of the predicted tip over that of the reference."""
     caution: NonNegative = 0.3
     """Standard deviations of the half width by which less of it is compensated than estimated: an
@@ -23,7 +23,7 @@ class AdaptiveConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=T
     [s]."""
     direction_travel: Positive = 0.01
     """Travel of the reference over which its direction is averaged."""
-    change_rate: PerDof = (0.12, 0.12, 100.0)
+    change_rate: PerDof = (0.07, 0.07, 100.0)
     """Rate limit of half width and centre in the compensation, per second of motion, for each DOF.
     That of bending bounds nothing: where one of its cables takes over from the other, offsets
     change within a stroke faster than by any motion of the endoscope."""

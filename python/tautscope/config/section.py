@@ -37,6 +37,22 @@ class Section(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
         if check is not None:
             check(self)
 
+    def __repr__(self) -> str:
+        """A call that makes an equal section: the profile, and values that are not defaults."""
+        values = (
+            f"{field.name}={value!r}"
+            for field in msgspec.structs.fields(type(self))
+            if (value := getattr(self, field.name)) != _default(field) or field.name == "profile"
+        )
+        return f"{type(self).__name__}({', '.join(values)})"
+
+
+def _default(field: msgspec.structs.FieldInfo) -> Any:
+    """The default of a field; `msgspec.NODEFAULT` if it is required."""
+    if field.default_factory is msgspec.NODEFAULT:
+        return field.default
+    return field.default_factory()
+
 
 def relation(section: type[S]) -> Callable[[Callable[[S], None]], Callable[[S], None]]:
     """Register a function that checks the relations between the values of a section.

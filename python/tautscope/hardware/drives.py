@@ -26,6 +26,7 @@ from tautscope.hardware.commissioning import commission
 from tautscope.hardware.drive_monitor import BusStatistics, DriveMonitor
 from tautscope.hardware.drive_state_machine import DriveStateMachine
 from tautscope.hardware.fieldbus import Fieldbus
+from tautscope.hardware.rig_lock import RigLock
 from tautscope.hardware.signals import defer_signals
 
 
@@ -34,9 +35,15 @@ def open_drives(config: DrivesConfig) -> Drives:
 
     Raises:
         ConfigError: An EDS file is missing, unreadable or describes another drive.
+        SecondMasterError: Another program on this computer has opened them.
         DriveError: As `Drives`.
     """
-    return Drives(config, open_fieldbus(config))
+    lock = RigLock(config)
+    try:
+        return Drives(config, open_fieldbus(config), lock)
+    except BaseException:
+        lock.release()
+        raise
 
 
 def open_fieldbus(config: DrivesConfig) -> Fieldbus:
@@ -64,6 +71,7 @@ class Drives:
     Args:
         config: Bus, drives, limits and timeouts.
         bus: The open bus; it is closed with the drives.
+        lock: Released with the drives.
 
     Raises:
         ModeRefusedError: A drive has neither mode 8 nor 7, or did not enter it.
@@ -71,8 +79,9 @@ class Drives:
         DriveError: A drive does not answer, or is no CiA 402 drive.
     """
 
-    def __init__(self, config: DrivesConfig, bus: Fieldbus) -> None:
+    def __init__(self, config: DrivesConfig, bus: Fieldbus, lock: RigLock | None = None) -> None:
         self.config = config
+        self._lock = lock
         self._bus = bus
         self._scales = [Scale(config[dof], dof.label) for dof in Dof]
         self._is_running = False
@@ -214,6 +223,8 @@ class Drives:
                 unconfirmed = self._quick_stop()
             finally:
                 self._bus.close()
+                if self._lock is not None:
+                    self._lock.release()
         if unconfirmed:
             raise _unconfirmed(unconfirmed)
 

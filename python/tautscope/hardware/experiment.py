@@ -141,6 +141,7 @@ def run_on_hardware(
 
 def write_run_folder(run: HardwareRun, folder: Path) -> None:
     """Write tables, timing, figures and report into the folder of the logs."""
+    from tautscope.figure_style import style  # noqa: PLC0415
     from tautscope.hardware.timing_figure import timing_figure  # noqa: PLC0415  matplotlib
     from tautscope.report import figures, report, tables  # noqa: PLC0415  matplotlib takes half a second
 
@@ -153,8 +154,8 @@ def write_run_folder(run: HardwareRun, folder: Path) -> None:
         report.CaptionedFigure(
             loops,
             "Fig. 9. (a)-(c) with compensation: reference, command, estimate and both contact "
-            "offsets. (d)-(f) loops of the estimate; the first period, in which the slack is "
-            "estimated, is thin. The dashed line is an ideal tip.",
+            "offsets. (d)-(f) loops of the estimate; a narrow loop on the dashed line, an ideal "
+            "tip, is the goal. The first period, in which the slack is estimated, is thin.",
         ),
         report.CaptionedFigure(
             picture,
@@ -170,7 +171,7 @@ def write_run_folder(run: HardwareRun, folder: Path) -> None:
         "control": f"{1 / first.timing.cycle:g} Hz, {first.timing.lost} cycles lost",
         "log": first.log.path.name,
     }
-    with figures.style():
+    with style():
         picture.savefig(folder / "timing.png")
         loops.savefig(folder / "fig9.png")
         page = report.run_report(run.config, facts, results, pictures, first.recording.warnings)

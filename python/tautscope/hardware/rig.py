@@ -87,6 +87,10 @@ class HardwareRig:
         self._trouble = ""
         self._is_frozen = False
 
+    def __repr__(self) -> str:
+        state = "closed" if self._setpoints is None else f"open, {self._ticks} cycles"
+        return f"<HardwareRig: cycle {1e3 * self._drives.cycle:g} ms, {state}>"
+
     @property
     def control_period(self) -> float:
         """Time from one command to the next [s]."""
@@ -143,6 +147,14 @@ class HardwareRig:
             self.close()
             raise
         return Sample(self._ticks * self.control_period, applied, frame)
+
+    def interrupt(self) -> None:
+        """Quick-stop the motors; for any thread, also during `reset` and `step`.
+
+        These raise `StateError` if one of them runs. Call `close` afterwards.
+        """
+        if (setpoints := self._setpoints) is not None:
+            setpoints.interrupt()
 
     def close(self) -> None:
         """Quick-stop the motors, release bus and camera; a second call does nothing.

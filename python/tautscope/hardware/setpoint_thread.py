@@ -97,6 +97,13 @@ class SetpointThread:
             self._condition.notify_all()
             return self._wait_for_answer()
 
+    def interrupt(self) -> None:
+        """Quick-stop the motors in the present cycle; for any thread.
+
+        `start` or `send`, if one waits, raises `StateError`. Call `stop` afterwards.
+        """
+        self._is_stopping = True
+
     def stop(self, *, disable: bool = False) -> None:
         """Quick-stop the motors and release the bus; a second call does nothing.
 

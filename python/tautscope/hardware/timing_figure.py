@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
+from tautscope.figure_style import BLUE, ORANGE, PAGE, style
 from tautscope.hardware.timing import Timing
-from tautscope.report.figures import BLUE, ORANGE, PAGE, style
 
 
 def timing_figure(timing: Timing) -> Figure:

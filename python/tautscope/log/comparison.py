@@ -85,7 +85,7 @@ def replay_figure(replayed: Recording, recorded: Recording | None = None) -> Fig
     """Plot state estimate and backlash width of each DOF over time."""
     from matplotlib.figure import Figure  # noqa: PLC0415  slow import
 
-    from tautscope.report.figures import BLUE, GREY, ORANGE, PAGE, style  # noqa: PLC0415
+    from tautscope.figure_style import BLUE, GREY, ORANGE, PAGE, style  # noqa: PLC0415
 
     runs = [(replayed, "replayed", BLUE, 0.9)]
     if recorded is not None:
@@ -124,7 +124,7 @@ def write_replay(
     Raises:
         OutputError: The folder is not empty, or cannot be written; then nothing is written.
     """
-    from tautscope.report.figures import style  # noqa: PLC0415
+    from tautscope.figure_style import style  # noqa: PLC0415
 
     figure = replay_figure(replayed, recorded)
     with new_folder(folder) as folder_path, style():

@@ -103,8 +103,18 @@ def _send_request(loop: HysteresisReduction, request: str) -> None:
         getattr(loop, request)()
     elif call == "raise_flag" and name in DETECTORS:
         loop.raise_flag(name)
-    else:
-        raise RecordError("log", request, "engage, acknowledge, or raise_flag and a known name")
+    elif call == "set_compensation":
+        loop.set_compensation(_share(request, name))
+    elif call != "note":
+        allowed = "engage, acknowledge, raise_flag, set_compensation, or a note"
+        raise RecordError("log", request, allowed)
+
+
+def _share(request: str, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise RecordError("log", request, "set_compensation and a share from 0 to 1") from None
 
 
 def _is_same(

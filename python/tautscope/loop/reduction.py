@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tautscope.config import Config
+from tautscope.dof import display_text
 from tautscope.loop.construction import build_loop
 from tautscope.loop.rig import Frame
 from tautscope.loop.safety import Reaction, Supervision, checksum, disabled_monitors
@@ -87,6 +88,14 @@ class Report:
     reaction: Reaction
     warnings: tuple[str, ...]
 
+    def __repr__(self) -> str:
+        warnings = f", warnings {', '.join(self.warnings)}" if self.warnings else ""
+        return (
+            f"<Report of {self.captured_at:.3f} s: {self.status}, "
+            f"tip at {display_text(self.state_estimate)}, "
+            f"slack {display_text(self.delta_plus - self.delta_minus)}{warnings}>"
+        )
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HysteresisEstimate:
@@ -125,8 +134,9 @@ class HysteresisReduction:
 
     Attributes:
         updates: Number of image updates so far.
-        on_event: Called at every `engage`, `acknowledge` and `raise_flag` with the name of the call
-            (and of the flag): a replay needs these beside references and images.
+        on_event: Called at every `engage`, `acknowledge`, `set_compensation` and `raise_flag` with
+            the name of the call (and the share or the flag): a replay needs these beside references
+            and images.
     """
 
     def __init__(self, config: Config, compensate: bool = True) -> None:
@@ -135,6 +145,13 @@ class HysteresisReduction:
         self.on_event: Callable[[str], None] | None = None
         self._disabled = disabled_monitors(config)
         self._loop = build_loop(config, compensate)
+
+    def __repr__(self) -> str:
+        return (
+            f"<HysteresisReduction: profile {self._config.profile}, {self.updates} image updates, "
+            f"reaction {self.supervision.reaction}, "
+            f"slack {display_text(self.delta_plus - self.delta_minus)}>"
+        )
 
     def step(
         self, reference: ArrayLike, time: float | None = None, made_at: float | None = None
@@ -233,6 +250,17 @@ class HysteresisReduction:
         """
         self._loop.acknowledge()
         self._notify("acknowledge")
+
+    def set_compensation(self, share: float) -> None:
+        """Use a share of the compensation: all with 1, none with 0.
+
+        Bumpless: the command moves only with the reference. The supervisor uses a share of it.
+
+        Raises:
+            ConfigError: The share is not from 0 to 1; the loop is unchanged.
+        """
+        self._loop.set_compensation(float(share))
+        self._notify(f"set_compensation {float(share)!r}")
 
     def raise_flag(self, name: str) -> None:
         """Raise a flag that only the rig can detect: ``drive_fault``, ``following_error``.

@@ -89,6 +89,10 @@ class SineSequence:
         self.segments: tuple[Segment, ...] = tuple(segments)
         self.duration: float = start
 
+    def __repr__(self) -> str:
+        parts = (f"{each.dof.label} {each.start:g} to {each.end:g} s" for each in self.segments)
+        return f"<SineSequence: {', '.join(parts)}>"
+
     def __call__(self, time: float) -> NDArray[np.float64]:
         """(3,) [m, rad, rad] at `time` [s from the start of the reference]."""
         position = self._centre.copy()

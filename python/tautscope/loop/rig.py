@@ -11,6 +11,8 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tautscope.dof import display_text
+
 
 @dataclass(frozen=True, slots=True)
 class Frame:
@@ -32,6 +34,10 @@ class Frame:
     true_features: NDArray[np.float64] | None = None
     true_visible: NDArray[np.float64] | None = None
 
+    def __repr__(self) -> str:
+        height, width = self.image.shape[:2]
+        return f"<Frame {self.sequence}: {width} x {height}, captured at {self.captured_at:.3f} s>"
+
 
 @dataclass(frozen=True, slots=True)
 class Sample:
@@ -48,6 +54,10 @@ class Sample:
     applied: NDArray[np.float64]
     frame: Frame | None = None
     true_state: NDArray[np.float64] | None = None
+
+    def __repr__(self) -> str:
+        frame = "no frame" if self.frame is None else f"frame {self.frame.sequence}"
+        return f"<Sample at {self.time:.3f} s: applied {display_text(self.applied)}, {frame}>"
 
 
 @runtime_checkable

@@ -93,6 +93,13 @@ class Detection:
     regions: tuple[Region, ...]
     discriminant: int
 
+    def __repr__(self) -> str:
+        bands = [
+            reason or f"at ({u:.1f}, {v:.1f}) px"
+            for reason, (u, v) in zip(self.reasons, self.features.reshape(2, 2), strict=True)
+        ]
+        return f"<Detection: band A {bands[0]}, band B {bands[1]}>"
+
     @property
     def found(self) -> tuple[bool, bool]:
         """Which bands were found."""
@@ -168,6 +175,9 @@ class MarkerDetector:
             msgspec.to_builtins(config.vision),
             _workspace(config),
         )
+
+    def __repr__(self) -> str:
+        return f"<MarkerDetector: {self._layout.pixel_format} images of shape {self._layout.shape}>"
 
     def detect(
         self,

@@ -19,6 +19,7 @@ from tautscope.report.operator_motion import (
 )
 from tautscope.report.report import CaptionedFigure
 from tautscope.report.results import Results, evaluate
+from tautscope.report.rows import ROWS
 from tautscope.runs.output_folder import new_folder
 from tautscope.runs.recording import Recording
 from tautscope.runs.trials import RigMaker, Trial, make_twin, run_trials
@@ -70,6 +71,7 @@ class Demo:
         sim_seconds: Simulated time of all runs [s].
         wall_seconds: Computing time [s].
         article_results: Table 1 of each seed with profile ``paper``, if `config` has another one.
+        article: The first seed's compensated run with profile ``paper``, likewise.
     """
 
     config: Config
@@ -83,6 +85,7 @@ class Demo:
     sim_seconds: float
     wall_seconds: float
     article_results: tuple[Results, ...] = ()
+    article: Recording | None = None
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -130,6 +133,7 @@ def run_demo(
         sim_seconds=sum(float(run.trace["time"][-1] - run.trace["time"][0]) for run in recordings),
         wall_seconds=time.perf_counter() - started,
         article_results=results[1] if len(results) > 1 else (),
+        article=runs[1][0] if len(runs) > 1 else None,
     )
 
 
@@ -158,27 +162,19 @@ def write_run_folder(demo: Demo, folder: str | PathLike[str]) -> None:
         OutputError: The folder is not empty, or cannot be written.
     """
     # Matplotlib takes half a second to import.
+    from tautscope.figure_style import style  # noqa: PLC0415
     from tautscope.report import figures  # noqa: PLC0415
     from tautscope.report.operator_figure import draw_operator_motion  # noqa: PLC0415
 
-    figure9 = figures.figure9(demo.uncompensated, demo.compensated)
-    captioned = [
-        CaptionedFigure(
-            figure9,
-            f"Fig. 9, seed {demo.seeds[0]}. (a)-(c) with compensation, each degree of freedom "
-            "while it moves: reference, command, estimate and both contact offsets. (d)-(f) loops: "
-            "the estimate over the command without, over the reference with compensation; the "
-            "first period, in which the offsets are estimated, is thin. The dashed line is an "
-            "ideal tip.",
-        )
-    ]
+    figure9 = figures.figure9(demo.uncompensated, demo.compensated, demo.article)
+    captioned = [CaptionedFigure(figure9, _figure9_caption(demo))]
     if demo.compensated.snapshot is not None:
         captioned.append(
             CaptionedFigure(
                 figures.figure5(demo.compensated.snapshot, demo.config),
-                "Fig. 5. One frame of the compensated run: the image, the pixels above the "
-                "discriminant's threshold, the regions with markers A and B, and measured and "
-                "predicted features.",
+                "Fig. 5. One frame of the compensated run: (a) the image, (b) the pixels above the "
+                "discriminant's threshold, (c) the regions of these pixels with markers A and B, "
+                "and (d) measured and predicted features.",
             )
         )
     operator_figure = draw_operator_motion(demo.operator_uncompensated, demo.operator_compensated)
@@ -192,7 +188,7 @@ def write_run_folder(demo: Demo, folder: str | PathLike[str]) -> None:
         tables.write_operator_csv(
             place / "operator_motion.csv", demo.config.profile, demo.seeds, demo.operator_results
         )
-        with figures.style():
+        with style():
             figure9.savefig(place / "fig9.png")
             figure9.savefig(place / "fig9.pdf", metadata={"CreationDate": None})
             operator_figure.savefig(place / "operator_motion.png")
@@ -201,6 +197,18 @@ def write_run_folder(demo: Demo, folder: str | PathLike[str]) -> None:
                 each.figure.savefig(place / "fig5.png")
             page = demo_report(demo, captioned)
         (place / "report.html").write_text(page, encoding="utf-8")
+
+
+def _figure9_caption(demo: Demo) -> str:
+    rows, loops = ("(a)-(c)", "(d)-(f)") if demo.article is None else ("(a)-(f)", "(g)-(i)")
+    return (
+        f"Fig. 9, seed {demo.seeds[0]}. {rows} with compensation, each degree of freedom while it "
+        "moves: reference, command, estimate, true tip and both contact offsets. The command moves "
+        "ahead of the reference so that the tip stays on it. "
+        f"{loops} loops: the tip over the command without compensation, over the reference with "
+        "it; lines are the true tip, dots the estimate. A narrow loop on the dashed line, an ideal "
+        "tip, is the goal. The first period, in which the offsets are estimated, is thin."
+    )
 
 
 def demo_report(demo: Demo, figures: Sequence[CaptionedFigure]) -> str:
@@ -226,9 +234,10 @@ def demo_report(demo: Demo, figures: Sequence[CaptionedFigure]) -> str:
         }
 Widths over the last two periods of each degree of freedom: mean over 41 levels across the central
 80&nbsp;% of the tip&rsquo;s range, of the true tip unless stated otherwise.</p>
+{report.row_explanations(ROWS, profiles.get("best", ()))}
 {report.operator_section(demo.config.profile, demo.operator_results)}
 {report.warning_list(demo.warnings)}
-<h2>Figures{f", profile {demo.config.profile}" if len(profiles) > 1 else ""}</h2>
+<h2>Figures</h2>
 {report.figure_list(figures)}
 <h2>Limits of these results</h2>
 {_CAVEATS}""",

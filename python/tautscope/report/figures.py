@@ -1,88 +1,83 @@
-"""Figures in one style, with colours that colour-blind readers can distinguish.
-
-They do not use pyplot's global state, a display or a file.
-"""
+"""The article's Figs. 5 and 9, drawn from recordings."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from tautscope.config import Config
+from tautscope.figure_style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PAGE,
+    PURPLE,
+    SKY,
+    YELLOW,
+    style,
+)
 from tautscope.loop.references import Segment
 from tautscope.loop.vision import MarkerDetector
-from tautscope.report.results import estimated_loop, used_frames
+from tautscope.report.results import estimated_loop, true_loop, used_frames
 from tautscope.runs.recording import Recording, Snapshot
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
-BLACK, GREY = "#222222", "#8a8a8a"
-BLUE, ORANGE, GREEN, PURPLE = "#0072b2", "#d55e00", "#009e73", "#aa4499"
-"""After Okabe and Ito (2008)."""
-
-COLUMN, PAGE = 3.5, 7.2
-"""Widths of a column and of a page [inch]."""
-
-_STYLE: dict[str, Any] = {
-    "font.size": 8,
-    "font.family": "DejaVu Sans",
-    "axes.titlesize": 8,
-    "axes.titlelocation": "left",
-    "axes.titleweight": "bold",
-    "axes.labelsize": 8,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.linewidth": 0.6,
-    "xtick.labelsize": 7,
-    "ytick.labelsize": 7,
-    "xtick.major.width": 0.6,
-    "ytick.major.width": 0.6,
-    "legend.fontsize": 7,
-    "legend.frameon": False,
-    "lines.linewidth": 1.0,
-    "figure.constrained_layout.w_pad": 0.08,
-    "savefig.dpi": 200,
-    "pdf.fonttype": 42,
+_ON_IMAGE: dict[str, Any] = {
+    "loc": "lower right",
+    "frameon": True,
+    "facecolor": BLACK,
+    "framealpha": 0.75,
+    "labelcolor": "white",
 }
+"""Legend over an image."""
 
 
-@contextmanager
-def style() -> Iterator[None]:
-    """Context in which figures are made and saved in the package's style."""
-    with matplotlib.rc_context(_STYLE):  # type: ignore[arg-type]  # its stub lists every key
-        yield
+def figure9(
+    uncompensated: Recording | None, compensated: Recording, article: Recording | None = None
+) -> Figure:
+    """The article's Fig. 9: one column per DOF, with the true tip where it is known.
 
-
-def figure9(uncompensated: Recording | None, compensated: Recording) -> Figure:
-    """The article's Fig. 9: one column per DOF.
-
-    (a)-(c): reference, command, estimate and both contact offsets over time, with compensation.
-    (d)-(f): estimate over command without (if run) and over reference with compensation, the first
-    period thin.
+    First row: reference, command, estimate, true tip and both contact offsets over time, with
+    compensation; second row likewise for another compensated run (`article`), if there is one. Last
+    row, the loops: tip over command without (if run) and over reference with compensation; a line
+    is the true tip, or the estimate if the tip is not known, and dots are the estimate. The first
+    period is thin.
     """
     segments = compensated.segments
+    runs = [compensated] if article is None else [compensated, article]
+    letters = iter("abcdefghi")
+    heights = (*[1.0] * len(runs), 1.25)
     with style():
-        figure = Figure(figsize=(PAGE, 5.3), layout="constrained")
-        upper, lower = figure.subfigures(2, 1, height_ratios=(1, 1.12), squeeze=False).flat
-        for part, letters in ((upper, "abc"), (lower, "def")):
+        figure = Figure(figsize=(PAGE, 2.4 * sum(heights)), layout="constrained")
+        parts = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False).ravel()
+        for run, part in zip(runs, parts, strict=False):
             axes = part.subplots(1, len(segments), squeeze=False)[0]
-            for axis, letter, segment in zip(axes, letters, segments, strict=False):
-                if part is upper:
-                    _over_time(axis, compensated, segment)
-                else:
-                    _loops(axis, uncompensated, compensated, segment)
-                axis.set_title(f"({letter}) {segment.dof.label}")
-            lines, labels = axes[0].get_legend_handles_labels()
-            part.legend(lines, labels, loc="outside upper center", ncols=len(lines))
+            for axis, segment in zip(axes, segments, strict=True):
+                _over_time(axis, run, segment)
+                axis.set_title(
+                    f"({next(letters)}) {segment.dof.label}, profile {run.config.profile}"
+                )
+            if run is compensated:
+                lines, labels = axes[0].get_legend_handles_labels()
+                part.legend(lines, labels, loc="outside upper center", ncols=len(lines))
+        axes = parts[-1].subplots(1, len(segments), squeeze=False)[0]
+        for axis, segment in zip(axes, segments, strict=True):
+            _loops(axis, uncompensated, runs[::-1], segment)
+            axis.set_title(f"({next(letters)}) {segment.dof.label}")
+        handles = list(_loop_legend(uncompensated, runs[::-1]))
+        parts[-1].legend(handles=handles, loc="outside upper center", ncols=len(handles))
     return figure
 
 
@@ -93,16 +88,16 @@ def _over_time(axes: Axes, recording: Recording, segment: Segment) -> None:
     for table, clock, name, label, colour, width in (
         (trace, "time", "command", "command c", ORANGE, 0.8),
         (trace, "time", "reference", "reference u", BLACK, 0.8),
-        (frames, "captured_at", "estimate", "estimate q̂", BLUE, 1.1),
+        (trace, "time", "true", "true tip", SKY, 2.6),
+        (frames, "captured_at", "estimate", "estimate q̂", BLUE, 0.7),
         (trace, "time", "delta_plus", "offset δ⁺", GREEN, 1.1),
         (trace, "time", "delta_minus", "offset δ⁻", PURPLE, 1.1),
     ):
+        values = table[f"{name}_{dof.label}"] * dof.display_scale
+        if name == "true" and not np.isfinite(values).any():
+            continue
         axes.plot(
-            table[clock] - trace["time"][0],
-            table[f"{name}_{dof.label}"] * dof.display_scale,
-            color=colour,
-            linewidth=width,
-            label=label,
+            table[clock] - trace["time"][0], values, color=colour, linewidth=width, label=label
         )
     axes.set_xlabel("time [s]")
     axes.set_ylabel(f"{dof.label} [{dof.display_unit}]")
@@ -110,34 +105,52 @@ def _over_time(axes: Axes, recording: Recording, segment: Segment) -> None:
 
 
 def _loops(
-    axes: Axes, uncompensated: Recording | None, compensated: Recording, segment: Segment
+    axes: Axes, uncompensated: Recording | None, compensated: list[Recording], segment: Segment
 ) -> None:
     dof = segment.dof
     scale = dof.display_scale
-    for recording, name, label, colour, width in (
-        (uncompensated, "command", "uncompensated: q̂ over c", GREY, 1.0),
-        (compensated, "reference", "compensated: q̂ over u", BLUE, 1.0),
-        (compensated, "reference", "compensated, first period", BLUE, 0.4),
-    ):
-        if recording is None:
-            continue
-        x, y = estimated_loop(recording, segment, name, first=0)
-        if recording is compensated:
-            settled, _ = estimated_loop(recording, segment, name, first=1)
-            begin = len(x) - len(settled)
-            shown = slice(begin, None) if width == 1.0 else slice(begin + 1)
-            x, y = x[shown], y[shown]
-        axes.plot(x * scale, y * scale, color=colour, linewidth=width, label=label)
+    runs = [*([] if uncompensated is None else [uncompensated]), *compensated]
+    for run in runs:
+        x = "command" if run is uncompensated else "reference"
+        colour = _colour(run, compensated)
+        tip, settled = (true_loop(run, segment, x, first) for first in (0, 1))
+        estimate = estimated_loop(run, segment, x, 1)
+        if not np.isfinite(tip[1]).any():
+            tip, settled = (estimated_loop(run, segment, x, first) for first in (0, 1))
+        start = slice(None, len(tip[0]) - len(settled[0]) + 1)
+        axes.plot(*(scale * each for each in settled), color=colour, linewidth=1.0)
+        axes.plot(*(scale * each[start] for each in tip), color=colour, linewidth=0.4)
+        axes.plot(*(scale * each for each in estimate), ".", color=colour, markersize=1.2)
     if not any(np.size(line.get_xydata()) for line in axes.lines):
         axes.text(0.25, 0.75, "not measured", transform=axes.transAxes, ha="center")
         axes.set(xticks=[], yticks=[])
     low, high = zip(axes.get_xlim(), axes.get_ylim(), strict=True)
     axes.axline((0, 0), slope=1, color=BLACK, linewidth=0.5, linestyle=(0, (4, 4)), zorder=0)
     axes.set_xlabel(f"{'u' if uncompensated is None else 'c or u'} [{dof.display_unit}]")
-    axes.set_ylabel(f"estimate q̂ [{dof.display_unit}]")
+    axes.set_ylabel(f"tip [{dof.display_unit}]")
     axes.set_box_aspect(1)
     axes.set_xlim(min(low), max(high))
     axes.set_ylim(min(low), max(high))
+
+
+def _colour(run: Recording, compensated: list[Recording]) -> str:
+    """Of a run in the loops: the last compensated run is blue."""
+    if not run.compensated:
+        return GREY
+    return BLUE if run is compensated[-1] else ORANGE
+
+
+def _loop_legend(uncompensated: Recording | None, compensated: list[Recording]) -> Iterator[Artist]:
+    if uncompensated is not None:
+        yield Line2D([], [], color=GREY, label="without compensation, over c")
+    for run in compensated:
+        colour = _colour(run, compensated)
+        yield Line2D([], [], color=colour, label=f"{run.config.profile}, over u")
+    is_true = np.isfinite(compensated[-1].trace["true_insertion"]).any()
+    if is_true:
+        yield Line2D([], [], color=BLACK, label="true tip")
+    yield Line2D([], [], color=BLACK, linestyle="", marker=".", markersize=3, label="estimate q̂")
+    yield Line2D([], [], color=BLACK, linewidth=0.4, label="first period")
 
 
 def figure5(snapshot: Snapshot, config: Config) -> Figure:
@@ -155,25 +168,28 @@ def figure5(snapshot: Snapshot, config: Config) -> Figure:
         axes = figure.subplots(2, 2).ravel()
         axes[0].imshow(image)
         axes[1].imshow(detector.mask(snapshot.image), cmap="gray", interpolation="nearest")
-        axes[2].imshow(image // 2 + 96)
+        above = Rectangle((0, 0), 1, 1, facecolor="white", label="above the threshold")
+        axes[1].legend(handles=[above], **_ON_IMAGE)
+        axes[2].imshow(image // 2)
         for region in regions:
             left, top, width, height = region.box
             outline = Rectangle(
-                (left - 0.5, top - 0.5), width, height, fill=False, color=ORANGE, linewidth=1.0
+                (left - 0.5, top - 0.5), width, height, fill=False, color=SKY, linewidth=1.2
             )
             axes[2].add_patch(outline)
+        axes[2].legend(handles=_region_legend(), **_ON_IMAGE)
         axis_direction = (measured[1] - measured[0]) / np.hypot(*(measured[1] - measured[0]))
         _label_marker(axes[2], "A", measured[0], -axis_direction)
         _label_marker(axes[2], "B", measured[1], axis_direction)
         axes[3].imshow(image)
         axes[3].plot(*predicted.T, "x", color="white", markersize=9, label="predicted s")
         axes[3].plot(
-            *measured.T, "o", color=ORANGE, fillstyle="none", markersize=9, label="measured s*"
+            *measured.T, "o", color=YELLOW, fillstyle="none", markersize=9, label="measured s*"
         )
         for begin, end in zip(predicted, measured, strict=True):
             axes[3].plot(*np.array([begin, end]).T, color="white", linewidth=1.0)
         _magnify(axes[3], np.concatenate([measured, predicted]), image.shape)
-        axes[3].legend(loc="lower right", frameon=True, facecolor="#555555", labelcolor="white")
+        axes[3].legend(**_ON_IMAGE)
         titles = ("frame", "mask", "regions and markers", "features, magnified")
         for axis, letter, title in zip(axes, "abcd", titles, strict=True):
             axis.set_title(f"({letter}) {title}")
@@ -181,11 +197,17 @@ def figure5(snapshot: Snapshot, config: Config) -> Figure:
     return figure
 
 
+def _region_legend() -> list[Artist]:
+    region = Rectangle((0, 0), 1, 1, fill=False, color=SKY, label="region of the mask")
+    marker = Line2D([], [], color="white", linestyle="", marker="+", label="measured marker")
+    return [region, marker]
+
+
 def _label_marker(
     axes: Axes, name: str, at: NDArray[np.float64], away: NDArray[np.float64]
 ) -> None:
     """A cross at a marker [px], its name 26 points off in the direction `away` [px]."""
-    axes.plot(*at, "+", color=BLACK, markersize=8)
+    axes.plot(*at, "+", color="white", markersize=8)
     axes.annotate(
         name,
         (at[0], at[1]),
@@ -197,7 +219,7 @@ def _label_marker(
         fontsize=11,
         fontweight="bold",
         path_effects=[withStroke(linewidth=2.5, foreground="white")],
-        arrowprops={"arrowstyle": "-", "color": BLACK, "linewidth": 0.8},
+        arrowprops={"arrowstyle": "-", "color": "white", "linewidth": 0.8},
     )
 
 

@@ -15,8 +15,8 @@ from tautscope.calibration.images import to_bgr
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import OutputError
+from tautscope.figure_style import BLUE, GREY, ORANGE, PAGE, style
 from tautscope.loop.construction import build_feature_model
-from tautscope.report.figures import BLUE, GREY, ORANGE, PAGE, style
 
 VIDEO_RATE = 12.5
 _COLOURS = ((178, 114, 0), (0, 94, 213))

@@ -46,6 +46,11 @@ class LoopWidth:
     def __float__(self) -> float:
         return self.mean
 
+    def __repr__(self) -> str:
+        passed = np.count_nonzero(np.isfinite(self.widths))
+        levels = f"{passed} of {len(self.levels)} levels"
+        return f"<LoopWidth: mean {self.mean:.4g}, largest {self.max:.4g}, {levels}>"
+
 
 def loop_width(
     x: ArrayLike, y: ArrayLike, *, levels: int = LEVELS, central: float = CENTRAL

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from tautscope.dof import Dof
-from tautscope.report.figures import BLACK, BLUE, GREY, ORANGE, PAGE, style
+from tautscope.figure_style import BLACK, BLUE, GREY, ORANGE, PAGE, style
 from tautscope.report.operator_motion import EVALUATED_AFTER
 from tautscope.runs.recording import Recording
 

@@ -12,9 +12,11 @@ from typing import TYPE_CHECKING
 
 from tautscope._core import __version__
 from tautscope.config import Config, dump_config
+from tautscope.dof import Dof
 from tautscope.report import tables
 from tautscope.report.operator_motion import OperatorResults
-from tautscope.report.results import Results
+from tautscope.report.results import Figures, Results
+from tautscope.report.rows import OPERATOR_ROWS, ROWS, Row
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -31,6 +33,10 @@ figure img { width: 100%; height: auto; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
 th, td { padding: .28rem .5rem; text-align: right; white-space: nowrap; }
 th:first-child, td:first-child { text-align: left; padding-left: 0; }
+.meanings th, .meanings td { text-align: left; vertical-align: top; font-size: .88rem; }
+.meanings td { white-space: normal; } .meanings td:nth-child(2) { color: #555; min-width: 20rem; }
+.meanings td:nth-child(3) { min-width: 6.5rem; }
+details { margin: 1rem 0; } summary { cursor: pointer; font-weight: 600; }
 thead th { border-bottom: 1.5px solid #222; font-weight: 600; }
 thead tr:first-child:not(:last-child) th { border-bottom: 0; text-align: center; }
 tbody tr + tr td { border-top: 1px solid #e4e4e4; }
@@ -69,6 +75,7 @@ def run_report(
 <p class="note">Measured by the camera: the true state of the tip is not known on hardware. The
 tracking error includes the first period, in which the contact offsets are estimated. The
 article&rsquo;s figures are of its own rig.</p>
+{row_explanations(measured_rows([results]))}
 {warning_list(warnings)}
 <h2>Figures</h2>
 {figure_list(figures)}""",
@@ -131,9 +138,7 @@ def results_table(columns: Mapping[str, Sequence[Results]], by_camera: bool = Fa
     names = "".join(f"<th>{escape(name)}</th>" for name in columns)
     names = f'<th class="first">article</th>{names}' * len(dofs)
     lines = []
-    for row in tables.ROWS:
-        if by_camera and all(math.isnan(getattr(result, row.name)) for result in dofs.values()):
-            continue
+    for row in measured_rows(last) if by_camera else ROWS:
         cells = []
         for dof in dofs:
             article = tables.article_cell(row, dof, by_camera)
@@ -146,17 +151,53 @@ def results_table(columns: Mapping[str, Sequence[Results]], by_camera: bool = Fa
                 cells.append(f"<td{mark}>{value}{note}</td>")
         lines.append(f"<tr><td>{escape(row.title)}</td>{''.join(cells)}</tr>")
     return (
-        f"<table><thead><tr><th></th>{heads}</tr><tr><th></th>{names}</tr></thead>"
+        f'<table class="figures"><thead><tr><th></th>{heads}</tr><tr><th></th>{names}</tr></thead>'
         f"<tbody>{''.join(lines)}</tbody></table>"
     )
 
 
+def row_explanations(rows: Sequence[Row], results: Sequence[dict[Dof, Figures]] = ()) -> str:
+    """A table of what each row means, its goal, and for which DOFs results of ``best`` meet it.
+
+    Args:
+        rows: Rows of the table above it.
+        results: Results per seed, of which the median counts; none for another profile or rig.
+    """
+    middle: dict[Dof, Figures] = tables.median(results) if results else {}
+    lines = []
+    for row in rows:
+        values = {dof: getattr(each, row.name) for dof, each in middle.items()}
+        missed = ", ".join(
+            f"{dof.label} {tables.exact_cell(row, dof, value)}"
+            for dof, value in values.items()
+            if row.holds(dof, value) is False
+        )
+        verdict = f"<b>missed: {missed}</b>" if missed else "holds" if row.goal else ""
+        lines.append(
+            f"<tr><td>{escape(row.title)}</td><td>{escape(row.meaning)}</td>"
+            f"<td>{tables.goal_text(row)}</td>" + f"<td>{verdict}</td>" * bool(results) + "</tr>"
+        )
+    heads = "<th>row</th><th>what it is</th><th>goal</th>" + "<th>result</th>" * bool(results)
+    return (
+        '<details open><summary>What the rows mean</summary><table class="meanings">'
+        f"<thead><tr>{heads}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
+        '<p class="note">Goals are for profile &ldquo;best&rdquo; and the median of several '
+        "seeds; rows without one describe the instrument or explain the others.</p></details>"
+    )
+
+
+def measured_rows(results: Sequence[Results]) -> list[Row]:
+    """The rows of Table 1 with a value for a DOF."""
+    dofs = tables.median(results).values()
+    return [row for row in ROWS if not all(math.isnan(getattr(each, row.name)) for each in dofs)]
+
+
 def operator_section(profile: str, results: Sequence[OperatorResults]) -> str:
     """The section of the operator motion: per figure the median over the seeds, and the worst."""
-    middle, bad = tables.median(results), tables.worst(results, tables.OPERATOR_ROWS)
+    middle, bad = tables.median(results), tables.worst(results, OPERATOR_ROWS)
     heads = "".join(f"<th>{tables.heading(dof)}</th>" for dof in middle)
     lines = []
-    for row in tables.OPERATOR_ROWS:
+    for row in OPERATOR_ROWS:
         cells = []
         for dof in middle:
             value, worst = (
@@ -166,13 +207,14 @@ def operator_section(profile: str, results: Sequence[OperatorResults]) -> str:
             cells.append(f"<td>{value}{note}</td>")
         lines.append(f"<tr><td>{escape(row.title)}</td>{''.join(cells)}</tr>")
     return f"""<h2>Operator motion</h2>
-<div class="wide"><table><thead><tr><th></th>{heads}</tr></thead>
+<div class="wide"><table class="figures"><thead><tr><th></th>{heads}</tr></thead>
 <tbody>{"".join(lines)}</tbody></table></div>
 <p class="note">Profile &ldquo;{profile}&rdquo;. All degrees of freedom make minimum-jerk moves
 between random targets at the same time, with rests; the first 40&nbsp;s do not count. Errors are of
 the true tip, and their mean is not removed. Creep is the travel of the tip while every reference
 rests. The bound is the reduction of a law with exact knowledge, on ideal plays of the widths of the
-article.</p>"""
+article.</p>
+{row_explanations(OPERATOR_ROWS, results if profile == "best" else ())}"""
 
 
 def _figure(captioned: CaptionedFigure) -> str:

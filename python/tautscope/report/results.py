@@ -114,10 +114,14 @@ def _combined(values: list[float], how: str) -> float:
 
 
 def true_loop(
-    recording: Recording, segment: Segment, x: str
+    recording: Recording, segment: Segment, x: str, first: float | None = None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """X (``"command"`` or ``"reference"``) and the true tip in a segment's last two periods."""
-    rows = recording.during(segment, segment.periods - LAST_PERIODS, segment.periods)
+    """X (``"command"`` or ``"reference"``) and the true tip, from period `first` of a segment.
+
+    By default from the last but one.
+    """
+    begin = segment.periods - LAST_PERIODS if first is None else first
+    rows = recording.during(segment, begin, segment.periods)
     label = segment.dof.label
     return recording.trace[f"{x}_{label}"][rows], recording.trace[f"true_{label}"][rows]
 

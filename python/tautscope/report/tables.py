@@ -5,72 +5,13 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from tautscope.dof import Dof
 from tautscope.report.results import DofResult, Figures, Results, combine
-
-Worst = Literal["min", "max"]
-
-
-@dataclass(frozen=True, slots=True)
-class Row:
-    """One row of the table.
-
-    Attributes:
-        name: Field of `DofResult` or of the figures of an operator motion.
-        title: Title in printed tables.
-        kind: ``length`` is in the DOF's unit, ``share`` is printed in percent, ``number`` and
-            ``count`` have no conversion.
-        worst: Whether the worst value is the smallest or the largest.
-        in_summary: Whether ``--json`` contains it.
-    """
-
-    name: str
-    title: str
-    kind: Literal["length", "share", "number", "count"]
-    worst: Worst = "max"
-    in_summary: bool = False
-
-
-ROWS = (
-    Row("uncompensated", "uncompensated width", "length", in_summary=True),
-    Row("uncompensated_max", "uncompensated width, largest", "length"),
-    Row("compensated", "compensated width", "length", in_summary=True),
-    Row("compensated_max", "compensated width, largest", "length"),
-    Row("reduction", "reduction", "share", "min", in_summary=True),
-    Row("reduction_max", "reduction of the largest width", "share", "min", in_summary=True),
-    Row("uncompensated_estimate", "uncompensated width, by camera", "length"),
-    Row("compensated_estimate", "compensated width, by camera", "length"),
-    Row("reduction_estimate", "reduction, by camera", "share", "min"),
-    Row("start_periods", "periods until settled", "count", in_summary=True),
-    Row("tracking_rms", "tracking error, RMS", "length", in_summary=True),
-    Row("tracking_estimate", "tracking error, RMS, by camera", "length"),
-    Row("state_rms", "state error, RMS", "length", in_summary=True),
-    Row("marker_rms_px", "marker error, RMS [px]", "number", in_summary=True),
-    Row("frames_used", "frames used", "share", "min"),
-    Row("tip_overspeed", "tip overspeed", "number"),
-    Row("actuator_gain", "actuator gain", "number"),
-)
-
-OPERATOR_ROWS = (
-    Row("uncompensated_rms", "uncompensated tracking error, RMS", "length"),
-    Row("compensated_rms", "compensated tracking error, RMS", "length"),
-    Row("reduction", "reduction", "share", "min"),
-    Row("largest", "largest error", "length"),
-    Row("overspeed", "tip overspeed", "number"),
-    Row("creep", "creep", "length"),
-    Row("bound", "bound of the reduction", "share", "min"),
-)
-
-ARTICLE: dict[str, dict[Dof, float]] = {
-    "uncompensated": {Dof.INSERTION: 10e-3, Dof.ROTATION: 1.8, Dof.BENDING: 1.1},
-    "compensated": {Dof.INSERTION: 2.5e-3, Dof.ROTATION: 0.4, Dof.BENDING: 0.3},
-    "reduction": {Dof.INSERTION: 0.75, Dof.ROTATION: 0.78, Dof.BENDING: 0.73},
-}
-"""Table 1 of the article [m or rad, fraction]."""
+from tautscope.report.rows import ARTICLE, OPERATOR_ROWS, ROWS, Row
 
 
 def median(results: Sequence[dict[Dof, Figures]]) -> dict[Dof, Figures]:
@@ -103,6 +44,28 @@ def cell(row: Row, dof: Dof, value: float) -> str:
         return f"{value:g}"
     shown = in_display_unit(row, dof, value)
     return f"{shown:.3g}" if abs(shown) >= 1 else f"{shown:.2g}"
+
+
+def exact_cell(row: Row, dof: Dof, value: float) -> str:
+    """A figure with a digit more than `cell` and its unit, to compare it with a goal."""
+    if math.isnan(value):
+        return "not known"
+    if row.kind == "share":
+        return f"{100 * value:.1f} %"
+    unit = f" {dof.display_unit}" if row.kind == "length" else ""
+    return f"{in_display_unit(row, dof, value):.4g}{unit}"
+
+
+def goal_text(row: Row) -> str:
+    """The goal of a row in display units: ``at most 2 mm, 0.5 rad, 0.25 rad``."""
+    if row.goal is None:
+        return ""
+    texts = []
+    for dof in Dof:
+        text = cell(row, dof, row.limit(dof) or 0.0)
+        texts.append(f"{text} {dof.display_unit}" if row.kind == "length" else text)
+    joined = texts[0] if len(set(texts)) == 1 else ", ".join(texts)
+    return f"at {'least' if row.worst == 'min' else 'most'} {joined}"
 
 
 def article_cell(row: Row, dof: Dof, by_camera: bool = False) -> str:

@@ -14,7 +14,7 @@ from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import SignalError
 from tautscope.report.metrics import reduction, tracking_rms
-from tautscope.report.tables import ARTICLE
+from tautscope.report.rows import ARTICLE
 
 Floats = NDArray[np.float64]
 Pair = tuple[float, float]

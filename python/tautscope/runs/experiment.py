@@ -28,7 +28,7 @@ ImageUpdate = Callable[[HysteresisReduction, Frame], Report]
 """Updates the loop with a frame."""
 HELD_TIME = 1.0
 """How long motion is held before a run ends in which nobody can re-engage it [s]."""
-_Reports = Iterator[tuple[Frame, Report]]
+Reports = Iterator[tuple[Frame, Report]]
 
 
 class Log(Protocol):
@@ -96,7 +96,7 @@ def run_experiment(
     """
     reduction = HysteresisReduction(config, compensate=compensate)
     recorder = _ExperimentRecorder(config, reference.duration / 2)
-    updater = _InlineUpdater(look) if executor is None else _BackgroundUpdater(executor)
+    updater = _InlineUpdater(look) if executor is None else BackgroundUpdater(executor)
     events = None if log is None else _EventLog(reduction, log)
     stop = _MotionStop(reduction, engage, rig.control_period)
 
@@ -180,12 +180,12 @@ class _InlineUpdater:
     def __init__(self, image_update: ImageUpdate) -> None:
         self._image_update = image_update
 
-    def update(self, reduction: HysteresisReduction, frame: Frame | None) -> _Reports:
+    def update(self, reduction: HysteresisReduction, frame: Frame | None) -> Reports:
         if frame is not None:
             yield frame, self._image_update(reduction, frame)
 
 
-class _BackgroundUpdater:
+class BackgroundUpdater:
     """Detects the markers of one frame at a time in a background thread."""
 
     def __init__(self, executor: Executor) -> None:
@@ -193,7 +193,8 @@ class _BackgroundUpdater:
         self._next: Frame | None = None
         self._running: tuple[Frame, Future[Detection]] | None = None
 
-    def update(self, reduction: HysteresisReduction, frame: Frame | None) -> _Reports:
+    def update(self, reduction: HysteresisReduction, frame: Frame | None) -> Reports:
+        """Updates that have ended since the last call; `frame` is the next one, if it arrived."""
         if self._running is not None and self._running[1].done():
             (detected, result), self._running = self._running, None
             yield detected, reduction.on_detection(detected, result.result())

@@ -70,6 +70,10 @@ class Snapshot:
     features: Floats
     predicted_features: Floats
 
+    def __repr__(self) -> str:
+        height, width = self.image.shape[:2]
+        return f"<Snapshot: {width} x {height}, captured at {self.captured_at:.3f} s>"
+
 
 @dataclass(frozen=True, eq=False)
 class Recording:
@@ -99,6 +103,15 @@ class Recording:
     segments: tuple[Segment, ...]
     snapshot: Snapshot | None = None
     warnings: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        time = self.trace["time"]
+        seconds = time[-1] - time[0] if len(time) else 0.0
+        compensated = "with" if self.compensated else "without"
+        return (
+            f"<Recording: {len(time)} ticks in {seconds:g} s, {len(self.frames)} images, "
+            f"profile {self.config.profile}, {compensated} compensation>"
+        )
 
     def during(self, segment: Segment, first: float, last: float) -> NDArray[np.bool_]:
         """(ticks,) rows of the trace in periods `first` to `last` of a segment."""

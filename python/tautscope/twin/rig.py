@@ -36,6 +36,11 @@ class Twin:
         self._plant: Plant | None = None
         self._ticks = 0
 
+    def __repr__(self) -> str:
+        clock = "closed" if self._plant is None else f"at {self.time:.3f} s"
+        images = f"{self._config.twin.frame_rate:g} images/s" if self.has_images else "no images"
+        return f"<Twin: seed {self._config.twin.seed}, {images}, {clock}>"
+
     @property
     def time(self) -> float:
         """Time of its clock [s]."""

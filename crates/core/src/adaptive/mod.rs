@@ -1,5 +1,6 @@
 //! Compensation law of profile `best`.
 
+pub(crate) mod lag_lead;
 pub(crate) mod offset_rate_limit;
 pub(crate) mod settings;
 pub(crate) mod slip_direction;

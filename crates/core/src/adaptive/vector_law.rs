@@ -1,5 +1,6 @@
 //! Compensation law of profile `best`: the limited gain of Eq. (2) for insertion and rotation together.
 
+use crate::adaptive::lag_lead::LagLead;
 use crate::adaptive::offset_rate_limit::OffsetRateLimit;
 use crate::adaptive::settings::AdaptiveSettings;
 use crate::adaptive::slip_direction::SlipDirection;
@@ -14,8 +15,6 @@ use crate::settings::{ControlSettings, DofSettings};
 const GROUPS: [PerDof<f64>; 2] = [[1.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 /// Share of `command_speed` that the law uses, so that rounding does not exceed it.
 const BELOW_LIMIT: f64 = 0.999;
-/// Time constant of the velocity of the reference in s.
-const VELOCITY_TIME: f64 = 0.05;
 /// Steps in search of the largest motion whose predicted tip is slow enough.
 const STEPS: usize = 5;
 
@@ -30,7 +29,7 @@ const STEPS: usize = 5;
 /// contact   |dq| <= tip_gain |du| for the tip q that the estimate predicts, and q does not pass u along du
 /// ```
 ///
-/// of bending by itself; in target and contact u is u + lag du/dt, because the tip lags behind its plays. One DOF alone:
+/// of bending by itself; target and contact are those of the reference led by the lag ([`LagLead`]). One DOF alone:
 /// 0 <= dc / du <= `K_b`, Eq. (2). Where insertion and rotation rest, neither command moves, but each moves where the other
 /// does: while rotation turns, the friction that held the insertion is released.
 /// A share of the compensation s makes it dc = du + s (dc - du).
@@ -54,8 +53,7 @@ pub struct VectorLaw {
     command: PerDof<f64>,
     share: f64,
     period: f64,
-    /// Smoothed velocity of the reference (3,).
-    velocity: PerDof<f64>,
+    lag_lead: LagLead,
 }
 
 impl VectorLaw {
@@ -116,7 +114,7 @@ impl VectorLaw {
             command: [f64::NAN; 3],
             share: 1.0,
             period: control.period,
-            velocity: [0.0; 3],
+            lag_lead: LagLead::new(unit, control.period),
         })
     }
 
@@ -154,10 +152,7 @@ impl VectorLaw {
             *travel /= unit;
         }
         self.rate_limit.step(travel);
-        let kept = self.period / (VELOCITY_TIME + self.period);
-        for (velocity, motion) in self.velocity.iter_mut().zip(motion) {
-            *velocity += kept * (motion / self.period - *velocity);
-        }
+        self.lag_lead.step(motion);
         let lead = self.next_lead(reference, motion, filter);
         let command = limit(self.lawful(reference, motion, lead));
         self.lead = subtract(command, reference);
@@ -196,16 +191,7 @@ impl VectorLaw {
         motion: PerDof<f64>,
         filter: &Filter,
     ) -> PerDof<f64> {
-        // The tip lags behind the output, which therefore leads the reference.
-        let mut ahead = reference;
-        for ((ahead, velocity), lag) in ahead
-            .iter_mut()
-            .zip(self.velocity)
-            .zip(filter.nominal().lag)
-        {
-            *ahead += lag * velocity;
-        }
-        let reference = ahead;
+        let reference = self.lag_lead.apply(reference, filter.nominal().lag);
         let output = filter.nominal().output(reference);
         let used = self.usable(filter, output);
         let deflection = used.steady_deflection(self.direction.value());

@@ -2,17 +2,12 @@
 
 use crate::article::play::Play;
 use crate::dof::PerDof;
-use crate::error::{ConfigError, require, require_non_negative, require_positive};
+use crate::error::{ConfigError, require_positive};
 use crate::estimation::centre_map::CentreMap;
-use crate::estimation::ensemble::{Ensemble, STATE, State, geometry, hysteresis, lag, position};
+use crate::estimation::ensemble::{Ensemble, STATE, State, hysteresis, lag, position};
 use crate::estimation::gain::GainEstimate;
-use crate::estimation::history::{Entry, History};
 use crate::estimation::nominal::Nominal;
-use crate::estimation::path::straight_pieces;
-use crate::estimation::posture::Belief;
 use crate::estimation::settings::StateEstimationSettings;
-use crate::math::linear::{dot, solve_symmetric};
-use crate::model::features::GEOMETRY;
 use crate::model::hysteresis::{Hysteresis, PlayPosition};
 
 /// Initial half width of a slack of unknown width, and its bounds, in half of `width_limit`.
@@ -73,41 +68,14 @@ impl Filter {
         start_plays: PerDof<Play>,
         radius: f64,
     ) -> Result<Self, ConfigError> {
-        for (field, value) in [
-            ("marker_deviation", settings.marker_deviation),
-            ("tip_deviation", settings.tip_deviation),
-            ("width_deviation", settings.width_deviation),
-            ("gain_window", settings.gain_window),
-            ("gain_prior", settings.gain_prior),
-            ("diameter", radius),
-        ] {
-            require_positive(field, value)?;
-        }
-        for (field, value) in [
-            ("model_deviation", settings.model_deviation),
-            ("shape_deviation", settings.shape_deviation),
-            ("image_deviation", settings.image_deviation),
-            ("centre_deviation", settings.centre_deviation),
-            ("share_deviation", settings.share_deviation),
-            ("lag_deviation", settings.lag_deviation),
-            ("tip_walk", settings.tip_walk),
-            ("width_walk", settings.width_walk),
-            ("centre_walk", settings.centre_walk),
-            ("share_walk", settings.share_walk),
-        ] {
-            require_non_negative(field, value)?;
-        }
-        for rate in settings.map_rate {
-            require_non_negative("map_rate", rate)?;
-        }
+        settings.check()?;
+        require_positive("diameter", radius)?;
         for value in unit {
             require_positive("width_limit", value)?;
         }
         for value in start_std {
             require_positive("start_deviation", value)?;
         }
-        let outlier = settings.outlier_distance;
-        require(outlier > 0.0, "outlier_distance", outlier, "above 0")?;
         let blank = PlayPosition::at([f64::NAN; 3]);
         let zero = [0.0; STATE];
         Ok(Self {
@@ -236,190 +204,6 @@ impl Filter {
         self.settle();
     }
 
-    /// Follows the command of a control tick [m, rad, rad] with the prediction.
-    pub fn step(&mut self, from: PerDof<f64>, to: PerDof<f64>, time: f64) {
-        let nominal = &mut self.nominal;
-        let before = nominal.position.output;
-        nominal.position = nominal
-            .hysteresis
-            .propagate(self.radius, &nominal.position, from, to);
-        nominal.follow(before, nominal.position.output, time);
-    }
-
-    /// Propagates the ensemble along the control ticks to a tick of the history, unless that is past already.
-    ///
-    /// In steps of at most a quarter of the history, so that a prediction does not depend on whether the ensemble has been
-    /// propagated over a part of the way before.
-    pub fn advance<S: AsRef<[Entry]> + AsMut<[Entry]>>(
-        &mut self,
-        history: &History<S>,
-        to: &Entry,
-    ) {
-        while let Some(part) = self.next_step(history)
-            && part.time > self.time
-            && part.time < to.time
-        {
-            self.advance_once(history, &part);
-        }
-        self.advance_once(history, to);
-    }
-
-    /// The tick a quarter of the history after the time of the ensemble; None if the history does not have it.
-    pub fn next_step<S: AsRef<[Entry]> + AsMut<[Entry]>>(
-        &self,
-        history: &History<S>,
-    ) -> Option<Entry> {
-        history.at(self.time + history.span() / 4.0)
-    }
-
-    fn advance_once<S: AsRef<[Entry]> + AsMut<[Entry]>>(
-        &mut self,
-        history: &History<S>,
-        to: &Entry,
-    ) {
-        if self.origin.is_none() || to.time <= self.time {
-            return;
-        }
-        let path = history
-            .since(self.time)
-            .filter(|entry| entry.time < to.time);
-        let path = path.chain(core::iter::once(to));
-        let before = position(&self.ensemble.mean()).output;
-        self.follow(path.map(|entry| (entry.command, entry.reference)));
-        let after = position(&self.ensemble.mean()).output;
-        let mut nominal = Nominal {
-            velocity: self.velocity,
-            ..self.nominal
-        };
-        nominal.follow(before, after, to.time - self.time);
-        self.velocity = nominal.velocity;
-        self.time = to.time;
-    }
-
-    /// Propagates the ensemble along commands with their references, from the last ones on.
-    pub fn follow(&mut self, path: impl Iterator<Item = (PerDof<f64>, PerDof<f64>)> + Clone) {
-        let commands = path.clone().map(|(command, _)| command);
-        let commands = straight_pieces(commands, self.command, self.unit);
-        self.ensemble
-            .propagate(&self.maps, self.radius, self.command, &commands);
-        let mut walked = [0.0; 3];
-        // A centre that varies with the position looks like a gain.
-        let plays = Hysteresis {
-            centre: [0.0; 3],
-            ..self.nominal.hysteresis
-        };
-        for (command, reference) in path {
-            self.uncorrected =
-                plays.propagate(self.radius, &self.uncorrected, self.command, command);
-            let steps = reference.into_iter().zip(self.reference).zip(self.unit);
-            for (walked, ((reference, last), unit)) in walked.iter_mut().zip(steps) {
-                *walked += ((reference - last) / unit).abs();
-            }
-            (self.command, self.reference) = (command, reference);
-        }
-        for (travel, walked) in self.travel.iter_mut().zip(walked) {
-            *travel += walked;
-        }
-        self.walk(walked);
-    }
-
-    /// Random walks over a travel of the reference (3,): standard deviations grow with its square root.
-    fn walk(&mut self, [t1, t2, t3]: PerDof<f64>) {
-        let (shaft, bending) = (libm::sqrt(libm::sqrt(t1 * t1 + t2 * t2)), libm::sqrt(t3));
-        if shaft + bending == 0.0 {
-            return;
-        }
-        let settings = &self.settings;
-        let [h1, h2, h3] = self.nominal.hysteresis.half_width;
-        let tip = settings.tip_walk;
-        self.ensemble
-            .disturb_position([tip * shaft * h1, tip * shaft * h2, tip * bending * h3]);
-        let (width, centre) = (settings.width_walk, settings.centre_walk);
-        let mut std = [0.0; STATE];
-        let [_, _, _, _, _, w1, w2, w3, c1, c2, c3, share, ..] = &mut std;
-        let own = [t1, t2, t3].map(libm::sqrt);
-        [*w1, *w2, *w3] = own.map(|travel| width * travel);
-        let [r1, r2, r3] = own.map(|travel| centre * travel);
-        (*c1, *c2, *c3) = (r1 * h1, r2 * h2, r3 * h3);
-        *share = settings.share_walk * shaft;
-        self.ensemble.add_noise(&std);
-    }
-
-    /// Mean and standard deviations of the tip at a tick of the history.
-    pub fn predict<S: AsRef<[Entry]> + AsMut<[Entry]>>(
-        &self,
-        history: &History<S>,
-        to: &Entry,
-    ) -> Belief {
-        let mut ahead = self.clone();
-        ahead.advance(history, to);
-        ahead.belief()
-    }
-
-    /// Mean and standard deviations of the tip of the ensemble.
-    pub fn belief(&self) -> Belief {
-        let ([q1, q2, q3], [[v1, _, _], [_, v2, _], [_, _, v3]]) = self.tips();
-        Belief {
-            state: [q1, q2, q3],
-            deviation: [v1, v2, v3].map(libm::sqrt),
-        }
-    }
-
-    /// Mean and covariance of the tip, with its deviation from the plays.
-    pub(super) fn tips(&self) -> ([f64; 3], [[f64; 3]; 3]) {
-        let nominal = Nominal {
-            velocity: self.velocity,
-            ..self.nominal
-        };
-        let (mean, [[v1, a, b], [c, v2, d], [e, f, v3]]) = self
-            .ensemble
-            .covariance(|state| nominal.lagging_tip(position(state).output, lag(state)));
-        let [d1, d2, d3] = self.deviation();
-        let covariance = [
-            [v1 + d1 * d1, a, b],
-            [c, v2 + d2 * d2, d],
-            [e, f, v3 + d3 * d3],
-        ];
-        (mean, covariance)
-    }
-
-    /// Mean and covariance of the geometry.
-    pub fn geometry(&self) -> ([f64; GEOMETRY], [[f64; GEOMETRY]; GEOMETRY]) {
-        self.ensemble.covariance(geometry)
-    }
-
-    /// Mean of the geometry, and its covariance where the output of the plays is known: G - X' P^-1 X with the covariances G
-    /// of the geometry, P of the output and X of both.
-    pub(super) fn geometry_of_a_known_output(
-        &self,
-    ) -> ([f64; GEOMETRY], [[f64; GEOMETRY]; GEOMETRY]) {
-        let joint = |state: &State| {
-            let ([a, b, c], [d, e, f]) = (position(state).output, geometry(state));
-            [a, b, c, d, e, f]
-        };
-        let ([_, _, _, d, e, f], [a1, a2, a3, d1, e1, f1]) = self.ensemble.covariance(joint);
-        let split = |[x1, x2, x3, g1, g2, g3]: [f64; 6]| ([x1, x2, x3], [g1, g2, g3]);
-        let outputs = [a1, a2, a3].map(|row| split(row).0);
-        let (crosses, mut own) = (
-            [d1, e1, f1].map(|row| split(row).0),
-            [d1, e1, f1].map(|row| split(row).1),
-        );
-        for (row, cross) in own.iter_mut().zip(crosses) {
-            let Some(solved) = solve_symmetric(outputs, cross) else {
-                continue;
-            };
-            for (entry, other) in row.iter_mut().zip(crosses) {
-                *entry -= dot(solved, other);
-            }
-        }
-        ([d, e, f], own)
-    }
-
-    /// Standard deviation of the tip from that of the plays (3,) [m, rad, rad].
-    pub(super) fn deviation(&self) -> PerDof<f64> {
-        self.unit.map(|unit| self.settings.tip_deviation * unit)
-    }
-
     /// Moves every member to where its plays allow it, and takes the mean.
     pub(super) fn settle(&mut self) {
         let largest = self.unit.map(|unit| LARGEST_WIDTH * unit);
@@ -443,16 +227,6 @@ impl Filter {
                 .propagate(self.radius, &at, self.command, self.command);
     }
 
-    /// Propagates the prediction from the time of the ensemble to now.
-    pub(super) fn catch_up<S: AsRef<[Entry]> + AsMut<[Entry]>>(&mut self, history: &History<S>) {
-        let (mut from, mut time) = (self.command, self.time);
-        self.nominal.velocity = self.velocity;
-        for entry in history.since(self.time) {
-            self.step(from, entry.command, entry.time - time);
-            (from, time) = (entry.command, entry.time);
-        }
-    }
-
     /// Centre of the contact offsets (3,) at outputs of the plays (3,) [m, rad, rad].
     pub fn centre(&self, output: PerDof<f64>) -> PerDof<f64> {
         let mut centre = self.nominal.hysteresis.centre;
@@ -461,15 +235,5 @@ impl Filter {
             *centre += map.at(there) - map.at(here);
         }
         centre
-    }
-
-    /// The time to which the ensemble has been propagated, in s.
-    pub const fn time(&self) -> f64 {
-        self.time
-    }
-
-    /// Continues on a clock that was set back.
-    pub const fn restart_clock(&mut self) {
-        self.time = f64::NEG_INFINITY;
     }
 }

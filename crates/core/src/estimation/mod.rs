@@ -4,6 +4,8 @@ pub(crate) mod centre_map;
 pub(crate) mod ensemble;
 pub(crate) mod expectation;
 pub(crate) mod filter;
+pub(crate) mod filter_belief;
+pub(crate) mod filter_motion;
 pub(crate) mod filter_update;
 pub(crate) mod gain;
 pub(crate) mod history;

@@ -1,6 +1,7 @@
 //! Settings of the state estimation of profile `best`.
 
 use crate::dof::PerDof;
+use crate::error::{ConfigError, require, require_non_negative, require_positive};
 
 /// The estimate of profile `best`, decision 0030. Names and units are those of the TOML keys; half widths and travels
 /// are in half of `width_limit`, so that one set serves all DOFs.
@@ -43,4 +44,41 @@ pub struct StateEstimationSettings {
     pub gain_window: f64,
     /// Strength of the prior of the gain, as a variance of the position times a travel.
     pub gain_prior: f64,
+}
+
+impl StateEstimationSettings {
+    /// Checks the range of every setting.
+    ///
+    /// # Errors
+    /// One is out of range.
+    pub(super) fn check(&self) -> Result<(), ConfigError> {
+        for (field, value) in [
+            ("marker_deviation", self.marker_deviation),
+            ("tip_deviation", self.tip_deviation),
+            ("width_deviation", self.width_deviation),
+            ("gain_window", self.gain_window),
+            ("gain_prior", self.gain_prior),
+        ] {
+            require_positive(field, value)?;
+        }
+        for (field, value) in [
+            ("model_deviation", self.model_deviation),
+            ("shape_deviation", self.shape_deviation),
+            ("image_deviation", self.image_deviation),
+            ("centre_deviation", self.centre_deviation),
+            ("share_deviation", self.share_deviation),
+            ("lag_deviation", self.lag_deviation),
+            ("tip_walk", self.tip_walk),
+            ("width_walk", self.width_walk),
+            ("centre_walk", self.centre_walk),
+            ("share_walk", self.share_walk),
+        ] {
+            require_non_negative(field, value)?;
+        }
+        for rate in self.map_rate {
+            require_non_negative("map_rate", rate)?;
+        }
+        let outlier = self.outlier_distance;
+        require(outlier > 0.0, "outlier_distance", outlier, "above 0")
+    }
 }

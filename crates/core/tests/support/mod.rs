@@ -108,11 +108,11 @@ pub fn settings(safety: &SafetySettings) -> Settings {
         },
         safety: *safety,
         adaptive: AdaptiveSettings {
-            tip_gain: 1.9,
+            tip_gain: 1.85,
             caution: 0.3,
             tremor_time: 0.15,
             direction_travel: 0.01,
-            change_rate: [0.12, 0.12, 100.0],
+            change_rate: [0.07, 0.07, 100.0],
             known_travel: 10.0,
         },
         state_estimation: StateEstimationSettings {

@@ -21,6 +21,7 @@ from tautscope.calibration.bands.labels import (
 from tautscope.calibration.colour import ColorDiscriminant
 from tautscope.calibration.result import CalibrationResult
 from tautscope.errors import CalibrationError
+from tautscope.figure_style import BLACK, GREEN, GREY
 
 LEAST_HITS = 0.8
 """Share of the pixels of each band that must be classified as marker."""
@@ -141,12 +142,12 @@ def _figure(fit: ColourFit, images: Sequence[LabelledImage]) -> Figure:
     left.set_axis_off()
     weights = np.array(fit.discriminant.weights)
     groups = {"bands": (BAND_A, BAND_B), "everything else": (BACKGROUND,)}
-    for (name, labels), colour in zip(groups.items(), ("C2", "0.5"), strict=True):
+    for (name, labels), colour in zip(groups.items(), (GREEN, GREY), strict=True):
         pixels = np.concatenate([_of(images, label) for label in labels])
         values: NDArray[np.float64] = pixels @ weights
         share = np.full(len(values), 1 / max(len(values), 1))
         right.hist(values, bins=120, weights=share, label=name, color=colour, alpha=0.7)
-    right.axvline(fit.discriminant.threshold, color="k", linewidth=1, label="threshold")
+    right.axvline(fit.discriminant.threshold, color=BLACK, linewidth=1, label="threshold")
     right.set(xlabel="w . x [grey levels]", ylabel="share of the pixels", yscale="log")
     right.legend(frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
     return figure

@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 
 from tautscope.calibration.camera.coverage import COLUMNS, ROWS, Coverage
 from tautscope.calibration.camera.intrinsics import CameraFit
+from tautscope.figure_style import BLUE
 
 CAPTION = (
     "Left: all corners of the board that were used, in the image, with the cells that had to be "
@@ -20,7 +21,7 @@ def coverage_figure(fit: CameraFit, coverage: Coverage) -> Figure:
     figure = Figure(figsize=(9, 4.4), layout="constrained")
     image, scatter = figure.subplots(1, 2, width_ratios=(width / height, 1))
     corners = np.concatenate([view.pixels for view in fit.views])
-    image.scatter(*corners.T, s=3, linewidths=0, color="C0")
+    image.scatter(*corners.T, s=3, linewidths=0, color=BLUE)
     for row in range(ROWS):
         for column in range(COLUMNS):
             place = (column + 0.5) * width / COLUMNS, (row + 0.5) * height / ROWS
@@ -33,7 +34,7 @@ def coverage_figure(fit: CameraFit, coverage: Coverage) -> Figure:
         image.axhline(k * height / ROWS, color="0.7", linewidth=0.6)
     image.set(xlim=(0, width), ylim=(height, 0), xlabel="u [px]", ylabel="v [px]", aspect="equal")
     image.set_title(f"{len(corners)} corners in {len(fit.views)} views", fontsize=10)
-    scatter.scatter(*fit.residuals.T, s=3, linewidths=0, color="C0")
+    scatter.scatter(*fit.residuals.T, s=3, linewidths=0, color=BLUE)
     scatter.axhline(0, color="0.7", linewidth=0.6)
     scatter.axvline(0, color="0.7", linewidth=0.6)
     reach = 1.05 * float(np.abs(fit.residuals).max())

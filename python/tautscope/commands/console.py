@@ -1,0 +1,77 @@
+"""The command ``tautscope console``."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from tautscope.commands import arguments
+from tautscope.commands.printing import print_json
+from tautscope.config import load_config
+from tautscope.config.placeholders import refuse_placeholders
+from tautscope.errors import ConfigError
+from tautscope.extras import require_extras
+
+
+def add_parser(verbs: arguments.Verbs) -> None:
+    """Add the command to the parser."""
+    console = arguments.add_verb(
+        verbs,
+        "console",
+        help="see, steer and stop the instrument in a browser",
+        description="Serve the operator's console on 127.0.0.1 and print its address with a new "
+        "token. Without --twin or --replay THE MOTORS of the configuration MOVE, once an operator "
+        "enables them on the page. Research software, not a medical device; a stop on the page is "
+        "no emergency stop: have one in hardware, within reach.",
+        extras=["console"],
+    )
+    arguments.add_config(console)
+    arguments.add_profile(console, "how slack is compensated")
+    kind = console.add_mutually_exclusive_group()
+    kind.add_argument("--twin", action="store_true", help="steer the simulated instrument")
+    kind.add_argument("--replay", type=Path, metavar="LOG", help="show a log; nothing is steered")
+    console.add_argument(
+        "--port", type=arguments.natural, default=0, metavar="N", help="port [a free one]"
+    )
+    arguments.add_out(console, "console")
+    arguments.add_json(console)
+    console.set_defaults(run=_console)
+
+
+def _console(options: argparse.Namespace) -> int:
+    if not 0 <= options.port <= 65535:
+        raise ConfigError("port", options.port, "a port from 0 to 65535")
+    if options.replay is not None:
+        require_extras("tautscope console --replay", ["hardware"])
+        from tautscope.console.log_player import play  # noqa: PLC0415
+
+        return play(
+            options.replay, options.port, lambda url: _announce(options.json, url, "replay")
+        )
+    require_extras("tautscope console", ["twin" if options.twin else "hardware"])
+    from tautscope.console.start import start_console  # noqa: PLC0415
+    from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
+
+    config = load_config(options.config, options.profile)
+    if not options.twin:
+        refuse_placeholders(options.config)
+        if config.drives is None:
+            raise ConfigError("drives", None, "a section [drives], or the option --twin")
+    folder = check_free(options.out or default_folder("console"))
+    what = "the twin" if options.twin else f"REAL MOTORS of {options.config}"
+    return start_console(
+        config,
+        folder,
+        options.port,
+        lambda url: _announce(options.json, url, what),
+        is_twin=options.twin,
+    )
+
+
+def _announce(is_json: bool, url: str, what: str) -> None:
+    if is_json:
+        print_json({"url": url})
+    else:
+        print(f"The console of {what}: {url}\nWho has this address can move it. Ctrl-C ends.")
+    sys.stdout.flush()

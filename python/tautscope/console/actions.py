@@ -1,0 +1,162 @@
+"""What the holder of the lease may request beside motion, and the lease itself."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from tautscope.console import messages as msg
+from tautscope.console import programs
+from tautscope.console.rig_control import RigControl
+from tautscope.console.stills import Image, write_still
+from tautscope.dof import Dof
+from tautscope.loop.safety import Reaction
+
+MOVING = {"home": programs.home, "experiment": programs.experiment, "sweep": programs.sweep}
+"""Actions that move the instrument."""
+
+
+class Actions:
+    """Executes requests; each is refused or executed completely, and noted in the log.
+
+    Args:
+        control: Rig and loop.
+        newest_image: Returns the newest image, if there is one.
+    """
+
+    def __init__(self, control: RigControl, newest_image: Callable[[], Image | None]) -> None:
+        self._control = control
+        self._newest_image = newest_image
+        self._takes = self._stills = 0
+
+    def execute(self, inbound: msg.Received | msg.Gone) -> msg.Reply | None:
+        """Execute a message; the reply to its page, if there is one."""
+        control = self._control
+        if isinstance(inbound, msg.Gone):
+            if control.lease.release(inbound.client):
+                control.operator.interrupt()
+                self._control.note(f"page {inbound.client} is gone; the lease is free")
+            return None
+        client, message = inbound.client, inbound.message
+        if isinstance(message, msg.Take):
+            control.operator.interrupt()
+            control.lease.take(client)
+            self._control.note(f"page {client} takes lease {control.lease.number}")
+            return msg.Reply(client, "take", True)
+        if isinstance(message, msg.Servo | msg.Stop):
+            return None
+        what = message.name if isinstance(message, msg.Action | msg.Setting) else "profile"
+        reason = control.lease.refusal(
+            client, message, time.monotonic(), needs_image=what in MOVING
+        )
+        if reason:
+            control.operator.refused[reason] += 1
+        else:
+            reason = self._execute(message)
+        if not reason:
+            self._control.note(f"page {client}: {_described(message)}")
+        return msg.Reply(client, what, not reason, reason)
+
+    def _execute(self, message: msg.Request) -> str:
+        """Execute a request; why it cannot be, else empty."""
+        if isinstance(message, msg.Setting):
+            return self._set(message)
+        if isinstance(message, msg.SetProfile):
+            return self._set_profile(message)
+        if message.name in MOVING:
+            return self._start_program(message.name)
+        reason: str = getattr(self, f"_{message.name}")(message)
+        return reason
+
+    def _set(self, setting: msg.Setting) -> str:
+        operator = self._control.operator
+        if setting.name == "compensation":
+            self._control.compensation = setting.value
+            if self._control.run is not None:
+                self._control.run.loop.set_compensation(setting.value)
+            return ""
+        operator.interrupt()
+        dof = Dof[setting.dof.upper()]
+        if setting.name == "scale":
+            operator.scale[dof] = setting.value
+        else:
+            operator.is_coupled[dof] = setting.value > 0
+        return ""
+
+    def _set_profile(self, message: msg.SetProfile) -> str:
+        control = self._control
+        if control.operator.is_moving:
+            return "the instrument moves"
+        if message.profile != control.config.profile:
+            control.restart(control.config.replace(profile=message.profile))
+        return ""
+
+    def _start_program(self, name: str) -> str:
+        control = self._control
+        operator, run = control.operator, control.run
+        if run is None or operator.stopped_by or run.is_held:
+            return "motion is stopped"
+        if not operator.is_present(time.monotonic()):
+            return "no command for 0.1 s"
+        operator.interrupt()
+        operator.program = MOVING[name](control.config, operator.reference)
+        return ""
+
+    def _end_program(self, _: msg.Action) -> str:
+        self._control.operator.interrupt()
+        return ""
+
+    def _enable(self, _: msg.Action) -> str:
+        control = self._control
+        control.operator.enable()
+        run = control.run
+        if run is None:
+            control.open()
+            return control.fault
+        if run.loop.supervision.reaction is Reaction.DISABLE:
+            control.restart(control.config)
+        elif run.is_held:
+            run.loop.engage()
+        return ""
+
+    def _acknowledge(self, _: msg.Action) -> str:
+        if self._control.run is not None:
+            self._control.run.loop.acknowledge()
+        return ""
+
+    def _release(self, _: msg.Action) -> str:
+        control = self._control
+        control.operator.interrupt()
+        assert control.lease.holder is not None
+        control.lease.release(control.lease.holder)
+        return ""
+
+    def _mark(self, _: msg.Action) -> str:
+        return "" if self._control.run is not None else "there is no log"
+
+    def _record(self, _: msg.Action) -> str:
+        if self._control.run is None:
+            return "there is no log"
+        self._control.is_recording = not self._control.is_recording
+        self._takes += self._control.is_recording
+        verb = "begins" if self._control.is_recording else "ends"
+        self._control.note(f"take {self._takes} {verb}")
+        return ""
+
+    def _still(self, _: msg.Action) -> str:
+        image = self._newest_image()
+        if image is None:
+            return "there is no image"
+        self._stills += 1
+        path = self._control.folder / f"still-{self._stills}.png"
+        write_still(path, image.copy(), self._control.config.camera.pixel_format)
+        return ""
+
+
+def _described(message: msg.Request) -> str:
+    if isinstance(message, msg.SetProfile):
+        return f"profile {message.profile}"
+    if isinstance(message, msg.Setting):
+        dof = f" {message.dof}" if message.name != "compensation" else ""
+        return f"{message.name}{dof} {message.value:g}"
+    return f"{message.name} {message.text}".strip()

@@ -1,0 +1,184 @@
+"""States and images to the pages: the newest only, to each page as fast as it takes them."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import msgspec
+from websockets.asyncio.server import ServerConnection
+from websockets.exceptions import ConnectionClosed
+
+from tautscope.console import messages as msg
+from tautscope.console.shared import Channels, ImageChannel
+from tautscope.console.stills import encode_jpeg
+
+POLL_PERIOD = 0.004
+"""Time between two looks into the shared memory [s]."""
+IN_FLIGHT = 2
+"""Images that a page has been sent and has not drawn yet, at most."""
+
+
+class StateFeed:
+    """The state of the control process, and its replies to each page.
+
+    Args:
+        channels: Views of the shared memory.
+        latency: Returns median and 95th percentile of the time from an image's arrival until it
+            was drawn [s], if they are known.
+
+    Attributes:
+        holder: The connection that holds the lease, as of the newest state.
+    """
+
+    def __init__(
+        self, channels: Channels, latency: Callable[[], tuple[float, float] | None]
+    ) -> None:
+        self._channels = channels
+        self._latency = latency
+        self._newest = b""
+        self._number = 0
+        self.holder: int | None = None
+        self._has_news = asyncio.Condition()
+        self._replies: dict[int, deque[bytes]] = {}
+
+    async def run(self) -> None:
+        """Poll the shared memory."""
+        while True:
+            await asyncio.sleep(POLL_PERIOD)
+            found = self._channels.state.newest()
+            replies = []
+            while (reply := self._channels.replies.following()) is not None:
+                replies.append(reply[1])
+            if found is None and not replies:
+                continue
+            if found is not None:
+                self._number, self._newest = found
+                self.holder = msg.decode_state(self._newest)["holder"]
+            for data in replies:
+                queue = self._replies.get(msg.decode_reply(data).client)
+                if queue is not None:
+                    queue.append(data)
+            async with self._has_news:
+                self._has_news.notify_all()
+
+    async def send(self, connection: ServerConnection, client: int) -> None:
+        """Send the newest state to a page whenever it has taken the last one."""
+        replies = self._replies[client] = deque(maxlen=32)
+        number = 0
+        try:
+            await connection.send(msg.encode({"type": "welcome", "client": client}).decode())
+            while True:
+                async with self._has_news:
+                    await self._has_news.wait_for(
+                        lambda: self._number != number or bool(replies)  # noqa: B023
+                    )
+                while replies:
+                    await connection.send(
+                        f'{{"type":"reply","reply":{replies.popleft().decode()}}}'
+                    )
+                if self._number != number:
+                    number = self._number
+                    latency = msg.encode(self._latency()).decode()
+                    text = self._newest.decode()
+                    await connection.send(f'{{"type":"state","latency":{latency},"state":{text}}}')
+        except ConnectionClosed:
+            pass
+        finally:
+            del self._replies[client]
+
+
+@dataclass
+class _Viewer:
+    """A page that gets images.
+
+    Attributes:
+        sent: Sequences of images sent and not drawn yet, with the times of their arrival.
+        may_send: Set when one may be sent.
+    """
+
+    sent: dict[int, float] = field(default_factory=dict)
+    may_send: asyncio.Event = field(default_factory=asyncio.Event)
+    dropped: int = 0
+
+
+class ImageFeed:
+    """The newest image as JPEG to each page; a page that is slow misses images.
+
+    A message is the length of the overlay in 4 bytes, little-endian, the overlay in JSON, and the
+    JPEG.
+
+    Args:
+        channel: The images in the shared memory.
+        pixel_format: Their pixel format.
+
+    Attributes:
+        latencies: Times from the arrival of an image in the control process until a page reported
+            that it was drawn [s], the newest 250 of all pages.
+    """
+
+    def __init__(self, channel: ImageChannel, pixel_format: str) -> None:
+        self._channel = channel
+        self._pixel_format = pixel_format
+        self._viewers: dict[ServerConnection, _Viewer] = {}
+        self._newest = b""
+        self._sequence = 0
+        self._arrived_at = 0.0
+        self.latencies: deque[float] = deque(maxlen=250)
+
+    async def run(self) -> None:
+        """Poll the shared memory; encode an image if somebody sees it."""
+        while True:
+            await asyncio.sleep(POLL_PERIOD)
+            if not self._viewers:
+                continue
+            found = self._channel.newest()
+            if found is None:
+                continue
+            image, overlay = found
+            jpeg = await asyncio.to_thread(encode_jpeg, image, self._pixel_format)
+            info = msgspec.json.encode(overlay)
+            self._newest = b"".join((len(info).to_bytes(4, "little"), info, jpeg))
+            self._sequence, self._arrived_at = overlay.sequence, overlay.published_at
+            for viewer in self._viewers.values():
+                viewer.may_send.set()
+
+    async def send(self, connection: ServerConnection) -> None:
+        """Send the newest image to a page whenever it has drawn an earlier one."""
+        viewer = self._viewers[connection] = _Viewer()
+        sequence = 0
+        try:
+            while True:
+                await viewer.may_send.wait()
+                viewer.may_send.clear()
+                if self._sequence == sequence or len(viewer.sent) >= IN_FLIGHT:
+                    continue
+                sequence = self._sequence
+                viewer.sent[sequence] = self._arrived_at
+                await connection.send(self._newest)
+        except ConnectionClosed:
+            pass
+
+    @property
+    def latency(self) -> tuple[float, float] | None:
+        """Median and 95th percentile of the latencies [s]; None if nothing was drawn."""
+        found = sorted(self.latencies)
+        return (found[len(found) // 2], found[19 * len(found) // 20]) if found else None
+
+    def acknowledge(self, connection: ServerConnection, sequence: int) -> None:
+        """A page has drawn an image, and with it those sent before."""
+        viewer = self._viewers.get(connection)
+        if viewer is None:
+            return
+        arrived_at = viewer.sent.get(sequence)
+        if arrived_at is not None:
+            self.latencies.append(time.monotonic() - arrived_at)
+        viewer.sent = {each: at for each, at in viewer.sent.items() if each > sequence}
+        viewer.may_send.set()
+
+    def remove(self, connection: ServerConnection) -> None:
+        """Forget a page."""
+        self._viewers.pop(connection, None)

@@ -1,0 +1,163 @@
+"""Messages between page, web server and control process, with their ranges.
+
+Whatever a page sends is decoded into one of these types or refused.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, TypeAlias
+
+import msgspec
+from msgspec import Meta, Struct
+
+Count = Annotated[int, Meta(ge=0, lt=2**53)]
+"""An integer that JavaScript represents exactly."""
+Axis = Annotated[float, Meta(ge=-1, le=1)]
+Share = Annotated[float, Meta(ge=0, le=1)]
+Text = Annotated[str, Meta(max_length=200)]
+DofName = Literal["insertion", "rotation", "bending"]
+ActionName = Literal[
+    "acknowledge",
+    "enable",
+    "end_program",
+    "experiment",
+    "home",
+    "mark",
+    "record",
+    "release",
+    "still",
+    "sweep",
+]
+
+
+class _Message(Struct, frozen=True, forbid_unknown_fields=True, tag_field="type"):
+    """A message of a page."""
+
+
+class Hello(_Message, frozen=True, tag="hello"):
+    """The first message of a connection."""
+
+    token: Annotated[str, Meta(max_length=100)]
+
+
+class Stop(_Message, frozen=True, tag="stop"):
+    """Stop all motion; needs no lease."""
+
+
+class Take(_Message, frozen=True, tag="take"):
+    """Take the lease, also from its holder."""
+
+
+class Command(_Message, frozen=True):
+    """What only the holder of the lease may send.
+
+    Attributes:
+        lease: Number of the lease.
+        sequence: Grows from command to command.
+        image: Sequence of the image displayed.
+    """
+
+    lease: Count
+    sequence: Count
+    image: Count
+
+
+class Servo(Command, frozen=True, tag="servo"):
+    """The deflection of the input device, sent periodically.
+
+    Attributes:
+        axes: Speeds of insertion, rotation, bending [of the largest speed times scale].
+        is_holding: Whether the operator holds the device's enabling button.
+    """
+
+    axes: tuple[Axis, Axis, Axis]
+    is_holding: bool
+
+
+class Action(Command, frozen=True, tag="action"):
+    """A request without a value, or with a text.
+
+    Attributes:
+        name: What is requested.
+        text: The text of a mark.
+    """
+
+    name: ActionName
+    text: Text = ""
+
+
+class Setting(Command, frozen=True, tag="setting"):
+    """A changed setting.
+
+    Attributes:
+        name: ``compensation``, a share from 0 to 1; ``scale``, of a DOF; ``clutch``, 1 couples
+            a DOF to the input device and 0 does not.
+        value: The new value.
+        dof: The DOF of ``scale`` and ``clutch``.
+    """
+
+    name: Literal["compensation", "scale", "clutch"]
+    value: Share
+    dof: DofName = "insertion"
+
+
+class SetProfile(Command, frozen=True, tag="profile"):
+    """Another profile of compensation; the estimates start anew."""
+
+    profile: Literal["paper", "best"]
+
+
+class Drawn(_Message, frozen=True, tag="drawn"):
+    """An image has been drawn."""
+
+    image: Count
+
+
+Request: TypeAlias = Action | Setting | SetProfile
+"""Commands that are executed once, in their order."""
+ControlMessage: TypeAlias = Stop | Take | Servo | Action | Setting | SetProfile
+
+decode_hello = msgspec.json.Decoder(Hello).decode
+decode_control = msgspec.json.Decoder(ControlMessage).decode
+decode_video = msgspec.json.Decoder(Drawn).decode
+
+
+class Received(Struct, frozen=True, tag=True):
+    """A message with its connection, from the web server to the control process.
+
+    Attributes:
+        client: Number of the connection; the page cannot choose it.
+        at: When it arrived [s, monotonic clock].
+        message: The message.
+    """
+
+    client: int
+    at: float
+    message: Take | Servo | Action | Setting | SetProfile | Stop
+
+
+class Gone(Struct, frozen=True, tag=True):
+    """A connection has ended."""
+
+    client: int
+
+
+class Reply(Struct, frozen=True):
+    """Result of a command, from the control process to a page."""
+
+    client: int
+    what: str
+    is_accepted: bool
+    reason: str = ""
+
+
+encode = msgspec.json.Encoder().encode
+decode_received = msgspec.json.Decoder(Received).decode
+decode_inbound = msgspec.json.Decoder(Received | Gone).decode
+decode_reply = msgspec.json.Decoder(Reply).decode
+
+
+def decode_state(data: bytes) -> dict[str, Any]:
+    """The state of `tautscope.console.state.State` as a dictionary."""
+    state: dict[str, Any] = msgspec.json.decode(data)
+    return state

@@ -1,0 +1,167 @@
+"""The reference from the operator's commands, and the supervision of these: the dead man's switch.
+
+It runs in the process of the control loop, once per control tick. Whatever happens to the page, the
+browser, the network or the web server, the reference rests when no acceptable command arrives.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tautscope.config import Config
+from tautscope.console.lease import Lease
+from tautscope.console.messages import Received, Servo
+from tautscope.console.programs import Program
+from tautscope.dof import Dof
+
+Floats = NDArray[np.float64]
+COMMAND_TIMEOUT = 0.1
+"""Time without an accepted command after which motion stops [s]."""
+LARGEST_SPEED = 0.75
+"""Speed at full deflection and scale 1 [of `safety.reference_speed`]."""
+RAMP_TIME = 0.15
+"""Time from rest to the largest speed [s]; deceleration is immediate."""
+TRAVEL_MARGIN = 0.25
+"""Distance of reference and command from the drives' travel [in `safety.width_limit`]."""
+TWIN_TRAVEL = 4 / 3
+"""Travel of the reference in the twin about the start position [in amplitudes]."""
+
+
+class OperatorInput:
+    """Integrates the commands of the holder of the lease into a reference.
+
+    At each tick v is the commanded speed, ramped up from rest, and u <- u + v dt. The reference
+    rests, and moves again only after the operator has let go of the input device once, when
+
+    - no command was accepted for `COMMAND_TIMEOUT`,
+    - the lease changes,
+    - motion is stopped (`stop`) or held by the supervisor.
+
+    Args:
+        config: Limits of speed and travel.
+        lease: The lease.
+
+    Attributes:
+        reference: u (3,) [m, rad, rad].
+        scale: (3,) share of the largest speed at full deflection.
+        is_coupled: (3,) whether the input device moves each DOF (clutch).
+        program: The motion that runs by itself, if there is one.
+        stopped_by: Why motion is stopped until it is enabled; empty if it is not.
+        refused: Reason -> number of refused commands.
+    """
+
+    def __init__(self, config: Config, lease: Lease) -> None:
+        self._lease = lease
+        self._speed: Final = LARGEST_SPEED * np.array(config.safety.reference_speed)
+        self._limits: Final = _travel(config)
+        self.reference = np.array([config.experiment[dof].centre for dof in Dof])
+        self.scale = np.full(3, 0.4)
+        self.is_coupled = np.ones(3, bool)
+        self.program: Program | None = None
+        self.stopped_by = ""
+        self.refused: Counter[str] = Counter()
+        self._axes = np.zeros(3)
+        self._velocity = np.zeros(3)
+        self._accepted_at = -float("inf")
+        self._must_release = True
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether the reference moves."""
+        return self.program is not None or bool(self._velocity.any())
+
+    @property
+    def must_release(self) -> bool:
+        """Whether the operator has to let go of the input device before it moves anything."""
+        return self._must_release
+
+    def is_present(self, now: float) -> bool:
+        """Whether a command was accepted in the last `COMMAND_TIMEOUT`, at a time [s]."""
+        return now - self._accepted_at <= COMMAND_TIMEOUT
+
+    def receive(self, received: Received, now: float) -> None:
+        """Take a deflection of the input device, unless the lease refuses it."""
+        servo = received.message
+        assert isinstance(servo, Servo)
+        # While a rig opens there are no images yet; then only the page's presence counts.
+        moves = servo.is_holding or self.program is not None
+        reason = self._lease.refusal(received.client, servo, now, needs_image=moves)
+        if reason:
+            self.refused[reason] += 1
+            return
+        # Its age counts from the arrival, also if the control loop reads it late.
+        self._accepted_at = min(received.at, now)
+        if not servo.is_holding:
+            self._must_release = False
+            self._axes[:] = 0
+        elif not self._must_release:
+            self.program = None
+            self._axes[:] = servo.axes
+
+    def reset(self, reference: Floats) -> None:
+        """Continue from another reference (3,) [m, rad, rad], at the start of a new run."""
+        self.interrupt()
+        self.reference = reference.copy()
+
+    def stop(self, reason: str) -> None:
+        """Stop motion until `enable`."""
+        self.interrupt()
+        self.stopped_by = reason
+
+    def enable(self) -> None:
+        """End a stop; nothing moves before the operator has let go of the input device."""
+        self.interrupt()
+        self.stopped_by = ""
+
+    def interrupt(self) -> None:
+        """Rest until the operator has let go of the input device."""
+        self._must_release = True
+        self._axes[:] = 0
+        self._velocity[:] = 0
+        self.program = None
+
+    def update(self, now: float, period: float, command: Floats, *, is_held: bool) -> Floats:
+        """The reference (3,) [m, rad, rad] of a control tick.
+
+        Args:
+            now: Time [s, monotonic clock].
+            period: Control period [s].
+            command: The last command of the loop (3,) [m, rad, rad].
+            is_held: Whether the supervisor holds motion.
+        """
+        if is_held or self.stopped_by or not self.is_present(now):
+            self.interrupt()
+        elif self.program is not None:
+            self.reference = self.program.advance(period)
+            if self.program.is_over:
+                self.interrupt()
+        else:
+            self._integrate(period, command)
+        return self.reference.copy()
+
+    def _integrate(self, period: float, command: Floats) -> None:
+        target = self._axes * self.scale * self._speed * self.is_coupled
+        lower, upper = self._limits
+        low, high = np.minimum(self.reference, command), np.maximum(self.reference, command)
+        target[(high >= upper) & (target > 0)] = 0
+        target[(low <= lower) & (target < 0)] = 0
+        gain = period / RAMP_TIME * self._speed
+        ramped = np.clip(target, -(np.abs(self._velocity) + gain), np.abs(self._velocity) + gain)
+        ramped[ramped * self._velocity < 0] = 0
+        self._velocity = ramped
+        self.reference = self.reference + ramped * period
+
+
+def _travel(config: Config) -> tuple[Floats, Floats]:
+    """Least and largest reference (3,) [m, rad, rad]."""
+    if config.drives is None:
+        centre = np.array([config.experiment[dof].centre for dof in Dof])
+        reach = TWIN_TRAVEL * np.array([config.experiment[dof].amplitude for dof in Dof])
+        return centre - reach, centre + reach
+    travel = np.array([config.drives[dof].travel for dof in Dof])
+    margin = TRAVEL_MARGIN * np.array(config.safety.width_limit)
+    return travel[:, 0] + margin, travel[:, 1] - margin

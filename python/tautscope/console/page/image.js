@@ -1,0 +1,97 @@
+// The endoscope's image with the bands as measured and predicted, the tip, and the reference.
+
+const COLOURS = { measured: "#5dff7a", predicted: "#ffd23e", tip: "#58b9ff", target: "#ffffff" };
+
+/** Draws the newest image; `onDrawn` gets the sequence of every image that is on the screen. */
+export class ImageView {
+  constructor(canvas, onDrawn) {
+    this.canvas = canvas;
+    this.context = canvas.getContext("2d", { alpha: false, desynchronized: true });
+    this.onDrawn = onDrawn;
+    this.sequence = 0;
+    this.drawnAt = -Infinity;
+    this.waiting = null;
+    this.isBusy = false;
+    this.drawn = [];
+    this.painted = new MessageChannel();
+    this.painted.port1.onmessage = (event) => this.onDrawn(event.data);
+  }
+
+  /** A message of the video connection: length of the overlay, overlay, JPEG. */
+  receive(data) {
+    this.waiting = data;
+    if (!this.isBusy) this.#show();
+  }
+
+  async #show() {
+    this.isBusy = true;
+    while (this.waiting) {
+      const data = this.waiting;
+      this.waiting = null;
+      const length = new DataView(data).getUint32(0, true);
+      const overlay = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
+      const blob = new Blob([new Uint8Array(data, 4 + length)], { type: "image/jpeg" });
+      let bitmap;
+      try {
+        bitmap = await createImageBitmap(blob);
+      } catch {
+        continue;
+      }
+      await new Promise((resolve) => requestAnimationFrame(resolve));
+      this.#draw(bitmap, overlay);
+      bitmap.close();
+    }
+    this.isBusy = false;
+  }
+
+  #draw(bitmap, overlay) {
+    const { canvas, context } = this;
+    if (canvas.width !== bitmap.width || canvas.height !== bitmap.height) {
+      canvas.width = bitmap.width;
+      canvas.height = bitmap.height;
+    }
+    context.drawImage(bitmap, 0, 0);
+    context.lineWidth = Math.max(1.5, bitmap.height / 380);
+    this.#outlines(overlay.predicted, COLOURS.predicted, [6, 4]);
+    this.#outlines(overlay.measured, COLOURS.measured, []);
+    const { tip, target } = overlay;
+    const radius = bitmap.height / 60;
+    if (tip && target) this.#line([tip, target], COLOURS.target);
+    if (target) this.#circle(target, radius, COLOURS.target);
+    if (tip) this.#circle(tip, radius / 2.5, COLOURS.tip);
+    this.sequence = overlay.sequence;
+    this.drawnAt = performance.now();
+    this.drawn.push(this.drawnAt);
+    if (this.drawn.length > 50) this.drawn.shift();
+    // Delivered after the frame has been painted.
+    this.painted.port2.postMessage(overlay.sequence);
+  }
+
+  /** Images per second of the last 50. */
+  get rate() {
+    const times = this.drawn;
+    return times.length < 2 ? 0 : (1000 * (times.length - 1)) / (times.at(-1) - times[0]);
+  }
+
+  #outlines(outlines, colour, dashes) {
+    this.context.setLineDash(dashes);
+    for (const outline of outlines) this.#line([...outline, outline[0]], colour);
+    this.context.setLineDash([]);
+  }
+
+  #line(points, colour) {
+    const { context } = this;
+    context.strokeStyle = colour;
+    context.beginPath();
+    points.forEach(([u, v], k) => (k ? context.lineTo(u, v) : context.moveTo(u, v)));
+    context.stroke();
+  }
+
+  #circle([u, v], radius, colour) {
+    const { context } = this;
+    context.strokeStyle = colour;
+    context.beginPath();
+    context.arc(u, v, radius, 0, 2 * Math.PI);
+    context.stroke();
+  }
+}

@@ -1,0 +1,114 @@
+"""Motions that run by themselves while the operator's page is present."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tautscope.config import Config
+from tautscope.dof import Dof
+from tautscope.loop.references import MINIMUM_JERK_PEAK, SineSequence
+
+Floats = NDArray[np.float64]
+MOVE_SPEED = 0.25
+"""Peak speed of a move to the start [of `safety.reference_speed`]."""
+
+
+class Motion(Protocol):
+    """A motion of the reference."""
+
+    @property
+    def duration(self) -> float:
+        """Duration [s]."""
+        ...
+
+    def __call__(self, time: float) -> Floats:
+        """(3,) [m, rad, rad] at `time` [s from its start]."""
+        ...
+
+
+class Move:
+    """A minimum-jerk move of all DOFs between two positions (3,) [m, rad, rad].
+
+    u = a + (b - a) (10 x^3 - 15 x^4 + 6 x^5), x = time / duration, as fast as `speed` (3,) allows.
+    """
+
+    def __init__(self, start: Floats, end: Floats, speed: Floats) -> None:
+        self._start, self._travel = start.copy(), end - start
+        self.duration = float(max(MINIMUM_JERK_PEAK * np.max(np.abs(self._travel) / speed), 0.1))
+
+    def __call__(self, time: float) -> Floats:
+        """(3,) [m, rad, rad] at `time` [s from its start]."""
+        x = min(max(time / self.duration, 0.0), 1.0)
+        return self._start + self._travel * x**3 * (10 - 15 * x + 6 * x**2)
+
+
+class Program:
+    """Motions one after the other.
+
+    Attributes:
+        name: Its name for people.
+        elapsed: Time since its start [s].
+        duration: Total duration [s].
+    """
+
+    def __init__(self, name: str, motions: Sequence[Motion]) -> None:
+        self.name = name
+        self._motions = motions
+        self.elapsed = 0.0
+        self.duration = sum(motion.duration for motion in motions)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the last motion has ended."""
+        return self.elapsed >= self.duration
+
+    def advance(self, period: float) -> Floats:
+        """The reference (3,) [m, rad, rad] after a further period [s]."""
+        self.elapsed += period
+        time = self.elapsed
+        for motion in self._motions[:-1]:
+            if time < motion.duration:
+                return motion(time)
+            time -= motion.duration
+        return self._motions[-1](time)
+
+
+def home(config: Config, reference: Floats) -> Program:
+    """A slow move to the start position of the experiment."""
+    return Program("homing", [_move_to_start(config, reference)])
+
+
+def experiment(config: Config, reference: Floats) -> Program:
+    """The article's experiment after a move to its start."""
+    sines = SineSequence(config.experiment)
+    return Program("experiment", [_move_to_start(config, reference), sines])
+
+
+def sweep(config: Config, reference: Floats) -> Program:
+    """One period of the experiment's sine per DOF, in which the slack is estimated."""
+    periods = _FirstPeriods(SineSequence(config.experiment))
+    return Program("calibration sweep", [_move_to_start(config, reference), periods])
+
+
+class _FirstPeriods:
+    """The first period of each DOF of a sine sequence."""
+
+    def __init__(self, sines: SineSequence) -> None:
+        self._sines = sines
+        self._ends = np.cumsum([segment.period for segment in sines.segments])
+        self.duration = float(self._ends[-1])
+
+    def __call__(self, time: float) -> Floats:
+        index = min(int(np.searchsorted(self._ends, time, side="right")), len(self._ends) - 1)
+        segment = self._sines.segments[index]
+        since = min(time - (self._ends[index] - segment.period), segment.period)
+        return self._sines(segment.start + since)
+
+
+def _move_to_start(config: Config, reference: Floats) -> Move:
+    centre = np.array([config.experiment[dof].centre for dof in Dof])
+    return Move(reference, centre, MOVE_SPEED * np.array(config.safety.reference_speed))

@@ -1,0 +1,135 @@
+"""Images and what is drawn over them, from the control loop to the web server."""
+
+from __future__ import annotations
+
+import shutil
+import threading
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tautscope.config import Config
+from tautscope.console.shared import ImageChannel, Overlay
+from tautscope.console.state import LogState
+from tautscope.hardware.realtime import OTHERS, set_realtime_priority
+from tautscope.loop.construction import build_feature_model
+from tautscope.loop.rig import Frame
+
+Floats = NDArray[np.float64]
+_LOG_PERIOD = 1.0
+"""Time between two looks at the size of the log and at the free disk [s]."""
+
+
+@dataclass(frozen=True)
+class Update:
+    """An image update to be shown.
+
+    Attributes:
+        sequence: Of the image, as in `tautscope.console.lease.ImageTimes`.
+        frame: The frame.
+        estimate: State estimate (3,) [m, rad, rad].
+        predicted: Predicted state (3,) [m, rad, rad].
+        found: Which bands were found.
+        reference: (3,) [m, rad, rad].
+        arrived_at: When the control loop got the frame [s, monotonic clock].
+    """
+
+    sequence: int
+    frame: Frame
+    estimate: Floats
+    predicted: Floats
+    found: tuple[bool, bool]
+    reference: Floats
+    arrived_at: float
+
+
+class Publisher:
+    """Copies images into shared memory in a thread of its own; only the newest is kept.
+
+    Args:
+        config: Camera and instrument, for the outlines.
+        channel: Where images are written to.
+
+    Attributes:
+        log: Size of the log and remaining time, renewed each second.
+        log_path: The log; None before there is one.
+        image: The newest image.
+    """
+
+    def __init__(self, config: Config, channel: ImageChannel) -> None:
+        self._model = build_feature_model(config)
+        self._size = config.camera.width, config.camera.height
+        self._channel = channel
+        self._next: Update | None = None
+        self.image: NDArray[np.uint8] | None = None
+        self._wake = threading.Event()
+        self._is_closing = False
+        self.log = LogState()
+        self.log_path: Path | None = None
+        self._watched: tuple[Path, float, int] | None = None
+        self._thread = threading.Thread(target=self._run, name="publisher", daemon=True)
+        self._thread.start()
+
+    def submit(self, update: Update) -> None:
+        """Show an image update, in place of one that still waits."""
+        self._next, self.image = update, update.frame.image
+        self._wake.set()
+
+    def close(self) -> None:
+        """End the thread."""
+        self._is_closing = True
+        self._wake.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        set_realtime_priority(OTHERS)
+        checked = 0.0
+        while not self._is_closing:
+            self._wake.wait(_LOG_PERIOD)
+            self._wake.clear()
+            update, self._next = self._next, None
+            if update is not None:
+                self._channel.write(update.frame.image, self._overlay(update))
+            if time.monotonic() - checked >= _LOG_PERIOD:
+                checked = time.monotonic()
+                self._check_log(checked)
+
+    def _overlay(self, update: Update) -> Overlay:
+        overlay = Overlay(update.sequence, update.arrived_at, *self._size)
+        measured = zip(self._outlines(update.estimate), update.found, strict=False)
+        overlay.measured = [outline for outline, is_found in measured if is_found]
+        overlay.predicted = self._outlines(update.predicted)
+        overlay.tip = self._tip(update.estimate)
+        overlay.target = self._tip(update.reference)
+        return overlay
+
+    def _outlines(self, state: Floats) -> list[list[tuple[float, float]]]:
+        bands = self._model.bands(state) if np.isfinite(state).all() else None
+        if bands is None:
+            return []
+        return [[(round(u, 1), round(v, 1)) for u, v in band[3].tolist()] for band in bands]
+
+    def _tip(self, state: Floats) -> tuple[float, float] | None:
+        found = self._model.predict(state) if np.isfinite(state).all() else None
+        if found is None:
+            return None
+        _, _, u, v = found[0].tolist()
+        return round(u, 1), round(v, 1)
+
+    def _check_log(self, now: float) -> None:
+        path = self.log_path
+        if path is None:
+            return
+        try:
+            size, free = path.stat().st_size, shutil.disk_usage(path).free
+        except OSError:
+            return
+        if self._watched is None or self._watched[0] != path:
+            self._watched = path, now, size
+        _, since, before = self._watched
+        grown = size - before
+        remaining = free * (now - since) / grown if grown > 0 else None
+        self.log = LogState(str(path), size, remaining)

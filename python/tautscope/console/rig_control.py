@@ -1,0 +1,156 @@
+"""The rig and its control loop, switched on and off by the operator."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Executor
+from pathlib import Path
+
+from tautscope.config import Config
+from tautscope.console.control_run import ControlRun, LiveRig
+from tautscope.console.lease import ImageTimes, Lease
+from tautscope.console.operator_input import OperatorInput
+from tautscope.errors import TautscopeError
+from tautscope.hardware.rig import HardwareRig
+from tautscope.loop.rig import Sample
+
+INTERRUPTED = "STOP, or the page was away, while they were being enabled"
+_IDLE_PERIOD = 0.005
+"""Time between two calls of `while_opening` [s]."""
+
+
+class RigControl:
+    """Starts and ends runs of the control loop.
+
+    Args:
+        config: Settings of the loop.
+        rig: `tautscope.console.live_twin.LiveTwin` or `tautscope.hardware.rig.HardwareRig`.
+        folder: For logs and stills.
+        executor: Runs the marker detection.
+
+    Attributes:
+        images: When images were published.
+        lease: Who may command.
+        operator: The source of the reference.
+        run: The present run; None while the rig is off.
+        fault: Why the rig is off; empty if it is not, or was never on.
+        is_opening: Whether the drives are being enabled.
+        stopped_at: When the newest STOP took effect [s, monotonic clock]; None before one.
+        compensation: Share of the compensation that the operator has chosen.
+        is_recording: Whether a take is marked in the log.
+        while_opening: Called periodically, in another thread, while the rig opens: this takes
+            seconds, in which commands have to be received.
+    """
+
+    def __init__(self, config: Config, rig: LiveRig, folder: Path, executor: Executor) -> None:
+        self.config = config
+        self.folder = folder
+        self.images = ImageTimes()
+        self.lease = Lease(self.images)
+        self.operator = OperatorInput(config, self.lease)
+        self.run: ControlRun | None = None
+        self.fault = ""
+        self.is_opening = self.is_recording = False
+        self.stopped_at: float | None = None
+        self.compensation = 1.0
+        self.while_opening: Callable[[], None] = lambda: None
+        self._rig, self._executor = rig, executor
+        self._runs = 0
+        self._was_interrupted = False
+        self._endings: list[threading.Thread] = []
+
+    @property
+    def is_hardware(self) -> bool:
+        """Whether real motors move."""
+        return isinstance(self._rig, HardwareRig)
+
+    def open(self) -> None:
+        """Enable the rig and start a run; a STOP, or a page that is gone, interrupts it."""
+        self.fault, self.is_opening, self._was_interrupted = "", True, False
+        watching = threading.Thread(target=self._watch_opening, name="opening")
+        watching.start()
+        try:
+            sample = self._rig.reset()
+        except TautscopeError as error:
+            self.fault = INTERRUPTED if self._was_interrupted else str(error)
+            return
+        finally:
+            self.is_opening = False
+            watching.join()
+        self.operator.reset(sample.applied)
+        self._start_run(sample)
+
+    def close(self, fault: str = "", *, disable: bool = False) -> None:
+        """End the run; motors are quick-stopped, with `disable` also without power."""
+        run, self.run = self.run, None
+        self.operator.interrupt()
+        self.fault = fault
+        if run is None:
+            return
+        try:
+            if isinstance(self._rig, HardwareRig) and disable:
+                self._rig.disable()
+            elif self.is_hardware:
+                self._rig.close()
+        except TautscopeError as error:
+            self.fault = f"{fault}; {error}" if fault else str(error)
+        if self.fault:
+            run.note(f"rig off: {self.fault}")
+        self._end(run)
+
+    def restart(self, config: Config) -> None:
+        """Start a new run with other settings; the command stays where it is."""
+        self.config = config
+        if (run := self.run) is not None:
+            self.operator.reset(run.command)
+            self._end(run)
+            self._start_run(run.sample)
+
+    def stop(self, reason: str) -> None:
+        """Stop motion until it is enabled; motors are quick-stopped."""
+        self.operator.stop(reason)
+        self.stopped_at = time.monotonic()
+        if self.run is not None:
+            self.run.note(reason)
+            if self.is_hardware:
+                self.close(reason)
+
+    def note(self, text: str) -> None:
+        """Write a note into the log, if there is one."""
+        if self.run is not None:
+            self.run.note(text)
+
+    def shut_down(self) -> None:
+        """Stop the motors, release the rig, and wait for the logs."""
+        self.close()
+        self._rig.close()
+        for thread in self._endings:
+            thread.join()
+
+    def _start_run(self, sample: Sample) -> None:
+        self._runs += 1
+        path = self.folder / f"console-{self._runs}.mcap"
+        self.run = ControlRun(
+            self.config, self._rig, sample, self.operator, path=path, executor=self._executor
+        )
+        if self.compensation != 1:
+            self.run.loop.set_compensation(self.compensation)
+
+    def _end(self, run: ControlRun) -> None:
+        """Close the log in the background, because the disk may be slow."""
+        thread = threading.Thread(target=run.log.close, name="closing")
+        self._endings = [each for each in self._endings if each.is_alive()]
+        self._endings.append(thread)
+        thread.start()
+
+    def _watch_opening(self) -> None:
+        while self.is_opening:
+            self.while_opening()
+            operator = self.operator
+            is_wanted = not operator.stopped_by and operator.is_present(time.monotonic())
+            if isinstance(self._rig, HardwareRig) and not is_wanted:
+                self._was_interrupted = True
+                self._rig.interrupt()
+            time.sleep(_IDLE_PERIOD)

@@ -1,0 +1,115 @@
+"""The control process of the console: it receives commands, runs the loop, publishes its state.
+
+It shares nothing with the web server but memory, and waits for nothing that the server does.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+
+from tautscope.console import messages as msg
+from tautscope.console.actions import Actions
+from tautscope.console.control_run import ControlRun
+from tautscope.console.publisher import Publisher, Update
+from tautscope.console.rig_control import RigControl
+from tautscope.console.session_state import session_state
+from tautscope.console.shared import Channels
+from tautscope.errors import TautscopeError
+from tautscope.loop.safety import Reaction
+
+_LOG = logging.getLogger(__name__)
+STATE_PERIOD = 0.02
+"""Time between two states for the page [s]."""
+_IDLE_PERIOD = 0.005
+"""Time between two looks at the commands while the rig is off [s]."""
+
+
+class Session:
+    """Runs the control loop for the operator's console.
+
+    Args:
+        control: Rig and loop.
+        channels: This process's views of the shared memory.
+        must_end: Whether the session has to end, e.g. because the web server did.
+    """
+
+    def __init__(
+        self,
+        control: RigControl,
+        channels: Channels,
+        must_end: Callable[[], bool] = lambda: False,
+    ) -> None:
+        self._control = control
+        self._channels = channels
+        self._must_end = must_end
+        self._publisher = Publisher(control.config, channels.images)
+        self._actions = Actions(control, lambda: self._publisher.image)
+        self._published_at = 0.0
+        control.while_opening = self._idle_opening
+
+    def main(self) -> None:
+        """Run until it has to end; the motors are stopped and the log is closed on every exit."""
+        control = self._control
+        try:
+            if not control.is_hardware:
+                control.open()
+            while not self._must_end():
+                self._receive()
+                if control.run is None:
+                    self._publish()
+                    time.sleep(_IDLE_PERIOD)
+                else:
+                    self._tick(control.run)
+        finally:
+            control.shut_down()
+            self._publisher.close()
+
+    def _tick(self, run: ControlRun) -> None:
+        control = self._control
+        self._publisher.log_path = run.path
+        for frame, report, arrived_at in run.tick():
+            sequence = control.images.add(arrived_at)
+            detection = report.detection
+            found = (False, False) if detection is None else detection.found
+            states = report.state_estimate, report.predicted_state
+            update = Update(sequence, frame, *states, found, run.reference, arrived_at)
+            self._publisher.submit(update)
+        supervision = run.loop.supervision
+        if supervision.reaction.rank >= Reaction.QUICK_STOP.rank and control.is_hardware:
+            reason = f"{supervision.reaction}: {', '.join(supervision.flags)}"
+            control.close(reason, disable=supervision.reaction is Reaction.DISABLE)
+            return
+        self._publish()
+        try:
+            run.step()
+        except TautscopeError as error:
+            _LOG.warning("%s", error)
+            control.close(str(error))
+
+    def _idle_opening(self) -> None:
+        self._receive_motion()
+        self._publish()
+
+    def _receive(self) -> None:
+        self._receive_motion()
+        while (found := self._channels.inbound.following()) is not None:
+            reply = self._actions.execute(msg.decode_inbound(found[1]))
+            if reply is not None:
+                self._channels.replies.write(msg.encode(reply))
+
+    def _receive_motion(self) -> None:
+        """Stops first, because they have priority."""
+        if (found := self._channels.stop.newest()) is not None:
+            self._control.stop(f"STOP by page {msg.decode_received(found[1]).client}")
+        if (found := self._channels.servo.newest()) is not None:
+            self._control.operator.receive(msg.decode_received(found[1]), time.monotonic())
+
+    def _publish(self) -> None:
+        now = time.monotonic()
+        if now - self._published_at < STATE_PERIOD * 0.9:
+            return
+        self._published_at = now
+        state = session_state(self._control, self._publisher.log, now)
+        self._channels.state.write(msg.encode(state))

@@ -1,0 +1,121 @@
+"""The state that the control process publishes, and its summary in one line."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tautscope.console.control_run import ControlRun
+from tautscope.console.rig_control import RigControl
+from tautscope.console.state import ImageState, LogState, State
+from tautscope.loop.safety import MEANINGS, Reaction
+
+_EFFECTS = {
+    Reaction.HOLD_ESTIMATE: "The slack is held as estimated so far",
+    Reaction.FADE: "Compensation fades out with motion",
+    Reaction.PASS_THROUGH: "No compensation; the command follows the reference",
+    Reaction.HOLD_MOTION: "Motion is held",
+    Reaction.QUICK_STOP: "Quick stop",
+    Reaction.DISABLE: "The drives are disabled",
+}
+
+
+def session_state(control: RigControl, log: LogState, now: float) -> State:
+    """The state of the session, with that of its log, at a time [s, monotonic clock]."""
+    operator, lease, run = control.operator, control.lease, control.run
+    program = operator.program
+    state = State(
+        "hardware" if control.is_hardware else "twin",
+        control.config.profile,
+        now=now,
+        reference=_three(operator.reference),
+        scale=_three(operator.scale),
+        clutch=tuple(operator.is_coupled.tolist()),
+        compensation=control.compensation,
+        must_release=operator.must_release,
+        lease=lease.number,
+        holder=lease.holder,
+        program=program.name if program else "",
+        progress=program.elapsed / program.duration if program else 0.0,
+        is_recording=control.is_recording,
+        refused=dict(operator.refused),
+        stopped_at=control.stopped_at,
+    )
+    if run is not None:
+        _add_run(state, run)
+        dropped = run.log.dropped
+        state.log = LogState(log.path, log.size, log.remaining, dropped, run.log.failure)
+    state.image.sequence = control.images.newest
+    state.motion, state.message = _motion(control)
+    state.drives = _drives(control)
+    return state
+
+
+def _add_run(state: State, run: ControlRun) -> None:
+    loop, sample, report = run.loop, run.sample, run.report
+    state.time = sample.time
+    state.command = _three(run.command)
+    state.applied = _three(sample.applied)
+    state.tip = _three(loop.predicted_state)
+    state.delta_minus, state.delta_plus = _three(loop.delta_minus), _three(loop.delta_plus)
+    if (hysteresis := loop.hysteresis) is not None:
+        state.width_std = _known(hysteresis.width_std)
+    supervision = loop.supervision
+    state.reaction, state.flags = str(supervision.reaction), supervision.flags
+    state.latched = tuple((name, MEANINGS[name]) for name in supervision.latched)
+    state.lead = supervision.lead
+    state.late = run.late, run.ticks
+    if report is not None:
+        age = sample.time - report.captured_at
+        deviation = _known(report.state_deviation)
+        state.image = ImageState(0, str(report.status), age, run.unused, deviation)
+
+
+def _motion(control: RigControl) -> tuple[str, str]:
+    """The kind of motion, and what is in force and why, in one line."""
+    operator, run = control.operator, control.run
+    if control.is_opening:
+        found = "opening", "The drives are being enabled and move to the start position."
+    elif operator.stopped_by:
+        found = "stopped", f"{operator.stopped_by}. Motion is stopped until it is enabled."
+    elif run is not None:
+        found = _reaction(control, run)
+    elif control.fault:
+        found = "off", f"The drives are off: {control.fault}"
+    else:
+        found = "off", "The drives are off. Enabling moves the motors to the start position."
+    return found
+
+
+def _reaction(control: RigControl, run: ControlRun) -> tuple[str, str]:
+    supervision, program = run.loop.supervision, control.operator.program
+    motion = "moving" if control.operator.is_moving else "ready"
+    why = "; ".join(MEANINGS[name] for name in supervision.flags)
+    if supervision.reaction in _EFFECTS:
+        text = f"{_EFFECTS[supervision.reaction]}: {why}"
+        return ("held" if run.is_held else motion), text
+    if control.compensation == 0:
+        text = "Compensation is off; the command follows the reference"
+    else:
+        text = f"Compensating with {control.compensation * supervision.lead:.0%} of the gain"
+    if program is not None:
+        text += f"; running: {program.name}"
+    return motion, f"{text}. Warning: {why}" if why else f"{text}."
+
+
+def _drives(control: RigControl) -> str:
+    if not control.is_hardware:
+        return "simulated"
+    return "operation enabled" if control.run is not None else "quick stop, or off"
+
+
+def _three(values: NDArray[Any]) -> tuple[float, float, float]:
+    a, b, c = values.tolist()
+    return a, b, c
+
+
+def _known(values: NDArray[np.float64]) -> tuple[float | None, float | None, float | None]:
+    a, b, c = (value if np.isfinite(value) else None for value in values.tolist())
+    return a, b, c

@@ -1,0 +1,110 @@
+"""The memory that control process and web server share, and what crosses it."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from multiprocessing.context import SpawnContext
+from typing import Any
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from tautscope.config import CameraConfig
+from tautscope.console.slots import Slots
+from tautscope.loop.frame_layout import FrameLayout
+
+Image = NDArray[np.uint8]
+_SMALL, _STATE, _INFO = 1 << 10, 1 << 14, 1 << 14
+_QUEUE = 256
+_IMAGES = 3
+
+
+class Overlay(msgspec.Struct):
+    """What is drawn over an image; coordinates in its pixels.
+
+    Attributes:
+        sequence: Of the image, as in `ImageTimes`.
+        published_at: [s, monotonic clock].
+        width: Of the image [px].
+        height: Of the image [px].
+        measured: Outlines of the bands found, each (n, 2).
+        predicted: Outlines of the bands that the model predicted.
+        tip: Centre of the distal band where the tip is estimated; None if not known.
+        target: The same where the reference is.
+    """
+
+    sequence: int
+    published_at: float
+    width: int
+    height: int
+    measured: list[list[tuple[float, float]]] = []
+    predicted: list[list[tuple[float, float]]] = []
+    tip: tuple[float, float] | None = None
+    target: tuple[float, float] | None = None
+
+
+class SharedMemory:
+    """Memory for the messages in both directions; pass it to the other process at its start.
+
+    Attributes of `channels`: ``servo``, ``stop``, ``inbound`` are written by the web server,
+    ``state``, ``replies``, ``images`` by the control process.
+    """
+
+    def __init__(self, context: SpawnContext, camera: CameraConfig) -> None:
+        def memory(size: int) -> Any:
+            return context.RawArray(ctypes.c_uint8, size)
+
+        self.shape = FrameLayout(camera).shape
+        self.pixel_format = camera.pixel_format
+        self.servo = memory(Slots.size(_SMALL, 2))
+        self.stop = memory(Slots.size(_SMALL, 2))
+        self.inbound = memory(Slots.size(_SMALL, _QUEUE))
+        self.state = memory(Slots.size(_STATE, 2))
+        self.replies = memory(Slots.size(_SMALL, _QUEUE))
+        self.images = memory(Slots.size(_INFO, _IMAGES))
+        self.pixels = memory(_IMAGES * math.prod(self.shape))
+        self.ready = memory(8)
+
+
+class Channels:
+    """Views of a `SharedMemory`; each process makes its own."""
+
+    def __init__(self, memory: SharedMemory) -> None:
+        def slots(name: str, count: int) -> Slots:
+            return Slots(memoryview(getattr(memory, name)), count)
+
+        self.servo, self.stop = slots("servo", 2), slots("stop", 2)
+        self.inbound = slots("inbound", _QUEUE)
+        self.state = slots("state", 2)
+        self.replies = slots("replies", _QUEUE)
+        self.images = ImageChannel(memory, slots("images", _IMAGES))
+
+
+class ImageChannel:
+    """The newest images and what is drawn over them."""
+
+    def __init__(self, memory: SharedMemory, info: Slots) -> None:
+        self._pixels = np.frombuffer(memory.pixels, np.uint8).reshape(_IMAGES, *memory.shape)
+        self._info = info
+        self._number = 0
+        self._decode = msgspec.json.Decoder(Overlay).decode
+        self._encode = msgspec.json.Encoder().encode
+
+    def write(self, image: Image, overlay: Overlay) -> None:
+        """Write an image."""
+        self._number += 1
+        np.copyto(self._pixels[self._number % _IMAGES], image)
+        self._info.write(self._encode(overlay))
+
+    def newest(self) -> tuple[Image, Overlay] | None:
+        """A copy of the newest image, if it was not read before.
+
+        An image that is overwritten meanwhile shows parts of both, which harms only the view.
+        """
+        found = self._info.newest()
+        if found is None:
+            return None
+        number, data = found
+        return self._pixels[number % _IMAGES].copy(), self._decode(data)

@@ -1,0 +1,110 @@
+"""Start of the console: the web server's process, then the control loop in this one."""
+
+from __future__ import annotations
+
+import multiprocessing
+import socket
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+
+from tautscope.config import CameraConfig, Config
+from tautscope.console.access import ADDRESS, new_token
+from tautscope.console.control_run import LiveRig
+from tautscope.console.rig_control import RigControl
+from tautscope.console.server import run_server
+from tautscope.console.session import Session
+from tautscope.console.shared import Channels, SharedMemory
+from tautscope.errors import ConfigError
+from tautscope.hardware.realtime import (
+    LOOP,
+    OTHERS,
+    VISION,
+    limited_garbage_collection,
+    locked_memory,
+    realtime,
+    set_realtime_priority,
+)
+from tautscope.hardware.rig import HardwareRig
+from tautscope.hardware.signals import exit_on_signals
+
+
+def start_console(
+    config: Config,
+    folder: Path,
+    port: int,
+    announce: Callable[[str], None],
+    *,
+    is_twin: bool,
+) -> int:
+    """Serve the console of the twin or of a rig until Ctrl-C; the exit status.
+
+    Args:
+        config: Settings.
+        folder: New; for logs and stills.
+        port: Port on 127.0.0.1; 0 is a free one.
+        announce: Called with the page's address.
+        is_twin: Whether the simulated instrument is steered, not the drives of the configuration.
+
+    Raises:
+        ConfigError: The port is taken, or the configuration does not describe a rig.
+    """
+    rig, config = make_rig(config, is_twin=is_twin)
+    with exit_on_signals(), web_server(config.camera, port) as (server, channels, url):
+        announce(url)
+        with (
+            ThreadPoolExecutor(1, "vision", set_realtime_priority, (VISION,)) as executor,
+            limited_garbage_collection(),
+            locked_memory(),
+            realtime(OTHERS if not is_twin else LOOP),
+        ):
+            control = RigControl(config, rig, folder, executor)
+            try:
+                Session(control, channels, lambda: not server.is_alive()).main()
+            except KeyboardInterrupt:
+                return 0
+    return 1
+
+
+def make_rig(config: Config, *, is_twin: bool) -> tuple[LiveRig, Config]:
+    """The simulated instrument, or the drives and camera of a configuration; with its settings.
+
+    Raises:
+        ConfigError: The configuration does not describe a rig.
+    """
+    if not is_twin:
+        return HardwareRig(config), config
+    from tautscope.console.live_twin import LiveTwin  # noqa: PLC0415  MuJoCo
+
+    config = config.replace(drives=None)
+    return LiveTwin(config), config
+
+
+@contextmanager
+def web_server(camera: CameraConfig, port: int) -> Iterator[tuple[BaseProcess, Channels, str]]:
+    """A web server in a process of its own, this process's channels, and the page's address.
+
+    Raises:
+        ConfigError: The port is taken.
+    """
+    context = multiprocessing.get_context("spawn")
+    memory, token = SharedMemory(context, camera), new_token()
+    with socket.socket() as listener:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            listener.bind((ADDRESS, port))
+        except OSError as error:
+            raise ConfigError("port", port, f"a free port ({error.strerror})") from None
+        listener.listen(64)
+        url = f"http://{ADDRESS}:{listener.getsockname()[1]}/#token={token}"
+        process = context.Process(
+            target=run_server, args=(memory, token, [listener]), name="web server", daemon=True
+        )
+        process.start()
+    try:
+        yield process, Channels(memory), url
+    finally:
+        process.terminate()
+        process.join(2.0)

@@ -1,0 +1,278 @@
+"""The page in a real browser, Debian's chromium.
+
+How long a browser takes on a busy computer is not tested here: limits of time are longer than in
+use. `tests/console/test_operator_input.py` has those in use, `benchmarks/console` measures them.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, Page, expect, sync_playwright
+from running import RunningConsole, rests, running_console
+from tautscope.console import lease, operator_input
+
+CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
+AXE = Path(__file__).resolve().parents[2] / "target" / "axe-core" / "package" / "axe.min.js"
+FLAGS = [
+    "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-quic", "--disable-sync",
+    "--disable-background-networking", "--disable-component-update",
+]  # fmt: skip
+GAMEPAD = """
+window.pad = {connected: true, id: "simulated", axes: [0, 0, 0, 0], buttons: []};
+for (let k = 0; k < 17; k++) pad.buttons.push({pressed: false});
+navigator.getGamepads = () => [pad];
+"""
+TIMEOUT = 20_000  # ms
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    if not Path(CHROMIUM).exists():
+        reason = "no chromium: apt-get install chromium"
+        if os.environ.get("CI") == "true":
+            pytest.fail(reason)
+        pytest.skip(reason)
+    with sync_playwright() as playwright:
+        found = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        yield found
+        found.close()
+
+
+@pytest.fixture(scope="module")
+def console(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningConsole]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(lease, "COMMAND_AGE", 4.0)
+        patch.setattr(operator_input, "COMMAND_TIMEOUT", 1.5)
+        with running_console(tmp_path_factory.mktemp("browser")) as found:
+            yield found
+
+
+@pytest.fixture
+def open_page(browser: Browser, console: RunningConsole) -> Iterator[Callable[..., Page]]:
+    """Opens pages in a window; each must be free of errors and of requests to others."""
+    context = browser.new_context(viewport={"width": 1280, "height": 800})
+    context.set_default_timeout(TIMEOUT)
+    problems: list[str] = []
+
+    def open_one(query: str = "", script: str = "") -> Page:
+        page = context.new_page()
+        page.on("console", lambda message: problems.append(message.text))
+        page.on("pageerror", lambda error: problems.append(str(error)))
+        page.on("request", lambda request: check(request.url))
+        if script:
+            page.add_init_script(script)
+        page.goto(f"{console.origin}/{query}#token={console.token}")
+        expect(page.locator("body")).not_to_have_attribute("data-motion", "lost", timeout=TIMEOUT)
+        expect(page.locator("#stale")).to_be_hidden(timeout=TIMEOUT)
+        return page
+
+    def check(url: str) -> None:
+        if not url.startswith((console.origin, f"ws://{console.host}")):
+            problems.append(f"request to {url}")
+
+    yield open_one
+    context.close()
+    wait(lambda: console.control.lease.holder is None)
+    console.control.operator.enable()
+    assert not problems
+
+
+def wait(condition: Callable[[], Any]) -> None:
+    deadline = time.monotonic() + TIMEOUT / 1000
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+def take(page: Page) -> None:
+    page.click("#take")
+    expect(page.locator("#lease")).to_have_text("You have control.", timeout=TIMEOUT)
+    if page.get_attribute("body", "data-motion") == "stopped":
+        page.click("#enable")
+    expect(page.locator("#hint")).to_contain_text("Hold a key", timeout=TIMEOUT)
+
+
+def moves(console: RunningConsole) -> bool:
+    return bool(console.control.operator.is_moving)
+
+
+def test_the_page_shows_the_loop(console: RunningConsole, open_page) -> None:
+    page = open_page()
+    assert "token" not in page.url
+    expect(page.locator("#mode")).to_have_text("SIMULATED")
+    expect(page.locator("#message")).to_contain_text("Compensating")
+    assert page.evaluate("[image.width, image.height]") == [180, 144]
+    assert page.evaluate("document.querySelectorAll('.dof canvas').length") == 9
+    page.reload()  # the token is kept for this tab
+    expect(page.locator("body")).not_to_have_attribute("data-motion", "lost", timeout=TIMEOUT)
+    assert rests(console, 0.1)
+
+
+def test_keys_move_while_they_are_held(console: RunningConsole, open_page) -> None:
+    page = open_page()
+    page.keyboard.down("ArrowUp")  # without the lease
+    assert rests(console)
+    page.keyboard.up("ArrowUp")
+    take(page)
+    for key, dof in (("ArrowUp", 0), ("ArrowRight", 1), ("KeyS", 2)):
+        before = console.control.operator.reference
+        page.keyboard.down(key)
+        wait(lambda: moves(console))
+        page.keyboard.up(key)
+        wait(lambda: not moves(console))
+        moved = console.control.operator.reference - before
+        assert [k for k in range(3) if moved[k]] == [dof]
+
+
+@pytest.mark.parametrize(
+    "script",
+    [
+        "dispatchEvent(new Event('blur')); document.hasFocus = () => false",
+        "Object.defineProperty(document, 'visibilityState', {value: 'hidden'});"
+        "document.dispatchEvent(new Event('visibilitychange'))",
+    ],
+    ids=["focus", "hidden"],
+)
+def test_a_page_without_focus_or_hidden_moves_nothing(
+    console: RunningConsole, open_page, script: str
+) -> None:
+    page = open_page()
+    take(page)
+    page.keyboard.down("ArrowUp")
+    wait(lambda: moves(console))
+    page.evaluate(script)
+    wait(lambda: not moves(console))
+    assert rests(console)
+
+
+def test_a_gamepad_moves_while_its_button_is_held(console: RunningConsole, open_page) -> None:
+    page = open_page(script=GAMEPAD)
+    take(page)
+    page.evaluate("pad.axes = [0.8, 0, 0, 0]")
+    assert rests(console)
+    page.evaluate("pad.buttons[5].pressed = true")
+    wait(lambda: moves(console))
+    page.evaluate("pad.buttons[5].pressed = false")
+    wait(lambda: not moves(console))
+    page.evaluate("pad.buttons[1].pressed = true")
+    expect(page.locator("#motion")).to_have_text("STOPPED", timeout=TIMEOUT)
+
+
+def test_two_tabs_and_a_stop_by_the_one_that_watches(console: RunningConsole, open_page) -> None:
+    first, second = open_page(), open_page()
+    take(first)
+    expect(second.locator("#lease")).to_contain_text("you watch", timeout=TIMEOUT)
+    assert second.is_disabled("#gain")
+    first.bring_to_front()
+    first.keyboard.down("ArrowDown")
+    wait(lambda: moves(console))
+    second.keyboard.press("Escape")
+    expect(first.locator("#motion")).to_have_text("STOPPED", timeout=TIMEOUT)
+    assert rests(console)
+    first.keyboard.up("ArrowDown")
+    first.click("#enable")
+    expect(first.locator("#motion")).to_have_text("READY", timeout=TIMEOUT)
+    second.click("#take")
+    expect(first.locator("#lease")).to_contain_text("you watch", timeout=TIMEOUT)
+
+
+def test_warnings_stay_until_acknowledged(console: RunningConsole, open_page) -> None:
+    page = open_page()
+    take(page)
+    console.control.run.loop.raise_flag("tremor")
+    expect(page.locator("#warnings")).to_contain_text("(tremor)", timeout=TIMEOUT)
+    wait(lambda: "tremor" not in console.control.run.loop.supervision.flags)
+    page.wait_for_timeout(300)
+    expect(page.locator("#warnings")).to_contain_text("(tremor)")
+    page.click("#acknowledge")
+    expect(page.locator("#warnings")).not_to_contain_text("(tremor)", timeout=TIMEOUT)
+
+
+def test_controls_reach_the_loop(console: RunningConsole, open_page) -> None:
+    page = open_page()
+    take(page)
+    page.uncheck("#compensate")
+    wait(lambda: console.control.compensation == 0)
+    page.check("#compensate")
+    wait(lambda: console.control.compensation == 1)
+    page.fill("#mark", "here, with wasd")
+    page.click("#set_mark")
+    expect(page.locator("#reply")).to_have_text("mark: done", timeout=TIMEOUT)
+    page.click("[data-action=sweep]")
+    wait(lambda: console.control.operator.program is not None)
+    page.click("[data-action=end_program]")
+    wait(lambda: console.control.operator.program is None)
+    page.locator("[aria-label='scale of bending']").press("End")
+    wait(lambda: console.control.operator.scale[2] == 1)
+    assert rests(console, 0.1)
+
+
+def test_the_wall_view_has_no_controls(console: RunningConsole, open_page) -> None:
+    page = open_page("?view")
+    assert page.locator("button:visible, input:visible, select:visible").count() == 0
+    page.keyboard.press("Escape")  # a stop is possible everywhere
+    expect(page.locator("#motion")).to_have_text("STOPPED", timeout=TIMEOUT)
+
+
+def test_commands_delivered_all_at_once_move_nothing(console: RunningConsole, open_page) -> None:
+    page = open_page()
+    take(page)
+    page.keyboard.down("ArrowUp")
+    wait(lambda: moves(console))
+    os.kill(console.server.pid, signal.SIGSTOP)
+    try:
+        wait(lambda: not moves(console))
+        page.wait_for_timeout(4000)
+    finally:
+        os.kill(console.server.pid, signal.SIGCONT)
+    assert rests(console, 1.0)
+
+
+def test_a_killed_browser_stops_motion(console: RunningConsole, open_page, browser) -> None:
+    assert open_page  # leaves the console as it found it
+    with_processes = browser.browser_type.launch(executable_path=CHROMIUM, args=FLAGS)
+    try:
+        page = with_processes.new_page()
+        page.goto(console.url)
+        expect(page.locator("#stale")).to_be_hidden(timeout=TIMEOUT)
+        take(page)
+        page.keyboard.down("ArrowUp")
+        wait(lambda: moves(console))
+        session = with_processes.new_browser_cdp_session()
+        processes = session.send("SystemInfo.getProcessInfo")["processInfo"]
+        os.kill(next(p["id"] for p in processes if p["type"] == "browser"), signal.SIGKILL)
+        wait(lambda: not moves(console))
+        assert rests(console)
+    finally:
+        with_processes.close()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("size", [(1024, 768), (3840, 2160)], ids=["1024", "4K"])
+def test_nothing_is_cut_off_and_axe_finds_no_serious_fault(
+    console: RunningConsole, open_page, scheme: str, size: tuple[int, int]
+) -> None:
+    page = open_page()
+    page.emulate_media(color_scheme=scheme)
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    take(page)
+    cut = page.evaluate(
+        "[...document.querySelectorAll('body > *, fieldset, button')].filter(each => {"
+        " const box = each.getBoundingClientRect();"
+        " return box.width && (box.right > innerWidth + 1 || box.bottom > innerHeight + 1)})"
+        ".map(each => each.id || each.textContent)"
+    )
+    assert cut == []
+    if not AXE.exists():
+        pytest.skip(f"no {AXE}: `npm pack axe-core`, unpacked there, as .ci/run does")
+    page.evaluate(AXE.read_text(encoding="utf-8"))
+    found = page.evaluate("axe.run(document)")["violations"]
+    assert [each["id"] for each in found if each["impact"] in ("serious", "critical")] == []

@@ -1,0 +1,72 @@
+"""The command ``tautscope console``: what it steers, and where it listens."""
+
+from __future__ import annotations
+
+import json
+import signal
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from refused import failed
+from tautscope.config import load_config
+from tautscope.console.rig_control import RigControl
+from tautscope.console.start import make_rig
+from tautscope.hardware.rig import HardwareRig
+from tautscope.twin.rig import Twin
+
+COMMAND = [sys.executable, "-m", "tautscope", "console"]
+
+
+def test_drives_need_a_configuration_and_the_twin_has_none(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert "drives: got None" in failed(capsys, "console")
+    err = failed(capsys, "console", "--config", "article_rig")
+    assert "placeholders of" in err
+    config = load_config("bench")
+    twin, _ = make_rig(config, is_twin=True)
+    assert isinstance(twin, Twin)
+    twin.close()
+    rig, used = make_rig(config, is_twin=False)
+    assert isinstance(rig, HardwareRig)
+    assert used.drives == config.drives
+
+
+def test_motors_are_enabled_only_on_request(tmp_path: Path) -> None:
+    rig, config = make_rig(load_config("bench"), is_twin=False)
+    control = RigControl(config, rig, tmp_path, None)  # type: ignore[arg-type]
+    assert control.is_hardware
+    assert control.run is None
+    control.shut_down()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_taken_port_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = str(taken.getsockname()[1])
+        err = failed(capsys, "console", "--twin", "--port", port, "--out", str(tmp_path / "a"))
+    assert f"port: got {port}, expected a free port" in err
+    assert "port: got 70000" in failed(capsys, "console", "--twin", "--port", "70000")
+
+
+def test_it_prints_its_address_and_ends_with_ctrl_c(tmp_path: Path) -> None:
+    command = [*COMMAND, "--twin", "--json", "--out", str(tmp_path / "out")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        url = json.loads(process.stdout.readline())["url"]
+        assert url.startswith("http://127.0.0.1:")
+        host = url.removeprefix("http://").split("/")[0]
+        with socket.create_connection(host.split(":"), timeout=30) as raw:  # type: ignore[arg-type]
+            raw.sendall(f"GET / HTTP/1.1\r\nHost: {host}\r\n\r\n".encode())
+            assert raw.recv(100).startswith(b"HTTP/1.1 200")
+        while not (tmp_path / "out" / "console-1.mcap").exists():
+            assert process.poll() is None
+        process.send_signal(signal.SIGINT)
+        assert process.wait(30) == 0
+        assert process.stderr.read() == b""

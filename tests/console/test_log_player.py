@@ -1,0 +1,51 @@
+"""A log on the console's page."""
+
+from __future__ import annotations
+
+import multiprocessing
+from pathlib import Path
+
+import numpy as np
+from drawn import short_experiment
+from recorded import record
+from tautscope.console import messages as msg
+from tautscope.console.log_player import LogPlayer
+from tautscope.console.shared import Channels, SharedMemory
+from tautscope.log.reader import Tick, read_log
+
+
+def test_the_player_shows_the_recorded_states_and_images(tmp_path: Path, monkeypatch) -> None:
+    config = short_experiment()
+    path = tmp_path / "run.mcap"
+    record(path, config, 0.6)
+    log = read_log(path)
+    memory = SharedMemory(multiprocessing.get_context("spawn"), config.camera)
+    shown, seen = Channels(memory), []
+    player = LogPlayer(log, Channels(memory))
+    monkeypatch.setattr("tautscope.console.log_player.STATE_PERIOD", 0.0)
+    shown.inbound.write(msg.encode(msg.Received(5, 0.0, msg.Take())))
+
+    def look() -> bool:
+        if (found := shown.state.newest()) is not None:
+            seen.append(msg.decode_state(found[1]))
+        return True
+
+    try:
+        player.run(look)
+    finally:
+        player.close()
+    ticks = [event for event in log.events.values() if isinstance(event, Tick)]
+    by_time = {tick.sample.time: tick for tick in ticks}
+    assert len(seen) > 50
+    for state in seen:
+        assert state["mode"] == "replay"
+        if state["time"] in by_time and state["time"] > 0:
+            assert np.allclose(state["command"], by_time[state["time"]].command)
+    found = shown.images.newest()
+    assert found is not None
+    image, overlay = found
+    assert image.shape == (config.camera.height, config.camera.width, 3)
+    assert overlay.tip is not None
+    reply = shown.replies.following()
+    assert reply is not None
+    assert not msg.decode_reply(reply[1]).is_accepted

@@ -1,0 +1,184 @@
+"""The console without a browser: lease, motion, stop, faults of the connection, log."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from running import Page, RunningConsole, rests, running_console, small_config
+from tautscope.console.operator_input import COMMAND_TIMEOUT
+from tautscope.log.reader import Request, read_log
+from tautscope.log.replay import replay_same
+
+
+@pytest.fixture
+def page(console: RunningConsole) -> Page:
+    found = console.page()
+    found.take()
+    assert found.request(type="action", name="enable")["is_accepted"]
+    yield found
+    found.close()
+    while console.control.lease.holder == found.client:
+        time.sleep(0.01)
+
+
+def test_hold_to_move_and_rest_when_released(console: RunningConsole, page: Page) -> None:
+    assert rests(console)
+    before = console.command
+    page.move()
+    assert (console.command != before).any()
+    page.servo(is_holding=False)
+    page.wait(lambda: page.state["motion"] == "ready")
+    assert rests(console)
+
+
+def test_motion_stops_in_the_control_process_when_the_page_is_silent(
+    console: RunningConsole, page: Page
+) -> None:
+    page.move()
+    time.sleep(COMMAND_TIMEOUT + 0.1)
+    assert rests(console)
+    assert console.control.operator.must_release
+
+
+def test_the_web_server_killed_while_moving_stops_motion(tmp_path: Path) -> None:
+    with running_console(tmp_path) as console:
+        page = console.page()
+        page.take()
+        page.move()
+        os.kill(console.server.pid, signal.SIGKILL)
+        time.sleep(COMMAND_TIMEOUT + 0.1)
+        assert rests(console)
+
+
+def test_a_closed_page_gives_up_the_lease(console: RunningConsole) -> None:
+    page = console.page()
+    page.take()
+    page.move()
+    page.close()
+    deadline = time.monotonic() + 10
+    while console.control.lease.holder is not None:
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    assert rests(console)
+
+
+def test_stop_from_anyone_is_latched(console: RunningConsole, page: Page) -> None:
+    watcher = console.page()
+    watcher.wait(lambda: bool(watcher.state))
+    page.move()
+    watcher.send({"type": "stop"})
+    page.wait(lambda: page.state["motion"] == "stopped")
+    page.servo(is_holding=False)
+    page.servo()
+    assert rests(console)
+    watcher.send({"type": "stop"})  # again: nothing else
+    reply = page.request(type="action", name="home")
+    assert reply["reason"] == "motion is stopped"
+    assert page.request(type="action", name="enable")["is_accepted"]
+    assert rests(console)
+    page.move()
+    watcher.close()
+
+
+def test_a_second_page_watches_until_it_takes_over(console: RunningConsole, page: Page) -> None:
+    second = console.page()
+    second.wait(lambda: bool(second.state))
+    fields = {"lease": page.state["lease"], "image": page.state["image"]["sequence"]}
+    for k in range(100):
+        second.send(
+            {"type": "servo", **fields, "sequence": k, "axes": [1, 0, 0], "is_holding": k % 5 > 0}
+        )
+    second.send({"type": "action", "name": "home", **fields, "sequence": 1})
+    second.wait(lambda: bool(second.replies))
+    assert second.replies[0]["reason"] == "another has the lease"
+    assert rests(console)
+    page.move()
+    second.take()
+    assert rests(console)
+    page.wait(lambda: page.state["holder"] == second.client)
+    page.servo(is_holding=False)
+    page.servo()
+    assert rests(console)
+    second.move()
+    second.close()
+
+
+def test_settings_programs_and_profile(console: RunningConsole, page: Page) -> None:
+    def setting(name: str, value: float, **more: str) -> None:
+        found = page.request(type="setting", name=name, value=value, **more)
+        assert found["is_accepted"], found
+
+    setting("scale", 0.7, dof="rotation")
+    setting("clutch", 0, dof="bending")
+    setting("compensation", 0.5)
+    page.wait(lambda: page.state["compensation"] == 0.5)
+    assert page.state["scale"][1] == 0.7
+    assert page.state["clutch"] == [True, True, False]
+    setting("clutch", 1, dof="bending")
+    setting("compensation", 1)
+    before = console.command
+    assert page.request(type="profile", profile="paper")["is_accepted"]
+    page.wait(lambda: page.state["profile"] == "paper")
+    assert rests(console)
+    assert (console.command == before).all()
+    assert page.request(type="profile", profile="best")["is_accepted"]
+    page.let_go()
+    assert page.request(type="action", name="sweep")["is_accepted"]
+
+    def present() -> bool:
+        page.servo(is_holding=False)
+        return bool(page.state["progress"] > 0.005)
+
+    page.wait(present)
+    assert page.state["program"] == "calibration sweep"
+    page.servo((1, 0, 0))  # the operator takes over
+    page.wait(lambda: not page.state["program"])
+
+
+def test_everything_is_in_the_log_and_the_log_replays(tmp_path: Path) -> None:
+    with running_console(tmp_path) as console:
+        page = console.page()
+        page.take()
+        page.move((0, 1, 1))
+        for action in ("record", "still", "record", "acknowledge"):
+            assert page.request(type="action", name=action)["is_accepted"]
+        page.request(type="setting", name="compensation", value=0)
+        page.move((0, -1, 0))
+        page.request(type="action", name="mark", text="here")
+        page.send({"type": "stop"})
+        page.wait(lambda: page.state["motion"] == "stopped")
+        while not (tmp_path / "still-1.png").exists():
+            time.sleep(0.01)
+    log = read_log(tmp_path / "console-1.mcap")
+    texts = [event.text for event in log.events.values() if isinstance(event, Request)]
+    found = [text.partition(": ")[2] or text for text in texts]
+    for text in (
+        "note take 1 begins", "still", "note take 1 ends", "acknowledge", "set_compensation 0.0",
+        "mark here", "note STOP by page 1",
+    ):  # fmt: skip
+        assert text in found, (text, texts)
+    shape = small_config().camera.height, small_config().camera.width, 3
+    assert cv2.imread(str(tmp_path / "still-1.png")).shape == shape
+    # Images are JPEG here, so estimates differ; commands do not depend on them in this time.
+    comparison, _ = replay_same(log)
+    assert comparison.ticks > 100
+
+
+def test_a_slow_video_client_delays_no_command(console: RunningConsole, page: Page) -> None:
+    video = console.page("/video")
+    message = video.socket.recv(timeout=20)  # and then it reads no more
+    length = int.from_bytes(message[:4], "little")
+    image = cv2.imdecode(np.frombuffer(message[4 + length :], np.uint8), cv2.IMREAD_COLOR)
+    assert image.shape[:2] == (small_config().camera.height, small_config().camera.width)
+    newest = console.control.images.newest
+    while console.control.images.newest < newest + 20:
+        time.sleep(0.02)
+    page.move()
+    page.servo(is_holding=False)
+    video.close()
