@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tautscope.calibration.bands.labels import Image, LabelledImage, Mask, labelled
+from tautscope.calibration.bands.regions import LEAST_AREA, centroid, two_bands
 from tautscope.calibration.colour import fit_discriminant
 from tautscope.errors import CalibrationError, FieldError
 
@@ -30,20 +31,10 @@ _CELL = 8
 """Size of a cell of the colour space [grey levels]."""
 _ITERATIONS = 2
 """Repetitions of the fit with the regions of the fit before."""
-_MOST_ALIKE = 4.0
-"""Largest ratio of the areas of the bands."""
-_LEAST_SOLIDITY = 0.6
-"""Least area of a band relative to its convex hull; bands are arcs in the image."""
-_LEAST_AREA = 40
-"""[px]."""
-_LEAST_DISTANCE = 1.2
-"""Least distance of the bands relative to the root of their mean area."""
 _MOST_PIXELS = 40_000
 """Largest number of pixels that are clustered."""
 _LEAST_TISSUE = 0.3
 """Least share of the pixels that never change."""
-_REMAINDER = 0.35
-"""Largest area of all other regions relative to the bands."""
 _LAGS = (0.0, 0.5, 1.0)
 """Delays of the motors that may explain the position: slack delays the tip [s]."""
 
@@ -159,7 +150,7 @@ def _split(images: Sequence[Image]) -> tuple[Image, Image]:
     moving = small[changed]
     cells = tuple((moving // _CELL + 1).T.astype(int))
     own = moving[near[cells] <= _SHARE_OF_TISSUE * len(tissue)]
-    if len(own) < _LEAST_AREA * len(images) / 4:
+    if len(own) < LEAST_AREA * len(images) / 4:
         raise CalibrationError(
             f"Hardly anything in the images moves: {changed.mean():.2%} of the pixels, of which "
             f"{len(own) / max(len(moving), 1):.0%} have a colour that the tissue has not",
@@ -193,7 +184,7 @@ def _clusters(pixels: Image) -> list[tuple[Image, Image]]:
     count = min(_CLUSTERS, len(colours))
     _, names, _ = cv2.kmeans(colours, count, nothing, criteria, 4, cv2.KMEANS_PP_CENTERS)
     members = [names.ravel() == k for k in range(count)]
-    return [(pixels[own], pixels[~own]) for own in members if own.sum() > _LEAST_AREA]
+    return [(pixels[own], pixels[~own]) for own in members if own.sum() > LEAST_AREA]
 
 
 def _candidate(
@@ -225,51 +216,9 @@ def _evaluate(
     return _Candidate(weights, threshold, bands, float(following))
 
 
-def two_bands(image: Image, weights: Sequence[float], threshold: float) -> tuple[Mask, Mask] | None:
-    """The two compact regions of a colour, if it has no others of their size."""
-    kernel = np.array([weights], np.float32)
-    values = cv2.transform(image.astype(np.float32), kernel)
-    values = cv2.GaussianBlur(values, (0, 0), 1.0)
-    mask = (values > threshold).astype(np.uint8)
-    mask = np.asarray(cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), np.uint8)
-    count, names, stats, _ = cv2.connectedComponentsWithStats(mask)
-    if count < 3:
-        return None
-    areas = stats[1:, cv2.CC_STAT_AREA]
-    first, second = np.argsort(areas)[::-1][:2]
-    larger, smaller = int(areas[first]), int(areas[second])
-    if smaller < _LEAST_AREA or larger > _MOST_ALIKE * smaller:
-        return None
-    if areas.sum() - larger - smaller > _REMAINDER * (larger + smaller):
-        return None
-    bands = [(names == name + 1).astype(np.uint8) for name in (first, second)]
-    if any(_touches_border(band) or _solidity(band) < _LEAST_SOLIDITY for band in bands):
-        return None
-    distance = np.linalg.norm(np.subtract(*(_centroid(band) for band in bands)))
-    if distance < _LEAST_DISTANCE * np.sqrt((larger + smaller) / 2):
-        return None
-    return bands[0], bands[1]
-
-
-def _touches_border(mask: Mask) -> bool:
-    return bool(mask[0].any() or mask[-1].any() or mask[:, 0].any() or mask[:, -1].any())
-
-
-def _solidity(mask: Mask) -> float:
-    points = cv2.findNonZero(mask)
-    hull = cv2.convexHull(points)
-    # The area of a hull is that between pixel centres.
-    around = cv2.contourArea(hull) + cv2.arcLength(hull, True) / 2 + 1
-    return float(len(points) / around)
-
-
-def _centroid(mask: Mask) -> Floats:
-    return np.asarray(cv2.findNonZero(mask).reshape(-1, 2).mean(axis=0), np.float64)
-
-
 def _centre(bands: tuple[Mask, Mask]) -> Floats:
     """Mean of the centroids of both bands, which does not depend on their order [px]."""
-    return np.asarray(np.mean([_centroid(band) for band in bands], axis=0), np.float64)
+    return np.asarray(np.mean([centroid(band) for band in bands], axis=0), np.float64)
 
 
 def _regressors(times: Floats, positions: Floats) -> Floats:

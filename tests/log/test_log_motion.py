@@ -1,0 +1,35 @@
+"""Images and motor positions of a log, for calibration."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tautscope.commands.recorded_motion import MOST_IMAGES, log_motion
+from tautscope.errors import MissingPathError
+from tautscope.log.reader import Update, read_log
+from tautscope.log.writer import LogSummary
+from tautscope.runs.recording import Recording, per_dof
+
+
+def test_images_have_the_positions_of_their_capture(recorded: tuple[Path, Recording, LogSummary]) -> None:
+    path, recording, _ = recorded
+    found = log_motion(path)
+    assert 20 <= len(found.images) <= MOST_IMAGES
+    assert (np.diff(found.times) > 0).all()
+    log = read_log(path)
+    captured = {
+        float(event.row[0]): index  # type: ignore[arg-type]
+        for index, event in log.events.items()
+        if isinstance(event, Update)
+    }
+    for k in (0, len(found.images) // 2, -1):
+        assert np.array_equal(found.images[k], log.image(captured[float(found.times[k])]))
+    trace = recording.trace
+    for k, dof in enumerate(per_dof(trace, "applied").T):
+        expected = np.interp(found.times, trace["time"], dof)
+        assert found.positions[:, k] == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_missing_log_is_named(tmp_path: Path) -> None:
+    with pytest.raises(MissingPathError):
+        log_motion(tmp_path / "none.mcap")
