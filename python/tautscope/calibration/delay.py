@@ -45,7 +45,7 @@ AGREEMENT = 0.15
 friction and move at once."""
 LEAST_IMAGES, LEAST_PARTS = 50, 4
 """Images with a measured tip, and parts of the record per probe."""
-JUMP, JUMP_PARTS = 0.08, 4
+JUMP, JUMP_PARTS = 0.2, 4
 """Deviation [s] of so many successive parts from the line that is a jump."""
 STRONG = 0.012
 """A tenth of a second changes the tip by 1 % of the motor's range, summed over the images."""
@@ -53,7 +53,7 @@ MOST_POSITIONS = 200_000
 """Motor positions that are used; of longer records every second, third, ..."""
 UNEXPLAINED = 0.5
 """Largest share of the tip's motion that a probe may leave unexplained."""
-_STEP, _RATE = 0.05, 8.0  # of the first search: distance of delays [s], images per second
+_STEP, _RATE = 0.05, 15.0  # of the first search: distance of delays [s], images per second
 _GAP = 0.2  # of log scores: a second delay that is so close is as good as the first
 
 

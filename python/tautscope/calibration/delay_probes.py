@@ -21,7 +21,7 @@ WINDOW, LONGEST = 0.15, 3.0
 """Travel of the motor on either side of a turning point, as a share of its range, and time [s]."""
 BLOCK = 4.0
 """Duration of a part of the record for the model [s]."""
-LEAST_IMAGES = 8
+LEAST_IMAGES = 6
 """In a part of the record."""
 _DIFFERENCE = 0.02  # for derivatives [s]
 

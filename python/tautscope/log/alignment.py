@@ -15,7 +15,8 @@ from tautscope.dof import Dof
 from tautscope.errors import RecordError
 from tautscope.log.reader import Log
 from tautscope.loop.rig import Frame
-from tautscope.loop.vision import MarkerDetector
+from tautscope.loop.state_prediction import StatePrediction
+from tautscope.loop.vision import MarkerDetector, workspace_starts
 from tautscope.runs.recording import Recording, per_dof, per_feature
 
 Floats = NDArray[np.float64]
@@ -37,7 +38,7 @@ def align_video(
 ) -> tuple[DelayEstimate, Floats]:
     """Estimate the delay of a video behind motor positions.
 
-    The bands are searched in each image by itself.
+    The bands are searched in each image by itself, in the workspace of the experiment.
 
     Args:
         frames: Frames in order, stamped on about the clock of the motors.
@@ -55,13 +56,18 @@ def align_video(
         FrameError: The video is not from the configured camera.
     """
     detector = MarkerDetector(config)
+    starts, spread = workspace_starts(config)
+    anywhere = StatePrediction(starts[0], spread)
     stamps: list[float] = []
     features: list[Floats] = []
     first, span = 0.0, float(times[-1] - times[0])
     for frame in frames:
         first = first if stamps else frame.captured_at
         stamps.append(frame.captured_at)
-        features.append(detector.detect(frame.image).features)
+        detection = detector.detect(frame.image, expectation=anywhere)
+        if not detection.valid:
+            detection = detector.detect(frame.image)  # slower, from more postures
+        features.append(detection.features)
         if progress is not None:
             progress(min((frame.captured_at - first) / span, 1.0))
     if len(stamps) < 2:
