@@ -70,7 +70,11 @@ class Page:
         self._resources = ExitStack()
         self.socket: ClientConnection = self._resources.enter_context(
             connect(
-                f"ws://{console.host}{path}", origin=console.origin, compression=None, max_size=None
+                f"ws://{console.host}{path}",
+                origin=console.origin,
+                compression=None,
+                max_size=None,
+                open_timeout=60,
             )
         )
         self.client = 0
@@ -140,7 +144,8 @@ class Page:
         self.let_go()
 
         def hold() -> bool:
-            self.servo(axes)
+            # On a busy computer a command may be late; then the operator presses again.
+            self.servo(axes, is_holding=not self.state["must_release"])
             return bool(self.state["motion"] == "moving")
 
         self.wait(hold)

@@ -34,7 +34,9 @@ class StateFeed:
         holder: The connection that holds the lease, as of the newest state.
     """
 
-    def __init__(self, channels: Channels, latency: Callable[[], tuple[float, float] | None]) -> None:
+    def __init__(
+        self, channels: Channels, latency: Callable[[], tuple[float, float] | None]
+    ) -> None:
         self._channels = channels
         self._latency = latency
         self._newest = b""
