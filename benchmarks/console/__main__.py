@@ -46,12 +46,12 @@ def arguments() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def measure(options: argparse.Namespace, folder: Path) -> dict[str, Measurement]:
-    """The requested goals."""
-    found: dict[str, Measurement] = {}
+def measure(options: argparse.Namespace, folder: Path) -> None:
+    """The requested goals, each written at once."""
 
     def add(name: str, result: Measurement) -> None:
-        found[name] = result
+        if options.write:
+            goals.write({name: result})
         print(json.dumps({"goal": name, **result.__dict__}), flush=True)
 
     if options.fuzz:
@@ -77,14 +77,13 @@ def measure(options: argparse.Namespace, folder: Path) -> dict[str, Measurement]
             page.close()
     if options.networks:
         add("G20f", hazards.held_networks(folder / "networks", options.networks))
-    return found
 
 
 def main() -> None:
     options = arguments()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        found = measure(options, folder)
+        measure(options, folder)
         if options.images or options.ticks or options.hand:
             from console import live  # noqa: PLC0415  playwright
 
@@ -97,8 +96,6 @@ def main() -> None:
                 print(json.dumps({"ticks": "page" if is_watched else "no page", **result}))
             if options.hand:
                 print(json.dumps(live.hand(folder / "hand", options.hand)), flush=True)
-    if options.write:
-        goals.write(found)
 
 
 if __name__ == "__main__":

@@ -181,7 +181,7 @@ def replays(page: Page, count: int) -> Measurement:
     failures = 0
     for k in range(count):
         page.ready()
-        page.hold()
+        page.hold(((-1) ** k, 0, 0))
         page.servo(is_holding=False)
         page.wait(lambda: page.state["motion"] == "ready")
         old = page.fields()

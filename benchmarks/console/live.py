@@ -129,7 +129,7 @@ def images(folder: Path, size: str, seconds: float) -> dict[str, float]:
             "drawn per s": (_drawn(page) - drawn) / lasted,
             "p50 [ms]": float(median),
             "p95 [ms]": float(p95),
-            "p95 of the worst 10 s [ms]": worst,
+            "p95 of the worst 250 images [ms]": worst,
             "load": os.getloadavg()[0],
         }
 

@@ -73,6 +73,7 @@ class Page:
     def __init__(self, address: Address) -> None:
         self._resources = ExitStack()
         options: dict[str, Any] = {"origin": address.origin, "compression": None, "max_size": None}
+        options["open_timeout"] = PATIENCE
         uri = f"ws://{address.host}/control"
         self.socket = self._resources.enter_context(connect(uri, **options))
         self.client, self.state = 0, dict[str, Any]()
@@ -135,7 +136,8 @@ class Page:
         """Hold until the instrument moves."""
 
         def moving() -> bool:
-            self.servo(axes)
+            # On a busy computer a command may be late; then the operator presses again.
+            self.servo(axes, is_holding=not self.state["must_release"])
             return bool(self.state["motion"] == "moving")
 
         self.wait(moving, PERIOD)

@@ -1,4 +1,8 @@
-"""A console of the twin: web server in a process, control loop in a thread of the tests."""
+"""A console of the twin: web server in a process, control loop in a thread of the tests.
+
+Its limits of time are longer than in use, because the computer may be busy.
+`tests/console/test_operator_input.py` tests those in use, `benchmarks/console` measures them.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +16,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from tautscope.config import Config, load_config
+from tautscope.console import lease, operator_input
 from tautscope.console.live_twin import LiveTwin
 from tautscope.console.rig_control import RigControl
 from tautscope.console.session import Session
@@ -20,6 +26,8 @@ from tautscope.console.start import web_server
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
+TIMEOUT, AGE = 1.5, 4.0
+"""In place of `COMMAND_TIMEOUT` and `COMMAND_AGE` [s]."""
 SCALE = 0.25
 """Size of the images relative to PAL: they are drawn and encoded quickly."""
 
@@ -70,7 +78,11 @@ class Page:
         self._resources = ExitStack()
         self.socket: ClientConnection = self._resources.enter_context(
             connect(
-                f"ws://{console.host}{path}", origin=console.origin, compression=None, max_size=None
+                f"ws://{console.host}{path}",
+                origin=console.origin,
+                compression=None,
+                max_size=None,
+                open_timeout=60,
             )
         )
         self.client = 0
@@ -140,7 +152,8 @@ class Page:
         self.let_go()
 
         def hold() -> bool:
-            self.servo(axes)
+            # On a busy computer a command may be late; then the operator presses again.
+            self.servo(axes, is_holding=not self.state["must_release"])
             return bool(self.state["motion"] == "moving")
 
         self.wait(hold)
@@ -155,9 +168,12 @@ def running_console(folder: Path, config: Config | None = None) -> Iterator[Runn
     config = small_config() if config is None else config
     ending = threading.Event()
     with (
+        pytest.MonkeyPatch.context() as patch,
         web_server(config.camera, 0) as (server, channels, url),
         ThreadPoolExecutor(1) as executor,
     ):
+        patch.setattr(lease, "COMMAND_AGE", AGE)
+        patch.setattr(operator_input, "COMMAND_TIMEOUT", TIMEOUT)
         control = RigControl(config, LiveTwin(config), folder, executor)
         session = Session(control, channels, ending.is_set)
         thread = threading.Thread(target=session.main, name="control")

@@ -1,8 +1,4 @@
-"""The page in a real browser, Debian's chromium.
-
-How long a browser takes on a busy computer is not tested here: limits of time are longer than in
-use. `tests/console/test_operator_input.py` has those in use, `benchmarks/console` measures them.
-"""
+"""The page in a real browser, Debian's chromium."""
 
 from __future__ import annotations
 
@@ -16,8 +12,7 @@ from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, Page, expect, sync_playwright
-from running import RunningConsole, rests, running_console
-from tautscope.console import lease, operator_input
+from running import AGE, RunningConsole, rests
 
 CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
 AXE = Path(__file__).resolve().parents[2] / "target" / "axe-core" / "package" / "axe.min.js"
@@ -44,15 +39,6 @@ def browser() -> Iterator[Browser]:
         found = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
         yield found
         found.close()
-
-
-@pytest.fixture(scope="module")
-def console(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningConsole]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(lease, "COMMAND_AGE", 4.0)
-        patch.setattr(operator_input, "COMMAND_TIMEOUT", 1.5)
-        with running_console(tmp_path_factory.mktemp("browser")) as found:
-            yield found
 
 
 @pytest.fixture
@@ -230,7 +216,7 @@ def test_commands_delivered_all_at_once_move_nothing(console: RunningConsole, op
     os.kill(console.server.pid, signal.SIGSTOP)
     try:
         wait(lambda: not moves(console))
-        page.wait_for_timeout(4000)
+        page.wait_for_timeout(1000 * (AGE + 0.5))
     finally:
         os.kill(console.server.pid, signal.SIGCONT)
     assert rests(console, 1.0)

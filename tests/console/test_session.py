@@ -10,8 +10,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from running import Page, RunningConsole, rests, running_console, small_config
-from tautscope.console.operator_input import COMMAND_TIMEOUT
+from running import TIMEOUT, Page, RunningConsole, rests, running_console, small_config
 from tautscope.log.reader import Request, read_log
 from tautscope.log.replay import replay_same
 
@@ -41,7 +40,7 @@ def test_motion_stops_in_the_control_process_when_the_page_is_silent(
     console: RunningConsole, page: Page
 ) -> None:
     page.move()
-    time.sleep(COMMAND_TIMEOUT + 0.1)
+    time.sleep(TIMEOUT + 0.1)
     assert rests(console)
     assert console.control.operator.must_release
 
@@ -52,7 +51,7 @@ def test_the_web_server_killed_while_moving_stops_motion(tmp_path: Path) -> None
         page.take()
         page.move()
         os.kill(console.server.pid, signal.SIGKILL)
-        time.sleep(COMMAND_TIMEOUT + 0.1)
+        time.sleep(TIMEOUT + 0.1)
         assert rests(console)
 
 
@@ -129,7 +128,7 @@ def test_settings_programs_and_profile(console: RunningConsole, page: Page) -> N
     assert (console.command == before).all()
     assert page.request(type="profile", profile="best")["is_accepted"]
     page.let_go()
-    assert page.request(type="action", name="sweep")["is_accepted"]
+    page.wait(lambda: page.request(type="action", name="sweep")["is_accepted"])
 
     def present() -> bool:
         page.servo(is_holding=False)

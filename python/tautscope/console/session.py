@@ -103,7 +103,7 @@ class Session:
         """Stops first, because they have priority."""
         if (found := self._channels.stop.newest()) is not None:
             self._control.stop(f"STOP by page {msg.decode_received(found[1]).client}")
-        if (found := self._channels.servo.newest()) is not None:
+        while (found := self._channels.servo.following()) is not None:
             self._control.operator.receive(msg.decode_received(found[1]), time.monotonic())
 
     def _publish(self) -> None:

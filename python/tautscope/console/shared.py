@@ -58,7 +58,7 @@ class SharedMemory:
 
         self.shape = FrameLayout(camera).shape
         self.pixel_format = camera.pixel_format
-        self.servo = memory(Slots.size(_SMALL, 2))
+        self.servo = memory(Slots.size(_SMALL, _QUEUE))
         self.stop = memory(Slots.size(_SMALL, 2))
         self.inbound = memory(Slots.size(_SMALL, _QUEUE))
         self.state = memory(Slots.size(_STATE, 2))
@@ -75,7 +75,7 @@ class Channels:
         def slots(name: str, count: int) -> Slots:
             return Slots(memoryview(getattr(memory, name)), count)
 
-        self.servo, self.stop = slots("servo", 2), slots("stop", 2)
+        self.servo, self.stop = slots("servo", _QUEUE), slots("stop", 2)
         self.inbound = slots("inbound", _QUEUE)
         self.state = slots("state", 2)
         self.replies = slots("replies", _QUEUE)
