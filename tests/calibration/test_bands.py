@@ -122,6 +122,15 @@ def test_bands_grow_from_clicks() -> None:
     assert fit.errors < 0.01
 
 
+def test_a_band_of_a_similar_colour_does_not_run_into_the_instrument() -> None:
+    # Each channel differs from the grey of the tip by less than the largest tolerance.
+    image, bands = scene(30, 0, (70, 140, 70))
+    clicks = [tuple(int(c) for c in np.argwhere(mask).mean(axis=0)[::-1]) for mask in bands]
+    each = label_clicks(image, clicks)
+    assert bands[0][each.labels == BAND_A].mean() > 0.95
+    assert bands[1][each.labels == BAND_B].mean() > 0.95
+
+
 @pytest.mark.parametrize(
     ("clicks", "kind", "named"),
     [
@@ -137,6 +146,15 @@ def test_bad_clicks_are_refused(
     image, _ = scene(30, 0)
     with pytest.raises(kind, match=named):
         fit_colour([label_clicks(image, clicks)])
+
+
+def test_the_band_that_cannot_be_told_is_named() -> None:
+    image, (first, second) = scene(30, 0)
+    patch = np.zeros_like(second)
+    patch[20:28, 20:28] = 1  # tissue, and so few pixels that they do not change the fit
+    assert not (second & patch).any()
+    with pytest.raises(CalibrationError, match=r"the second band .* of its pixels"):
+        fit_colour([labelled(image, (first, patch))])
 
 
 @pytest.mark.parametrize(

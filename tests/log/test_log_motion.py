@@ -11,7 +11,9 @@ from tautscope.log.writer import LogSummary
 from tautscope.runs.recording import Recording, per_dof
 
 
-def test_images_have_the_positions_of_their_capture(recorded: tuple[Path, Recording, LogSummary]) -> None:
+def test_images_have_the_positions_of_their_capture(
+    recorded: tuple[Path, Recording, LogSummary],
+) -> None:
     path, recording, _ = recorded
     found = log_motion(path)
     assert 20 <= len(found.images) <= MOST_IMAGES

@@ -85,8 +85,7 @@ def _bench(options: argparse.Namespace) -> None:
     if options.drawn is not None:
         from tautscope.twin.drawn_rig import draw_rig  # noqa: PLC0415
 
-        # The stream's clock subtracts the configured delay.
-        config = draw_rig(config.replace(**{"camera.source.delay": 0.0}), options.drawn)
+        config = draw_rig(config, options.drawn)
     with (
         exit_on_signals(),
         short_switch_interval(),

@@ -29,8 +29,7 @@ def draw_rig(config: Config, seed: int) -> Config:
 
     Focal lengths, principal point, k1, pose of the guide, length of the section and positions of
     the bands differ uniformly from the defaults, whatever `config` has: the rig stays the same
-    while its configuration is calibrated step by step. Images are stamped late by a drawn delay
-    minus ``camera.source.delay``, as a camera does.
+    while its configuration is calibrated step by step. Images are stamped late by a drawn delay.
 
     Args:
         config: All other values are its.
@@ -64,7 +63,7 @@ def draw_rig(config: Config, seed: int) -> Config:
             * (1 + random.uniform(-SECTION, SECTION)),
             "instrument.marker_a": marker_a,
             "instrument.marker_b": min(marker_b, instrument.tip_length - half),
-            "twin.sensor.stamp_error": random.uniform(0, DELAY) - config.camera.source.delay,
+            "twin.sensor.stamp_error": random.uniform(0, DELAY),
             "twin.seed": seed,
         }
     )

@@ -114,10 +114,7 @@ def _check_delay(config: CameraConfig) -> list[CheckResult]:
     if source.delay > 0:
         found = f"{1e3 * source.delay:.0f} ms, as configured"
         return [CheckResult("camera", "constant delay", "note", found)]
-    todo = (
-        "Film a clock on a screen, and set camera.source.delay: an unknown delay is estimated as "
-        "slack"
-    )
+    todo = "tautscope calibrate geometry measures it: an unknown delay is estimated as slack"
     return [CheckResult("camera", "constant delay", "note", "0 ms: not measured yet", todo)]
 
 
