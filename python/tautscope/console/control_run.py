@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tautscope.config import Config
 from tautscope.console.operator_input import OperatorInput
+from tautscope.hardware.plausibility import PlausibilityMonitor
 from tautscope.log.writer import LogWriter
 from tautscope.loop.reduction import HysteresisReduction, Report
 from tautscope.loop.rig import Frame, Sample
@@ -57,6 +58,7 @@ class ControlRun:
         operator: The source of the reference.
         path: New file of the log.
         executor: Runs the marker detection.
+        monitor: Compares drives and images with the configuration; for a rig.
 
     Attributes:
         loop: The loop.
@@ -81,13 +83,14 @@ class ControlRun:
         *,
         path: Path,
         executor: Executor,
+        monitor: PlausibilityMonitor | None = None,
     ) -> None:
         self.sample = sample
         self.loop = HysteresisReduction(config)
         self.path = path
         self.log = LogWriter(path, config)
         self.loop.on_event = lambda what: self.log.event(self.sample.time, what)
-        self._rig, self._operator = rig, operator
+        self._rig, self._operator, self._monitor = rig, operator, monitor
         self._updater = BackgroundUpdater(executor)
         self._arrivals: deque[tuple[int, float]] = deque(maxlen=16)
         self._last_frame: int | None = None
@@ -98,7 +101,11 @@ class ControlRun:
         self.times: deque[float] = deque(maxlen=_TIMES)
 
     def tick(self) -> list[tuple[Frame, Report, float]]:
-        """Compute the command; the image updates that have ended, with the frames' arrivals."""
+        """Compute the command; the image updates that have ended, with the frames' arrivals.
+
+        Raises:
+            ConfigError: The rig differs from its configuration; see `PlausibilityMonitor`.
+        """
         began = time.monotonic()
         sample = self.sample
         self.late += self.ticks > 0 and began - self._began > LATE * self._rig.control_period
@@ -110,12 +117,16 @@ class ControlRun:
         self.ticks += 1
         self.times.append(time.monotonic() - began)
         self.log.tick(sample, self.reference, self.command)
+        if self._monitor is not None:
+            self._monitor.add_sample(sample.time, sample.applied)
         if sample.frame is not None:
             self._arrivals.append((sample.frame.sequence, began))
         updates = []
         for frame, report in self._updater.update(self.loop, sample.frame):
             self.log.frame(sample.time, frame, report)
             self.report = report
+            if self._monitor is not None:
+                self._monitor.check_frame(frame.captured_at, report)
             if self._last_frame is not None:
                 self.unused += max(frame.sequence - self._last_frame - 1, 0)
             self._last_frame = frame.sequence

@@ -50,6 +50,7 @@ class OperatorInput:
         scale: (3,) share of the largest speed at full deflection.
         is_coupled: (3,) whether the input device moves each DOF (clutch).
         program: The motion that runs by itself, if there is one.
+        rested_by: Why the last motion ended, if the operator did not end it.
         stopped_by: Why motion is stopped until it is enabled; empty if it is not.
         refused: Reason -> number of refused commands.
     """
@@ -62,7 +63,7 @@ class OperatorInput:
         self.scale = np.full(3, 0.4)
         self.is_coupled = np.ones(3, bool)
         self.program: Program | None = None
-        self.stopped_by = ""
+        self.stopped_by = self.rested_by = ""
         self.refused: Counter[str] = Counter()
         self._axes = np.zeros(3)
         self._velocity = np.zeros(3)
@@ -99,6 +100,7 @@ class OperatorInput:
             self._must_release = False
             self._axes[:] = 0
         elif not self._must_release:
+            self.rested_by = ""
             self.program = None
             self._axes[:] = servo.axes
 
@@ -117,8 +119,10 @@ class OperatorInput:
         self.interrupt()
         self.stopped_by = ""
 
-    def interrupt(self) -> None:
-        """Rest until the operator has let go of the input device."""
+    def interrupt(self, reason: str = "") -> None:
+        """Rest until the operator has let go of the input device; `reason` is shown."""
+        if self.is_moving:
+            self.rested_by = reason
         self._must_release = True
         self._axes[:] = 0
         self._velocity[:] = 0
@@ -133,8 +137,10 @@ class OperatorInput:
             command: The last command of the loop (3,) [m, rad, rad].
             is_held: Whether the supervisor holds motion.
         """
-        if is_held or self.stopped_by or not self.is_present(now):
+        if is_held or self.stopped_by:
             self.interrupt()
+        elif not self.is_present(now):
+            self.interrupt(f"no accepted command for {COMMAND_TIMEOUT:g} s")
         elif self.program is not None:
             self.reference = self.program.advance(period)
             if self.program.is_over:

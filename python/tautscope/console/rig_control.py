@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from collections.abc import Callable
@@ -13,9 +14,12 @@ from tautscope.console.control_run import ControlRun, LiveRig
 from tautscope.console.lease import ImageTimes, Lease
 from tautscope.console.operator_input import OperatorInput
 from tautscope.errors import TautscopeError
+from tautscope.hardware.plausibility import PlausibilityMonitor
+from tautscope.hardware.realtime import OTHERS, realtime
 from tautscope.hardware.rig import HardwareRig
 from tautscope.loop.rig import Sample
 
+_LOG = logging.getLogger(__name__)
 INTERRUPTED = "STOP, or the page was away, while they were being enabled"
 _IDLE_PERIOD = 0.005
 """Time between two calls of `while_opening` [s]."""
@@ -57,6 +61,8 @@ class RigControl:
         self.compensation = 1.0
         self.while_opening: Callable[[], None] = lambda: None
         self._rig, self._executor = rig, executor
+        if isinstance(rig, HardwareRig):
+            rig.warn = self._warn
         self._runs = 0
         self._was_interrupted = False
         self._endings: list[threading.Thread] = []
@@ -132,11 +138,25 @@ class RigControl:
     def _start_run(self, sample: Sample) -> None:
         self._runs += 1
         path = self.folder / f"console-{self._runs}.mcap"
-        self.run = ControlRun(
-            self.config, self._rig, sample, self.operator, path=path, executor=self._executor
-        )
+        monitor = PlausibilityMonitor(self.config, sample.applied) if self.is_hardware else None
+        # Threads of the log inherit the priority.
+        with realtime(OTHERS):
+            self.run = ControlRun(
+                self.config,
+                self._rig,
+                sample,
+                self.operator,
+                path=path,
+                executor=self._executor,
+                monitor=monitor,
+            )
         if self.compensation != 1:
             self.run.loop.set_compensation(self.compensation)
+
+    def _warn(self, text: str) -> None:
+        _LOG.warning("%s", text)
+        if self.run is not None:
+            self.run.log.warn(text)
 
     def _end(self, run: ControlRun) -> None:
         """Close the log in the background, because the disk may be slow."""

@@ -17,6 +17,8 @@ from tautscope.console.rig_control import RigControl
 from tautscope.console.session_state import session_state
 from tautscope.console.shared import Channels
 from tautscope.errors import TautscopeError
+from tautscope.loop.reduction import Report
+from tautscope.loop.rig import Frame
 from tautscope.loop.safety import Reaction
 
 _LOG = logging.getLogger(__name__)
@@ -69,24 +71,27 @@ class Session:
     def _tick(self, run: ControlRun) -> None:
         control = self._control
         self._publisher.log_path = run.path
-        for frame, report, arrived_at in run.tick():
-            sequence = control.images.add(arrived_at)
+        try:
+            self._show(run, run.tick())
+            supervision = run.loop.supervision
+            if supervision.reaction.rank >= Reaction.QUICK_STOP.rank and control.is_hardware:
+                reason = f"{supervision.reaction}: {', '.join(supervision.flags)}"
+                control.close(reason, disable=supervision.reaction is Reaction.DISABLE)
+                return
+            self._publish()
+            run.step()
+        except TautscopeError as error:
+            _LOG.warning("%s", error)
+            control.close(str(error))
+
+    def _show(self, run: ControlRun, updates: list[tuple[Frame, Report, float]]) -> None:
+        for frame, report, arrived_at in updates:
+            sequence = self._control.images.add(arrived_at)
             detection = report.detection
             found = (False, False) if detection is None else detection.found
             states = report.state_estimate, report.predicted_state
             update = Update(sequence, frame, *states, found, run.reference, arrived_at)
             self._publisher.submit(update)
-        supervision = run.loop.supervision
-        if supervision.reaction.rank >= Reaction.QUICK_STOP.rank and control.is_hardware:
-            reason = f"{supervision.reaction}: {', '.join(supervision.flags)}"
-            control.close(reason, disable=supervision.reaction is Reaction.DISABLE)
-            return
-        self._publish()
-        try:
-            run.step()
-        except TautscopeError as error:
-            _LOG.warning("%s", error)
-            control.close(str(error))
 
     def _idle_opening(self) -> None:
         self._receive_motion()

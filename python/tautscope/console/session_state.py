@@ -34,6 +34,7 @@ def session_state(control: RigControl, log: LogState, now: float) -> State:
         scale=_three(operator.scale),
         clutch=tuple(operator.is_coupled.tolist()),
         compensation=control.compensation,
+        rested_by=operator.rested_by,
         must_release=operator.must_release,
         lease=lease.number,
         holder=lease.holder,
@@ -100,6 +101,8 @@ def _reaction(control: RigControl, run: ControlRun) -> tuple[str, str]:
         text = "Compensation is off; the command follows the reference"
     else:
         text = f"Compensating with {control.compensation * supervision.lead:.0%} of the gain"
+    if run.log.failure:
+        text += f"; the log has ended: {run.log.failure}"
     if program is not None:
         text += f"; running: {program.name}"
     return motion, f"{text}. Warning: {why}" if why else f"{text}."

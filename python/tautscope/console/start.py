@@ -17,7 +17,7 @@ from tautscope.console.rig_control import RigControl
 from tautscope.console.server import run_server
 from tautscope.console.session import Session
 from tautscope.console.shared import Channels, SharedMemory
-from tautscope.errors import ConfigError
+from tautscope.errors import STOPPED, ConfigError, StateError
 from tautscope.hardware.realtime import (
     LOOP,
     OTHERS,
@@ -50,6 +50,7 @@ def start_console(
 
     Raises:
         ConfigError: The port is taken, or the configuration does not describe a rig.
+        StateError: The web server ended.
     """
     rig, config = make_rig(config, is_twin=is_twin)
     with exit_on_signals(), web_server(config.camera, port) as (server, channels, url):
@@ -65,7 +66,9 @@ def start_console(
                 Session(control, channels, lambda: not server.is_alive()).main()
             except KeyboardInterrupt:
                 return 0
-    return 1
+    error = StateError("web server", "it ended", "Motion is stopped. Start the console again")
+    error.exit_status = STOPPED
+    raise error
 
 
 def make_rig(config: Config, *, is_twin: bool) -> tuple[LiveRig, Config]:

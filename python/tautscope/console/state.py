@@ -65,6 +65,7 @@ class State(Struct):
         profile: The profile of compensation.
         scale: (3,) of the input device.
         clutch: (3,) whether it moves each DOF.
+        rested_by: Why the last motion ended, if the operator did not end it.
         must_release: Whether the operator has to let go of the input device first.
         lease: Number of the lease.
         holder: Connection that holds it.
@@ -99,6 +100,7 @@ class State(Struct):
     compensation: float = 1.0
     scale: Three = (0.4, 0.4, 0.4)
     clutch: tuple[bool, bool, bool] = (True, True, True)
+    rested_by: str = ""
     must_release: bool = True
     lease: int = 0
     holder: int | None = None

@@ -36,11 +36,18 @@ class DofCharts {
     card.innerHTML = `<h2><b>${dof.name}</b> error <b class="error"></b><span class="offsets"></span></h2>`;
     this.error = card.querySelector(".error");
     this.offsets = card.querySelector(".offsets");
-    this.boxes = ["over time: reference, command and tip", "loop of tip over reference", "contact offsets"].map((what) => {
+    const { unit } = dof;
+    this.boxes = [
+      ["over time: reference, command and tip",
+        `<span class="reference">reference</span> <span class="command">command</span> <span class="tip">tip</span> [${unit}]`],
+      ["loop of tip over reference", `<span class="tip">tip</span> over reference [${unit}]`],
+      ["contact offsets over time", `<span class="offset">contact offsets</span> [${unit}]`],
+    ].map(([what, caption]) => {
       const box = document.createElement("div");
       box.className = "chart";
       box.setAttribute("role", "img");
       box.setAttribute("aria-label", `${dof.name}, ${what}`);
+      box.innerHTML = `<p aria-hidden="true">${caption}</p>`;
       card.append(box);
       return box;
     });
@@ -51,14 +58,15 @@ class DofCharts {
   rebuild() {
     this.plots.forEach((plot) => plot.destroy());
     const line = (name, width = 1.5) => ({ label: name, stroke: colour(name), width, points: { show: false } });
+    const letter = 0.75 * parseFloat(getComputedStyle(document.documentElement).fontSize);
     const axis = () => ({
-      stroke: colour("dim"), grid: { stroke: colour("line"), width: 0.5 }, ticks: { show: false }, size: 26,
-      font: "11px system-ui", gap: 2,
+      stroke: colour("dim"), grid: { stroke: colour("line"), width: 0.5 }, ticks: { show: false }, size: 2 * letter,
+      font: `${letter}px system-ui`, gap: 2, space: 3.5 * letter,
     });
-    const vertical = () => ({ ...axis(), size: 40 });
+    const vertical = () => ({ ...axis(), size: 3.6 * letter, space: 2.2 * letter });
     const common = (box, title) => ({
       width: Math.max(box.clientWidth, 40), height: Math.max(box.clientHeight, 40), legend: { show: false },
-      cursor: { show: false }, padding: [6, 6, 0, 0], title,
+      cursor: { show: false }, padding: [1.4 * letter, 6, 0, 0], title,
     });
     const least = (size) => (plot, low, high) => {
       const middle = (low + high) / 2 || 0;

@@ -183,6 +183,7 @@ function hint() {
   if (!hasLease()) return "Take control to steer. Others watch; everybody may stop.";
   if (!steering.isActive) return "This page does not have the focus: nothing moves.";
   if (["stopped", "held", "off"].includes(state.motion)) return "Press Enable; then hold a key to move.";
+  if (state.rested_by) return `Motion ended: ${state.rested_by}. Let go, then hold again.`;
   if (state.must_release) return "Let go of all keys and buttons, then hold one to move.";
   return "Hold a key, or a shoulder button of the gamepad and its sticks, to move. Escape stops.";
 }
