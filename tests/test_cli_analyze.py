@@ -226,3 +226,21 @@ def test_suggested_settings_say_what_to_check(
     settings = json.loads(capsys.readouterr().out)["settings"]
     assert settings["dofs"] == dofs
     assert any(note in each for each in settings["notes"])
+
+
+def test_offsets_of_one_sign_are_zeros_that_differ(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """Tip = play of -3 and 5 mm, less 20 mm: offsets of 17 and 25 mm."""
+    file = tmp_path / "log.csv"
+    command = 15 * np.sin(np.arange(1000) / 50)
+    measured = play(command, -3.0, 5.0) - 20.0
+    lines = [f"{c:.5f},{m:.5f}\n" for c, m in zip(command, measured, strict=True)]
+    file.write_text("motor [mm],tip [mm]\n" + "".join(lines))
+    columns = ["--command", "motor", "--measured", "tip", "--out", str(tmp_path / "out")]
+    assert main(["analyze", str(file), *columns, "--json"]) == 0
+    settings = json.loads(capsys.readouterr().out)["settings"]
+    assert settings["values"]["delta_minus"] == pytest.approx(-4e-3, abs=3e-4)
+    assert settings["values"]["delta_plus"] == pytest.approx(4e-3, abs=3e-4)
+    [note] = settings["notes"]
+    assert note.startswith("the zeros of motor and tip differ by 0.02")

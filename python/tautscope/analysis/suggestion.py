@@ -43,8 +43,9 @@ def suggest_settings(analysis: Analysis) -> Suggestion | None:
     """Settings by the constant play that fits the record; None without that model.
 
     The offsets are those of the play, the update distance 1 % of the travel, the deviation before
-    the first image half the width. Wrong when the tip's zero is not that of the motor: the offsets
-    then contain the difference.
+    the first image half the width. Offsets of one sign mean that the zeros of motor and tip differ;
+    the offsets are then those about their middle, which is noted. A smaller difference stays in
+    them.
     """
     play = next((entry for entry in analysis.entries if entry.model.name == "play"), None)
     if play is None:
@@ -63,12 +64,17 @@ def suggest_settings(analysis: Analysis) -> Suggestion | None:
         notes.append("in the tip's unit, which the file does not name: convert to m or rad")
     if abs(gain - 1) > GAIN_TOLERANCE:
         notes.append(f"the tip moves {gain:.3g} times as far as the motor: the loop assumes 1")
+    minus, plus = float(found["delta_minus"]), float(found["delta_plus"])
+    if not minus <= 0 <= plus:
+        middle = (minus + plus) / 2
+        notes.append(f"the zeros of motor and tip differ by {scale * middle:.4g}: set the motor's")
+        minus, plus = minus - middle, plus - middle
     travel = abs(gain) * float(np.ptp(analysis.record.command))
     values = {
         "update_distance": UPDATE_SHARE * travel,
         "start_deviation": width / 2,
-        "delta_minus": float(found["delta_minus"]),
-        "delta_plus": float(found["delta_plus"]),
+        "delta_minus": minus,
+        "delta_plus": plus,
     }
     scaled = {name: scale * value for name, value in values.items()}
     return Suggestion(dofs, si, scaled, tuple(notes))
