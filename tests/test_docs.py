@@ -44,8 +44,8 @@ def rows(text: str) -> list[list[str]]:
 
 
 def commands(text: str) -> list[str]:
-    """Every `uv run ...` in a code span or block."""
-    found = re.findall(r"uv run ([^`\n]+)", text)
+    """Every `uv run ...` in a code span or block, without a redirection to a file."""
+    found = re.findall(r"uv run ([^`\n>]+)", text)
     return sorted({command.strip() for command in found})
 
 

@@ -11,10 +11,11 @@ use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2, PyReadonlyArrayDyn};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use tautscope_band_prediction::{ModelPredictor, outlines};
 use tautscope_core as core;
 use tautscope_vision::{
-    BandPrediction, BandPredictor, ColorDiscriminant, Detector, Error, Frame, Labeller, MAX_SIDE,
-    Outline, PixelFormat, SECTION_DISCS, SectionDisc, Segmenter, Settings, Window, each_run,
+    ColorDiscriminant, Detector, Error, Frame, Labeller, MAX_SIDE, PixelFormat, Segmenter,
+    Settings, Window, each_run,
 };
 
 use crate::arrays::table;
@@ -56,7 +57,7 @@ impl MarkerDetector {
         let discriminant = ColorDiscriminant::new(weights, threshold).map_err(rejected(py))?;
         let postures = workspace
             .iter()
-            .filter_map(|state| Some(model.0.bands(*state)?.each_ref().map(outline)));
+            .filter_map(|state| outlines(&model.0, *state));
         Ok(Self {
             format: PixelFormat::named(pixel_format).map_err(rejected(py))?,
             model: model.0,
@@ -81,15 +82,12 @@ impl MarkerDetector {
         std: [f64; 3],
     ) -> PyResult<Detected<'py>> {
         let frame = ArrayFrame::new(&image, self.format)?;
-        let predictor = Predictor {
-            model: &self.model,
-            beliefs: core::Beliefs {
-                states: &states,
-                deviation: std,
-                model_deviation: self.model_deviation,
-            },
-            state: None,
+        let beliefs = core::Beliefs {
+            states: &states,
+            deviation: std,
+            model_deviation: self.model_deviation,
         };
+        let predictor = ModelPredictor::new(&self.model, beliefs);
         let (found, regions) = py.detach(|| {
             let mut detector = self.detector.lock().unwrap_or_else(PoisonError::into_inner);
             let (found, regions) = detector.recognise(&frame, &predictor);
@@ -161,14 +159,6 @@ impl MarkerDetector {
     }
 }
 
-fn outline(band: &core::BandImage) -> Outline {
-    Outline {
-        corners: band.outline,
-        centroid: band.centroid,
-        area: band.area,
-    }
-}
-
 fn window([left, top, right, bottom]: [usize; 4]) -> Window {
     Window {
         left,
@@ -186,71 +176,6 @@ type Detected<'py> = (
     Vec<Described>,
     usize,
 );
-
-/// Standard deviations of a posture that was found in an image: those of the workspace over this.
-const NEAR: f64 = 8.0;
-
-/// Predicts the bands by the core's feature model.
-struct Predictor<'a> {
-    model: &'a core::FeatureModel,
-    beliefs: core::Beliefs<'a>,
-    /// The only state, where it was found in the image.
-    state: Option<[f64; 3]>,
-}
-
-impl Predictor<'_> {
-    fn beliefs(&self) -> core::Beliefs<'_> {
-        match &self.state {
-            Some(state) => core::Beliefs {
-                states: std::slice::from_ref(state),
-                ..self.beliefs
-            },
-            None => self.beliefs,
-        }
-    }
-}
-
-impl BandPredictor for Predictor<'_> {
-    fn predict(&self, observed: [f64; 4], std: [f64; 4]) -> Option<BandPrediction> {
-        let expected = self.model.expect(&self.beliefs(), observed, std)?;
-        Some(BandPrediction {
-            features: expected.features,
-            covariance: expected.covariance,
-            outlines: expected.bands.each_ref().map(outline),
-        })
-    }
-
-    fn section(&self, observed: [f64; 4], std: [f64; 4]) -> [Option<SectionDisc>; SECTION_DISCS] {
-        self.model.expect(&self.beliefs(), observed, std).map_or(
-            [None; SECTION_DISCS],
-            |expected| {
-                self.model.section(expected.state).map(|disc| {
-                    disc.map(|disc| SectionDisc {
-                        centre: disc.centre,
-                        radius: disc.radius,
-                        is_nearer: disc.is_nearer,
-                    })
-                })
-            },
-        )
-    }
-
-    fn is_located(&self) -> bool {
-        self.beliefs().states.len() <= 1
-    }
-
-    fn near(&self, observed: [f64; 4]) -> Option<Self> {
-        let state = self.model.expect(&self.beliefs, observed, [2.0; 4])?.state;
-        Some(Self {
-            state: Some(state),
-            beliefs: core::Beliefs {
-                deviation: self.beliefs.deviation.map(|std| std / NEAR),
-                ..self.beliefs
-            },
-            ..*self
-        })
-    }
-}
 
 /// The 8-connected regions of a mask (h, w), in the order of their last rows.
 #[pyfunction]

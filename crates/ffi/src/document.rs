@@ -1,0 +1,170 @@
+//! The configuration: TOML with every key, as `tautscope config` prints it.
+
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use tautscope_core as core;
+use tautscope_vision::PixelFormat;
+
+use crate::result::{TautscopeResult, failed};
+
+/// What the detection reads beside the settings of the core.
+#[derive(Debug, Deserialize)]
+pub struct DetectionDocument {
+    /// `[vision]`.
+    pub vision: tautscope_vision::Settings,
+    /// `[camera]`: the images' size.
+    pub camera: ImageSize,
+    /// `[experiment]`: the workspace.
+    pub experiment: Experiment,
+}
+
+/// Size and format of the images, in `[camera]`.
+#[derive(Debug, Deserialize)]
+pub struct ImageSize {
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Name of the format.
+    pub pixel_format: String,
+}
+
+/// The motion of each DOF, `[experiment]`.
+#[derive(Debug, Clone, Copy, Deserialize)]
+pub struct Experiment {
+    insertion: Sine,
+    rotation: Sine,
+    bending: Sine,
+}
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+struct Sine {
+    centre: f64,
+    amplitude: f64,
+}
+
+#[derive(Deserialize)]
+struct ProfileDocument {
+    profile: String,
+}
+
+/// The profiles of the loop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Profile {
+    /// The article's blocks.
+    Paper,
+    /// The vector law on one ensemble filter.
+    Best,
+}
+
+/// Settings and profile of a loop.
+///
+/// # Errors
+/// The text is not TOML in UTF-8, a key is missing, or a value is of the wrong kind.
+pub fn loop_settings(text: &[u8]) -> Result<(core::Settings, Profile), TautscopeResult> {
+    let ProfileDocument { profile } = parsed(text)?;
+    let profile = match profile.as_str() {
+        "paper" => Profile::Paper,
+        "best" => Profile::Best,
+        other => {
+            return Err(config(format_args!(
+                "profile: got {other:?}, expected \"paper\" or \"best\""
+            )));
+        }
+    };
+    Ok((parsed(text)?, profile))
+}
+
+/// Settings of a detector and the model it predicts the bands with.
+///
+/// # Errors
+/// As [`loop_settings`].
+pub fn detector_settings(
+    text: &[u8],
+) -> Result<(DetectionDocument, core::FeatureModel, PixelFormat), TautscopeResult> {
+    let document: DetectionDocument = parsed(text)?;
+    let settings: core::Settings = parsed(text)?;
+    let model = settings
+        .feature_model()
+        .map_err(|error| config(format_args!("{error}")))?;
+    let size = &document.camera;
+    let format = PixelFormat::named(&size.pixel_format)
+        .and_then(|format| {
+            format.check_sides([size.width, size.height].map(|side| side as usize))?;
+            Ok(format)
+        })
+        .map_err(|error| config(format_args!("camera.{error}")))?;
+    Ok((document, model, format))
+}
+
+/// The error of a configuration.
+pub fn config(message: std::fmt::Arguments<'_>) -> TautscopeResult {
+    failed(TautscopeResult::Config, message)
+}
+
+fn parsed<T: DeserializeOwned>(text: &[u8]) -> Result<T, TautscopeResult> {
+    let text = str::from_utf8(text)
+        .map_err(|error| config(format_args!("configuration: not UTF-8: {error}")))?;
+    toml::from_str(text).map_err(|error| {
+        config(format_args!(
+            "configuration: {error}every key is needed, as `tautscope config` prints them"
+        ))
+    })
+}
+
+impl Experiment {
+    fn sines(self) -> [Sine; 3] {
+        [self.insertion, self.rotation, self.bending]
+    }
+
+    /// States that cover the workspace, and standard deviations between them: `workspace_starts` of
+    /// `python/tautscope/loop/vision.py`, to the bit.
+    pub fn starts(self) -> (Vec<[f64; 3]>, [f64; 3]) {
+        let sines = self.sines();
+        let axes = std::array::from_fn(|dof| {
+            let count = [2, 5, 2][dof];
+            let Sine { centre, amplitude } = sines[dof];
+            let end = 1.0 / f64::from(count);
+            linspace(-1.0 + end, 1.0 - end, count)
+                .map(|share| centre + amplitude * share)
+                .collect()
+        });
+        let mut states = vec![sines.map(|sine| sine.centre)];
+        states.extend(product(&axes));
+        (states, sines.map(|sine| sine.amplitude))
+    }
+
+    /// Postures that cover the workspace: `_workspace` of the same file, to the bit.
+    pub fn postures(self) -> Vec<[f64; 3]> {
+        let sines = self.sines();
+        product(&std::array::from_fn(|dof| {
+            let Sine { centre, amplitude } = sines[dof];
+            linspace(-1.0, 1.0, [13, 45, 23][dof])
+                .map(|share| centre + 1.1 * amplitude * share)
+                .collect()
+        }))
+        .collect()
+    }
+}
+
+/// Evenly spaced numbers with both ends, as `numpy.linspace` rounds them.
+fn linspace(start: f64, stop: f64, count: u32) -> impl Iterator<Item = f64> {
+    let step = (stop - start) / f64::from(count - 1);
+    (0..count).map(move |index| {
+        if index + 1 == count {
+            stop
+        } else {
+            f64::from(index) * step + start
+        }
+    })
+}
+
+/// Every combination, the last axis fastest.
+fn product(axes: &[Vec<f64>; 3]) -> impl Iterator<Item = [f64; 3]> {
+    let [first, second, third] = axes;
+    first.iter().flat_map(move |a| {
+        second
+            .iter()
+            .flat_map(move |b| third.iter().map(move |c| [*a, *b, *c]))
+    })
+}

@@ -1,0 +1,468 @@
+//! Structures and enumerations of the header.
+
+use std::ffi::{CStr, c_char};
+
+use tautscope_core as core;
+use tautscope_vision as vision;
+
+/// Version of this interface. It changes whenever a program has to be compiled again; `tautscope_abi_version` is that of the
+/// library in use.
+pub const TAUTSCOPE_ABI_VERSION: u32 = 1;
+
+/// Result of an image update.
+#[repr(u32)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TautscopeStatus {
+    /// Every DOF was measured.
+    Ok = 0,
+    /// A DOF was not observable and was held at its prediction.
+    Held = 1,
+    /// Only one marker was found; the DOFs it does not determine were held.
+    Partial = 2,
+    /// Neither marker was found.
+    NoMarkers = 3,
+    /// The frame was captured before the start of the command history.
+    Stale = 4,
+    /// The frame was captured no later than one already used.
+    Duplicate = 5,
+    /// A monitor rejected the frame: it updated nothing.
+    Refused = 6,
+}
+
+/// What the loop does while a flag is active; a later one has priority.
+#[repr(u32)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TautscopeReaction {
+    /// Continue.
+    None = 0,
+    /// Continue, with a warning until it is acknowledged.
+    Warn = 1,
+    /// Compensate with the slack estimated so far; images update nothing.
+    HoldEstimate = 2,
+    /// As `HOLD_ESTIMATE`, and reduce the compensation to nothing with motion.
+    Fade = 3,
+    /// Move the command as the reference does, at a constant difference.
+    PassThrough = 4,
+    /// Hold the command; motion of the reference is discarded.
+    HoldMotion = 5,
+    /// As `HOLD_MOTION`; the caller must bring the drives to quick stop.
+    QuickStop = 6,
+    /// As `HOLD_MOTION`; the caller must disable the drives.
+    Disable = 7,
+}
+
+/// Why a contact offset was updated.
+#[repr(u32)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TautscopeTrigger {
+    /// It was not.
+    None = 0,
+    /// Contact, Eq. (4).
+    Contact = 1,
+    /// Violation, Eq. (5).
+    Violation = 2,
+}
+
+/// Memory layout of an image's 8-bit pixels.
+#[repr(u32)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TautscopePixelFormat {
+    /// B, G, R per pixel.
+    Bgr = 0,
+    /// R, G, B per pixel.
+    Rgb = 1,
+    /// B, G, R and an unused byte per pixel.
+    Bgra = 2,
+    /// Y, U, Y, V per two pixels.
+    Yuyv = 3,
+    /// U, Y, V, Y per two pixels.
+    Uyvy = 4,
+    /// The rows of Y, then a line of U, V, U, V, ... for every two rows.
+    Nv12 = 5,
+    /// The rows of Y, then those of U, then of V, at half the resolution, two of them per line.
+    I420 = 6,
+}
+
+/// Why a band was not found.
+#[repr(u32)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TautscopeRejection {
+    /// It was found.
+    None = 0,
+    /// The image has no region of the markers' colour, or no outline fits one.
+    NoRegion = 1,
+    /// The instrument model predicts no visible bands.
+    NotPredicted = 2,
+    /// Too much of the band is outside the image.
+    Outside = 3,
+    /// Too little of the band has the markers' colour.
+    Hidden = 4,
+    /// The markers' colour continues around the band.
+    Spill = 5,
+    /// Too little of the band's outline was found.
+    MissingEdges = 6,
+    /// There is no instrument between the bands.
+    NoInstrument = 7,
+    /// A band found alone may be either of the two.
+    Ambiguous = 8,
+    /// The bands are too far from their predicted positions.
+    Elsewhere = 9,
+}
+
+/// A camera image in the caller's memory. Lines are `stride` bytes apart; width, height and format are those of `[camera]`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct TautscopeImage {
+    /// The first line.
+    pub data: *const u8,
+    /// Readable bytes from `data` on.
+    pub length: usize,
+    /// Distance of two lines in bytes, at least a line.
+    pub stride: usize,
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// A `TautscopePixelFormat`.
+    pub format: u32,
+}
+
+/// The state at a capture time, before the image is seen: where the detection searches.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TautscopeStatePrediction {
+    /// Insertion, rotation, bending [m, rad, rad].
+    pub state: [f64; 3],
+    /// Their standard deviations [m, rad, rad].
+    pub std: [f64; 3],
+    /// 1, or 0 beyond the history: then the detection searches the whole workspace.
+    pub is_known: u32,
+}
+
+/// The bands in an image.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TautscopeDetection {
+    /// Centroids u, v of band A, then of band B (px); NaN for a band that was not found.
+    pub features: [f64; 4],
+    /// Their covariance (4, 4) (px^2); NaN likewise.
+    pub covariance: [[f64; 4]; 4],
+    /// Why each band was not found, a `TautscopeRejection`.
+    pub rejections: [u32; 2],
+    /// Discriminant that was used: 0 is the trained one, others count `vision.alternatives` from 1.
+    pub discriminant: u32,
+    /// CRC-32 of every eighth line of the image.
+    pub checksum: u32,
+}
+
+/// Result of an image update; values that are not known are NaN.
+///
+/// Set `size` to `sizeof(TautscopeReport)` first. A library with more members than the caller's fills those the caller has.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TautscopeReport {
+    /// Bytes of the structure as the caller knows it.
+    pub size: u32,
+    /// Result of the update.
+    pub status: TautscopeStatus,
+    /// The reaction in force after this image.
+    pub reaction: TautscopeReaction,
+    /// The active flags, a bit `1 << TautscopeFlag` each.
+    pub flags: u32,
+    /// When the image was captured (s).
+    pub captured_at: f64,
+    /// State estimate (3,) [m, rad, rad], Eq. (16).
+    pub state_estimate: [f64; 3],
+    /// Predicted state q (3,) at the capture time [m, rad, rad].
+    pub predicted_state: [f64; 3],
+    /// Predicted features (4,) (px), Eq. (9).
+    pub predicted_features: [f64; 4],
+    /// Measured minus predicted features (4,) (px).
+    pub innovation: [f64; 4],
+    /// Standard deviation per px of marker noise (3,) [m/px, rad/px].
+    pub deviation: [f64; 3],
+    /// Standard deviation of the state estimate (3,) [m, rad, rad].
+    pub state_deviation: [f64; 3],
+    /// Negative contact offsets after this image (3,) [m, rad, rad], input minus output.
+    pub delta_minus: [f64; 3],
+    /// Positive contact offsets after this image (3,) [m, rad, rad], input minus output.
+    pub delta_plus: [f64; 3],
+    /// Per DOF, why `delta_minus` was updated.
+    pub triggers_minus: [TautscopeTrigger; 3],
+    /// Per DOF, why `delta_plus` was updated.
+    pub triggers_plus: [TautscopeTrigger; 3],
+    /// Per DOF, 1 if the image determined it.
+    pub is_observable: [u32; 3],
+    /// 0.
+    pub reserved: u32,
+}
+
+/// State of the supervision.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TautscopeSupervision {
+    /// The reaction in force.
+    pub reaction: TautscopeReaction,
+    /// The active flags, a bit `1 << TautscopeFlag` each.
+    pub flags: u32,
+    /// The flags raised since the last acknowledgement.
+    pub latched: u32,
+    /// 0.
+    pub reserved: u32,
+    /// Share of the compensation in use, 0 to 1.
+    pub share: f64,
+}
+
+/// A condition that a monitor detected, or that the rig reported.
+#[repr(u32)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TautscopeFlag {
+    /// The image is identical to an earlier one although the command has moved.
+    Frozen = 0,
+    /// The frame was older than `frame_age` when it arrived.
+    Late = 1,
+    /// The frame was captured no later than the one before it.
+    Duplicate = 2,
+    /// No frame has arrived for longer than `frame_gap`.
+    Dropped = 3,
+    /// A time is later than the control tick, goes back, or is not a number.
+    Clock = 4,
+    /// The measured state is too far from the predicted state.
+    Innovation = 5,
+    /// The image agrees with the prediction if its two markers are exchanged.
+    Swapped = 6,
+    /// Only one marker was found, or one of the two is where it cannot be.
+    Merged = 7,
+    /// No marker was found, or none that agrees with the prediction.
+    Lost = 8,
+    /// Both markers were found, but they do not determine every degree of freedom.
+    Unobservable = 9,
+    /// The rig reports that a drive does not follow its command.
+    FollowingError = 10,
+    /// The reference jumped: it changed by more than its speed before and `reference_speed` allow.
+    ReferenceJump = 11,
+    /// The reference was faster than `reference_speed` over `reference_time`, and is followed at this speed.
+    ReferenceFast = 12,
+    /// The reference was older than `reference_age`, or jumped after its device had been silent for as long.
+    ReferenceLate = 13,
+    /// The reference is not a finite number.
+    ReferenceInvalid = 14,
+    /// A control tick came too late.
+    LateTick = 15,
+    /// The rig reports a fault of a drive or of its bus.
+    DriveFault = 16,
+    /// The rig reports that the tip does not follow its command in sign or scale.
+    StartCheck = 17,
+    /// The estimated slack reached `width_limit` or `offset_limit`.
+    WidthLimit = 18,
+    /// The command limiter changed a command.
+    Monitor = 19,
+    /// A command would have moved faster than `command_speed`.
+    CommandJump = 20,
+    /// The reference reverses more than `tremor_rate` times a second within the slack.
+    Tremor = 21,
+    /// The tip has moved farther than the reference since the reference turned.
+    Overcompensation = 22,
+    /// Reference and tip oscillate with growing swings.
+    LimitCycle = 23,
+    /// The estimated slack changed after it had settled: the instrument has changed, or the images are wrong.
+    SlackChanged = 24,
+    /// The images contradict the configured camera: its pose or principal point seems wrong by more than a degree.
+    GeometryOff = 25,
+}
+
+/// Names of the flags, in their order.
+const FLAG_NAMES: [&CStr; 26] = [
+    c"frozen",
+    c"late",
+    c"duplicate",
+    c"dropped",
+    c"clock",
+    c"innovation",
+    c"swapped",
+    c"merged",
+    c"lost",
+    c"unobservable",
+    c"following_error",
+    c"reference_jump",
+    c"reference_fast",
+    c"reference_late",
+    c"reference_invalid",
+    c"late_tick",
+    c"drive_fault",
+    c"start_check",
+    c"width_limit",
+    c"monitor",
+    c"command_jump",
+    c"tremor",
+    c"overcompensation",
+    c"limit_cycle",
+    c"slack_changed",
+    c"geometry_off",
+];
+
+const REACTION_NAMES: [&CStr; 8] = [
+    c"none",
+    c"warn",
+    c"hold_estimate",
+    c"fade",
+    c"pass_through",
+    c"hold_motion",
+    c"quick_stop",
+    c"disable",
+];
+
+const STATUS_NAMES: [&CStr; 7] = [
+    c"ok",
+    c"held",
+    c"partial",
+    c"no_markers",
+    c"stale",
+    c"duplicate",
+    c"refused",
+];
+
+fn name(names: &[&'static CStr], index: u32) -> *const c_char {
+    let found = usize::try_from(index)
+        .ok()
+        .and_then(|index| names.get(index));
+    found.map_or(std::ptr::null(), |name| name.as_ptr())
+}
+
+/// Version of the interface of this library, `TAUTSCOPE_ABI_VERSION` of its header.
+#[allow(unsafe_code, reason = "exported")]
+#[unsafe(no_mangle)]
+pub extern "C" fn tautscope_abi_version() -> u32 {
+    TAUTSCOPE_ABI_VERSION
+}
+
+/// Version of this library, for example "0.1.0".
+#[allow(unsafe_code, reason = "exported")]
+#[unsafe(no_mangle)]
+pub extern "C" fn tautscope_version() -> *const c_char {
+    concat!(env!("CARGO_PKG_VERSION"), "\0").as_ptr().cast()
+}
+
+/// Name of a `TautscopeFlag` in configuration, reports and logs; null for any other number.
+#[allow(unsafe_code, reason = "exported")]
+#[unsafe(no_mangle)]
+pub extern "C" fn tautscope_flag_name(flag: u32) -> *const c_char {
+    name(&FLAG_NAMES, flag)
+}
+
+/// Name of a `TautscopeReaction`; null for any other number.
+#[allow(unsafe_code, reason = "exported")]
+#[unsafe(no_mangle)]
+pub extern "C" fn tautscope_reaction_name(reaction: u32) -> *const c_char {
+    name(&REACTION_NAMES, reaction)
+}
+
+/// Name of a `TautscopeStatus`; null for any other number.
+#[allow(unsafe_code, reason = "exported")]
+#[unsafe(no_mangle)]
+pub extern "C" fn tautscope_status_name(status: u32) -> *const c_char {
+    name(&STATUS_NAMES, status)
+}
+
+/// The bits of a set of flags.
+pub fn bits(flags: core::Flags) -> u32 {
+    let mut bits = 0;
+    for (index, flag) in core::Flag::ALL.iter().enumerate() {
+        bits |= u32::from(flags.contains(*flag)) << index;
+    }
+    bits
+}
+
+impl From<core::Status> for TautscopeStatus {
+    fn from(status: core::Status) -> Self {
+        match status {
+            core::Status::Ok => Self::Ok,
+            core::Status::Held => Self::Held,
+            core::Status::Partial => Self::Partial,
+            core::Status::NoMarkers => Self::NoMarkers,
+            core::Status::Stale => Self::Stale,
+            core::Status::Duplicate => Self::Duplicate,
+            core::Status::Refused => Self::Refused,
+        }
+    }
+}
+
+impl From<core::Reaction> for TautscopeReaction {
+    fn from(reaction: core::Reaction) -> Self {
+        match reaction {
+            core::Reaction::None => Self::None,
+            core::Reaction::Warn => Self::Warn,
+            core::Reaction::HoldEstimate => Self::HoldEstimate,
+            core::Reaction::Fade => Self::Fade,
+            core::Reaction::PassThrough => Self::PassThrough,
+            core::Reaction::HoldMotion => Self::HoldMotion,
+            core::Reaction::QuickStop => Self::QuickStop,
+            core::Reaction::Disable => Self::Disable,
+        }
+    }
+}
+
+impl From<Option<core::Trigger>> for TautscopeTrigger {
+    fn from(trigger: Option<core::Trigger>) -> Self {
+        match trigger {
+            None => Self::None,
+            Some(core::Trigger::Contact) => Self::Contact,
+            Some(core::Trigger::Violation) => Self::Violation,
+        }
+    }
+}
+
+impl From<Option<vision::Rejection>> for TautscopeRejection {
+    fn from(rejection: Option<vision::Rejection>) -> Self {
+        match rejection {
+            None => Self::None,
+            Some(vision::Rejection::NoRegion) => Self::NoRegion,
+            Some(vision::Rejection::NotPredicted) => Self::NotPredicted,
+            Some(vision::Rejection::Outside { .. }) => Self::Outside,
+            Some(vision::Rejection::Hidden { .. }) => Self::Hidden,
+            Some(vision::Rejection::Spill { .. }) => Self::Spill,
+            Some(vision::Rejection::MissingEdges { .. }) => Self::MissingEdges,
+            Some(vision::Rejection::NoInstrument) => Self::NoInstrument,
+            Some(vision::Rejection::Ambiguous) => Self::Ambiguous,
+            Some(vision::Rejection::Elsewhere { .. }) => Self::Elsewhere,
+        }
+    }
+}
+
+impl From<core::Supervision> for TautscopeSupervision {
+    fn from(now: core::Supervision) -> Self {
+        Self {
+            reaction: now.reaction.into(),
+            flags: bits(now.flags),
+            latched: bits(now.latched),
+            reserved: 0,
+            share: now.lead,
+        }
+    }
+}
+
+impl TautscopeReport {
+    /// The report of an image that was captured at a time in s.
+    pub fn new(report: &core::Report, captured_at: f64) -> Self {
+        Self {
+            // Checked against the caller's where it is written.
+            size: 0,
+            status: report.status.into(),
+            reaction: report.supervision.reaction.into(),
+            flags: bits(report.supervision.flags),
+            captured_at,
+            state_estimate: report.estimate.state,
+            predicted_state: report.predicted_state,
+            predicted_features: report.predicted_features,
+            innovation: report.estimate.innovation,
+            deviation: report.estimate.deviation,
+            state_deviation: report.state_deviation,
+            delta_minus: report.play.map(|play| play.delta_minus()),
+            delta_plus: report.play.map(|play| play.delta_plus()),
+            triggers_minus: report.triggers.map(|triggers| triggers.minus.into()),
+            triggers_plus: report.triggers.map(|triggers| triggers.plus.into()),
+            is_observable: report.estimate.observable.map(u32::from),
+            reserved: 0,
+        }
+    }
+}

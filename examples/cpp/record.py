@@ -1,0 +1,175 @@
+"""Inputs of the loop and what it answered in Python, for the controller in C++ to repeat.
+
+Run it with ``uv run python examples/cpp/record.py FOLDER``. A recording is three files,
+with rows of float64:
+
+- ``NAME.toml``: the configuration with every key.
+- ``NAME.ticks``: time, made_at, reference (3,), event; command (3,).
+- ``NAME.images``: tick, captured_at, features (4,); status, reaction, flags, state estimate (3,),
+  delta_minus (3,), delta_plus (3,); features found without a prediction (4,).
+
+``frames.pixels`` has the images themselves. Units are m, rad, s, px; NaN is not known.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from tautscope import Config, Frame, HysteresisReduction, Report
+from tautscope.config import ControlConfig, Profile, dump_config
+from tautscope.loop.construction import build_feature_model
+from tautscope.loop.reduction import Status
+from tautscope.loop.safety import DETECTORS
+from tautscope.loop.vision import MarkerDetector
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from own_rig import DrawnRig, short_experiment
+
+DURATION = 60.0
+PERIOD = 1e-3
+TICKS_PER_IMAGE = 40
+LATENCY = 80
+"""From capture to arrival, in ticks."""
+
+SEED = 20
+NOISE = 0.3
+"""Standard deviation of the features [px]."""
+
+WIDTHS = np.array([10e-3, 1.8, 1.1])
+CENTRES = np.array([25e-3, 0.0, 0.9])
+AMPLITUDES = np.array([15e-3, 1.5, 0.6])
+PERIODS = np.array([20.0, 23.0, 17.0])
+
+EVENTS = {31.0: 1, 35.0: 2, 40.0: 3, 41.0: 1, 50.0: 4, 55.0: 5}
+"""Times [s] of: 1 engage, 2 acknowledge, 3 drive fault, 4 half of the compensation, 5 all of it."""
+
+JUMP = (30.0, np.array([8e-3, 0.0, 0.0]))
+"""Time and size of a jump of the reference, which stops the motion."""
+
+NOTHING = np.full(4, np.nan)
+
+
+@dataclass
+class Record:
+    """A loop with what went in and came out."""
+
+    config: Config
+    loop: HysteresisReduction = field(init=False)
+    ticks: list[NDArray[np.float64]] = field(default_factory=list)
+    images: list[NDArray[np.float64]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.loop = HysteresisReduction(self.config)
+
+    def step(
+        self, time: float, reference: NDArray[np.float64], event: int = 0, age: float = np.nan
+    ) -> NDArray[np.float64]:
+        """One tick, after an event."""
+        match event:
+            case 1:
+                self.loop.engage()
+            case 2:
+                self.loop.acknowledge()
+            case 3:
+                self.loop.raise_flag("drive_fault")
+            case 4:
+                self.loop.set_compensation(0.5)
+            case 5:
+                self.loop.set_compensation(1.0)
+        made_at = time - age
+        command = self.loop.step(reference, time, None if np.isnan(age) else made_at)
+        self.ticks.append(np.array([time, made_at, *reference, event, *command]))
+        return command
+
+    def keep(
+        self,
+        report: Report,
+        features: NDArray[np.float64],
+        unlocated: NDArray[np.float64] = NOTHING,
+    ) -> None:
+        """An image update after the last tick."""
+        now = self.loop.supervision
+        row = [
+            len(self.ticks) - 1,
+            report.captured_at,
+            *features,
+            list(Status).index(report.status),
+            now.reaction.rank,
+            sum(1 << DETECTORS.index(name) for name in now.flags),
+            *report.state_estimate,
+            *report.delta_minus,
+            *report.delta_plus,
+            *unlocated,
+        ]
+        self.images.append(np.array(row))
+
+    def write(self, folder: Path, name: str) -> None:
+        """The three files."""
+        (folder / f"{name}.toml").write_text(dump_config(self.config), encoding="utf-8")
+        for kind, rows in (("ticks", self.ticks), ("images", self.images)):
+            np.array(rows).astype("<f8").tofile(folder / f"{name}.{kind}")
+
+
+def record_features(profile: Profile) -> Record:
+    """60 s at 1 kHz: centroids from three plays and an ideal camera, and every kind of event."""
+    record = Record(Config(profile=profile, control=ControlConfig(period=PERIOD, history=1.0)))
+    model = build_feature_model(record.config)
+    random = np.random.default_rng(SEED)
+    tip = CENTRES.copy()
+    waiting: list[tuple[int, NDArray[np.float64]]] = []
+    for tick in range(round(DURATION / PERIOD)):
+        time = tick * PERIOD
+        reference = CENTRES + AMPLITUDES * np.sin(2 * np.pi * time / PERIODS)
+        if time >= JUMP[0]:
+            reference += JUMP[1]
+        age = 0.01 if 10 <= time < 15 else np.nan
+        command = record.step(time, reference, EVENTS.get(time, 0), age)
+        tip = np.clip(tip, command - WIDTHS / 2, command + WIDTHS / 2)
+        if tick % TICKS_PER_IMAGE == 0:
+            seen = model.predict(tip)
+            features = NOTHING if seen is None else seen[0] + random.normal(0, NOISE, 4)
+            if 20 <= time < 21:
+                features[2:] = np.nan
+            waiting.append((tick, NOTHING if 22 <= time < 22.5 else features))
+        if waiting and waiting[0][0] + LATENCY == tick:
+            captured, features = waiting.pop(0)
+            found = None if np.isnan(features).all() else features
+            record.keep(record.loop.on_features(found, captured * PERIOD), features)
+    return record
+
+
+def record_frames(folder: Path) -> Record:
+    """2 s with the images of `examples/own_rig.py`; their pixels go to a file."""
+    record = Record(short_experiment())
+    rig, detector = DrawnRig(record.config), MarkerDetector(record.config)
+    sample = rig.reset()
+    with (folder / "frames.pixels").open("wb") as pixels:
+        while sample.time < 2.0:
+            reference = CENTRES + AMPLITUDES * np.sin(np.pi * sample.time / 2) / 2
+            command = record.step(sample.time, reference)
+            if (frame := sample.frame) is not None:
+                pixels.write(frame.image.tobytes())
+                report = record.loop.on_frame(Frame(frame.image, frame.captured_at, frame.sequence))
+                assert report.detection is not None
+                unlocated = detector.detect(frame.image).features
+                record.keep(report, report.detection.features, unlocated)
+            sample = rig.step(command)
+    return record
+
+
+def main() -> None:
+    folder = Path(sys.argv[1])
+    folder.mkdir(parents=True, exist_ok=True)
+    for profile in ("paper", "best"):
+        record_features(profile).write(folder, profile)
+    record_frames(folder).write(folder, "frames")
+    print(f"{folder}: 60 s of profiles paper and best, 2 s of images")
+
+
+if __name__ == "__main__":
+    main()
