@@ -17,7 +17,7 @@ from tautscope.calibration.geometry import Patch, Recording, fit
 from tautscope.cli import main
 from tautscope.config import from_document, load_config
 from tautscope.log.writer import LogWriter
-from tautscope.loop.references import SineSequence
+from tautscope.loop.references import OperatorMotion
 from tautscope.report.geometry_figures import residual_figure, write_overlay
 from tautscope.runs.experiment import run_experiment
 from tautscope.twin import Twin
@@ -96,12 +96,8 @@ def test_a_log_without_enough_motion_is_refused(
     config = told()
     rig, path = Twin(config), tmp_path / "run.mcap"
 
-    class Short(SineSequence):
-        duration = 2.0
-
-    reference = Short(config.experiment)
     with LogWriter(path, config, wait=True) as log:
-        run_experiment(rig, reference, config, log=log)
+        run_experiment(rig, OperatorMotion(config.experiment, 0, duration=2.0), config, log=log)
     rig.close()
     message = failed(capsys, "calibrate", "geometry", str(path), "--config", str(file), "--write")
     assert "both bands in" in message
@@ -115,7 +111,8 @@ def test_a_log_without_enough_motion_is_refused(
         (["clip.avi", "--motors", "missing.csv"], "File not found: missing.csv"),
         (["missing.mcap"], "File not found: missing.mcap"),
         ([], "--config"),
-        (["--motors", "motors.csv"], "motors"),
+        (["--motors", "motors.csv"], "a video together with --motors"),
+        (["run.mcap", "--twin"], "no file together with --twin"),
     ],
 )
 def test_bad_sources_are_named(capsys: Capture, arguments: list[str], message: str) -> None:

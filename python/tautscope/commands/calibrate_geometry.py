@@ -104,6 +104,10 @@ def _run(options: argparse.Namespace) -> int:
 
 def _source(options: argparse.Namespace) -> _Source:
     file: Path | None = options.file
+    if file is not None and options.twin:
+        raise FieldError("file", str(file), "no file together with --twin")
+    if options.motors is not None and (file is None or file.suffix == ".mcap"):
+        raise FieldError("--motors", str(options.motors), "a video together with --motors")
     if file is None:
         return _from_twin(options) if options.twin else _from_hardware(options)
     if file.suffix == ".mcap":
