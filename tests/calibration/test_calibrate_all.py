@@ -117,6 +117,13 @@ def test_the_terminal_answers_while_the_camera_has_the_input(
     assert len(steps.seen) == 3
 
 
+def test_a_step_that_fails_on_the_twin_ends_the_sequence(steps: Steps, capsys: Capture) -> None:
+    steps.failing = {"colour"}
+    assert main([*COMMAND, "--twin", "--out", "out"]) == 2
+    assert "colour failed" in capsys.readouterr().err
+    assert [name for name, _ in steps.seen] == ["camera", "colour"]
+
+
 def test_another_rig_and_a_damaged_state_are_refused(steps: Steps, capsys: Capture) -> None:
     steps.failing = {"colour"}
     assert main([*COMMAND, "--yes"]) == 2

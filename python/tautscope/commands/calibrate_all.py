@@ -97,7 +97,7 @@ def _do(step: Step, session: CalibrationSession, options: argparse.Namespace) ->
             result = step.run(confirmed, session.config, session.folder)
             break
         except TautscopeError as error:
-            if options.yes:
+            if options.yes or options.twin:
                 raise
             _say(f"error: {error}")
     session.finish_step(step.name, result)

@@ -8,8 +8,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from tautscope.calibration.bands.regions import centroid, two_bands
+from tautscope.calibration.images import to_bgr
 from tautscope.config import CameraConfig, Config
 from tautscope.errors import RecordError, SignalError
+from tautscope.loop.construction import build_feature_model
 from tautscope.loop.frame_layout import FrameLayout
 from tautscope.loop.vision import Detection, MarkerDetector
 
@@ -17,6 +20,9 @@ Floats = NDArray[np.float64]
 Image = NDArray[np.uint8]
 IMAGE_PERIOD = 0.08
 """Least time between two images that are used [s]; neighbouring ones tell the same."""
+LEAST_FOUND = 0.25
+"""Share of the images in which the marker detection must find both bands for its features to be
+used."""
 MARGIN = 60
 """Pixels that are kept around the regions of the markers' colour [px]: tissue beside the bands."""
 
@@ -103,6 +109,8 @@ class Recorder:
     """Collects a `Recording`: motor positions, and images in which the bands are searched.
 
     The bands are searched without a prediction, because the configured geometry is what is unknown.
+    Where it is so wrong that no posture explains most of the images, the centroids of the two
+    regions of the bands' colour are taken instead, until the fit searches again.
 
     Args:
         config: Camera, instrument and vision.
@@ -110,10 +118,13 @@ class Recorder:
 
     def __init__(self, config: Config) -> None:
         self._camera = config.camera
+        self._vision = config.vision
         self._detector = MarkerDetector(config)
+        self._model = build_feature_model(config)
         self._ticks: list[tuple[float, Floats]] = []
         self._images: list[tuple[float, Floats, Patch, float]] = []
         self._reasons: dict[str, int] = {}
+        self._regions: list[tuple[float, Floats]] = []
         self._due = -np.inf
 
     def add_tick(self, time: float, motors: Floats) -> None:
@@ -136,10 +147,27 @@ class Recorder:
             reason = generic(detection.reason)
             self._reasons[reason] = self._reasons.get(reason, 0) + 1
         features = detection.features if detection.valid else np.full(4, np.nan)
+        self._regions.append((captured_at, self._by_regions(image)))
         patch = self._patch(image, detection)
         is_saturated = patch.pixels.max(axis=-1) == 255 if patch.pixels.size else np.zeros(1)
         self._images.append((captured_at, features, patch, float(np.mean(is_saturated))))
         return detection
+
+    def _by_regions(self, image: Image) -> Floats:
+        """The centroids of two regions of the bands' colour, ordered as the motors let expect."""
+        unknown = np.full(4, np.nan)
+        predicted = self._model.predict(self._ticks[-1][1]) if self._ticks else None
+        if predicted is None:
+            return unknown
+        vision = self._vision
+        pixels = to_bgr(image, self._camera.pixel_format)
+        bands = two_bands(pixels, vision.weights, vision.threshold)
+        if bands is None:
+            return unknown
+        first, second = (centroid(band) for band in bands)
+        features = predicted[0]
+        is_ordered = (second - first) @ (features[2:] - features[:2]) > 0
+        return np.concatenate([first, second] if is_ordered else [second, first])
 
     def recording(self) -> Recording:
         """What was collected, in the order of capture.
@@ -153,6 +181,8 @@ class Recorder:
         times, motors = zip(*self._ticks, strict=True)
         images = sorted(self._images, key=lambda each: each[0])
         captured_at, features, patches, saturated = zip(*images, strict=True)
+        if np.isfinite(features).all(axis=1).mean() < LEAST_FOUND:
+            _, features = zip(*sorted(self._regions, key=lambda each: each[0]), strict=True)
         return Recording(
             np.array(times),
             np.array(motors),
