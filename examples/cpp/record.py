@@ -6,7 +6,7 @@ with rows of float64:
 - ``NAME.toml``: the configuration with every key.
 - ``NAME.ticks``: time, made_at, reference (3,), event; command (3,).
 - ``NAME.images``: tick, captured_at, features (4,); status, reaction, flags, state estimate (3,),
-  delta_minus (3,), delta_plus (3,); features found without a prediction (4,).
+  delta_minus (3,), delta_plus (3,); features found without a prediction (4,), checksum.
 
 ``frames.pixels`` has the images themselves. Units are m, rad, s, px; NaN is not known.
 """
@@ -23,7 +23,7 @@ from tautscope import Config, Frame, HysteresisReduction, Report
 from tautscope.config import ControlConfig, Profile, dump_config
 from tautscope.loop.construction import build_feature_model
 from tautscope.loop.reduction import Status
-from tautscope.loop.safety import DETECTORS
+from tautscope.loop.safety import DETECTORS, checksum
 from tautscope.loop.vision import MarkerDetector
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -91,6 +91,7 @@ class Record:
         report: Report,
         features: NDArray[np.float64],
         unlocated: NDArray[np.float64] = NOTHING,
+        image_checksum: int = 0,
     ) -> None:
         """An image update after the last tick."""
         now = self.loop.supervision
@@ -105,6 +106,7 @@ class Record:
             *report.delta_minus,
             *report.delta_plus,
             *unlocated,
+            image_checksum,
         ]
         self.images.append(np.array(row))
 
@@ -157,7 +159,7 @@ def record_frames(folder: Path) -> Record:
                 report = record.loop.on_frame(Frame(frame.image, frame.captured_at, frame.sequence))
                 assert report.detection is not None
                 unlocated = detector.detect(frame.image).features
-                record.keep(report, report.detection.features, unlocated)
+                record.keep(report, report.detection.features, unlocated, checksum(frame.image))
             sample = rig.step(command)
     return record
 

@@ -25,9 +25,10 @@ struct ImageUpdate {
     double status, reaction, flags;
     tautscope::Vector state_estimate, delta_minus, delta_plus;
     std::array<double, 4> features_without_prediction;
+    double checksum;
 };
 
-static_assert(sizeof(Tick) == 9 * sizeof(double) && sizeof(ImageUpdate) == 22 * sizeof(double));
+static_assert(sizeof(Tick) == 9 * sizeof(double) && sizeof(ImageUpdate) == 23 * sizeof(double));
 
 template <class Row> std::vector<Row> read_rows(const std::string &path) {
     const std::string bytes = tautscope::read_file(path);

@@ -51,6 +51,7 @@ int main(int count, char **arguments) try {
             auto detecting = std::async(std::launch::async, [&] { return background.detect(view, prediction); });
             const TautscopeDetection detection = detecting.get();
             wrong += !is_same(detection.features, expected.features);
+            wrong += detection.checksum != static_cast<std::uint32_t>(expected.checksum);
             wrong += !is_same(other.on_detection(detection, expected.captured_at), expected);
             wrong += !is_same(detector.detect(view).features, expected.features_without_prediction);
         }

@@ -1,4 +1,5 @@
-//! Tests that need no configuration; `examples/cpp/tests` has the others, from C and C++.
+//! Tests in Rust; `examples/cpp/tests` has those in C and C++.
 
 mod calls;
+mod configured;
 mod header;

@@ -1,0 +1,77 @@
+//! Calls on a loop, for Miri: `examples/cpp/tests` has more, in C++.
+//!
+//! ```sh
+//! export TAUTSCOPE_CONFIG=$PWD/target/cpp/recordings/paper.toml MIRIFLAGS=-Zmiri-disable-isolation
+//! cargo +nightly miri test --package tautscope-ffi configured -- --ignored
+//! ```
+#![allow(unsafe_code)]
+
+use std::mem::MaybeUninit;
+use std::ptr::null_mut;
+
+use crate::reduction::{
+    tautscope_loop_create, tautscope_loop_destroy, tautscope_loop_engage,
+    tautscope_loop_on_features, tautscope_loop_predict_state, tautscope_loop_raise_flag,
+    tautscope_loop_step, tautscope_loop_supervision,
+};
+use crate::result::TautscopeResult;
+use crate::types::{
+    TautscopeFlag, TautscopeReaction, TautscopeReport, TautscopeStatePrediction,
+    TautscopeSupervision,
+};
+
+#[test]
+#[ignore = "needs the name of a configuration in TAUTSCOPE_CONFIG"]
+fn a_loop_is_created_used_and_destroyed() {
+    let toml = std::fs::read(std::env::var_os("TAUTSCOPE_CONFIG").unwrap()).unwrap();
+    let mut handle = null_mut();
+    // SAFETY: the handle is valid until it is destroyed, and the places are writable.
+    unsafe {
+        let ok = TautscopeResult::Ok;
+        assert_eq!(
+            tautscope_loop_create(toml.as_ptr(), toml.len(), &raw mut handle),
+            ok
+        );
+        let mut time = 0.0;
+        let mut command = [f64::NAN; 3];
+        for step in 0..4 {
+            time = 0.001 * f64::from(step);
+            let reference = [0.025 + time, 0.0, 0.9];
+            let (from, to) = (reference.as_ptr(), command.as_mut_ptr());
+            assert_eq!(tautscope_loop_step(handle, from, f64::NAN, time, to), ok);
+        }
+        assert!(command.iter().all(|value| value.is_finite()));
+
+        // As in C: only the size is set.
+        let mut report = MaybeUninit::<TautscopeReport>::uninit();
+        (&raw mut (*report.as_mut_ptr()).size)
+            .write(u32::try_from(size_of::<TautscopeReport>()).unwrap());
+        let features = [350.0, 260.0, 345.0, 190.0];
+        let result =
+            tautscope_loop_on_features(handle, features.as_ptr(), 0.002, report.as_mut_ptr());
+        assert_eq!(result, ok);
+        let report = report.assume_init();
+        assert_eq!((report.captured_at, report.reserved), (0.002, 0));
+        assert_eq!(
+            tautscope_loop_on_features(handle, std::ptr::null(), time, null_mut()),
+            ok
+        );
+
+        let mut prediction = MaybeUninit::<TautscopeStatePrediction>::uninit();
+        assert_eq!(
+            tautscope_loop_predict_state(handle, 0.002, prediction.as_mut_ptr()),
+            ok
+        );
+        assert_eq!(prediction.assume_init().is_known, 1);
+
+        assert_eq!(
+            tautscope_loop_raise_flag(handle, TautscopeFlag::DriveFault as u32),
+            ok
+        );
+        let mut now = MaybeUninit::<TautscopeSupervision>::uninit();
+        assert_eq!(tautscope_loop_supervision(handle, now.as_mut_ptr()), ok);
+        assert_eq!(now.assume_init().reaction, TautscopeReaction::QuickStop);
+        assert_eq!(tautscope_loop_engage(handle), ok);
+        tautscope_loop_destroy(handle);
+    }
+}
