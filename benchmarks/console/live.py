@@ -44,6 +44,8 @@ FLAGS = ["--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-quic", "-
 SCREEN = {"width": 1280, "height": 800}
 START_TIME = 8.0
 """Time after which a measurement begins [s]."""
+HAND_SIZE = "360x288"
+"""Size of the images of the hand protocol, which runs twice in one process too."""
 DEAD_BAND = 0.1
 """Of the page's gamepad."""
 GAMEPAD = """
@@ -54,7 +56,9 @@ navigator.getGamepads = () => {
     const elapsed = (performance.now() - motion.start) / 1000;
     const row = motion.rows[Math.floor(elapsed / motion.period)] ?? [0, 0, 0, 0];
     pad.axes = row;
-    pad.buttons[5].pressed = elapsed >= 0 && elapsed < motion.rows.length * motion.period;
+    // After a late command the page asks to let go; then the operator presses again.
+    const mustRelease = !document.querySelector("#hint").textContent.startsWith("Hold");
+    pad.buttons[5].pressed = !mustRelease && elapsed < motion.rows.length * motion.period;
   }
   return [pad];
 };
@@ -184,7 +188,7 @@ class Recorded:
 
 def hand(folder: Path, seconds: float) -> dict[str, dict[str, float]]:
     """Reduction of the tracking error by gamepad and page, and in one process [%]."""
-    config = sized("720x576")
+    config = sized(HAND_SIZE)
     motion = OperatorMotion(config.experiment, FIRST_SEED, seconds)
     with live_console(folder, config) as console, browser_page(GAMEPAD) as page:
         page.goto(console.address.url)

@@ -17,6 +17,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 SIZES = {"720x576": (720, 576), "1920x1080": (1920, 1080)}
+"""Sizes at which images are measured."""
 PATIENCE = 60.0
 PERIOD = 0.02
 """Time between two commands of a page [s]."""
@@ -26,7 +27,7 @@ def sized(name: str) -> Config:
     """The default configuration with images of another size."""
     base = load_config()
     camera = base.camera
-    width, height = SIZES[name]
+    width, height = (int(side) for side in name.split("x"))
     across, down = width / camera.width, height / camera.height
     return base.replace(
         **{

@@ -62,6 +62,17 @@ def test_any_bytes_are_a_message_within_its_ranges_or_refused(data: bytes) -> No
             check(decode(data))
 
 
+@given(st.lists(st.floats(-3, 3) | NUMBERS, min_size=3, max_size=3))
+def test_axes_are_from_minus_one_to_one(axes: list[float]) -> None:
+    fields = {"type": "servo", "lease": 1, "sequence": 1, "image": 1, "is_holding": True}
+    data = json.dumps({**fields, "axes": axes}).encode()
+    if all(-1 <= axis <= 1 for axis in axes):
+        assert list(msg.decode_control(data).axes) == axes
+    else:
+        with pytest.raises(msgspec.MsgspecError):
+            msg.decode_control(data)
+
+
 @pytest.mark.parametrize("depth", [1000, 100_000])
 def test_nesting_ends_in_an_error(depth: int) -> None:
     with pytest.raises((msgspec.MsgspecError, RecursionError)):

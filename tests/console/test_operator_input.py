@@ -131,6 +131,22 @@ def test_replayed_commands_move_nothing_and_do_not_use_up_sequences() -> None:
     assert desk.tick().any()
 
 
+def test_a_stop_lasts_until_it_is_ended() -> None:
+    desk = Desk()
+    desk.engage()
+    desk.input.stop("STOP")
+    for _ in range(10):
+        desk.servo(is_holding=False)
+        desk.servo()
+        assert not desk.tick().any()
+    desk.input.enable()
+    desk.servo()
+    assert not desk.tick().any()
+    desk.servo(is_holding=False)
+    desk.servo()
+    assert desk.tick().any()
+
+
 def test_a_new_holder_starts_at_rest() -> None:
     desk = Desk()
     desk.engage()
