@@ -8,7 +8,9 @@ with rows of float64:
 - ``NAME.images``: tick, captured_at, features (4,); status, reaction, flags, state estimate (3,),
   delta_minus (3,), delta_plus (3,); features found without a prediction (4,), checksum.
 
-``frames.pixels`` has the images themselves. Units are m, rad, s, px; NaN is not known.
+``frames.pixels`` has the images themselves, ``frames.workspace`` the states (3,) that the detection
+starts from without a prediction: starts, their standard deviations, postures. Units are m, rad, s,
+px; NaN is not known.
 """
 
 from __future__ import annotations
@@ -24,7 +26,7 @@ from tautscope.config import ControlConfig, Profile, dump_config
 from tautscope.loop.construction import build_feature_model
 from tautscope.loop.reduction import Status
 from tautscope.loop.safety import DETECTORS, checksum
-from tautscope.loop.vision import MarkerDetector
+from tautscope.loop.vision import MarkerDetector, _workspace, workspace_starts
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
@@ -45,8 +47,11 @@ CENTRES = np.array([25e-3, 0.0, 0.9])
 AMPLITUDES = np.array([15e-3, 1.5, 0.6])
 PERIODS = np.array([20.0, 23.0, 17.0])
 
-EVENTS = {31.0: 1, 35.0: 2, 40.0: 3, 41.0: 1, 50.0: 4, 55.0: 5}
+EVENTS = {16.0: 1, 31.0: 1, 35.0: 2, 40.0: 3, 41.0: 1, 50.0: 4, 55.0: 5}
 """Times [s] of: 1 engage, 2 acknowledge, 3 drive fault, 4 half of the compensation, 5 all of it."""
+
+OLD_REFERENCE = 14.0
+"""Time [s] of a reference that is 1 s old, which stops the motion."""
 
 JUMP = (30.0, np.array([8e-3, 0.0, 0.0]))
 """Time and size of a jump of the reference, which stops the motion."""
@@ -130,6 +135,8 @@ def record_features(profile: Profile) -> Record:
         if time >= JUMP[0]:
             reference += JUMP[1]
         age = 0.01 if 10 <= time < 15 else np.nan
+        if tick == round(OLD_REFERENCE / PERIOD):
+            age = 1.0
         command = record.step(time, reference, EVENTS.get(time, 0), age)
         tip = np.clip(tip, command - WIDTHS / 2, command + WIDTHS / 2)
         if tick % TICKS_PER_IMAGE == 0:
@@ -149,6 +156,9 @@ def record_frames(folder: Path) -> Record:
     """2 s with the images of `examples/own_rig.py`; their pixels go to a file."""
     record = Record(short_experiment())
     rig, detector = DrawnRig(record.config), MarkerDetector(record.config)
+    starts, std = workspace_starts(record.config)
+    states = np.vstack([starts, std, _workspace(record.config)])
+    states.astype("<f8").tofile(folder / "frames.workspace")
     sample = rig.reset()
     with (folder / "frames.pixels").open("wb") as pixels:
         while sample.time < 2.0:

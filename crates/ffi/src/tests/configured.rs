@@ -1,14 +1,16 @@
-//! Calls on a loop, for Miri: `examples/cpp/tests` has more, in C++.
+//! Tests with the recordings of `examples/cpp/record.py`; `examples/cpp/tests` has more, in C++. Those of a loop are for Miri:
 //!
 //! ```sh
-//! export TAUTSCOPE_CONFIG=$PWD/target/cpp/recordings/paper.toml MIRIFLAGS=-Zmiri-disable-isolation
-//! cargo +nightly miri test --package tautscope-ffi configured -- --ignored
+//! export TAUTSCOPE_RECORDINGS=$PWD/target/cpp/recordings MIRIFLAGS=-Zmiri-disable-isolation
+//! cargo +nightly miri test --package tautscope-ffi a_loop -- --ignored
 //! ```
 #![allow(unsafe_code)]
 
 use std::mem::MaybeUninit;
+use std::path::Path;
 use std::ptr::null_mut;
 
+use crate::document::detector_settings;
 use crate::reduction::{
     tautscope_loop_create, tautscope_loop_destroy, tautscope_loop_engage,
     tautscope_loop_on_features, tautscope_loop_predict_state, tautscope_loop_raise_flag,
@@ -20,10 +22,32 @@ use crate::types::{
     TautscopeSupervision,
 };
 
+fn recorded(file: &str) -> Vec<u8> {
+    let folder = std::env::var_os("TAUTSCOPE_RECORDINGS").unwrap();
+    std::fs::read(Path::new(&folder).join(file)).unwrap()
+}
+
 #[test]
-#[ignore = "needs the name of a configuration in TAUTSCOPE_CONFIG"]
+#[ignore = "needs the folder of record.py in TAUTSCOPE_RECORDINGS"]
+fn the_workspace_is_that_of_python() {
+    let Ok((document, _, _)) = detector_settings(&recorded("frames.toml")) else {
+        panic!("the configuration is read");
+    };
+    let (starts, std) = document.experiment.starts();
+    let postures = document.experiment.postures();
+    let ours = [starts, vec![std], postures].concat();
+    let bytes: Vec<u8> = ours
+        .into_iter()
+        .flatten()
+        .flat_map(f64::to_le_bytes)
+        .collect();
+    assert!(bytes == recorded("frames.workspace"));
+}
+
+#[test]
+#[ignore = "needs the folder of record.py in TAUTSCOPE_RECORDINGS"]
 fn a_loop_is_created_used_and_destroyed() {
-    let toml = std::fs::read(std::env::var_os("TAUTSCOPE_CONFIG").unwrap()).unwrap();
+    let toml = recorded("paper.toml");
     let mut handle = null_mut();
     // SAFETY: the handle is valid until it is destroyed, and the places are writable.
     unsafe {
