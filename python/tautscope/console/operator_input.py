@@ -121,7 +121,7 @@ class OperatorInput:
 
     def interrupt(self, reason: str = "") -> None:
         """Rest until the operator has let go of the input device; `reason` is shown."""
-        if self.is_moving:
+        if self.is_moving or not reason:
             self.rested_by = reason
         self._must_release = True
         self._axes[:] = 0
