@@ -147,9 +147,12 @@ class Page:
 
         self.wait(release)
 
-    def move(self, axes: tuple[float, ...] = (1, 0, 0)) -> None:
-        """Let go, then hold until the reference moves."""
+    def move(self, axes: tuple[float, ...] | None = None) -> None:
+        """Let go, then hold until the reference moves; by default insertion to its farther end."""
         self.let_go()
+        if axes is None:
+            is_far = self.state["reference"][0] > load_config().experiment.insertion.centre
+            axes = (-1, 0, 0) if is_far else (1, 0, 0)
 
         def hold() -> bool:
             # On a busy computer a command may be late; then the operator presses again.
