@@ -77,8 +77,10 @@ pub fn guarded(call: impl FnOnce() -> Result<(), TautscopeResult>) -> TautscopeR
                 TautscopeResult::Internal,
                 format_args!("error in the library: {text}"),
             );
-            // The value of a panic may itself panic when it is dropped.
-            std::mem::forget(cause);
+            // The value of a panic may itself panic when it is dropped; the value of that one is leaked.
+            if let Err(again) = catch_unwind(AssertUnwindSafe(|| drop(cause))) {
+                std::mem::forget(again);
+            }
             result
         }
     }

@@ -58,6 +58,20 @@ fn a_panic_becomes_an_error_and_the_handle_is_unusable() {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "leaks on purpose")]
+fn a_panic_whose_value_panics_does_not_leave_the_library() {
+    struct Again;
+    impl Drop for Again {
+        fn drop(&mut self) {
+            panic!("again");
+        }
+    }
+    let result = guarded(|| std::panic::panic_any(Again));
+    assert_eq!(result, TautscopeResult::Internal);
+    assert!(message().contains("unknown cause"), "{}", message());
+}
+
+#[test]
 fn an_error_leaves_the_handle_usable() {
     let mut counter = Counter {
         calls: 0,
