@@ -227,7 +227,7 @@ def test_a_killed_browser_stops_motion(console: RunningConsole, open_page, brows
         page.goto(console.url)
         expect(page.locator("#stale")).to_be_hidden(timeout=TIMEOUT)
         take(page)
-        page.keyboard.down("ArrowUp")
+        page.keyboard.down("ArrowDown")
         wait(lambda: moves(console))
         session = with_processes.new_browser_cdp_session()
         processes = session.send("SystemInfo.getProcessInfo")["processInfo"]
