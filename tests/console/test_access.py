@@ -58,7 +58,9 @@ def test_every_route_without_a_token_changes_nothing(console: RunningConsole) ->
     command = console.command
     for path in (*Pages([]).files, *SOCKETS, "/stop", "/take"):
         for method in ("POST", "PUT", "PATCH", "DELETE", "OPTIONS"):
-            assert get(console, method, path)[0] == 405
+            # Before websockets 17 the connection is closed without an answer.
+            with suppress(http.client.RemoteDisconnected):
+                assert get(console, method, path)[0] == 405
     for path in SOCKETS:
         for token in ("", console.token[:-1], console.token + "x", "é" * 20):
             page = console.page(path, token)
