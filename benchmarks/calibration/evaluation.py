@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from calibration.records import Case, Floats, contradictory, noisy_features, with_small_images
+from calibration.records import Case, Floats, contradictory, noisy_features
+from common.small_images import with_small_images
 from tautscope.calibration.geometry import GeometryFit, fit
 from tautscope.calibration.geometry.parameters import matrix
 from tautscope.config import Config

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from common.small_images import full_size, with_small_images
 from numpy.typing import NDArray
 from tautscope.calibration.geometry import Recording, SweepReference, sweep
 from tautscope.config import Config, load_config
@@ -24,8 +25,6 @@ INSTRUMENTS: tuple[Instrument, ...] = (
 )
 NOISE = 0.5
 """Standard deviation of features in place of images [px]."""
-SMALL = 4
-"""With features, images are drawn with this part of the camera's resolution, for the truth."""
 LEAST_VISIBLE = 0.8
 """A band is measured if at least this share of it is visible."""
 IMAGE_PERIOD = 0.08
@@ -80,29 +79,10 @@ class Case:
             rig.close()
 
 
-def with_small_images(config: Config) -> Config:
-    """The same view with fewer pixels, whose centres are at integers in both."""
-    camera = config.camera
-
-    def centre(value: float) -> float:
-        return (value + 0.5) / SMALL - 0.5
-
-    return config.replace(
-        **{
-            "camera.width": camera.width // SMALL,
-            "camera.height": camera.height // SMALL,
-            "camera.fx": camera.fx / SMALL,
-            "camera.fy": camera.fy / SMALL,
-            "camera.cx": centre(camera.cx),
-            "camera.cy": centre(camera.cy),
-        }
-    )
-
-
 def noisy_features(frame: Frame, noise: float, random: np.random.Generator) -> Floats:
     """True features (4,) of an image of `with_small_images`, with noise; NaN: not visible."""
     assert frame.true_features is not None and frame.true_visible is not None
-    features = (frame.true_features + 0.5) * SMALL - 0.5 + noise * random.standard_normal(4)
+    features = full_size(frame.true_features) + noise * random.standard_normal(4)
     features[np.repeat(frame.true_visible < LEAST_VISIBLE, 2)] = np.nan
     return np.asarray(features)
 

@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 from common.features import NOISE
+from common.small_images import full_size, with_small_images
 from instruments.properties import DrawnInstrument, draw_instrument
 from numpy.typing import NDArray
 from tautscope.config import Config
@@ -30,8 +31,6 @@ LEAST_VISIBLE = 0.5
 LEAST_SEPARATION = 10.0
 """And both count only if their centres are at least this far apart; nearer, the tip is seen from
 its end [px]."""
-SMALL = 4
-"""With features, images are drawn with this part of the camera's resolution, for the truth."""
 PERIODS = 2
 """The last periods of a sine count."""
 
@@ -116,23 +115,9 @@ def _told(instrument: DrawnInstrument, variant: Variant) -> Config:
 
 
 def _with_small_images(config: Config) -> Config:
-    """The same view with fewer pixels, whose centres are at integers in both."""
-    camera = config.camera
-
-    def centre(value: float) -> float:
-        return (value + 0.5) / SMALL - 0.5
-
-    return config.replace(
-        **{
-            "camera.width": camera.width // SMALL,
-            "camera.height": camera.height // SMALL,
-            "camera.fx": camera.fx / SMALL,
-            "camera.fy": camera.fy / SMALL,
-            "camera.cx": centre(camera.cx),
-            "camera.cy": centre(camera.cy),
-            "twin.sensor.jpeg_quality": None,
-            "twin.sensor.exposure_time_constant": 0.0,
-        }
+    """Small images for the truth alone: without compression and exposure."""
+    return with_small_images(config).replace(
+        **{"twin.sensor.jpeg_quality": None, "twin.sensor.exposure_time_constant": 0.0}
     )
 
 
@@ -148,7 +133,7 @@ class _Look:
         is_visible = frame.true_visible >= LEAST_VISIBLE
         truth = frame.true_features
         if not self._has_images:
-            truth = (truth + 0.5) * SMALL - 0.5
+            truth = full_size(truth)
         if self._has_images:
             report = loop.on_frame(frame)
         else:

@@ -12,6 +12,7 @@ import msgspec
 from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosed
 
+from tautscope.config import PixelFormat
 from tautscope.console import messages as msg
 from tautscope.console.shared import Channels, ImageChannel
 from tautscope.console.stills import encode_jpeg
@@ -120,7 +121,7 @@ class ImageFeed:
             that it was drawn [s], the newest 250 of all pages.
     """
 
-    def __init__(self, channel: ImageChannel, pixel_format: str) -> None:
+    def __init__(self, channel: ImageChannel, pixel_format: PixelFormat) -> None:
         self._channel = channel
         self._pixel_format = pixel_format
         self._viewers: dict[ServerConnection, _Viewer] = {}

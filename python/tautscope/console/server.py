@@ -21,6 +21,7 @@ from websockets.asyncio.server import ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
+from tautscope.config import PixelFormat
 from tautscope.console import messages as msg
 from tautscope.console.access import (
     LARGEST_CONNECTIONS,
@@ -54,7 +55,9 @@ class Server:
         port: The port.
     """
 
-    def __init__(self, channels: Channels, pixel_format: str, token: str, port: int) -> None:
+    def __init__(
+        self, channels: Channels, pixel_format: PixelFormat, token: str, port: int
+    ) -> None:
         self._channels = channels
         self._access = Access(token, port)
         self._pages = Pages(self._access.hosts)
