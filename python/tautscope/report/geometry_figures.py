@@ -42,9 +42,13 @@ def residual_figure(fit: GeometryFit) -> Figure:
             axis.legend(loc="upper right", markerscale=4)
         for axis, dof in zip(lower.subplots(1, 3), Dof, strict=True):
             scale, unit = dof.display_scale, dof.display_unit
-            axis.plot(scale * motors[:, dof], scale * fit.expected[:, dof], color=GREY, lw=0.6)
-            axis.plot(scale * motors[:, dof], scale * fit.states[:, dof], ".", ms=1.5, color=BLUE)
+            motor, model, found = (
+                scale * each[:, dof] for each in (motors, fit.expected, fit.states)
+            )
+            axis.plot(motor, model, color=GREY, lw=0.6, label="play")
+            axis.plot(motor, found, ".", ms=1.5, color=BLUE, label="images")
             axis.set(title=dof.label.capitalize(), xlabel=f"motor [{unit}]", ylabel=f"tip [{unit}]")
+        axis.legend(loc="lower right", markerscale=4)
     return figure
 
 
