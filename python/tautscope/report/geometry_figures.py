@@ -48,7 +48,7 @@ def residual_figure(fit: GeometryFit) -> Figure:
             axis.plot(motor, model, color=GREY, lw=0.6, label="play")
             axis.plot(motor, found, ".", ms=1.5, color=BLUE, label="images")
             axis.set(title=dof.label.capitalize(), xlabel=f"motor [{unit}]", ylabel=f"tip [{unit}]")
-        axis.legend(loc="lower right", markerscale=4)
+        lower.axes[Dof.ROTATION].legend(loc="upper left", markerscale=4)
     return figure
 
 
