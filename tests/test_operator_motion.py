@@ -67,6 +67,29 @@ def test_the_bound_is_of_the_same_ticks(results: OperatorResults) -> None:
     assert not np.array_equal(tracking_bound(REFERENCE, CONFIG), expected)
 
 
+def test_by_camera_where_the_true_tip_is_not_known() -> None:
+    """Errors are those of the estimates of the frames that measured the DOF, over half the run."""
+    run = recording(error=0.0, before=0.0, compensated=True)
+    short = run.trace[TIME < 30]
+    for dof in Dof:
+        short[f"true_{dof.label}"] = np.nan
+    frames = np.zeros(100, FRAME_COLUMNS)
+    frames["captured_at"] = START + np.linspace(1, 29, 100)
+    late = frames["captured_at"] >= START + (TIME[TIME < 30][-1]) / 2
+    for dof in Dof:
+        reference = np.interp(frames["captured_at"], short["time"], short[f"reference_{dof.label}"])
+        frames[f"estimate_{dof.label}"] = reference + np.where(late, 2e-3, 1.0)
+        frames[f"observable_{dof.label}"] = True
+    frames["estimate_rotation"][-1] += 7
+    frames["observable_rotation"][-1] = False
+    blind = Recording(short, frames, CONFIG, True, ())
+    for result in evaluate_operator_motion(None, blind).values():
+        assert result.compensated_rms == pytest.approx(2e-3)
+        assert result.largest == pytest.approx(2e-3)
+        unknown = (result.uncompensated_rms, result.reduction, result.overspeed, result.creep)
+        assert np.isnan(unknown).all()
+
+
 def test_every_twin_has_its_own_motion() -> None:
     assert operator_motion(CONFIG).seed == 42
     disturbed = operator_motion(CONFIG, is_disturbed=True)

@@ -17,7 +17,7 @@ from tautscope.report import figures, tables
 from tautscope.report.demo import Demo, demo_report
 from tautscope.report.operator_figure import draw_operator_motion
 from tautscope.report.operator_motion import OperatorResult
-from tautscope.report.report import CaptionedFigure, run_report
+from tautscope.report.report import CaptionedFigure, run_report, table1_section
 from tautscope.report.results import DofResult, evaluate
 from tautscope.report.rows import ARTICLE, OPERATOR_ROWS, ROWS
 from tautscope.report.tables import article_cell, cell
@@ -135,7 +135,9 @@ def test_the_report_of_one_run_without_a_true_state(runs: tuple[Recording, Recor
     for dof in Dof:
         blind.trace[f"true_{dof.label}"] = blind.frames[f"true_{dof.label}"] = np.nan
     results = evaluate(None, blind)
-    page = run_report(blind.config, {}, results, [], ["lost (nothing) at 1 of 2 images"])
+    page = run_report(
+        blind.config, {}, table1_section(results), [], ["lost (nothing) at 1 of 2 images"]
+    )
     for title in ("compensated width, by camera", "tracking error, RMS, by camera", "frames used"):
         assert f"<td>{title}</td>" in page
     for title in ("reduction", "state error, RMS", "uncompensated width, by camera"):
@@ -144,7 +146,7 @@ def test_the_report_of_one_run_without_a_true_state(runs: tuple[Recording, Recor
     assert "nan" not in page.split("profile =")[0].lower()
     axis = figures.figure9(None, blind).axes[4]
     assert axis.get_xlabel() == "u [rad]"
-    both = run_report(blind.config, {}, evaluate(runs[0], blind), [], [])
+    both = run_report(blind.config, {}, table1_section(evaluate(runs[0], blind)), [], [])
     assert "<td>reduction, by camera</td>" in both
     assert '<td class="first">78 %</td>' in both  # the article's rotation
 

@@ -3,9 +3,17 @@
 from tautscope.loop.references import (
     DatedReference,
     OperatorMotion,
+    RecordedReference,
     Reference,
     Segment,
     SineSequence,
 )
 
-__all__ = ["DatedReference", "OperatorMotion", "Reference", "Segment", "SineSequence"]
+__all__ = [
+    "DatedReference",
+    "OperatorMotion",
+    "RecordedReference",
+    "Reference",
+    "Segment",
+    "SineSequence",
+]

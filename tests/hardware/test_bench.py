@@ -23,6 +23,7 @@ from tautscope.hardware.cameras import Camera, Capture
 from tautscope.hardware.experiment import run_on_hardware, write_run_folder
 from tautscope.hardware.timing import read_sent
 from tautscope.log.reader import read_log
+from tautscope.loop.references import RecordedReference
 from tautscope.runs.recording import Recording, per_dof
 from test_processes import Lines, process
 from waiting import TIMEOUT, until
@@ -204,6 +205,28 @@ def test_protocol_runs_over_bus_and_stream(rig: tuple[Config, Path, Lines], tmp_
     assert facts["runs"]["compensated"]["timing"]["frames"] >= len(frames)
     for name in ("report.html", "timing.png", "compensated.mcap", "timing_frames.csv"):
         assert (out / name).stat().st_size > 0
+
+
+def test_a_recorded_motion_runs_on_the_rig(rig: tuple[Config, Path, Lines], tmp_path: Path) -> None:
+    config, _, lines = rig
+    time = np.linspace(5, 6.5, 40)
+    centre = np.array([config.experiment[dof].centre for dof in Dof])
+    motion = np.sin(4 * (time - 5))[:, np.newaxis] * [5e-3, 0.3, 0.2]
+    reference = RecordedReference(time, centre + motion, config)
+    out = tmp_path / "run"
+    found = run_on_hardware(config, out, lambda share: None, reference, compare=True)
+    write_run_folder(found, out)
+    lines.until("quick stop active", 6)
+    trace = found.compensated.recording.trace
+    np.testing.assert_array_equal(
+        per_dof(trace, "reference"), [reference(tick - trace["time"][0]) for tick in trace["time"]]
+    )
+    assert len(trace) == round(reference.duration / CYCLE)
+    facts = json.loads((out / "run.json").read_text(encoding="utf-8"))["by_camera"]
+    assert {"uncompensated_rms", "compensated_rms", "reduction"} <= facts["insertion"].keys()
+    assert "Recorded motion" in (out / "report.html").read_text(encoding="utf-8")
+    assert (out / "tracking.png").stat().st_size > 0
+    assert not (out / "table1.csv").exists()
 
 
 def test_sigterm_stops_the_motors_and_keeps_the_log(

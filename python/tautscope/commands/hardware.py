@@ -9,13 +9,16 @@ from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
 from tautscope.commands.held_run import recording_saved
+from tautscope.commands.positions import add_reference, read_reference
 from tautscope.commands.printing import announce, print_json
 from tautscope.config import load_config
 from tautscope.config.placeholders import refuse_placeholders
 from tautscope.dof import Dof
+from tautscope.errors import FieldError
 from tautscope.loop.references import SineSequence
 
 if TYPE_CHECKING:
+    from tautscope.report.operator_motion import OperatorResult
     from tautscope.report.results import DofResult
 
 
@@ -24,8 +27,10 @@ def add_parser(verbs: arguments.Verbs) -> None:
     run = arguments.add_verb(
         verbs,
         "run",
-        help="run the article's experiment on the drives and camera of a configuration",
-        description="Run the article's experiment on the drives and the camera of a configuration. "
+        help="run the article's experiment, or a recorded motion, on the drives and camera of a "
+        "configuration",
+        description="Run the article's experiment on the drives and the camera of a configuration, "
+        "or a recorded motion of an operator. "
         "THE MOTORS MOVE. Writes a folder with the log, tables, a timing figure and a report. On "
         "every exit the motors are quick-stopped. Research software, not a medical device; have an "
         "emergency stop within reach.",
@@ -44,6 +49,7 @@ def add_parser(verbs: arguments.Verbs) -> None:
         metavar="N",
         help="periods of the reference per DOF [experiment.periods of the configuration]",
     )
+    add_reference(run, "the article's experiment")
     arguments.add_out(run, "run")
     arguments.add_json(run)
     run.set_defaults(run=_run)
@@ -58,14 +64,17 @@ def _run(options: argparse.Namespace) -> int:
     config = load_config(options.config, options.profile)
     refuse_placeholders(options.config)
     if options.periods is not None:
+        if options.reference is not None:
+            raise FieldError("--periods", options.periods, "no --reference, which has no periods")
         config = config.replace(**{"experiment.periods": options.periods})
+    reference = read_reference(options, config) or SineSequence(config.experiment)
     folder = check_free(options.out or default_folder("run"))
     runs = 2 if options.compare else 1
-    seconds = runs * SineSequence(config.experiment).duration
+    seconds = runs * reference.duration
     announce(f"{runs} run{'s' * (runs > 1)}", seconds, seconds * bytes_per_second(config), folder)
     try:
         with recording_saved(folder), progress_bar("run") as progress:
-            found = run_on_hardware(config, folder, progress, compare=options.compare)
+            found = run_on_hardware(config, folder, progress, reference, compare=options.compare)
     except KeyboardInterrupt as stop:
         notes = getattr(stop, "__notes__", ())
         print("\n".join(["Interrupted. The motors are stopped.", *notes]), file=sys.stderr)
@@ -82,6 +91,8 @@ def _run(options: argparse.Namespace) -> int:
     )
     for dof, result in found.results.items():
         print(summary_line(dof, result))
+    for dof, tracking in found.operator_results.items():
+        print(tracking_line(dof, tracking))
     for warning in found.compensated.recording.warnings:
         print(f"Warning: {warning}.")
     print(f"Report, figures and traces: {folder / 'report.html'}")
@@ -90,13 +101,22 @@ def _run(options: argparse.Namespace) -> int:
 
 def summary_line(dof: Dof, result: DofResult) -> str:
     """One line of results of a DOF from its state estimates; a dash for unknown values."""
-
-    def shown(value: float) -> str:
-        return "-" if math.isnan(value) else f"{dof.display_scale * value:.3g} {dof.display_unit}"
-
-    line = f"{dof.label}: remaining slack {shown(result.compensated_estimate)}"
+    line = f"{dof.label}: remaining slack {_shown(dof, result.compensated_estimate)}"
     if not math.isnan(result.uncompensated_estimate):
         reduction = result.reduction_estimate
         percent = "-" if math.isnan(reduction) else f"{reduction:.0%}"
-        line += f" of {shown(result.uncompensated_estimate)}, reduction {percent}"
-    return f"{line}; tracking error {shown(result.tracking_estimate)} RMS; by camera"
+        line += f" of {_shown(dof, result.uncompensated_estimate)}, reduction {percent}"
+    return f"{line}; tracking error {_shown(dof, result.tracking_estimate)} RMS; by camera"
+
+
+def tracking_line(dof: Dof, result: OperatorResult) -> str:
+    """One line of the tracking of a recorded motion; a dash for unknown values."""
+    line = f"{dof.label}: tracking error {_shown(dof, result.compensated_rms)} RMS"
+    if not math.isnan(result.reduction):
+        before = _shown(dof, result.uncompensated_rms)
+        line += f", without compensation {before}, reduction {result.reduction:.0%}"
+    return f"{line}; largest {_shown(dof, result.largest)}; by camera"
+
+
+def _shown(dof: Dof, value: float) -> str:
+    return "-" if math.isnan(value) else f"{dof.display_scale * value:.3g} {dof.display_unit}"

@@ -10,17 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.commands import arguments
+from tautscope.commands.positions import add_units, read_positions
 from tautscope.config import Config
-from tautscope.dof import Dof
 from tautscope.errors import FieldError
 
 if TYPE_CHECKING:
     from tautscope.calibration.delay import DelayEstimate
 
 Floats = NDArray[np.float64]
-
-LARGEST_WORKSPACES = 3.0
-"""Positions beyond so many workspaces of the experiment are in another unit."""
 
 
 def add_video_options(parser: argparse.ArgumentParser, start_help: str) -> None:
@@ -33,13 +30,7 @@ def add_video_options(parser: argparse.ArgumentParser, start_help: str) -> None:
         help="motor positions: CSV or Parquet with columns time, insertion, rotation, bending; "
         "- reads standard input",
     )
-    parser.add_argument(
-        "--units",
-        default="",
-        metavar="COL=UNIT,...",
-        help="units of these columns: insertion=mm,rotation=deg,bending=deg,time=ms "
-        "[those of the titles, else s, m, rad]",
-    )
+    add_units(parser)
     parser.add_argument("--video-start", type=arguments.seconds, metavar="S", help=start_help)
 
 
@@ -58,12 +49,7 @@ def check_video_options(options: argparse.Namespace) -> None:
 
 def read_motor_options(options: argparse.Namespace, config: Config) -> tuple[Floats, Floats]:
     """Time [s] and motor positions [m, rad, rad] of ``--motors``, see `read_motors`."""
-    from tautscope.runs.records import read_motors  # noqa: PLC0415
-    from tautscope.runs.units import parse_units  # noqa: PLC0415
-
-    sines = [config.experiment[dof] for dof in Dof]
-    largest = [LARGEST_WORKSPACES * (abs(sine.centre) + sine.amplitude) for sine in sines]
-    return read_motors(options.motors, parse_units(options.units), np.array(largest))
+    return read_positions(options.motors, options.units, config)
 
 
 def align_video_options(

@@ -29,11 +29,12 @@ from tautscope.hardware.signals import exit_on_signals
 from tautscope.hardware.timing import Timing
 from tautscope.log.writer import LogSummary, LogWriter
 from tautscope.loop.reduction import Report
-from tautscope.loop.references import SineSequence
+from tautscope.loop.references import Reference, SineSequence
 from tautscope.loop.rig import Frame, Sample
 from tautscope.loop.safety import Reaction, Supervision
+from tautscope.report.operator_motion import OperatorResults, evaluate_operator_motion
 from tautscope.report.results import Results, evaluate
-from tautscope.report.tables import finite_or_none
+from tautscope.report.tables import finite_or_none, operator_to_json
 from tautscope.runs.experiment import run_experiment
 from tautscope.runs.output_folder import check_free
 from tautscope.runs.recording import Floats, Recording, Table
@@ -73,9 +74,21 @@ class HardwareRun:
 
     @property
     def results(self) -> Results:
-        """Table 1 from the state estimates; NaN where it needs an uncompensated run."""
-        plain = None if self.uncompensated is None else self.uncompensated.recording
-        return evaluate(plain, self.compensated.recording)
+        """Table 1 from the state estimates; NaN where it needs an uncompensated run.
+
+        Empty for a recorded motion.
+        """
+        return evaluate(self._plain, self.compensated.recording)
+
+    @property
+    def operator_results(self) -> OperatorResults:
+        """Tracking of a recorded motion by the state estimates; empty for the experiment."""
+        recording = self.compensated.recording
+        return {} if recording.segments else evaluate_operator_motion(self._plain, recording)
+
+    @property
+    def _plain(self) -> Recording | None:
+        return None if self.uncompensated is None else self.uncompensated.recording
 
     def to_json(self) -> dict[str, Any]:
         """The output of ``tautscope run --json``; widths in m or rad, None if unknown."""
@@ -93,7 +106,8 @@ class HardwareRun:
                     "tracking_rms": finite_or_none(found.tracking_estimate),
                 }
                 for dof, found in self.results.items()
-            },
+            }
+            | operator_to_json(self.operator_results),
         }
 
 
@@ -101,11 +115,12 @@ def run_on_hardware(
     config: Config,
     folder: Path,
     progress: Callable[[float], None],
+    reference: Reference | None = None,
     *,
     compare: bool = False,
     make_rig: RigMaker = HardwareRig,
 ) -> HardwareRun:
-    """Run the article's protocol on the configured drives and camera, and log every run.
+    """Run a reference on the configured drives and camera, and log every run.
 
     The motors are quick-stopped and the log is closed on every exit, also after SIGTERM and SIGHUP.
     A run that is refused before the loop begins leaves no log and no folder.
@@ -114,6 +129,7 @@ def run_on_hardware(
         config: With a section ``drives``.
         folder: New or empty; the log is written there from the start.
         progress: Called with the fraction of the work done, 0 to 1.
+        reference: By default the article's protocol.
         compare: Run without compensation first, to compute the reduction.
         make_rig: Makes the rig.
 
@@ -131,9 +147,10 @@ def run_on_hardware(
                 _run(
                     rig,
                     config,
+                    reference or SineSequence(config.experiment),
                     folder / ("compensated.mcap" if compensate else "uncompensated.mcap"),
-                    compensate,
-                    lambda fraction, done=index: progress((done + fraction) / len(kinds)),  # type: ignore[misc]
+                    compensate=compensate,
+                    progress=lambda fraction, done=index: progress((done + fraction) / len(kinds)),  # type: ignore[misc]
                 )
             )
     return HardwareRun(config, runs[-1], runs[0] if compare else None)
@@ -144,19 +161,29 @@ def write_run_folder(run: HardwareRun, folder: Path) -> None:
     from tautscope.figure_style import style  # noqa: PLC0415
     from tautscope.hardware.timing_figure import timing_figure  # noqa: PLC0415  matplotlib
     from tautscope.report import figures, report, tables  # noqa: PLC0415  matplotlib takes half a second
+    from tautscope.report.operator_figure import draw_operator_motion  # noqa: PLC0415
 
     first, results = run.compensated, run.results
     first.recording.write(folder)
     picture = timing_figure(first.timing)
     plain = None if run.uncompensated is None else run.uncompensated.recording
-    loops = figures.figure9(plain, first.recording)
-    pictures = [
-        report.CaptionedFigure(
-            loops,
+    if first.recording.segments:
+        name, section = "fig9.png", report.table1_section(results)
+        main = report.CaptionedFigure(
+            figures.figure9(plain, first.recording),
             "Fig. 9. (a)-(c) with compensation: reference, command, estimate and both contact "
             "offsets. (d)-(f) loops of the estimate; a narrow loop on the dashed line, an ideal "
             "tip, is the goal. The first period, in which the slack is estimated, is thin.",
-        ),
+        )
+    else:
+        name, section = "tracking.png", report.recorded_motion_section(run.operator_results)
+        main = report.CaptionedFigure(
+            draw_operator_motion(plain, first.recording),
+            "The recorded motion. (a)-(c) reference, command and the tip as the camera measures "
+            "it, in a part of the run. (d)-(f) tracking error over the whole run.",
+        )
+    pictures = [
+        main,
         report.CaptionedFigure(
             picture,
             "Timing of the run. (a), (b) delay of each set-point after its due time; "
@@ -166,15 +193,24 @@ def write_run_folder(run: HardwareRun, folder: Path) -> None:
     if run.uncompensated is not None:
         run.uncompensated.recording.write(folder, "_uncompensated")
         run.uncompensated.timing.write(folder, "_uncompensated")
-    tables.write_csv(folder / "table1.csv", [run.config.twin.seed], {run.config.profile: [results]})
+    if results:
+        tables.write_csv(
+            folder / "table1.csv", [run.config.twin.seed], {run.config.profile: [results]}
+        )
     facts = {
         "control": f"{1 / first.timing.cycle:g} Hz, {first.timing.lost} cycles lost",
         "log": first.log.path.name,
     }
     with style():
         picture.savefig(folder / "timing.png")
-        loops.savefig(folder / "fig9.png")
-        page = report.run_report(run.config, facts, results, pictures, first.recording.warnings)
+        main.figure.savefig(folder / name)
+        page = report.run_report(
+            run.config,
+            facts,
+            section,
+            pictures,
+            first.recording.warnings,
+        )
     (folder / "report.html").write_text(page, encoding="utf-8")
     (folder / "run.json").write_text(json.dumps(run.to_json(), indent=1), encoding="utf-8")
     first.timing.write(folder)
@@ -183,11 +219,12 @@ def write_run_folder(run: HardwareRun, folder: Path) -> None:
 def _run(
     rig: HardwareRig,
     config: Config,
+    reference: Reference,
     path: Path,
+    *,
     compensate: bool,
     progress: Callable[[float], None],
 ) -> ProtocolRun:
-    reference = SineSequence(config.experiment)
     with LogWriter(path, config, compensate=compensate, segments=reference.segments) as log:
 
         def warn(text: str) -> None:

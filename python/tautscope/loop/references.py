@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Protocol, runtime_checkable
+from typing import ClassVar, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from tautscope.config import ExperimentConfig, Sine
+from tautscope.config import Config, ExperimentConfig, Sine
 from tautscope.dof import Dof
+
+Value = TypeVar("Value", float, NDArray[np.float64])
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,6 +107,8 @@ class SineSequence:
 
 MINIMUM_JERK_PEAK = 15 / 8
 """Peak speed of a minimum-jerk move over its mean speed."""
+APPROACH_SPEED = 0.5
+"""Largest speed of the approach to a recorded motion [of `safety.reference_speed`]."""
 TREMOR, TREMOR_FREQUENCY = (0.1e-3, 0.01, 0.01), 8.0
 """Amplitude [m, rad, rad], and frequency [Hz]."""
 FLICKS, PAUSES = 0.2, 0.1
@@ -166,8 +170,49 @@ class OperatorMotion:
         for dof, moves in enumerate(self._moves):
             index = max(int(np.searchsorted(moves[:, 0], time, side="right")) - 1, 0)
             start, lasts, a, b = moves[index]
-            x = min(max((time - start) / lasts, 0.0), 1.0)
-            position[dof] = a + (b - a) * x**3 * (10 - 15 * x + 6 * x**2)
+            position[dof] = _minimum_jerk(a, b, (time - start) / lasts)
         if self.is_disturbed:
             position += np.array(TREMOR) * np.sin(2 * np.pi * TREMOR_FREQUENCY * time)
         return position
+
+
+class RecordedReference:
+    """A recorded motion of an operator, after a slow approach from the centres of the experiment.
+
+    Linear between the rows of the record. The approach is a minimum-jerk move of at most half of
+    `safety.reference_speed`, of at least 1 s. The whole motion is known beforehand, so that the
+    reference has no `made_at`.
+
+    Args:
+        time: (n,) [s], increasing; n at least 2.
+        position: (n, 3) [m, rad, rad].
+        config: `experiment` has the centres.
+    """
+
+    segments: ClassVar[tuple[Segment, ...]] = ()
+
+    def __init__(self, time: ArrayLike, position: ArrayLike, config: Config) -> None:
+        self._position = np.array(position, dtype=np.float64)
+        self._centre = np.array([config.experiment[dof].centre for dof in Dof])
+        distance = np.abs(self._position[0] - self._centre)
+        slow = APPROACH_SPEED * np.array(config.safety.reference_speed)
+        self.approach: float = max(1.0, MINIMUM_JERK_PEAK * float((distance / slow).max()))
+        """Duration of the approach [s]."""
+        stamps = np.array(time, dtype=np.float64)
+        self._time = stamps - stamps[0] + self.approach
+        self.duration: float = float(self._time[-1])
+
+    def __repr__(self) -> str:
+        return f"<RecordedReference: {len(self._time)} rows, {self.duration:g} s>"
+
+    def __call__(self, time: float) -> NDArray[np.float64]:
+        """(3,) [m, rad, rad] at `time` [s from the start of the reference]."""
+        if time < self.approach:
+            return _minimum_jerk(self._centre, self._position[0], time / self.approach)
+        return np.array([np.interp(time, self._time, each) for each in self._position.T])
+
+
+def _minimum_jerk(a: Value, b: Value, x: float) -> Value:
+    """Position of a minimum-jerk move from a to b after the share x of its duration."""
+    x = min(max(x, 0.0), 1.0)
+    return a + (b - a) * x**3 * (10 - 15 * x + 6 * x**2)

@@ -10,35 +10,43 @@ from matplotlib.ticker import MultipleLocator
 
 from tautscope.dof import Dof
 from tautscope.figure_style import BLACK, BLUE, GREY, ORANGE, PAGE, style
-from tautscope.report.operator_motion import EVALUATED_AFTER
+from tautscope.report.operator_motion import evaluated_after, tip_and_reference
 from tautscope.runs.recording import Recording
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+Runs = list[tuple[Recording, str]]
+"""Recordings with their colours; the last is the compensated one."""
 WINDOW = 20.0
-"""Part of the run in which the signals are drawn, from `EVALUATED_AFTER` on [s]."""
+"""Part of the run in which the signals are drawn, from the start of the evaluation on [s]."""
 
 
-def draw_operator_motion(uncompensated: Recording, compensated: Recording) -> Figure:
+def draw_operator_motion(uncompensated: Recording | None, compensated: Recording) -> Figure:
     """The operator motion: one row per DOF.
 
-    (a)-(c): reference, command and true tip over 20 s, the tip also without compensation.
-    (d)-(f): tracking error of the true tip over the whole run, without and with compensation.
+    (a)-(c): reference, command and tip over 20 s, the tip also without compensation.
+    (d)-(f): tracking error of the tip over the whole run, without and with compensation.
+    The tip is the true one where it is known, else that of the images.
     """
+    runs = [(uncompensated, GREY)] if uncompensated is not None else []
+    runs.append((compensated, BLUE))
+    begin = evaluated_after(compensated)
     with style():
         figure = Figure(figsize=(PAGE, 6.0), layout="constrained")
         panels = figure.subplots(len(Dof), 2, sharex="col", width_ratios=(1.25, 1))
         for dof, (signals, errors), letters in zip(Dof, panels, ("ad", "be", "cf"), strict=True):
-            _draw_signals(signals, uncompensated, compensated, dof)
-            _draw_errors(errors, uncompensated, compensated, dof)
+            _draw_signals(signals, runs, dof)
+            signals.set_xlim(begin, begin + WINDOW)
+            _draw_errors(errors, runs, dof)
+            errors.axvspan(0, begin, color="#eeeeee", linewidth=0, zorder=0)
             signals.set_title(f"({letters[0]}) {dof.label}")
             errors.set_title(f"({letters[1]}) tracking error of {dof.label}")
         for axes in panels[-1]:
             axes.set_xlabel("time [s]")
         panels[0, 1].annotate(
             "not evaluated",
-            (EVALUATED_AFTER / 2, 0.99),
+            (begin / 2, 0.99),
             xycoords=("data", "axes fraction"),
             ha="center",
             va="top",
@@ -51,35 +59,45 @@ def draw_operator_motion(uncompensated: Recording, compensated: Recording) -> Fi
     return figure
 
 
-def _draw_signals(axes: Axes, uncompensated: Recording, compensated: Recording, dof: Dof) -> None:
-    for recording, name, label, colour, width in (
-        (uncompensated, "true", "tip without compensation", GREY, 1.0),
-        (compensated, "command", "command", ORANGE, 0.7),
-        (compensated, "true", "tip with compensation", BLUE, 1.2),
-        (compensated, "reference", "reference", BLACK, 0.8),
-    ):
-        time = recording.trace["time"] - recording.trace["time"][0]
-        rows = (time >= EVALUATED_AFTER) & (time <= EVALUATED_AFTER + WINDOW)
+def _draw_signals(axes: Axes, runs: Runs, dof: Dof) -> None:
+    compensated, _ = runs[-1]
+    trace = compensated.trace
+    time = trace["time"] - trace["time"][0]
+    for recording, colour in runs:
+        stamps, tip, _ = tip_and_reference(recording, dof)
+        with_or_without = "with" if recording is compensated else "without"
         axes.plot(
-            time[rows],
-            recording.trace[f"{name}_{dof.label}"][rows] * dof.display_scale,
+            stamps - recording.trace["time"][0],
+            tip * dof.display_scale,
+            color=colour,
+            linewidth=1.1,
+            label=f"tip {with_or_without} compensation",
+        )
+    for name, colour, width, line in (
+        ("command", ORANGE, 0.7, "-"),
+        ("reference", BLACK, 0.8, "--"),
+    ):
+        axes.plot(
+            time,
+            trace[f"{name}_{dof.label}"] * dof.display_scale,
+            line,
             color=colour,
             linewidth=width,
-            label=label,
-            linestyle="--" if name == "reference" else "-",
+            label=name,
         )
     axes.set_ylabel(f"{dof.label} [{dof.display_unit}]")
     axes.xaxis.set_major_locator(MultipleLocator(5))
-    axes.set_xlim(EVALUATED_AFTER, EVALUATED_AFTER + WINDOW)
 
 
-def _draw_errors(axes: Axes, uncompensated: Recording, compensated: Recording, dof: Dof) -> None:
-    for recording, colour in ((uncompensated, GREY), (compensated, BLUE)):
-        trace = recording.trace
-        time = trace["time"] - trace["time"][0]
-        error = trace[f"true_{dof.label}"] - trace[f"reference_{dof.label}"]
-        axes.plot(time, error * dof.display_scale, color=colour, linewidth=0.7)
+def _draw_errors(axes: Axes, runs: Runs, dof: Dof) -> None:
+    for recording, colour in runs:
+        time, tip, reference = tip_and_reference(recording, dof)
+        axes.plot(
+            time - recording.trace["time"][0],
+            (tip - reference) * dof.display_scale,
+            color=colour,
+            linewidth=0.7,
+        )
     axes.axhline(0, color=BLACK, linewidth=0.5, linestyle=(0, (4, 4)))
-    axes.axvspan(0, EVALUATED_AFTER, color="#eeeeee", linewidth=0, zorder=0)
     axes.set_ylabel(f"error [{dof.display_unit}]")
-    axes.set_xlim(0, math.ceil(time[-1]))
+    axes.set_xlim(0, math.ceil(recording.trace["time"][-1] - recording.trace["time"][0]))

@@ -1,8 +1,11 @@
-"""Tracking of an operator motion: all DOFs at once, judged by the true tip."""
+"""Tracking of an operator motion: all DOFs at once, judged by the true tip where it is known."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
 
 from tautscope.config import Config
 from tautscope.dof import Dof
@@ -10,6 +13,8 @@ from tautscope.loop.references import OperatorMotion
 from tautscope.report import metrics
 from tautscope.report.tracking_bound import tracking_bound
 from tautscope.runs.recording import Recording, per_dof
+
+Floats = NDArray[np.float64]
 
 FIRST_SEED = 40
 """Seed of the motion on the twin of seed 0."""
@@ -19,13 +24,17 @@ EVALUATED_AFTER = 40.0
 
 @dataclass(frozen=True, slots=True)
 class OperatorResult:
-    """Figures of one DOF under an operator motion, after the first 40 s [m or rad].
+    """Figures of one DOF under an operator motion, from `evaluated_after` on [m or rad].
+
+    The tip is the true one, or where it is not known, on hardware, the estimate at the capture
+    times of the frames that measured the DOF ("by camera"). NaN without an uncompensated run;
+    overspeed and creep also by camera, whose noise they would measure.
 
     Attributes:
-        uncompensated_rms: RMS of (true tip - reference) without compensation.
-        compensated_rms: RMS of (true tip - reference) with compensation.
+        uncompensated_rms: RMS of (tip - reference) without compensation.
+        compensated_rms: RMS of (tip - reference) with compensation.
         reduction: 1 - compensated_rms / uncompensated_rms.
-        largest: Largest |true tip - reference| with compensation.
+        largest: Largest |tip - reference| with compensation.
         overspeed: 99.9th percentile of |tip speed| over the peak of |reference speed|.
         creep: Travel of the true tip while every reference rests, with compensation.
         bound: The reduction of the vector law with exact knowledge on ideal plays of the article's
@@ -50,29 +59,53 @@ def operator_motion(config: Config, *, is_disturbed: bool = False) -> OperatorMo
     return OperatorMotion(config.experiment, seed, is_disturbed=is_disturbed)
 
 
-def evaluate_operator_motion(uncompensated: Recording, compensated: Recording) -> OperatorResults:
-    """The figures of every DOF from two runs of one reference, with and without compensation."""
-    time = compensated.trace["time"]
-    first = int(time.searchsorted(time[0] + EVALUATED_AFTER))
-    references = per_dof(compensated.trace, "reference")
+def evaluated_after(recording: Recording) -> float:
+    """From when on a run is evaluated: after 40 s, or half of a shorter run [s]."""
+    time = recording.trace["time"]
+    return min(EVALUATED_AFTER, float(time[-1] - time[0]) / 2)
+
+
+def tip_and_reference(recording: Recording, dof: Dof) -> tuple[Floats, Floats, Floats]:
+    """Times [s, the rig's clock], the tip, true or by camera, and the reference, each (n,)."""
+    trace, frames = recording.trace, recording.frames
+    truth, reference = trace[f"true_{dof.label}"], trace[f"reference_{dof.label}"]
+    if np.isfinite(truth).any():
+        return trace["time"], truth, reference
+    frames = frames[frames[f"observable_{dof.label}"]]
+    time = frames["captured_at"]
+    return time, frames[f"estimate_{dof.label}"], np.interp(time, trace["time"], reference)
+
+
+def evaluate_operator_motion(
+    uncompensated: Recording | None, compensated: Recording
+) -> OperatorResults:
+    """The figures of every DOF from a run with compensation, and one without it if there is one."""
+    run = compensated.trace
+    first = int(run["time"].searchsorted(run["time"][0] + evaluated_after(compensated)))
+    references = per_dof(run, "reference")
     bounds = tracking_bound(references, compensated.config, first=first)
-    free, run, references = (
-        uncompensated.trace[first:],
-        compensated.trace[first:],
-        references[first:],
-    )
     results: OperatorResults = {}
     for dof in Dof:
-        reference, tip = references[:, dof], run[f"true_{dof.label}"]
-        before = metrics.tracking_rms(reference, free[f"true_{dof.label}"])
-        after = metrics.tracking_rms(reference, tip)
+        tip = run[f"true_{dof.label}"][first:]
+        errors = _tracking_errors(compensated, dof)
+        before = (
+            np.nan if uncompensated is None else metrics.rms(_tracking_errors(uncompensated, dof))
+        )
+        after = metrics.rms(errors)
         results[dof] = OperatorResult(
             uncompensated_rms=before,
             compensated_rms=after,
             reduction=metrics.reduction(before, after),
-            largest=metrics.largest_error(reference, tip),
-            overspeed=metrics.tip_overspeed(run["time"], reference, tip),
-            creep=metrics.creep(references, tip),
+            largest=metrics.largest_error(np.zeros_like(errors), errors),
+            overspeed=metrics.tip_overspeed(run["time"][first:], references[first:, dof], tip),
+            creep=metrics.creep(references[first:], tip),
             bound=float(bounds[dof]),
         )
     return results
+
+
+def _tracking_errors(recording: Recording, dof: Dof) -> Floats:
+    time, tip, reference = tip_and_reference(recording, dof)
+    counts = time >= recording.trace["time"][0] + evaluated_after(recording)
+    errors: Floats = tip[counts] - reference[counts]
+    return errors

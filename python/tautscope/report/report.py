@@ -63,19 +63,22 @@ class CaptionedFigure:
 def run_report(
     config: Config,
     facts: dict[str, str],
-    results: Results,
+    section: str,
     figures: Sequence[CaptionedFigure],
     warnings: Sequence[str],
 ) -> str:
-    """The page of ``tautscope run``: one or two runs on hardware, as measured by the camera."""
+    """The page of ``tautscope run``: one or two runs on hardware, as measured by the camera.
+
+    Args:
+        config: Configuration of the run.
+        facts: Further facts of the run.
+        section: Of the figures of merit: `table1_section` or `recorded_motion_section`.
+        figures: Figures of the run.
+        warnings: Warnings of the run.
+    """
     return page(
         "on the drives and the camera named below",
-        f"""<h2>Table 1</h2>
-<div class="wide">{results_table({"rig": [results]}, by_camera=True)}</div>
-<p class="note">Measured by the camera: the true state of the tip is not known on hardware. The
-tracking error includes the first period, in which the contact offsets are estimated. The
-article&rsquo;s figures are of its own rig.</p>
-{row_explanations(measured_rows([results]))}
+        f"""{section}
 {warning_list(warnings)}
 <h2>Figures</h2>
 {figure_list(figures)}""",
@@ -84,12 +87,33 @@ article&rsquo;s figures are of its own rig.</p>
     )
 
 
+def table1_section(results: Results) -> str:
+    """Table 1 of a run on hardware."""
+    return f"""<h2>Table 1</h2>
+<div class="wide">{results_table({"rig": [results]}, by_camera=True)}</div>
+<p class="note">Measured by the camera: the true state of the tip is not known on hardware. The
+tracking error includes the first period, in which the contact offsets are estimated. The
+article&rsquo;s figures are of its own rig.</p>
+{row_explanations(measured_rows([results], ROWS))}"""
+
+
+def recorded_motion_section(results: OperatorResults) -> str:
+    """The tracking of a recorded motion on hardware."""
+    rows = measured_rows([results], OPERATOR_ROWS)
+    return f"""<h2>Recorded motion</h2>
+<div class="wide">{operator_table([results], rows)}</div>
+<p class="note">Measured by the camera: the true state of the tip is not known on hardware. The
+first 40&nbsp;s, or half of a shorter run, do not count: there the contact offsets are
+estimated.</p>
+{row_explanations(rows)}"""
+
+
 def page(where: str, body: str, facts: dict[str, str], config: Config) -> str:
     """The page around a body, with the facts of the run and its configuration."""
     facts_list = "".join(f"<dt>{escape(k)}</dt><dd>{escape(v)}</dd>" for k, v in facts.items())
     return document(
         "Hysteresis reduction from the endoscope\u2019s images",
-        f"""The experiment of Reilink, Stramigioli and Misra (Mechatronics 23, 2013, 652, doi
+        f"""The method of Reilink, Stramigioli and Misra (Mechatronics 23, 2013, 652, doi
 10.1016/j.mechatronics.2013.06.006) {where}.""",
         f"""{body}
 <h2>Run</h2>
@@ -138,7 +162,7 @@ def results_table(columns: Mapping[str, Sequence[Results]], by_camera: bool = Fa
     names = "".join(f"<th>{escape(name)}</th>" for name in columns)
     names = f'<th class="first">article</th>{names}' * len(dofs)
     lines = []
-    for row in measured_rows(last) if by_camera else ROWS:
+    for row in measured_rows(last, ROWS) if by_camera else ROWS:
         cells = []
         for dof in dofs:
             article = tables.article_cell(row, dof, by_camera)
@@ -186,18 +210,30 @@ def row_explanations(rows: Sequence[Row], results: Sequence[dict[Dof, Figures]] 
     )
 
 
-def measured_rows(results: Sequence[Results]) -> list[Row]:
-    """The rows of Table 1 with a value for a DOF."""
+def measured_rows(results: Sequence[dict[Dof, Figures]], rows: Sequence[Row]) -> list[Row]:
+    """The rows with a value for a DOF."""
     dofs = tables.median(results).values()
-    return [row for row in ROWS if not all(math.isnan(getattr(each, row.name)) for each in dofs)]
+    return [row for row in rows if not all(math.isnan(getattr(each, row.name)) for each in dofs)]
 
 
 def operator_section(profile: str, results: Sequence[OperatorResults]) -> str:
-    """The section of the operator motion: per figure the median over the seeds, and the worst."""
+    """The section of the operator motion of ``tautscope demo``."""
+    return f"""<h2>Operator motion</h2>
+<div class="wide">{operator_table(results, OPERATOR_ROWS)}</div>
+<p class="note">Profile &ldquo;{profile}&rdquo;. All degrees of freedom make minimum-jerk moves
+between random targets at the same time, with rests; the first 40&nbsp;s do not count. Errors are of
+the true tip, and their mean is not removed. Creep is the travel of the tip while every reference
+rests. The bound is the reduction of a law with exact knowledge, on ideal plays of the widths of the
+article.</p>
+{row_explanations(OPERATOR_ROWS, results if profile == "best" else ())}"""
+
+
+def operator_table(results: Sequence[OperatorResults], rows: Sequence[Row]) -> str:
+    """A table of an operator motion: per figure the median over the seeds, and the worst."""
     middle, bad = tables.median(results), tables.worst(results, OPERATOR_ROWS)
     heads = "".join(f"<th>{tables.heading(dof)}</th>" for dof in middle)
     lines = []
-    for row in OPERATOR_ROWS:
+    for row in rows:
         cells = []
         for dof in middle:
             value, worst = (
@@ -206,15 +242,10 @@ def operator_section(profile: str, results: Sequence[OperatorResults]) -> str:
             note = f"<small>({worst})</small>" if len(results) > 1 else ""
             cells.append(f"<td>{value}{note}</td>")
         lines.append(f"<tr><td>{escape(row.title)}</td>{''.join(cells)}</tr>")
-    return f"""<h2>Operator motion</h2>
-<div class="wide"><table class="figures"><thead><tr><th></th>{heads}</tr></thead>
-<tbody>{"".join(lines)}</tbody></table></div>
-<p class="note">Profile &ldquo;{profile}&rdquo;. All degrees of freedom make minimum-jerk moves
-between random targets at the same time, with rests; the first 40&nbsp;s do not count. Errors are of
-the true tip, and their mean is not removed. Creep is the travel of the tip while every reference
-rests. The bound is the reduction of a law with exact knowledge, on ideal plays of the widths of the
-article.</p>
-{row_explanations(OPERATOR_ROWS, results if profile == "best" else ())}"""
+    return (
+        f'<table class="figures"><thead><tr><th></th>{heads}</tr></thead>'
+        f"<tbody>{''.join(lines)}</tbody></table>"
+    )
 
 
 def _figure(captioned: CaptionedFigure) -> str:

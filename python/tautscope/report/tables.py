@@ -150,12 +150,17 @@ def to_json(
         "seeds": list(seeds),
         "dof": _by_dof(results),
         **({"paper": _by_dof(article_results)} if article_results else {}),
-        "hand": {
-            dof.label: {name: finite_or_none(value) for name, value in asdict(figures).items()}
-            for dof, figures in median(operator_results).items()
-        },
+        "hand": operator_to_json(median(operator_results)),
         "sim_seconds": sim_seconds,
         "wall_seconds": wall_seconds,
+    }
+
+
+def operator_to_json(results: Mapping[Dof, Figures]) -> dict[str, dict[str, float | None]]:
+    """Figures of an operator motion by DOF [m or rad]; an unknown figure is None."""
+    return {
+        dof.label: {name: finite_or_none(value) for name, value in asdict(figures).items()}
+        for dof, figures in results.items()
     }
 
 
