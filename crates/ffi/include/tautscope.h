@@ -1,4 +1,4 @@
-/* C interface of tautscope: image-based hysteresis reduction. docs/interfaces.md has examples. */
+/* C interface of tautscope: image-based hysteresis reduction. docs/interfaces/cpp.md has examples. */
 
 #ifndef TAUTSCOPE_H
 #define TAUTSCOPE_H
