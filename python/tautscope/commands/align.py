@@ -17,7 +17,8 @@ from tautscope.config import load_config
 from tautscope.errors import USAGE, CameraError
 
 if TYPE_CHECKING:
-    from tautscope.calibration.delay import DelayEstimate, Probe
+    from tautscope.calibration.delay import DelayEstimate
+    from tautscope.calibration.delay_search import Probe
 
 NO_ANSWER = 1
 
