@@ -2,13 +2,14 @@
 
 use crate::adaptive::lag_lead::LagLead;
 use crate::adaptive::offset_rate_limit::OffsetRateLimit;
+use crate::adaptive::predicted_tip::PredictedTip;
 use crate::adaptive::settings::AdaptiveSettings;
 use crate::adaptive::slip_direction::SlipDirection;
 use crate::article::play_limit::PlayLimit;
 use crate::dof::{PerDof, all_finite};
 use crate::error::{ConfigError, require, require_non_negative, require_positive};
 use crate::estimation::filter::Filter;
-use crate::model::hysteresis::{Hysteresis, PlayPosition};
+use crate::model::hysteresis::Hysteresis;
 use crate::settings::{ControlSettings, DofSettings};
 
 /// Insertion with rotation, and bending: DOFs whose motions are bounded together.
@@ -200,10 +201,11 @@ impl VectorLaw {
         for (wanted, ((centre, deflection), command)) in wanted.iter_mut().zip(parts) {
             *wanted += centre + deflection - command;
         }
+        let predicted = PredictedTip::new(filter, self.command);
         let mut lead = self.lead;
         let gains = [self.free_gain, self.bending_gain];
         for (group, gain) in GROUPS.into_iter().zip(gains) {
-            let step = self.bounded_step(group, gain, wanted, motion, reference, filter);
+            let step = self.bounded_step(group, gain, wanted, motion, reference, &predicted);
             let axes = step.into_iter().zip(motion).zip(group);
             // Without gain there is no compensation.
             let share = if gain > 1.0 { self.share } else { 0.0 };
@@ -240,7 +242,7 @@ impl VectorLaw {
         wanted: PerDof<f64>,
         motion: PerDof<f64>,
         reference: PerDof<f64>,
-        filter: &Filter,
+        predicted: &PredictedTip,
     ) -> PerDof<f64> {
         let moved = self.norm(group, motion);
         if moved == 0.0 {
@@ -260,21 +262,7 @@ impl VectorLaw {
         for (step, limit) in step.iter().zip(self.step_limit) {
             share = share.min(limit / step.abs());
         }
-        let nominal = filter.nominal();
-        // The contact may be a standard deviation nearer than estimated.
-        let mut near = nominal.hysteresis.half_width;
-        for (half, std) in near.iter_mut().zip(nominal.width_std) {
-            *half *= libm::exp(-std);
-        }
-        let predicted = Hysteresis {
-            half_width: near,
-            ..nominal.hysteresis
-        };
-        let propagate = |position: &PlayPosition, command: PerDof<f64>| {
-            predicted.propagate(filter.radius(), position, self.command, command)
-        };
-        let position = propagate(&nominal.position, self.command);
-        let before = nominal.tip(position.output);
+        let before = predicted.now();
         let ahead = |tip| self.product(group, subtract(tip, reference), motion) / moved;
         let room = moved.max(-ahead(before));
         for _ in 0..STEPS {
@@ -282,7 +270,7 @@ impl VectorLaw {
             for (command, step) in command.iter_mut().zip(step) {
                 *command += share * step;
             }
-            let there = nominal.tip(propagate(&position, command).output);
+            let there = predicted.after(command);
             let tip = self.norm(group, subtract(there, before));
             let along = ahead(there) - ahead(before);
             let excess = (tip / (self.tip_gain * moved)).max(along / room);

@@ -108,17 +108,21 @@ impl Ensemble {
         maps: &PerDof<CentreMap>,
         radius: f64,
         from: PerDof<f64>,
-        path: &(impl Iterator<Item = PerDof<f64>> + Clone),
+        path: impl Iterator<Item = PerDof<f64>>,
     ) {
-        for member in &mut self.members {
-            let mut position = position(member);
-            let hysteresis = hysteresis(member, maps, position.output);
-            let mut last = from;
-            for command in path.clone() {
-                position = hysteresis.propagate(radius, &position, last, command);
-                last = command;
+        let mut plays = self.members.map(|member| {
+            let position = position(&member);
+            (hysteresis(&member, maps, position.output), position)
+        });
+        let mut last = from;
+        for command in path {
+            for (hysteresis, position) in &mut plays {
+                *position = hysteresis.propagate(radius, position, last, command);
             }
-            set_position(member, &position);
+            last = command;
+        }
+        for (member, (_, position)) in self.members.iter_mut().zip(&plays) {
+            set_position(member, position);
         }
     }
 

@@ -211,7 +211,7 @@ impl Filter {
             .limit(self.unit.map(|unit| LEAST_WIDTH * unit), largest);
         let here = core::iter::once(self.command);
         self.ensemble
-            .propagate(&self.maps, self.radius, self.command, &here);
+            .propagate(&self.maps, self.radius, self.command, here);
         let mean = self.ensemble.mean();
         let at = position(&mean);
         let (_, [[v1, _, _], [_, v2, _], [_, _, v3]]) = self

@@ -74,7 +74,7 @@ impl Filter {
         let commands = path.clone().map(|(command, _)| command);
         let commands = straight_pieces(commands, self.command, self.unit);
         self.ensemble
-            .propagate(&self.maps, self.radius, self.command, &commands);
+            .propagate(&self.maps, self.radius, self.command, commands);
         let mut walked = [0.0; 3];
         // A centre that varies with the position looks like a gain.
         let plays = Hysteresis {

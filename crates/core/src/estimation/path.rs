@@ -14,10 +14,10 @@ const LENGTH: f64 = 0.1;
 /// distances of such ticks from the piece would exceed 0.002 units, or if it is 0.1 units long: where DOFs share a part of
 /// their friction, the shaft may turn back while the command goes straight on.
 pub fn straight_pieces(
-    path: impl Iterator<Item = PerDof<f64>> + Clone,
+    path: impl Iterator<Item = PerDof<f64>>,
     from: PerDof<f64>,
     unit: PerDof<f64>,
-) -> impl Iterator<Item = PerDof<f64>> + Clone {
+) -> impl Iterator<Item = PerDof<f64>> {
     let mut path = path.peekable();
     let mut start = from;
     core::iter::from_fn(move || {

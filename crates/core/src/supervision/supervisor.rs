@@ -94,14 +94,22 @@ impl Supervisor {
             self.time = event.time;
         }
         self.travel += travel;
+        // Without a flag, as in most ticks, there is nothing to update.
+        let flags = self.flags.union(event.raised).union(event.severe);
+        if !flags.is_empty() {
+            self.update_flags(event);
+        }
+        self.update_gain_share(travel);
+    }
+
+    fn update_flags(&mut self, event: &Event) {
+        let now = (self.time, self.travel);
         for (rule, active) in TABLE.iter().zip(&mut self.active) {
-            let now = (self.time, self.travel);
             if update_flag(active, rule, &self.settings, event, now) {
                 self.latched = self.latched.union(Flags::of(rule.flag));
             }
         }
         self.summarize();
-        self.update_gain_share(travel);
     }
 
     fn update_gain_share(&mut self, travel: f64) {

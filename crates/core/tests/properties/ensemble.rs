@@ -199,7 +199,7 @@ proptest! {
         let run = |mut ensemble: Ensemble| {
             ensemble.disturb_position([0.1, 0.2, 0.3]);
             let path = [[0.1; 3], command].into_iter();
-            ensemble.propagate(&NO_MAPS, 1.75, [0.0; 3], &path);
+            ensemble.propagate(&NO_MAPS, 1.75, [0.0; 3], path);
             ensemble.update(&measurement, [1.0, 0.5, 0.2]);
             ensemble.add_noise(&[0.1; STATE]);
             ensemble.limit([0.1; 3], [2.0; 3]);
