@@ -20,7 +20,7 @@ from tautscope.twin.drawn_rig import draw_geometry
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 
-from calibration.records import Case
+from calibration.records import Case, Instrument
 
 
 @cache
@@ -115,6 +115,16 @@ def test_the_geometry_of_a_twin_is_found(seed: int) -> None:
     assert across(found.config, case.actual) < min(0.8e-3, 0.4 * across(case.told, case.actual))
     delay = found.config.camera.source.delay
     assert delay == pytest.approx(case.actual.twin.sensor.stamp_error, abs=0.05)
+
+
+@pytest.mark.parametrize(("instrument", "seed"), [("gains 0.7", 600), ("distributed play", 602)])
+def test_widths_that_never_rest_are_no_doubt(instrument: Instrument, seed: int) -> None:
+    """The half widths of these twins alternate between two values at the end of the fit."""
+    case = Case(seed, instrument)
+    rig = case.actual.instrument
+    found = fit(case.record(), case.told, band_distance=rig.marker_b - rig.marker_a)
+    assert found.is_plausible, found.warnings
+    assert angle(found.config, case.actual) < 1
 
 
 def test_a_twin_is_calibrated_by_its_images() -> None:

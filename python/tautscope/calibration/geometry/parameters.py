@@ -75,6 +75,8 @@ NAMES = tuple(parameter.name for parameter in PARAMETERS)
 INDEX = {name: index for index, name in enumerate(NAMES)}
 IMAGE = slice(0, INDEX["unevenness over bending"] + 1)
 """The parameters that the features depend on; the others are of the motion of the tip."""
+RESULTS = slice(0, INDEX["camera.source.delay"] + 1)
+"""The parameters that are results; the others are those of this motion alone."""
 TYPICAL_ROUNDING = 0.15
 """Median of the prior of the rounding of the loops."""
 TYPICAL_LAG = 0.03

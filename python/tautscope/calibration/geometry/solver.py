@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.calibration.geometry.model import FEATURE_STD, Model
+from tautscope.calibration.geometry.parameters import RESULTS
 
 Floats = NDArray[np.float64]
 TOLERANCE = 0.02
@@ -32,7 +33,9 @@ class Solution:
         states: (images, 4) most probable state and unevenness of each image.
         residuals: (images, 4) measured minus predicted features [px]; NaN where not visible.
         expected: (images, 4) states that the motors let expect.
-        last_step: Largest part of the last step, in standard deviations.
+        last_step: Largest part of the last step of the `RESULTS`, in standard deviations. The
+            other parameters may never rest: the derivative of a play by its width jumps where an
+            image begins to be in contact.
     """
 
     z: Floats
@@ -84,10 +87,11 @@ def solve(
     for _ in range(_ITERATIONS):
         images = _most_probable(model, z, images, free_states)
         information, scores = _equations(model, z, images, active, free_states)
-        step = np.zeros(len(z))
+        step, std = np.zeros(len(z)), np.ones(len(z))
         step[active] = np.linalg.solve(information[pick], (scores.sum(axis=0) - z)[active])
-        std = np.sqrt(np.diag(np.linalg.inv(information[pick])))
-        size = float((np.abs(step[active]) / std).max())
+        std[active] = np.sqrt(np.diag(np.linalg.inv(information[pick])))
+        sizes = np.abs(step) / std
+        size = float(sizes.max())
         # Weights that alternate would repeat for ever.
         damping = damping if size < 0.9 * last else max(damping / 2, 0.1)
         last = size
@@ -96,10 +100,11 @@ def solve(
             break
     images = _most_probable(model, z, images, free_states)
     information, scores = _equations(model, z, images, active, free_states)
+    last_step = float(sizes[RESULTS].max())
     covariance = np.zeros_like(information)
     covariance[pick] = _covariance(information[pick], scores[:, active], model.data.captured_at)
     residuals = model.data.features - model.features(z, images.states)[0]
-    return Solution(z, covariance, images.states, residuals, model.expected(z), last)
+    return Solution(z, covariance, images.states, residuals, model.expected(z), last_step)
 
 
 def _most_probable(model: Model, z: Floats, images: _Images, free_states: bool) -> _Images:
