@@ -25,6 +25,7 @@ def test_every_page_is_in_the_list_of_pages() -> None:
     listed = re.findall(r"<([\w./-]+)>", INDEX.read_text(encoding="utf-8"))
     paths = {(INDEX.parent / name).resolve() for name in listed}
     pages = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *NOTEBOOKS]
+    pages += (ROOT / "docs" / "interfaces").glob("*.md")
     pages += [page for page in INDEX.parent.glob("*.md") if page != INDEX]
     assert {page.with_suffix("") for page in pages} == paths
 

@@ -4,6 +4,8 @@ import ctypes
 import os
 import re
 import signal
+import subprocess
+import sys
 import time
 import zipfile
 from collections.abc import Callable, Iterator
@@ -314,3 +316,22 @@ def test_a_killed_process_is_an_error_and_none_is_left(opened: Callable[..., Uni
     assert process not in children()
     other.terminate()
     assert len(children() - before) == 1
+
+
+def test_the_process_ends_with_the_importer(builder: Builder, tmp_path: Path) -> None:
+    program = """
+import os, pathlib, sys, test_units
+unit = test_units.Unit(*map(pathlib.Path, sys.argv[1:]))
+print(pathlib.Path(f"/proc/self/task/{os.getpid()}/children").read_text(), flush=True)
+os.kill(os.getpid(), 9)
+"""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    command = [sys.executable, "-c", program, str(builder("twin", CONFIG)), str(tmp_path)]
+    importer = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert importer.returncode == -signal.SIGKILL, importer.stderr
+    process = Path("/proc") / importer.stdout.strip()
+    assert process.name.isdigit()
+    deadline = time.monotonic() + 20
+    while process.exists() and "zombie" not in (process / "status").read_text():
+        assert time.monotonic() < deadline, "the process of the twin is still running"
+        time.sleep(0.05)
