@@ -1,0 +1,242 @@
+"""Builds the FMI 3.0 co-simulation units: the simulated instrument, and the loop.
+
+``uv run --group fmi fmi/build.py twin|loop --out FILE [--config FILE]``. A C compiler is needed,
+for the loop also ``cargo build --package tautscope-ffi --release``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+import zipfile
+from collections.abc import Iterable
+from hashlib import sha256
+from pathlib import Path
+from typing import Literal, NamedTuple
+from xml.etree import ElementTree
+
+import fmpy
+from fmpy.validation import validate_fmu
+from tautscope import Config, TautscopeError, __version__, load_config
+from tautscope.config import dump_config
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent
+DOFS = {"insertion": "m", "rotation": "rad", "bending": "rad"}
+COORDINATES = ("a_x", "a_y", "b_x", "b_y")
+LIBRARIES = ("-lpthread", "-ldl", "-lm")
+
+
+class Variable(NamedTuple):
+    """A variable of a unit; its index is its value reference."""
+
+    name: str
+    role: Literal["time", "input", "fixed", "tunable", "output"]
+    description: str
+    unit: str = ""
+    start: float | bool | str = 0.0
+
+    @property
+    def type(self) -> str:
+        """The element of the model description."""
+        return {bool: "Boolean", int: "Int32", str: "String"}.get(type(self.start), "Float64")
+
+
+def per_dof(prefix: str, role: Literal["input", "output"], description: str) -> list[Variable]:
+    """A variable for each degree of freedom."""
+    return [Variable(f"{prefix}_{dof}", role, description, unit) for dof, unit in DOFS.items()]
+
+
+def markers(role: Literal["input", "output"]) -> list[Variable]:
+    """What an image contributes."""
+    band = "Centroid of a marker band; NaN if it was not found"
+    return [
+        Variable("has_image", role, "Whether an image has arrived since the last step", "", False),
+        Variable("captured_at", role, "When the last image was captured", "s"),
+        *(Variable(f"features_{name}", role, band, "px") for name in COORDINATES),
+    ]
+
+
+TIME = Variable("time", "time", "Time of the simulation", "s")
+TWIN = [
+    TIME,
+    *per_dof("command", "input", "Command to the drives"),
+    Variable("seed", "fixed", "Random seed: another instrument", "", 0),
+    Variable(
+        "has_camera", "fixed", "Whether there are images; without them it is faster", "", True
+    ),
+    Variable("python", "fixed", "Python interpreter with tautscope[twin]", "", sys.executable),
+    *per_dof("applied", "output", "Position that the drives report"),
+    *per_dof("true", "output", "State of the tip"),
+    *markers("output"),
+]
+"""`twin.c` expects the outputs together, as `twin_process.py` sends them."""
+
+LOOP = [
+    TIME,
+    *per_dof("reference", "input", "Reference of the operator"),
+    Variable("reference_age", "input", "Time since the reference was made; NaN: not known", "s"),
+    *markers("input"),
+    Variable("engage", "input", "Rising edge: resume held motion", "", False),
+    Variable("acknowledge", "input", "Rising edge: acknowledge warnings", "", False),
+    Variable("drive_fault", "input", "Rising edge: a drive has failed", "", False),
+    Variable("compensation", "tunable", "Share of the compensation in use, 0 to 1", "", 1.0),
+    *per_dof("command", "output", "Command to the drives"),
+    *per_dof("delta_minus", "output", "Negative contact offset"),
+    *per_dof("delta_plus", "output", "Positive contact offset"),
+    *per_dof("estimate", "output", "State estimate; NaN: not known"),
+    Variable("status", "output", "Result of the last image, a TautscopeStatus", "", 0),
+    Variable("reaction", "output", "From 5 on the drives must stop; a TautscopeReaction", "", 0),
+    Variable("flags", "output", "Active flags, a bit 1 << TautscopeFlag each", "", 0),
+]
+UNITS = {"twin": TWIN, "loop": LOOP}
+DESCRIPTIONS = {
+    "twin": "Simulated flexible endoscopic instrument with hysteresis and a camera",
+    "loop": "Image-based hysteresis compensation for flexible endoscopic instruments",
+}
+CAUSALITY = {
+    "time": ("independent", "continuous"),
+    "input": ("input", "discrete"),
+    "fixed": ("parameter", "fixed"),
+    "tunable": ("parameter", "tunable"),
+    "output": ("output", "discrete"),
+}
+
+
+def token(kind: str, config: Config) -> str:
+    """The instantiation token: another one for other variables or another configuration."""
+    return sha256(f"{UNITS[kind]}{dump_config(config)}".encode()).hexdigest()[:32]
+
+
+def start_text(variable: Variable) -> str:
+    """A start value in XML."""
+    return str(variable.start).lower() if variable.type == "Boolean" else str(variable.start)
+
+
+def model_description(kind: str, config: Config) -> bytes:
+    """The unit's modelDescription.xml."""
+    variables, name, period = UNITS[kind], f"tautscope_{kind}", repr(config.control.period)
+    root = ElementTree.Element("fmiModelDescription", fmiVersion="3.0", modelName=name)
+    root.attrib |= {"instantiationToken": token(kind, config), "version": __version__}
+    root.attrib |= {"description": DESCRIPTIONS[kind], "generationTool": "tautscope"}
+    ElementTree.SubElement(root, "CoSimulation", modelIdentifier=name, fixedInternalStepSize=period)
+    units = ElementTree.SubElement(root, "UnitDefinitions")
+    for unit in sorted({variable.unit for variable in variables} - {""}):
+        element = ElementTree.SubElement(units, "Unit", name=unit)
+        if unit != "px":
+            ElementTree.SubElement(element, "BaseUnit", {unit: "1"})
+    ElementTree.SubElement(root, "DefaultExperiment", startTime="0", stepSize=period)
+    declarations = ElementTree.SubElement(root, "ModelVariables")
+    structure = ElementTree.SubElement(root, "ModelStructure")
+    outputs = [str(i) for i, variable in enumerate(variables) if variable.role == "output"]
+    for reference in outputs:
+        ElementTree.SubElement(structure, "Output", valueReference=reference)
+    for reference in outputs:
+        ElementTree.SubElement(structure, "InitialUnknown", valueReference=reference)
+    for reference, variable in enumerate(variables):
+        causality, variability = CAUSALITY[variable.role]
+        element = ElementTree.SubElement(declarations, variable.type, name=variable.name)
+        element.attrib |= {"valueReference": str(reference), "description": variable.description}
+        element.attrib |= {"causality": causality, "variability": variability}
+        if variable.unit:
+            element.set("unit", variable.unit)
+        if variable.type == "String":
+            ElementTree.SubElement(element, "Start", value=start_text(variable))
+        elif variable.role not in ("time", "output"):
+            element.set("start", start_text(variable))
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True)
+
+
+def quoted(text: str) -> str:
+    """A string of C."""
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+def header(kind: str, config: Config) -> str:
+    """`variables.h` of `unit.c`: indices, types, roles and start values."""
+    variables = UNITS[kind]
+    names = ", ".join(variable.name.upper() for variable in variables)
+    rows = ", ".join(
+        f"{{{v.type.upper()}, {v.role.upper() if v.role != 'time' else 'OUTPUT'}, "
+        f"{0.0 if v.type == 'String' else float(v.start)!r}}}"
+        for v in variables
+    )
+    text = next((str(v.start) for v in variables if v.type == "String"), "")
+    outputs = sum(variable.role == "output" for variable in variables)
+    return (
+        f"enum {{ {names}, VARIABLES }};\n"
+        "enum { NONE, FLOAT64, INT32, BOOLEAN, STRING };\n"
+        "enum { INPUT, FIXED, TUNABLE, OUTPUT };\n"
+        f"#define OUTPUTS {outputs}\n"
+        f"#define VARIABLE_TABLE {{{rows}}}\n"
+        f"#define START_TEXT {quoted(text)}\n"
+        f"#define PERIOD {config.control.period!r}\n"
+        f"#define INSTANTIATION_TOKEN {quoted(token(kind, config))}\n"
+    )
+
+
+def compile_unit(kind: str, config: Config, folder: Path, flags: Iterable[str]) -> Path:
+    """Compile the unit's library into a folder."""
+    (folder / "variables.h").write_text(header(kind, config), encoding="utf-8")
+    library = folder / (f"tautscope_{kind}" + (".dylib" if sys.platform == "darwin" else ".so"))
+    includes = [folder, HERE, Path(fmpy.__file__).parent / "c-code", ROOT / "crates/ffi/include"]
+    command = [os.environ.get("CC", "cc"), "-std=c99", "-O2", "-shared", "-fPIC"]
+    command += ["-fvisibility=hidden", "-Wall", "-Wextra", "-Werror", *flags]
+    command += [f"-I{include}" for include in includes]
+    command += [str(HERE / "unit.c"), str(HERE / f"{kind}.c"), "-o", str(library)]
+    if kind == "loop":
+        archive = ROOT / "target" / "release" / "libtautscope.a"
+        if not archive.is_file():
+            first = "cargo build --package tautscope-ffi --release"
+            raise SystemExit(f"error: File not found: {archive}. First run: {first}")
+        command += [str(archive), *([] if sys.platform == "darwin" else ["-Wl,--exclude-libs,ALL"])]
+    subprocess.run([*command, *LIBRARIES], check=True)
+    return library
+
+
+def build(kind: str, out: Path, config: Config, flags: Iterable[str] = ()) -> None:
+    """Write a unit.
+
+    Args:
+        kind: ``twin`` or ``loop``.
+        out: The file to write, ``*.fmu``.
+        config: Becomes part of the unit.
+        flags: More options of the compiler.
+    """
+    machine = {"AMD64": "x86_64", "arm64": "aarch64"}.get(platform.machine(), platform.machine())
+    system = "darwin" if sys.platform == "darwin" else "linux"
+    with tempfile.TemporaryDirectory() as folder:
+        library = compile_unit(kind, config, Path(folder), flags)
+        written = Path(folder) / out.name
+        with zipfile.ZipFile(written, "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr("modelDescription.xml", model_description(kind, config))
+            archive.write(library, f"binaries/{machine}-{system}/{library.name}")
+            archive.writestr("resources/config.toml", dump_config(config))
+            if kind == "twin":
+                archive.write(HERE / "twin_process.py", "resources/twin_process.py")
+        if problems := validate_fmu(str(written)):
+            raise SystemExit("error: " + "\n".join(problems))
+        out.write_bytes(written.read_bytes())
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Build an FMI 3.0 co-simulation unit.")
+    parser.add_argument("kind", choices=UNITS, help="the simulated instrument, or the loop")
+    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="the .fmu to write")
+    parser.add_argument("--config", metavar="FILE", help="TOML file; missing keys are the defaults")
+    options = parser.parse_args()
+    try:
+        config = load_config(options.config)
+    except TautscopeError as error:
+        parser.error(str(error))
+    build(options.kind, options.out, config)
+    print(options.out)
+
+
+if __name__ == "__main__":
+    main()

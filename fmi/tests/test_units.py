@@ -1,0 +1,337 @@
+"""The units in FMPy: the same numbers as in Python, and errors that say what was wrong."""
+
+import ctypes
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+import zipfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import build
+import fmpy
+import numpy as np
+import pytest
+import record
+from conftest import Builder
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi3 import FMU3Slave
+from fmpy.validation import validate_fmu
+from numpy.typing import NDArray
+from tautscope import Config, HysteresisReduction, MarkerDetector, Twin
+from tautscope.config import Profile
+from tautscope.loop.reduction import Status
+
+CONFIG = Config().replace(**{"twin.seed": 3})
+PERIOD = CONFIG.control.period
+DOFS = tuple(build.DOFS)
+FEATURES = tuple(f"features_{name}" for name in build.COORDINATES)
+KINDS = pytest.mark.parametrize("kind", ["twin", "loop"])
+
+
+class Unit:
+    """An initialized unit, its variables by name."""
+
+    def __init__(self, path: Path, folder: Path, **parameters: float | str) -> None:
+        description = fmpy.read_model_description(str(path))
+        self._types = {v.name: (v.type, v.valueReference) for v in description.modelVariables}
+        self.messages: list[str] = []
+        self._fmu = FMU3Slave(
+            guid=description.guid,
+            unzipDirectory=fmpy.extract(str(path), unzipdir=str(folder)),
+            modelIdentifier=description.coSimulation.modelIdentifier,
+            instanceName="unit",
+        )
+        self._fmu.instantiate(loggingOn=True, logMessage=self._log)
+        self._parameters = parameters
+        try:
+            self.initialize()
+        except FMICallException as error:
+            self.close()
+            raise RuntimeError(" ".join(self.messages)) from error
+
+    def initialize(self) -> None:
+        for name, value in self._parameters.items():
+            self.set(name, value)
+        self._fmu.enterInitializationMode()
+        self._fmu.exitInitializationMode()
+
+    def _log(self, environment: object, status: int, category: bytes, message: bytes) -> None:
+        self.messages.append(message.decode())
+
+    def set(self, name: str, value: float | str) -> None:
+        kind, reference = self._types[name]
+        getattr(self._fmu, f"set{kind}")([reference], [value])
+
+    def get(self, *names: str) -> NDArray[np.float64]:
+        values = []
+        for name in names:
+            kind, reference = self._types[name]
+            values += getattr(self._fmu, f"get{kind}")([reference])
+        return np.array(values, dtype=np.float64)
+
+    def set_all(self, prefix: str, values: NDArray[np.float64]) -> None:
+        for dof, value in zip(DOFS, values, strict=True):
+            self.set(f"{prefix}_{dof}", value)
+
+    def get_all(self, prefix: str) -> NDArray[np.float64]:
+        return self.get(*(f"{prefix}_{dof}" for dof in DOFS))
+
+    def step(self, at: float, size: float = PERIOD) -> None:
+        self._fmu.doStep(at, size)
+
+    def reset(self) -> None:
+        self._fmu.reset()
+        self.initialize()
+
+    def terminate(self) -> None:
+        self._fmu.terminate()
+
+    def close(self) -> None:
+        self._fmu.freeInstance()
+
+
+@pytest.fixture
+def opened(builder: Builder, tmp_path: Path) -> Iterator[Callable[..., Unit]]:
+    """Initialized units, released after the test."""
+    units: list[Unit] = []
+
+    def unit(kind: str, config: Config = CONFIG, **parameters: float | str) -> Unit:
+        # A folder of its own: a library that is loaded must not be written again.
+        folder = tmp_path / str(len(list(tmp_path.iterdir())))
+        units.append(Unit(builder(kind, config), folder, **parameters))
+        return units[-1]
+
+    yield unit
+    for unit_ in units:
+        unit_.close()
+
+
+@contextmanager
+def refused(unit: Unit, words: str) -> Iterator[None]:
+    with pytest.raises(FMICallException):
+        yield
+    assert words in " ".join(unit.messages), unit.messages
+
+
+def motion(time: float) -> NDArray[np.float64]:
+    """A command."""
+    return record.CENTRES + record.AMPLITUDES * np.sin(2 * np.pi * time / np.array([5, 7, 4]))
+
+
+@KINDS
+def test_units_are_valid_and_have_every_function(
+    kind: str, builder: Builder, tmp_path: Path
+) -> None:
+    path = builder(kind, CONFIG)
+    assert validate_fmu(str(path)) == []
+    declared = (Path(fmpy.__file__).parent / "c-code" / "fmi3Functions.h").read_text("utf-8")
+    names = set(re.findall(r"^FMI3_Export fmi3\w+TYPE\s+(fmi3\w+);", declared, re.M))
+    assert len(names) > 70
+    with zipfile.ZipFile(path) as archive:
+        (library,) = [name for name in archive.namelist() if name.startswith("binaries/")]
+        loaded = ctypes.CDLL(archive.extract(library, tmp_path))
+    assert [name for name in sorted(names) if not hasattr(loaded, name)] == []
+
+
+@pytest.mark.parametrize(("has_camera", "duration"), [(True, 15), (False, 60)])
+def test_the_twin_in_fmpy_is_the_twin_in_python(
+    has_camera: bool, duration: float, builder: Builder
+) -> None:
+    """Simulated by FMPy's own master from a table of commands."""
+    ticks = round(duration / PERIOD)
+    commands = [(k * PERIOD, *motion(k * PERIOD)) for k in range(ticks)]
+    inputs = [("time", float), *((f"command_{dof}", float) for dof in DOFS)]
+    outputs = ["has_image", "captured_at", *FEATURES]
+    outputs += [f"{prefix}_{dof}" for prefix in ("applied", "true") for dof in DOFS]
+    begin = time.perf_counter()
+    result = fmpy.simulate_fmu(
+        str(builder("twin", CONFIG)),
+        stop_time=ticks * PERIOD,
+        output_interval=PERIOD,
+        input=np.array(commands, dtype=inputs),
+        start_values={"seed": 3, "has_camera": has_camera},
+        output=outputs,
+    )
+    took = time.perf_counter() - begin
+    assert len(result) == ticks + 1
+
+    twin, detector = Twin(CONFIG, images=has_camera), MarkerDetector(CONFIG)
+    seen = np.full(5, np.nan)
+    expected = []
+    for k in range(ticks + 1):
+        sample = twin.step(commands[k - 1][1:]) if k else twin.reset()
+        if sample.frame is not None:
+            seen = np.array(
+                [sample.frame.captured_at, *detector.detect(sample.frame.image).features]
+            )
+        assert sample.true_state is not None
+        expected.append((sample.frame is not None, *seen, *sample.applied, *sample.true_state))
+    values = np.array([result[name] for name in outputs], dtype=np.float64).T
+    difference = np.nanmax(np.abs(values - np.array(expected, dtype=np.float64)))
+    print(f"twin, camera {has_camera}: {ticks} ticks in {took:.1f} s, difference {difference}")
+    np.testing.assert_array_equal(values, np.array(expected, dtype=np.float64))
+    assert values[:, 0].sum() == (pytest.approx(duration * 25, abs=5) if has_camera else 0)
+    assert np.ptp(values[:, -3:], axis=0).min() > 5e-3, "the tip did not move"
+
+
+@pytest.mark.parametrize("profile", ["paper", "best"])
+def test_the_loop_in_fmpy_is_the_loop_in_python(
+    profile: Profile, recorded: Callable[[Profile], record.Record], opened: Callable[..., Unit]
+) -> None:
+    """60 s at 1 kHz with lost bands, jumps, old references, a drive fault and half compensation."""
+    recording = recorded(profile)
+    unit = opened("loop", recording.config)
+    images = {int(row[0]): row for row in recording.images}
+    commands, answers = [], []
+    begin = time.perf_counter()
+    for k, (at, made_at, *reference, event, _, _, _) in enumerate(recording.ticks):
+        unit.set_all("reference", np.array(reference))
+        unit.set("reference_age", at - made_at)
+        for action, name in enumerate(("engage", "acknowledge", "drive_fault"), 1):
+            unit.set(name, event == action)
+        if event in (4, 5):
+            unit.set("compensation", 0.5 if event == 4 else 1.0)
+        image = images.get(k)
+        unit.set("has_image", image is not None)
+        if image is not None:
+            unit.set("captured_at", image[1])
+            for name, value in zip(FEATURES, image[2:6], strict=True):
+                unit.set(name, value)
+        unit.step(at, record.PERIOD)
+        commands.append(unit.get_all("command"))
+        if image is not None:
+            state = unit.get("status", "reaction", "flags")
+            offsets = [unit.get_all(name) for name in ("estimate", "delta_minus", "delta_plus")]
+            answers.append(np.concatenate([state, *offsets]))
+    duration = time.perf_counter() - begin
+    expected = np.array(recording.ticks)[:, 6:]
+    difference = np.abs(np.array(commands) - expected).max()
+    print(f"loop, {profile}: {len(commands)} ticks in {duration:.1f} s, difference {difference}")
+    np.testing.assert_array_equal(commands, expected)
+    np.testing.assert_array_equal(answers, np.array(recording.images)[:, 6:18])
+
+
+def test_the_two_units_together_are_the_loop_on_the_twin(opened: Callable[..., Unit]) -> None:
+    """Images of the one unit go to the other, commands back; 10 s."""
+    plant, loop = opened("twin", seed=3), opened("loop")
+    twin, reduction = Twin(CONFIG), HysteresisReduction(CONFIG)
+    detector = MarkerDetector(CONFIG)
+    sample = twin.reset()
+    seen = 0
+    for k in range(round(10 / PERIOD)):
+        now, reference = k * PERIOD, motion(k * PERIOD)
+        has_image = bool(plant.get("has_image")[0])
+        loop.set_all("reference", reference)
+        loop.set("reference_age", np.nan)
+        for name in ("has_image", "captured_at", *FEATURES):
+            (value,) = plant.get(name)
+            loop.set(name, bool(value) if name == "has_image" else value)
+        loop.step(now)
+        plant.set_all("command", loop.get_all("command"))
+        plant.step(now)
+
+        command = reduction.step(reference, now)
+        np.testing.assert_array_equal(loop.get_all("command"), command)
+        assert has_image == (sample.frame is not None)
+        if sample.frame is not None:
+            features = detector.detect(sample.frame.image).features
+            found = None if np.isnan(features).all() else features
+            report = reduction.on_features(found, sample.frame.captured_at)
+            assert list(Status)[int(loop.get("status")[0])] is report.status
+            seen += report.status is Status.OK
+        sample = twin.step(command)
+    assert seen > 100
+
+
+def test_a_larger_communication_step_is_several_control_periods(
+    opened: Callable[..., Unit],
+) -> None:
+    one, ten = opened("twin", has_camera=False), opened("twin", has_camera=False)
+    for k in range(100):
+        for unit, ticks in ((one, 1), (ten, 10)):
+            if k % ticks == 0:
+                unit.set_all("command", motion(k // 10 * 0.05))
+                unit.step(k * PERIOD, ticks * PERIOD)
+    np.testing.assert_array_equal(ten.get_all("true"), one.get_all("true"))
+    assert ten.get("time") == pytest.approx(0.5)
+
+
+def test_reset_starts_again(opened: Callable[..., Unit]) -> None:
+    unit = opened("twin", has_camera=False, seed=5)
+    start = unit.get_all("true")
+    unit.set_all("command", motion(1.0))
+    for k in range(20):
+        unit.step(k * PERIOD)
+    assert (unit.get_all("true") != start).any()
+    unit.reset()
+    np.testing.assert_array_equal(unit.get_all("true"), start)
+
+
+def test_bad_use_is_an_error_with_a_message(opened: Callable[..., Unit]) -> None:
+    twin, loop = opened("twin", has_camera=False), opened("loop")
+    with refused(twin, "got 0.007 s, expected one or more control periods of 0.005 s"):
+        twin.step(0.0, 0.007)
+    with refused(twin, "cannot be set after the initialization"):
+        twin.set("seed", 1)
+    with refused(twin, "because it is an output"):
+        twin.set("true_bending", 0.0)
+    with refused(loop, "reference"):
+        loop.set_all("reference", np.array([np.nan, 0, 0]))
+        loop.step(0.0)
+    with refused(loop, "not initialized, or has failed"):
+        loop.step(0.0)
+    with refused(twin, "command"):
+        twin.set_all("command", np.array([np.nan, 0, 0]))
+        twin.step(0.0)
+
+
+def test_an_interpreter_that_does_not_exist_is_named(opened: Callable[..., Unit]) -> None:
+    with pytest.raises(RuntimeError, match="/no/such/python cannot be started: No such file"):
+        opened("twin", python="/no/such/python")
+    with pytest.raises(
+        RuntimeError, match=r"has ended; was it started\? Parameter python: /bin/true"
+    ):
+        opened("twin", python="/bin/true")
+
+
+def test_a_killed_process_is_an_error_and_none_is_left(opened: Callable[..., Unit]) -> None:
+    def children() -> set[int]:
+        tasks = Path("/proc/self/task").glob("*/children")
+        return {int(child) for task in tasks for child in task.read_text().split()}
+
+    before = children()
+    unit = opened("twin", has_camera=False)
+    (process,) = children() - before
+    os.kill(process, signal.SIGKILL)
+    with refused(unit, "the Python process has ended"):
+        unit.step(0.0)
+    other = opened("twin", has_camera=False)
+    assert len(children() - before) == 2, "the killed one is waited for when its unit is released"
+    unit.reset()
+    assert process not in children()
+    other.terminate()
+    assert len(children() - before) == 1
+
+
+def test_the_process_ends_with_the_importer(builder: Builder, tmp_path: Path) -> None:
+    program = """
+import os, pathlib, sys, test_units
+unit = test_units.Unit(*map(pathlib.Path, sys.argv[1:]))
+print(pathlib.Path(f"/proc/self/task/{os.getpid()}/children").read_text(), flush=True)
+os.kill(os.getpid(), 9)
+"""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    command = [sys.executable, "-c", program, str(builder("twin", CONFIG)), str(tmp_path)]
+    importer = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert importer.returncode == -signal.SIGKILL, importer.stderr
+    process = Path("/proc") / importer.stdout.strip()
+    assert process.name.isdigit()
+    deadline = time.monotonic() + 20
+    while process.exists() and "zombie" not in (process / "status").read_text():
+        assert time.monotonic() < deadline, "the process of the twin is still running"
+        time.sleep(0.05)

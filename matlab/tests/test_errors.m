@@ -1,0 +1,54 @@
+function test_errors(folder)
+% Bad input is an error that names the argument, and leaves the loop unchanged.
+config = fullfile(folder, 'paper.toml');
+expect('tautscope:Config', 'missing.toml', @() tautscope.Loop('missing.toml'));
+incomplete = [tempname '.toml'];
+id = fopen(incomplete, 'w');
+fprintf(id, 'profile = "best"\n');
+fclose(id);
+remove = onCleanup(@() delete(incomplete));
+expect('tautscope:Config', 'every key is needed', @() tautscope.Loop(incomplete));
+
+loop = tautscope.Loop(config);
+assert(loop.period == 1e-3);
+first = loop.step([0.025 0 0.9], 0);
+expect('tautscope:Signal', 'reference', @() loop.step([NaN 0 0.9], 0.001));
+expect('tautscope:Signal', 'reference: got 2 elements', @() loop.step([0 0], 0.001));
+expect('tautscope:Signal', 'time: got 1 elements of class single', @() loop.step([0.025 0 0.9], single(1)));
+expect('tautscope:Signal', 'features', @() loop.on_features([1 2 3], 0));
+expect('tautscope:Image', 'uint8', @() loop.on_frame(zeros(576, 720, 3), 0));
+expect('tautscope:Image', 'got 57 x 72 px', @() loop.on_frame(zeros(72, 57, 3, 'uint8'), 0));
+expect('tautscope:Signal', 'share', @() loop.set_compensation(2));
+expect('tautscope:Signal', 'no_such_flag', @() loop.raise_flag('no_such_flag'));
+assert(isequal(loop.step([0.025 0 0.9], 0.001), first));
+
+loop.raise_flag('drive_fault');
+state = loop.supervision();
+assert(strcmp(state.reaction, 'quick_stop') && any(strcmp(state.flags, 'drive_fault')));
+held = loop.step([0.03 0 0.9], 0.002);
+assert(isequal(held, first));
+loop.engage();
+state = loop.supervision();
+assert(strcmp(state.reaction, 'none') || strcmp(state.reaction, 'warn'));
+
+another = tautscope.Loop(config);
+another.step([0.025 0 0.9], 0);
+delete(another);
+expect('tautscope:Signal', 'deleted', @() another.step([0.025 0 0.9], 0.001));
+loop.step([0.025 0 0.9], 0.003);
+for i = 1:200  % more loops than can exist at once: each is destroyed
+    passing = tautscope.Loop(config);
+    delete(passing);
+end
+end
+
+function expect(identifier, words, action)
+try
+    action();
+catch problem
+    assert(strcmp(problem.identifier, identifier), '%s: %s', problem.identifier, problem.message);
+    assert(~isempty(strfind(problem.message, words)), problem.message); %#ok<STREMP>
+    return
+end
+error('no error, expected %s: %s', identifier, words);
+end
