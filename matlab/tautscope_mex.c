@@ -145,6 +145,7 @@ static mxArray *create(const mxArray *toml) {
     }
     check(tautscope_loop_create(document(toml), mxGetNumberOfElements(toml), &slot->loop));
     slot->serial = ++last_serial;
+    mexLock(); /* `clear all` must not unload it under a loop */
     return mxCreateDoubleScalar(slot->serial);
 }
 
@@ -246,6 +247,7 @@ void mexFunction(int result_count, mxArray *results[], int count, const mxArray 
     if (strcmp(action, "destroy") == 0) {
         if (slot) {
             destroy(slot);
+            mexUnlock();
         }
         return;
     }

@@ -30,6 +30,9 @@ CONFIG = Config().replace(**{"twin.seed": 3})
 PERIOD = CONFIG.control.period
 DOFS = tuple(build.DOFS)
 FEATURES = tuple(f"features_{name}" for name in build.COORDINATES)
+PRESSED = 2000
+"""Ticks for which an action stays set: it acts once, and longer than until the next engagement."""
+
 KINDS = pytest.mark.parametrize("kind", ["twin", "loop"])
 
 
@@ -188,12 +191,14 @@ def test_the_loop_in_fmpy_is_the_loop_in_python(
     unit = opened("loop", recording.config)
     images = {int(row[0]): row for row in recording.images}
     commands, answers = [], []
+    pressed: dict[str, int] = {}
     begin = time.perf_counter()
     for k, (at, made_at, *reference, event, _, _, _) in enumerate(recording.ticks):
         unit.set_all("reference", np.array(reference))
         unit.set("reference_age", at - made_at)
         for action, name in enumerate(("engage", "acknowledge", "drive_fault"), 1):
-            unit.set(name, event == action)
+            pressed[name] = k if event == action else pressed.get(name, -PRESSED)
+            unit.set(name, k < pressed[name] + PRESSED)
         if event in (4, 5):
             unit.set("compensation", 0.5 if event == 4 else 1.0)
         image = images.get(k)

@@ -35,7 +35,10 @@ another = tautscope.Loop(config);
 another.step([0.025 0 0.9], 0);
 delete(another);
 expect('tautscope:Signal', 'deleted', @() another.step([0.025 0 0.9], 0.001));
+expect('tautscope:Signal', 'deleted', @() tautscope_mex('period', 'no number'));
 loop.step([0.025 0 0.9], 0.003);
+clear tautscope_mex  % a loop outlives this
+loop.step([0.025 0 0.9], 0.004);
 for i = 1:200  % more loops than can exist at once: each is destroyed
     passing = tautscope.Loop(config);
     delete(passing);

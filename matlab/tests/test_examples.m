@@ -5,8 +5,9 @@ frames = tautscope.read_table(fullfile(folder, 'frames.csv'));
 assert(all(abs(diff(trace.time) - 0.005) < 1e-9) && trace.time(1) == 0);
 assert(isnan(trace.estimate_bending(1)) && ~isnan(trace.estimate_bending(end)));
 assert(iscellstr(frames.status) && any(strcmp(frames.status, 'ok')));
-assert(all(frames.observable_bending == 0 | frames.observable_bending == 1));
-lines = strsplit(strtrim(fileread(fullfile(folder, 'trace.csv'))), "\n");
+assert(all(frames.observable_bending(strcmp(frames.status, 'ok')) == 1));
+assert(all(frames.valid(strcmp(frames.status, 'no_markers')) == 0));
+lines = strsplit(strtrim(fileread(fullfile(folder, 'trace.csv'))), char(10));
 assert(numel(trace.time) == numel(lines) - 1);
 [words, names] = deal(strsplit(strtrim(lines{end}), ','), fieldnames(trace));
 for column = 1:numel(names) - 1

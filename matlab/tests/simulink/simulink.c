@@ -8,6 +8,9 @@
 
 enum { TICK = 9, IMAGE = 23 };
 
+/* Ticks for which an action stays set: it acts once. The drive fault is still set when the loop is engaged again. */
+enum { PRESSED = 2000 };
+
 static double *read_rows(const char *recording, const char *kind, size_t columns, size_t *count) {
     char path[4096];
     FILE *file;
@@ -53,6 +56,7 @@ int main(int count, char **arguments) {
     double *tick_rows, *image_rows;
     mxArray parameters[2] = {{config, 0.0}, {NULL, 1.0}};
     SimStruct S = {.parameter_count = 2, .parameters = parameters};
+    size_t pressed_at[BLOCK_ACTIONS] = {0};
     clock_t begin;
     require(count == 2, "usage: sfun_driver RECORDING");
     snprintf(config, sizeof config, "%s.toml", arguments[1]);
@@ -77,7 +81,8 @@ int main(int count, char **arguments) {
         memcpy(S.inputs.signal[REFERENCE], now + 2, 3 * sizeof(double));
         S.inputs.signal[AGE][0] = now[0] - now[1];
         for (int action = 0; action < BLOCK_ACTIONS; ++action) {
-            S.inputs.signal[ACTIONS][action] = event == action + 1;
+            pressed_at[action] = event == action + 1 ? tick : pressed_at[action];
+            S.inputs.signal[ACTIONS][action] = pressed_at[action] > 0 && tick < pressed_at[action] + PRESSED;
         }
         parameters[SHARE_PARAMETER].number = event == 4 ? 0.5 : event == 5 ? 1.0 : parameters[SHARE_PARAMETER].number;
         S.phase = OUTPUTS_PHASE;
