@@ -13,7 +13,6 @@ import subprocess
 import sys
 import tempfile
 import zipfile
-from collections.abc import Iterable
 from hashlib import sha256
 from pathlib import Path
 from typing import Literal, NamedTuple
@@ -90,7 +89,7 @@ LOOP = [
     *per_dof("delta_plus", "output", "Positive contact offset"),
     *per_dof("estimate", "output", "State estimate; NaN: not known"),
     Variable("status", "output", "Result of the last image, a TautscopeStatus", "", 0),
-    Variable("reaction", "output", "From 5 on the drives must stop; a TautscopeReaction", "", 0),
+    Variable("reaction", "output", "From 6 on the drives must stop; a TautscopeReaction", "", 0),
     Variable("flags", "output", "Active flags, a bit 1 << TautscopeFlag each", "", 0),
 ]
 UNITS = {"twin": TWIN, "loop": LOOP}
@@ -180,13 +179,13 @@ def header(kind: str, config: Config) -> str:
     )
 
 
-def compile_unit(kind: str, config: Config, folder: Path, flags: Iterable[str]) -> Path:
+def compile_unit(kind: str, config: Config, folder: Path) -> Path:
     """Compile the unit's library into a folder."""
     (folder / "variables.h").write_text(header(kind, config), encoding="utf-8")
     library = folder / (f"tautscope_{kind}" + (".dylib" if sys.platform == "darwin" else ".so"))
     includes = [folder, HERE, Path(fmpy.__file__).parent / "c-code", ROOT / "crates/ffi/include"]
     command = [os.environ.get("CC", "cc"), "-std=c99", "-O2", "-shared", "-fPIC"]
-    command += ["-fvisibility=hidden", "-Wall", "-Wextra", "-Werror", *flags]
+    command += ["-fvisibility=hidden", "-Wall", "-Wextra", "-Werror"]
     command += [f"-I{include}" for include in includes]
     command += [str(HERE / "unit.c"), str(HERE / f"{kind}.c"), "-o", str(library)]
     if kind == "loop":
@@ -199,19 +198,18 @@ def compile_unit(kind: str, config: Config, folder: Path, flags: Iterable[str]) 
     return library
 
 
-def build(kind: str, out: Path, config: Config, flags: Iterable[str] = ()) -> None:
+def build(kind: str, out: Path, config: Config) -> None:
     """Write a unit.
 
     Args:
         kind: ``twin`` or ``loop``.
         out: The file to write, ``*.fmu``.
         config: Becomes part of the unit.
-        flags: More options of the compiler.
     """
     machine = {"AMD64": "x86_64", "arm64": "aarch64"}.get(platform.machine(), platform.machine())
     system = "darwin" if sys.platform == "darwin" else "linux"
     with tempfile.TemporaryDirectory() as folder:
-        library = compile_unit(kind, config, Path(folder), flags)
+        library = compile_unit(kind, config, Path(folder))
         written = Path(folder) / out.name
         with zipfile.ZipFile(written, "w", zipfile.ZIP_DEFLATED) as archive:
             archive.writestr("modelDescription.xml", model_description(kind, config))
