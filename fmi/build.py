@@ -18,10 +18,14 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 from xml.etree import ElementTree
 
-import fmpy
-from fmpy.validation import validate_fmu
 from tautscope import Config, TautscopeError, __version__, load_config
 from tautscope.config import dump_config
+
+try:
+    import fmpy
+    from fmpy.validation import validate_fmu
+except ModuleNotFoundError:
+    raise SystemExit("error: FMPy is not installed. First run: uv sync --group fmi") from None
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
@@ -187,7 +191,8 @@ def compile_unit(kind: str, config: Config, folder: Path) -> Path:
     command = [os.environ.get("CC", "cc"), "-std=c99", "-O2", "-shared", "-fPIC"]
     command += ["-fvisibility=hidden", "-Wall", "-Wextra", "-Werror"]
     command += [f"-I{include}" for include in includes]
-    command += [str(HERE / "unit.c"), str(HERE / f"{kind}.c"), "-o", str(library)]
+    command += [str(HERE / name) for name in ("unit.c", "unsupported.c", f"{kind}.c")]
+    command += ["-o", str(library)]
     if kind == "loop":
         archive = ROOT / "target" / "release" / "libtautscope.a"
         if not archive.is_file():
