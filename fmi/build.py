@@ -13,16 +13,19 @@ import subprocess
 import sys
 import tempfile
 import zipfile
-from collections.abc import Iterable
 from hashlib import sha256
 from pathlib import Path
 from typing import Literal, NamedTuple
 from xml.etree import ElementTree
 
-import fmpy
-from fmpy.validation import validate_fmu
 from tautscope import Config, TautscopeError, __version__, load_config
 from tautscope.config import dump_config
+
+try:
+    import fmpy
+    from fmpy.validation import validate_fmu
+except ModuleNotFoundError:
+    raise SystemExit("error: FMPy is not installed. First run: uv sync --group fmi") from None
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
@@ -90,7 +93,7 @@ LOOP = [
     *per_dof("delta_plus", "output", "Positive contact offset"),
     *per_dof("estimate", "output", "State estimate; NaN: not known"),
     Variable("status", "output", "Result of the last image, a TautscopeStatus", "", 0),
-    Variable("reaction", "output", "From 5 on the drives must stop; a TautscopeReaction", "", 0),
+    Variable("reaction", "output", "From 6 on the drives must stop; a TautscopeReaction", "", 0),
     Variable("flags", "output", "Active flags, a bit 1 << TautscopeFlag each", "", 0),
 ]
 UNITS = {"twin": TWIN, "loop": LOOP}
@@ -180,15 +183,16 @@ def header(kind: str, config: Config) -> str:
     )
 
 
-def compile_unit(kind: str, config: Config, folder: Path, flags: Iterable[str]) -> Path:
+def compile_unit(kind: str, config: Config, folder: Path) -> Path:
     """Compile the unit's library into a folder."""
     (folder / "variables.h").write_text(header(kind, config), encoding="utf-8")
     library = folder / (f"tautscope_{kind}" + (".dylib" if sys.platform == "darwin" else ".so"))
     includes = [folder, HERE, Path(fmpy.__file__).parent / "c-code", ROOT / "crates/ffi/include"]
     command = [os.environ.get("CC", "cc"), "-std=c99", "-O2", "-shared", "-fPIC"]
-    command += ["-fvisibility=hidden", "-Wall", "-Wextra", "-Werror", *flags]
+    command += ["-fvisibility=hidden", "-Wall", "-Wextra", "-Werror"]
     command += [f"-I{include}" for include in includes]
-    command += [str(HERE / "unit.c"), str(HERE / f"{kind}.c"), "-o", str(library)]
+    command += [str(HERE / name) for name in ("unit.c", "unsupported.c", f"{kind}.c")]
+    command += ["-o", str(library)]
     if kind == "loop":
         archive = ROOT / "target" / "release" / "libtautscope.a"
         if not archive.is_file():
@@ -199,19 +203,18 @@ def compile_unit(kind: str, config: Config, folder: Path, flags: Iterable[str]) 
     return library
 
 
-def build(kind: str, out: Path, config: Config, flags: Iterable[str] = ()) -> None:
+def build(kind: str, out: Path, config: Config) -> None:
     """Write a unit.
 
     Args:
         kind: ``twin`` or ``loop``.
         out: The file to write, ``*.fmu``.
         config: Becomes part of the unit.
-        flags: More options of the compiler.
     """
     machine = {"AMD64": "x86_64", "arm64": "aarch64"}.get(platform.machine(), platform.machine())
     system = "darwin" if sys.platform == "darwin" else "linux"
     with tempfile.TemporaryDirectory() as folder:
-        library = compile_unit(kind, config, Path(folder), flags)
+        library = compile_unit(kind, config, Path(folder))
         written = Path(folder) / out.name
         with zipfile.ZipFile(written, "w", zipfile.ZIP_DEFLATED) as archive:
             archive.writestr("modelDescription.xml", model_description(kind, config))

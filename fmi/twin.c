@@ -77,7 +77,8 @@ static fmi3Status receive_outputs(Unit *unit) {
 }
 
 fmi3Status content_start(Unit *unit) {
-    char script[2 * TEXT_LENGTH], config[2 * TEXT_LENGTH], seed[16], has_camera[2] = {unit->values[HAS_CAMERA] != 0.0 ? '1' : '0', 0};
+    char script[2 * TEXT_LENGTH], config[2 * TEXT_LENGTH], seed[16];
+    char *has_camera = unit->values[HAS_CAMERA] != 0.0 ? "1" : "0";
     char *arguments[] = {unit->text, script, config, seed, has_camera, NULL};
     posix_spawn_file_actions_t actions;
     int channels[2], error;
