@@ -143,7 +143,11 @@ class Laboratory(Node):
             self.spin(max(0.0, begin + tick[0] - time.monotonic()))
             last = self.refer(tick[2:5])
             # As a camera: two ticks after the capture.
-            while with_images and image < len(recorded.images) and recorded.images[image][1] + 0.01 <= tick[0]:
+            while (
+                with_images
+                and image < len(recorded.images)
+                and recorded.images[image][1] + 0.01 <= tick[0]
+            ):
                 shown.append(start + round(1e9 * recorded.images[image][1]))
                 self.show(recorded.pixels[image], shown[-1])
                 image += 1

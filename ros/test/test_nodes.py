@@ -147,7 +147,9 @@ def test_the_share_of_the_compensation_is_checked(laboratory):
     def set_share(share):
         value = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=share)
         request = SetParameters.Request(parameters=[Parameter(name="compensation", value=value)])
-        return call(laboratory, SetParameters, "/instrument/tautscope/set_parameters", request).results[0]
+        return call(
+            laboratory, SetParameters, "/instrument/tautscope/set_parameters", request
+        ).results[0]
 
     assert set_share(0.5).successful
     refused = set_share(1.5)

@@ -68,9 +68,14 @@ def test_the_cpp_package_declares_what_it_finds_and_includes():
 
 def test_the_part_without_ros_includes_nothing_of_it():
     for name in ("control_loop", "detection_exchange", "detection_worker"):
-        for path in (CONTROL / "src" / f"{name}.cpp", CONTROL / "include/tautscope_control" / f"{name}.hpp"):
+        for path in (
+            CONTROL / "src" / f"{name}.cpp",
+            CONTROL / "include/tautscope_control" / f"{name}.hpp",
+        ):
             headers = re.findall(r"#include [<\"]([\w/.]+)[>\"]", path.read_text("utf-8"))
-            assert all("/" not in header or header.startswith("tautscope_control/") for header in headers)
+            assert all(
+                "/" not in header or header.startswith("tautscope_control/") for header in headers
+            )
 
 
 def test_launch_files_use_what_is_declared():
@@ -87,7 +92,9 @@ def test_the_plugin_is_the_exported_class_and_the_type_of_the_controller():
     source = (CONTROL / "src" / "controller.cpp").read_text("utf-8")
     (exported,) = re.findall(r"PLUGINLIB_EXPORT_CLASS\(([\w:]+), ([\w:]+)\)", source)
     assert (plugin.get("type"), plugin.get("base_class_type")) == exported
-    assert f"type: {plugin.get('name')}\n" in (CONTROL / "config/controllers.yaml").read_text("utf-8")
+    assert f"type: {plugin.get('name')}\n" in (CONTROL / "config/controllers.yaml").read_text(
+        "utf-8"
+    )
     library = ElementTree.parse(CONTROL / "controllers.xml").getroot().get("path")
     assert f"add_library({library} SHARED" in (CONTROL / "CMakeLists.txt").read_text("utf-8")
 
@@ -101,7 +108,9 @@ def test_the_joints_are_the_same_everywhere():
         assert joint.get("name") == name
         for kind in ("command_interface", "state_interface"):
             assert [each.get("name") for each in joint.findall(kind)] == ["position"]
-    assert f"joints: [{', '.join(JOINTS)}]" in (CONTROL / "config/controllers.yaml").read_text("utf-8")
+    assert f"joints: [{', '.join(JOINTS)}]" in (CONTROL / "config/controllers.yaml").read_text(
+        "utf-8"
+    )
     names = ", ".join(f'"{joint}"' for joint in JOINTS)
     for path in (CONTROL / "src/controller.cpp", CONTROL / "src/node.cpp"):
         assert f"{{{names}}}" in path.read_text("utf-8")
@@ -110,7 +119,9 @@ def test_the_joints_are_the_same_everywhere():
 
 def test_pixi_brings_every_dependency():
     manifest = tomllib.loads((ROS / "pixi.toml").read_text("utf-8"))
-    brought = {name.removeprefix("ros-jazzy-").replace("-", "_") for name in manifest["dependencies"]}
+    brought = {
+        name.removeprefix("ros-jazzy-").replace("-", "_") for name in manifest["dependencies"]
+    }
     needed = set.union(*(declared(package) for package in PACKAGES))
     needed |= imported(*ROS.glob("test/*.py")) - {"conftest", "numpy", "record"}
     # launch and messages come with others; crtk_msgs has to be beside the packages.

@@ -22,7 +22,8 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.time import Time
 from sensor_msgs.msg import CameraInfo, Image, JointState
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
-from tautscope import ConfigError, Frame, load_config
+from tautscope import Frame, load_config
+from tautscope.errors import ConfigError
 from tautscope.loop.safety import Reaction
 
 from tautscope_node.control_loop import ControlLoop, OperatingState
