@@ -1,4 +1,4 @@
-"""What the tests of the packages share: a recording, and an operator and an endoscope that replay it."""
+"""A recording, and an operator, an endoscope and drives that replay it."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -45,7 +46,7 @@ class Recorded:
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
     folder = tmp_path_factory.mktemp("recordings")
     sys.path.insert(0, str(ROOT / "examples" / "cpp"))
-    import record  # noqa: PLC0415
+    import record
 
     record.record_frames(folder).write(folder, "frames")
     return Recorded(
@@ -162,9 +163,7 @@ def stamp(message: JointState) -> int:
 def last_motion(messages: list[JointState]) -> int:
     """Stamp of the last message whose positions differ from those before [ns]."""
     moved = [
-        stamp(after)
-        for before, after in zip(messages, messages[1:], strict=False)
-        if before.position != after.position
+        stamp(after) for before, after in pairwise(messages) if before.position != after.position
     ]
     return moved[-1] if moved else 0
 

@@ -136,7 +136,7 @@ def test_motion_begins_where_the_drives_are(laboratory, recorded):
 
 
 def laboratory_message(laboratory, position):
-    from sensor_msgs.msg import JointState  # noqa: PLC0415
+    from sensor_msgs.msg import JointState
 
     message = JointState(name=JOINTS, position=position.tolist())
     message.header.stamp = laboratory.get_clock().now().to_msg()

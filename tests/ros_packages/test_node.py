@@ -3,7 +3,6 @@
 import doubles
 import numpy as np
 import pytest
-
 from tautscope.config import Config, dump_config
 
 doubles.install()

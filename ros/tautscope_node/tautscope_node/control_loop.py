@@ -16,7 +16,7 @@ from tautscope.runs.experiment import BackgroundUpdater
 
 Floats = NDArray[np.float64]
 START_TOLERANCE = np.array([1e-3, 0.05, 0.05])
-"""Largest distance of the drives from the last command when they are enabled again [m, rad, rad]."""
+"""Largest distance of the drives from the last command when enabled again [m, rad, rad]."""
 
 
 class OperatingState(StrEnum):
