@@ -48,7 +48,7 @@ public:
     CallbackReturn on_configure(const rclcpp_lifecycle::State &) override {
         const auto node = get_node();
         try {
-            session_ = std::make_unique<Session>(
+            session_ = Session::create(
                 *node, SessionSettings{node->get_parameter("config").as_string(), joints(),
                                        node->get_parameter("image_topic").as_string(),
                                        node->get_parameter("frame_id").as_string(), "~/"});
@@ -67,15 +67,15 @@ public:
             return CallbackReturn::FAILURE;
         }
         servo_ = node->create_subscription<sensor_msgs::msg::JointState>(
-            "~/servo_jp", rclcpp::QoS(1), [this](const sensor_msgs::msg::JointState &message) {
-                if (const auto position = positions(message, session_->joints())) {
-                    received_.writeFromNonRT({*position, session_->seconds(message.header.stamp), ++messages_});
+            "~/servo_jp", rclcpp::QoS(1), [this, session = session_](const sensor_msgs::msg::JointState &message) {
+                if (const auto position = positions(message, session->joints())) {
+                    received_.writeFromNonRT({*position, session->seconds(message.header.stamp), ++messages_});
                 } else {
                     RCLCPP_WARN_THROTTLE(get_node()->get_logger(), *get_node()->get_clock(), 1000,
                                          "servo_jp: joints are missing");
                 }
             });
-        report_ = node->create_wall_timer(std::chrono::milliseconds(100), [this] { session_->report(); });
+        report_ = node->create_wall_timer(std::chrono::milliseconds(100), [session = session_] { session->report(); });
         return CallbackReturn::SUCCESS;
     }
 
@@ -172,7 +172,7 @@ private:
         return CallbackReturn::SUCCESS;
     }
 
-    std::unique_ptr<Session> session_;
+    std::shared_ptr<Session> session_;
     realtime_tools::RealtimeBuffer<Received> received_;
     std::uint64_t messages_ = 0, used_message_ = 0;
     double made_at_ = unknown;

@@ -33,7 +33,7 @@ public:
 
     CallbackReturn on_configure(const rclcpp_lifecycle::State &) override {
         try {
-            session_ = std::make_unique<Session>(
+            session_ = Session::create(
                 *this, SessionSettings{get_parameter("config").as_string(), get_parameter("joints").as_string_array(),
                                        get_parameter("image_topic").as_string(), get_parameter("frame_id").as_string(), ""});
             if (!session_->control().set_compensation(get_parameter("compensation").as_double())) {
@@ -162,7 +162,7 @@ private:
         return result;
     }
 
-    std::unique_ptr<Session> session_;
+    std::shared_ptr<Session> session_;
     OperatingState last_ = OperatingState::disabled;
     JointState setpoint_message_, command_message_;
     rclcpp::Publisher<JointState>::SharedPtr setpoint_, actuators_;

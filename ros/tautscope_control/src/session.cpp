@@ -37,6 +37,23 @@ std::string description(const Status &status) {
 
 } // namespace
 
+std::shared_ptr<Session> Session::create(rclcpp_lifecycle::LifecycleNode &node, const SessionSettings &settings) {
+    std::shared_ptr<Session> session(new Session(node, settings));
+    session->state_command_ = node.create_subscription<crtk_msgs::msg::StringStamped>(
+        settings.prefix + "state_command", rclcpp::QoS(10),
+        [weak = std::weak_ptr<Session>(session)](const crtk_msgs::msg::StringStamped &message) {
+            const auto session = weak.lock();
+            const auto request = parse_state_command(message.string);
+            if (session && request) {
+                session->control_.post(*request);
+            } else if (session) {
+                RCLCPP_WARN(session->logger_, "state_command %s: expected enable, disable, pause, resume or acknowledge",
+                            message.string.c_str());
+            }
+        });
+    return session;
+}
+
 Session::Session(rclcpp_lifecycle::LifecycleNode &node, const SessionSettings &settings)
     : settings_(settings), clock_(node.get_clock()), logger_(node.get_logger()), name_(node.get_fully_qualified_name()),
       origin_(clock_->now()), control_(tautscope::read_file(settings.config)) {
@@ -58,7 +75,7 @@ Session::Session(rclcpp_lifecycle::LifecycleNode &node, const SessionSettings &s
     image_group_ = node.create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive);
     rclcpp::SubscriptionOptions options;
     options.callback_group = image_group_;
-    // A running callback may outlive the subscription: it holds the worker, and nothing of this object.
+    // A running callback may outlive the subscription.
     images_ = node.create_subscription<sensor_msgs::msg::Image>(
         settings_.image_topic, rclcpp::SensorDataQoS().keep_last(1),
         [worker = std::weak_ptr<DetectionWorker>(worker_), origin = origin_, logger = logger_,
@@ -73,15 +90,6 @@ Session::Session(rclcpp_lifecycle::LifecycleNode &node, const SessionSettings &s
             }
         },
         options);
-    state_command_ = node.create_subscription<crtk_msgs::msg::StringStamped>(
-        topic("state_command"), rclcpp::QoS(10), [this](const crtk_msgs::msg::StringStamped &message) {
-            if (const auto request = parse_state_command(message.string)) {
-                control_.post(*request);
-            } else {
-                RCLCPP_WARN(logger_, "state_command %s: expected enable, disable, pause, resume or acknowledge",
-                            message.string.c_str());
-            }
-        });
     publish_state(control_.status(), clock_->now());
 }
 

@@ -39,11 +39,12 @@ struct SessionSettings {
 /// Control loop with image subscription, `state_command`, `measured_js`, `hysteresis/delta`, `operating_state`, `warning` and
 /// diagnostics, from configuring a node to cleaning it up.
 ///
-/// Images are received in a callback group of their own and detected in a thread of their own.
+/// Images are received in a callback group of their own and detected in a thread of their own. No callback that still runs uses a
+/// session that has ended.
 class Session {
 public:
     /// Throws `tautscope::Error` or `std::invalid_argument`, which say what is wrong in the settings.
-    Session(rclcpp_lifecycle::LifecycleNode &node, const SessionSettings &settings);
+    static std::shared_ptr<Session> create(rclcpp_lifecycle::LifecycleNode &node, const SessionSettings &settings);
 
     ~Session();
 
@@ -67,6 +68,8 @@ public:
     sensor_msgs::msg::JointState joint_state() const;
 
 private:
+    Session(rclcpp_lifecycle::LifecycleNode &node, const SessionSettings &settings);
+
     double seconds(const rclcpp::Time &time) const { return 1e-9 * static_cast<double>((time - origin_).nanoseconds()); }
     void on_report(const TautscopeReport &report);
     void publish_state(const Status &status, const rclcpp::Time &now);
