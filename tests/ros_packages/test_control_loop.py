@@ -155,6 +155,22 @@ def test_motion_begins_where_the_drives_are():
     assert rig.control.is_misplaced
 
 
+def test_a_reference_from_before_neither_begins_nor_stops_a_motion():
+    rig = Rig()
+    rig.control.request("enable")
+    rig.control.set_reference(START, rig.time - 1.0)
+    tick = rig.wait(0.5)
+    assert (tick.is_sent, tick.state) == (False, OperatingState.ENABLED)
+    rig.move(0.5)
+    rig.control.request("pause")
+    rig.wait(0.5)
+    rig.control.request("resume")
+    rig.control.set_reference([40e-3, 0.0, 0.9], rig.time - 0.2)
+    resumed = rig.time
+    assert rig.wait(0.5).state is OperatingState.ENABLED
+    assert rig.motion(resumed)[0] == []
+
+
 def test_what_is_not_finite_or_not_known_changes_nothing():
     rig = Rig()
     rig.control.request("enable")

@@ -62,7 +62,8 @@ std::string flag_names(std::uint32_t flags) {
 
 ControlLoop::ControlLoop(const std::string &toml)
     : loop_(toml), period_(loop_.period()), measured_{unknown, unknown, unknown}, reference_(measured_), used_(measured_),
-      command_(measured_), made_at_(unknown) {}
+      command_(measured_), made_at_(unknown),
+      engaged_at_(unknown) {}
 
 void ControlLoop::set_measured(const Vector &position) noexcept {
     if (is_finite(position)) {
@@ -79,7 +80,9 @@ void ControlLoop::set_reference(const Vector &position, double made_at) noexcept
 }
 
 Tick ControlLoop::step(double time) noexcept {
-    apply_requests();
+    apply_requests(time);
+    // An old reference must not begin a motion, nor stop one that has not begun.
+    has_new_reference_ = has_new_reference_ && !(made_at_ < engaged_at_);
     const double share = wanted_share_.load(std::memory_order_relaxed);
     if (share != share_ && tautscope_loop_set_compensation(loop_.handle(), share) == TAUTSCOPE_RESULT_OK) {
         share_ = share;
@@ -133,7 +136,7 @@ Status ControlLoop::status() const noexcept {
             published_misplaced_.load(std::memory_order_relaxed)};
 }
 
-void ControlLoop::apply_requests() noexcept {
+void ControlLoop::apply_requests(double time) noexcept {
     const std::uint32_t requests = requests_.exchange(0, std::memory_order_relaxed);
     if (contains(requests, Request::acknowledge)) {
         tautscope_loop_acknowledge(loop_.handle());
@@ -141,9 +144,11 @@ void ControlLoop::apply_requests() noexcept {
     // What stops comes last, so that it wins.
     if (contains(requests, Request::resume) && state_ == OperatingState::paused) {
         engage();
+        engaged_at_ = time;
     }
-    if (contains(requests, Request::enable)) {
+    if (contains(requests, Request::enable) && state_ != OperatingState::enabled) {
         enable();
+        engaged_at_ = time;
     }
     if (contains(requests, Request::pause) && state_ == OperatingState::enabled) {
         is_paused_ = true;
@@ -161,9 +166,6 @@ void ControlLoop::apply_requests() noexcept {
 }
 
 void ControlLoop::enable() noexcept {
-    if (state_ == OperatingState::enabled) {
-        return;
-    }
     if (is_finite(command_)) {
         is_misplaced_ = false;
         for (std::size_t i = 0; i < command_.size() && is_finite(measured_); ++i) {

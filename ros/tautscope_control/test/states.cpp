@@ -175,6 +175,22 @@ void motion_begins_where_the_drives_are(const std::string &toml) {
     EXPECT(!tick.is_sent && tick.state == OperatingState::fault && rig.control.status().is_misplaced);
 }
 
+void a_reference_from_before_neither_begins_nor_stops_a_motion(const std::string &toml) {
+    Rig rig(toml);
+    rig.control.post(Request::enable);
+    rig.control.set_reference(start, rig.time - 1.0);
+    Tick tick = rig.wait(0.5);
+    EXPECT(!tick.is_sent && tick.state == OperatingState::enabled);
+    rig.move(0.5);
+    rig.control.post(Request::pause);
+    rig.wait(0.5);
+    rig.control.post(Request::resume);
+    rig.control.set_reference({40e-3, 0.0, 0.9}, rig.time - 0.2);
+    rig.last_motion = nan;
+    tick = rig.wait(0.5);
+    EXPECT(tick.state == OperatingState::enabled && std::isnan(rig.last_motion));
+}
+
 void what_is_not_finite_changes_nothing(const std::string &toml) {
     Rig rig(toml);
     rig.control.post(Request::enable);
@@ -203,6 +219,7 @@ int main(int count, char **arguments) try {
     a_pause_holds_until_resumed(toml);
     a_drive_fault_stops_the_drives(toml);
     motion_begins_where_the_drives_are(toml);
+    a_reference_from_before_neither_begins_nor_stops_a_motion(toml);
     what_is_not_finite_changes_nothing(toml);
     state_commands_are_those_of_crtk();
     std::printf("%d failures\n", failures);

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -77,6 +78,8 @@ class ControlLoop:
         self._made_at: float | None = None
         self._is_clutching = False
         self._is_paused = False
+        self._is_engaging = False
+        self._engaged_at = -math.inf
 
     def set_measured(self, position: Sequence[float] | Floats) -> None:
         """Position of the drives (3,) [m, rad, rad]; values that are not finite are ignored."""
@@ -93,6 +96,11 @@ class ControlLoop:
     def step(self, time: float) -> Tick:
         """One control tick at a time [s]."""
         new, self._next = self._next, None
+        if self._is_engaging:
+            self._engaged_at, self._is_engaging = time, False
+        if new is not None and new[1] is not None and new[1] < self._engaged_at:
+            # An old reference must not begin a motion, nor stop one that has not begun.
+            new = None
         if self.state is OperatingState.DISABLED:
             return Tick(self._command, False, self.state)
         if new is not None:
@@ -151,6 +159,7 @@ class ControlLoop:
                 self.state = OperatingState.FAULT
                 return
         self.state = OperatingState.ENABLED
+        self._is_engaging = True
         if has_command:
             self._engage()
         elif self._measured is not None:
@@ -185,6 +194,7 @@ class ControlLoop:
 
     def _engage(self) -> None:
         self.loop.engage()
+        self._is_engaging = True
         self._is_paused = False
         self._is_clutching = bool(np.isfinite(self._command).all())
 

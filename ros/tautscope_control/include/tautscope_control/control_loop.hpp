@@ -114,7 +114,7 @@ public:
     tautscope::Loop &loop() noexcept { return loop_; }
 
 private:
-    void apply_requests() noexcept;
+    void apply_requests(double time) noexcept;
     void enable() noexcept;
     void engage() noexcept;
     void update_state() noexcept;
@@ -124,6 +124,8 @@ private:
     double period_;
     Vector measured_, reference_, used_, command_;
     double made_at_;
+    /// When motion was last enabled or resumed [s].
+    double engaged_at_;
     bool has_new_reference_ = false;
     /// The next new reference is where the motion begins, wherever it is.
     bool is_clutching_ = false;
