@@ -252,6 +252,15 @@ def test_ticks_go_on_while_an_image_is_detected():
     assert first[1].status is Status.NO_MARKERS
 
 
+def test_the_first_image_creates_nothing_in_a_tick(monkeypatch):
+    control = ControlLoop(Config(), Held())
+    control.enable()
+    control.set_reference(START, 0.0)
+    control.step(0.0)
+    monkeypatch.setattr("tautscope.loop.vision.MarkerDetector", None)
+    assert control.exchange(Frame(np.zeros((576, 720, 3), np.uint8), 0.0, 1)) == []
+
+
 def test_images_go_through_a_thread():
     with ThreadPoolExecutor(1) as executor:
         control = ControlLoop(Config(), executor)

@@ -67,6 +67,8 @@ class ControlLoop:
 
     def __init__(self, config: Config, executor: Executor) -> None:
         self.loop = HysteresisReduction(config)
+        # It creates the detector, which takes 0.1 s, now and not in a tick.
+        self.loop.prepare_detection(Frame(np.empty(0, np.uint8), 0.0, 0))
         self.period = config.control.period
         self.reference = np.full(3, np.nan)
         self.state = OperatingState.DISABLED
