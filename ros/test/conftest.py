@@ -20,6 +20,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
 from rclpy.time import Time
 from sensor_msgs.msg import Image, JointState
+from std_msgs.msg import String
 
 ROOT = Path(__file__).resolve().parents[2]
 JOINTS = ["insertion", "rotation", "bending"]
@@ -89,13 +90,18 @@ class Laboratory(Node):
             lambda message: self.states.append(message.state),
             latched,
         )
-        for topic, texts, qos in (
-            (f"{namespace}/warning", self.warnings, latched),
-            (f"{namespace}/actuators/state_command", self.drive_commands, reliable),
-        ):
-            self._listen(
-                StringStamped, topic, lambda message, texts=texts: texts.append(message.string), qos
-            )
+        self._listen(
+            String,
+            f"{namespace}/warning",
+            lambda message: self.warnings.append(message.data),
+            latched,
+        )
+        self._listen(
+            StringStamped,
+            f"{namespace}/actuators/state_command",
+            lambda message: self.drive_commands.append(message.string),
+            reliable,
+        )
         self.executor_of_tests = SingleThreadedExecutor()
         self.executor_of_tests.add_node(self)
 

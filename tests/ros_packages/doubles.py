@@ -120,7 +120,7 @@ def modules() -> dict[str, ModuleType]:
         "diagnostic_msgs": ("DiagnosticArray", "DiagnosticStatus", "KeyValue"),
         "rcl_interfaces": ("SetParametersResult",),
         "sensor_msgs": ("CameraInfo", "Image", "JointState"),
-        "std_msgs": ("Float64MultiArray", "MultiArrayDimension"),
+        "std_msgs": ("Float64MultiArray", "MultiArrayDimension", "String"),
     }
     found = [
         _module("rclpy"),

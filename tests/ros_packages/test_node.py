@@ -48,6 +48,9 @@ class Laboratory:
     def texts(self, topic):
         return [message.string for message in self.node.published[topic]]
 
+    def warnings(self):
+        return [message.data for message in self.node.published["warning"]]
+
     def states(self):
         return [message.state for message in self.node.published["operating_state"]]
 
@@ -100,7 +103,7 @@ def test_commands_have_names_and_stamps_and_stop_with_the_device(laboratory):
     assert last - 10_000_000 < max(np.array(times)[1:][moved]) <= last + 100_000_000
     assert times[-1] > last + 900_000_000
     assert laboratory.states()[-1] == "PAUSED"
-    assert any("reference_late" in text for text in laboratory.texts("warning"))
+    assert any("reference_late" in text for text in laboratory.warnings())
 
 
 def test_the_tip_has_a_stamp_of_zero_without_markers(laboratory):

@@ -65,7 +65,7 @@ Session::Session(rclcpp_lifecycle::LifecycleNode &node, const SessionSettings &s
     measured_ = rclcpp::create_publisher<sensor_msgs::msg::JointState>(node, topic("measured_js"), latest);
     delta_ = rclcpp::create_publisher<std_msgs::msg::Float64MultiArray>(node, topic("hysteresis/delta"), latest);
     operating_state_ = rclcpp::create_publisher<crtk_msgs::msg::OperatingState>(node, topic("operating_state"), latched);
-    warning_ = rclcpp::create_publisher<crtk_msgs::msg::StringStamped>(node, topic("warning"), latched);
+    warning_ = rclcpp::create_publisher<std_msgs::msg::String>(node, topic("warning"), latched);
     diagnostics_ = rclcpp::create_publisher<diagnostic_msgs::msg::DiagnosticArray>(node, "/diagnostics", latest);
     worker_ = std::make_shared<DetectionWorker>(
         tautscope::read_file(settings.config), control_.detection(),
@@ -137,11 +137,10 @@ void Session::report() {
     }
     const bool has_warning = status.is_misplaced || status.latched != 0 || status.flags != 0;
     if (has_warning && (status.flags != last_.flags || status.latched != last_.latched || status.is_misplaced != last_.is_misplaced)) {
-        crtk_msgs::msg::StringStamped warning;
-        warning.header.stamp = now;
-        warning.string = description(status);
+        std_msgs::msg::String warning;
+        warning.data = description(status);
         warning_->publish(warning);
-        RCLCPP_WARN(logger_, "%s", warning.string.c_str());
+        RCLCPP_WARN(logger_, "%s", warning.data.c_str());
     }
     if (has_changed || reports_ % reports_per_second == 0) {
         publish_diagnostics(status, now);

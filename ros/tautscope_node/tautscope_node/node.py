@@ -21,7 +21,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from rclpy.signals import SignalHandlerOptions
 from rclpy.time import Time
 from sensor_msgs.msg import CameraInfo, Image, JointState
-from std_msgs.msg import Float64MultiArray, MultiArrayDimension
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension, String
 from tautscope import Frame, load_config
 from tautscope.errors import ConfigError
 from tautscope.loop.safety import Reaction
@@ -146,7 +146,7 @@ class InstrumentNode(LifecycleNode):
         self._measured = publish(JointState, "measured_js", LATEST)
         self._delta = publish(Float64MultiArray, "hysteresis/delta", LATEST)
         self._operating_state = publish(OperatingStateMessage, "operating_state", LATCHED)
-        self._warning = publish(StringStamped, "warning", LATCHED)
+        self._warning = publish(String, "warning", LATCHED)
         self._diagnostics = publish(DiagnosticArray, "/diagnostics", LATEST)
         subscribe(JointState, "servo_jp", self._on_reference, LATEST)
         subscribe(StringStamped, "state_command", self._on_state_command, COMMANDS)
@@ -290,9 +290,7 @@ class InstrumentNode(LifecycleNode):
         if control.is_misplaced:
             text = "the drives are not where the last command was: clean up and configure again"
         if has_warning and warned != self._warned:
-            warning = StringStamped(string=text)
-            warning.header.stamp = self.get_clock().now().to_msg()
-            self._warning.publish(warning)
+            self._warning.publish(String(data=text))
             self.get_logger().warning(text)
         self._warned = warned
         if self._reports % REPORTS_PER_SECOND == 0:

@@ -16,6 +16,7 @@
 #include <sensor_msgs/msg/image.hpp>
 #include <sensor_msgs/msg/joint_state.hpp>
 #include <std_msgs/msg/float64_multi_array.hpp>
+#include <std_msgs/msg/string.hpp>
 
 #include "tautscope_control/control_loop.hpp"
 #include "tautscope_control/detection_worker.hpp"
@@ -84,7 +85,7 @@ private:
     rclcpp::Publisher<sensor_msgs::msg::JointState>::SharedPtr measured_;
     rclcpp::Publisher<std_msgs::msg::Float64MultiArray>::SharedPtr delta_;
     rclcpp::Publisher<crtk_msgs::msg::OperatingState>::SharedPtr operating_state_;
-    rclcpp::Publisher<crtk_msgs::msg::StringStamped>::SharedPtr warning_;
+    rclcpp::Publisher<std_msgs::msg::String>::SharedPtr warning_;
     rclcpp::Publisher<diagnostic_msgs::msg::DiagnosticArray>::SharedPtr diagnostics_;
     /// When an image was last used [s].
     std::atomic<double> measured_at_{-1.0};
