@@ -38,8 +38,8 @@ class Laboratory:
                 report()
             self.node.now += round(period * 1e9)
 
-    def refer(self, position):
-        message = stamped(self.node.now, name=JOINTS, position=list(position))
+    def refer(self, position, age=0):
+        message = stamped(self.node.now - age, name=JOINTS, position=list(position))
         self.node.callbacks["servo_jp"](message)
 
     def request(self, text):
@@ -104,6 +104,14 @@ def test_commands_have_names_and_stamps_and_stop_with_the_device(laboratory):
     assert times[-1] > last + 900_000_000
     assert laboratory.states()[-1] == "PAUSED"
     assert any("reference_late" in text for text in laboratory.warnings())
+
+
+def test_an_old_reference_stops_the_motion_though_it_arrives_now(laboratory):
+    laboratory.request("enable")
+    laboratory.run(0.5, speed=0.01)
+    laboratory.refer(START, age=80_000_000)
+    laboratory.run(0.005)
+    assert laboratory.states()[-1] == "PAUSED"
 
 
 def test_the_tip_has_a_stamp_of_zero_without_markers(laboratory):
@@ -187,6 +195,8 @@ def test_a_wrong_parameter_is_refused_and_named(laboratory, monkeypatch, overrid
     assert node.on_configure(None) == "failure"
     assert text in node.logged[-1]
     assert node.callbacks == {}
+    # There is no loop that would refuse it.
+    assert node.set_parameter("compensation", 2.0).successful
 
 
 def test_the_share_of_the_compensation_is_checked(laboratory):

@@ -293,7 +293,7 @@ class InstrumentNode(LifecycleNode):
             self._warning.publish(String(data=text))
             self.get_logger().warning(text)
         self._warned = warned
-        if self._reports % REPORTS_PER_SECOND == 0:
+        if control.state != self._reported_state or self._reports % REPORTS_PER_SECOND == 0:
             self._publish_state()
             self._diagnose(text if has_warning else self._problem or str(control.state))
         if self._now() - self._measured_at > MEASURED_TIMEOUT:
@@ -305,6 +305,7 @@ class InstrumentNode(LifecycleNode):
         message = OperatingStateMessage(state=str(self._control.state), is_homed=True)
         message.header.stamp = self.get_clock().now().to_msg()
         self._operating_state.publish(message)
+        self._reported_state = self._control.state
 
     def _diagnose(self, text: str) -> None:
         assert self._control is not None
