@@ -25,7 +25,7 @@ PAPER = (ROOT / "docs" / "paper.md").read_text(encoding="utf-8")
 
 REFERENCE = re.compile(r"`([\w./-]+\.(?:py|rs))::(\w+)`")
 """`file::name`, the file from the repository's root."""
-FOLDERS = ("benchmarks", "configs", "crates", "docs", "examples", "python", "tests")
+FOLDERS = ("benchmarks", "configs", "crates", "docs", "examples", "python", "ros", "tests")
 TREE_PATH = re.compile(rf"`((?:{'|'.join(FOLDERS)})/[\w./-]+)(?:::\w+)?`")
 LINK = re.compile(r"\]\(([^)#\s]+)")
 

@@ -11,7 +11,7 @@ namespace allocations {
 inline std::atomic<unsigned long> count{0};
 }
 
-#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__)
+#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define ALLOCATIONS_ARE_COUNTED 1
 
 extern "C" {

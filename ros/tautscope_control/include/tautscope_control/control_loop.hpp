@@ -1,0 +1,147 @@
+/* The loop with operating states, requests of other threads, and detection in a thread of its own. It knows no ROS. */
+
+#ifndef TAUTSCOPE_CONTROL__CONTROL_LOOP_HPP_
+#define TAUTSCOPE_CONTROL__CONTROL_LOOP_HPP_
+
+#include <atomic>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include <tautscope.hpp>
+
+#include "tautscope_control/detection_exchange.hpp"
+
+namespace tautscope_control {
+
+using tautscope::Vector;
+
+/// Operating states of the collaborative robotics toolkit (CRTK).
+enum class OperatingState : std::uint8_t {
+    /// The loop does not run, and no command is to be sent.
+    disabled,
+    /// The reference is followed.
+    enabled,
+    /// The command is held; `resume` continues where the reference then is.
+    paused,
+    /// The drives are to be stopped; `enable` clears it, unless the loop has to be created anew.
+    fault,
+};
+
+/// The name in a message: "DISABLED", "ENABLED", "PAUSED", "FAULT".
+const char *name(OperatingState state) noexcept;
+
+/// What an operator or a drive asks of the loop.
+enum class Request : std::uint32_t {
+    disable = 1,
+    pause = 2,
+    drive_fault = 4,
+    enable = 8,
+    resume = 16,
+    acknowledge = 32,
+};
+
+/// The request of a CRTK `state_command`; none for any other text.
+std::optional<Request> parse_state_command(std::string_view text) noexcept;
+
+/// Result of a control tick.
+struct Tick {
+    /// Insertion, rotation, bending [m, rad, rad]; NaN before the first reference.
+    Vector command;
+    /// Whether the command is to be sent to the drives.
+    bool is_sent;
+    OperatingState state;
+};
+
+/// State for other threads; each member is from one of the last ticks.
+struct Status {
+    OperatingState state;
+    TautscopeReaction reaction;
+    /// A bit `1 << TautscopeFlag` each.
+    std::uint32_t flags;
+    /// Flags raised since the last acknowledgement.
+    std::uint32_t latched;
+    /// Whether enabling was refused: the drives were not where the last command was.
+    bool is_misplaced;
+};
+
+/// The names of flags, separated by commas.
+std::string flag_names(std::uint32_t flags);
+
+/// Control loop: reference in, command out, in operating states.
+///
+/// All functions are for the control thread, but for `post`, `set_compensation` and `status`. None but the constructor allocates,
+/// blocks or reads a clock. Times are seconds on one clock, the same for references, ticks and images.
+class ControlLoop {
+public:
+    /// Largest distance of the drives from the last command when they are enabled again [m, rad, rad].
+    static constexpr Vector start_tolerance{1e-3, 0.05, 0.05};
+
+    /// From the configuration with every key, as `tautscope config` prints it. Throws `tautscope::Error`.
+    explicit ControlLoop(const std::string &toml);
+
+    /// The control period [s].
+    double period() const noexcept { return period_; }
+
+    /// Position of the drives [m, rad, rad], before `enable`; values that are not finite are ignored.
+    void set_measured(const Vector &position) noexcept;
+
+    /// The newest reference [m, rad, rad], made at `made_at` [s], NaN if that is not known; none if it is not finite.
+    void set_reference(const Vector &position, double made_at) noexcept;
+
+    /// One control tick at `time` [s]: applies requests, then steps the loop.
+    Tick step(double time) noexcept;
+
+    /// After the command of a tick has been sent: hands predictions to the detection, and its results to the loop.
+    void exchange() noexcept;
+
+    /// Requests an operation for the next tick.
+    void post(Request request) noexcept;
+
+    /// Share of the compensation from the next tick on, 0 to 1. Returns false for any other number, and changes nothing.
+    bool set_compensation(double share) noexcept;
+
+    Status status() const noexcept;
+
+    /// The newest reference that went into the loop [m, rad, rad]; NaN before the first.
+    const Vector &reference() const noexcept { return used_; }
+
+    /// For the thread that detects.
+    DetectionExchange &detection() noexcept { return exchange_; }
+
+    /// The loop itself, for features from a detector of your own.
+    tautscope::Loop &loop() noexcept { return loop_; }
+
+private:
+    void apply_requests(double time) noexcept;
+    void enable() noexcept;
+    void engage() noexcept;
+    void update_state() noexcept;
+
+    tautscope::Loop loop_;
+    DetectionExchange exchange_;
+    double period_;
+    Vector measured_, reference_, used_, command_;
+    double made_at_;
+    /// When motion was last enabled or resumed [s].
+    double engaged_at_;
+    bool has_new_reference_ = false;
+    /// The next new reference is where the motion begins, wherever it is.
+    bool is_clutching_ = false;
+    bool is_paused_ = false;
+    /// The drives were elsewhere when they should have been enabled.
+    bool is_misplaced_ = false;
+    OperatingState state_ = OperatingState::disabled;
+    double share_ = 1.0;
+    std::atomic<std::uint32_t> requests_{0};
+    std::atomic<double> wanted_share_{1.0};
+    std::atomic<OperatingState> published_state_{OperatingState::disabled};
+    std::atomic<TautscopeReaction> reaction_{TAUTSCOPE_REACTION_NONE};
+    std::atomic<std::uint32_t> flags_{0}, latched_{0};
+    std::atomic<bool> published_misplaced_{false};
+};
+
+} // namespace tautscope_control
+
+#endif

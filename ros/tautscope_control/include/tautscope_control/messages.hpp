@@ -1,0 +1,33 @@
+/* Conversions between messages and the control loop. */
+
+#ifndef TAUTSCOPE_CONTROL__MESSAGES_HPP_
+#define TAUTSCOPE_CONTROL__MESSAGES_HPP_
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <sensor_msgs/msg/image.hpp>
+#include <sensor_msgs/msg/joint_state.hpp>
+
+#include "tautscope_control/control_loop.hpp"
+#include "tautscope_control/detection_worker.hpp"
+
+namespace tautscope_control {
+
+/// Throws `std::invalid_argument` unless there are three different joint names.
+void check_joints(const std::vector<std::string> &joints);
+
+/// Positions of the joints, by their names; by their order where the message has no names. None if one is missing.
+std::optional<Vector> positions(const sensor_msgs::msg::JointState &message, const std::vector<std::string> &joints);
+
+/// Writes positions into a message of these joints.
+void set_positions(sensor_msgs::msg::JointState &message, const Vector &positions);
+
+/// An image of its message, without a copy. None if the encoding is not one of bgr8, rgb8, bgra8, yuv422_yuy2, uyvy, yuv422,
+/// nv12.
+std::optional<OwnedImage> image(sensor_msgs::msg::Image::ConstSharedPtr message, double captured_at);
+
+} // namespace tautscope_control
+
+#endif

@@ -1,0 +1,102 @@
+/* What the node and the controller share: the loop, its images, and the topics that report on it. */
+
+#ifndef TAUTSCOPE_CONTROL__SESSION_HPP_
+#define TAUTSCOPE_CONTROL__SESSION_HPP_
+
+#include <atomic>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <crtk_msgs/msg/operating_state.hpp>
+#include <crtk_msgs/msg/string_stamped.hpp>
+#include <diagnostic_msgs/msg/diagnostic_array.hpp>
+#include <rclcpp/rclcpp.hpp>
+#include <rclcpp_lifecycle/lifecycle_node.hpp>
+#include <sensor_msgs/msg/image.hpp>
+#include <sensor_msgs/msg/joint_state.hpp>
+#include <std_msgs/msg/float64_multi_array.hpp>
+#include <std_msgs/msg/string.hpp>
+
+#include "tautscope_control/control_loop.hpp"
+#include "tautscope_control/detection_worker.hpp"
+
+namespace tautscope_control {
+
+/// Settings of a session, as parameters of its node.
+struct SessionSettings {
+    /// File of the configuration with every key, as `tautscope config` prints it.
+    std::string config;
+    /// Names of insertion, rotation and bending.
+    std::vector<std::string> joints;
+    /// Topic of the endoscope's images.
+    std::string image_topic;
+    /// `frame_id` of what is published.
+    std::string frame_id;
+    /// Begin of the names of topics: empty, or "~/".
+    std::string prefix;
+};
+
+/// Control loop with image subscription, `state_command`, `measured_js`, `hysteresis/delta`, `operating_state`, `warning` and
+/// diagnostics, from configuring a node to cleaning it up.
+///
+/// Images are received in a callback group of their own and detected in a thread of their own. No callback that still runs uses a
+/// session that has ended.
+class Session {
+public:
+    /// Throws `tautscope::Error` or `std::invalid_argument`, which say what is wrong in the settings.
+    static std::shared_ptr<Session> create(rclcpp_lifecycle::LifecycleNode &node, const SessionSettings &settings);
+
+    ~Session();
+
+    Session(const Session &) = delete;
+    Session &operator=(const Session &) = delete;
+
+    ControlLoop &control() noexcept { return control_; }
+
+    const std::vector<std::string> &joints() const noexcept { return settings_.joints; }
+
+    /// Seconds since the session began, on the node's clock.
+    double now() const { return seconds(clock_->now()); }
+
+    /// Seconds since the session began of the stamp of a message; of now, if it has none or one of the future.
+    double seconds(const builtin_interfaces::msg::Time &stamp) const;
+
+    /// Publishes state, warnings and diagnostics; from a timer, at 10 Hz.
+    void report();
+
+    /// A message of the joints, with names and `frame_id`.
+    sensor_msgs::msg::JointState joint_state() const;
+
+private:
+    Session(rclcpp_lifecycle::LifecycleNode &node, const SessionSettings &settings);
+
+    double seconds(const rclcpp::Time &time) const { return 1e-9 * static_cast<double>((time - origin_).nanoseconds()); }
+    void on_report(const TautscopeReport &report);
+    void publish_state(const Status &status, const rclcpp::Time &now);
+    void publish_diagnostics(const Status &status, const rclcpp::Time &now);
+
+    SessionSettings settings_;
+    rclcpp::Clock::SharedPtr clock_;
+    rclcpp::Logger logger_;
+    std::string name_;
+    rclcpp::Time origin_;
+    ControlLoop control_;
+    rclcpp::Publisher<sensor_msgs::msg::JointState>::SharedPtr measured_;
+    rclcpp::Publisher<std_msgs::msg::Float64MultiArray>::SharedPtr delta_;
+    rclcpp::Publisher<crtk_msgs::msg::OperatingState>::SharedPtr operating_state_;
+    rclcpp::Publisher<std_msgs::msg::String>::SharedPtr warning_;
+    rclcpp::Publisher<diagnostic_msgs::msg::DiagnosticArray>::SharedPtr diagnostics_;
+    /// When an image was last used [s].
+    std::atomic<double> measured_at_{-1.0};
+    Status last_{OperatingState::disabled, TAUTSCOPE_REACTION_NONE, 0, 0, false};
+    int reports_ = 0;
+    std::shared_ptr<DetectionWorker> worker_;
+    rclcpp::CallbackGroup::SharedPtr image_group_;
+    rclcpp::Subscription<sensor_msgs::msg::Image>::SharedPtr images_;
+    rclcpp::Subscription<crtk_msgs::msg::StringStamped>::SharedPtr state_command_;
+};
+
+} // namespace tautscope_control
+
+#endif

@@ -1,0 +1,217 @@
+#include "tautscope_control/control_loop.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace tautscope_control {
+
+namespace {
+
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+
+bool is_finite(const Vector &values) noexcept {
+    return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
+}
+
+bool contains(std::uint32_t requests, Request request) noexcept {
+    return (requests & static_cast<std::uint32_t>(request)) != 0;
+}
+
+} // namespace
+
+static_assert(std::atomic<double>::is_always_lock_free && std::atomic<std::uint32_t>::is_always_lock_free);
+
+const char *name(OperatingState state) noexcept {
+    switch (state) {
+    case OperatingState::enabled:
+        return "ENABLED";
+    case OperatingState::paused:
+        return "PAUSED";
+    case OperatingState::fault:
+        return "FAULT";
+    default:
+        return "DISABLED";
+    }
+}
+
+std::optional<Request> parse_state_command(std::string_view text) noexcept {
+    constexpr std::pair<std::string_view, Request> commands[] = {
+        {"enable", Request::enable}, {"disable", Request::disable},         {"pause", Request::pause},
+        {"resume", Request::resume}, {"acknowledge", Request::acknowledge},
+    };
+    for (const auto &[command, request] : commands) {
+        if (text == command) {
+            return request;
+        }
+    }
+    return std::nullopt;
+}
+
+std::string flag_names(std::uint32_t flags) {
+    std::string names;
+    for (std::uint32_t flag = 0; flag < 32; ++flag) {
+        const char *name = (flags >> flag) & 1U ? tautscope_flag_name(flag) : nullptr;
+        if (name != nullptr) {
+            names += names.empty() ? name : std::string(", ") + name;
+        }
+    }
+    return names;
+}
+
+ControlLoop::ControlLoop(const std::string &toml)
+    : loop_(toml), period_(loop_.period()), measured_{unknown, unknown, unknown}, reference_(measured_), used_(measured_),
+      command_(measured_), made_at_(unknown),
+      engaged_at_(unknown) {}
+
+void ControlLoop::set_measured(const Vector &position) noexcept {
+    if (is_finite(position)) {
+        measured_ = position;
+    }
+}
+
+void ControlLoop::set_reference(const Vector &position, double made_at) noexcept {
+    if (is_finite(position)) {
+        reference_ = position;
+        made_at_ = made_at;
+        has_new_reference_ = true;
+    }
+}
+
+Tick ControlLoop::step(double time) noexcept {
+    apply_requests(time);
+    // An old reference must not begin a motion, nor stop one that has not begun.
+    has_new_reference_ = has_new_reference_ && !(made_at_ < engaged_at_);
+    const double share = wanted_share_.load(std::memory_order_relaxed);
+    if (share != share_ && tautscope_loop_set_compensation(loop_.handle(), share) == TAUTSCOPE_RESULT_OK) {
+        share_ = share;
+    }
+    if (state_ == OperatingState::disabled) {
+        has_new_reference_ = false;
+        return {command_, false, state_};
+    }
+    double made_at = made_at_;
+    if (is_paused_ || is_clutching_) {
+        if (is_clutching_ && !is_paused_ && has_new_reference_) {
+            // Where the operator is now is where the motion continues.
+            tautscope_loop_engage(loop_.handle());
+            is_clutching_ = false;
+            used_ = reference_;
+        } else {
+            made_at = unknown;
+        }
+    } else if (has_new_reference_) {
+        used_ = reference_;
+    }
+    has_new_reference_ = false;
+    if (is_finite(used_)) {
+        tautscope_loop_step(loop_.handle(), used_.data(), made_at, time, command_.data());
+    }
+    update_state();
+    return {command_, is_finite(command_) && state_ != OperatingState::fault, state_};
+}
+
+void ControlLoop::exchange() noexcept {
+    if (state_ != OperatingState::disabled && exchange_.serve(loop_)) {
+        update_state();
+    }
+}
+
+void ControlLoop::post(Request request) noexcept {
+    requests_.fetch_or(static_cast<std::uint32_t>(request), std::memory_order_relaxed);
+}
+
+bool ControlLoop::set_compensation(double share) noexcept {
+    const bool is_share = share >= 0.0 && share <= 1.0;
+    if (is_share) {
+        wanted_share_.store(share, std::memory_order_relaxed);
+    }
+    return is_share;
+}
+
+Status ControlLoop::status() const noexcept {
+    return {published_state_.load(std::memory_order_relaxed), reaction_.load(std::memory_order_relaxed),
+            flags_.load(std::memory_order_relaxed), latched_.load(std::memory_order_relaxed),
+            published_misplaced_.load(std::memory_order_relaxed)};
+}
+
+void ControlLoop::apply_requests(double time) noexcept {
+    const std::uint32_t requests = requests_.exchange(0, std::memory_order_relaxed);
+    if (contains(requests, Request::acknowledge)) {
+        tautscope_loop_acknowledge(loop_.handle());
+    }
+    // What stops comes last, so that it wins.
+    if (contains(requests, Request::resume) && state_ == OperatingState::paused) {
+        engage();
+        engaged_at_ = time;
+    }
+    if (contains(requests, Request::enable) && state_ != OperatingState::enabled) {
+        enable();
+        engaged_at_ = time;
+    }
+    if (contains(requests, Request::pause) && state_ == OperatingState::enabled) {
+        is_paused_ = true;
+    }
+    if (contains(requests, Request::drive_fault) && state_ != OperatingState::disabled) {
+        tautscope_loop_raise_flag(loop_.handle(), TAUTSCOPE_FLAG_DRIVE_FAULT);
+    }
+    if (contains(requests, Request::disable)) {
+        state_ = OperatingState::disabled;
+        is_paused_ = is_misplaced_ = false;
+    }
+    if (requests != 0) {
+        update_state();
+    }
+}
+
+void ControlLoop::enable() noexcept {
+    if (is_finite(command_)) {
+        is_misplaced_ = false;
+        for (std::size_t i = 0; i < command_.size() && is_finite(measured_); ++i) {
+            is_misplaced_ |= std::abs(measured_[i] - command_[i]) > start_tolerance[i];
+        }
+        if (is_misplaced_) {
+            state_ = OperatingState::fault;
+            return;
+        }
+    }
+    state_ = OperatingState::enabled;
+    if (is_finite(command_)) {
+        engage();
+    } else if (is_finite(measured_)) {
+        // The first reference passes: the command begins where the drives are.
+        used_ = measured_;
+        is_clutching_ = true;
+    }
+}
+
+void ControlLoop::engage() noexcept {
+    tautscope_loop_engage(loop_.handle());
+    is_paused_ = false;
+    is_clutching_ = is_finite(command_);
+    state_ = OperatingState::enabled;
+}
+
+void ControlLoop::update_state() noexcept {
+    TautscopeSupervision now{};
+    if (tautscope_loop_supervision(loop_.handle(), &now) != TAUTSCOPE_RESULT_OK) {
+        now.reaction = TAUTSCOPE_REACTION_DISABLE;
+    }
+    if (state_ != OperatingState::disabled) {
+        if (is_misplaced_ || now.reaction >= TAUTSCOPE_REACTION_QUICK_STOP) {
+            state_ = OperatingState::fault;
+        } else if (is_paused_ || now.reaction == TAUTSCOPE_REACTION_HOLD_MOTION) {
+            state_ = OperatingState::paused;
+        } else {
+            state_ = OperatingState::enabled;
+        }
+    }
+    published_state_.store(state_, std::memory_order_relaxed);
+    reaction_.store(now.reaction, std::memory_order_relaxed);
+    flags_.store(now.flags, std::memory_order_relaxed);
+    latched_.store(now.latched, std::memory_order_relaxed);
+    published_misplaced_.store(is_misplaced_, std::memory_order_relaxed);
+}
+
+} // namespace tautscope_control

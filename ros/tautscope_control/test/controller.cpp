@@ -1,0 +1,262 @@
+/* The controller as plugin, with interfaces and a clock of this test: the commands of the loop, bit for bit, without an allocation.
+
+   controller RECORDING                                        (a recording of examples/cpp/record.py at 1 kHz, as .../best) */
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <controller_interface/chainable_controller_interface.hpp>
+#include <pluginlib/class_loader.hpp>
+#include <rcl/time.h>
+#include <rclcpp/rclcpp.hpp>
+#include <sensor_msgs/msg/joint_state.hpp>
+
+#include "recording.hpp"
+#include "tautscope_control/control_loop.hpp"
+
+namespace {
+/// Of this thread alone: the middleware has its own.
+thread_local bool is_counted = false;
+unsigned long allocations = 0;
+} // namespace
+
+extern "C" {
+void *__libc_malloc(std::size_t size);
+void *__libc_calloc(std::size_t number, std::size_t size);
+void *__libc_realloc(void *memory, std::size_t size);
+
+void *malloc(std::size_t size) {
+    allocations += is_counted;
+    return __libc_malloc(size);
+}
+
+void *calloc(std::size_t number, std::size_t size) {
+    allocations += is_counted;
+    return __libc_calloc(number, size);
+}
+
+void *realloc(void *memory, std::size_t size) {
+    allocations += is_counted;
+    return __libc_realloc(memory, size);
+}
+}
+
+namespace {
+
+using controller_interface::return_type;
+using hardware_interface::CommandInterface;
+using hardware_interface::LoanedCommandInterface;
+using hardware_interface::LoanedStateInterface;
+using hardware_interface::StateInterface;
+using lifecycle_msgs::msg::State;
+
+int failures = 0;
+
+#define EXPECT(condition)                                                                                              \
+    do {                                                                                                               \
+        if (!(condition)) {                                                                                            \
+            std::printf("line %d: %s\n", __LINE__, #condition);                                                        \
+            ++failures;                                                                                                \
+        }                                                                                                              \
+    } while (false)
+
+constexpr std::array<const char *, 3> joints{"insertion", "rotation", "bending"};
+constexpr tautscope::Vector start{25e-3, 0.0, 0.9};
+
+/// The controller, with motors that are where they were last commanded.
+class Rig {
+public:
+    Rig(pluginlib::ClassLoader<controller_interface::ChainableControllerInterface> &loader, const std::string &config)
+        : controller_(loader.createSharedInstance("tautscope_control/HysteresisController")) {
+        controller_interface::ControllerInterfaceParams parameters;
+        parameters.controller_name = "instrument";
+        parameters.controller_manager_update_rate = parameters.update_rate = 1000;
+        parameters.node_options.parameter_overrides({{"config", config}});
+        EXPECT(controller_->init(parameters) == return_type::OK);
+        // Simulated time.
+        EXPECT(rcl_enable_ros_time_override(clock()) == RCL_RET_OK);
+        set_time(0);
+        executor_.add_node(controller_->get_node()->get_node_base_interface());
+    }
+
+    ~Rig() { controller_->get_node()->shutdown(); }
+
+    void configure() {
+        EXPECT(controller_->configure().id() == State::PRIMARY_STATE_INACTIVE);
+        references_ = controller_->export_reference_interfaces();
+        EXPECT(references_.size() == joints.size());
+        for (std::size_t i = 0; i < joints.size(); ++i) {
+            EXPECT(references_[i]->get_name() == std::string("instrument/") + joints[i] + "/position");
+        }
+    }
+
+    void activate(bool is_chained) {
+        EXPECT(controller_->set_chained_mode(is_chained));
+        std::vector<LoanedCommandInterface> commands;
+        std::vector<LoanedStateInterface> states;
+        const auto command_names = controller_->command_interface_configuration().names;
+        const auto state_names = controller_->state_interface_configuration().names;
+        for (std::size_t i = 0; i < joints.size(); ++i) {
+            const std::string name = std::string(joints[i]) + "/position";
+            EXPECT(command_names.at(i) == name && state_names.at(i) == name);
+            commands.emplace_back(std::make_shared<CommandInterface>(joints[i], "position", &command[i]), nullptr);
+            states.emplace_back(std::make_shared<StateInterface>(joints[i], "position", &measured[i]), nullptr);
+        }
+        controller_->assign_interfaces(std::move(commands), std::move(states));
+        EXPECT(controller_->get_node()->activate().id() == State::PRIMARY_STATE_ACTIVE);
+    }
+
+    void deactivate() {
+        EXPECT(controller_->get_node()->deactivate().id() == State::PRIMARY_STATE_INACTIVE);
+        controller_->release_interfaces();
+    }
+
+    void refer(const tautscope::Vector &reference) {
+        for (std::size_t i = 0; i < joints.size(); ++i) {
+            EXPECT(references_[i]->set_value(reference[i]));
+        }
+    }
+
+    return_type update(std::int64_t nanoseconds) {
+        set_time(nanoseconds);
+        is_counted = true;
+        const return_type result = controller_->update(rclcpp::Time(nanoseconds), rclcpp::Duration(0, 1000000));
+        is_counted = false;
+        measured = command;
+        return result;
+    }
+
+    void spin() { executor_.spin_some(); }
+
+    rclcpp_lifecycle::LifecycleNode &node() { return *controller_->get_node(); }
+
+    std::array<double, 3> command{start}, measured{start};
+
+private:
+    rcl_clock_t *clock() { return controller_->get_node()->get_clock()->get_clock_handle(); }
+
+    void set_time(std::int64_t nanoseconds) { EXPECT(rcl_set_ros_time_override(clock(), epoch + nanoseconds) == RCL_RET_OK); }
+
+    static constexpr std::int64_t epoch = 1'700'000'000'000'000'000;
+
+    std::shared_ptr<controller_interface::ChainableControllerInterface> controller_;
+    std::vector<CommandInterface::SharedPtr> references_;
+    rclcpp::executors::SingleThreadedExecutor executor_;
+};
+
+using Loader = pluginlib::ClassLoader<controller_interface::ChainableControllerInterface>;
+
+void chained_references_give_the_commands_of_the_loop(Loader &loader, const std::string &recording) {
+    Rig rig(loader, recording + ".toml");
+    rig.configure();
+    rig.activate(true);
+    tautscope_control::ControlLoop expected(tautscope::read_file(recording + ".toml"));
+    expected.set_measured(start);
+    expected.post(tautscope_control::Request::enable);
+    const auto ticks = read_rows<Tick>(recording + ".ticks");
+    std::size_t wrong = 0, moved = 0;
+    for (std::size_t tick = 0; tick < 13000; ++tick) {
+        const auto nanoseconds = static_cast<std::int64_t>(tick) * 1000000;
+        rig.refer(ticks[tick].reference);
+        const auto before = rig.command;
+        EXPECT(rig.update(nanoseconds) == return_type::OK);
+        expected.set_reference(ticks[tick].reference, std::nan(""));
+        const auto wanted = expected.step(1e-9 * static_cast<double>(nanoseconds)).command;
+        wrong += std::memcmp(wanted.data(), rig.command.data(), sizeof wanted) != 0;
+        moved += rig.command != before;
+    }
+    std::printf("%zu updates unlike the loop, %zu with motion, %lu allocations\n", wrong, moved, allocations);
+    EXPECT(wrong == 0 && moved > 10000 && allocations == 0);
+
+    // A reference that is not a number is none: the command rests, and goes on from there.
+    const auto rest = rig.command;
+    rig.refer({std::nan(""), 0.0, 0.9});
+    EXPECT(rig.update(13000 * 1000000LL) == return_type::OK && rig.command == rest);
+
+    // Deactivated, moved by hand, and activated again: an error, and no command.
+    rig.deactivate();
+    rig.measured[0] = rig.command[0] + 2e-3;
+    rig.activate(true);
+    rig.refer(ticks[13000].reference);
+    EXPECT(rig.update(13001 * 1000000LL) == return_type::ERROR && rig.command == rest);
+    rig.deactivate();
+    rig.measured = rig.command;
+    rig.activate(true);
+    EXPECT(rig.update(13002 * 1000000LL) == return_type::OK && rig.command == rest);
+}
+
+void references_of_a_topic_stop_with_their_device(Loader &loader, const std::string &recording) {
+    Rig rig(loader, recording + ".toml");
+    rig.configure();
+    rig.activate(false);
+    const auto publisher =
+        rclcpp::create_publisher<sensor_msgs::msg::JointState>(rig.node(), "/instrument/servo_jp", rclcpp::QoS(1));
+    sensor_msgs::msg::JointState message;
+    message.name = {joints.begin(), joints.end()};
+    message.position = {start.begin(), start.end()};
+    std::int64_t now = 0;
+    const auto run = [&](int ticks, double speed) {
+        std::int64_t last_motion = 0;
+        for (int tick = 0; tick < ticks; ++tick, now += 1000000) {
+            if (speed != 0.0) {
+                message.position[0] += 1e-3 * speed;
+                publisher->publish(message);
+                // Delivered within the process, by its time of arrival.
+                rig.spin();
+            }
+            const auto before = rig.command;
+            EXPECT(rig.update(now) == return_type::OK);
+            last_motion = rig.command != before ? now : last_motion;
+        }
+        return last_motion;
+    };
+    const std::int64_t moving = run(500, 0.01);
+    EXPECT(moving > now - 50000000);
+    const std::int64_t silent_since = now;
+    EXPECT(run(1000, 0.0) <= silent_since + 100000000);
+    // It returns: held until the operator resumes.
+    EXPECT(run(200, 0.01) == 0);
+    std::printf("%lu allocations\n", allocations);
+    EXPECT(allocations == 0);
+}
+
+void wrong_parameters_are_refused(Loader &loader, const std::string &recording) {
+    for (const rclcpp::Parameter &wrong :
+         {rclcpp::Parameter("config", "missing.toml"), rclcpp::Parameter("compensation", 1.5), rclcpp::Parameter("update_rate", 200)}) {
+        const auto controller = loader.createSharedInstance("tautscope_control/HysteresisController");
+        controller_interface::ControllerInterfaceParams parameters;
+        parameters.controller_name = "instrument";
+        parameters.controller_manager_update_rate = parameters.update_rate = 1000;
+        std::vector<rclcpp::Parameter> overrides{wrong};
+        if (wrong.get_name() != "config") {
+            overrides.emplace_back("config", recording + ".toml");
+        }
+        parameters.node_options.parameter_overrides(overrides);
+        EXPECT(controller->init(parameters) == return_type::OK);
+        EXPECT(controller->configure().id() == State::PRIMARY_STATE_UNCONFIGURED);
+        controller->get_node()->shutdown();
+    }
+}
+
+} // namespace
+
+int main(int count, char **arguments) {
+    rclcpp::init(0, nullptr);
+    {
+        const std::string recording = count == 2 ? arguments[1] : "best";
+        Loader loader("controller_interface", "controller_interface::ChainableControllerInterface");
+        chained_references_give_the_commands_of_the_loop(loader, recording);
+        references_of_a_topic_stop_with_their_device(loader, recording);
+        wrong_parameters_are_refused(loader, recording);
+    }
+    rclcpp::shutdown();
+    std::printf("%d failures\n", failures);
+    return failures > 0;
+}

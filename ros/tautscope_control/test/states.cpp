@@ -1,0 +1,230 @@
+/* Operating states: what moves the command, what stops it, and when. */
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <string>
+
+#include <tautscope_control/control_loop.hpp>
+
+using namespace tautscope_control;
+
+namespace {
+
+int failures = 0;
+
+#define EXPECT(condition)                                                                                              \
+    do {                                                                                                               \
+        if (!(condition)) {                                                                                            \
+            std::printf("line %d: %s\n", __LINE__, #condition);                                                        \
+            ++failures;                                                                                                \
+        }                                                                                                              \
+    } while (false)
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr Vector start{25e-3, 0.0, 0.9};
+
+/// A loop with its clock, and an operator who moves the insertion at 10 mm/s.
+struct Rig {
+    explicit Rig(const std::string &toml) : control(toml) {}
+
+    /// Ticks without a word from the operator.
+    Tick wait(double duration) {
+        Tick result{};
+        for (const double end = time + duration; time < end; time += control.period()) {
+            result = control.step(time);
+            control.exchange();
+            const double step = std::abs(result.command[0] - last);
+            largest_step = std::isfinite(step) ? std::max(largest_step, step) : largest_step;
+            last_motion = step > 0 ? time : last_motion;
+            last = result.command[0];
+        }
+        return result;
+    }
+
+    /// Ticks with a new reference each.
+    Tick move(double duration, double speed = 10e-3) {
+        Tick result{};
+        for (const double end = time + duration; time < end;) {
+            reference[0] += speed * control.period();
+            control.set_reference(reference, time);
+            result = wait(control.period() / 2);
+        }
+        return result;
+    }
+
+    ControlLoop control;
+    Vector reference = start;
+    double time = 100.0, last = nan, last_motion = nan, largest_step = 0.0;
+};
+
+void disabled_until_enabled(const std::string &toml) {
+    Rig rig(toml);
+    EXPECT(rig.control.status().state == OperatingState::disabled);
+    Tick tick = rig.move(0.1);
+    EXPECT(!tick.is_sent && tick.state == OperatingState::disabled);
+    rig.control.post(Request::enable);
+    tick = rig.wait(0.1);
+    // Nothing to send before the first reference.
+    EXPECT(!tick.is_sent && tick.state == OperatingState::enabled);
+    tick = rig.move(0.1);
+    EXPECT(tick.is_sent && tick.command[0] > start[0]);
+    rig.control.post(Request::disable);
+    tick = rig.move(0.1);
+    EXPECT(!tick.is_sent && tick.state == OperatingState::disabled);
+}
+
+void a_silent_device_stops_the_motion(const std::string &toml) {
+    for (const double silence_at : {0.5, 0.503, 1.7}) {
+        Rig rig(toml);
+        rig.control.post(Request::enable);
+        rig.move(silence_at);
+        const double silent_since = rig.time;
+        EXPECT(rig.last_motion > silent_since - 2 * rig.control.period());
+        Tick tick = rig.wait(1.0);
+        EXPECT(rig.last_motion <= silent_since + 0.1);
+        EXPECT(tick.is_sent && tick.state == OperatingState::paused);
+        EXPECT(rig.control.status().flags & (1U << TAUTSCOPE_FLAG_REFERENCE_LATE));
+        // The device returns elsewhere: nothing moves before the operator resumes, and then from where the command is.
+        rig.reference[0] += 20e-3;
+        rig.last_motion = nan;
+        tick = rig.move(0.5);
+        EXPECT(std::isnan(rig.last_motion) && tick.state == OperatingState::paused);
+        rig.largest_step = 0.0;
+        rig.control.post(Request::resume);
+        tick = rig.move(0.5);
+        EXPECT(tick.state == OperatingState::enabled && rig.last_motion > rig.time - 2 * rig.control.period());
+        EXPECT(rig.largest_step < 1e-3);
+    }
+}
+
+void a_jump_stops_the_motion(const std::string &toml) {
+    Rig rig(toml);
+    rig.control.post(Request::enable);
+    rig.move(0.5);
+    rig.reference[0] += 20e-3;
+    rig.largest_step = 0.0;
+    const Tick tick = rig.move(0.2);
+    EXPECT(tick.state == OperatingState::paused && rig.largest_step < 1e-3);
+}
+
+void a_pause_holds_until_resumed(const std::string &toml) {
+    Rig rig(toml);
+    rig.control.post(Request::enable);
+    rig.move(0.5);
+    rig.control.post(Request::pause);
+    Tick tick = rig.wait(0.01);
+    rig.last_motion = nan;
+    rig.largest_step = 0.0;
+    tick = rig.move(2.0);
+    EXPECT(tick.is_sent && tick.state == OperatingState::paused && std::isnan(rig.last_motion));
+    rig.control.post(Request::resume);
+    tick = rig.move(1.0);
+    EXPECT(tick.state == OperatingState::enabled && rig.last_motion > 0.0 && rig.largest_step < 1e-3);
+    // What stops wins over what moves, in whichever order they were asked for.
+    rig.control.post(Request::pause);
+    rig.control.post(Request::resume);
+    EXPECT(rig.wait(0.01).state == OperatingState::paused);
+    rig.control.post(Request::disable);
+    rig.control.post(Request::enable);
+    EXPECT(rig.wait(0.01).state == OperatingState::disabled);
+}
+
+void a_drive_fault_stops_the_drives(const std::string &toml) {
+    Rig rig(toml);
+    rig.control.post(Request::drive_fault);
+    EXPECT(rig.wait(0.01).state == OperatingState::disabled);
+    rig.control.post(Request::enable);
+    rig.move(0.5);
+    rig.control.post(Request::drive_fault);
+    Tick tick = rig.move(0.1);
+    EXPECT(!tick.is_sent && tick.state == OperatingState::fault);
+    EXPECT(rig.control.status().reaction == TAUTSCOPE_REACTION_QUICK_STOP);
+    rig.control.post(Request::resume);
+    EXPECT(rig.wait(0.01).state == OperatingState::fault);
+    rig.largest_step = 0.0;
+    rig.control.post(Request::enable);
+    tick = rig.move(0.5);
+    EXPECT(tick.is_sent && tick.state == OperatingState::enabled && rig.largest_step < 1e-3);
+}
+
+void motion_begins_where_the_drives_are(const std::string &toml) {
+    Rig rig(toml);
+    const Vector measured{35e-3, 0.1, 0.8};
+    rig.control.set_measured({nan, nan, nan});
+    rig.control.set_measured(measured);
+    rig.control.post(Request::enable);
+    Tick tick = rig.wait(0.1);
+    EXPECT(tick.is_sent && tick.command == measured);
+    rig.largest_step = 0.0;
+    tick = rig.move(0.5);
+    EXPECT(tick.state == OperatingState::enabled && rig.largest_step < 1e-3);
+    EXPECT(tick.command[0] > measured[0] && tick.command[0] < measured[0] + 15e-3);
+    // Enabled again where the command was, and refused elsewhere.
+    rig.control.post(Request::disable);
+    rig.wait(1.0);
+    rig.control.set_measured(tick.command);
+    rig.control.post(Request::enable);
+    EXPECT(rig.wait(0.01).state == OperatingState::enabled);
+    rig.control.post(Request::disable);
+    rig.wait(0.1);
+    rig.control.set_measured({tick.command[0] + 2e-3, tick.command[1], tick.command[2]});
+    rig.control.post(Request::enable);
+    tick = rig.move(0.1);
+    EXPECT(!tick.is_sent && tick.state == OperatingState::fault && rig.control.status().is_misplaced);
+}
+
+void a_reference_from_before_neither_begins_nor_stops_a_motion(const std::string &toml) {
+    Rig rig(toml);
+    rig.control.post(Request::enable);
+    rig.control.set_reference(start, rig.time - 1.0);
+    Tick tick = rig.wait(0.5);
+    EXPECT(!tick.is_sent && tick.state == OperatingState::enabled);
+    rig.move(0.5);
+    rig.control.post(Request::pause);
+    rig.wait(0.5);
+    rig.control.post(Request::resume);
+    rig.control.set_reference({40e-3, 0.0, 0.9}, rig.time - 0.2);
+    rig.last_motion = nan;
+    tick = rig.wait(0.5);
+    EXPECT(tick.state == OperatingState::enabled && std::isnan(rig.last_motion));
+}
+
+void what_is_not_finite_changes_nothing(const std::string &toml) {
+    Rig rig(toml);
+    rig.control.post(Request::enable);
+    rig.move(0.5);
+    const Tick before = rig.wait(0.01);
+    rig.control.set_reference({nan, 0.0, 0.9}, rig.time);
+    EXPECT(rig.wait(0.01).command == before.command);
+    EXPECT(!rig.control.set_compensation(nan) && !rig.control.set_compensation(1.1) && rig.control.set_compensation(0.0));
+}
+
+void state_commands_are_those_of_crtk() {
+    EXPECT(parse_state_command("enable") == Request::enable);
+    EXPECT(parse_state_command("resume") == Request::resume);
+    EXPECT(!parse_state_command("home") && !parse_state_command("ENABLE") && !parse_state_command(""));
+    EXPECT(flag_names(0).empty());
+    EXPECT(flag_names((1U << TAUTSCOPE_FLAG_LOST) | (1U << TAUTSCOPE_FLAG_LATE) | (1U << 31)) == "late, lost");
+}
+
+} // namespace
+
+int main(int count, char **arguments) try {
+    const std::string toml = tautscope::read_file(count == 2 ? arguments[1] : "best.toml");
+    disabled_until_enabled(toml);
+    a_silent_device_stops_the_motion(toml);
+    a_jump_stops_the_motion(toml);
+    a_pause_holds_until_resumed(toml);
+    a_drive_fault_stops_the_drives(toml);
+    motion_begins_where_the_drives_are(toml);
+    a_reference_from_before_neither_begins_nor_stops_a_motion(toml);
+    what_is_not_finite_changes_nothing(toml);
+    state_commands_are_those_of_crtk();
+    std::printf("%d failures\n", failures);
+    return failures > 0;
+} catch (const std::exception &error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 1;
+}

@@ -1,0 +1,110 @@
+"""Conversions between messages and the loop; nothing of ROS is imported."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from tautscope.config import CameraConfig
+from tautscope.loop.frame_layout import FrameLayout
+from tautscope.loop.reduction import Report, Status
+
+ENCODINGS = {
+    "bgr": ("bgr8",),
+    "rgb": ("rgb8",),
+    "bgra": ("bgra8",),
+    "yuyv": ("yuv422_yuy2",),
+    "uyvy": ("uyvy", "yuv422"),
+    "nv12": ("nv12",),
+}
+"""`camera.pixel_format` -> values of ``encoding``."""
+CALIBRATION_TOLERANCE = 0.01
+"""Largest difference of focal length or principal point from the configuration, of the width."""
+MEASURED = (Status.OK, Status.HELD, Status.PARTIAL)
+"""Image updates that measured the tip."""
+
+
+def check_joints(joints: Sequence[str]) -> None:
+    """Check the parameter of the joints' names.
+
+    Raises:
+        ValueError: They are not three different names.
+    """
+    if len(joints) != 3 or len(set(joints)) != 3:
+        raise ValueError(
+            f"Parameter joints: expected three different names, of insertion, rotation and "
+            f"bending, got {', '.join(joints)}"
+        )
+
+
+def nanoseconds(stamp: Any) -> int:
+    """A stamp, builtin_interfaces/Time, in ns."""
+    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
+
+
+def positions(message: Any, joints: Sequence[str]) -> NDArray[np.float64] | None:
+    """Positions (3,) of the joints in a JointState: by name, by order where it has no names.
+
+    None if one is missing.
+    """
+    names, values = list(message.name), list(message.position)
+    if not names:
+        return np.array(values, np.float64) if len(values) == len(joints) else None
+    if len(values) < len(names) or not set(joints) <= set(names):
+        return None
+    return np.array([values[names.index(joint)] for joint in joints], np.float64)
+
+
+def pixels(message: Any, camera: CameraConfig) -> NDArray[np.uint8]:
+    """The array of an Image, of the shape of `tautscope.loop.frame_layout`, without a copy.
+
+    Raises:
+        ValueError: Encoding, size or step are not those of the configured camera.
+    """
+    allowed = ENCODINGS.get(camera.pixel_format, ())
+    if message.encoding not in allowed:
+        raise ValueError(
+            f"Image of encoding {message.encoding}: expected {' or '.join(allowed)}, as "
+            f"camera.pixel_format {camera.pixel_format}"
+        )
+    shape = FrameLayout(camera).shape
+    line = int(np.prod(shape[1:]))
+    step, data = int(message.step), np.frombuffer(message.data, np.uint8)
+    if (message.width, message.height) != (camera.width, camera.height):
+        raise ValueError(
+            f"Image of {message.width} x {message.height} px: expected {camera.width} x "
+            f"{camera.height} px, as camera.width and camera.height"
+        )
+    if step < line or len(data) < step * shape[0]:
+        raise ValueError(f"Image of step {step} and {len(data)} bytes: expected {line} a line")
+    return data[: step * shape[0]].reshape(shape[0], step)[:, :line].reshape(shape)
+
+
+def calibration_problem(message: Any, camera: CameraConfig) -> str:
+    """What a CameraInfo has differently from the configuration; empty if nothing is."""
+    if (message.width, message.height) != (camera.width, camera.height):
+        return (
+            f"camera_info: {message.width} x {message.height} px, "
+            f"configured {camera.width} x {camera.height} px"
+        )
+    matrix = np.array(message.k, np.float64).reshape(3, 3)
+    if matrix[0, 0] == 0:
+        return ""  # Not calibrated.
+    configured = np.array([camera.fx, camera.fy, camera.cx, camera.cy])
+    found = matrix[[0, 1, 0, 1], [0, 1, 2, 2]]
+    if (np.abs(found - configured) > CALIBRATION_TOLERANCE * camera.width).any():
+        return f"camera_info: fx, fy, cx, cy {found.round(1)}, configured {configured.round(1)}"
+    return ""
+
+
+def is_measured(report: Report) -> bool:
+    """Whether an image update measured the tip; else the stamp of `measured_js` is 0."""
+    return report.status in MEASURED
+
+
+def offsets(report: Report) -> list[float]:
+    """delta_minus and delta_plus of each DOF, one after the other (6,)."""
+    values = np.stack([report.delta_minus, report.delta_plus], axis=1)
+    return [float(value) for value in values.ravel()]

@@ -1,0 +1,368 @@
+"""Lifecycle node with rclpy: CRTK topics in and out, and the loop in between."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from crtk_msgs.msg import OperatingState as OperatingStateMessage
+from crtk_msgs.msg import StringStamped
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.executors import MultiThreadedExecutor
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+from rclpy.time import Time
+from sensor_msgs.msg import CameraInfo, Image, JointState
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension, String
+from tautscope import Frame, load_config
+from tautscope.errors import ConfigError
+from tautscope.loop.safety import Reaction
+
+from tautscope_node.control_loop import ControlLoop, OperatingState
+from tautscope_node.messages import (
+    calibration_problem,
+    check_joints,
+    is_measured,
+    nanoseconds,
+    offsets,
+    pixels,
+    positions,
+)
+
+REPORT_PERIOD = 0.1
+"""Of state, warnings and diagnostics [s]."""
+REPORTS_PER_SECOND = 10
+MEASURED_TIMEOUT = 0.2
+"""Without a used image for this long, `measured_js` is invalid [s]."""
+LATEST = QoSProfile(depth=1)
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+COMMANDS = QoSProfile(depth=10)
+SENSOR = QoSProfile(
+    depth=1, history=HistoryPolicy.KEEP_LAST, reliability=ReliabilityPolicy.BEST_EFFORT
+)
+
+
+class InstrumentNode(LifecycleNode):
+    """Node of the instrument.
+
+    Everything but the reception of images runs in its default callback group, one at a time.
+    Detection runs in a thread of its own, so that no tick waits for it.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("tautscope", **options)
+        self.declare_parameter("config", "")
+        self.declare_parameter("joints", ["insertion", "rotation", "bending"])
+        self.declare_parameter("image_topic", "/endoscope/image_raw")
+        self.declare_parameter("camera_info_topic", "/endoscope/camera_info")
+        self.declare_parameter("frame_id", "guide")
+        self.declare_parameter("compensation", 1.0)
+        self._control: ControlLoop | None = None
+        self._detection: ThreadPoolExecutor | None = None
+        self._session_subscriptions: list[Any] = []
+        self._session_publishers: list[Any] = []
+        self._session_timers: list[Any] = []
+        self._last_state = OperatingState.DISABLED
+        self.add_on_set_parameters_callback(self._on_parameters)
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Read the configuration, and create the loop, publishers and subscriptions."""
+        try:
+            self._joints = list(self.get_parameter("joints").value)
+            check_joints(self._joints)
+            path = Path(self.get_parameter("config").value)
+            self._config = load_config(path)
+            self._detection = ThreadPoolExecutor(1, "detection")
+            self._control = ControlLoop(self._config, self._detection)
+            self._control.loop.set_compensation(self.get_parameter("compensation").value)
+        except (ConfigError, OSError, ValueError) as error:
+            self.get_logger().error(str(error))
+            self._release()
+            return TransitionCallbackReturn.FAILURE
+        self._origin = self.get_clock().now().nanoseconds
+        self._frame_id = self.get_parameter("frame_id").value
+        self._newest: Frame | None = None
+        self._sequence = self._reports = 0
+        self._arrived = self._replaced = self._used = 0
+        self._measured_at = -1.0
+        self._warned: tuple[Any, ...] = ()
+        self._problem = ""
+        self._create_topics()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Start the ticks; the state command `enable` starts the motion."""
+        assert self._control is not None
+        self._last_state = OperatingState.DISABLED
+        self._session_timers = [
+            self.create_timer(self._control.period, self._tick),
+            self.create_timer(REPORT_PERIOD, self._report),
+        ]
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Stop the drives."""
+        self.stop()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Stop the drives and release everything."""
+        self.stop()
+        self._release()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Stop the drives and release everything."""
+        return self.on_cleanup(state)
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Stop the drives and release everything."""
+        return self.on_cleanup(state)
+
+    def stop(self) -> None:
+        """Stop the drives and end the ticks."""
+        for timer in self._session_timers:
+            self.destroy_timer(timer)
+        self._session_timers = []
+        if self._control is not None and self._last_state is not OperatingState.DISABLED:
+            self._stop_drives()
+            self._control.disable()
+            self._last_state = OperatingState.DISABLED
+            self._publish_state()
+
+    def _create_topics(self) -> None:
+        publish, subscribe = self._publisher, self._subscribe
+        self._setpoint = publish(JointState, "setpoint_js", LATEST)
+        self._actuators = publish(JointState, "actuators/setpoint_js", LATEST)
+        self._actuators_command = publish(StringStamped, "actuators/state_command", COMMANDS)
+        self._measured = publish(JointState, "measured_js", LATEST)
+        self._delta = publish(Float64MultiArray, "hysteresis/delta", LATEST)
+        self._operating_state = publish(OperatingStateMessage, "operating_state", LATCHED)
+        self._warning = publish(String, "warning", LATCHED)
+        self._diagnostics = publish(DiagnosticArray, "/diagnostics", LATEST)
+        subscribe(JointState, "servo_jp", self._on_reference, LATEST)
+        subscribe(StringStamped, "state_command", self._on_state_command, COMMANDS)
+        subscribe(JointState, "actuators/measured_js", self._on_measured, LATEST)
+        subscribe(OperatingStateMessage, "actuators/operating_state", self._on_actuators, LATEST)
+        camera_info = self.get_parameter("camera_info_topic").value
+        subscribe(CameraInfo, camera_info, self._on_camera_info, LATEST)
+        images = self.get_parameter("image_topic").value
+        group = MutuallyExclusiveCallbackGroup()
+        subscribe(Image, images, self._on_image, SENSOR, callback_group=group)
+        self._publish_state()
+
+    def _publisher(self, kind: Any, topic: str, qos: QoSProfile) -> Any:
+        # Not those of the lifecycle: the state is published also while the node is not active.
+        publisher = self.create_publisher(kind, topic, qos)
+        self._session_publishers.append(publisher)
+        return publisher
+
+    def _subscribe(
+        self, kind: Any, topic: str, callback: Any, qos: QoSProfile, **options: Any
+    ) -> None:
+        subscription = self.create_subscription(kind, topic, callback, qos, **options)
+        self._session_subscriptions.append(subscription)
+
+    def _release(self) -> None:
+        for subscription in self._session_subscriptions:
+            self.destroy_subscription(subscription)
+        for publisher in self._session_publishers:
+            self.destroy_publisher(publisher)
+        self._session_subscriptions, self._session_publishers = [], []
+        if self._detection is not None:
+            self._detection.shutdown()
+        self._control = self._detection = None
+
+    def _now(self) -> float:
+        """Seconds since the node was configured, on its clock."""
+        return 1e-9 * (self.get_clock().now().nanoseconds - self._origin)
+
+    def _on_reference(self, message: JointState) -> None:
+        reference = positions(message, self._joints)
+        if self._control is None:
+            return
+        if reference is None:
+            self.get_logger().warning("servo_jp: joints are missing", throttle_duration_sec=1.0)
+            return
+        now, stamp = self.get_clock().now().nanoseconds, nanoseconds(message.header.stamp)
+        made_at = min(stamp, now) if stamp else now
+        self._control.set_reference(reference, 1e-9 * (made_at - self._origin))
+
+    def _on_state_command(self, message: StringStamped) -> None:
+        if self._control is not None and not self._control.request(message.string):
+            self.get_logger().warning(
+                f"state_command {message.string}: expected enable, disable, pause, resume or "
+                "acknowledge"
+            )
+
+    def _on_measured(self, message: JointState) -> None:
+        measured = positions(message, self._joints)
+        # CRTK: a stamp of 0 marks what is not valid.
+        if self._control is not None and measured is not None and nanoseconds(message.header.stamp):
+            self._control.set_measured(measured)
+
+    def _on_actuators(self, message: OperatingStateMessage) -> None:
+        if self._control is not None and message.state == OperatingState.FAULT:
+            self._control.raise_drive_fault()
+
+    def _on_camera_info(self, message: CameraInfo) -> None:
+        self._problem = calibration_problem(message, self._config.camera)
+        if self._problem:
+            self.get_logger().error(self._problem, throttle_duration_sec=10.0)
+
+    def _on_image(self, message: Image) -> None:
+        try:
+            image = pixels(message, self._config.camera)
+        except ValueError as error:
+            self.get_logger().error(str(error), throttle_duration_sec=1.0)
+            return
+        self._sequence += 1
+        self._arrived += 1
+        self._replaced += self._newest is not None
+        captured_at = 1e-9 * (nanoseconds(message.header.stamp) - self._origin)
+        self._newest = Frame(image, captured_at, self._sequence)
+
+    def _tick(self) -> None:
+        control = self._control
+        if control is None:
+            return
+        tick = control.step(self._now())
+        if tick.is_sent:
+            stamp = self.get_clock().now().to_msg()
+            self._actuators.publish(self._joint_state(tick.command, stamp))
+            self._setpoint.publish(self._joint_state(control.reference, stamp))
+        if tick.state is OperatingState.FAULT and self._last_state is not OperatingState.FAULT:
+            self._stop_drives()
+        self._last_state = tick.state
+        # After the command, which never waits for an image.
+        frame, self._newest = self._newest, None
+        for used, report in control.exchange(frame):
+            self._used += 1
+            stamp = Time().to_msg()
+            if is_measured(report):
+                captured = self._origin + round(1e9 * used.captured_at)
+                stamp = Time(nanoseconds=captured).to_msg()
+                self._measured_at = self._now()
+            self._measured.publish(self._joint_state(report.state_estimate, stamp))
+            delta = Float64MultiArray()
+            delta.layout.dim = [
+                MultiArrayDimension(label="insertion,rotation,bending", size=3, stride=6),
+                MultiArrayDimension(label="minus,plus", size=2, stride=2),
+            ]
+            delta.data = offsets(report)
+            self._delta.publish(delta)
+
+    def _joint_state(self, values: Any, stamp: Any) -> JointState:
+        message = JointState(name=self._joints, position=[float(value) for value in values])
+        message.header.stamp = stamp
+        message.header.frame_id = self._frame_id
+        return message
+
+    def _stop_drives(self) -> None:
+        """Quick stop; or disable, where the loop has to be created anew."""
+        assert self._control is not None
+        is_final = self._control.supervision.reaction is Reaction.DISABLE
+        command = StringStamped(string="disable" if is_final else "pause")
+        command.header.stamp = self.get_clock().now().to_msg()
+        self._actuators_command.publish(command)
+
+    def _report(self) -> None:
+        """State, warnings and diagnostics."""
+        control = self._control
+        if control is None:
+            return
+        supervision = control.supervision
+        if control.state is OperatingState.FAULT:
+            # A message may be lost, and a drive may begin to listen later.
+            self._stop_drives()
+        flags = tuple(dict.fromkeys((*supervision.flags, *supervision.latched)))
+        warned = (supervision.flags, supervision.latched, control.is_misplaced)
+        has_warning = bool(flags) or control.is_misplaced
+        text = f"{supervision.reaction}: {', '.join(flags)}"
+        if control.is_misplaced:
+            text = "the drives are not where the last command was: clean up and configure again"
+        if has_warning and warned != self._warned:
+            self._warning.publish(String(data=text))
+            self.get_logger().warning(text)
+        self._warned = warned
+        if control.state != self._reported_state or self._reports % REPORTS_PER_SECOND == 0:
+            self._publish_state()
+            self._diagnose(text if has_warning else self._problem or str(control.state))
+        if self._now() - self._measured_at > MEASURED_TIMEOUT:
+            self._measured.publish(self._joint_state([0.0] * 3, Time().to_msg()))
+        self._reports += 1
+
+    def _publish_state(self) -> None:
+        assert self._control is not None
+        message = OperatingStateMessage(state=str(self._control.state), is_homed=True)
+        message.header.stamp = self.get_clock().now().to_msg()
+        self._operating_state.publish(message)
+        self._reported_state = self._control.state
+
+    def _diagnose(self, text: str) -> None:
+        assert self._control is not None
+        supervision = self._control.supervision
+        level = DiagnosticStatus.OK
+        if supervision.reaction.rank >= Reaction.HOLD_MOTION.rank or self._control.is_misplaced:
+            level = DiagnosticStatus.ERROR
+        elif supervision.flags or supervision.latched or self._problem:
+            level = DiagnosticStatus.WARN
+        values = {
+            "operating_state": self._control.state,
+            "reaction": supervision.reaction,
+            "flags": ", ".join(supervision.flags),
+            "latched": ", ".join(supervision.latched),
+            "images arrived": self._arrived,
+            "images replaced by newer ones": self._replaced,
+            "images used": self._used,
+        }
+        status = DiagnosticStatus(
+            level=level,
+            name=f"{self.get_fully_qualified_name()}: hysteresis reduction",
+            hardware_id=self._frame_id,
+            message=text,
+            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
+        )
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics.publish(message)
+
+    def _on_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
+        for parameter in parameters:
+            if parameter.name == "compensation" and self._control is not None:
+                try:
+                    self._control.loop.set_compensation(parameter.value)
+                except ConfigError as error:
+                    return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the node until it is interrupted or terminated; then the drives are stopped."""
+    # The context outlives the signal, so that the stop can still be published.
+    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    node = InstrumentNode()
+    executor = MultiThreadedExecutor(2)
+    executor.add_node(node)
+    # In the main thread a wait for messages would also wait with the signal.
+    spinning = threading.Thread(target=executor.spin, daemon=True)
+    spinning.start()
+    try:
+        while spinning.is_alive():
+            spinning.join(0.1)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        executor.shutdown()
+        node.stop()
+        node.destroy_node()
+        rclpy.try_shutdown()

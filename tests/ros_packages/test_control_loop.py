@@ -1,0 +1,274 @@
+"""Operating states of the rclpy node's loop, and the same commands as the loop alone."""
+
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+
+import numpy as np
+import pytest
+import record
+from tautscope import Config, Frame
+from tautscope.loop.reduction import Status
+from tautscope_node.control_loop import ControlLoop, OperatingState
+
+START = np.array([25e-3, 0.0, 0.9])
+PERIOD = Config().control.period
+
+
+class Refused(Executor):
+    """An executor that must not be used."""
+
+    def submit(self, *_):
+        raise AssertionError
+
+
+class Rig:
+    """A loop with its clock, and an operator who moves the insertion."""
+
+    def __init__(self):
+        self.control = ControlLoop(Config(), Refused())
+        self.reference = START.copy()
+        self.time = 100.0
+        self.commands = []
+
+    def wait(self, duration):
+        """Ticks without a word from the operator."""
+        for _ in range(max(1, round(duration / PERIOD))):
+            tick = self.control.step(self.time)
+            self.control.exchange(None)
+            self.commands.append((self.time, tick.command[0]))
+            self.time += PERIOD
+        return tick
+
+    def move(self, duration, speed=10e-3):
+        """Ticks with a new reference each."""
+        for _ in range(round(duration / PERIOD)):
+            self.reference[0] += speed * PERIOD
+            self.control.set_reference(self.reference, self.time)
+            tick = self.wait(0)
+        return tick
+
+    def motion(self, since):
+        """Times of ticks in which the command moved, and the largest step."""
+        recent = [row for row in self.commands if row[0] >= since - 1.5 * PERIOD]
+        steps = np.abs(np.diff([value for _, value in recent]))
+        times = [time for (time, _), step in zip(recent[1:], steps, strict=True) if step > 0]
+        return times, steps.max(initial=0)
+
+
+def test_nothing_is_sent_before_it_is_enabled_and_referenced():
+    rig = Rig()
+    tick = rig.move(0.1)
+    assert (tick.is_sent, tick.state) == (False, OperatingState.DISABLED)
+    assert rig.control.request("enable")
+    assert not rig.wait(0.1).is_sent
+    tick = rig.move(0.1)
+    assert tick.is_sent
+    assert tick.command[0] > START[0]
+    assert rig.control.request("disable")
+    assert not rig.move(0.1).is_sent
+
+
+@pytest.mark.parametrize("after", [0.5, 0.505, 1.7])
+def test_a_silent_device_stops_the_motion_within_100_ms(after):
+    rig = Rig()
+    rig.control.request("enable")
+    rig.move(after)
+    silent_since = rig.time
+    tick = rig.wait(1.0)
+    times, _ = rig.motion(0.0)
+    assert silent_since - 2 * PERIOD < times[-1] <= silent_since + 0.1
+    assert (tick.is_sent, tick.state) == (True, OperatingState.PAUSED)
+    assert "reference_late" in rig.control.supervision.flags
+    # The device returns elsewhere: nothing moves before the operator resumes, and then from there.
+    rig.reference[0] += 20e-3
+    returned = rig.time
+    assert rig.move(0.5).state is OperatingState.PAUSED
+    assert rig.motion(returned)[0] == []
+    rig.control.request("resume")
+    assert rig.move(0.5).state is OperatingState.ENABLED
+    times, largest = rig.motion(returned)
+    assert times
+    assert largest < 1e-3
+
+
+def test_a_jump_stops_the_motion():
+    rig = Rig()
+    rig.control.request("enable")
+    rig.move(0.5)
+    rig.reference[0] += 20e-3
+    assert rig.move(0.2).state is OperatingState.PAUSED
+    assert rig.motion(0.0)[1] < 1e-3
+
+
+def test_a_pause_holds_until_resumed():
+    rig = Rig()
+    rig.control.request("enable")
+    rig.move(0.5)
+    rig.control.request("pause")
+    rig.wait(PERIOD)
+    paused = rig.time
+    tick = rig.move(2.0)
+    assert (tick.is_sent, tick.state) == (True, OperatingState.PAUSED)
+    assert rig.motion(paused)[0] == []
+    rig.control.request("resume")
+    assert rig.move(1.0).state is OperatingState.ENABLED
+    times, largest = rig.motion(paused)
+    assert times
+    assert largest < 1e-3
+
+
+def test_a_drive_fault_stops_the_drives_until_enabled():
+    rig = Rig()
+    rig.control.raise_drive_fault()
+    assert rig.control.state is OperatingState.DISABLED
+    rig.control.request("enable")
+    rig.move(0.5)
+    rig.control.raise_drive_fault()
+    tick = rig.move(0.1)
+    assert (tick.is_sent, tick.state) == (False, OperatingState.FAULT)
+    rig.control.request("resume")
+    assert rig.wait(PERIOD).state is OperatingState.FAULT
+    rig.control.request("enable")
+    tick = rig.move(0.5)
+    assert (tick.is_sent, tick.state) == (True, OperatingState.ENABLED)
+
+
+def test_motion_begins_where_the_drives_are():
+    rig = Rig()
+    measured = np.array([35e-3, 0.1, 0.8])
+    rig.control.set_measured([np.nan] * 3)
+    rig.control.set_measured(measured)
+    rig.control.request("enable")
+    assert (rig.wait(0.1).command == measured).all()
+    tick = rig.move(0.5)
+    assert measured[0] < tick.command[0] < measured[0] + 15e-3
+    assert rig.motion(0.0)[1] < 1e-3
+    rig.control.request("disable")
+    rig.wait(1.0)
+    rig.control.set_measured(tick.command)
+    rig.control.request("enable")
+    assert rig.wait(PERIOD).state is OperatingState.ENABLED
+    rig.control.request("disable")
+    rig.control.set_measured(tick.command + np.array([2e-3, 0.0, 0.0]))
+    rig.control.request("enable")
+    tick = rig.move(0.1)
+    assert (tick.is_sent, tick.state) == (False, OperatingState.FAULT)
+    assert rig.control.is_misplaced
+
+
+def test_a_reference_from_before_neither_begins_nor_stops_a_motion():
+    rig = Rig()
+    rig.control.request("enable")
+    rig.control.set_reference(START, rig.time - 1.0)
+    tick = rig.wait(0.5)
+    assert (tick.is_sent, tick.state) == (False, OperatingState.ENABLED)
+    rig.move(0.5)
+    rig.control.request("pause")
+    rig.wait(0.5)
+    rig.control.request("resume")
+    rig.control.set_reference([40e-3, 0.0, 0.9], rig.time - 0.2)
+    resumed = rig.time
+    assert rig.wait(0.5).state is OperatingState.ENABLED
+    assert rig.motion(resumed)[0] == []
+
+
+def test_what_is_not_finite_or_not_known_changes_nothing():
+    rig = Rig()
+    rig.control.request("enable")
+    rig.move(0.5)
+    before = rig.wait(PERIOD)
+    rig.control.set_reference([np.nan, 0.0, 0.9], rig.time)
+    assert (rig.wait(PERIOD).command == before.command).all()
+    assert not rig.control.request("home")
+    assert rig.control.state is OperatingState.ENABLED
+
+
+@pytest.mark.parametrize("profile", ["paper", "best"])
+def test_the_commands_are_those_of_the_loop_alone(profile, monkeypatch):
+    monkeypatch.setattr(record, "DURATION", 56.0)
+    recorded = record.record_features(profile)
+    control = ControlLoop(recorded.config, Refused())
+    control.enable()
+    images = iter(recorded.images)
+    image = next(images)
+    states = set()
+    for number, row in enumerate(recorded.ticks):
+        time, made_at, *values = row
+        reference, event, expected = values[:3], int(values[3]), values[4:]
+        match event:
+            case 1:
+                is_fault = control.state is OperatingState.FAULT
+                control.request("enable" if is_fault else "resume")
+            case 2:
+                control.request("acknowledge")
+            case 3:
+                control.raise_drive_fault()
+            case 4 | 5:
+                control.loop.set_compensation(0.5 if event == 4 else 1.0)
+        control.set_reference(reference, None if np.isnan(made_at) else made_at)
+        tick = control.step(time)
+        states.add(tick.state)
+        assert tick.command.tolist() == expected, f"tick {number}"
+        while image is not None and image[0] == number:
+            features = image[2:6]
+            control.loop.on_features(None if np.isnan(features).all() else features, image[1])
+            image = next(images, None)
+    assert states == {OperatingState.ENABLED, OperatingState.PAUSED, OperatingState.FAULT}
+
+
+class Held(Executor):
+    """An executor whose work is done when a test says so."""
+
+    def __init__(self):
+        self.waiting = []
+
+    def submit(self, function):
+        future = Future()
+        self.waiting.append((future, function))
+        return future
+
+    def work(self):
+        for future, function in self.waiting:
+            future.set_result(function())
+        self.waiting.clear()
+
+
+def test_ticks_go_on_while_an_image_is_detected():
+    executor = Held()
+    control = ControlLoop(Config(), executor)
+    control.enable()
+    control.set_reference(START, 0.0)
+    image = np.zeros((576, 720, 3), np.uint8)
+    frames = [Frame(image, number * PERIOD, number) for number in range(4)]
+    for frame in frames:
+        control.set_reference(START, frame.captured_at)
+        assert control.step(frame.captured_at).is_sent
+        assert control.exchange(frame) == []
+    # Of those that waited only the newest is detected.
+    executor.work()
+    (first,) = control.exchange(None)
+    executor.work()
+    (second,) = control.exchange(None)
+    assert [used.sequence for used, _ in (first, second)] == [0, 3]
+    assert first[1].status is Status.NO_MARKERS
+
+
+def test_the_first_image_creates_nothing_in_a_tick(monkeypatch):
+    control = ControlLoop(Config(), Held())
+    control.enable()
+    control.set_reference(START, 0.0)
+    control.step(0.0)
+    monkeypatch.setattr("tautscope.loop.vision.MarkerDetector", None)
+    assert control.exchange(Frame(np.zeros((576, 720, 3), np.uint8), 0.0, 1)) == []
+
+
+def test_images_go_through_a_thread():
+    with ThreadPoolExecutor(1) as executor:
+        control = ControlLoop(Config(), executor)
+        control.enable()
+        frame = Frame(np.zeros((576, 720, 3), np.uint8), 0.0, 1)
+        control.set_reference(START, 0.0)
+        control.step(0.0)
+        reports = control.exchange(frame)
+        while not reports:
+            reports = control.exchange(None)
+        assert reports[0][0] is frame

@@ -1,0 +1,206 @@
+"""The node with rclpy replaced by test doubles: topics, stamps, and what it does when it ends."""
+
+import doubles
+import numpy as np
+import pytest
+from tautscope.config import Config, dump_config
+
+doubles.install()
+from tautscope_node.node import InstrumentNode  # noqa: E402
+
+START = [25e-3, 0.0, 0.9]
+JOINTS = ["insertion", "rotation", "bending"]
+
+
+def stamped(nanoseconds, **fields):
+    message = doubles.Message(**fields)
+    message.header.stamp = doubles.Time(nanoseconds=nanoseconds).to_msg()
+    return message
+
+
+class Laboratory:
+    """An active node, and what happens around it."""
+
+    def __init__(self):
+        self.node = InstrumentNode()
+        assert self.node.on_configure(None) == "success"
+        assert self.node.on_activate(None) == "success"
+
+    def run(self, duration, speed=None):
+        """Timers of the node, with a reference in every tick if it has a speed [m/s]."""
+        (period, tick), (_, report) = self.node.timers
+        for number in range(round(duration / period)):
+            if speed is not None:
+                START[0] += speed * period
+                self.refer(START)
+            tick()
+            if number % 20 == 0:
+                report()
+            self.node.now += round(period * 1e9)
+
+    def refer(self, position, age=0):
+        message = stamped(self.node.now - age, name=JOINTS, position=list(position))
+        self.node.callbacks["servo_jp"](message)
+
+    def request(self, text):
+        self.node.callbacks["state_command"](doubles.Message(string=text))
+
+    def texts(self, topic):
+        return [message.string for message in self.node.published[topic]]
+
+    def warnings(self):
+        return [message.data for message in self.node.published["warning"]]
+
+    def states(self):
+        return [message.state for message in self.node.published["operating_state"]]
+
+
+@pytest.fixture
+def laboratory(tmp_path, monkeypatch):
+    path = tmp_path / "rig.toml"
+    path.write_text(dump_config(Config()))
+    monkeypatch.setattr(doubles.Node, "overrides", {"config": str(path)})
+    monkeypatch.setitem(globals(), "START", [25e-3, 0.0, 0.9])
+    return Laboratory()
+
+
+def test_names_and_quality_of_service_are_those_of_crtk_and_sensors(laboratory):
+    assert set(laboratory.node.callbacks) == {
+        "servo_jp",
+        "state_command",
+        "actuators/measured_js",
+        "actuators/operating_state",
+        "/endoscope/image_raw",
+        "/endoscope/camera_info",
+    }
+    assert set(laboratory.node.published) >= {
+        "setpoint_js",
+        "actuators/setpoint_js",
+        "actuators/state_command",
+        "measured_js",
+        "operating_state",
+        "warning",
+        "/diagnostics",
+    }
+    assert laboratory.node.qos["/endoscope/image_raw"].reliability == "best effort"
+    assert laboratory.node.qos["operating_state"].durability == "latched"
+    assert laboratory.node.groups["/endoscope/image_raw"] is not None
+    assert laboratory.node.groups["servo_jp"] is None
+
+
+def test_commands_have_names_and_stamps_and_stop_with_the_device(laboratory):
+    laboratory.run(0.1, speed=0.01)
+    commands = laboratory.node.published["actuators/setpoint_js"]
+    assert commands == []
+    laboratory.request("enable")
+    laboratory.run(0.5, speed=0.01)
+    last = laboratory.node.now
+    laboratory.run(1.0)
+    assert all(each.name == JOINTS and each.header.frame_id == "guide" for each in commands)
+    times = [each.header.stamp.sec * 10**9 + each.header.stamp.nanosec for each in commands]
+    assert (np.diff(times) == 5_000_000).all()
+    moved = np.diff([each.position[0] for each in commands]) != 0
+    assert last - 10_000_000 < max(np.array(times)[1:][moved]) <= last + 100_000_000
+    assert times[-1] > last + 900_000_000
+    assert laboratory.states()[-1] == "PAUSED"
+    assert any("reference_late" in text for text in laboratory.warnings())
+
+
+def test_an_old_reference_stops_the_motion_though_it_arrives_now(laboratory):
+    laboratory.request("enable")
+    laboratory.run(0.5, speed=0.01)
+    laboratory.refer(START, age=80_000_000)
+    laboratory.run(0.005)
+    assert laboratory.states()[-1] == "PAUSED"
+
+
+def test_the_tip_has_a_stamp_of_zero_without_markers(laboratory):
+    laboratory.request("enable")
+    laboratory.run(0.05, speed=0.0)
+    image = stamped(
+        laboratory.node.now,
+        encoding="bgr8",
+        width=720,
+        height=576,
+        step=2160,
+        data=bytes(720 * 576 * 3),
+    )
+    laboratory.node.callbacks["/endoscope/image_raw"](image)
+    measured = laboratory.node.published["measured_js"]
+    while not laboratory.node.published["hysteresis/delta"]:
+        laboratory.run(0.05, speed=0.0)
+    assert measured
+    assert all(each.header.stamp.sec == each.header.stamp.nanosec == 0 for each in measured)
+    assert len(laboratory.node.published["hysteresis/delta"][0].data) == 6
+
+
+@pytest.mark.parametrize("end", ["on_deactivate", "on_cleanup", "on_shutdown", "on_error"])
+def test_every_end_stops_the_drives_once(laboratory, end):
+    laboratory.request("enable")
+    laboratory.run(0.2, speed=0.01)
+    assert laboratory.texts("actuators/state_command") == []
+    assert getattr(laboratory.node, end)(None) == "success"
+    assert laboratory.texts("actuators/state_command") == ["pause"]
+    assert laboratory.states()[-1] == "DISABLED"
+    assert laboratory.node.timers == []
+    laboratory.node.stop()
+    assert laboratory.texts("actuators/state_command") == ["pause"]
+    if end != "on_deactivate":
+        assert laboratory.node.callbacks == {}
+
+
+def test_a_fault_of_the_drives_stops_them_until_it_is_cleared(laboratory):
+    laboratory.request("enable")
+    laboratory.run(0.2, speed=0.01)
+    fault = laboratory.node.callbacks["actuators/operating_state"]
+    fault(doubles.Message(state="FAULT"))
+    sent = len(laboratory.node.published["actuators/setpoint_js"])
+    laboratory.run(0.5, speed=0.01)
+    assert len(laboratory.node.published["actuators/setpoint_js"]) == sent
+    stops = laboratory.texts("actuators/state_command")
+    assert set(stops) == {"pause"}
+    assert 5 <= len(stops) <= 7
+    laboratory.request("enable")
+    laboratory.run(0.1, speed=0.01)
+    assert len(laboratory.node.published["actuators/setpoint_js"]) > sent
+
+
+def test_bad_messages_are_reported_and_change_nothing(laboratory):
+    laboratory.request("enable")
+    laboratory.run(0.1, speed=0.0)
+    before = laboratory.node.published["actuators/setpoint_js"][-1].position
+    laboratory.node.callbacks["servo_jp"](stamped(laboratory.node.now, name=["a"], position=[1.0]))
+    laboratory.node.callbacks["/endoscope/image_raw"](stamped(0, encoding="mono8", width=1))
+    laboratory.request("home")
+    info = doubles.Message(width=640, height=480, k=[0.0] * 9)
+    laboratory.node.callbacks["/endoscope/camera_info"](info)
+    laboratory.run(0.01)
+    assert laboratory.node.published["actuators/setpoint_js"][-1].position == before
+    texts = "\n".join(laboratory.node.logged)
+    for part in ("joints are missing", "mono8", "home", "640 x 480"):
+        assert part in texts
+
+
+@pytest.mark.parametrize(
+    ("overrides", "text"),
+    [
+        ({"config": "missing.toml"}, "missing.toml"),
+        ({"joints": ["a", "a", "b"]}, "three different names"),
+        ({"compensation": 2.0}, "compensation"),
+    ],
+)
+def test_a_wrong_parameter_is_refused_and_named(laboratory, monkeypatch, overrides, text):
+    monkeypatch.setattr(doubles.Node, "overrides", doubles.Node.overrides | overrides)
+    node = InstrumentNode()
+    assert node.on_configure(None) == "failure"
+    assert text in node.logged[-1]
+    assert node.callbacks == {}
+    # There is no loop that would refuse it.
+    assert node.set_parameter("compensation", 2.0).successful
+
+
+def test_the_share_of_the_compensation_is_checked(laboratory):
+    assert laboratory.node.set_parameter("compensation", 0.5).successful
+    refused = laboratory.node.set_parameter("compensation", 1.5)
+    assert not refused.successful
+    assert "compensation" in refused.reason
