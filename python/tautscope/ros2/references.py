@@ -16,9 +16,12 @@ from tautscope.errors import MessageError
 from tautscope.ros2.clock import Clock
 from tautscope.ros2.inputs import JoyAxes, Stamps, joint_positions, joy_deflection
 from tautscope.ros2.session import Node
+from tautscope.ros2.wire import Qos
 
 Floats = NDArray[np.float64]
 SERVO, JOY = "servo_jp", "joy"
+QUEUE = 10
+"""Number of references that wait for a tick; it takes the newest."""
 Refuse = Callable[[MessageError], None]
 """Called with the reason for which a message is refused."""
 
@@ -66,7 +69,7 @@ class ServoReference:
     """
 
     def __init__(self, node: Node, topic: str, clock: Clock, refuse: Refuse) -> None:
-        self._messages = node.subscription(topic, "sensor_msgs/msg/JointState")
+        self._messages = node.subscription(topic, "sensor_msgs/msg/JointState", Qos(depth=QUEUE))
         self._clock, self._refuse = clock, refuse
         self._stamps = Stamps(self._messages.topic)
         self.reference = self._before = np.full(3, np.nan)
@@ -77,8 +80,7 @@ class ServoReference:
     def reset(self, reference: Floats) -> None:
         """Start at a reference (3,) [m, rad, rad]; what arrived before is discarded."""
         self.reference = self._before = reference.copy()
-        while self._take() is not None:
-            pass
+        self._newest()
         self.engage()
 
     def engage(self) -> None:
@@ -87,7 +89,7 @@ class ServoReference:
 
     def update(self, now: float, period: float, command: Floats, *, is_held: bool) -> Floats:
         """The newest reference (3,) [m, rad, rad]; sets `age`."""
-        found = self._take()
+        found = self._newest()
         if is_held:
             # The increment with which motion was stopped has not been followed.
             if self._made_at is not None:
@@ -105,16 +107,19 @@ class ServoReference:
             self.age = (self._clock.wall() - self._made_at) / 1e9
         return self.reference.copy()
 
-    def _take(self) -> tuple[Floats, int] | None:
-        try:
-            message = self._messages.take()
-            if message is None:
-                return None
-            position = joint_positions(self._messages.topic, message)
-            return position, self._stamps.check(message.header, self._clock.wall())
-        except MessageError as error:
-            self._refuse(error)
-            return None
+    def _newest(self) -> tuple[Floats, int] | None:
+        """Position and stamp of the newest valid message that waits."""
+        newest = None
+        for _ in range(QUEUE):
+            try:
+                message = self._messages.take()
+                if message is None:
+                    break
+                position = joint_positions(self._messages.topic, message)
+                newest = position, self._stamps.check(message.header, self._clock.wall())
+            except MessageError as error:
+                self._refuse(error)
+        return newest
 
 
 class JoyReference:

@@ -25,6 +25,8 @@ SENSOR_DATA = Qos(depth=1, is_reliable=False)
 """Best effort, and only the newest: images."""
 NEWEST = Qos(depth=1)
 """Only the newest: set-points."""
+_RELIABILITY = {True: zenoh.Reliability.RELIABLE, False: zenoh.Reliability.BEST_EFFORT}
+_PRIORITY = {True: zenoh.Priority.REAL_TIME, False: zenoh.Priority.DATA}
 _LARGEST_DOMAIN = 232
 _LOOPBACK = "tcp/127.0.0.1:0"
 _NAME = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)*")
@@ -54,11 +56,19 @@ class Publisher:
 
 
 class Subscription:
-    """The messages of one topic; made by `Node.subscription`."""
+    """The messages of one topic; made by `Node.subscription`.
+
+    Attributes:
+        topic: Full name of the topic.
+        received: Number of messages taken.
+        missed: Number of messages between these that were lost, or replaced by newer ones.
+    """
 
     def __init__(self, topic: str, kind: str, subscriber: Any, token: Any) -> None:
-        self.topic, self.kind = topic, kind
+        self.topic, self._kind = topic, kind
         self._subscriber, self._token = subscriber, token
+        self.received = self.missed = 0
+        self._last: tuple[bytes, int] | None = None
 
     def take(self) -> Any | None:
         """The oldest message that waits, or None.
@@ -69,10 +79,18 @@ class Subscription:
         sample = self._subscriber.try_recv()
         if sample is None:
             return None
+        self.received += 1
         try:
-            return types.decode(self.kind, sample.payload.to_bytes())
+            if sample.attachment is not None:
+                self._count(*wire.read_attachment(sample.attachment.to_bytes()))
+            return types.decode(self._kind, sample.payload.to_bytes())
         except MessageError as error:
             raise MessageError(self.topic, error.value, error.allowed) from None
+
+    def _count(self, sequence: int, sent_at: int, source: bytes) -> None:
+        if self._last is not None and self._last[0] == source:
+            self.missed += max(sequence - self._last[1] - 1, 0)
+        self._last = source, sequence
 
 
 class Service:
@@ -116,6 +134,10 @@ class Node:
         connect: Endpoint of a router or another node; tried again until it answers. Empty: none.
         listen: Own endpoint, on the loopback interface.
 
+    Attributes:
+        identity: The node in the network.
+        subscriptions: All subscriptions.
+
     Raises:
         ConfigError: A name, the domain or an endpoint is not valid, or not free.
     """
@@ -154,16 +176,16 @@ class Node:
         self.identity = wire.Identity(domain, str(self._session.info.zid()), namespace, name)
         self._tokens = [self._declare(self.identity.node_token())]
         self._entities = 0
+        self.subscriptions: list[Subscription] = []
 
     def publisher(self, topic: str, kind: str, qos: Qos = NEWEST) -> Publisher:
         """A publisher of messages of a type."""
         token, name = self._announce(Entity.PUBLISHER, topic, kind, qos)
-        reliability = (
-            zenoh.Reliability.RELIABLE if qos.is_reliable else zenoh.Reliability.BEST_EFFORT
-        )
+        # An image fills the queue of its priority: set-points must not be dropped behind it.
         publisher = self._session.declare_publisher(
             self._key(topic, kind),
-            reliability=reliability,
+            reliability=_RELIABILITY[qos.is_reliable],
+            priority=_PRIORITY[qos.is_reliable],
             congestion_control=zenoh.CongestionControl.DROP,
             express=True,
         )
@@ -174,7 +196,9 @@ class Node:
         token, _ = self._announce(Entity.SUBSCRIPTION, topic, kind, qos)
         channel: zenoh.handlers.RingChannel[zenoh.Sample] = zenoh.handlers.RingChannel(qos.depth)
         subscriber = self._session.declare_subscriber(self._key(topic, kind), channel)
-        return Subscription(self.resolve(topic), kind, subscriber, token)
+        subscription = Subscription(self.resolve(topic), kind, subscriber, token)
+        self.subscriptions.append(subscription)
+        return subscription
 
     def service(self, name: str, kind: str, handler: Callable[[Any], Any]) -> Service:
         """A service; `handler` makes the response to a request."""

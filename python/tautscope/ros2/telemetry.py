@@ -53,6 +53,7 @@ class Telemetry:
         self, config: Config, node: Node, topics: Topics, clock: Clock, *, has_rig: bool
     ) -> None:
         self._config, self._clock, self._has_rig = config, clock, has_rig
+        self._node = node
         self._name = node.identity.path.lstrip("/")
         joints, text = "sensor_msgs/msg/JointState", "std_msgs/msg/String"
 
@@ -134,7 +135,11 @@ class Telemetry:
         if now - self._diagnosed_at < DIAGNOSTICS_PERIOD:
             return
         self._diagnosed_at = now
-        values: dict[str, object] = {f"refused {name}": n for name, n in self.refused.items()}
+        values: dict[str, object] = {}
+        for each in self._node.subscriptions:
+            values[f"received {each.topic}"] = each.received
+            values[f"missed {each.topic}"] = each.missed
+        values |= {f"refused {name}": n for name, n in self.refused.items()}
         flags: tuple[str, ...] = ()
         if run is not None:
             flags = run.loop.supervision.flags

@@ -11,6 +11,7 @@ from typing import Any
 
 from rosbags.interfaces import Nodetype
 from rosbags.interfaces.typing import FieldDesc, Typesdict
+from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
@@ -124,7 +125,7 @@ def decode(kind: str, data: bytes) -> Any:
         if data[:2] != _LITTLE_ENDIAN:
             raise ValueError(f"header {data[:4].hex()}")
         return _store().deserialize_cdr(data, kind)
-    except (struct.error, ValueError, IndexError, AssertionError, TypeError) as error:
+    except (SerdeError, struct.error, ValueError, IndexError, AssertionError, TypeError) as error:
         raise MessageError(kind, str(error), "a message in little-endian CDR") from None
 
 
