@@ -26,8 +26,8 @@ from tautscope.ros2 import messages, types
 from tautscope.ros2.clock import Clock
 from tautscope.ros2.control import NodeControl
 from tautscope.ros2.inputs import JoyAxes
-from tautscope.ros2.session import _PRIORITY, _RELIABILITY, SENSOR_DATA, Node, Subscription
 from tautscope.ros2.references import SERVO
+from tautscope.ros2.session import _PRIORITY, _RELIABILITY, SENSOR_DATA, Node, Subscription
 from tautscope.ros2.start import Drives, build_control
 from tautscope.ros2.wire import Qos
 from tautscope.twin.rig import Twin
