@@ -27,7 +27,16 @@ from tautscope.ros2.clock import Clock
 from tautscope.ros2.control import NodeControl
 from tautscope.ros2.inputs import JoyAxes
 from tautscope.ros2.references import SERVO
-from tautscope.ros2.session import _PRIORITY, _RELIABILITY, SENSOR_DATA, Node, Subscription
+from tautscope.ros2.session import (
+    _PRIORITY,
+    _RELIABILITY,
+    IMAGE,
+    NEWEST,
+    SENSOR_DATA,
+    Node,
+    Publisher,
+    Subscription,
+)
 from tautscope.ros2.start import Drives, build_control
 from tautscope.ros2.wire import Qos
 from tautscope.twin.rig import Twin
@@ -37,7 +46,7 @@ Shares = Sequence[tuple[float, float]]
 JOINTS, NUMBER = "sensor_msgs/msg/JointState", "std_msgs/msg/Float64"
 EPOCH = 1_700_000_000_000_000_000
 """Wall clock time of the start [ns]."""
-TIMEOUT = 20.0
+TIMEOUT = 60.0
 
 
 class SteppedClock(Clock):
@@ -75,19 +84,24 @@ def free_endpoint() -> str:
         return f"tcp/127.0.0.1:{listener.getsockname()[1]}"
 
 
+def blocking(node: Node, topic: str, kind: str, qos: Qos) -> Any:
+    """A publisher of Zenoh that drops nothing."""
+    return node._session.declare_publisher(
+        node._key(topic, kind),
+        reliability=_RELIABILITY[qos.is_reliable],
+        priority=_PRIORITY[qos.is_reliable],
+        congestion_control=zenoh.CongestionControl.BLOCK,
+        express=True,
+    )
+
+
 class Barrier:
     """A topic whose messages arrive after all that was published before with the same priority."""
 
     def __init__(self, sender: Node, receiver: Node, kind: int) -> None:
         topic = f"/barrier{kind}"
         self._in = receiver.subscription(topic, NUMBER)
-        self._out = sender._session.declare_publisher(
-            sender._key(topic, NUMBER),
-            reliability=_RELIABILITY[kind == 0],
-            priority=_PRIORITY[kind == 0],
-            congestion_control=zenoh.CongestionControl.BLOCK,
-            express=True,
-        )
+        self._out = blocking(sender, topic, NUMBER, Qos(is_reliable=kind == 0))
         self._sent = 0
 
     def wait(self, *, resend: bool = False) -> None:
@@ -127,14 +141,10 @@ class Peers:
         # One per priority, because order is kept within each; these wait where others are dropped.
         self._barriers_to_node = [Barrier(self.other, self.node, n) for n in range(2)]
         self._barrier_to_other = Barrier(self.node, self.other, 0)
-        self.servo = self.other.publisher("/instrument/servo_jp", JOINTS)
-        self.positions = self.other.publisher("/instrument/actuators/measured_js", JOINTS)
-        self.images = self.other.publisher(
-            "/endoscope/image_raw", "sensor_msgs/msg/Image", SENSOR_DATA
-        )
-        self.requests = self.other.publisher(
-            "/instrument/state_command", "crtk_msgs/msg/StringStamped"
-        )
+        self.servo = self.publisher("/instrument/servo_jp", JOINTS)
+        self.positions = self.publisher("/instrument/actuators/measured_js", JOINTS)
+        self.images = self.publisher("/endoscope/image_raw", IMAGE, SENSOR_DATA)
+        self.requests = self.publisher("/instrument/state_command", "crtk_msgs/msg/StringStamped")
         self.commands = self.other.subscription(
             "/instrument/actuators/setpoint_js", JOINTS, Qos(depth=1000)
         )
@@ -146,6 +156,12 @@ class Peers:
         )
         self.delivered(resend=True)
         self._barrier_to_other.wait(resend=True)
+
+    def publisher(self, topic: str, kind: str, qos: Qos = NEWEST) -> Publisher:
+        """A publisher of the other node that waits where others drop."""
+        found = self.other.publisher(topic, kind, qos)
+        found._publisher = blocking(self.other, topic, kind, qos)
+        return found
 
     def close(self) -> None:
         """End both nodes."""

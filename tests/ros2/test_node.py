@@ -256,7 +256,7 @@ class Gamepad:
 
     def __init__(self, both: Peers) -> None:
         self._both = both
-        self._joy = both.other.publisher("/joy", "sensor_msgs/msg/Joy")
+        self._joy = both.publisher("/joy", "sensor_msgs/msg/Joy")
         both.delivered(resend=True)
 
     def drive(self, ticks: int, deflection: float | None, *, is_holding: bool = True) -> np.ndarray:

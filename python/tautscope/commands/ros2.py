@@ -75,6 +75,7 @@ def add_parser(verbs: arguments.Verbs) -> None:
 def _ros2(options: argparse.Namespace) -> int:
     if not options.driver:
         require_extras("tautscope ros2", ["twin" if options.twin else "hardware"])
+    from tautscope.hardware.realtime import OTHERS, realtime  # noqa: PLC0415
     from tautscope.ros2.inputs import JoyAxes  # noqa: PLC0415
     from tautscope.ros2.session import Node  # noqa: PLC0415
     from tautscope.ros2.start import NAME, start_node  # noqa: PLC0415
@@ -90,7 +91,9 @@ def _ros2(options: argparse.Namespace) -> int:
     endpoints = {"connect": options.connect}
     if options.listen is not None:
         endpoints = {"connect": "", "listen": options.listen}
-    with Node(NAME, options.namespace, domain=options.domain, **endpoints) as node:
+    with realtime(OTHERS):  # Zenoh's threads inherit the priority
+        opened = Node(NAME, options.namespace, domain=options.domain, **endpoints)
+    with opened as node:
         folder.mkdir(parents=True, exist_ok=True)
         return start_node(
             config,

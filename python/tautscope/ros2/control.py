@@ -128,6 +128,7 @@ class NodeControl:
         finally:
             rig, self._rig = self._rig, None
             self._publish_state()
+            self._telemetry.close()
             if rig is not None:
                 rig.close()
 
@@ -190,6 +191,8 @@ class NodeControl:
             self.fault = str(error)
             _LOG.warning("%s", error)
             self._telemetry.warn(str(error))
+            if transition is ACTIVATE and isinstance(self._rig, HardwareRig):
+                self._rig.close()
             # A rig that cannot be stopped orderly is left in any case.
             return transition not in (CONFIGURE, ACTIVATE)
         return True

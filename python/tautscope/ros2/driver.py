@@ -13,7 +13,7 @@ from tautscope.ros2 import messages
 from tautscope.ros2.clock import Clock
 from tautscope.ros2.inputs import ImageReader, Stamps, joint_positions
 from tautscope.ros2.references import Refuse
-from tautscope.ros2.session import SENSOR_DATA, Node
+from tautscope.ros2.session import IMAGE, SENSOR_DATA, Node
 
 DRIVER_TIMEOUT = 0.1
 """Longest time without positions from the driver [s]."""
@@ -51,7 +51,7 @@ class DriverRig:
         kind = "sensor_msgs/msg/JointState"
         self._setpoints = node.publisher(f"{instrument}/actuators/setpoint_js", kind)
         self._positions = node.subscription(f"{instrument}/actuators/measured_js", kind)
-        self._images = node.subscription(image, "sensor_msgs/msg/Image", SENSOR_DATA)
+        self._images = node.subscription(image, IMAGE, SENSOR_DATA)
         self._position_stamps = Stamps(self._positions.topic)
         self._image_stamps = Stamps(self._images.topic)
         self._reader = ImageReader(self._images.topic, config.camera)
@@ -72,6 +72,8 @@ class DriverRig:
             DriveError: There are none.
         """
         self._applied = None
+        self._position_stamps.reset()
+        self._image_stamps.reset()
         give_up = self._clock.monotonic() + round(START_TIMEOUT * 1e9)
         while self._newest_position() is None:
             if self._clock.monotonic() > give_up:

@@ -43,6 +43,10 @@ class Stamps:
         self._topic = topic
         self._last = 0
 
+    def reset(self) -> None:
+        """Forget the last stamp: the sender's clock may have been set."""
+        self._last = 0
+
     def check(self, header: Any, wall: int) -> int:
         """The stamp [ns since 1970] of a header that arrived at a wall clock time [ns].
 

@@ -81,6 +81,7 @@ class ServoReference:
         """Start at a reference (3,) [m, rad, rad]; what arrived before is discarded."""
         self.reference = self._before = reference.copy()
         self._newest()
+        self._stamps.reset()
         self.engage()
 
     def engage(self) -> None:
@@ -165,6 +166,7 @@ class JoyReference:
 
     def reset(self, reference: Floats) -> None:
         """Start at a reference (3,) [m, rad, rad], after the button was released once."""
+        self._stamps.reset()
         self._operator.reset(reference)
 
     def engage(self) -> None:

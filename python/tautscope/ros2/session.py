@@ -19,14 +19,21 @@ from tautscope.errors import ConfigError, MessageError
 from tautscope.ros2 import types, wire
 from tautscope.ros2.wire import Entity, Qos
 
+IMAGE = "sensor_msgs/msg/Image"
 ROUTER = "tcp/127.0.0.1:7447"
 """Where the router of rmw_zenoh, `ros2 run rmw_zenoh_cpp rmw_zenohd`, listens."""
 SENSOR_DATA = Qos(depth=1, is_reliable=False)
 """Best effort, and only the newest: images."""
 NEWEST = Qos(depth=1)
 """Only the newest: set-points."""
+LARGEST = 2**16
+"""Longest message that is decoded, but for images [byte]: a tick must not wait for a longer one."""
+LARGEST_IMAGE = 2**26
+"""Longest image that is decoded [byte]."""
 _RELIABILITY = {True: zenoh.Reliability.RELIABLE, False: zenoh.Reliability.BEST_EFFORT}
 _PRIORITY = {True: zenoh.Priority.REAL_TIME, False: zenoh.Priority.DATA}
+_QUEUE = 16
+"""Batches that wait for the transport, per priority; Zenoh allows no more."""
 _LARGEST_DOMAIN = 232
 _LOOPBACK = "tcp/127.0.0.1:0"
 _NAME = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)*")
@@ -40,7 +47,7 @@ class Publisher:
         self._sequence = 0
 
     def publish(self, message: Any) -> None:
-        """Send a message; never waits."""
+        """Send a message; what the transport cannot take in 1 ms, images in 50 ms, is dropped."""
         self.send(types.encode(message))
 
     def send(self, payload: bytes) -> None:
@@ -66,6 +73,7 @@ class Subscription:
 
     def __init__(self, topic: str, kind: str, subscriber: Any, token: Any) -> None:
         self.topic, self._kind = topic, kind
+        self._largest = LARGEST_IMAGE if kind == IMAGE else LARGEST
         self._subscriber, self._token = subscriber, token
         self.received = self.missed = 0
         self._last: tuple[bytes, int] | None = None
@@ -82,8 +90,8 @@ class Subscription:
         self.received += 1
         try:
             if sample.attachment is not None:
-                self._count(*wire.read_attachment(sample.attachment.to_bytes()))
-            return types.decode(self._kind, sample.payload.to_bytes())
+                self._count(*wire.read_attachment(_payload(sample.attachment, LARGEST)))
+            return types.decode(self._kind, _payload(sample.payload, self._largest))
         except MessageError as error:
             raise MessageError(self.topic, error.value, error.allowed) from None
 
@@ -112,8 +120,8 @@ class Service:
         try:
             if query.payload is None or query.attachment is None:
                 raise MessageError(self._kind, None, "a request with an attachment")
-            sequence, _, source = wire.read_attachment(query.attachment.to_bytes())
-            request = types.decode(f"{self._kind}_Request", query.payload.to_bytes())
+            sequence, _, source = wire.read_attachment(_payload(query.attachment, LARGEST))
+            request = types.decode(f"{self._kind}_Request", _payload(query.payload, LARGEST))
             response = types.encode(self._handler(request))
         except MessageError as error:
             query.reply_err(str(error).encode())
@@ -164,6 +172,9 @@ class Node:
             "connect/timeout_ms": -1,
             "listen/endpoints": [listen],
             "scouting/multicast/enabled": False,
+            # The default of 1 drops the second message of a tick if the computer is busy for 1 ms.
+            "transport/link/tx/queue/size/real_time": _QUEUE,
+            "transport/link/tx/queue/size/data": _QUEUE,
         }
         config = zenoh.Config()
         try:
@@ -240,6 +251,12 @@ class Node:
 
     def _declare(self, token: str) -> Any:
         return self._session.liveliness().declare_token(token)
+
+
+def _payload(data: Any, largest: int) -> bytes:
+    if len(data) > largest:
+        raise MessageError("message", f"{len(data)} bytes", f"at most {largest} bytes")
+    return bytes(data.to_bytes())
 
 
 def check_loopback(endpoint: str) -> None:

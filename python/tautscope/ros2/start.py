@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from concurrent.futures import Executor, ThreadPoolExecutor
 from pathlib import Path
@@ -31,6 +32,7 @@ from tautscope.ros2.telemetry import Telemetry, Topics
 
 Drives = Literal["twin", "rig", "ros"]
 """What the loop commands: the twin, the drives of the configuration, or a driver in ROS."""
+_LOG = logging.getLogger(__name__)
 NAME = "tautscope"
 """Name of the node."""
 
@@ -74,8 +76,10 @@ def start_node(
             limited_garbage_collection(),
             locked_memory(),
             short_switch_interval(),
-            realtime(OTHERS if drives == "rig" else LOOP),
+            realtime(OTHERS if drives == "rig" else LOOP) as refusal,
         ):
+            if refusal:
+                _LOG.warning("%s", refusal)
             try:
                 announce(node.identity.path)
                 control.main()

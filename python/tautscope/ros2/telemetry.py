@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
+from concurrent.futures import Future, ThreadPoolExecutor
 
 from tautscope.config import Config
 from tautscope.console.control_run import ControlRun
 from tautscope.errors import MessageError
+from tautscope.hardware.realtime import OTHERS, set_realtime_priority
 from tautscope.loop.reduction import Report
 from tautscope.loop.rig import Frame
 from tautscope.ros2 import messages
@@ -73,6 +75,10 @@ class Telemetry:
             self._command = publisher("actuators/setpoint_js", joints)
             self._applied = publisher("actuators/measured_js", joints)
             self._image = node.publisher(topics.image, "sensor_msgs/msg/Image", SENSOR_DATA)
+        # The transport may wait for a slow receiver; a tick may not.
+        self._images = ThreadPoolExecutor(1, "images", set_realtime_priority, (OTHERS,))
+        self._sending: Future[None] = Future()
+        self._sending.set_result(None)
         self.refused: Counter[str] = Counter()
         self._warned: dict[str, int] = {}
         self._flags: tuple[str, ...] = ()
@@ -101,10 +107,17 @@ class Telemetry:
         self._mode.publish(messages.text(str(supervision.reaction)))
         self._compensation.publish(messages.number(supervision.lead))
         self._camera_info.publish(messages.camera_info(captured, self._config.camera))
-        if self._has_rig and self._image.has_subscribers:
-            image = messages.image(captured, frame, self._config.camera)
-            if image is not None:
-                self._image.publish(image)
+        if self._has_rig and self._sending.done() and self._image.has_subscribers:
+            self._sending = self._images.submit(self._send_image, captured, frame)
+
+    def _send_image(self, captured: int, frame: Frame) -> None:
+        image = messages.image(captured, frame, self._config.camera)
+        if image is not None:
+            self._image.publish(image)
+
+    def close(self) -> None:
+        """Wait for the image that is sent."""
+        self._images.shutdown()
 
     def state(self, state: str, *, is_homed: bool = False, is_busy: bool = False) -> None:
         """Publish the operating state, if it has changed or is due."""

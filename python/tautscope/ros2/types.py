@@ -54,8 +54,6 @@ SERVICES = {
     ),
 }
 """Services -> definitions of request and response."""
-LARGEST = 64 * 2**20
-"""Longest message that is decoded [byte]."""
 _EVENT_INFO = "service_msgs/msg/ServiceEventInfo"
 _LITTLE_ENDIAN = b"\x00\x01"
 
@@ -120,8 +118,6 @@ def decode(kind: str, data: bytes) -> Any:
         MessageError: The bytes are not little-endian CDR of this type.
     """
     try:
-        if len(data) > LARGEST:
-            raise ValueError(f"{len(data)} bytes")
         if data[:2] != _LITTLE_ENDIAN:
             raise ValueError(f"header {data[:4].hex()}")
         return _store().deserialize_cdr(data, kind)
