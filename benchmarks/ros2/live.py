@@ -17,6 +17,7 @@ import numpy as np
 from common.paths import ROOT
 from ros2.lockstep import free_endpoint
 from tautscope.config import Config, dump_config, load_config
+from tautscope.hardware.realtime import OTHERS, realtime
 from tautscope.log.reader import read_log
 from tautscope.loop.reduction import HysteresisReduction
 from tautscope.ros2 import types
@@ -61,8 +62,7 @@ class Lab:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._endpoint = free_endpoint()
-        # The others meet here, so that the node may be killed and started again.
-        self.node = Node("benchmark", connect="", listen=self._endpoint)
+        self.node = Node("benchmark", connect=self._endpoint)
         self._states = self.node.subscription(
             "/instrument/operating_state", "crtk_msgs/msg/OperatingState"
         )
@@ -76,12 +76,13 @@ class Lab:
         self._config.write_text(dump_config(settings()), encoding="utf-8")
         frames = folder / "frames.bin"
         write_frames(settings(), frames)
-        self._peer = subprocess.Popen(
-            [PEER, self._endpoint, "stream", frames],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
+        with realtime(OTHERS):  # where it is permitted: the peer measures
+            self._peer = subprocess.Popen(
+                [PEER, self._endpoint, "stream", frames],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                text=True,
+            )
         self._process: subprocess.Popen[str] | None = None
         self._runs = 0
 
@@ -89,7 +90,7 @@ class Lab:
         """Start the node, and enable it."""
         self._runs += 1
         command = [sys.executable, "-m", "tautscope", "ros2", "--driver", "--json"]
-        options = ["--config", self._config, "--connect", self._endpoint]
+        options = ["--config", self._config, "--listen", self._endpoint]
         self._process = subprocess.Popen(
             [*command, *options, "--out", self._folder / str(self._runs)],
             stdout=subprocess.PIPE,
@@ -178,18 +179,19 @@ def lab(folder: Path) -> Iterator[Lab]:
 
 def round_trip(found: Lab, duration: float) -> dict[str, Any]:
     """References at 200 Hz and images at 25 Hz for a time [s]: losses and latencies."""
+    topics = "/instrument/servo_jp", "/endoscope/image_raw"
+    keys = [f"{what} {topic}" for topic in topics for what in ("received", "missed")]
+    keys += ["ticks", "late ticks", "unused images"]
+    before = found.diagnostics()
     found.tell("talk")
     time.sleep(duration)
     found.tell("report")
     report = found.event("report")
     found.tell("silent")
     found.event("silent")
-    values = found.diagnostics()
-    report["node"] = {
-        key: int(values[key])
-        for topic in ("/instrument/servo_jp", "/endoscope/image_raw")
-        for key in (f"received {topic}", f"missed {topic}")
-    } | {key: int(values[key]) for key in ("ticks", "late ticks", "unused images")}
+    after = found.diagnostics()
+    report["node"] = {key: int(after[key]) - int(before[key]) for key in keys}
+    report["load"] = os.getloadavg()
     return report
 
 

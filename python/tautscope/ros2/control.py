@@ -9,13 +9,16 @@ from collections.abc import Callable
 from concurrent.futures import Executor
 from pathlib import Path
 
+import numpy as np
+
 from tautscope.config import Config
 from tautscope.console.control_run import ControlRun, Floats, LiveRig
 from tautscope.errors import MessageError, TautscopeError
 from tautscope.hardware.plausibility import PlausibilityMonitor
 from tautscope.hardware.realtime import OTHERS, realtime
 from tautscope.hardware.rig import HardwareRig
-from tautscope.loop.rig import Sample
+from tautscope.loop.frame_layout import FrameLayout
+from tautscope.loop.rig import Frame, Sample
 from tautscope.loop.safety import Reaction
 from tautscope.ros2.clock import Clock
 from tautscope.ros2.lifecycle import ACTIVATE, CONFIGURE, DEACTIVATE, Lifecycle, State, Transition
@@ -218,6 +221,9 @@ class NodeControl:
                 executor=self._executor,
                 monitor=PlausibilityMonitor(self._config, sample.applied) if is_hardware else None,
             )
+        # The detector is made and used now, because its first use is slow.
+        blank = np.zeros(FrameLayout(self._config.camera).shape, np.uint8)
+        run.loop.prepare_detection(Frame(blank, sample.time, 0))()
         share = float(self.parameters["compensation"])
         if share != 1:
             run.loop.set_compensation(share)

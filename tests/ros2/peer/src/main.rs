@@ -30,7 +30,7 @@ struct Record {
     references: u64,
     images: u64,
     setpoints: HashMap<i64, Bits>,
-    latencies: Vec<f64>,
+    arrivals: HashMap<i64, Instant>,
     commands: u64,
     missed_commands: i64,
     last_sequence: Option<i64>,
@@ -44,13 +44,26 @@ struct Record {
 
 fn header(frame: &str) -> Header {
     let now = SystemTime::now().duration_since(UNIX_EPOCH).expect("clock");
-    let stamp = Time { sec: now.as_secs() as i32, nanosec: now.subsec_nanos() };
-    Header { stamp, frame_id: frame.into() }
+    let stamp = Time {
+        sec: now.as_secs() as i32,
+        nanosec: now.subsec_nanos(),
+    };
+    Header {
+        stamp,
+        frame_id: frame.into(),
+    }
 }
 
 fn joints(position: &[f64]) -> JointState {
-    let name = ["insertion", "rotation", "bending"].map(String::from).to_vec();
-    JointState { header: header("guide"), name, position: position.to_vec(), ..Default::default() }
+    let name = ["insertion", "rotation", "bending"]
+        .map(String::from)
+        .to_vec();
+    JointState {
+        header: header("guide"),
+        name,
+        position: position.to_vec(),
+        ..Default::default()
+    }
 }
 
 fn bits(message: &JointState) -> Bits {
@@ -75,7 +88,10 @@ struct Pace {
 
 impl Pace {
     fn new(period: Duration) -> Self {
-        Self { due: Instant::now(), period }
+        Self {
+            due: Instant::now(),
+            period,
+        }
     }
 
     fn wait(&mut self) {
@@ -90,7 +106,11 @@ impl Pace {
 }
 
 fn quality(depth: usize, reliability: QosReliability) -> QosProfile {
-    QosProfile { history: QosHistory::from_depth(depth), reliability, ..Default::default() }
+    QosProfile {
+        history: QosHistory::from_depth(depth),
+        reliability,
+        ..Default::default()
+    }
 }
 
 fn stream(node: Arc<ZNode>, frames: Vec<Vec<u8>>) -> Result<()> {
@@ -101,7 +121,10 @@ fn stream(node: Arc<ZNode>, frames: Vec<Vec<u8>>) -> Result<()> {
     let reliable = |depth| quality(depth, QosReliability::Reliable);
 
     // The driver: positions are the last set-point; without set-points it stops.
-    let driver = node.create_pub::<JointState>("/instrument/actuators/measured_js").with_qos(reliable(1)).build()?;
+    let driver = node
+        .create_pub::<JointState>("/instrument/actuators/measured_js")
+        .with_qos(reliable(1))
+        .build()?;
     let at = position.clone();
     let watched = record.clone();
     std::thread::spawn(move || {
@@ -114,7 +137,10 @@ fn stream(node: Arc<ZNode>, frames: Vec<Vec<u8>>) -> Result<()> {
                 let silence = last.elapsed();
                 if silence > WATCHDOG {
                     record.is_stopped = true;
-                    say(format!("{{\"event\": \"quick stop\", \"after\": {}}}", silence.as_secs_f64()));
+                    say(format!(
+                        "{{\"event\": \"quick stop\", \"after\": {}}}",
+                        silence.as_secs_f64()
+                    ));
                 }
             }
             drop(record);
@@ -122,28 +148,45 @@ fn stream(node: Arc<ZNode>, frames: Vec<Vec<u8>>) -> Result<()> {
         }
     });
 
-    let setpoints = node.create_sub::<JointState>("/instrument/setpoint_js").with_qos(reliable(1000)).build()?;
+    let setpoints = node
+        .create_sub::<JointState>("/instrument/setpoint_js")
+        .with_qos(reliable(1000))
+        .build()?;
     let accepted = record.clone();
     std::thread::spawn(move || {
         loop {
             let sample = setpoints.recv_serialized().expect("sample");
-            let message = JointState::deserialize(&sample.payload().to_bytes()).expect("JointState");
-            let sequence = Attachment::try_from(sample.attachment().expect("attachment")).expect("attachment");
-            accepted.lock().expect("lock").setpoints.insert(sequence.sequence_number, bits(&message));
+            let message =
+                JointState::deserialize(&sample.payload().to_bytes()).expect("JointState");
+            let sequence =
+                Attachment::try_from(sample.attachment().expect("attachment")).expect("attachment");
+            accepted
+                .lock()
+                .expect("lock")
+                .setpoints
+                .insert(sequence.sequence_number, bits(&message));
         }
     });
 
-    let commands = node.create_sub::<JointState>("/instrument/actuators/setpoint_js").with_qos(reliable(1000)).build()?;
+    let commands = node
+        .create_sub::<JointState>("/instrument/actuators/setpoint_js")
+        .with_qos(reliable(1000))
+        .build()?;
     let received = record.clone();
     let moved = position.clone();
     std::thread::spawn(move || {
         loop {
             let sample = commands.recv_serialized().expect("sample");
             let now = Instant::now();
-            let message = JointState::deserialize(&sample.payload().to_bytes()).expect("JointState");
-            let sequence =
-                Attachment::try_from(sample.attachment().expect("attachment")).expect("attachment").sequence_number;
-            moved.lock().expect("lock").copy_from_slice(&message.position);
+            let message =
+                JointState::deserialize(&sample.payload().to_bytes()).expect("JointState");
+            let sequence = Attachment::try_from(sample.attachment().expect("attachment"))
+                .expect("attachment")
+                .sequence_number;
+            moved
+                .lock()
+                .expect("lock")
+                .copy_from_slice(&message.position);
             let mut record = received.lock().expect("lock");
             record.commands += 1;
             if let Some(last) = record.last_sequence {
@@ -160,20 +203,24 @@ fn stream(node: Arc<ZNode>, frames: Vec<Vec<u8>>) -> Result<()> {
                 record.last_command = command;
                 record.changed_at = Some(now);
             }
-            // Set-points and commands are published once per tick, in this order.
-            if let Some(sent) = record.setpoints.remove(&sequence).and_then(|found| record.sent.remove(&found)) {
-                record.latencies.push((now - sent).as_secs_f64());
-            }
+            record.arrivals.insert(sequence, now);
         }
     });
 
-    let servo = node.create_pub::<JointState>("/instrument/servo_jp").with_qos(reliable(1)).build()?;
+    let servo = node
+        .create_pub::<JointState>("/instrument/servo_jp")
+        .with_qos(reliable(1))
+        .build()?;
     let (silent, sent, at) = (is_silent.clone(), record.clone(), phase.clone());
     std::thread::spawn(move || {
         let mut pace = Pace::new(Duration::from_millis(5));
+        let mut was_silent = true;
         loop {
-            if !silent.load(Ordering::SeqCst) {
-                let now = f64::from_bits(at.load(Ordering::SeqCst)) + 0.005;
+            let is_silent = silent.load(Ordering::SeqCst);
+            if !is_silent {
+                let last = f64::from_bits(at.load(Ordering::SeqCst));
+                // A stream begins where the last one has ended: at the set-point, bit for bit.
+                let now = if was_silent { last } else { last + 0.005 };
                 at.store(now.to_bits(), Ordering::SeqCst);
                 let message = joints(&reference(now));
                 let mut record = sent.lock().expect("lock");
@@ -184,12 +231,15 @@ fn stream(node: Arc<ZNode>, frames: Vec<Vec<u8>>) -> Result<()> {
                 drop(record);
                 servo.publish(&message).expect("publish");
             }
+            was_silent = is_silent;
             pace.wait();
         }
     });
 
-    let camera =
-        node.create_pub::<Image>("/endoscope/image_raw").with_qos(quality(1, QosReliability::BestEffort)).build()?;
+    let camera = node
+        .create_pub::<Image>("/endoscope/image_raw")
+        .with_qos(quality(1, QosReliability::BestEffort))
+        .build()?;
     let shown = record.clone();
     let at = phase.clone();
     std::thread::spawn(move || {
@@ -220,16 +270,36 @@ fn stream(node: Arc<ZNode>, frames: Vec<Vec<u8>>) -> Result<()> {
                 std::thread::sleep(Duration::from_millis(500));
                 let record = record.lock().expect("lock");
                 let after = match (record.changed_at, record.last_reference) {
-                    (Some(changed), Some(sent)) => changed.saturating_duration_since(sent).as_secs_f64(),
+                    (Some(changed), Some(sent)) => {
+                        changed.saturating_duration_since(sent).as_secs_f64()
+                    }
                     _ => f64::NAN,
                 };
                 say(format!("{{\"event\": \"silent\", \"after\": {after}}}"));
             }
             "report" => {
                 let mut record = record.lock().expect("lock");
-                let mut found = std::mem::take(&mut record.latencies);
+                // Set-points and commands are published once per tick, so that they have the same numbers.
+                let Record {
+                    setpoints,
+                    arrivals,
+                    sent,
+                    ..
+                } = &mut *record;
+                let mut found: Vec<f64> = arrivals
+                    .iter()
+                    .filter_map(|(number, arrival)| {
+                        Some((arrival, sent.remove(setpoints.get(number)?)?))
+                    })
+                    .map(|(arrival, sent)| arrival.saturating_duration_since(sent).as_secs_f64())
+                    .collect();
                 found.sort_by(f64::total_cmp);
-                let quantile = |share: f64| found.get((share * (found.len() as f64 - 1.0)) as usize).copied().unwrap_or(0.0);
+                let quantile = |share: f64| {
+                    found
+                        .get((share * (found.len() as f64 - 1.0)) as usize)
+                        .copied()
+                        .unwrap_or(0.0)
+                };
                 say(format!(
                     "{{\"event\": \"report\", \"references\": {}, \"images\": {}, \"commands\": {}, \"missed_commands\": {}, \
                      \"matched\": {}, \"p50\": {}, \"p99\": {}, \"p999\": {}, \"max\": {}, \"largest_gap\": {}}}",
@@ -256,16 +326,26 @@ async fn parameters(node: Arc<ZNode>) -> Result<()> {
     let client = ParameterClient::new(node, target)?;
     tokio::time::sleep(Duration::from_secs(1)).await;
     let listed = client.list(&[] as &[&str], None).await?;
-    let before = client.get(&["compensation", "control.period", "profile", "nothing"]).await?;
+    let before = client
+        .get(&["compensation", "control.period", "profile", "nothing"])
+        .await?;
     let described = client.describe(&["compensation"]).await?;
     let set = |value: f64| Parameter::new("compensation", ParameterValue::Double(value));
     let results = client.set(&[set(0.5), set(2.0)]).await?;
-    let atomic = client.set_atomically(&[set(0.25), Parameter::new("profile", ParameterValue::String("paper".into()))]).await?;
+    let atomic = client
+        .set_atomically(&[
+            set(0.25),
+            Parameter::new("profile", ParameterValue::String("paper".into())),
+        ])
+        .await?;
     let after = client.get(&["compensation"]).await?;
     let outcomes: Vec<bool> = results.iter().map(|each| each.successful).collect();
     say(format!("list {:?}", listed.names));
     say(format!("get {before:?}"));
-    say(format!("read_only {} range {:?}", described[0].read_only, described[0].floating_point_range));
+    say(format!(
+        "read_only {} range {:?}",
+        described[0].read_only, described[0].floating_point_range
+    ));
     say(format!("set {outcomes:?} {:?}", results[1].reason));
     say(format!("atomic {} {:?}", atomic.successful, atomic.reason));
     say(format!("after {after:?}"));
@@ -288,6 +368,9 @@ async fn main() -> Result<()> {
         return parameters(node).await;
     }
     let size = 3 * SIZE.0 as usize * SIZE.1 as usize;
-    let frames = std::fs::read(&rest[0])?.chunks_exact(size).map(<[u8]>::to_vec).collect();
+    let frames = std::fs::read(&rest[0])?
+        .chunks_exact(size)
+        .map(<[u8]>::to_vec)
+        .collect();
     tokio::task::spawn_blocking(move || stream(node, frames)).await?
 }
