@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import zenoh
 from ros2.lockstep import JOINTS, free_endpoint
 from tautscope.cli import main
 from tautscope.log.reader import read_log
@@ -147,6 +148,22 @@ def test_a_device_that_ends_pauses_the_node(tmp_path: Path, endpoint: str) -> No
         hand.wait("PAUSED")
 
 
+def test_nodes_meet_at_a_router(tmp_path: Path, endpoint: str) -> None:
+    settings = zenoh.Config()
+    settings.insert_json5("mode", '"router"')
+    settings.insert_json5("listen/endpoints", json.dumps([endpoint]))
+    settings.insert_json5("scouting/multicast/enabled", "false")
+    where = ["--connect", endpoint, "--out", tmp_path / "out", "--json"]
+    with (
+        zenoh.open(settings),
+        process("-m", "tautscope", "ros2", "--driver", *where) as node,
+        process("examples/ros2/driver.py", endpoint),
+        operator(endpoint) as hand,
+    ):
+        line(node)
+        hand.wait("ENABLED", lambda: hand.request("enable"))
+
+
 def test_the_first_steps_of_the_page_work_as_written(tmp_path: Path, endpoint: str) -> None:
     block, device = re.findall(r"```sh\n(.*?)```", PAGE, re.DOTALL)[:2]
     node = shlex.split(block.strip().splitlines()[-1])
@@ -180,7 +197,7 @@ def test_the_network_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Pa
     assert not (tmp_path / "out").exists()
 
 
-def test_a_gamepad_cannot_have_one_axis_twice_or_none(capsys: Any) -> None:
+def test_axes_are_numbers(capsys: Any) -> None:
     with pytest.raises(SystemExit):
         main(["ros2", "--twin", "--axes", "1", "-2", "0"])
     assert "--axes" in capsys.readouterr().err
