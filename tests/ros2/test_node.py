@@ -77,6 +77,17 @@ def test_a_stream_that_begins_at_the_set_point_is_followed_bit_for_bit(both: Pee
     assert (commands(both)[-1] == last).all()
 
 
+def test_the_first_of_several_waiting_references_clutches_in(both: Peers) -> None:
+    both.control.parameters._parameters["compensation"].value = 0.0
+    both.enable(START)
+    for step in range(3):
+        both.clock.now += 1
+        both.send_reference(START + np.array([step * 1e-5, 0, 0]))
+    both.delivered()
+    rest(both, 1)
+    assert (commands(both)[-1] == START + np.array([2e-5, 0, 0])).all()
+
+
 def test_a_stream_that_begins_elsewhere_moves_nothing_at_first(both: Peers) -> None:
     both.enable(START)
     drive(both, 20, 0.0, at=START + np.array([0.01, 1.0, 0.2]))

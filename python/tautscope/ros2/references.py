@@ -80,7 +80,7 @@ class ServoReference:
     def reset(self, reference: Floats) -> None:
         """Start at a reference (3,) [m, rad, rad]; what arrived before is discarded."""
         self.reference = self._before = reference.copy()
-        self._newest()
+        self._take()
         self._stamps.reset()
         self.engage()
 
@@ -90,7 +90,7 @@ class ServoReference:
 
     def update(self, now: float, period: float, command: Floats, *, is_held: bool) -> Floats:
         """The newest reference (3,) [m, rad, rad]; sets `age`."""
-        found = self._newest()
+        found = self._take()
         if is_held:
             # The increment with which motion was stopped has not been followed.
             if self._made_at is not None:
@@ -98,29 +98,29 @@ class ServoReference:
             self.engage()
             return self.reference.copy()
         self._before = self.reference
-        if found is not None:
-            position, self._made_at = found
+        if found:
             if self._offset is None:
-                self._offset = self.reference - position
+                self._offset = self.reference - found[0][0]
+            position, self._made_at = found[-1]
             # Bit for bit, for a stream that begins at the set-point.
             self.reference = position + self._offset if self._offset.any() else position
         if self._made_at is not None:
             self.age = (self._clock.wall() - self._made_at) / 1e9
         return self.reference.copy()
 
-    def _newest(self) -> tuple[Floats, int] | None:
-        """Position and stamp of the newest valid message that waits."""
-        newest = None
+    def _take(self) -> list[tuple[Floats, int]]:
+        """Position and stamp of the valid messages that wait."""
+        found = []
         for _ in range(QUEUE):
             try:
                 message = self._messages.take()
                 if message is None:
                     break
                 position = joint_positions(self._messages.topic, message)
-                newest = position, self._stamps.check(message.header, self._clock.wall())
+                found.append((position, self._stamps.check(message.header, self._clock.wall())))
             except MessageError as error:
                 self._refuse(error)
-        return newest
+        return found
 
 
 class JoyReference:
