@@ -55,9 +55,16 @@ CONTROLS = {
     "L2": ["python/tautscope/log/mcap_records.py"],
     "L3": ["python/tautscope/log/cdr.py", "python/tautscope/log/mcap_records.py"],
     "L4": ["python/tautscope/config/section.py"],
-    "N1": ["python/tautscope/console/access.py", "python/tautscope/console/server.py"],
+    "N1": [
+        "python/tautscope/console/access.py",
+        "python/tautscope/console/server.py",
+        "python/tautscope/ros2/session.py",
+    ],
     "N2": ["python/tautscope/console/access.py", "python/tautscope/console/pages.py"],
-    "N3": ["python/tautscope/console/operator_input.py"],
+    "N3": [
+        "python/tautscope/console/operator_input.py",
+        "python/tautscope/ros2/references.py",
+    ],
     "N4": ["python/tautscope/console/session.py", "python/tautscope/console/rig_control.py"],
     "N5": ["python/tautscope/console/lease.py"],
     "M1": ["python/tautscope/hardware/rig_lock.py", "python/tautscope/console/lease.py"],
@@ -82,6 +89,8 @@ PURPOSE = {
     "python-can": "CAN frames: set-points, heartbeats, quick stop",
     "pysoem": "EtherCAT master",
     "dask": "benchmarks on a cluster",
+    "eclipse-zenoh": "messages of ROS 2, in the process of the loop",
+    "rosbags": "types, hashes and CDR of ROS 2",
     "websockets": "web server of the console, in a process of its own",
 }
 """Python package -> what this software uses it for."""

@@ -4,19 +4,11 @@ import re
 import shlex
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
-import numpy as np
 import pytest
 import tautscope
-from drawn import BACKLASH, DrawnRig, short_experiment
 from tautscope.cli import _parser
-from tautscope.config import dump_config
-from tautscope.dof import Dof
-from tautscope.loop.references import SineSequence
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), ROOT / "paper" / "paper.md"])
@@ -118,77 +110,3 @@ def test_the_readmes_loop_estimates_the_backlash() -> None:
 def test_the_citation_has_this_version() -> None:
     text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     assert re.search(rf"^version: {re.escape(tautscope.__version__)}$", text, re.MULTILINE)
-
-
-def test_the_ros_node_estimates_the_backlash(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    """ROS is not installed here: test doubles record what they receive."""
-    sent: list[list[float]] = []
-    callbacks: dict[str, Callable[..., None]] = {}
-    now = SimpleNamespace(nanoseconds=0)
-
-    class Node:
-        def __init__(self, name: str) -> None:
-            assert name == "tautscope"
-
-        def create_publisher(self, kind: object, topic: str, depth: int) -> SimpleNamespace:
-            return SimpleNamespace(publish=lambda message: sent.append(message.position))
-
-        def create_subscription(
-            self, kind: object, topic: str, callback: Callable[..., None], depth: int
-        ) -> None:
-            callbacks[topic] = callback
-
-        def create_timer(self, period: float, callback: Callable[..., None]) -> None:
-            callbacks["timer"] = callback
-
-        def get_clock(self) -> SimpleNamespace:
-            return SimpleNamespace(now=lambda: now)
-
-        def get_logger(self) -> SimpleNamespace:
-            return SimpleNamespace(warning=lambda text: None)
-
-    messages = SimpleNamespace(Image=SimpleNamespace, JointState=SimpleNamespace)
-    for name, module in {
-        "rclpy": SimpleNamespace(init=None, spin=None),
-        "rclpy.node": SimpleNamespace(Node=Node),
-        "sensor_msgs": SimpleNamespace(msg=messages),
-        "sensor_msgs.msg": messages,
-    }.items():
-        monkeypatch.setitem(sys.modules, name, module)
-    monkeypatch.chdir(tmp_path)
-    config = short_experiment()
-    Path("rig.toml").write_text(dump_config(config), encoding="utf-8")
-    page = (ROOT / "docs" / "interfaces.md").read_text(encoding="utf-8")
-    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
-    names: dict[str, Any] = {}
-    exec(code, names)
-    node = names["Loop"]()
-
-    rig, reference = DrawnRig(config), SineSequence(config.experiment)
-    callbacks["timer"]()
-    assert sent == [], "no command before the first reference"
-    sample = rig.reset()
-    while sample.time < 8:
-        now.nanoseconds = round(1e9 * sample.time)
-        callbacks["/instrument/servo_jp"](SimpleNamespace(position=reference(sample.time)))
-        callbacks["timer"]()
-        if (frame := sample.frame) is not None:
-            height, width, _ = frame.image.shape
-            padded = np.pad(frame.image.reshape(height, 3 * width), ((0, 0), (0, 16)))
-            stamp = SimpleNamespace(
-                sec=int(frame.captured_at), nanosec=round(1e9 * (frame.captured_at % 1))
-            )
-            callbacks["/endoscope/image_raw"](
-                SimpleNamespace(
-                    header=SimpleNamespace(stamp=stamp),
-                    height=height,
-                    width=width,
-                    step=3 * width + 16,
-                    data=padded.tobytes(),
-                )
-            )
-        sample = rig.step(sent[-1])
-    width = node.loop.delta_plus - node.loop.delta_minus
-    assert width[Dof.INSERTION] == pytest.approx(BACKLASH[Dof.INSERTION], rel=0.2)

@@ -23,6 +23,7 @@ from tautscope.commands import (
     hardware,
     jog,
     log,
+    ros2,
 )
 from tautscope.errors import TautscopeError
 from tautscope.extras import require_extras
@@ -93,6 +94,7 @@ def _parser() -> argparse.ArgumentParser:
     align.add_parser(verbs)
     hardware.add_parser(verbs)
     console.add_parser(verbs)
+    ros2.add_parser(verbs)
     bench.add_parser(verbs)
     doctor.add_parser(verbs)
     calibrate.add_parser(verbs)

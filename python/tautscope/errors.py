@@ -54,6 +54,10 @@ class RecordError(FieldError):
     """A recorded file lacks a column, or a cell is not a number."""
 
 
+class MessageError(FieldError):
+    """A message cannot be decoded, or has a value that is not allowed; it has changed nothing."""
+
+
 class MissingPathError(FieldError):
     """A file or folder does not exist, or has no usable content."""
 

@@ -11,6 +11,7 @@ MODULES = {
     "analysis": ("matplotlib", "polars", "rich", "scipy"),
     "twin": ("cv2", "matplotlib", "mujoco", "rich"),
     "console": ("cv2", "mcap", "websockets"),
+    "ros2": ("cv2", "mcap", "rosbags", "zenoh"),
     "hardware": ("av", "can", "canopen", "cv2", "matplotlib", "mcap", "polars", "rich"),
     "ethercat": ("pysoem",),
     "cluster": ("dask", "distributed"),

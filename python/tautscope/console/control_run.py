@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tautscope.config import Config
-from tautscope.console.operator_input import OperatorInput
 from tautscope.hardware.plausibility import PlausibilityMonitor
 from tautscope.log.writer import LogWriter
 from tautscope.loop.reduction import HysteresisReduction, Report
@@ -48,6 +47,24 @@ class LiveRig(Protocol):
         ...
 
 
+class ReferenceSource(Protocol):
+    """Makes the reference of each tick from an operator's input device."""
+
+    @property
+    def reference(self) -> Floats:
+        """Reference u (3,) [m, rad, rad] of the last tick."""
+        ...
+
+    @property
+    def age(self) -> float | None:
+        """Time from when the reference was made to the last tick [s]; None: made in the tick."""
+        ...
+
+    def update(self, now: float, period: float, command: Floats, *, is_held: bool) -> Floats:
+        """The reference of a tick, as `tautscope.console.operator_input.OperatorInput.update`."""
+        ...
+
+
 class ControlRun:
     """Ticks of the control loop with the operator's reference, all of them in a log.
 
@@ -79,7 +96,7 @@ class ControlRun:
         config: Config,
         rig: LiveRig,
         sample: Sample,
-        operator: OperatorInput,
+        operator: ReferenceSource,
         *,
         path: Path,
         executor: Executor,
@@ -113,10 +130,12 @@ class ControlRun:
         self.reference = self._operator.update(
             began, self._rig.control_period, self.command, is_held=self.is_held
         )
-        self.command = self.loop.step(self.reference, sample.time)
+        age = self._operator.age
+        made_at = None if age is None else sample.time - age
+        self.command = self.loop.step(self.reference, sample.time, made_at)
         self.ticks += 1
         self.times.append(time.monotonic() - began)
-        self.log.tick(sample, self.reference, self.command)
+        self.log.tick(sample, self.reference, self.command, made_at)
         if self._monitor is not None:
             self._monitor.add_sample(sample.time, sample.applied)
         if sample.frame is not None:

@@ -50,10 +50,13 @@ class OperatorInput:
         scale: (3,) share of the largest speed at full deflection.
         is_coupled: (3,) whether the input device moves each DOF (clutch).
         program: The motion that runs by itself, if there is one.
+        age: None, because the reference is made in the tick.
         rested_by: Why the last motion ended, if the operator did not end it.
         stopped_by: Why motion is stopped until it is enabled; empty if it is not.
         refused: Reason -> number of refused commands.
     """
+
+    age: None = None
 
     def __init__(self, config: Config, lease: Lease) -> None:
         self._lease = lease

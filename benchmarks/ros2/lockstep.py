@@ -1,0 +1,319 @@
+"""The node and the Python loop with the same input, tick by tick, on a clock that the test steps.
+
+References, images and positions go to the node as messages over Zenoh, in a session of their own;
+commands come back the same way. The Python loop gets the arrays and times themselves.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import zenoh
+from numpy.typing import NDArray
+from tautscope.config import Config
+from tautscope.loop.reduction import HysteresisReduction
+from tautscope.loop.references import OperatorMotion
+from tautscope.loop.rig import Frame
+from tautscope.ros2 import messages, types
+from tautscope.ros2.clock import Clock
+from tautscope.ros2.control import NodeControl
+from tautscope.ros2.inputs import JoyAxes
+from tautscope.ros2.references import SERVO
+from tautscope.ros2.session import (
+    _PRIORITY,
+    _RELIABILITY,
+    IMAGE,
+    NEWEST,
+    SENSOR_DATA,
+    Node,
+    Publisher,
+    Subscription,
+)
+from tautscope.ros2.start import Drives, build_control
+from tautscope.ros2.wire import Qos
+from tautscope.twin.rig import Twin
+
+Floats = NDArray[np.float64]
+Shares = Sequence[tuple[float, float]]
+JOINTS, NUMBER = "sensor_msgs/msg/JointState", "std_msgs/msg/Float64"
+EPOCH = 1_700_000_000_000_000_000
+"""Wall clock time of the start [ns]."""
+TIMEOUT = 60.0
+
+
+class SteppedClock(Clock):
+    """A clock that goes on when the node waits; `before_tick` is called then, with the time."""
+
+    def __init__(self) -> None:
+        self.now = 10**9
+        self.before_tick: Callable[[], None] = lambda: None
+
+    def monotonic(self) -> int:  # noqa: D102  as Clock
+        return self.now
+
+    def wall(self) -> int:  # noqa: D102
+        return EPOCH + self.now
+
+    def sleep_until(self, instant: int) -> None:  # noqa: D102
+        self.now = max(self.now, instant)
+        self.before_tick()
+
+
+class InlineExecutor(Executor):
+    """Runs at once what is submitted."""
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """The result of a call, as a future."""
+        future: Future[Any] = Future()
+        future.set_result(fn(*args, **kwargs))
+        return future
+
+
+def free_endpoint() -> str:
+    """A free port of this computer, as an endpoint."""
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{listener.getsockname()[1]}"
+
+
+def blocking(node: Node, topic: str, kind: str, qos: Qos) -> Any:
+    """A publisher of Zenoh that drops nothing."""
+    return node._session.declare_publisher(
+        node._key(topic, kind),
+        reliability=_RELIABILITY[qos.is_reliable],
+        priority=_PRIORITY[qos.is_reliable],
+        congestion_control=zenoh.CongestionControl.BLOCK,
+        express=True,
+    )
+
+
+class Barrier:
+    """A topic whose messages arrive after all that was published before with the same priority."""
+
+    def __init__(self, sender: Node, receiver: Node, kind: int) -> None:
+        topic = f"/barrier{kind}"
+        self._in = receiver.subscription(topic, NUMBER)
+        self._out = blocking(sender, topic, NUMBER, Qos(is_reliable=kind == 0))
+        self._sent = 0
+
+    def wait(self, *, resend: bool = False) -> None:
+        """Wait until it has arrived; `resend`: send until the sessions are connected."""
+        self._sent += 1
+        number = types.encode(messages.number(float(self._sent)))
+        begin = time.monotonic()
+        self._out.put(number)
+        while (found := self._in.take()) is None or found.data != self._sent:
+            assert time.monotonic() < begin + TIMEOUT, "nothing arrives"
+            if resend:
+                time.sleep(0.02)
+                self._out.put(number)
+
+
+class Peers:
+    """A node under test on a stepped clock, and another node that talks with it.
+
+    Attributes:
+        clock: The clock of the node under test.
+        control: The node under test.
+        other: The other node, in a session of its own.
+    """
+
+    def __init__(
+        self, config: Config, folder: Path, *, drives: Drives = "ros", device: str = SERVO
+    ) -> None:
+        endpoint = free_endpoint()
+        self.clock = SteppedClock()
+        self.config = config
+        self.node = Node("tautscope", connect="", listen=endpoint)
+        self.other = Node("other", connect=endpoint)
+        self.control: NodeControl = build_control(
+            config, self.node, folder, InlineExecutor(), self.clock,
+            drives=drives, device=device, layout=JoyAxes(),
+        )  # fmt: skip
+        # One per priority, because order is kept within each; these wait where others are dropped.
+        self._barriers_to_node = [Barrier(self.other, self.node, n) for n in range(2)]
+        self._barrier_to_other = Barrier(self.node, self.other, 0)
+        self.servo = self.publisher("/instrument/servo_jp", JOINTS)
+        self.positions = self.publisher("/instrument/actuators/measured_js", JOINTS)
+        self.images = self.publisher("/endoscope/image_raw", IMAGE, SENSOR_DATA)
+        self.requests = self.publisher("/instrument/state_command", "crtk_msgs/msg/StringStamped")
+        self.commands = self.other.subscription(
+            "/instrument/actuators/setpoint_js", JOINTS, Qos(depth=1000)
+        )
+        self.warnings = self.other.subscription(
+            "/instrument/warning", "std_msgs/msg/String", Qos(depth=1000)
+        )
+        self.states = self.other.subscription(
+            "/instrument/operating_state", "crtk_msgs/msg/OperatingState", Qos(depth=1000)
+        )
+        self.delivered(resend=True)
+        self._barrier_to_other.wait(resend=True)
+
+    def publisher(self, topic: str, kind: str, qos: Qos = NEWEST) -> Publisher:
+        """A publisher of the other node that waits where others drop."""
+        found = self.other.publisher(topic, kind, qos)
+        found._publisher = blocking(self.other, topic, kind, qos)
+        return found
+
+    def close(self) -> None:
+        """End both nodes."""
+        self.control.shut_down()
+        self.other.close()
+        self.node.close()
+
+    def delivered(self, *, resend: bool = False) -> None:
+        """Wait until everything that was published has arrived: a session keeps the order."""
+        for barrier in self._barriers_to_node:
+            barrier.wait(resend=resend)
+
+    def received(self, subscription: Subscription, what: str) -> Any:
+        """The next message of the other node's subscription."""
+        begin = time.monotonic()
+        while (found := subscription.take()) is None:
+            assert time.monotonic() < begin + TIMEOUT, f"no {what}"
+        return found
+
+    def request(self, text: str) -> None:
+        """Send a state command, and let the node execute it."""
+        self.requests.publish(
+            types.make("crtk_msgs/msg/StringStamped", header=types.header(0, ""), string=text)
+        )
+        self.delivered()
+        self.control.serve()
+
+    def send_position(self, values: Floats) -> None:
+        """Send the drives' positions (3,) [m, rad, rad]."""
+        self.positions.publish(messages.joint_state(self.clock.wall(), values))
+
+    def send_reference(self, values: Floats) -> None:
+        """Send a reference (3,) [m, rad, rad]."""
+        self.servo.publish(messages.joint_state(self.clock.wall(), values))
+
+    def enable(self, at: Floats) -> None:
+        """Enable the loop with the drives at a position (3,)."""
+        self.send_position(at)
+        self.delivered()
+        self.request("enable")
+        assert self.control.run is not None, self.control.fault
+
+    def tick(self) -> None:
+        """A tick of the node under test."""
+        assert self.control.run is not None, self.control.fault
+        self.control.serve()
+        self.control.tick(self.control.run)
+
+    def drain(self, subscription: Subscription) -> list[Any]:
+        """What the node has published until now, as it arrived at the other node."""
+        self._barrier_to_other.wait()
+        found = []
+        while (message := subscription.take()) is not None:
+            found.append(message)
+        return found
+
+
+@contextlib.contextmanager
+def peers(config: Config, folder: Path, **options: str) -> Iterator[Peers]:
+    """A node under test and another one."""
+    both = Peers(config, folder, **options)
+    try:
+        yield both
+    finally:
+        both.close()
+
+
+@dataclass
+class Result:
+    """Comparison of the node's commands with those of the Python loop.
+
+    Attributes:
+        ticks: Number of compared commands.
+        different: Number of commands with other bits.
+        images: Number of images sent.
+        updates: Number of image updates of the node.
+        travel: (3,) travel of the command [m, rad, rad].
+        missed: Number of messages that the node did not get.
+        log: The node's log.
+    """
+
+    ticks: int = 0
+    different: int = 0
+    images: int = 0
+    updates: int = 0
+    travel: Floats = field(default_factory=lambda: np.zeros(3))
+    missed: int = 0
+    log: Path = Path()
+
+
+def compare(
+    config: Config, folder: Path, duration: float, seed: int, shares: Shares = ()
+) -> Result:
+    """Run the twin with the Python loop, and the node beside it with the same input.
+
+    Args:
+        config: Of both loops.
+        folder: For the node's log.
+        duration: [s].
+        seed: Of the operator's motion.
+        shares: (time [s], share of the compensation) of changes.
+    """
+    period = round(config.control.period * 1e9)
+    motion = OperatorMotion(config.experiment, seed, duration)
+    loop, twin, result, changes = HysteresisReduction(config), Twin(config), Result(), list(shares)
+    sample = twin.reset()
+    pending = None
+    with peers(config, folder) as both:
+        clock = both.clock
+        both.enable(sample.applied)
+        start, command, reference = clock.now, sample.applied, np.array(sample.applied)
+        offset, frame, made_at = motion(0.0) - reference, None, None
+
+        def send() -> None:
+            both.send_position(sample.applied)
+            both.send_reference(reference)
+            if frame is not None:
+                stamp = EPOCH + start + frame_time
+                both.images.publish(messages.image(stamp, frame, config.camera))
+            both.delivered()
+
+        clock.before_tick = send
+        for tick in range(round(duration / config.control.period)):
+            now = tick * period / 1e9
+            if changes and now >= changes[0][0]:
+                share = changes.pop(0)[1]
+                loop.set_compensation(share)
+                both.control.run.loop.set_compensation(share)
+            before = command
+            command = loop.step(reference, now, made_at)
+            if pending is not None:
+                loop.on_detection(*pending)
+                pending = None
+            if frame is not None:
+                pending = frame, loop.prepare_detection(frame)()
+            sample = twin.step(command)
+            if tick > 0:  # the stream begins at the set-point, bit for bit
+                reference = motion(tick * config.control.period) - offset
+            made_at = (tick + 1) * period / 1e9
+            frame = sample.frame
+            if frame is not None:
+                frame_time = round(frame.captured_at * 1e9)
+                frame = Frame(frame.image, frame_time / 1e9, frame.sequence)
+                result.images += 1
+            both.tick()
+            sent = both.received(both.commands, "command").position
+            result.ticks += 1
+            result.different += sent.tobytes() != command.tobytes()
+            result.travel += np.abs(command - before)
+        run = both.control.run
+        result.updates, result.log = run.loop.updates, run.path
+        result.missed = sum(each.missed for each in both.node.subscriptions)
+        clock.before_tick = lambda: None
+    twin.close()
+    return result

@@ -1,0 +1,292 @@
+"""The control process of the node: requests, rig, loop, telemetry; one thread, no lock."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Executor
+from pathlib import Path
+
+import numpy as np
+
+from tautscope.config import Config
+from tautscope.console.control_run import ControlRun, Floats, LiveRig
+from tautscope.errors import MessageError, TautscopeError
+from tautscope.hardware.plausibility import PlausibilityMonitor
+from tautscope.hardware.realtime import OTHERS, realtime
+from tautscope.hardware.rig import HardwareRig
+from tautscope.loop.frame_layout import FrameLayout
+from tautscope.loop.rig import Frame, Sample
+from tautscope.loop.safety import Reaction
+from tautscope.ros2.clock import Clock
+from tautscope.ros2.lifecycle import ACTIVATE, CONFIGURE, DEACTIVATE, Lifecycle, State, Transition
+from tautscope.ros2.parameters import Parameter, Parameters
+from tautscope.ros2.references import Source
+from tautscope.ros2.session import Node
+from tautscope.ros2.telemetry import Telemetry, Topics
+from tautscope.ros2.wire import Qos
+
+_LOG = logging.getLogger(__name__)
+_IDLE_PERIOD = 0.005
+"""Time between two looks at requests while no loop runs [s]."""
+COMMANDS = ("enable", "disable", "pause", "resume")
+"""Values of ``state_command`` that are executed; CRTK has others."""
+
+
+class NodeControl:
+    """Runs the loop as the requests to a node say.
+
+    Args:
+        config: Of the loop.
+        node: The node.
+        topics: Names of the topics.
+        telemetry: Publishes.
+        source: The operator's reference.
+        make_rig: Makes the rig; called by the transition ``configure``.
+        folder: For logs.
+        executor: Runs the marker detection.
+        clock: The clocks.
+
+    Attributes:
+        run: The present run; None if the node is not active.
+        fault: Why the last run ended, if nobody ended it.
+        is_paused: Whether motion is held by request.
+    """
+
+    def __init__(
+        self,
+        config: Config,
+        node: Node,
+        topics: Topics,
+        telemetry: Telemetry,
+        *,
+        source: Source,
+        make_rig: Callable[[], LiveRig],
+        folder: Path,
+        executor: Executor,
+        clock: Clock,
+    ) -> None:
+        self._config, self._folder, self._executor = config, folder, executor
+        self._telemetry, self._source, self._make_rig = telemetry, source, make_rig
+        self._rig: LiveRig | None = None
+        self.run: ControlRun | None = None
+        self.fault = ""
+        self.is_paused = False
+        self._is_disabling = False
+        self._runs = 0
+        self._commands = node.subscription(
+            topics.state_command, "crtk_msgs/msg/StringStamped", Qos(depth=10)
+        )
+        self.lifecycle = Lifecycle(node, self._change)
+        self.parameters = Parameters(node, clock, self._declared())
+
+    def main(self) -> None:
+        """Run until the node is finalized."""
+        while self.lifecycle.state is not State.FINALIZED:
+            self.serve()
+            if self.run is None:
+                time.sleep(_IDLE_PERIOD)
+            else:
+                self.tick(self.run)
+
+    def serve(self) -> None:
+        """Execute the requests that wait, and publish the state if it is due."""
+        while (command := self._take_command()) is not None:
+            self._execute(command)
+        self.lifecycle.serve()
+        self.parameters.serve()
+        self._publish_state()
+        self._telemetry.diagnose(self.run, self.operating_state, self.fault)
+
+    def tick(self, run: ControlRun) -> None:
+        """A tick of the loop; a fault ends the run, with the drives stopped."""
+        try:
+            for frame, report, _ in run.tick():
+                self._telemetry.update(run, frame, report)
+            self._telemetry.tick(run)
+            supervision = run.loop.supervision
+            if supervision.reaction.rank >= Reaction.QUICK_STOP.rank:
+                self._is_disabling = supervision.reaction is Reaction.DISABLE
+                self._fail(f"{supervision.reaction}: {', '.join(supervision.flags)}")
+                return
+            run.step()
+        except TautscopeError as error:
+            self._fail(str(error))
+
+    @property
+    def operating_state(self) -> str:
+        """The state in the words of CRTK."""
+        if self.fault:
+            return "FAULT"
+        if self.run is None:
+            return "DISABLED"
+        return "PAUSED" if self.is_paused or self.run.is_held else "ENABLED"
+
+    def shut_down(self) -> None:
+        """Stop the motors, close the log, release the rig."""
+        try:
+            self._end_run()
+        finally:
+            rig, self._rig = self._rig, None
+            self._publish_state()
+            self._telemetry.close()
+            if rig is not None:
+                rig.close()
+
+    def _declared(self) -> dict[str, Parameter]:
+        config = self._config
+        return {
+            "compensation": Parameter(
+                1.0, "share of the compensation, 0 to 1", (0.0, 1.0), self._set_compensation
+            ),
+            "control.period": Parameter(config.control.period, "control period [s]"),
+            "profile": Parameter(config.profile, "how slack is compensated"),
+            "safety.reference_age": Parameter(
+                config.safety.reference_age, "age of a reference that stops motion [s]"
+            ),
+        }
+
+    def _set_compensation(self, share: float) -> None:
+        if self.run is not None:
+            self.run.loop.set_compensation(share)
+
+    def _take_command(self) -> str | None:
+        try:
+            message = self._commands.take()
+        except MessageError as error:
+            self._telemetry.refuse(error)
+            return ""
+        return None if message is None else str(message.string)
+
+    def _execute(self, command: str) -> None:
+        if command == "enable":
+            self.lifecycle.trigger(CONFIGURE)
+            self.lifecycle.trigger(ACTIVATE)
+        elif command == "disable":
+            self.fault, self._is_disabling = "", True
+            self.lifecycle.trigger(DEACTIVATE)
+        elif command == "pause":
+            self.is_paused = self.run is not None
+        elif command == "resume" and self.run is not None:
+            self.is_paused = False
+            self._source.engage()
+            self.run.loop.engage()
+        elif command and command not in COMMANDS:
+            field = f"{self._commands.topic} string"
+            self._telemetry.refuse(MessageError(field, command[:32], ", ".join(COMMANDS)))
+
+    def _change(self, transition: Transition) -> bool:
+        """Carry out a transition of the lifecycle."""
+        try:
+            if transition is CONFIGURE:
+                self._rig = self._make_rig()
+            elif transition is ACTIVATE:
+                self._start_run()
+            else:
+                self._end_run()
+                if transition.goal in (State.UNCONFIGURED, State.FINALIZED):
+                    rig, self._rig = self._rig, None
+                    if rig is not None:
+                        rig.close()
+        except TautscopeError as error:
+            self.fault = str(error)
+            _LOG.warning("%s", error)
+            self._telemetry.warn(str(error))
+            if transition is ACTIVATE and isinstance(self._rig, HardwareRig):
+                self._rig.close()
+            # A rig that cannot be stopped orderly is left in any case.
+            return transition not in (CONFIGURE, ACTIVATE)
+        return True
+
+    def _start_run(self) -> None:
+        """Enable the rig and start the loop at rest, where the instrument is."""
+        rig = self._rig
+        assert rig is not None
+        self.fault, self.is_paused, self._is_disabling = "", False, False
+        self._telemetry.state("DISABLED", is_busy=True)
+        sample = self._reset(rig)
+        self._source.reset(sample.applied)
+        self._runs += 1
+        is_hardware = isinstance(rig, HardwareRig)
+        # Threads of the log inherit the priority.
+        with realtime(OTHERS):
+            run = ControlRun(
+                self._config,
+                rig,
+                sample,
+                _Pausable(self, self._source),
+                path=self._folder / f"ros2-{self._runs}.mcap",
+                executor=self._executor,
+                monitor=PlausibilityMonitor(self._config, sample.applied) if is_hardware else None,
+            )
+        # The detector is made and used now, because its first use is slow.
+        blank = np.zeros(FrameLayout(self._config.camera).shape, np.uint8)
+        run.loop.prepare_detection(Frame(blank, sample.time, 0))()
+        share = float(self.parameters["compensation"])
+        if share != 1:
+            run.loop.set_compensation(share)
+        self.run = run
+
+    def _reset(self, rig: LiveRig) -> Sample:
+        """Reset the rig; ``disable`` and ``pause`` interrupt it, which takes seconds."""
+        if not isinstance(rig, HardwareRig):
+            return rig.reset()
+        is_over = threading.Event()
+
+        def watch() -> None:
+            while not is_over.wait(_IDLE_PERIOD):
+                if self._take_command() in ("disable", "pause"):
+                    rig.interrupt()
+
+        thread = threading.Thread(target=watch, name="opening")
+        thread.start()
+        try:
+            return rig.reset()
+        finally:
+            is_over.set()
+            thread.join()
+
+    def _end_run(self) -> None:
+        """Stop the drives, then close the log."""
+        run, self.run = self.run, None
+        if run is None:
+            return
+        try:
+            if isinstance(self._rig, HardwareRig):
+                self._rig.disable() if self._is_disabling else self._rig.close()
+        finally:
+            self._publish_state()
+            run.log.close()
+
+    def _fail(self, fault: str) -> None:
+        """End the run because of a fault."""
+        _LOG.warning("%s", fault)
+        self.fault = fault
+        if self.run is not None:
+            self.run.note(f"rig off: {fault}")
+        self._telemetry.warn(fault)
+        self.lifecycle.trigger(DEACTIVATE)
+
+    def _publish_state(self) -> None:
+        self._telemetry.state(self.operating_state, is_homed=self.run is not None)
+
+
+class _Pausable:
+    """The operator's reference, held by request too."""
+
+    def __init__(self, control: NodeControl, source: Source) -> None:
+        self._control, self._source = control, source
+
+    @property
+    def reference(self) -> Floats:
+        return self._source.reference
+
+    @property
+    def age(self) -> float | None:
+        return self._source.age
+
+    def update(self, now: float, period: float, command: Floats, *, is_held: bool) -> Floats:
+        is_held = is_held or self._control.is_paused
+        return self._source.update(now, period, command, is_held=is_held)

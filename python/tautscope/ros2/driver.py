@@ -1,0 +1,141 @@
+"""A rig whose drives and camera are nodes of ROS."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tautscope.config import Config
+from tautscope.errors import DriveError, MessageError
+from tautscope.loop.rig import Frame, Sample
+from tautscope.loop.signal_checks import check_signal
+from tautscope.ros2 import messages
+from tautscope.ros2.clock import Clock
+from tautscope.ros2.inputs import ImageReader, Stamps, joint_positions
+from tautscope.ros2.references import Refuse
+from tautscope.ros2.session import IMAGE, SENSOR_DATA, Node
+
+DRIVER_TIMEOUT = 0.1
+"""Longest time without positions from the driver [s]."""
+START_TIMEOUT = 2.0
+"""How long the first positions of the driver are waited for [s]."""
+_POLL = 1_000_000
+
+
+class DriverRig:
+    """Drives behind ``actuators/setpoint_js`` and ``actuators/measured_js``, and a camera.
+
+    Implements `tautscope.loop.rig.Rig`. Its clock is the monotonic one, from `reset` on; a stamp is
+    converted by its age. The first command should be the applied position of the first sample.
+    After `close`, and if this process ends, no set-point is sent, by which the driver has to stop.
+
+    Args:
+        config: With the camera's size and format.
+        node: Publishes and subscribes.
+        instrument: Namespace of the topics of the drives.
+        image: Topic of the images.
+        clock: The clocks.
+        refuse: Called for refused messages.
+    """
+
+    def __init__(
+        self,
+        config: Config,
+        node: Node,
+        *,
+        instrument: str,
+        image: str,
+        clock: Clock,
+        refuse: Refuse,
+    ) -> None:
+        kind = "sensor_msgs/msg/JointState"
+        self._setpoints = node.publisher(f"{instrument}/actuators/setpoint_js", kind)
+        self._positions = node.subscription(f"{instrument}/actuators/measured_js", kind)
+        self._images = node.subscription(image, IMAGE, SENSOR_DATA)
+        self._position_stamps = Stamps(self._positions.topic)
+        self._image_stamps = Stamps(self._images.topic)
+        self._reader = ImageReader(self._images.topic, config.camera)
+        self._clock, self._refuse = clock, refuse
+        self._period = round(config.control.period * 1e9)
+        self._applied: NDArray[np.float64] | None = None
+        self._start = self._due = self._moved_at = self._frames = 0
+
+    @property
+    def control_period(self) -> float:
+        """Time from one command to the next [s]."""
+        return self._period / 1e9
+
+    def reset(self) -> Sample:
+        """Wait for the driver's positions; the clock is at 0.
+
+        Raises:
+            DriveError: There are none.
+        """
+        self._applied = None
+        self._position_stamps.reset()
+        self._image_stamps.reset()
+        give_up = self._clock.monotonic() + round(START_TIMEOUT * 1e9)
+        while self._newest_position() is None:
+            if self._clock.monotonic() > give_up:
+                raise self._silent(START_TIMEOUT, "Start the driver")
+            self._clock.sleep_until(self._clock.monotonic() + _POLL)
+        self._newest_frame()  # one from before the start
+        self._start = self._due = self._clock.monotonic()
+        return self._sample()
+
+    def step(self, command: ArrayLike) -> Sample:
+        """Publish command (3,) [m, rad, rad]; return at the end of the control period.
+
+        A tick that wakes late does not catch up.
+
+        Raises:
+            SignalError: The command is not three finite numbers.
+            DriveError: The driver is silent for `DRIVER_TIMEOUT`.
+        """
+        positions = check_signal("command", command, (3,))
+        stamp = self._clock.wall()
+        self._setpoints.publish(messages.joint_state(stamp, positions))
+        self._due += self._period
+        self._due = max(self._due, self._clock.monotonic())
+        self._clock.sleep_until(self._due)
+        self._newest_position()
+        if self._clock.monotonic() - self._moved_at > DRIVER_TIMEOUT * 1e9:
+            raise self._silent(DRIVER_TIMEOUT, "The node sends no set-point any more")
+        return self._sample()
+
+    def close(self) -> None:
+        """Send no set-point any more; a second call does nothing."""
+
+    def _sample(self) -> Sample:
+        assert self._applied is not None
+        now = (self._clock.monotonic() - self._start) / 1e9
+        return Sample(now, self._applied, self._newest_frame())
+
+    def _newest_position(self) -> NDArray[np.float64] | None:
+        try:
+            message = self._positions.take()
+            if message is not None:
+                applied = joint_positions(self._positions.topic, message)
+                self._position_stamps.check(message.header, self._clock.wall())
+                self._applied, self._moved_at = applied, self._clock.monotonic()
+        except MessageError as error:
+            self._refuse(error)
+        return self._applied
+
+    def _newest_frame(self) -> Frame | None:
+        try:
+            message = self._images.take()
+            if message is None:
+                return None
+            wall = self._clock.wall()
+            age = wall - self._image_stamps.check(message.header, wall)
+            captured_at = (self._clock.monotonic() - age - self._start) / 1e9
+            frame = self._reader.read(message, captured_at, self._frames)
+        except MessageError as error:
+            self._refuse(error)
+            return None
+        self._frames += 1
+        return frame
+
+    def _silent(self, time: float, remedy: str) -> DriveError:
+        return DriveError(self._positions.topic, f"no message for {time:g} s", remedy)

@@ -1,0 +1,168 @@
+"""Checks of received messages, and conversion to what the loop takes.
+
+An error names the topic and the field; the message then changes nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tautscope.config import CameraConfig
+from tautscope.dof import Dof
+from tautscope.errors import FrameError, MessageError
+from tautscope.loop.frame_layout import FrameLayout
+from tautscope.loop.rig import Frame
+
+Floats = NDArray[np.float64]
+FUTURE = 5_000_000
+"""How much later than this computer's clock a stamp may be [ns]."""
+JOINTS = [dof.label for dof in Dof]
+ENCODINGS = {
+    "bgr": ("bgr8",),
+    "rgb": ("rgb8",),
+    "bgra": ("bgra8",),
+    "yuyv": ("yuv422_yuy2",),
+    "uyvy": ("uyvy", "yuv422"),
+}
+"""`camera.pixel_format` -> values of ``encoding``, of sensor_msgs/image_encodings.hpp."""
+_CHANNELS = {"bgr": 3, "rgb": 3, "bgra": 4, "yuyv": 2, "uyvy": 2}
+
+
+class Stamps:
+    """Checks that the stamps of a topic are known, of the present, and later each time.
+
+    Args:
+        topic: The topic, for errors.
+    """
+
+    def __init__(self, topic: str) -> None:
+        self._topic = topic
+        self._last = 0
+
+    def reset(self) -> None:
+        """Forget the last stamp: the sender's clock may have been set."""
+        self._last = 0
+
+    def check(self, header: Any, wall: int) -> int:
+        """The stamp [ns since 1970] of a header that arrived at a wall clock time [ns].
+
+        Raises:
+            MessageError: It is 0 (CRTK: invalid data), no time, in the future, or not later than
+                the last one.
+        """
+        sec, nanosec = header.stamp.sec, header.stamp.nanosec
+        stamp = int(sec * 10**9 + nanosec)
+        given = f"{sec}.{nanosec:09d} s"
+        if sec < 0 or nanosec >= 10**9 or stamp == 0:
+            self._refuse(given, "a time above 0 with less than 10^9 ns; 0 marks invalid data")
+        if stamp > wall + FUTURE:
+            ahead = (stamp - wall) / 1e9
+            self._refuse(given, f"no time in the future (by {ahead:.3f} s): synchronise the clocks")
+        if stamp <= self._last:
+            self._refuse(given, "a later time than that of the last message")
+        self._last = stamp
+        return stamp
+
+    def _refuse(self, given: str, allowed: str) -> None:
+        raise MessageError(f"{self._topic} header.stamp", given, allowed)
+
+
+def joint_positions(topic: str, message: Any) -> Floats:
+    """Positions (3,) [m, rad, rad] of insertion, rotation and bending in a JointState.
+
+    Raises:
+        MessageError: A joint is missing, doubled or unknown, or a position is not finite.
+    """
+    names, positions = list(message.name), message.position
+    if sorted(names) != sorted(JOINTS):
+        raise MessageError(f"{topic} name", names[:9], f"{', '.join(JOINTS)}, in any order")
+    if len(positions) != len(names):
+        raise MessageError(f"{topic} position", len(positions), f"{len(names)} numbers, one a name")
+    for name, position in zip(names, positions, strict=True):
+        if not np.isfinite(position):
+            raise MessageError(f"{topic} position of {name}", float(position), "a finite number")
+    return np.array([positions[names.index(joint)] for joint in JOINTS], np.float64)
+
+
+@dataclass(frozen=True, slots=True)
+class JoyAxes:
+    """Which axes and which button of a gamepad are used.
+
+    Attributes:
+        axes: Index in ``axes`` for insertion, rotation, bending.
+        button: Index in ``buttons`` of the dead man's button.
+    """
+
+    axes: tuple[int, int, int] = (1, 0, 4)
+    button: int = 4
+
+
+def joy_deflection(topic: str, message: Any, layout: JoyAxes) -> tuple[Floats, bool]:
+    """Deflections (3,) from -1 to 1, and whether the dead man's button is held.
+
+    Raises:
+        MessageError: An axis or the button is missing, or a deflection is not from -1 to 1.
+    """
+    axes, buttons = message.axes, message.buttons
+    for name, values, least in (
+        ("axes", axes, max(layout.axes)),
+        ("buttons", buttons, layout.button),
+    ):
+        if len(values) <= least:
+            raise MessageError(f"{topic} {name}", len(values), f"at least {least + 1} values")
+    deflection = np.array([axes[index] for index in layout.axes], np.float64)
+    if not (np.abs(deflection) <= 1).all():
+        raise MessageError(f"{topic} axes", deflection.tolist(), "numbers from -1 to 1")
+    return deflection, bool(buttons[layout.button])
+
+
+class ImageReader:
+    """Converts sensor_msgs/msg/Image to frames of the configured camera.
+
+    Args:
+        topic: The topic, for errors.
+        camera: The camera; ``camera.pixel_format`` decides which encoding is taken.
+
+    Raises:
+        MessageError: ROS has no encoding for the pixel format.
+    """
+
+    def __init__(self, topic: str, camera: CameraConfig) -> None:
+        self._topic, self._camera = topic, camera
+        self._layout = FrameLayout(camera)
+        if camera.pixel_format not in ENCODINGS:
+            allowed = f"one of {', '.join(ENCODINGS)} for images of ROS"
+            raise MessageError("camera.pixel_format", camera.pixel_format, allowed)
+
+    def read(self, message: Any, captured_at: float, sequence: int) -> Frame:
+        """The frame of an image, without a copy, captured at a time of the rig's clock [s].
+
+        Raises:
+            MessageError: It is not from the configured camera, or its size is not that of its data.
+        """
+        topic, camera = self._topic, self._camera
+        encodings = ENCODINGS[camera.pixel_format]
+        if message.encoding not in encodings:
+            allowed = f"{' or '.join(encodings)}: camera.pixel_format is {camera.pixel_format}"
+            raise MessageError(f"{topic} encoding", message.encoding[:32], allowed)
+        for field, size in (("width", camera.width), ("height", camera.height)):
+            if getattr(message, field) != size:
+                raise MessageError(f"{topic} {field}", getattr(message, field), f"{size} px")
+        channels = _CHANNELS[camera.pixel_format]
+        if message.step < channels * camera.width:
+            least = f"at least {channels * camera.width} bytes a line"
+            raise MessageError(f"{topic} step", message.step, least)
+        if len(message.data) != message.step * camera.height:
+            allowed = f"step x height = {message.step * camera.height} bytes"
+            raise MessageError(f"{topic} data", f"{len(message.data)} bytes", allowed)
+        lines = np.asarray(message.data).reshape(camera.height, message.step)
+        pixels = lines[:, : channels * camera.width]
+        image = pixels.reshape(camera.height, camera.width, channels)
+        try:
+            return Frame(self._layout.checked(image), captured_at, sequence)
+        except FrameError as error:
+            raise MessageError(f"{topic} data", error.value, error.allowed) from None

@@ -1,0 +1,196 @@
+"""Sources of the operator's reference: ``servo_jp``, and ``sensor_msgs/Joy``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tautscope.config import Config
+from tautscope.console.lease import ImageTimes, Lease
+from tautscope.console.messages import Command, Received, Servo
+from tautscope.console.operator_input import OperatorInput
+from tautscope.errors import MessageError
+from tautscope.ros2.clock import Clock
+from tautscope.ros2.inputs import JoyAxes, Stamps, joint_positions, joy_deflection
+from tautscope.ros2.session import Node
+from tautscope.ros2.wire import Qos
+
+Floats = NDArray[np.float64]
+SERVO, JOY = "servo_jp", "joy"
+QUEUE = 10
+"""Number of references that wait for a tick; it takes the newest."""
+Refuse = Callable[[MessageError], None]
+"""Called with the reason for which a message is refused."""
+
+
+class Source(Protocol):
+    """A `tautscope.console.control_run.ReferenceSource` that can be started and clutched."""
+
+    reference: Floats
+
+    @property
+    def age(self) -> float | None:
+        """Time from when the reference was made to the last tick [s]; None: made in the tick."""
+        ...
+
+    def reset(self, reference: Floats) -> None:
+        """Start at a reference (3,) [m, rad, rad]."""
+        ...
+
+    def engage(self) -> None:
+        """Follow the device again, from where the reference is."""
+        ...
+
+    def update(self, now: float, period: float, command: Floats, *, is_held: bool) -> Floats:
+        """The reference of a tick."""
+        ...
+
+
+class ServoReference:
+    """The reference of a stream of positions, with its date.
+
+    The first message after `reset` and `engage` clutches in: the reference is where it was, and
+    follows the increments,
+
+        reference = position + offset
+
+    A stream that begins at ``setpoint_js`` has the offset 0. Between messages the last reference
+    remains, and its age grows, by which the loop detects a silent device
+    (``safety.reference_age``). While the supervisor holds motion the reference rests.
+
+    Args:
+        node: Subscribes.
+        topic: Of sensor_msgs/msg/JointState.
+        clock: Clock of the stamps.
+        refuse: Called for refused messages.
+    """
+
+    def __init__(self, node: Node, topic: str, clock: Clock, refuse: Refuse) -> None:
+        self._messages = node.subscription(topic, "sensor_msgs/msg/JointState", Qos(depth=QUEUE))
+        self._clock, self._refuse = clock, refuse
+        self._stamps = Stamps(self._messages.topic)
+        self.reference = self._before = np.full(3, np.nan)
+        self._offset: Floats | None = None
+        self._made_at: int | None = None
+        self.age: float | None = None
+
+    def reset(self, reference: Floats) -> None:
+        """Start at a reference (3,) [m, rad, rad]; what arrived before is discarded."""
+        self.reference = self._before = reference.copy()
+        self._take()
+        self._stamps.reset()
+        self.engage()
+
+    def engage(self) -> None:
+        """Follow the next message's increments."""
+        self._offset = self._made_at = self.age = None
+
+    def update(self, now: float, period: float, command: Floats, *, is_held: bool) -> Floats:
+        """The newest reference (3,) [m, rad, rad]; sets `age`."""
+        found = self._take()
+        if is_held:
+            # The increment with which motion was stopped has not been followed.
+            if self._made_at is not None:
+                self.reference = self._before
+            self.engage()
+            return self.reference.copy()
+        self._before = self.reference
+        if found:
+            if self._offset is None:
+                self._offset = self.reference - found[0][0]
+            position, self._made_at = found[-1]
+            # Bit for bit, for a stream that begins at the set-point.
+            self.reference = position + self._offset if self._offset.any() else position
+        if self._made_at is not None:
+            self.age = (self._clock.wall() - self._made_at) / 1e9
+        return self.reference.copy()
+
+    def _take(self) -> list[tuple[Floats, int]]:
+        """Position and stamp of the valid messages that wait."""
+        found = []
+        for _ in range(QUEUE):
+            try:
+                message = self._messages.take()
+                if message is None:
+                    break
+                position = joint_positions(self._messages.topic, message)
+                found.append((position, self._stamps.check(message.header, self._clock.wall())))
+            except MessageError as error:
+                self._refuse(error)
+        return found
+
+
+class JoyReference:
+    """The reference of a gamepad: deflections are speeds, while the dead man's button is held.
+
+    Speed, ramp, travel, and rest without messages are those of the operator's console,
+    `tautscope.console.operator_input.OperatorInput`.
+
+    Args:
+        config: Limits of speed and travel.
+        node: Subscribes.
+        topic: Of sensor_msgs/msg/Joy.
+        clock: Clock of the stamps.
+        refuse: Called for refused messages.
+        layout: Axes and button.
+    """
+
+    age: float | None = None
+
+    def __init__(
+        self,
+        config: Config,
+        node: Node,
+        topic: str,
+        *,
+        clock: Clock,
+        refuse: Refuse,
+        layout: JoyAxes,
+    ) -> None:
+        self._messages = node.subscription(topic, "sensor_msgs/msg/Joy")
+        self._clock, self._refuse, self._layout = clock, refuse, layout
+        self._stamps = Stamps(self._messages.topic)
+        self._operator = OperatorInput(config, _OneOperator(ImageTimes()))
+
+    @property
+    def reference(self) -> Floats:
+        """Reference u (3,) [m, rad, rad] of the last tick."""
+        return self._operator.reference
+
+    @reference.setter
+    def reference(self, reference: Floats) -> None:
+        self._operator.reference = reference
+
+    def reset(self, reference: Floats) -> None:
+        """Start at a reference (3,) [m, rad, rad], after the button was released once."""
+        self._stamps.reset()
+        self._operator.reset(reference)
+
+    def engage(self) -> None:
+        """Move again, after the button was released once."""
+        self._operator.interrupt()
+
+    def update(self, now: float, period: float, command: Floats, *, is_held: bool) -> Floats:
+        """The reference (3,) [m, rad, rad] of a tick at a time of the monotonic clock [s]."""
+        try:
+            message = self._messages.take()
+            if message is not None:
+                deflection, is_holding = joy_deflection(self._messages.topic, message, self._layout)
+                wall = self._clock.wall()
+                age = (wall - self._stamps.check(message.header, wall)) / 1e9
+                axes = tuple(deflection.tolist())
+                servo = Servo(lease=0, sequence=0, image=0, axes=axes, is_holding=is_holding)
+                self._operator.receive(Received(0, now - age, servo), now)
+        except MessageError as error:
+            self._refuse(error)
+        return self._operator.update(now, period, command, is_held=is_held)
+
+
+class _OneOperator(Lease):
+    """The lease of the only publisher."""
+
+    def refusal(self, client: int, command: Command, now: float, *, needs_image: bool) -> str:
+        return ""

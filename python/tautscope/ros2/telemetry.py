@@ -1,0 +1,170 @@
+"""What the node publishes about rig, loop and itself."""
+
+from __future__ import annotations
+
+from collections import Counter
+from concurrent.futures import Future, ThreadPoolExecutor
+
+from tautscope.config import Config
+from tautscope.console.control_run import ControlRun
+from tautscope.errors import MessageError
+from tautscope.hardware.realtime import OTHERS, set_realtime_priority
+from tautscope.loop.reduction import Report
+from tautscope.loop.rig import Frame
+from tautscope.ros2 import messages
+from tautscope.ros2.clock import Clock
+from tautscope.ros2.session import SENSOR_DATA, Node, Publisher
+
+STATE_PERIOD = 100_000_000
+"""Time between two operating states [ns]; a change is published at once."""
+DIAGNOSTICS_PERIOD = 1_000_000_000
+"""Time between two diagnostics, and between two warnings of the same field [ns]."""
+
+
+class Topics:
+    """Names of the topics of a node.
+
+    Args:
+        namespace: Of the node.
+    """
+
+    def __init__(self, namespace: str) -> None:
+        self.instrument = f"{namespace}/instrument"
+        self.image = f"{namespace}/endoscope/image_raw"
+        self.camera_info = f"{namespace}/endoscope/camera_info"
+        self.servo = f"{self.instrument}/servo_jp"
+        self.joy = f"{namespace}/joy"
+        self.state_command = f"{self.instrument}/state_command"
+
+
+class Telemetry:
+    """Publishes ticks, image updates, state, warnings and diagnostics.
+
+    Args:
+        config: Of the loop.
+        node: Publishes.
+        topics: Names of the topics.
+        clock: The clocks.
+        has_rig: Whether drives and camera are this process's, and not nodes of their own.
+
+    Attributes:
+        refused: Field -> number of refused messages.
+    """
+
+    def __init__(
+        self, config: Config, node: Node, topics: Topics, clock: Clock, *, has_rig: bool
+    ) -> None:
+        self._config, self._clock, self._has_rig = config, clock, has_rig
+        self._node = node
+        self._name = node.identity.path.lstrip("/")
+        joints, text = "sensor_msgs/msg/JointState", "std_msgs/msg/String"
+
+        def publisher(name: str, kind: str) -> Publisher:
+            return node.publisher(f"{topics.instrument}/{name}", kind)
+
+        self._setpoint = publisher("setpoint_js", joints)
+        self._tip = publisher("measured_js", joints)
+        self._offsets = publisher("hysteresis/delta", "std_msgs/msg/Float64MultiArray")
+        self._mode = publisher("hysteresis/mode", text)
+        self._compensation = publisher("hysteresis/compensation", "std_msgs/msg/Float64")
+        self._state = publisher("operating_state", "crtk_msgs/msg/OperatingState")
+        self._warning = publisher("warning", text)
+        self._diagnostics = node.publisher("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
+        self._camera_info = node.publisher(topics.camera_info, "sensor_msgs/msg/CameraInfo")
+        if has_rig:
+            self._command = publisher("actuators/setpoint_js", joints)
+            self._applied = publisher("actuators/measured_js", joints)
+            self._image = node.publisher(topics.image, "sensor_msgs/msg/Image", SENSOR_DATA)
+        # The transport may wait for a slow receiver; a tick may not.
+        self._images = ThreadPoolExecutor(1, "images", set_realtime_priority, (OTHERS,))
+        self._sending: Future[None] = Future()
+        self._sending.set_result(None)
+        self.refused: Counter[str] = Counter()
+        self._warned: dict[str, int] = {}
+        self._flags: tuple[str, ...] = ()
+        self._shown: tuple[str, bool, bool] | None = None
+        self._shown_at = self._diagnosed_at = -STATE_PERIOD
+
+    def tick(self, run: ControlRun) -> None:
+        """Publish set-points, and the positions of the drives."""
+        now = self._clock.wall()
+        self._setpoint.publish(messages.joint_state(now, run.reference))
+        if self._has_rig:
+            self._command.publish(messages.joint_state(now, run.command))
+            self._applied.publish(messages.joint_state(now, run.sample.applied))
+        flags = run.loop.supervision.flags
+        for flag in sorted(set(flags) - set(self._flags)):
+            self.warn(f"{flag}: {run.loop.supervision.reaction}")
+        self._flags = flags
+
+    def update(self, run: ControlRun, frame: Frame, report: Report) -> None:
+        """Publish an image update, and the image if anybody receives it."""
+        age = round((run.sample.time - report.captured_at) * 1e9)
+        captured = self._clock.wall() - age
+        self._tip.publish(messages.tip_state(captured, report))
+        self._offsets.publish(messages.offsets(report))
+        supervision = run.loop.supervision
+        self._mode.publish(messages.text(str(supervision.reaction)))
+        self._compensation.publish(messages.number(supervision.lead))
+        self._camera_info.publish(messages.camera_info(captured, self._config.camera))
+        if self._has_rig and self._sending.done() and self._image.has_subscribers:
+            self._sending = self._images.submit(self._send_image, captured, frame)
+
+    def _send_image(self, captured: int, frame: Frame) -> None:
+        image = messages.image(captured, frame, self._config.camera)
+        if image is not None:
+            self._image.publish(image)
+
+    def close(self) -> None:
+        """Wait for the image that is sent."""
+        self._images.shutdown()
+
+    def state(self, state: str, *, is_homed: bool = False, is_busy: bool = False) -> None:
+        """Publish the operating state, if it has changed or is due."""
+        now, shown = self._clock.monotonic(), (state, is_homed, is_busy)
+        if shown == self._shown and now - self._shown_at < STATE_PERIOD:
+            return
+        self._shown, self._shown_at = shown, now
+        wall = self._clock.wall()
+        self._state.publish(
+            messages.operating_state(wall, state, is_homed=is_homed, is_busy=is_busy)
+        )
+
+    def refuse(self, error: MessageError) -> None:
+        """Count a refused message, and warn at most once per second and field."""
+        self.refused[error.field] += 1
+        now = self._clock.monotonic()
+        if now - self._warned.get(error.field, -DIAGNOSTICS_PERIOD) >= DIAGNOSTICS_PERIOD:
+            self._warned[error.field] = now
+            self.warn(f"refused: {error}")
+
+    def warn(self, text: str) -> None:
+        """Publish a warning."""
+        self._warning.publish(messages.text(text))
+
+    def diagnose(self, run: ControlRun | None, state: str, fault: str) -> None:
+        """Publish diagnostics, once per second."""
+        now = self._clock.monotonic()
+        if now - self._diagnosed_at < DIAGNOSTICS_PERIOD:
+            return
+        self._diagnosed_at = now
+        values: dict[str, object] = {}
+        for each in self._node.subscriptions:
+            values[f"received {each.topic}"] = each.received
+            values[f"missed {each.topic}"] = each.missed
+        values |= {f"refused {name}": n for name, n in self.refused.items()}
+        flags: tuple[str, ...] = ()
+        if run is not None:
+            flags = run.loop.supervision.flags
+            values |= {
+                "ticks": run.ticks,
+                "late ticks": run.late,
+                "unused images": run.unused,
+                "log": run.path,
+                "dropped by the log": run.log.dropped,
+            }
+        level = messages.ERROR if fault else messages.WARN if flags else messages.OK
+        text = fault or ", ".join(flags) or state
+        self._diagnostics.publish(
+            messages.diagnostics(self._clock.wall(), self._name, level, text, values)
+        )

@@ -1,0 +1,93 @@
+"""Types, hashes and CDR against independent implementations."""
+
+from __future__ import annotations
+
+import random
+
+import numpy as np
+import pytest
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from tautscope.errors import MessageError
+from tautscope.log import cdr
+from tautscope.ros2 import types
+
+# As published: the type hash in `ros2 topic info --verbose` (std_msgs/msg/String, REP 2016), and
+# those of the services of rcl_interfaces that the crate hiroz 0.2.1 uses with rmw_zenoh of Jazzy.
+PUBLISHED = {
+    "std_msgs/msg/String": "df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18",
+    "rcl_interfaces/msg/ParameterEvent": (
+        "043e627780fcad87a22d225bc2a037361dba713fca6a6b9f4b869a5aa0393204"
+    ),
+    "rcl_interfaces/srv/DescribeParameters": (
+        "845b484d71eb0673dae682f2e3ba3c4851a65a3dcfb97bddd82c5b57e91e4cff"
+    ),
+    "rcl_interfaces/srv/GetParameters": (
+        "bf9803d5c74cf989a5de3e0c2e99444599a627c7ff75f97b8c05b01003675cbc"
+    ),
+    "rcl_interfaces/srv/GetParameterTypes": (
+        "da199c878688b3e530bdfe3ca8f74cb9fa0c303101e980a9e8f260e25e1c80ca"
+    ),
+    "rcl_interfaces/srv/ListParameters": (
+        "3e6062bfbb27bfb8730d4cef2558221f51a11646d78e7bb30a1e83afac3aad9d"
+    ),
+    "rcl_interfaces/srv/SetParameters": (
+        "56eed9a67e169f9cb6c1f987bc88f868c14a8fc9f743a263bc734c154015d7e0"
+    ),
+    "rcl_interfaces/srv/SetParametersAtomically": (
+        "0e192ef259c07fc3c07a13191d27002222e65e00ccec653ca05e856f79285fcd"
+    ),
+}
+JOINTS = "sensor_msgs/msg/JointState"
+STORE = get_typestore(Stores.ROS2_JAZZY)
+
+
+def joint_state(values: list[float]) -> dict[str, object]:
+    names = ["insertion", "rotation", "bending"]
+    stamp = {"sec": 12, "nanosec": 345}
+    header = {"stamp": stamp, "frame_id": "guide"}
+    return {"header": header, "name": names, "position": values, "velocity": (), "effort": ()}
+
+
+@pytest.mark.parametrize("kind", PUBLISHED)
+def test_hashes_are_the_published_ones(kind: str) -> None:
+    assert types.type_hash(kind) == f"RIHS01_{PUBLISHED[kind]}"
+
+
+@pytest.mark.parametrize("kind", sorted(set(cdr.DEFINITIONS) & set(STORE.fielddefs)))
+def test_the_definitions_of_the_logs_are_those_of_ros(kind: str) -> None:
+    store = get_typestore(Stores.EMPTY)
+    for name, text in cdr.DEFINITIONS.items():
+        store.register(get_types_from_msg(text, name))
+    assert store.hash_rihs01(kind) == types.type_hash(kind)
+
+
+def test_messages_are_those_of_our_other_encoder() -> None:
+    values = [0.025, -1.5, float(np.nextafter(0.9, 1))]
+    message = types.make(
+        JOINTS,
+        header=types.header(12_000_000_345, "guide"),
+        name=["insertion", "rotation", "bending"],
+        position=np.array(values),
+        velocity=np.empty(0),
+        effort=np.empty(0),
+    )
+    encoded = cdr.encode(JOINTS, joint_state(values))
+    assert types.encode(message) == encoded
+    assert types.decode(JOINTS, encoded).position.tolist() == values
+
+
+def test_damaged_messages_are_refused_and_never_crash() -> None:
+    random_ = random.Random(20)
+    good = cdr.encode(JOINTS, joint_state([0.025, 0.0, 0.9]))
+    refused = 0
+    for _ in range(3000):
+        data = bytearray(good[: random_.randrange(len(good) + 1)])
+        for _ in range(random_.randrange(4)):
+            if data:
+                data[random_.randrange(len(data))] = random_.randrange(256)
+        try:
+            types.decode(JOINTS, bytes(data))
+        except MessageError as error:
+            assert error.field == JOINTS
+            refused += 1
+    assert refused > 1000
