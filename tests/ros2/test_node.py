@@ -172,6 +172,15 @@ def test_a_missing_driver_is_named(both: Peers) -> None:
     assert "Start the driver" in both.control.fault
 
 
+def test_enable_changes_nothing_while_enabled(both: Peers) -> None:
+    both.enable(START)
+    run = both.control.run
+    drive(both, 5)
+    both.request("enable")
+    assert both.control.run is run
+    assert both.control.lifecycle.state is State.ACTIVE
+
+
 def test_unknown_commands_are_refused(both: Peers) -> None:
     both.request("home")
     (warning,) = both.drain(both.warnings)
@@ -328,7 +337,7 @@ def test_services_change_and_read_the_state(both: Peers) -> None:
     found = call("get_available_transitions", "GetAvailableTransitions", **empty)
     labels = [each.transition.label for each in found.available_transitions]
     assert labels == ["deactivate", "shutdown"]
-    assert change(7)
+    assert change(0, "shutdown")
     assert both.control.lifecycle.state is State.FINALIZED
     assert both.control.run is None
 

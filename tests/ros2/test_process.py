@@ -148,6 +148,33 @@ def test_a_device_that_ends_pauses_the_node(tmp_path: Path, endpoint: str) -> No
         hand.wait("PAUSED")
 
 
+def test_drives_of_a_configuration_stop_when_the_node_is_killed(
+    tmp_path: Path, endpoint: str
+) -> None:
+    with subprocess.Popen(
+        [*PYTHON, "-m", "tautscope", "bench"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as bench:
+        assert json.loads(line(bench))["what"] == "ready"
+        with (
+            process(*node_command(tmp_path, endpoint, "--config", "bench")) as node,
+            operator(endpoint) as hand,
+        ):
+            line(node)
+            hand.request("enable")
+            hand.wait("ENABLED", lambda: hand.request("enable"))
+            hand.move(0.5)
+            node.kill()
+            found: list[str] = []
+            while found.count("quick stop active") < 3:
+                found.append(json.loads(line(bench))["what"])
+        assert found.count("operation enabled") == 3
+        assert bench.stdin is not None
+        bench.stdin.close()
+
+
 def test_nodes_meet_at_a_router(tmp_path: Path, endpoint: str) -> None:
     settings = zenoh.Config()
     settings.insert_json5("mode", '"router"')
