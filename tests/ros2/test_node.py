@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,7 +20,17 @@ from tautscope.ros2.wire import Qos
 
 CONFIG = load_config()
 START = np.array([0.025, 0.0, 0.9])
-TICK = 5_000_000
+STRING, GET = "crtk_msgs/msg/StringStamped", "rcl_interfaces/srv/GetParameters"
+IMAGE = "sensor_msgs/msg/Image"
+IMAGE_FIELDS = {
+    "header": types.header(1, "endoscope"),
+    "height": 1,
+    "width": 2,
+    "encoding": "bgr8",
+    "is_bigendian": 0,
+    "step": 6,
+    "data": np.zeros(6, np.uint8),
+}
 
 
 def drive(both: Peers, ticks: int, speed: float = 0.0, *, at: np.ndarray = START) -> np.ndarray:
@@ -371,6 +382,44 @@ def test_parameters_are_read_and_set(both: Peers) -> None:
     )
     assert not atomic.result.successful
     assert both.control.parameters["compensation"] == 0.5
+
+
+def test_any_bytes_to_a_topic_or_service_are_answered_or_refused(both: Peers) -> None:
+    both.enable(START)
+    drive(both, 5)
+    random_ = random.Random(20)
+    names = types.make("rcl_interfaces/srv/GetParameters_Request", names=["compensation", "a"])
+    good = [
+        (both.requests, types.make(STRING, header=types.header(1, ""), string="reset")),
+        (both.servo, messages.joint_state(1, START)),
+        (both.positions, messages.joint_state(1, START)),
+        (both.images, types.make(IMAGE, **IMAGE_FIELDS)),
+    ]
+    get = wire.key(0, "/tautscope/get_parameters", GET, types.type_hash(GET))
+    attachment = wire.attachment(1, 2, b"c" * 16)
+    replies = []
+    for _ in range(150):
+        for publisher, message in good:
+            publisher.send(damaged(types.encode(message), random_))
+        payload = damaged(types.encode(names), random_)
+        send = {"payload": payload, "attachment": damaged(attachment, random_)}
+        replies.append(both.other._session.get(get, **send))
+        drive(both, 1)
+    assert both.control.operating_state == "ENABLED"
+    assert both.control.run.loop.supervision.flags == ()  # type: ignore[union-attr]
+    answers = [reply.try_recv() for reply in replies]
+    assert any(each is not None and each.err is not None for each in answers)
+    assert {"/instrument/servo_jp", "/instrument/state_command"} <= {
+        field.split()[0] for field in both.control._telemetry.refused
+    }
+
+
+def damaged(data: bytes, random_: random.Random) -> bytes:
+    """A message with changed bytes, cut off."""
+    found = bytearray(data)
+    for _ in range(1 + random_.randrange(4)):
+        found[random_.randrange(min(len(found), 120))] = random_.randrange(256)
+    return bytes(found[: random_.randrange(len(found))])
 
 
 def service(both: Peers, name: str, kind: str, request: object):

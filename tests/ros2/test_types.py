@@ -76,18 +76,55 @@ def test_messages_are_those_of_our_other_encoder() -> None:
     assert types.decode(JOINTS, encoded).position.tolist() == values
 
 
-def test_damaged_messages_are_refused_and_never_crash() -> None:
-    random_ = random.Random(20)
-    good = cdr.encode(JOINTS, joint_state([0.025, 0.0, 0.9]))
-    refused = 0
+def parameter() -> object:
+    """A rcl_interfaces/msg/Parameter with a value in every field."""
+    value = types.make(
+        "rcl_interfaces/msg/ParameterValue",
+        type=3,
+        bool_value=True,
+        integer_value=1,
+        double_value=0.5,
+        string_value="text",
+        byte_array_value=np.ones(3, np.uint8),
+        bool_array_value=np.ones(3, np.bool_),
+        integer_array_value=np.ones(3, np.int64),
+        double_array_value=np.ones(3),
+        string_array_value=["a", "bc"],
+    )
+    return types.make("rcl_interfaces/msg/Parameter", name="compensation", value=value)
+
+
+MESSAGES = {
+    JOINTS: cdr.encode(JOINTS, joint_state([0.025, 0.0, 0.9])),
+    "crtk_msgs/msg/StringStamped": types.encode(
+        types.make("crtk_msgs/msg/StringStamped", header=types.header(1, "a"), string="enable")
+    ),
+    "sensor_msgs/msg/Joy": types.encode(
+        types.make(
+            "sensor_msgs/msg/Joy",
+            header=types.header(1, ""),
+            axes=np.ones(6, np.float32),
+            buttons=np.ones(6, np.int32),
+        )
+    ),
+    "rcl_interfaces/srv/SetParameters_Request": types.encode(
+        types.make("rcl_interfaces/srv/SetParameters_Request", parameters=[parameter()] * 2)
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", MESSAGES)
+def test_damaged_messages_are_refused_and_never_crash(kind: str) -> None:
+    random_, good, refused = random.Random(20), MESSAGES[kind], 0
+    assert types.encode(types.decode(kind, good)) == good
     for _ in range(3000):
         data = bytearray(good[: random_.randrange(len(good) + 1)])
         for _ in range(random_.randrange(4)):
             if data:
                 data[random_.randrange(len(data))] = random_.randrange(256)
         try:
-            types.decode(JOINTS, bytes(data))
+            types.decode(kind, bytes(data))
         except MessageError as error:
-            assert error.field == JOINTS
+            assert error.field == kind
             refused += 1
     assert refused > 1000
