@@ -116,7 +116,8 @@ class DriverRig:
             message = self._positions.take()
             if message is not None:
                 applied = joint_positions(self._positions.topic, message)
-                self._position_stamps.check(message.header, self._clock.wall())
+                wall, source = self._clock.wall(), self._positions.source
+                self._position_stamps.check(message.header, wall, source)
                 self._applied, self._moved_at = applied, self._clock.monotonic()
         except MessageError as error:
             self._refuse(error)

@@ -87,6 +87,7 @@ class ServoReference:
     def engage(self) -> None:
         """Follow the next message's increments."""
         self._offset = self._made_at = self.age = None
+        self._stamps.release()
 
     def update(self, now: float, period: float, command: Floats, *, is_held: bool) -> Floats:
         """The newest reference (3,) [m, rad, rad]; sets `age`."""
@@ -117,7 +118,9 @@ class ServoReference:
                 if message is None:
                     break
                 position = joint_positions(self._messages.topic, message)
-                found.append((position, self._stamps.check(message.header, self._clock.wall())))
+                source = self._messages.source
+                stamp = self._stamps.check(message.header, self._clock.wall(), source)
+                found.append((position, stamp))
             except MessageError as error:
                 self._refuse(error)
         return found
@@ -171,6 +174,7 @@ class JoyReference:
 
     def engage(self) -> None:
         """Move again, after the button was released once."""
+        self._stamps.release()
         self._operator.interrupt()
 
     def update(self, now: float, period: float, command: Floats, *, is_held: bool) -> Floats:
@@ -180,7 +184,8 @@ class JoyReference:
             if message is not None:
                 deflection, is_holding = joy_deflection(self._messages.topic, message, self._layout)
                 wall = self._clock.wall()
-                age = (wall - self._stamps.check(message.header, wall)) / 1e9
+                stamp = self._stamps.check(message.header, wall, self._messages.source)
+                age = (wall - stamp) / 1e9
                 axes = tuple(deflection.tolist())
                 servo = Servo(lease=0, sequence=0, image=0, axes=axes, is_holding=is_holding)
                 self._operator.receive(Received(0, now - age, servo), now)

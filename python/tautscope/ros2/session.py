@@ -69,6 +69,7 @@ class Subscription:
         topic: Full name of the topic.
         received: Number of messages taken.
         missed: Number of messages between these that were lost, or replaced by newer ones.
+        source: Identifier of the publisher of the last message; empty if it has none.
     """
 
     def __init__(self, topic: str, kind: str, subscriber: Any, token: Any) -> None:
@@ -76,7 +77,8 @@ class Subscription:
         self._largest = LARGEST_IMAGE if kind == IMAGE else LARGEST
         self._subscriber, self._token = subscriber, token
         self.received = self.missed = 0
-        self._last: tuple[bytes, int] | None = None
+        self.source = b""
+        self._sequence = 0
 
     def take(self) -> Any | None:
         """The oldest message that waits, or None.
@@ -88,17 +90,17 @@ class Subscription:
         if sample is None:
             return None
         self.received += 1
+        before, self.source = self.source, b""
         try:
             if sample.attachment is not None:
-                self._count(*wire.read_attachment(_payload(sample.attachment, LARGEST)))
+                attachment = _payload(sample.attachment, LARGEST)
+                sequence, _, self.source = wire.read_attachment(attachment)
+                if self.source == before:
+                    self.missed += max(sequence - self._sequence - 1, 0)
+                self._sequence = sequence
             return types.decode(self._kind, _payload(sample.payload, self._largest))
         except MessageError as error:
             raise MessageError(self.topic, error.value, error.allowed) from None
-
-    def _count(self, sequence: int, sent_at: int, source: bytes) -> None:
-        if self._last is not None and self._last[0] == source:
-            self.missed += max(sequence - self._last[1] - 1, 0)
-        self._last = source, sequence
 
 
 class Service:
