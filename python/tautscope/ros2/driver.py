@@ -11,9 +11,10 @@ from tautscope.loop.rig import Frame, Sample
 from tautscope.loop.signal_checks import check_signal
 from tautscope.ros2 import messages
 from tautscope.ros2.clock import Clock
+from tautscope.ros2.endpoints import IMAGE
 from tautscope.ros2.inputs import ImageReader, Stamps, joint_positions
 from tautscope.ros2.references import Refuse
-from tautscope.ros2.session import IMAGE, SENSOR_DATA, Node
+from tautscope.ros2.session import SENSOR_DATA, Node
 
 DRIVER_TIMEOUT = 0.1
 """Longest time without positions from the driver [s]."""

@@ -49,6 +49,36 @@ class Source(Protocol):
         ...
 
 
+class Pausable:
+    """A source that is held by request too.
+
+    Args:
+        source: The source.
+
+    Attributes:
+        is_paused: Whether motion is held.
+    """
+
+    def __init__(self, source: Source) -> None:
+        self._source = source
+        self.is_paused = False
+        self.reset, self.engage = source.reset, source.engage
+
+    @property
+    def reference(self) -> Floats:
+        """Reference u (3,) [m, rad, rad] of the last tick."""
+        return self._source.reference
+
+    @property
+    def age(self) -> float | None:
+        """Time from when the reference was made to the last tick [s]; None: made in the tick."""
+        return self._source.age
+
+    def update(self, now: float, period: float, command: Floats, *, is_held: bool) -> Floats:
+        """The reference of a tick."""
+        return self._source.update(now, period, command, is_held=is_held or self.is_paused)
+
+
 class ServoReference:
     """The reference of a stream of positions, with its date.
 
