@@ -25,18 +25,10 @@ from tautscope.loop.rig import Frame
 from tautscope.ros2 import messages, types
 from tautscope.ros2.clock import Clock
 from tautscope.ros2.control import NodeControl
+from tautscope.ros2.endpoints import IMAGE, Publisher, Subscription
 from tautscope.ros2.inputs import JoyAxes
 from tautscope.ros2.references import SERVO
-from tautscope.ros2.session import (
-    _PRIORITY,
-    _RELIABILITY,
-    IMAGE,
-    NEWEST,
-    SENSOR_DATA,
-    Node,
-    Publisher,
-    Subscription,
-)
+from tautscope.ros2.session import _PRIORITY, _RELIABILITY, NEWEST, SENSOR_DATA, Node
 from tautscope.ros2.start import Drives, build_control
 from tautscope.ros2.wire import Qos
 from tautscope.twin.rig import Twin

@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 from tautscope.ros2 import messages, types
-from tautscope.ros2.session import ROUTER, Node, Subscription
+from tautscope.ros2.endpoints import Subscription
+from tautscope.ros2.session import ROUTER, Node
 
 JOINTS, STATE = "sensor_msgs/msg/JointState", "crtk_msgs/msg/OperatingState"
 AMPLITUDE = np.array([0.005, 0.5, 0.3])  # m, rad, rad

@@ -129,6 +129,33 @@ def test_a_silent_device_stops_motion_until_it_is_resumed(both: Peers) -> None:
     assert np.abs(np.diff(moved[:, 0])).max() < 0.4 * 5e-3  # no jump by what it moved meanwhile
 
 
+def test_a_second_publisher_is_refused_until_it_takes_over(both: Peers) -> None:
+    second = both.publisher("/instrument/servo_jp", JOINTS)
+    both.delivered()
+    both.enable(START)
+    last = drive(both, 50, 0.01)
+
+    def send() -> None:
+        both.send_position(START)
+        second.publish(messages.joint_state(both.clock.wall(), last - 0.01))
+        both.delivered()
+
+    both.clock.before_tick = send
+    both.tick()  # takes the last of the first publisher
+    before = both.control.run.reference.copy()  # type: ignore[union-attr]
+    for _ in range(5):
+        both.tick()
+    assert (both.control.run.reference == before).all()  # type: ignore[union-attr]
+    shown = [each.data for each in both.drain(both.warnings)]
+    assert any(text.startswith("refused: /instrument/servo_jp publisher") for text in shown)
+    both.request("resume")
+    for _ in range(5):
+        both.tick()
+    assert both.control.operating_state == "ENABLED"
+    assert both.control.run.reference is not None  # type: ignore[union-attr]
+    assert both.control._source.age is not None  # it is followed
+
+
 def test_late_references_move_nothing(both: Peers) -> None:
     both.enable(START)
     drive(both, 20)

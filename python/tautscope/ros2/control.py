@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Executor
@@ -12,18 +11,19 @@ from pathlib import Path
 import numpy as np
 
 from tautscope.config import Config
-from tautscope.console.control_run import ControlRun, Floats, LiveRig
+from tautscope.console.control_run import ControlRun, LiveRig
 from tautscope.errors import MessageError, TautscopeError
 from tautscope.hardware.plausibility import PlausibilityMonitor
 from tautscope.hardware.realtime import OTHERS, realtime
 from tautscope.hardware.rig import HardwareRig
 from tautscope.loop.frame_layout import FrameLayout
-from tautscope.loop.rig import Frame, Sample
+from tautscope.loop.rig import Frame
 from tautscope.loop.safety import Reaction
 from tautscope.ros2.clock import Clock
 from tautscope.ros2.lifecycle import ACTIVATE, CONFIGURE, DEACTIVATE, Lifecycle, State, Transition
+from tautscope.ros2.opening import reset_rig
 from tautscope.ros2.parameters import Parameter, Parameters
-from tautscope.ros2.references import Source
+from tautscope.ros2.references import Pausable, Source
 from tautscope.ros2.session import Node
 from tautscope.ros2.telemetry import Telemetry, Topics
 from tautscope.ros2.wire import Qos
@@ -52,7 +52,6 @@ class NodeControl:
     Attributes:
         run: The present run; None if the node is not active.
         fault: Why the last run ended, if nobody ended it.
-        is_paused: Whether motion is held by request.
     """
 
     def __init__(
@@ -69,11 +68,11 @@ class NodeControl:
         clock: Clock,
     ) -> None:
         self._config, self._folder, self._executor = config, folder, executor
-        self._telemetry, self._source, self._make_rig = telemetry, source, make_rig
+        self._telemetry, self._make_rig = telemetry, make_rig
+        self._source = Pausable(source)
         self._rig: LiveRig | None = None
         self.run: ControlRun | None = None
         self.fault = ""
-        self.is_paused = False
         self._is_disabling = False
         self._runs = 0
         self._commands = node.subscription(
@@ -122,7 +121,7 @@ class NodeControl:
             return "FAULT"
         if self.run is None:
             return "DISABLED"
-        return "PAUSED" if self.is_paused or self.run.is_held else "ENABLED"
+        return "PAUSED" if self._source.is_paused or self.run.is_held else "ENABLED"
 
     def shut_down(self) -> None:
         """Stop the motors, close the log, release the rig."""
@@ -168,9 +167,9 @@ class NodeControl:
             self.fault, self._is_disabling = "", True
             self.lifecycle.trigger(DEACTIVATE)
         elif command == "pause":
-            self.is_paused = self.run is not None
+            self._source.is_paused = self.run is not None
         elif command == "resume" and self.run is not None:
-            self.is_paused = False
+            self._source.is_paused = False
             self._source.engage()
             self.run.loop.engage()
         elif command and command not in COMMANDS:
@@ -204,9 +203,9 @@ class NodeControl:
         """Enable the rig and start the loop at rest, where the instrument is."""
         rig = self._rig
         assert rig is not None
-        self.fault, self.is_paused, self._is_disabling = "", False, False
+        self.fault, self._is_disabling, self._source.is_paused = "", False, False
         self._telemetry.state("DISABLED", is_busy=True)
-        sample = self._reset(rig)
+        sample = reset_rig(rig, lambda: self._take_command() in ("disable", "pause"))
         self._source.reset(sample.applied)
         self._runs += 1
         is_hardware = isinstance(rig, HardwareRig)
@@ -216,7 +215,7 @@ class NodeControl:
                 self._config,
                 rig,
                 sample,
-                _Pausable(self, self._source),
+                self._source,
                 path=self._folder / f"ros2-{self._runs}.mcap",
                 executor=self._executor,
                 monitor=PlausibilityMonitor(self._config, sample.applied) if is_hardware else None,
@@ -228,25 +227,6 @@ class NodeControl:
         if share != 1:
             run.loop.set_compensation(share)
         self.run = run
-
-    def _reset(self, rig: LiveRig) -> Sample:
-        """Reset the rig; ``disable`` and ``pause`` interrupt it, which takes seconds."""
-        if not isinstance(rig, HardwareRig):
-            return rig.reset()
-        is_over = threading.Event()
-
-        def watch() -> None:
-            while not is_over.wait(_IDLE_PERIOD):
-                if self._take_command() in ("disable", "pause"):
-                    rig.interrupt()
-
-        thread = threading.Thread(target=watch, name="opening")
-        thread.start()
-        try:
-            return rig.reset()
-        finally:
-            is_over.set()
-            thread.join()
 
     def _end_run(self) -> None:
         """Stop the drives, then close the log."""
@@ -271,22 +251,3 @@ class NodeControl:
 
     def _publish_state(self) -> None:
         self._telemetry.state(self.operating_state, is_homed=self.run is not None)
-
-
-class _Pausable:
-    """The operator's reference, held by request too."""
-
-    def __init__(self, control: NodeControl, source: Source) -> None:
-        self._control, self._source = control, source
-
-    @property
-    def reference(self) -> Floats:
-        return self._source.reference
-
-    @property
-    def age(self) -> float | None:
-        return self._source.age
-
-    def update(self, now: float, period: float, command: Floats, *, is_held: bool) -> Floats:
-        is_held = is_held or self._control.is_paused
-        return self._source.update(now, period, command, is_held=is_held)

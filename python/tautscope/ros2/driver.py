@@ -11,9 +11,10 @@ from tautscope.loop.rig import Frame, Sample
 from tautscope.loop.signal_checks import check_signal
 from tautscope.ros2 import messages
 from tautscope.ros2.clock import Clock
+from tautscope.ros2.endpoints import IMAGE
 from tautscope.ros2.inputs import ImageReader, Stamps, joint_positions
 from tautscope.ros2.references import Refuse
-from tautscope.ros2.session import IMAGE, SENSOR_DATA, Node
+from tautscope.ros2.session import SENSOR_DATA, Node
 
 DRIVER_TIMEOUT = 0.1
 """Longest time without positions from the driver [s]."""
@@ -116,7 +117,8 @@ class DriverRig:
             message = self._positions.take()
             if message is not None:
                 applied = joint_positions(self._positions.topic, message)
-                self._position_stamps.check(message.header, self._clock.wall())
+                wall, source = self._clock.wall(), self._positions.source
+                self._position_stamps.check(message.header, wall, source)
                 self._applied, self._moved_at = applied, self._clock.monotonic()
         except MessageError as error:
             self._refuse(error)

@@ -33,7 +33,7 @@ _CHANNELS = {"bgr": 3, "rgb": 3, "bgra": 4, "yuyv": 2, "uyvy": 2}
 
 
 class Stamps:
-    """Checks that the stamps of a topic are known, of the present, and later each time.
+    """Checks that messages are of one publisher, and their stamps known, of the present, and later.
 
     Args:
         topic: The topic, for errors.
@@ -42,18 +42,27 @@ class Stamps:
     def __init__(self, topic: str) -> None:
         self._topic = topic
         self._last = 0
+        self._source: bytes | None = None
 
     def reset(self) -> None:
-        """Forget the last stamp: the sender's clock may have been set."""
+        """Forget stamp and publisher: the sender's clock may have been set."""
         self._last = 0
+        self.release()
 
-    def check(self, header: Any, wall: int) -> int:
+    def release(self) -> None:
+        """Take the next publisher."""
+        self._source = None
+
+    def check(self, header: Any, wall: int, source: bytes = b"") -> int:
         """The stamp [ns since 1970] of a header that arrived at a wall clock time [ns].
 
         Raises:
             MessageError: It is 0 (CRTK: invalid data), no time, in the future, or not later than
-                the last one.
+                the last one; or the publisher is not that of the message before.
         """
+        if self._source not in (None, source):
+            allowed = "the publisher that was the first after `enable` or `resume`"
+            raise MessageError(f"{self._topic} publisher", source.hex(), allowed)
         sec, nanosec = header.stamp.sec, header.stamp.nanosec
         stamp = int(sec * 10**9 + nanosec)
         given = f"{sec}.{nanosec:09d} s"
@@ -64,7 +73,7 @@ class Stamps:
             self._refuse(given, f"no time in the future (by {ahead:.3f} s): synchronise the clocks")
         if stamp <= self._last:
             self._refuse(given, "a later time than that of the last message")
-        self._last = stamp
+        self._last, self._source = stamp, source
         return stamp
 
     def _refuse(self, given: str, allowed: str) -> None:

@@ -8,7 +8,8 @@ from enum import IntEnum
 from typing import Any
 
 from tautscope.ros2 import types
-from tautscope.ros2.session import Node, Publisher, Service
+from tautscope.ros2.endpoints import Publisher, Service
+from tautscope.ros2.session import Node
 
 
 class State(IntEnum):

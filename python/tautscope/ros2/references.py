@@ -49,6 +49,36 @@ class Source(Protocol):
         ...
 
 
+class Pausable:
+    """A source that is held by request too.
+
+    Args:
+        source: The source.
+
+    Attributes:
+        is_paused: Whether motion is held.
+    """
+
+    def __init__(self, source: Source) -> None:
+        self._source = source
+        self.is_paused = False
+        self.reset, self.engage = source.reset, source.engage
+
+    @property
+    def reference(self) -> Floats:
+        """Reference u (3,) [m, rad, rad] of the last tick."""
+        return self._source.reference
+
+    @property
+    def age(self) -> float | None:
+        """Time from when the reference was made to the last tick [s]; None: made in the tick."""
+        return self._source.age
+
+    def update(self, now: float, period: float, command: Floats, *, is_held: bool) -> Floats:
+        """The reference of a tick."""
+        return self._source.update(now, period, command, is_held=is_held or self.is_paused)
+
+
 class ServoReference:
     """The reference of a stream of positions, with its date.
 
@@ -87,6 +117,7 @@ class ServoReference:
     def engage(self) -> None:
         """Follow the next message's increments."""
         self._offset = self._made_at = self.age = None
+        self._stamps.release()
 
     def update(self, now: float, period: float, command: Floats, *, is_held: bool) -> Floats:
         """The newest reference (3,) [m, rad, rad]; sets `age`."""
@@ -117,7 +148,9 @@ class ServoReference:
                 if message is None:
                     break
                 position = joint_positions(self._messages.topic, message)
-                found.append((position, self._stamps.check(message.header, self._clock.wall())))
+                source = self._messages.source
+                stamp = self._stamps.check(message.header, self._clock.wall(), source)
+                found.append((position, stamp))
             except MessageError as error:
                 self._refuse(error)
         return found
@@ -171,6 +204,7 @@ class JoyReference:
 
     def engage(self) -> None:
         """Move again, after the button was released once."""
+        self._stamps.release()
         self._operator.interrupt()
 
     def update(self, now: float, period: float, command: Floats, *, is_held: bool) -> Floats:
@@ -180,7 +214,8 @@ class JoyReference:
             if message is not None:
                 deflection, is_holding = joy_deflection(self._messages.topic, message, self._layout)
                 wall = self._clock.wall()
-                age = (wall - self._stamps.check(message.header, wall)) / 1e9
+                stamp = self._stamps.check(message.header, wall, self._messages.source)
+                age = (wall - stamp) / 1e9
                 axes = tuple(deflection.tolist())
                 servo = Servo(lease=0, sequence=0, image=0, axes=axes, is_holding=is_holding)
                 self._operator.receive(Received(0, now - age, servo), now)

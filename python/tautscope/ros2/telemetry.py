@@ -13,7 +13,8 @@ from tautscope.loop.reduction import Report
 from tautscope.loop.rig import Frame
 from tautscope.ros2 import messages
 from tautscope.ros2.clock import Clock
-from tautscope.ros2.session import SENSOR_DATA, Node, Publisher
+from tautscope.ros2.endpoints import Publisher
+from tautscope.ros2.session import SENSOR_DATA, Node
 
 STATE_PERIOD = 100_000_000
 """Time between two operating states [ns]; a change is published at once."""
