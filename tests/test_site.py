@@ -27,6 +27,7 @@ def test_every_page_is_in_the_list_of_pages() -> None:
     pages = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *NOTEBOOKS]
     pages += (ROOT / "docs" / "interfaces").glob("*.md")
     pages += [page for page in INDEX.parent.glob("*.md") if page != INDEX]
+    pages += (ROOT / "docs" / "interfaces").glob("*.md")
     assert {page.with_suffix("") for page in pages} == paths
 
 
