@@ -106,8 +106,12 @@ public:
         for (std::size_t i = 0; i < joints.size(); ++i) {
             const std::string name = std::string(joints[i]) + "/position";
             EXPECT(command_names.at(i) == name && state_names.at(i) == name);
-            commands.emplace_back(std::make_shared<CommandInterface>(joints[i], "position", &command[i]), nullptr);
-            states.emplace_back(std::make_shared<StateInterface>(joints[i], "position", &measured[i]), nullptr);
+            // A loan does not keep its interface.
+            const auto lent = std::make_shared<CommandInterface>(joints[i], "position", &command[i]);
+            const auto read = std::make_shared<StateInterface>(joints[i], "position", &measured[i]);
+            interfaces_.insert(interfaces_.end(), {lent, read});
+            commands.emplace_back(lent, nullptr);
+            states.emplace_back(read, nullptr);
         }
         controller_->assign_interfaces(std::move(commands), std::move(states));
         EXPECT(controller_->get_node()->activate().id() == State::PRIMARY_STATE_ACTIVE);
@@ -148,6 +152,7 @@ private:
 
     std::shared_ptr<controller_interface::ChainableControllerInterface> controller_;
     std::vector<CommandInterface::SharedPtr> references_;
+    std::vector<std::shared_ptr<void>> interfaces_;
     rclcpp::executors::SingleThreadedExecutor executor_;
 };
 
