@@ -92,8 +92,9 @@ Tick ControlLoop::step(double time) noexcept {
         return {command_, false, state_};
     }
     double made_at = made_at_;
-    if (is_paused_ || is_clutching_) {
-        if (is_clutching_ && !is_paused_ && has_new_reference_) {
+    const bool is_resting = is_paused_ || is_misplaced_;
+    if (is_resting || is_clutching_) {
+        if (is_clutching_ && !is_resting && has_new_reference_) {
             // Where the operator is now is where the motion continues.
             tautscope_loop_engage(loop_.handle());
             is_clutching_ = false;

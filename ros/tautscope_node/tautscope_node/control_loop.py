@@ -108,12 +108,13 @@ class ControlLoop:
         if new is not None:
             self._made_at = new[1]
         made_at = self._made_at
-        if self._is_clutching and not self._is_paused and new is not None:
+        is_resting = self._is_paused or self.is_misplaced
+        if self._is_clutching and not is_resting and new is not None:
             # Where the operator is now is where the motion continues.
             self.loop.engage()
             self._is_clutching = False
             self.reference = new[0]
-        elif self._is_paused or self._is_clutching:
+        elif is_resting or self._is_clutching:
             made_at = None
         elif new is not None:
             self.reference = new[0]
