@@ -23,6 +23,7 @@ NEWEST = Qos(depth=1)
 """Only the newest: set-points."""
 _RELIABILITY = {True: zenoh.Reliability.RELIABLE, False: zenoh.Reliability.BEST_EFFORT}
 _PRIORITY = {True: zenoh.Priority.REAL_TIME, False: zenoh.Priority.DATA}
+_CONGESTION = zenoh.CongestionControl.DROP
 _QUEUE = 16
 """Batches that wait for the transport, per priority; Zenoh allows no more."""
 _LARGEST_DOMAIN = 232
@@ -97,7 +98,7 @@ class Node:
             self._key(topic, kind),
             reliability=_RELIABILITY[qos.is_reliable],
             priority=_PRIORITY[qos.is_reliable],
-            congestion_control=zenoh.CongestionControl.DROP,
+            congestion_control=_CONGESTION,
             express=True,
         )
         return Publisher(publisher, token, wire.gid(name))
