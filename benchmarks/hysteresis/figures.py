@@ -148,7 +148,12 @@ FIGURES: dict[str, tuple[str, str, Callable[[Finished], Figure]]] = {
         "largest without compensation",
         shared.levels,
     ),
-    "overspeed": ("alone", "Tip overspeed: last two periods; dashed, the goal", shared.speeds),
+    "overspeed": (
+        "alone",
+        "Tip overspeed: speed of the tip over the largest of the reference, last two periods; "
+        "dashed, the goal",
+        shared.speeds,
+    ),
     "start": ("alone", "Start: width of each period; dashed, a reduction of 95 %", shared.starts),
     "together": ("together", "Three DOFs at once: tip over reference", shared.loops),
     "width-change": ("changing", "Width 10-2-10 mm", widening),

@@ -114,7 +114,7 @@ def speeds(finished: Finished) -> Figure:
             axes.axhline(limit, color=BLACK, linewidth=0.5, linestyle="--")
         axes.set_title(dof.label)
         axes.set_xlabel("time [s]")
-    panels[0].set_ylabel("tip speed over largest reference speed")
+    panels[0].set_ylabel("tip speed, relative")
     add_legend(figure, panels[0])
     return figure
 
