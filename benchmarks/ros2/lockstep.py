@@ -40,6 +40,8 @@ JOINTS, NUMBER = "sensor_msgs/msg/JointState", "std_msgs/msg/Float64"
 EPOCH = 1_700_000_000_000_000_000
 """Wall clock time of the start [ns]."""
 TIMEOUT = 60.0
+SETTLING = 0.1
+"""Time in which a message arrives that another topic's has overtaken [s]."""
 
 
 class SteppedClock(Clock):
@@ -137,7 +139,6 @@ class Peers:
         )  # fmt: skip
         # One per priority, because order is kept within each; these wait where others are dropped.
         self._barriers_to_node = [Barrier(self.other, self.node, n) for n in range(2)]
-        self._barrier_to_other = Barrier(self.node, self.other, 0)
         self.servo = self.publisher("/instrument/servo_jp", JOINTS)
         self.positions = self.publisher("/instrument/actuators/measured_js", JOINTS)
         self.images = self.publisher("/endoscope/image_raw", IMAGE, SENSOR_DATA)
@@ -151,8 +152,15 @@ class Peers:
         self.states = self.other.subscription(
             "/instrument/operating_state", "crtk_msgs/msg/OperatingState", Qos(depth=1000)
         )
+        self._barrier_to_other = Barrier(self.node, self.other, 0)
         self.delivered(resend=True)
         self._barrier_to_other.wait(resend=True)
+        # Without a subscriber that it knows, a session drops what is published.
+        begin = time.monotonic()
+        for publisher in (self.requests, self.control._telemetry._warning):
+            while not publisher.has_subscribers:
+                assert time.monotonic() < begin + TIMEOUT, "the sessions do not meet"
+                time.sleep(0.01)
 
     def publisher(self, topic: str, kind: str, qos: Qos = NEWEST) -> Publisher:
         """A publisher of the other node that waits where others drop."""
@@ -211,6 +219,7 @@ class Peers:
     def drain(self, subscription: Subscription) -> list[Any]:
         """What the node has published until now, as it arrived at the other node."""
         self._barrier_to_other.wait()
+        time.sleep(SETTLING)  # topics may overtake each other
         found = []
         while (message := subscription.take()) is not None:
             found.append(message)

@@ -80,7 +80,7 @@ def test_enable_changes_nothing_while_enabled(both: Peers) -> None:
 
 def test_unknown_commands_are_refused(both: Peers) -> None:
     both.request("home")
-    (warning,) = both.drain(both.warnings)
+    warning = both.received(both.warnings, "warning")
     assert "/instrument/state_command string: got 'home'" in warning.data
 
 
