@@ -18,7 +18,8 @@ def test_values_and_deviations_are_those_of_opencv() -> None:
     )
     fx, fy, cx, cy = matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2]
     expected = [fx, fy, cx, cy, *distortion.ravel()[:5]]
-    assert values(fit.intrinsics) == pytest.approx(expected, rel=1e-9)
+    # OpenCV adds up in an order that depends on its threads.
+    assert (np.abs(values(fit.intrinsics) - expected) < 1e-3 * deviations.ravel()[:9]).all()
     assert fit.std == pytest.approx(deviations.ravel()[:9], rel=1e-3)
     assert fit.residual == pytest.approx(rms, rel=1e-6)
     assert fit.errors == pytest.approx(errors.ravel(), rel=1e-4)
