@@ -115,9 +115,13 @@ def _told(instrument: DrawnInstrument, variant: Variant) -> Config:
 
 
 def _with_small_images(config: Config) -> Config:
-    """Small images for the truth alone: without compression and exposure."""
+    """Small images for the truth alone: without compression, exposure and rolling shutter."""
     return with_small_images(config).replace(
-        **{"twin.sensor.jpeg_quality": None, "twin.sensor.exposure_time_constant": 0.0}
+        **{
+            "twin.sensor.jpeg_quality": None,
+            "twin.sensor.exposure_time_constant": 0.0,
+            "twin.sensor.readout": 0.0,
+        }
     )
 
 
