@@ -1,9 +1,9 @@
 """The operator's console: hazards with number of runs and failures, and figures with a browser.
 
-Needs Debian's chromium for --images, --ticks and --hand.
+Needs Debian's chromium for --images, --ticks, --warnings and --hand.
 
     uv run python benchmarks/console --requests 100000 --stops 300 --write
-    uv run python benchmarks/console --images 30 --ticks 100 --hand 120
+    uv run python benchmarks/console --images 30 --ticks 60 --warnings 50 --hand 120
 """
 
 from __future__ import annotations
@@ -41,6 +41,7 @@ def arguments() -> argparse.Namespace:
     count("fuzz", "G11: seconds of fuzzing; 600")
     count("images", "seconds of images at each size; 30")
     count("ticks", "seconds of control ticks with and without a browser; 100")
+    count("warnings", "U1: warnings until the page shows them; 50")
     count("hand", "seconds of the hand protocol by a gamepad; 120")
     parser.add_argument("--write", action="store_true", help="update docs/safety.md")
     return parser.parse_args()
@@ -84,7 +85,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         measure(options, folder)
-        if options.images or options.ticks or options.hand:
+        if options.images or options.ticks or options.warnings or options.hand:
             from console import live  # noqa: PLC0415  playwright
 
             for size in SIZES if options.images else ():
@@ -94,6 +95,9 @@ def main() -> None:
                 path = folder / f"ticks-{is_watched}"
                 result = live.ticks(path, "720x576", options.ticks, is_watched=is_watched)
                 print(json.dumps({"ticks": "page" if is_watched else "no page", **result}))
+            if options.warnings:
+                result = live.warnings(folder / "warnings", options.warnings)
+                print(json.dumps({"warnings": result}), flush=True)
             if options.hand:
                 print(json.dumps(live.hand(folder / "hand", options.hand)), flush=True)
 

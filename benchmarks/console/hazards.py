@@ -153,7 +153,7 @@ def fuzzing(seconds: float, seed: int) -> Measurement:
         for each in (
             msg.Stop(), msg.Take(), msg.Servo(1, 2, 3, (0.5, -1.0, 0.0), True),
             msg.Action(1, 2, 3, "mark", "here"), msg.Setting(1, 2, 3, "scale", 0.5, "bending"),
-            msg.SetProfile(1, 2, 3, "paper"), msg.Drawn(7), msg.Hello("x" * 43),
+            msg.SetProfile(1, 2, 3, "paper"), msg.Drawn(7, 800), msg.Hello("x" * 43),
         )
     ]  # fmt: skip
     decoders = (msg.decode_hello, msg.decode_control, msg.decode_video)

@@ -169,6 +169,28 @@ def ticks(folder: Path, size: str, seconds: float, *, is_watched: bool) -> dict[
             return measure(console, lambda duration: page.wait_for_timeout(1e3 * duration))
 
 
+def warnings(folder: Path, count: int) -> dict[str, float]:
+    """Time from a flag in the loop until the page shows its warning [ms]."""
+    shown = "name => document.querySelector('#warnings').textContent.includes(`(${name})`)"
+    found = []
+    with live_console(folder, sized("720x576")) as console, browser_page() as page:
+        page.goto(console.address.url)
+        page.wait_for_timeout(3000)
+        page.click("#take")
+        for _ in range(count):
+            run = console.control.run
+            assert run is not None
+            began = time.monotonic()
+            run.loop.raise_flag("tremor")
+            page.wait_for_function(shown, arg="tremor")
+            found.append(time.monotonic() - began)
+            page.wait_for_timeout(1000)
+            page.click("#acknowledge")
+            page.wait_for_function(f"name => !({shown})(name)", arg="tremor")
+    times = 1e3 * np.array(found)
+    return {"n": count, "p50": float(np.median(times)), "max": float(times.max())}
+
+
 class Recorded:
     """The reference of a recording."""
 

@@ -24,7 +24,7 @@ VALUES = st.recursive(
 )
 FIELDS = [
     "type", "lease", "sequence", "image", "axes", "is_holding", "name", "value", "dof", "text",
-    "profile", "token", "client",
+    "profile", "token", "client", "width",
 ]  # fmt: skip
 TYPES = ["hello", "stop", "take", "servo", "action", "setting", "profile", "drawn", "Received"]
 NEARLY = st.fixed_dictionaries(

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import time
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -171,9 +173,7 @@ def test_everything_is_in_the_log_and_the_log_replays(tmp_path: Path) -> None:
 
 def test_a_slow_video_client_delays_no_command(console: RunningConsole, page: Page) -> None:
     video = console.page("/video")
-    message = video.socket.recv(timeout=20)  # and then it reads no more
-    length = int.from_bytes(message[:4], "little")
-    image = cv2.imdecode(np.frombuffer(message[4 + length :], np.uint8), cv2.IMREAD_COLOR)
+    _, image = receive_image(video)  # and then it reads no more
     assert image.shape[:2] == (small_config().camera.height, small_config().camera.width)
     newest = console.control.images.newest
     while console.control.images.newest < newest + 20:
@@ -181,3 +181,37 @@ def test_a_slow_video_client_delays_no_command(console: RunningConsole, page: Pa
     page.move()
     page.servo(is_holding=False)
     video.close()
+
+
+def test_images_are_as_large_as_the_largest_page_shows_them(console: RunningConsole) -> None:
+    full = small_config().camera.width
+    small, large = console.page("/video"), console.page("/video")
+    widths = {small: full // 2, large: full // 2}
+
+    def wait_for(width: int) -> None:
+        for _ in range(100):
+            for page, shown in widths.items():
+                overlay, image = receive_image(page)
+                page.send({"type": "drawn", "image": overlay["sequence"], "width": shown})
+                assert overlay["width"] == full
+            if image.shape[1] == width:
+                return
+        pytest.fail(f"images {image.shape[1]} px wide, not {width}")
+
+    wait_for(full // 2)
+    widths[large] = full // 2 + 1
+    wait_for(full)
+    small.close()
+    large.close()
+
+
+def receive_image(video: Page) -> tuple[dict[str, Any], np.ndarray]:
+    """The next image of a connection, with what is drawn over it."""
+    message = video.socket.recv(timeout=20)
+    assert isinstance(message, bytes)
+    length = int.from_bytes(message[:4], "little")
+    overlay = json.loads(message[4 : 4 + length])
+    pixels = np.frombuffer(message[4 + length :], np.uint8)
+    image = cv2.imdecode(pixels, cv2.IMREAD_COLOR)
+    assert image is not None
+    return overlay, image

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import time
 from collections import deque
 from collections.abc import Callable
@@ -99,18 +100,19 @@ class _Viewer:
     Attributes:
         sent: Sequences of images sent and not drawn yet, with the times of their arrival.
         may_send: Set when one may be sent.
+        width: At which it shows images [px]; infinite until it is known.
     """
 
     sent: dict[int, float] = field(default_factory=dict)
     may_send: asyncio.Event = field(default_factory=asyncio.Event)
-    dropped: int = 0
+    width: float = math.inf
 
 
 class ImageFeed:
     """The newest image as JPEG to each page; a page that is slow misses images.
 
     A message is the length of the overlay in 4 bytes, little-endian, the overlay in JSON, and the
-    JPEG.
+    JPEG, which is smaller than the camera's image if no page shows it in full size.
 
     Args:
         channel: The images in the shared memory.
@@ -140,7 +142,8 @@ class ImageFeed:
             if found is None:
                 continue
             image, overlay = found
-            jpeg = await asyncio.to_thread(encode_jpeg, image, self._pixel_format)
+            width = max(viewer.width for viewer in self._viewers.values())
+            jpeg = await asyncio.to_thread(encode_jpeg, image, self._pixel_format, width)
             info = msgspec.json.encode(overlay)
             self._newest = b"".join((len(info).to_bytes(4, "little"), info, jpeg))
             self._sequence, self._arrived_at = overlay.sequence, overlay.published_at
@@ -169,11 +172,12 @@ class ImageFeed:
         found = sorted(self.latencies)
         return (found[len(found) // 2], found[19 * len(found) // 20]) if found else None
 
-    def acknowledge(self, connection: ServerConnection, sequence: int) -> None:
-        """A page has drawn an image, and with it those sent before."""
+    def acknowledge(self, connection: ServerConnection, sequence: int, width: int) -> None:
+        """A page has drawn an image, and with it those sent before, `width` pixels wide."""
         viewer = self._viewers.get(connection)
         if viewer is None:
             return
+        viewer.width = width or math.inf
         arrived_at = viewer.sent.get(sequence)
         if arrived_at is not None:
             self.latencies.append(time.monotonic() - arrived_at)

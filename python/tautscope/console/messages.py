@@ -108,9 +108,15 @@ class SetProfile(Command, frozen=True, tag="profile"):
 
 
 class Drawn(_Message, frozen=True, tag="drawn"):
-    """An image has been drawn."""
+    """An image has been drawn.
+
+    Attributes:
+        image: Its sequence.
+        width: Width at which the page shows images [pixels of its screen].
+    """
 
     image: Count
+    width: Annotated[int, Meta(ge=0, le=16384)]
 
 
 Request: TypeAlias = Action | Setting | SetProfile

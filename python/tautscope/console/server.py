@@ -174,7 +174,7 @@ class Server:
                 if not limit.allows(time.monotonic()):
                     await connection.close(POLICY_VIOLATION, "too many messages")
                     return
-                self._images.acknowledge(connection, drawn.image)
+                self._images.acknowledge(connection, drawn.image, drawn.width)
         finally:
             self._images.remove(connection)
             sending.cancel()

@@ -2,7 +2,7 @@
 
 const COLOURS = { measured: "#5dff7a", predicted: "#ffd23e", tip: "#58b9ff", target: "#ffffff" };
 
-/** Draws the newest image; `onDrawn` gets the sequence of every image that is on the screen. */
+/** Draws the newest image; `onDrawn` gets the sequence of every image that is on the screen, and its width there. */
 export class ImageView {
   constructor(canvas, onDrawn) {
     this.canvas = canvas;
@@ -10,11 +10,12 @@ export class ImageView {
     this.onDrawn = onDrawn;
     this.sequence = 0;
     this.drawnAt = -Infinity;
+    this.aspect = 1;
     this.waiting = null;
     this.isBusy = false;
     this.drawn = [];
     this.painted = new MessageChannel();
-    this.painted.port1.onmessage = (event) => this.onDrawn(event.data);
+    this.painted.port1.onmessage = (event) => this.onDrawn(event.data, this.shownWidth);
   }
 
   /** A message of the video connection: length of the overlay, overlay, JPEG. */
@@ -50,12 +51,16 @@ export class ImageView {
       canvas.width = bitmap.width;
       canvas.height = bitmap.height;
     }
-    context.drawImage(bitmap, 0, 0);
-    context.lineWidth = Math.max(1.5, bitmap.height / 380);
+    // The overlay has the camera's pixels, of which the bitmap may have a part.
+    const { width, height } = overlay;
+    this.aspect = width / height;
+    context.setTransform(bitmap.width / width, 0, 0, bitmap.height / height, 0, 0);
+    context.drawImage(bitmap, 0, 0, width, height);
+    context.lineWidth = Math.max(1.5, height / 380);
     this.#outlines(overlay.predicted, COLOURS.predicted, [6, 4]);
     this.#outlines(overlay.measured, COLOURS.measured, []);
     const { tip, target } = overlay;
-    const radius = bitmap.height / 60;
+    const radius = height / 60;
     if (tip && target) this.#line([tip, target], COLOURS.target);
     if (target) this.#circle(target, radius, COLOURS.target);
     if (tip) this.#circle(tip, radius / 2.5, COLOURS.tip);
@@ -65,6 +70,12 @@ export class ImageView {
     if (this.drawn.length > 50) this.drawn.shift();
     // Delivered after the frame has been painted.
     this.painted.port2.postMessage(overlay.sequence);
+  }
+
+  /** Pixels of the screen across the image, as `object-fit: contain` shows it. */
+  get shownWidth() {
+    const { clientWidth, clientHeight } = this.canvas;
+    return Math.ceil(devicePixelRatio * Math.min(clientWidth, clientHeight * this.aspect));
   }
 
   /** Images per second of the last 50. */

@@ -66,7 +66,7 @@ const control = new Link("/control", token, {
   },
 });
 const video = new Link("/video", token, { onMessage: (data) => view.receive(data) });
-const view = new ImageView($("image"), (image) => video.send({ type: "drawn", image }));
+const view = new ImageView($("image"), (image, width) => video.send({ type: "drawn", image, width }));
 const charts = new Charts($("charts"));
 const steering = new Steering({ getCommand: () => command("servo"), send: (message) => control.send(message), onStop: stop });
 
