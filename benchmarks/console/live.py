@@ -8,7 +8,6 @@ import shutil
 import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,7 +29,7 @@ from tautscope.hardware.realtime import (
     limited_garbage_collection,
     locked_memory,
     realtime,
-    set_realtime_priority,
+    realtime_executor,
 )
 from tautscope.log.reader import read_log
 from tautscope.loop.references import OperatorMotion
@@ -79,7 +78,7 @@ def live_console(folder: Path, config: Config) -> Iterator[LiveConsole]:
     ending = threading.Event()
     with (
         web_server(config.camera, 0) as (_, channels, url),
-        ThreadPoolExecutor(1, "vision", set_realtime_priority, (VISION,)) as executor,
+        realtime_executor("vision", VISION) as executor,
         limited_garbage_collection(),
         locked_memory(),
     ):

@@ -6,7 +6,6 @@ import json
 import logging
 from collections import Counter
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,14 +15,7 @@ from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import STOPPED, DriveError, OutputError, TautscopeError
 from tautscope.hardware.plausibility import PlausibilityMonitor
-from tautscope.hardware.realtime import (
-    OTHERS,
-    VISION,
-    limited_garbage_collection,
-    locked_memory,
-    realtime,
-    set_realtime_priority,
-)
+from tautscope.hardware.realtime import OTHERS, VISION, realtime_executor, realtime_process
 from tautscope.hardware.rig import HardwareRig
 from tautscope.hardware.signals import exit_on_signals
 from tautscope.hardware.timing import Timing
@@ -141,7 +133,7 @@ def run_on_hardware(
     rig = make_rig(config)  # an invalid configuration must leave no folder behind
     _make_folder(check_free(folder))
     runs = []
-    with exit_on_signals(), limited_garbage_collection(), locked_memory(), realtime(OTHERS):
+    with exit_on_signals(), realtime_process(OTHERS):
         for index, compensate in enumerate(kinds):
             runs.append(
                 _run(
@@ -232,7 +224,7 @@ def _run(
             log.warn(text)
 
         rig.warn = warn
-        executor = ThreadPoolExecutor(1, "vision", set_realtime_priority, (VISION,))
+        executor = realtime_executor("vision", VISION)
         monitored = _MonitoredLog(log, config)
         try:
             recording = run_experiment(
