@@ -127,10 +127,8 @@ def _motion(options: argparse.Namespace, config: Config, folder: Path) -> Calibr
             place.mkdir(parents=True)
             recording.write(place)
         else:
-            from tautscope.hardware.experiment import (  # noqa: PLC0415
-                run_on_hardware,
-                write_run_folder,
-            )
+            from tautscope.hardware.experiment import run_on_hardware  # noqa: PLC0415
+            from tautscope.hardware.run_results import write_run_folder  # noqa: PLC0415
 
             run = run_on_hardware(config, place, progress)
             write_run_folder(run, place)
