@@ -1,4 +1,4 @@
-"""Figures of the console with a browser: latency of images, control ticks, hand protocol."""
+"""Figures of the console with a browser: latency of images, control ticks, operator motion."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ SCREEN = {"width": 1280, "height": 800}
 START_TIME = 8.0
 """Time after which a measurement begins [s]."""
 HAND_SIZE = "360x288"
-"""Size of the images of the hand protocol, which runs twice in one process too."""
+"""Size of the images of the operator motion, which runs twice in one process too."""
 DEAD_BAND = 0.1
 """Of the page's gamepad."""
 GAMEPAD = """
