@@ -51,6 +51,12 @@ def compensated() -> Recording:
     return _run(compensate=True)
 
 
+@pytest.fixture(scope="session")
+def runs(uncompensated: Recording, compensated: Recording) -> tuple[Recording, Recording]:
+    """The experiment, without compensation first."""
+    return uncompensated, compensated
+
+
 def _run(compensate: bool) -> Recording:
     config = short_experiment()
     return run_experiment(DrawnRig(config), SineSequence(config.experiment), config, compensate)

@@ -1,6 +1,6 @@
 """The operator's console: hazards with number of runs and failures, and figures with a browser.
 
-Needs Debian's chromium for --images, --ticks, --warnings and --hand.
+Debian's chromium is needed for --images, --ticks, --warnings and --hand.
 
     uv run python benchmarks/console --requests 100000 --stops 300 --write
     uv run python benchmarks/console --images 30 --ticks 60 --warnings 50 --hand 120
@@ -16,7 +16,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from console import hazards
+from console import hazards, invalid_requests
 from console.pages import SIZES, Page, console, sized
 from guarantees import goals
 from guarantees.goals import Measurement
@@ -42,7 +42,7 @@ def arguments() -> argparse.Namespace:
     count("images", "seconds of images at each size; 30")
     count("ticks", "seconds of control ticks with and without a browser; 100")
     count("warnings", "U1: warnings until the page shows them; 50")
-    count("hand", "seconds of the hand protocol by a gamepad; 120")
+    count("hand", "seconds of operator motion by a gamepad; 120")
     parser.add_argument("--write", action="store_true", help="update docs/safety.md")
     return parser.parse_args()
 
@@ -56,7 +56,7 @@ def measure(options: argparse.Namespace, folder: Path) -> None:
         print(json.dumps({"goal": name, **result.__dict__}), flush=True)
 
     if options.fuzz:
-        add("G11", hazards.fuzzing(options.fuzz, SEED))
+        add("G11", invalid_requests.fuzzing(options.fuzz, SEED))
     if options.masters:
         add("G21", hazards.second_masters(options.masters))
     if any((options.requests, options.replays, options.losses, options.clients, options.stops)):
@@ -64,7 +64,7 @@ def measure(options: argparse.Namespace, folder: Path) -> None:
         with console(folder / "hazards", config, "--twin") as (address, _):
             page = Page(address)
             if options.requests:
-                add("G20", hazards.requests(address, page, options.requests, SEED))
+                add("G20", invalid_requests.requests(address, page, options.requests, SEED))
             page.take()
             if options.stops:
                 add("G20b", hazards.stops(address, page, options.stops, options.load))

@@ -1,4 +1,4 @@
-"""Figures of the console with a browser: latency of images, control ticks, hand protocol."""
+"""Figures of the console with a browser: latency of images, control ticks, operator motion."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import shutil
 import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,7 +29,7 @@ from tautscope.hardware.realtime import (
     limited_garbage_collection,
     locked_memory,
     realtime,
-    set_realtime_priority,
+    realtime_executor,
 )
 from tautscope.log.reader import read_log
 from tautscope.loop.references import OperatorMotion
@@ -45,7 +44,7 @@ SCREEN = {"width": 1280, "height": 800}
 START_TIME = 8.0
 """Time after which a measurement begins [s]."""
 HAND_SIZE = "360x288"
-"""Size of the images of the hand protocol, which runs twice in one process too."""
+"""Size of the images of the operator motion, which runs twice in one process too."""
 DEAD_BAND = 0.1
 """Of the page's gamepad."""
 GAMEPAD = """
@@ -79,7 +78,7 @@ def live_console(folder: Path, config: Config) -> Iterator[LiveConsole]:
     ending = threading.Event()
     with (
         web_server(config.camera, 0) as (_, channels, url),
-        ThreadPoolExecutor(1, "vision", set_realtime_priority, (VISION,)) as executor,
+        realtime_executor("vision", VISION) as executor,
         limited_garbage_collection(),
         locked_memory(),
     ):

@@ -69,22 +69,39 @@ def console(folder: Path, config: Config, *options: str) -> Iterator[tuple[Addre
 
 
 class Page:
-    """A page's connection for commands; a thread keeps its state up to date."""
+    """A page's connection; with the console's token, a thread keeps its state up to date.
 
-    def __init__(self, address: Address) -> None:
+    Args:
+        address: Of the console.
+        path: ``/control`` for commands, or another route of the web server.
+        token: By default that of the console.
+
+    Attributes:
+        client: The page's number; 0 before the console has accepted it.
+        state: The newest state that was received.
+        replies: To requests, in their order.
+        is_closed: Set when the connection has ended.
+        on_state: Called with each state.
+        on_latency: Called with each latency.
+    """
+
+    def __init__(self, address: Address, path: str = "/control", token: str | None = None) -> None:
         self._resources = ExitStack()
         options: dict[str, Any] = {"origin": address.origin, "compression": None, "max_size": None}
         options["open_timeout"] = PATIENCE
-        uri = f"ws://{address.host}/control"
+        uri = f"ws://{address.host}{path}"
         self.socket = self._resources.enter_context(connect(uri, **options))
         self.client, self.state = 0, dict[str, Any]()
         self.replies = list[dict[str, Any]]()
         self.on_state: Callable[[dict[str, Any]], None] = lambda state: None
         self.on_latency: Callable[[Any], None] = lambda latency: None
+        self.is_closed = threading.Event()
         self._sequence = 0
-        self.send({"type": "hello", "token": address.token})
-        threading.Thread(target=self._read, daemon=True).start()
-        self.wait(lambda: self.state and self.client)
+        token = address.token if token is None else token
+        self.send({"type": "hello", "token": token})
+        if path == "/control" and token == address.token:
+            threading.Thread(target=self._read, daemon=True).start()
+            self.wait(lambda: (self.state and self.client) or self.is_closed.is_set())
 
     def send(self, message: object) -> None:
         """Send a message as JSON."""
@@ -160,3 +177,4 @@ class Page:
                         self.on_latency(tuple(message["latency"]))
                     self.state = message["state"]
                     self.on_state(self.state)
+        self.is_closed.set()

@@ -74,7 +74,7 @@ def operator(recordings: Recordings) -> Found:
                 (f"{name}: largest error", dof, result.largest),
                 (f"{name}: tip overspeed", dof, result.overspeed),
             ]
-            # The reference with tremor never rests, and the bound knows no filter of the tremor.
+            # The reference with tremor never rests, and the bound has no filter of the tremor.
             if name == "operator":
                 found += [
                     (f"{name}: creep", dof, result.creep),

@@ -14,22 +14,20 @@ from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
-from unittest import mock
 
 import numpy as np
-import zenoh
 from numpy.typing import NDArray
 from tautscope.config import Config
 from tautscope.loop.reduction import HysteresisReduction
 from tautscope.loop.references import OperatorMotion
 from tautscope.loop.rig import Frame
-from tautscope.ros2 import messages, session, types
+from tautscope.ros2 import messages, types
 from tautscope.ros2.clock import Clock
 from tautscope.ros2.control import NodeControl
-from tautscope.ros2.endpoints import IMAGE, Publisher, Subscription
+from tautscope.ros2.endpoints import IMAGE, Subscription
 from tautscope.ros2.inputs import JoyAxes
 from tautscope.ros2.references import SERVO
-from tautscope.ros2.session import _PRIORITY, _RELIABILITY, NEWEST, SENSOR_DATA, Node
+from tautscope.ros2.session import SENSOR_DATA, Node
 from tautscope.ros2.start import Drives, build_control
 from tautscope.ros2.wire import Qos
 from tautscope.twin.rig import Twin
@@ -79,38 +77,28 @@ def free_endpoint() -> str:
         return f"tcp/127.0.0.1:{listener.getsockname()[1]}"
 
 
-def blocking(node: Node, topic: str, kind: str, qos: Qos) -> Any:
-    """A publisher of Zenoh that drops nothing."""
-    return node._session.declare_publisher(
-        node._key(topic, kind),
-        reliability=_RELIABILITY[qos.is_reliable],
-        priority=_PRIORITY[qos.is_reliable],
-        congestion_control=zenoh.CongestionControl.BLOCK,
-        express=True,
-    )
-
-
 class Barrier:
     """A topic whose messages arrive after all that was published before with the same priority."""
 
     def __init__(self, sender: Node, receiver: Node, kind: int) -> None:
         topic = f"/barrier{kind}"
-        self._in = receiver.subscription(topic, NUMBER)
-        self._out = blocking(sender, topic, NUMBER, Qos(is_reliable=kind == 0))
+        # Deep enough that none which is sent again replaces another: that would count as missed.
+        self._in = receiver.subscription(topic, NUMBER, Qos(depth=1000))
+        self._out = sender.publisher(topic, NUMBER, Qos(is_reliable=kind == 0))
         self._sent = 0
 
     def wait(self, *, resend: bool = False) -> None:
         """Wait until it has arrived; `resend`: send until the sessions are connected."""
         self._sent += 1
-        number = types.encode(messages.number(float(self._sent)))
+        number = messages.number(float(self._sent))
         begin = sent = time.monotonic()
-        self._out.put(number)
+        self._out.publish(number)
         while (found := self._in.take()) is None or found.data != self._sent:
             now = time.monotonic()
             assert now < begin + TIMEOUT, "nothing arrives"
             if now > sent + (0.02 if resend else 1.0):
                 sent = now
-                self._out.put(number)
+                self._out.publish(number)
 
 
 class Peers:
@@ -128,21 +116,21 @@ class Peers:
         endpoint = free_endpoint()
         self.clock = SteppedClock()
         self.config = config
-        self.node = Node("tautscope", connect="", listen=endpoint)
-        self.other = Node("other", connect=endpoint)
         # A busy computer must not drop what is compared.
-        self._blocking = mock.patch.object(session, "_CONGESTION", zenoh.CongestionControl.BLOCK)
-        self._blocking.start()
+        self.node = Node("tautscope", connect="", listen=endpoint, is_blocking=True)
+        self.other = Node("other", connect=endpoint, is_blocking=True)
         self.control: NodeControl = build_control(
             config, self.node, folder, InlineExecutor(), self.clock,
             drives=drives, device=device, layout=JoyAxes(),
         )  # fmt: skip
-        # One per priority, because order is kept within each; these wait where others are dropped.
+        # One per priority, because order is kept within each.
         self._barriers_to_node = [Barrier(self.other, self.node, n) for n in range(2)]
-        self.servo = self.publisher("/instrument/servo_jp", JOINTS)
-        self.positions = self.publisher("/instrument/actuators/measured_js", JOINTS)
-        self.images = self.publisher("/endoscope/image_raw", IMAGE, SENSOR_DATA)
-        self.requests = self.publisher("/instrument/state_command", "crtk_msgs/msg/StringStamped")
+        self.servo = self.other.publisher("/instrument/servo_jp", JOINTS)
+        self.positions = self.other.publisher("/instrument/actuators/measured_js", JOINTS)
+        self.images = self.other.publisher("/endoscope/image_raw", IMAGE, SENSOR_DATA)
+        self.requests = self.other.publisher(
+            "/instrument/state_command", "crtk_msgs/msg/StringStamped"
+        )
         self.commands = self.other.subscription(
             "/instrument/actuators/setpoint_js", JOINTS, Qos(depth=1000)
         )
@@ -156,18 +144,11 @@ class Peers:
         self.delivered(resend=True)
         self._barrier_to_other.wait(resend=True)
 
-    def publisher(self, topic: str, kind: str, qos: Qos = NEWEST) -> Publisher:
-        """A publisher of the other node that waits where others drop."""
-        found = self.other.publisher(topic, kind, qos)
-        found._publisher = blocking(self.other, topic, kind, qos)
-        return found
-
     def close(self) -> None:
         """End both nodes."""
         self.control.shut_down()
         self.other.close()
         self.node.close()
-        self._blocking.stop()
 
     def delivered(self, *, resend: bool = False) -> None:
         """Wait until everything that was published has arrived: a session keeps the order."""

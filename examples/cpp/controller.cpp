@@ -45,12 +45,6 @@ void apply(tautscope::Loop &loop, int event) {
     }
 }
 
-TautscopeReport update(tautscope::Loop &loop, const ImageUpdate &image) {
-    const bool has_band = std::any_of(image.features.begin(), image.features.end(), [](double v) { return !std::isnan(v); });
-    return has_band ? loop.on_features(image.features, image.captured_at)
-                    : loop.on_features(std::nullopt, image.captured_at);
-}
-
 void print(const char *name, std::vector<double> &times) {
     if (times.empty()) {
         return;

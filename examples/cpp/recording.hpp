@@ -3,10 +3,12 @@
 #ifndef RECORDING_HPP
 #define RECORDING_HPP
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -35,6 +37,13 @@ template <class Row> std::vector<Row> read_rows(const std::string &path) {
     std::vector<Row> rows(bytes.size() / sizeof(Row));
     std::memcpy(static_cast<void *>(rows.data()), bytes.data(), rows.size() * sizeof(Row));
     return rows;
+}
+
+/// The update of a loop by the features of a recorded image.
+inline TautscopeReport update(tautscope::Loop &loop, const ImageUpdate &image) {
+    const bool has_band = std::any_of(image.features.begin(), image.features.end(), [](double v) { return !std::isnan(v); });
+    return has_band ? loop.on_features(image.features, image.captured_at)
+                    : loop.on_features(std::nullopt, image.captured_at);
 }
 
 /// Whether all numbers have the same bits; every NaN is the same.

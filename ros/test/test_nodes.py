@@ -90,7 +90,7 @@ def test_a_session(laboratory, recorded):
     assert largest[0] > 0
     assert (largest < [2e-3, 0.1, 0.05]).all()
 
-    # A fault of the drives: they are told to stop, and get no set-point.
+    # A fault of the drives: they get a command to stop, and no set-point.
     assert laboratory.drive_commands == []
     laboratory.drive_states.publish(OperatingState(state="FAULT"))
     laboratory.wait_for(lambda: laboratory.states[-1] == "FAULT")

@@ -12,6 +12,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from console.pages import PERIOD
 from running import TIMEOUT, Page, RunningConsole, rests, running_console, small_config
 from tautscope.log.reader import Request, read_log
 from tautscope.log.replay import replay_same
@@ -130,13 +131,13 @@ def test_settings_programs_and_profile(console: RunningConsole, page: Page) -> N
     assert (console.command == before).all()
     assert page.request(type="profile", profile="best")["is_accepted"]
     page.let_go()
-    page.wait(lambda: page.request(type="action", name="sweep")["is_accepted"])
+    page.wait(lambda: page.request(type="action", name="sweep")["is_accepted"], PERIOD)
 
     def present() -> bool:
         page.servo(is_holding=False)
         return bool(page.state["progress"] > 0.005)
 
-    page.wait(present)
+    page.wait(present, PERIOD)
     assert page.state["program"] == "calibration sweep"
     page.servo((1, 0, 0))  # the operator takes over
     page.wait(lambda: not page.state["program"])

@@ -20,7 +20,8 @@ from tautscope.config import Config, dump_config, from_document
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError, OutputError
 from tautscope.hardware.cameras import Camera, Capture
-from tautscope.hardware.experiment import run_on_hardware, write_run_folder
+from tautscope.hardware.experiment import run_on_hardware
+from tautscope.hardware.run_results import write_run_folder
 from tautscope.hardware.timing import read_sent
 from tautscope.log.reader import read_log
 from tautscope.loop.references import RecordedReference

@@ -109,11 +109,11 @@ def test_the_driver_stops_and_the_log_replays_after_a_signal(
     with (
         process(*node_command(tmp_path, endpoint, "--driver")) as node,
         process("examples/ros2/driver.py", endpoint) as driver,
-        operator(endpoint) as hand,
+        operator(endpoint) as user,
     ):
         assert json.loads(line(node)) == {"node": "/tautscope"}
-        hand.wait("ENABLED", lambda: hand.request("enable"))
-        hand.move(1.0)
+        user.wait("ENABLED", lambda: user.request("enable"))
+        user.move(1.0)
         node.send_signal(end)
         assert node.wait(TIMEOUT) == status
         assert json.loads(line(driver))["event"] == "quick stop"
@@ -127,11 +127,11 @@ def test_the_driver_stops_when_the_node_is_killed(tmp_path: Path, endpoint: str)
     with (
         process(*node_command(tmp_path, endpoint, "--driver")) as node,
         process("examples/ros2/driver.py", endpoint) as driver,
-        operator(endpoint) as hand,
+        operator(endpoint) as user,
     ):
         line(node)
-        hand.wait("ENABLED", lambda: hand.request("enable"))
-        hand.move(0.5)
+        user.wait("ENABLED", lambda: user.request("enable"))
+        user.move(0.5)
         node.kill()
         assert json.loads(line(driver))["event"] == "quick stop"
 
@@ -140,12 +140,12 @@ def test_a_device_that_ends_pauses_the_node(tmp_path: Path, endpoint: str) -> No
     with (
         process(*node_command(tmp_path, endpoint, "--driver")) as node,
         process("examples/ros2/driver.py", endpoint),
-        operator(endpoint) as hand,
+        operator(endpoint) as user,
     ):
         line(node)
-        hand.wait("ENABLED", lambda: hand.request("enable"))
-        hand.move(0.5)
-        hand.wait("PAUSED")
+        user.wait("ENABLED", lambda: user.request("enable"))
+        user.move(0.5)
+        user.wait("PAUSED")
 
 
 def test_drives_of_a_configuration_stop_when_the_node_is_killed(
@@ -160,12 +160,12 @@ def test_drives_of_a_configuration_stop_when_the_node_is_killed(
         assert json.loads(line(bench))["what"] == "ready"
         with (
             process(*node_command(tmp_path, endpoint, "--config", "bench")) as node,
-            operator(endpoint) as hand,
+            operator(endpoint) as user,
         ):
             line(node)
-            hand.request("enable")
-            hand.wait("ENABLED", lambda: hand.request("enable"))
-            hand.move(0.5)
+            user.request("enable")
+            user.wait("ENABLED", lambda: user.request("enable"))
+            user.move(0.5)
             node.kill()
             found: list[str] = []
             while found.count("quick stop active") < 3:
@@ -185,10 +185,10 @@ def test_nodes_meet_at_a_router(tmp_path: Path, endpoint: str) -> None:
         zenoh.open(settings),
         process("-m", "tautscope", "ros2", "--driver", *where) as node,
         process("examples/ros2/driver.py", endpoint),
-        operator(endpoint) as hand,
+        operator(endpoint) as user,
     ):
         line(node)
-        hand.wait("ENABLED", lambda: hand.request("enable"))
+        user.wait("ENABLED", lambda: user.request("enable"))
 
 
 def test_the_first_steps_of_the_page_work_as_written(tmp_path: Path, endpoint: str) -> None:

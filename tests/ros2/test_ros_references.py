@@ -65,7 +65,7 @@ def test_a_silent_device_stops_motion_until_it_is_resumed(both: Peers) -> None:
 
 
 def test_a_second_publisher_is_refused_until_it_takes_over(both: Peers) -> None:
-    second = both.publisher("/instrument/servo_jp", JOINTS)
+    second = both.other.publisher("/instrument/servo_jp", JOINTS)
     both.delivered()
     both.enable(START)
     last = drive(both, 50, 0.01)
@@ -149,7 +149,7 @@ class Gamepad:
 
     def __init__(self, both: Peers) -> None:
         self._both = both
-        self._joy = both.publisher("/joy", "sensor_msgs/msg/Joy")
+        self._joy = both.other.publisher("/joy", "sensor_msgs/msg/Joy")
         both.delivered(resend=True)
 
     def drive(self, ticks: int, deflection: float | None, *, is_holding: bool = True) -> np.ndarray:

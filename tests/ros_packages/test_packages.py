@@ -2,9 +2,11 @@
 
 import ast
 import re
+import runpy
 import sys
 import tomllib
 from pathlib import Path
+from unittest.mock import MagicMock
 from xml.etree import ElementTree
 
 import pytest
@@ -78,9 +80,35 @@ def test_the_part_without_ros_includes_nothing_of_it():
             )
 
 
+def launch_files(package: str) -> set[Path]:
+    """The launch files that a package installs."""
+    cmake = (CONTROL / "CMakeLists.txt").read_text("utf-8")
+    shared = re.findall(r"install\(FILES (\S+\.launch\.py) DESTINATION", cmake)
+    files = set((ROS / package / "launch").glob("*.py"))
+    if package == CONTROL.name:
+        files |= {(CONTROL / path).resolve(strict=True) for path in shared}
+    return files
+
+
+@pytest.mark.parametrize("package", ["tautscope_control", "tautscope_node"])
+def test_the_launch_file_starts_the_node_of_the_package_it_is_installed_with(
+    package, tmp_path, monkeypatch
+):
+    (source,) = (path for path in launch_files(package) if path.name == "node.launch.py")
+    for name in imported(source):
+        for module in re.findall(rf"from ({name}[\w.]*) import", source.read_text("utf-8")):
+            monkeypatch.setitem(sys.modules, module, MagicMock())
+    path = tmp_path / "share" / package / "launch" / source.name
+    path.parent.mkdir(parents=True)
+    path.write_bytes(source.read_bytes())
+    runpy.run_path(str(path))["generate_launch_description"]()
+    (node,) = sys.modules["launch_ros.actions"].LifecycleNode.call_args_list
+    assert (node.kwargs["package"], node.kwargs["executable"]) == (package, "instrument_node")
+
+
 def test_launch_files_use_what_is_declared():
     for package in ("tautscope_control", "tautscope_node"):
-        for path in (ROS / package / "launch").glob("*.py"):
+        for path in launch_files(package):
             text = path.read_text("utf-8")
             used = imported(path) | set(re.findall(r'package="(\w+)"', text))
             used |= set(re.findall(r'"(joint_state_broadcaster)",', text))

@@ -155,7 +155,7 @@ def test_same_seed_same_motion_other_seed_other_instrument():
 
 
 def test_twin_shares_nothing_with_what_it_tests():
-    """No import of the loop's blocks in the twin, and the renderer knows no other crate of ours."""
+    """The twin imports none of the loop's blocks, and the renderer none of our other crates."""
     forbidden = re.compile(
         r"blocks|reduction|vision|replay|experiment|\b(Play|Compensator|Estimator|Instrument|Camera)\b"
     )

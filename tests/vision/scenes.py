@@ -1,4 +1,4 @@
-"""Pictures of the twin's instrument in a posture, with exact truth."""
+"""Images of the twin's instrument in a posture, with exact truth."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ DEVIATION = np.array([2e-3, 0.15, 0.12])
 
 @dataclass(frozen=True)
 class Scene:
-    """A posture, its picture and the true features."""
+    """A posture, its image and the true features."""
 
     state: NDArray[np.float64]
     image: NDArray[np.uint8]
@@ -28,7 +28,7 @@ class Scene:
         return StatePrediction(self.state + off, DEVIATION)
 
     def outline(self, band: int) -> NDArray[np.float64]:
-        """Of the band in the picture, by the model (n, 2) [px]."""
+        """Of the band in the image, by the model (n, 2) [px]."""
         bands = MODEL.bands(self.state)
         assert bands is not None
         return bands[band][3]
@@ -56,27 +56,27 @@ def scenes(count: int, seed: int, background: str | None = None) -> list[Scene]:
     found: list[Scene] = []
     while len(found) < count:
         state = rng.uniform([0.012, -2.0, 0.0], [0.040, 2.0, 1.5])
-        picture = camera.draw(*centreline(state), 25 * len(found))
+        rendered = camera.draw(*centreline(state), 25 * len(found))
         bands = MODEL.bands(state)
-        if bands is None or not (picture.true_visible > 0.97).all():
+        if bands is None or not (rendered.true_visible > 0.97).all():
             continue
         whole = np.concatenate([band[1] for band in bands])
         corners = np.vstack([band[3] for band in bands])
         inside = (corners > 8).all() and (corners < [711, 567]).all()
-        if inside and abs(whole - picture.true_features).max() < 0.5:
-            found.append(Scene(state, picture.image, picture.true_features))
+        if inside and abs(whole - rendered.true_features).max() < 0.5:
+            found.append(Scene(state, rendered.image, rendered.true_features))
     return found
 
 
 def cut_scenes(count: int, seed: int) -> list[Scene]:
-    """Postures in which the border of the picture leaves little more than half of a band."""
+    """Postures in which the border of the image leaves little more than half of a band."""
     rng = np.random.default_rng(seed)
     camera = TwinCamera(CONFIG.replace(**{"twin.seed": seed}))
     found: list[Scene] = []
     while len(found) < count:
         # Bent up, so that the bands come to lie at the upper border.
         state = rng.uniform([0.010, -2.0, 1.4], [0.020, -1.3, 1.75])
-        picture = camera.draw(*centreline(state), 25 * len(found))
-        if 0.52 < picture.true_visible.min() < 0.62:
-            found.append(Scene(state, picture.image, picture.true_features))
+        rendered = camera.draw(*centreline(state), 25 * len(found))
+        if 0.52 < rendered.true_visible.min() < 0.62:
+            found.append(Scene(state, rendered.image, rendered.true_features))
     return found

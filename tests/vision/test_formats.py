@@ -1,4 +1,4 @@
-"""Every pixel format is the same picture: against OpenCV's conversions, and what is refused."""
+"""Every pixel format is the same image: against OpenCV's conversions, and what is refused."""
 
 import cv2
 import numpy as np

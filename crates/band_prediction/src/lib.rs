@@ -32,7 +32,7 @@ pub struct ModelPredictor<'a> {
 }
 
 impl<'a> ModelPredictor<'a> {
-    /// From what is believed of the instrument's state before the image is seen.
+    /// From the state prediction of an image.
     pub const fn new(model: &'a core::FeatureModel, beliefs: core::Beliefs<'a>) -> Self {
         Self {
             model,

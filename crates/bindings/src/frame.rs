@@ -25,7 +25,7 @@ enum Lines<'a> {
 impl<'a> ArrayFrame<'a> {
     /// Sees `image` as a frame of this format: (h, w, channels), or (3 h / 2, w) with Y, U, V apart.
     ///
-    /// `tautscope.loop.frame_layout` refuses what this refuses, and says it better.
+    /// `tautscope.loop.frame_layout` refuses what this refuses, with a message for users.
     pub fn new(image: &'a PyReadonlyArrayDyn<'_, u8>, format: PixelFormat) -> PyResult<Self> {
         let refused = || {
             let allowed = format!("image: expected an array of a {} image", format.name());

@@ -8,15 +8,19 @@
 //! - After `create`, no function allocates but detection in an image larger than those before.
 //! - No panic leaves a function: the handle is then unusable, and every further call says so.
 //!
-//! This is the only crate with `unsafe`, in `pointers` and the two files of exported functions.
+//! This is the only crate with `unsafe`, in `pointers` and the files of exported functions.
 #![deny(unsafe_op_in_unsafe_fn)]
 
 #[cfg(test)]
 mod tests;
 
+mod conversions;
 mod detector;
 mod document;
+mod image_update;
+mod names;
 mod pointers;
 mod reduction;
 mod result;
+mod supervision;
 pub mod types;

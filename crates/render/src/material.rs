@@ -1,4 +1,4 @@
-//! What the instrument is made of, and how it looks in the light of the endoscope.
+//! What the instrument is made of, and how it appears in the light of the endoscope.
 
 use crate::vector::Vector;
 

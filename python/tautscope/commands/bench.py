@@ -74,9 +74,7 @@ def _bench(options: argparse.Namespace) -> None:
     from tautscope.bench.rig import Bench  # noqa: PLC0415
     from tautscope.hardware.realtime import (  # noqa: PLC0415
         SETPOINTS,
-        limited_garbage_collection,
-        locked_memory,
-        realtime,
+        realtime_process,
         short_switch_interval,
     )
     from tautscope.hardware.signals import exit_on_signals  # noqa: PLC0415
@@ -89,9 +87,7 @@ def _bench(options: argparse.Namespace) -> None:
     with (
         exit_on_signals(),
         short_switch_interval(),
-        limited_garbage_collection(),
-        locked_memory(),
-        realtime(SETPOINTS) as refusal,
+        realtime_process(SETPOINTS) as refusal,
         Bench(config, options.truth, modes=tuple(options.modes)) as bench,
     ):
         if refusal:

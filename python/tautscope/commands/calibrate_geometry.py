@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -172,14 +171,14 @@ def _from_twin(options: argparse.Namespace) -> _Source:
 def _from_hardware(options: argparse.Namespace) -> _Source:
     from tautscope.calibration.geometry import sweep  # noqa: PLC0415
     from tautscope.commands.progress import progress_bar  # noqa: PLC0415
-    from tautscope.hardware.realtime import VISION, set_realtime_priority  # noqa: PLC0415
+    from tautscope.hardware.realtime import VISION, realtime_executor  # noqa: PLC0415
 
     if options.config is None:
         raise FieldError("--config", None, "the configuration of a rig; or a file, or --twin")
     config = load_config(options.config)
     confirm_motion(options)
     with (
-        ThreadPoolExecutor(1, "vision", set_realtime_priority, (VISION,)) as executor,
+        realtime_executor("vision", VISION) as executor,
         open_rig(config) as setup,
         progress_bar("sweep") as progress,
     ):

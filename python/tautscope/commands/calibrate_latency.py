@@ -11,7 +11,11 @@ from typing import TYPE_CHECKING
 from tautscope.commands import arguments
 from tautscope.commands.align import NO_ANSWER, print_delay
 from tautscope.commands.calibration_output import add_options, check_options, finish
-from tautscope.commands.calibration_rig import add_rig_options, confirm_motion, rig_for_calibration
+from tautscope.commands.calibration_rig import (
+    add_rig_options,
+    confirm_motion,
+    simulated_experiment,
+)
 from tautscope.commands.printing import print_json
 from tautscope.config import Config, load_config
 from tautscope.dof import Dof
@@ -155,18 +159,7 @@ def record(
     config = _slow(config)
     with progress_bar("motion") as progress:
         if options.twin:
-            from tautscope.loop.references import SineSequence  # noqa: PLC0415
-            from tautscope.runs.experiment import run_experiment  # noqa: PLC0415
-
-            with rig_for_calibration(options) as setup:
-                recording = run_experiment(
-                    setup.rig,
-                    SineSequence(config.experiment),
-                    config,
-                    compensate=False,
-                    progress=lambda elapsed, duration: progress(elapsed / duration),
-                )
-            return recording, {}
+            return simulated_experiment(options, config, progress, compensate=False), {}
         from tautscope.hardware.experiment import run_on_hardware  # noqa: PLC0415
         from tautscope.hardware.serial_numbers import read_serial_numbers  # noqa: PLC0415
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -17,6 +17,7 @@ from tautscope.extras import require_extras
 
 if TYPE_CHECKING:
     from tautscope.loop.rig import Rig
+    from tautscope.runs.recording import Recording
 
 
 @dataclass(frozen=True)
@@ -85,6 +86,34 @@ def rig_for_calibration(options: argparse.Namespace) -> Iterator[Setup]:
     confirm_motion(options)
     with open_rig(config) as setup:
         yield setup
+
+
+def simulated_experiment(
+    options: argparse.Namespace,
+    config: Config,
+    progress: Callable[[float], None],
+    *,
+    compensate: bool = True,
+) -> Recording:
+    """Run the sines of a configuration on the twin of the options.
+
+    Args:
+        options: With those of `add_rig_options`, and ``--twin``.
+        config: Of the loop.
+        progress: Called with the share of the motion done.
+        compensate: Whether the hysteresis is compensated.
+    """
+    from tautscope.loop.references import SineSequence  # noqa: PLC0415
+    from tautscope.runs.experiment import run_experiment  # noqa: PLC0415
+
+    with rig_for_calibration(options) as setup:
+        return run_experiment(
+            setup.rig,
+            SineSequence(config.experiment),
+            config,
+            compensate,
+            progress=lambda elapsed, duration: progress(elapsed / duration),
+        )
 
 
 @contextmanager

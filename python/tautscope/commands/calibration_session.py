@@ -92,13 +92,13 @@ class CalibrationSession:
         """
         if result is not None:
             self.folder.mkdir(parents=True, exist_ok=True)
-            pictures = []
+            files = []
             for k, (figure, caption) in enumerate(result.figures):
-                picture = f"{name}_{k + 1}.png"
-                figure.savefig(self.folder / picture, dpi=130)
-                pictures.append([picture, caption])
+                file = f"{name}_{k + 1}.png"
+                figure.savefig(self.folder / file, dpi=130)
+                files.append([file, caption])
             values = result.rounded_values()
-            document = {"values": values, "notes": list(result.notes), "figures": pictures}
+            document = {"values": values, "notes": list(result.notes), "figures": files}
             document["std"] = dict(result.std)
             _write(self.folder / f"{name}.json", document)
             if values:
@@ -128,8 +128,8 @@ class CalibrationSession:
             parts += [f"<p>{escape(note)}</p>" for note in found["notes"]]
             if found["values"]:
                 parts.append(_table(found["values"], found["std"]))
-            for picture, caption in found["figures"]:
-                code = base64.b64encode((self.folder / picture).read_bytes()).decode()
+            for file, caption in found["figures"]:
+                code = base64.b64encode((self.folder / file).read_bytes()).decode()
                 parts.append(
                     f'<figure><img alt="{escape(caption)}" src="data:image/png;base64,{code}">'
                     f"<figcaption>{escape(caption)}</figcaption></figure>"

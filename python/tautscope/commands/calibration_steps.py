@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import itertools
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,7 +16,11 @@ from tautscope.commands import (
     calibrate_geometry,
     calibrate_latency,
 )
-from tautscope.commands.calibration_rig import actual_rig, rig_for_calibration
+from tautscope.commands.calibration_rig import (
+    actual_rig,
+    rig_for_calibration,
+    simulated_experiment,
+)
 from tautscope.config import Config
 from tautscope.errors import CalibrationError
 
@@ -66,15 +69,13 @@ def _colour(options: argparse.Namespace, config: Config, folder: Path) -> Calibr
 def _geometry(options: argparse.Namespace, config: Config, folder: Path) -> CalibrationResult:
     from tautscope.calibration.geometry import fit, sweep  # noqa: PLC0415
     from tautscope.commands.progress import progress_bar  # noqa: PLC0415
-    from tautscope.hardware.realtime import VISION, set_realtime_priority  # noqa: PLC0415
+    from tautscope.hardware.realtime import VISION, realtime_executor  # noqa: PLC0415
 
     with ExitStack() as resources:
         setup = resources.enter_context(rig_for_calibration(options))
         executor = None
         if not options.twin:
-            executor = resources.enter_context(
-                ThreadPoolExecutor(1, "vision", set_realtime_priority, (VISION,))
-            )
+            executor = resources.enter_context(realtime_executor("vision", VISION))
         progress = resources.enter_context(progress_bar("sweep"))
         recording = sweep(setup.rig, config, executor=executor, progress=progress)
         serial_numbers = setup.serial_numbers()
@@ -122,23 +123,12 @@ def _motion(options: argparse.Namespace, config: Config, folder: Path) -> Calibr
     place = _unused(folder, MOTION)
     with progress_bar("first compensated motion") as progress:
         if options.twin:
-            from tautscope.loop.references import SineSequence  # noqa: PLC0415
-            from tautscope.runs.experiment import run_experiment  # noqa: PLC0415
-
-            with rig_for_calibration(options) as setup:
-                recording = run_experiment(
-                    setup.rig,
-                    SineSequence(config.experiment),
-                    config,
-                    progress=lambda elapsed, duration: progress(elapsed / duration),
-                )
+            recording = simulated_experiment(options, config, progress)
             place.mkdir(parents=True)
             recording.write(place)
         else:
-            from tautscope.hardware.experiment import (  # noqa: PLC0415
-                run_on_hardware,
-                write_run_folder,
-            )
+            from tautscope.hardware.experiment import run_on_hardware  # noqa: PLC0415
+            from tautscope.hardware.run_results import write_run_folder  # noqa: PLC0415
 
             run = run_on_hardware(config, place, progress)
             write_run_folder(run, place)

@@ -15,7 +15,11 @@ from tautscope.errors import MissingPathError
 from tautscope.loop.references import SineSequence
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
+    from tautscope.dof import Dof
     from tautscope.report.demo import Demo
+    from tautscope.report.rows import Row
     from tautscope.runs.trials import Trial
 
 SPEED = 12.0
@@ -128,22 +132,35 @@ def _load(options: argparse.Namespace) -> Config:
     return config
 
 
-def _print_table1(demo: Demo) -> None:
+def _table(title: str, seeds: int) -> Table:
+    """An empty table of figures of a number of seeds."""
     from rich.table import Table  # noqa: PLC0415
 
+    if seeds > 1:
+        title += f" (median of {seeds} seeds, worst in brackets)"
+    table = Table(title=title, box=None, title_justify="left", title_style="bold", pad_edge=False)
+    table.add_column("", no_wrap=True)
+    return table
+
+
+def _cell(
+    row: Row, dof: Dof, median: dict[Dof, Any], worst: dict[Dof, Any], *, several: bool
+) -> str:
+    """A figure of a DOF, with the worst one in brackets if there are several seeds."""
+    from tautscope.report import tables  # noqa: PLC0415
+
+    middle, bad = (tables.cell(row, dof, getattr(of[dof], row.name)) for of in (median, worst))
+    return f"{middle} ({bad})" if several else middle
+
+
+def _print_table1(demo: Demo) -> None:
     from tautscope.report import tables  # noqa: PLC0415
     from tautscope.report.rows import ROWS  # noqa: PLC0415
 
     profiles = demo.by_profile
     several = len(demo.seeds) > 1
-    title = "Table 1: the article, and the twin" + (
-        f" (median of {len(demo.seeds)} seeds, worst in brackets)" if several else ""
-    )
-    figures = [
-        (name, tables.median(results), tables.worst(results)) for name, results in profiles.items()
-    ]
-    table = Table(title=title, box=None, title_justify="left", title_style="bold", pad_edge=False)
-    table.add_column("", no_wrap=True)
+    figures = [(tables.median(results), tables.worst(results)) for results in profiles.values()]
+    table = _table("Table 1: the article, and the twin", len(demo.seeds))
     for dof in demo.results[0]:
         table.add_column(
             f"{tables.heading(dof)}\narticle", justify="right", style="dim", no_wrap=True
@@ -154,10 +171,7 @@ def _print_table1(demo: Demo) -> None:
         cells = []
         for dof in demo.results[0]:
             cells.append(tables.article_cell(row, dof))
-            for _, middle, bad in figures:
-                ours = tables.cell(row, dof, getattr(middle[dof], row.name))
-                worst = f" ({tables.cell(row, dof, getattr(bad[dof], row.name))})"
-                cells.append(ours + worst * several)
+            cells += [_cell(row, dof, *each, several=several) for each in figures]
         table.add_row(row.title, *cells)
     screen = console()
     screen.print(table)
@@ -165,27 +179,18 @@ def _print_table1(demo: Demo) -> None:
 
 
 def _print_operator_motion(demo: Demo) -> None:
-    from rich.table import Table  # noqa: PLC0415
-
     from tautscope.report import tables  # noqa: PLC0415
     from tautscope.report.rows import OPERATOR_ROWS  # noqa: PLC0415
 
     results = demo.operator_results
     several = len(results) > 1
-    title = f"Operator motion, all degrees of freedom at once, profile {demo.config.profile}" + (
-        f" (median of {len(results)} seeds, worst in brackets)" if several else ""
-    )
-    table = Table(title=title, box=None, title_justify="left", title_style="bold", pad_edge=False)
-    table.add_column("", no_wrap=True)
+    title = f"Operator motion, all degrees of freedom at once, profile {demo.config.profile}"
+    table = _table(title, len(results))
     middle, bad = tables.median(results), tables.worst(results, OPERATOR_ROWS)
     for dof in middle:
         table.add_column(tables.heading(dof), justify="right", no_wrap=True)
     for row in OPERATOR_ROWS:
-        cells = []
-        for dof in middle:
-            ours = tables.cell(row, dof, getattr(middle[dof], row.name))
-            worst = f" ({tables.cell(row, dof, getattr(bad[dof], row.name))})"
-            cells.append(ours + worst * several)
+        cells = [_cell(row, dof, middle, bad, several=several) for dof in middle]
         table.add_row(row.title, *cells)
     screen = console()
     screen.print(table)

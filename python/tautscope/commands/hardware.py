@@ -58,7 +58,8 @@ def add_parser(verbs: arguments.Verbs) -> None:
 def _run(options: argparse.Namespace) -> int:
     from tautscope.commands.progress import progress_bar  # noqa: PLC0415
     from tautscope.hardware.doctor.computer import bytes_per_second  # noqa: PLC0415
-    from tautscope.hardware.experiment import run_on_hardware, write_run_folder  # noqa: PLC0415
+    from tautscope.hardware.experiment import run_on_hardware  # noqa: PLC0415
+    from tautscope.hardware.run_results import write_run_folder  # noqa: PLC0415
     from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
 
     config = load_config(options.config, options.profile)

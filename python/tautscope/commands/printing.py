@@ -21,7 +21,7 @@ def print_json(document: dict[str, Any]) -> None:
 
 
 def announce(what: str, seconds: float, size: float, folder: Path) -> None:
-    """Say on stderr what a command will take.
+    """Print on stderr how long a command takes, and where it writes.
 
     Args:
         what: What runs.

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import time
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 
 from numpy.typing import ArrayLike
 
 from tautscope.config import Config
-from tautscope.hardware.realtime import OTHERS, set_realtime_priority
+from tautscope.hardware.realtime import OTHERS, realtime_executor
 from tautscope.loop.rig import Frame, Sample
 from tautscope.twin.camera import RenderedImage, TwinCamera
 from tautscope.twin.plant import Plant
@@ -28,7 +28,7 @@ class LiveTwin(Twin):
 
     def __init__(self, config: Config) -> None:
         super().__init__(config)
-        self._renderer = ThreadPoolExecutor(1, "rendering", set_realtime_priority, (OTHERS,))
+        self._renderer = realtime_executor("rendering", OTHERS)
         self._rendering: tuple[Future[RenderedImage], int, float, float] | None = None
         self._due = 0.0
         self.dropped_images = 0

@@ -5,7 +5,6 @@ from __future__ import annotations
 import multiprocessing
 import socket
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -18,15 +17,7 @@ from tautscope.console.server import run_server
 from tautscope.console.session import Session
 from tautscope.console.shared import Channels, SharedMemory
 from tautscope.errors import STOPPED, ConfigError, StateError
-from tautscope.hardware.realtime import (
-    LOOP,
-    OTHERS,
-    VISION,
-    limited_garbage_collection,
-    locked_memory,
-    realtime,
-    set_realtime_priority,
-)
+from tautscope.hardware.realtime import LOOP, OTHERS, VISION, realtime_executor, realtime_process
 from tautscope.hardware.rig import HardwareRig
 from tautscope.hardware.signals import exit_on_signals
 
@@ -56,10 +47,8 @@ def start_console(
     with exit_on_signals(), web_server(config.camera, port) as (server, channels, url):
         announce(url)
         with (
-            ThreadPoolExecutor(1, "vision", set_realtime_priority, (VISION,)) as executor,
-            limited_garbage_collection(),
-            locked_memory(),
-            realtime(OTHERS if not is_twin else LOOP),
+            realtime_executor("vision", VISION) as executor,
+            realtime_process(LOOP if is_twin else OTHERS),
         ):
             control = RigControl(config, rig, folder, executor)
             try:

@@ -2,113 +2,29 @@
 
 from __future__ import annotations
 
-import json
 import logging
-from collections import Counter
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from tautscope.config import Config
-from tautscope.dof import Dof
 from tautscope.errors import STOPPED, DriveError, OutputError, TautscopeError
 from tautscope.hardware.plausibility import PlausibilityMonitor
-from tautscope.hardware.realtime import (
-    OTHERS,
-    VISION,
-    limited_garbage_collection,
-    locked_memory,
-    realtime,
-    set_realtime_priority,
-)
+from tautscope.hardware.realtime import OTHERS, VISION, realtime_executor, realtime_process
 from tautscope.hardware.rig import HardwareRig
+from tautscope.hardware.run_results import HardwareRun, ProtocolRun
 from tautscope.hardware.signals import exit_on_signals
-from tautscope.hardware.timing import Timing
-from tautscope.log.writer import LogSummary, LogWriter
+from tautscope.log.writer import LogWriter
 from tautscope.loop.reduction import Report
 from tautscope.loop.references import Reference, SineSequence
 from tautscope.loop.rig import Frame, Sample
 from tautscope.loop.safety import Reaction, Supervision
-from tautscope.report.operator_motion import OperatorResults, evaluate_operator_motion
-from tautscope.report.results import Results, evaluate
-from tautscope.report.tables import finite_or_none, operator_to_json
 from tautscope.runs.experiment import run_experiment
 from tautscope.runs.output_folder import check_free
-from tautscope.runs.recording import Floats, Recording, Table
+from tautscope.runs.recording import Floats
 
 RigMaker = Callable[[Config], HardwareRig]
 _LOG = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class ProtocolRun:
-    """One run of the protocol.
-
-    Attributes:
-        recording: Traces of the loop.
-        timing: Timing of set-points and frames.
-        log: Summary of its log.
-    """
-
-    recording: Recording
-    timing: Timing
-    log: LogSummary
-
-
-@dataclass(frozen=True)
-class HardwareRun:
-    """Results of ``tautscope run``.
-
-    Attributes:
-        config: The configuration used.
-        compensated: The run with compensation.
-        uncompensated: The run without compensation, if it was requested.
-    """
-
-    config: Config
-    compensated: ProtocolRun
-    uncompensated: ProtocolRun | None = None
-
-    @property
-    def results(self) -> Results:
-        """Table 1 from the state estimates; NaN where it needs an uncompensated run.
-
-        Empty for a recorded motion.
-        """
-        return evaluate(self._plain, self.compensated.recording)
-
-    @property
-    def operator_results(self) -> OperatorResults:
-        """Tracking of a recorded motion by the state estimates; empty for the experiment."""
-        recording = self.compensated.recording
-        return {} if recording.segments else evaluate_operator_motion(self._plain, recording)
-
-    @property
-    def _plain(self) -> Recording | None:
-        return None if self.uncompensated is None else self.uncompensated.recording
-
-    def to_json(self) -> dict[str, Any]:
-        """The output of ``tautscope run --json``; widths in m or rad, None if unknown."""
-        runs = {"compensated": self.compensated}
-        if self.uncompensated is not None:
-            runs = {"uncompensated": self.uncompensated, **runs}
-        return {
-            "profile": self.config.profile,
-            "runs": {name: _summary(run) for name, run in runs.items()},
-            "by_camera": {
-                dof.label: {
-                    "uncompensated": finite_or_none(found.uncompensated_estimate),
-                    "compensated": finite_or_none(found.compensated_estimate),
-                    "reduction": finite_or_none(found.reduction_estimate),
-                    "tracking_rms": finite_or_none(found.tracking_estimate),
-                }
-                for dof, found in self.results.items()
-            }
-            | operator_to_json(self.operator_results),
-        }
 
 
 def run_on_hardware(
@@ -141,7 +57,7 @@ def run_on_hardware(
     rig = make_rig(config)  # an invalid configuration must leave no folder behind
     _make_folder(check_free(folder))
     runs = []
-    with exit_on_signals(), limited_garbage_collection(), locked_memory(), realtime(OTHERS):
+    with exit_on_signals(), realtime_process(OTHERS):
         for index, compensate in enumerate(kinds):
             runs.append(
                 _run(
@@ -154,66 +70,6 @@ def run_on_hardware(
                 )
             )
     return HardwareRun(config, runs[-1], runs[0] if compare else None)
-
-
-def write_run_folder(run: HardwareRun, folder: Path) -> None:
-    """Write tables, timing, figures and report into the folder of the logs."""
-    from tautscope.figure_style import style  # noqa: PLC0415
-    from tautscope.hardware.timing_figure import timing_figure  # noqa: PLC0415  matplotlib
-    from tautscope.report import figures, report, tables  # noqa: PLC0415  matplotlib takes half a second
-    from tautscope.report.operator_figure import draw_operator_motion  # noqa: PLC0415
-
-    first, results = run.compensated, run.results
-    first.recording.write(folder)
-    picture = timing_figure(first.timing)
-    plain = None if run.uncompensated is None else run.uncompensated.recording
-    if first.recording.segments:
-        name, section = "fig9.png", report.table1_section(results)
-        main = report.CaptionedFigure(
-            figures.figure9(plain, first.recording),
-            "Fig. 9. (a)-(c) with compensation: reference, command, estimate and both contact "
-            "offsets. (d)-(f) loops of the estimate; a narrow loop on the dashed line, an ideal "
-            "tip, is the goal. The first period, in which the slack is estimated, is thin.",
-        )
-    else:
-        name, section = "tracking.png", report.recorded_motion_section(run.operator_results)
-        main = report.CaptionedFigure(
-            draw_operator_motion(plain, first.recording),
-            "The recorded motion. (a)-(c) reference, command and the tip as the camera measures "
-            "it, in a part of the run. (d)-(f) tracking error over the whole run.",
-        )
-    pictures = [
-        main,
-        report.CaptionedFigure(
-            picture,
-            "Timing of the run. (a), (b) delay of each set-point after its due time; "
-            "(c), (d) age of each frame when the loop took it.",
-        ),
-    ]
-    if run.uncompensated is not None:
-        run.uncompensated.recording.write(folder, "_uncompensated")
-        run.uncompensated.timing.write(folder, "_uncompensated")
-    if results:
-        tables.write_csv(
-            folder / "table1.csv", [run.config.twin.seed], {run.config.profile: [results]}
-        )
-    facts = {
-        "control": f"{1 / first.timing.cycle:g} Hz, {first.timing.lost} cycles lost",
-        "log": first.log.path.name,
-    }
-    with style():
-        picture.savefig(folder / "timing.png")
-        main.figure.savefig(folder / name)
-        page = report.run_report(
-            run.config,
-            facts,
-            section,
-            pictures,
-            first.recording.warnings,
-        )
-    (folder / "report.html").write_text(page, encoding="utf-8")
-    (folder / "run.json").write_text(json.dumps(run.to_json(), indent=1), encoding="utf-8")
-    first.timing.write(folder)
 
 
 def _run(
@@ -232,7 +88,7 @@ def _run(
             log.warn(text)
 
         rig.warn = warn
-        executor = ThreadPoolExecutor(1, "vision", set_realtime_priority, (VISION,))
+        executor = realtime_executor("vision", VISION)
         monitored = _MonitoredLog(log, config)
         try:
             recording = run_experiment(
@@ -322,25 +178,3 @@ def _make_folder(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError("out", str(folder), f"a place that can be written ({error})") from None
-
-
-def _summary(run: ProtocolRun) -> dict[str, Any]:
-    frames = run.recording.frames
-    return {
-        "log": str(run.log.path),
-        "log_complete": run.log.is_complete,
-        "ticks": len(run.recording.trace),
-        "status": dict(Counter(frames["status"].tolist())),
-        "observable": _observable_fractions(frames),
-        "timing": run.timing.summary(),
-        "warnings": list(run.recording.warnings),
-    }
-
-
-def _observable_fractions(frames: Table) -> dict[str, float | None]:
-    return {
-        dof.label: finite_or_none(float(frames[f"observable_{dof.label}"].mean()))
-        if len(frames)
-        else None
-        for dof in Dof
-    }

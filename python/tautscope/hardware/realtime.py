@@ -7,6 +7,7 @@ import gc
 import os
 import sys
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 
 SETPOINTS, LOOP, VISION, OTHERS = 60, 40, 20, 10
@@ -54,6 +55,11 @@ def set_realtime_priority(priority: int) -> None:
     """Set SCHED_FIFO for the calling thread permanently, if it is permitted."""
     with suppress(OSError, AttributeError):
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+
+
+def realtime_executor(name: str, priority: int) -> ThreadPoolExecutor:
+    """A thread in SCHED_FIFO, if it is permitted, that runs what is submitted to it."""
+    return ThreadPoolExecutor(1, name, set_realtime_priority, (priority,))
 
 
 def lower_realtime_priority(priority: int) -> None:
@@ -110,3 +116,14 @@ def locked_memory() -> Iterator[str]:
         yield ""
     finally:
         system.munlockall()
+
+
+@contextmanager
+def realtime_process(priority: int) -> Iterator[str]:
+    """Run the block in SCHED_FIFO, with locked memory and limited garbage collection.
+
+    Yields:
+        What `realtime` yields.
+    """
+    with limited_garbage_collection(), locked_memory(), realtime(priority) as refusal:
+        yield refusal

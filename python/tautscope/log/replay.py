@@ -2,7 +2,7 @@
 
 `replay_same` repeats a run with its own configuration; the outputs must be identical to the bit.
 `estimate_from_log` and `estimate_from_video` run the estimators of another configuration on
-recorded commands and images. They cannot tell how the instrument would have moved.
+recorded commands and images. They do not show how the instrument would have moved.
 """
 
 from __future__ import annotations

@@ -204,14 +204,14 @@ def _region_legend() -> list[Artist]:
 
 
 def _label_marker(
-    axes: Axes, name: str, at: NDArray[np.float64], away: NDArray[np.float64]
+    axes: Axes, name: str, at: NDArray[np.float64], direction: NDArray[np.float64]
 ) -> None:
-    """A cross at a marker [px], its name 26 points off in the direction `away` [px]."""
+    """A cross at a marker [px], its name 26 points off in a direction [px]."""
     axes.plot(*at, "+", color="white", markersize=8)
     axes.annotate(
         name,
         (at[0], at[1]),
-        xytext=(26 * away[0], -26 * away[1]),
+        xytext=(26 * direction[0], -26 * direction[1]),
         textcoords="offset points",
         ha="center",
         va="center",

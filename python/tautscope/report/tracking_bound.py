@@ -60,7 +60,7 @@ def tracking_bound(reference: ArrayLike, config: Config, *, first: int = 0) -> F
 def track_ideal_plays(
     reference: ArrayLike, config: Config, *, compensate: bool = True
 ) -> tuple[Floats, Floats]:
-    """Command and tip of ideal plays under the vector law, which knows tip and widths exactly.
+    """Command and tip of ideal plays under the vector law, with exact knowledge of tip and widths.
 
     Insertion and rotation are one vector play. With e = c - q, half the uncompensated widths of
     the article's Table 1, h, and the radius r of the shaft,

@@ -30,13 +30,13 @@ from tautscope.ros2.wire import Qos
 
 _LOG = logging.getLogger(__name__)
 _IDLE_PERIOD = 0.005
-"""Time between two looks at requests while no loop runs [s]."""
+"""Time between two checks for requests while no loop runs [s]."""
 COMMANDS = ("enable", "disable", "pause", "resume")
 """Values of ``state_command`` that are executed; CRTK has others."""
 
 
 class NodeControl:
-    """Runs the loop as the requests to a node say.
+    """Runs the loop by the requests to a node.
 
     Args:
         config: Of the loop.
@@ -51,7 +51,7 @@ class NodeControl:
 
     Attributes:
         run: The present run; None if the node is not active.
-        fault: Why the last run ended, if nobody ended it.
+        fault: Why the last run ended, if no request ended it.
     """
 
     def __init__(

@@ -23,7 +23,6 @@ NEWEST = Qos(depth=1)
 """Only the newest: set-points."""
 _RELIABILITY = {True: zenoh.Reliability.RELIABLE, False: zenoh.Reliability.BEST_EFFORT}
 _PRIORITY = {True: zenoh.Priority.REAL_TIME, False: zenoh.Priority.DATA}
-_CONGESTION = zenoh.CongestionControl.DROP
 _QUEUE = 16
 """Batches that wait for the transport, per priority; Zenoh allows no more."""
 _LARGEST_DOMAIN = 232
@@ -42,6 +41,8 @@ class Node:
         domain: ROS_DOMAIN_ID.
         connect: Endpoint of a router or another node; tried again until it answers. Empty: none.
         listen: Own endpoint, on the loopback interface.
+        is_blocking: Whether a publisher waits while the transport is busy, and drops no message;
+            for comparisons.
 
     Attributes:
         identity: The node in the network.
@@ -59,6 +60,7 @@ class Node:
         domain: int = 0,
         connect: str = ROUTER,
         listen: str = _LOOPBACK,
+        is_blocking: bool = False,
     ) -> None:
         if not _NAME.fullmatch(namespace):
             raise ConfigError("namespace", namespace, "empty, or names that begin with a slash")
@@ -87,6 +89,9 @@ class Node:
             raise ConfigError("endpoint", endpoints, f"as tcp/127.0.0.1:7447 ({error})") from None
         self.identity = wire.Identity(domain, str(self._session.info.zid()), namespace, name)
         self._tokens = [self._declare(self.identity.node_token())]
+        self._congestion = (
+            zenoh.CongestionControl.BLOCK if is_blocking else zenoh.CongestionControl.DROP
+        )
         self._entities = 0
         self.subscriptions: list[Subscription] = []
 
@@ -98,7 +103,7 @@ class Node:
             self._key(topic, kind),
             reliability=_RELIABILITY[qos.is_reliable],
             priority=_PRIORITY[qos.is_reliable],
-            congestion_control=_CONGESTION,
+            congestion_control=self._congestion,
             express=True,
         )
         return Publisher(publisher, token, wire.gid(name))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from concurrent.futures import Executor, ThreadPoolExecutor
+from concurrent.futures import Executor
 from pathlib import Path
 from typing import Literal
 
@@ -14,10 +14,8 @@ from tautscope.hardware.realtime import (
     LOOP,
     OTHERS,
     VISION,
-    limited_garbage_collection,
-    locked_memory,
-    realtime,
-    set_realtime_priority,
+    realtime_executor,
+    realtime_process,
     short_switch_interval,
 )
 from tautscope.hardware.rig import HardwareRig
@@ -67,16 +65,14 @@ def start_node(
         config = config.replace(drives=None)
     with (
         exit_on_signals(),
-        ThreadPoolExecutor(1, "vision", set_realtime_priority, (VISION,)) as executor,
+        realtime_executor("vision", VISION) as executor,
     ):
         control = build_control(
             config, node, folder, executor, Clock(), drives=drives, device=device, layout=layout
         )
         with (
-            limited_garbage_collection(),
-            locked_memory(),
             short_switch_interval(),
-            realtime(OTHERS if drives == "rig" else LOOP) as refusal,
+            realtime_process(OTHERS if drives == "rig" else LOOP) as refusal,
         ):
             if refusal:
                 _LOG.warning("%s", refusal)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 
 from tautscope.config import Config
 from tautscope.console.control_run import ControlRun
 from tautscope.errors import MessageError
-from tautscope.hardware.realtime import OTHERS, set_realtime_priority
+from tautscope.hardware.realtime import OTHERS, realtime_executor
 from tautscope.loop.reduction import Report
 from tautscope.loop.rig import Frame
 from tautscope.ros2 import messages
@@ -77,7 +77,7 @@ class Telemetry:
             self._applied = publisher("actuators/measured_js", joints)
             self._image = node.publisher(topics.image, "sensor_msgs/msg/Image", SENSOR_DATA)
         # The transport may wait for a slow receiver; a tick may not.
-        self._images = ThreadPoolExecutor(1, "images", set_realtime_priority, (OTHERS,))
+        self._images = realtime_executor("images", OTHERS)
         self._sending: Future[None] = Future()
         self._sending.set_result(None)
         self.refused: Counter[str] = Counter()

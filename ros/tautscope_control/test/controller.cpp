@@ -18,6 +18,7 @@
 #include <rclcpp/rclcpp.hpp>
 #include <sensor_msgs/msg/joint_state.hpp>
 
+#include "expect.hpp"
 #include "recording.hpp"
 #include "tautscope_control/control_loop.hpp"
 
@@ -56,16 +57,6 @@ using hardware_interface::LoanedCommandInterface;
 using hardware_interface::LoanedStateInterface;
 using hardware_interface::StateInterface;
 using lifecycle_msgs::msg::State;
-
-int failures = 0;
-
-#define EXPECT(condition)                                                                                              \
-    do {                                                                                                               \
-        if (!(condition)) {                                                                                            \
-            std::printf("line %d: %s\n", __LINE__, #condition);                                                        \
-            ++failures;                                                                                                \
-        }                                                                                                              \
-    } while (false)
 
 constexpr std::array<const char *, 3> joints{"insertion", "rotation", "bending"};
 constexpr tautscope::Vector start{25e-3, 0.0, 0.9};

@@ -1,10 +1,7 @@
 /* 60 s of references and features from record.py through the control loop: the commands and estimates have the bits that they had
    in Python, and nothing is allocated. */
 
-#include <algorithm>
-#include <cmath>
 #include <cstdio>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -38,12 +35,6 @@ void apply(ControlLoop &control, int event) {
     default:
         break;
     }
-}
-
-TautscopeReport update(tautscope::Loop &loop, const ImageUpdate &image) {
-    const bool has_band = std::any_of(image.features.begin(), image.features.end(), [](double v) { return !std::isnan(v); });
-    return has_band ? loop.on_features(image.features, image.captured_at)
-                    : loop.on_features(std::nullopt, image.captured_at);
 }
 
 } // namespace

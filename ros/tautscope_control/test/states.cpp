@@ -8,19 +8,11 @@
 
 #include <tautscope_control/control_loop.hpp>
 
+#include "expect.hpp"
+
 using namespace tautscope_control;
 
 namespace {
-
-int failures = 0;
-
-#define EXPECT(condition)                                                                                              \
-    do {                                                                                                               \
-        if (!(condition)) {                                                                                            \
-            std::printf("line %d: %s\n", __LINE__, #condition);                                                        \
-            ++failures;                                                                                                \
-        }                                                                                                              \
-    } while (false)
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr Vector start{25e-3, 0.0, 0.9};

@@ -1,7 +1,10 @@
-"""The node, configured and activated; `state_command` enables it.
+"""The node of a package, configured and activated; `state_command` enables it.
 
-ros2 launch tautscope_node node.launch.py config:=/path/to/rig.toml
+ros2 launch tautscope_node node.launch.py config:=/path/to/config.toml
+ros2 launch tautscope_control node.launch.py config:=/path/to/config.toml
 """
+
+from pathlib import Path
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, EmitEvent, RegisterEventHandler
@@ -12,11 +15,14 @@ from launch_ros.event_handlers import OnStateTransition
 from launch_ros.events.lifecycle import ChangeState
 from lifecycle_msgs.msg import Transition
 
+PACKAGE = Path(__file__).parents[1].name
+"""The package with which this file is installed, as share/PACKAGE/launch/node.launch.py."""
+
 
 def generate_launch_description() -> LaunchDescription:
     """One lifecycle node in the namespace of the instrument."""
     node = LifecycleNode(
-        package="tautscope_node",
+        package=PACKAGE,
         executable="instrument_node",
         name="tautscope",
         namespace=LaunchConfiguration("namespace"),
@@ -37,7 +43,11 @@ def generate_launch_description() -> LaunchDescription:
 
     return LaunchDescription(
         [
-            DeclareLaunchArgument("config", description="Configuration file"),
+            DeclareLaunchArgument(
+                "config",
+                description="Configuration; of tautscope_control with every key, as "
+                "`tautscope config` prints it",
+            ),
             DeclareLaunchArgument("namespace", default_value="instrument"),
             DeclareLaunchArgument("image_topic", default_value="/endoscope/image_raw"),
             RegisterEventHandler(

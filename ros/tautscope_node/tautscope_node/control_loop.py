@@ -1,4 +1,4 @@
-"""The loop with operating states and detection in the background; it knows no ROS."""
+"""The loop with operating states and detection in the background, without ROS."""
 
 from __future__ import annotations
 

@@ -11,17 +11,16 @@ from typing import Any
 import rclpy
 from crtk_msgs.msg import OperatingState as OperatingStateMessage
 from crtk_msgs.msg import StringStamped
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.executors import MultiThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from rclpy.time import Time
 from sensor_msgs.msg import CameraInfo, Image, JointState
-from std_msgs.msg import Float64MultiArray, MultiArrayDimension, String
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 from tautscope import Frame, load_config
 from tautscope.errors import ConfigError
 from tautscope.loop.safety import Reaction
@@ -36,14 +35,11 @@ from tautscope_node.messages import (
     pixels,
     positions,
 )
+from tautscope_node.status import REPORT_PERIOD, StatusPublisher
 
-REPORT_PERIOD = 0.1
-"""Of state, warnings and diagnostics [s]."""
-REPORTS_PER_SECOND = 10
 MEASURED_TIMEOUT = 0.2
 """Without a used image for this long, `measured_js` is invalid [s]."""
 LATEST = QoSProfile(depth=1)
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 COMMANDS = QoSProfile(depth=10)
 SENSOR = QoSProfile(
     depth=1, history=HistoryPolicy.KEEP_LAST, reliability=ReliabilityPolicy.BEST_EFFORT
@@ -90,10 +86,9 @@ class InstrumentNode(LifecycleNode):
         self._origin = self.get_clock().now().nanoseconds
         self._frame_id = self.get_parameter("frame_id").value
         self._newest: Frame | None = None
-        self._sequence = self._reports = 0
+        self._sequence = 0
         self._arrived = self._replaced = self._used = 0
         self._measured_at = -1.0
-        self._warned: tuple[Any, ...] = ()
         self._problem = ""
         self._create_topics()
         return TransitionCallbackReturn.SUCCESS
@@ -136,7 +131,7 @@ class InstrumentNode(LifecycleNode):
             self._stop_drives()
             self._control.disable()
             self._last_state = OperatingState.DISABLED
-            self._publish_state()
+            self._status_publisher.publish_state(self._control)
 
     def _create_topics(self) -> None:
         publish, subscribe = self._publisher, self._subscribe
@@ -145,9 +140,7 @@ class InstrumentNode(LifecycleNode):
         self._actuators_command = publish(StringStamped, "actuators/state_command", COMMANDS)
         self._measured = publish(JointState, "measured_js", LATEST)
         self._delta = publish(Float64MultiArray, "hysteresis/delta", LATEST)
-        self._operating_state = publish(OperatingStateMessage, "operating_state", LATCHED)
-        self._warning = publish(String, "warning", LATCHED)
-        self._diagnostics = publish(DiagnosticArray, "/diagnostics", LATEST)
+        self._status_publisher = StatusPublisher(self, publish, self._frame_id)
         subscribe(JointState, "servo_jp", self._on_reference, LATEST)
         subscribe(StringStamped, "state_command", self._on_state_command, COMMANDS)
         subscribe(JointState, "actuators/measured_js", self._on_measured, LATEST)
@@ -157,7 +150,8 @@ class InstrumentNode(LifecycleNode):
         images = self.get_parameter("image_topic").value
         group = MutuallyExclusiveCallbackGroup()
         subscribe(Image, images, self._on_image, SENSOR, callback_group=group)
-        self._publish_state()
+        assert self._control is not None
+        self._status_publisher.publish_state(self._control)
 
     def _publisher(self, kind: Any, topic: str, qos: QoSProfile) -> Any:
         # Not those of the lifecycle: the state is published also while the node is not active.
@@ -275,65 +269,20 @@ class InstrumentNode(LifecycleNode):
         self._actuators_command.publish(command)
 
     def _report(self) -> None:
-        """State, warnings and diagnostics."""
         control = self._control
         if control is None:
             return
-        supervision = control.supervision
         if control.state is OperatingState.FAULT:
             # A message may be lost, and a drive may begin to listen later.
             self._stop_drives()
-        flags = tuple(dict.fromkeys((*supervision.flags, *supervision.latched)))
-        warned = (supervision.flags, supervision.latched, control.is_misplaced)
-        has_warning = bool(flags) or control.is_misplaced
-        text = f"{supervision.reaction}: {', '.join(flags)}"
-        if control.is_misplaced:
-            text = "the drives are not where the last command was: clean up and configure again"
-        if has_warning and warned != self._warned:
-            self._warning.publish(String(data=text))
-            self.get_logger().warning(text)
-        self._warned = warned
-        if control.state != self._reported_state or self._reports % REPORTS_PER_SECOND == 0:
-            self._publish_state()
-            self._diagnose(text if has_warning else self._problem or str(control.state))
-        if self._now() - self._measured_at > MEASURED_TIMEOUT:
-            self._measured.publish(self._joint_state([0.0] * 3, Time().to_msg()))
-        self._reports += 1
-
-    def _publish_state(self) -> None:
-        assert self._control is not None
-        message = OperatingStateMessage(state=str(self._control.state), is_homed=True)
-        message.header.stamp = self.get_clock().now().to_msg()
-        self._operating_state.publish(message)
-        self._reported_state = self._control.state
-
-    def _diagnose(self, text: str) -> None:
-        assert self._control is not None
-        supervision = self._control.supervision
-        level = DiagnosticStatus.OK
-        if supervision.reaction.rank >= Reaction.HOLD_MOTION.rank or self._control.is_misplaced:
-            level = DiagnosticStatus.ERROR
-        elif supervision.flags or supervision.latched or self._problem:
-            level = DiagnosticStatus.WARN
-        values = {
-            "operating_state": self._control.state,
-            "reaction": supervision.reaction,
-            "flags": ", ".join(supervision.flags),
-            "latched": ", ".join(supervision.latched),
+        counts = {
             "images arrived": self._arrived,
             "images replaced by newer ones": self._replaced,
             "images used": self._used,
         }
-        status = DiagnosticStatus(
-            level=level,
-            name=f"{self.get_fully_qualified_name()}: hysteresis reduction",
-            hardware_id=self._frame_id,
-            message=text,
-            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
-        )
-        message = DiagnosticArray(status=[status])
-        message.header.stamp = self.get_clock().now().to_msg()
-        self._diagnostics.publish(message)
+        self._status_publisher.update(control, self._problem, counts)
+        if self._now() - self._measured_at > MEASURED_TIMEOUT:
+            self._measured.publish(self._joint_state([0.0] * 3, Time().to_msg()))
 
     def _on_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
         for parameter in parameters:

@@ -39,9 +39,9 @@ fn start_with_recovery(play: Play) -> (Compensator, CompensatorState) {
     (compensator.with_recovery(0.1).unwrap(), state)
 }
 
-/// The output of a true play behind a compensator that believes in another.
-fn tip_behind(compensator: &Compensator, believed: Play, truth: Play, travel: &[f64]) -> Vec<f64> {
-    let mut state = CompensatorState::new(believed);
+/// The output of a true play behind a compensator with an estimate of it.
+fn tip_behind(compensator: &Compensator, estimated: Play, truth: Play, travel: &[f64]) -> Vec<f64> {
+    let mut state = CompensatorState::new(estimated);
     let mut tip = PlayState { output: 0.0 };
     travel
         .iter()
@@ -59,7 +59,7 @@ proptest! {
         let (mut compensator, mut state) = start(5.0, play);
         let mut reference = first;
         prop_assert_eq!(compensator.step(&mut state, reference), reference);
-        let (mut believed, mut position) = (play, state.position());
+        let (mut estimated, mut position) = (play, state.position());
         for event in events {
             let before = state.command();
             match event {
@@ -69,7 +69,7 @@ proptest! {
                     let moved = compensator.step(&mut state, reference) - before;
                     let asked = reference - last;
                     let scale = before.abs().max(state.command().abs()).max(asked.abs());
-                    position = believed.clamp(position + moved);
+                    position = estimated.clamp(position + moved);
                     prop_assert!(close(state.position(), position));
                     prop_assert!(moved * asked >= 0.0);
                     prop_assert!(moved.abs() <= 5.0 * asked.abs() + 4.0 * f64::EPSILON * scale);
@@ -77,14 +77,14 @@ proptest! {
                 }
                 Event::Hold => { compensator.step(&mut state, reference); }
                 Event::Offsets(other) => {
-                    believed = other;
-                    position = believed.clamp(position);
-                    compensator.retune(&mut state, believed);
+                    estimated = other;
+                    position = estimated.clamp(position);
+                    compensator.retune(&mut state, estimated);
                 }
                 Event::Gain(gain, recovery) => {
                     compensator = Compensator::new(gain, 5.0).unwrap();
                     compensator = compensator.with_recovery(recovery).unwrap();
-                    compensator.retune(&mut state, believed);
+                    compensator.retune(&mut state, estimated);
                 }
                 Event::Spoil(bad) => { compensator.step(&mut state, bad); }
             }
@@ -133,13 +133,13 @@ proptest! {
     fn overestimated_width_overshoots_by_the_formula(
         gain in 1.0..5.0_f64, true_width in 0.0..3.0_f64, estimated_width in 0.0..3.0_f64
     ) {
-        let believed = Play::new(-estimated_width, 0.0).unwrap();
+        let estimated = Play::new(-estimated_width, 0.0).unwrap();
         let truth = Play::new(-true_width, 0.0).unwrap();
         let compensator = Compensator::new(gain, 5.0).unwrap();
         let back = path(&[1.0, -4.0], 5000);
         let mut travel = vec![0.0];
         travel.extend(&back);
-        let tip = tip_behind(&compensator, believed, truth, &travel);
+        let tip = tip_behind(&compensator, estimated, truth, &travel);
         let turned_at = tip[1];
         let overshoot = back.iter().zip(&tip[1..])
             .map(|(reference, tip)| (turned_at - tip) - (1.0 - reference))
@@ -188,7 +188,7 @@ fn noise_of_the_offsets_does_not_accumulate_in_the_command() {
     }
 }
 
-/// Eq. (2) to the letter: whatever was learnt before, K is 1 in contact.
+/// Eq. (2) to the letter: whatever was estimated before, K is 1 in contact.
 #[test]
 fn without_recovery_the_gain_in_contact_is_one() {
     let (compensator, mut state) = start(5.0, Play::new(-2.0, 2.0).unwrap());

@@ -62,10 +62,10 @@ proptest! {
         prop_assert!(close_plays(state.play(), truth, 1e-6), "{:?} {truth:?}", state.play());
     }
 
-    /// Steady contact, looked at more or less often: what counts is the distance travelled.
+    /// In steady contact the estimate depends on the distance travelled, not on the number of updates.
     #[test]
     fn estimate_does_not_depend_on_the_sample_rate(offset in 0.5..2.0, every in 1_u32..20) {
-        let learn = |stride: f64, updates: u32| {
+        let estimate = |stride: f64, updates: u32| {
             let mut state = unknown();
             for update in 0..=updates {
                 let command = f64::from(update) * stride;
@@ -73,8 +73,8 @@ proptest! {
             }
             state.play().delta_plus()
         };
-        let often = learn(1.000_001 * DISTANCE, 20 * every);
-        let seldom = learn(f64::from(every) * 1.000_001 * DISTANCE, 20);
+        let often = estimate(1.000_001 * DISTANCE, 20 * every);
+        let seldom = estimate(f64::from(every) * 1.000_001 * DISTANCE, 20);
         prop_assert!((often - seldom).abs() <= 1e-9, "{} {}", often, seldom);
     }
 

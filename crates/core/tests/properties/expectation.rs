@@ -1,4 +1,4 @@
-//! What is expected of an image: where a belief has the bands, and how sure that is.
+//! Prediction of the bands in an image from a state prediction, with its covariance.
 
 use crate::estimation::expectation::Beliefs;
 use crate::model::camera::{Camera, Pose};

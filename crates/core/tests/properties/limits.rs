@@ -1,4 +1,4 @@
-//! The most slack that is believed.
+//! Limits of the estimated slack.
 
 use crate::article::estimator::EstimatorState;
 use crate::article::play::Play;

@@ -7,6 +7,7 @@ mod camera;
 mod command_limiter;
 mod compensator;
 mod convergence;
+mod discarded_motion;
 mod ensemble;
 mod estimates;
 mod estimator;
@@ -17,9 +18,9 @@ mod frames;
 mod guarantees;
 mod history;
 mod hysteresis;
+mod image_updates;
 mod input_device;
 mod instrument;
-mod learning;
 mod limits;
 mod linear;
 mod marker_measurement;
@@ -39,7 +40,6 @@ mod supervised_law;
 mod supervisor;
 #[path = "../support/mod.rs"]
 mod support;
-mod thrown_away;
 mod whole;
 
 use crate::article::play::Play;

@@ -52,14 +52,14 @@ fn check_coupled(moved: PerDof<f64>, pulled: PerDof<f64>, place: &str) {
     );
 }
 
-/// A hand that moves, rests, trembles and jumps, ticks that come late, images of every kind, an operator who goes on:
-/// every command keeps the law.
+/// Motion, rest, tremor and jumps of the reference, late ticks, images of every kind, and an operator who re-engages: every
+/// command keeps the law.
 fn stress<P: Profile>(mut reduction: Loop<P>, seed: u64, steps: u64) {
     let mut chance = Chance(seed);
     let truth = model();
     let (mut reference, mut speed, mut time) = ([0.025, 0.0, 0.9], [0.0; 3], 0.0);
     let mut command = reduction.step(reference, None, time);
-    let (mut learnt, mut worst) = (0_u64, Reaction::None);
+    let (mut updates, mut worst) = (0_u64, Reaction::None);
     for tick in 0..steps {
         let mut next = reference;
         for ((next, speed), unit) in next.iter_mut().zip(&mut speed).zip(UNITS) {
@@ -145,7 +145,7 @@ fn stress<P: Profile>(mut reduction: Loop<P>, seed: u64, steps: u64) {
             });
             let report =
                 reduction.on_features(measured, None, time - 0.05 * chance.share().abs(), None);
-            learnt += u64::from(report.status == Status::Ok);
+            updates += u64::from(report.status == Status::Ok);
             worst = worst.max(report.supervision.reaction);
             for (play, unit) in report.play.iter().zip(UNITS) {
                 assert!(
@@ -155,7 +155,7 @@ fn stress<P: Profile>(mut reduction: Loop<P>, seed: u64, steps: u64) {
             }
         }
     }
-    assert!(learnt > 100, "images were used: {learnt}");
+    assert!(updates > 100, "images were used: {updates}");
     assert_eq!(worst, Reaction::QuickStop, "every kind of trouble came");
 }
 

@@ -1,4 +1,4 @@
-//! A tip against its reference, stroke by stroke: when it has outrun it, and when both have swung up.
+//! Tip and reference between their turning points: overcompensation, and limit cycles.
 
 use crate::article::play::Play;
 use crate::supervision::flags::{Flag, Flags};
@@ -180,9 +180,9 @@ fn any_dof_may_tremble() {
         let mut watch = MotionMonitor::new(&safety(), &dofs(), PERIOD).unwrap();
         let mut all = Flags::NONE;
         for tick in 0..1000_u32 {
-            let mut hand = [0.0; 3];
-            hand[dof] = UNITS[dof] * if tick % 20 < 10 { 1.0 } else { -1.0 };
-            all = all.union(watch.update_reference(hand));
+            let mut reference = [0.0; 3];
+            reference[dof] = UNITS[dof] * if tick % 20 < 10 { 1.0 } else { -1.0 };
+            all = all.union(watch.update_reference(reference));
         }
         assert_eq!(all, Flags::of(Flag::Tremor), "{dof}");
     }

@@ -1,4 +1,4 @@
-//! The monitors in the loop: that they change nothing, and that each is asked.
+//! The monitors in the loop: without a flag they change nothing, and each is called.
 
 use crate::article::compensator::{Compensator, CompensatorState};
 use crate::article::play::Play;
@@ -46,8 +46,8 @@ fn a_start_beyond_the_travel_begins_at_its_end() {
         let mut last = command;
         for tick in 1..=400_u32 {
             let time = f64::from(tick) * PERIOD;
-            let hand = 210.0 - 0.1 * f64::from(tick);
-            let [command, ..] = reduction.step([hand * unit, 0.0, 0.0], None, time);
+            let reference = 210.0 - 0.1 * f64::from(tick);
+            let [command, ..] = reduction.step([reference * unit, 0.0, 0.0], None, time);
             assert!(command < last, "tick {tick}: {command} after {last}");
             last = command;
         }
@@ -61,8 +61,8 @@ fn the_end_of_the_travel_is_neither_a_jump_nor_a_violation() {
     let mut reduction = article(|_| Play::new(0.0, 0.0).unwrap());
     for tick in 0..3000_u32 {
         let time = f64::from(tick) * PERIOD;
-        let hand = 230.0 * (0.4 * time).sin().max(0.0) * UNITS[0];
-        reduction.step([hand, 0.0, 0.0], None, time);
+        let reference = 230.0 * (0.4 * time).sin().max(0.0) * UNITS[0];
+        reduction.step([reference, 0.0, 0.0], None, time);
         let supervision = reduction.supervision();
         assert!(supervision.reaction < Reaction::HoldMotion, "tick {tick}");
     }
@@ -77,8 +77,8 @@ fn tremor_is_flagged_unless_its_detector_is_off() {
         let mut reduction = article_with(&settings, 0.0, |_| Play::new(0.0, 0.0).unwrap());
         for tick in 0..1000_u32 {
             let time = f64::from(tick) * PERIOD;
-            let hand = UNITS[0] * (40.0 * time).sin();
-            reduction.step([hand, 0.0, 0.0], None, time);
+            let reference = UNITS[0] * (40.0 * time).sin();
+            reduction.step([reference, 0.0, 0.0], None, time);
         }
         let latched = reduction.supervision().latched;
         assert_eq!(latched, Flags::of(Flag::Tremor).difference(off));

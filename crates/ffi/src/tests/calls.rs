@@ -8,18 +8,17 @@ use TautscopePixelFormat::{Bgr, Bgra, I420, Nv12, Rgb, Uyvy, Yuyv};
 use tautscope_core as core;
 use tautscope_vision::PixelFormat;
 
+use crate::conversions::bits;
 use crate::detector::{TautscopeDetector, tautscope_detector_create, tautscope_detector_destroy};
+use crate::names::{tautscope_flag_name, tautscope_reaction_name, tautscope_version};
 use crate::reduction::{
-    TautscopeLoop, tautscope_loop_create, tautscope_loop_destroy, tautscope_loop_engage,
-    tautscope_loop_step,
+    TautscopeLoop, tautscope_loop_create, tautscope_loop_destroy, tautscope_loop_step,
 };
 use crate::result::{
     Handle, TautscopeResult, failed, guarded, tautscope_error_message, with_handle,
 };
-use crate::types::{
-    TautscopeFlag, TautscopePixelFormat, TautscopeReport, bits, tautscope_flag_name,
-    tautscope_reaction_name, tautscope_version,
-};
+use crate::supervision::tautscope_loop_engage;
+use crate::types::{TautscopeFlag, TautscopePixelFormat, TautscopeReport};
 
 fn text(pointer: *const std::ffi::c_char) -> &'static str {
     // SAFETY: a text of the library, which ends with a zero.

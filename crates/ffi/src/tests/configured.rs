@@ -11,12 +11,12 @@ use std::path::Path;
 use std::ptr::null_mut;
 
 use crate::document::detector_settings;
-use crate::reduction::{
-    tautscope_loop_create, tautscope_loop_destroy, tautscope_loop_engage,
-    tautscope_loop_on_features, tautscope_loop_predict_state, tautscope_loop_raise_flag,
-    tautscope_loop_step, tautscope_loop_supervision,
-};
+use crate::image_update::{tautscope_loop_on_features, tautscope_loop_predict_state};
+use crate::reduction::{tautscope_loop_create, tautscope_loop_destroy, tautscope_loop_step};
 use crate::result::TautscopeResult;
+use crate::supervision::{
+    tautscope_loop_engage, tautscope_loop_raise_flag, tautscope_loop_supervision,
+};
 use crate::types::{
     TautscopeFlag, TautscopeReaction, TautscopeReport, TautscopeStatePrediction,
     TautscopeSupervision,

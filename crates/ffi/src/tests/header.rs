@@ -9,7 +9,16 @@ fn header_is_generated_from_these_sources() {
     let config = cbindgen::Config::from_file(folder.join("cbindgen.toml")).unwrap();
     let mut builder = cbindgen::Builder::new().with_config(config);
     // By file: `cargo metadata` would be run for the crate.
-    for file in ["types", "result", "reduction", "detector"] {
+    // In the order of the header.
+    for file in [
+        "types",
+        "names",
+        "result",
+        "reduction",
+        "image_update",
+        "supervision",
+        "detector",
+    ] {
         builder = builder.with_src(folder.join(format!("src/{file}.rs")));
     }
     let mut header = Vec::new();

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope.calibration.geometry.sweep import OF_IMAGES
 from tautscope.calibration.images import to_bgr
+from tautscope.calibration.rig_motion import move_rig
 from tautscope.config import Config
 from tautscope.dof import Dof
-from tautscope.errors import CameraError, MotionHeldError, SignalError
-from tautscope.loop.reduction import HysteresisReduction
+from tautscope.errors import CameraError
 from tautscope.loop.rig import Rig
-from tautscope.loop.safety import Reaction
 
 Floats = NDArray[np.float64]
 Image = NDArray[np.uint8]
@@ -28,7 +27,6 @@ _SHARE = (1.0, 0.0, 0.6)
 """Amplitude relative to that of the experiment."""
 _TURNS = (1, 1, 2)
 """Periods in the motion."""
-_HELD_TIME = 1.0
 
 
 @dataclass(frozen=True)
@@ -51,12 +49,12 @@ def record_motion(
 ) -> ImageSequence:
     """Move insertion and bending in sines within the range of the experiment, and keep images.
 
-    Gate and limits of the loop supervise the motion; images are not evaluated.
+    The motion is supervised as `move_rig` describes; images are not evaluated.
 
     Args:
         rig: It is reset first; the caller closes it.
         config: Configuration of the rig.
-        progress: Called with the share of the motion done.
+        progress: Called with the share of the motion done, 0 to 1, once per second.
 
     Raises:
         CameraError: No image arrived.
@@ -64,30 +62,15 @@ def record_motion(
         SignalError: The rig's clock does not advance.
         TautscopeError: Errors of the rig.
     """
-    off = tuple(dict.fromkeys([*config.safety.off, *OF_IMAGES]))
-    loop = HysteresisReduction(config.replace(**{"safety.off": off}), compensate=False)
     ticks: list[tuple[float, Floats]] = []
     frames: list[tuple[float, Image]] = []
-    sample = rig.reset()
-    start, held, due = sample.time, 0, 0.0
-    while (elapsed := sample.time - start) < DURATION:
-        command = loop.step(_reference(config, elapsed), time=sample.time)
+    due = 0.0
+    for sample in move_rig(rig, config, partial(_reference, config), DURATION, progress):
         ticks.append((sample.time, np.array(sample.applied, np.float64)))
-        if sample.frame is not None:
-            loop.on_features(None, sample.time)
-            if elapsed >= due:
-                image = to_bgr(sample.frame.image, config.camera.pixel_format).copy()
-                frames.append((sample.frame.captured_at, image))
-                due += DURATION / IMAGES
-        held = held + 1 if loop.supervision.reaction.rank >= Reaction.HOLD_MOTION.rank else 0
-        if held * rig.control_period > _HELD_TIME:
-            now = loop.supervision
-            raise MotionHeldError(sample.time, str(now.reaction), now.flags)
-        before, sample = sample, rig.step(command)
-        if not sample.time > before.time:
-            raise SignalError("sample.time", sample.time, f"later than the last, {before.time}")
-        if progress is not None:
-            progress(min((sample.time - start) / DURATION, 1.0))
+        if sample.frame is not None and sample.time - ticks[0][0] >= due:
+            image = to_bgr(sample.frame.image, config.camera.pixel_format).copy()
+            frames.append((sample.frame.captured_at, image))
+            due += DURATION / IMAGES
     if not frames:
         raise CameraError("camera.source", f"no image in {DURATION:g} s", "images")
     at, applied = (np.array(column) for column in zip(*ticks, strict=True))

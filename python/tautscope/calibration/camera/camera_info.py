@@ -53,7 +53,7 @@ def read_camera_info(path: Path) -> Intrinsics:
     if not path.is_file():
         raise MissingPathError("camera_info", str(path), "a ROS camera_info file (YAML)")
     text = path.read_text(encoding="utf-8", errors="replace")
-    # OpenCV's parser wants its own first line.
+    # OpenCV's parser needs its own first line.
     body = re.sub(r"\A(%YAML[^\n]*\n)?(---[^\n]*\n)?", "", text)
     try:
         storage = cv2.FileStorage(

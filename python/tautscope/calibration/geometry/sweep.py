@@ -9,33 +9,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from tautscope.calibration.geometry.recording import Floats, Recorder, Recording
+from tautscope.calibration.rig_motion import move_rig
 from tautscope.config import Config
 from tautscope.dof import Dof
-from tautscope.errors import MotionHeldError, SignalError
-from tautscope.loop.reduction import HysteresisReduction
 from tautscope.loop.rig import Frame, Rig
-from tautscope.loop.safety import Reaction
 
 DURATION = 60.0
 """Duration of the motion [s]."""
 _PERIODS = (5.0, 6.1, 4.1)
 _SPEED_SHARE = 0.5
 _GROWTH_TIME = 2.0
-_HELD_TIME = 1.0
-OF_IMAGES = (
-    "frozen",
-    "late",
-    "duplicate",
-    "innovation",
-    "swapped",
-    "merged",
-    "lost",
-    "unobservable",
-    "overcompensation",
-    "slack_changed",
-    "geometry_off",
-    "width_limit",
-)
 
 
 @dataclass(frozen=True)
@@ -88,10 +71,7 @@ def sweep(
 ) -> Recording:
     """Move all degrees of freedom of a rig at once, and record motors and images.
 
-    The motion is within the range of `config.experiment`. Gate, limits of travel and speed,
-    monitors of tick and camera and the rig's own protections are those of an experiment. Images
-    update no estimate, and the detectors that compare images with the configured geometry are off,
-    because it is what is unknown: the command is the reference.
+    The motion is within the range of `config.experiment`, and supervised as `move_rig` describes.
 
     Args:
         rig: It is reset first; the caller closes it.
@@ -108,29 +88,13 @@ def sweep(
         FrameError: An image is not what the configured camera gives.
         TautscopeError: Errors of the rig.
     """
-    off = tuple(dict.fromkeys([*config.safety.off, *OF_IMAGES]))
-    loop = HysteresisReduction(config.replace(**{"safety.off": off}), compensate=False)
     reference = SweepReference(config, duration)
     recorder = Recorder(config)
     images = _ImageQueue(recorder, executor)
-    sample = rig.reset()
-    start, held = sample.time, 0
-    while (elapsed := sample.time - start) < duration:
-        command = loop.step(reference(elapsed), time=sample.time)
+    for sample in move_rig(rig, config, reference, duration, progress):
         recorder.add_tick(sample.time, sample.applied)
         if sample.frame is not None:
             images.add(sample.frame)
-            # Only its arrival counts: its stamp may be wrong by the delay that is to be found.
-            loop.on_features(None, sample.time)
-        held = held + 1 if loop.supervision.reaction.rank >= Reaction.HOLD_MOTION.rank else 0
-        if held * rig.control_period > _HELD_TIME:
-            now = loop.supervision
-            raise MotionHeldError(sample.time, str(now.reaction), now.flags)
-        before, sample = sample, rig.step(command)
-        if not sample.time > before.time:
-            raise SignalError("sample.time", sample.time, f"later than the last, {before.time}")
-        if progress is not None and int(sample.time - start) > int(elapsed):
-            progress(min((sample.time - start) / duration, 1.0))
     images.finish()
     return recorder.recording()
 

@@ -1,4 +1,4 @@
-/* The loop with operating states, requests of other threads, and detection in a thread of its own. It knows no ROS. */
+/* The loop with operating states, requests of other threads, and detection in a thread of its own, without ROS. */
 
 #ifndef TAUTSCOPE_CONTROL__CONTROL_LOOP_HPP_
 #define TAUTSCOPE_CONTROL__CONTROL_LOOP_HPP_

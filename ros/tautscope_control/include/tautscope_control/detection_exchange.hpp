@@ -17,7 +17,7 @@ namespace tautscope_control {
 /// control thread                serve                                     serve
 /// ```
 ///
-/// `phase_` says whose turn it is; everything else belongs to that thread, so that neither ever waits for the other.
+/// `phase_` is the thread whose turn it is; only that thread uses the rest, so that neither ever waits for the other.
 class DetectionExchange {
 public:
     /// Detection thread: asks for the prediction at a capture time [s]. Returns false while another image is under way.

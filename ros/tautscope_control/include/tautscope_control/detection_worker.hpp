@@ -1,4 +1,4 @@
-/* Detection of the newest image in a thread of its own. It knows no ROS. */
+/* Detection of the newest image in a thread of its own, without ROS. */
 
 #ifndef TAUTSCOPE_CONTROL__DETECTION_WORKER_HPP_
 #define TAUTSCOPE_CONTROL__DETECTION_WORKER_HPP_

@@ -53,22 +53,22 @@ impl<P: Profile> Run<P> {
     }
 
     /// Of the insertion, in its unit.
-    fn believed(&self) -> (f64, f64) {
+    fn estimated(&self) -> (f64, f64) {
         let [play, ..] = self.reduction.play();
         (play.delta_minus() / UNITS[0], play.delta_plus() / UNITS[0])
     }
 }
 
 /// With each offset within `tolerance` units.
-fn learns_and_is_held<P: Profile>(reduction: Loop<P>, tolerance: f64) {
+fn is_estimated_and_held<P: Profile>(reduction: Loop<P>, tolerance: f64) {
     let mut run = Run::new(reduction, -6.0, 9.0);
     run.swing(4);
-    let (minus, plus) = run.believed();
+    let (minus, plus) = run.estimated();
     assert!(
         (minus + 6.0).abs() < tolerance && (plus - 9.0).abs() < tolerance,
         "{minus} {plus}"
     );
-    let before = run.believed();
+    let before = run.estimated();
     run.slack = Play::new(-3.0 * UNITS[0], 3.0 * UNITS[0]).unwrap();
     for _ in 0..400 {
         run.reduction.raise(Flag::Frozen);
@@ -76,7 +76,7 @@ fn learns_and_is_held<P: Profile>(reduction: Loop<P>, tolerance: f64) {
         let reaction = run.reduction.supervision().reaction;
         assert_eq!(reaction, Reaction::HoldEstimate);
     }
-    let after = run.believed();
+    let after = run.estimated();
     // The offsets of profile `best` may depend on the position.
     let widened = (after.1 - after.0) - (before.1 - before.0);
     assert!(widened.abs() < 0.5, "{before:?} {after:?}");
@@ -84,12 +84,12 @@ fn learns_and_is_held<P: Profile>(reduction: Loop<P>, tolerance: f64) {
 
 #[test]
 fn measurements_update_profile_paper_unless_the_estimate_is_held() {
-    learns_and_is_held(article(|_| Play::new(0.0, 0.0).unwrap()), 1.0);
+    is_estimated_and_held(article(|_| Play::new(0.0, 0.0).unwrap()), 1.0);
 }
 
 #[test]
 fn measurements_update_profile_best_unless_the_estimate_is_held() {
-    learns_and_is_held(adaptive(), 2.5);
+    is_estimated_and_held(adaptive(), 2.5);
 }
 
 #[test]
@@ -100,7 +100,7 @@ fn the_estimated_slack_stays_within_its_limits() {
     let mut widest = 0.0_f64;
     for _ in 0..6 * 1600 {
         run.tick();
-        let (minus, plus) = run.believed();
+        let (minus, plus) = run.estimated();
         widest = widest.max(plus - minus);
     }
     assert!((28.0..=30.0 + 1e-9).contains(&widest), "{widest}");
@@ -111,18 +111,18 @@ fn the_estimated_slack_stays_within_its_limits() {
 #[test]
 fn a_hold_ends_after_reference_travel_counted_in_widths() {
     let mut reduction = article(|_| Play::new(0.0, 0.0).unwrap());
-    let mut hand = CENTRES;
-    reduction.step(hand, None, 0.0);
+    let mut reference = CENTRES;
+    reduction.step(reference, None, 0.0);
     // Four widths of 12 mm end it, and 2 s do not.
     for tick in 1..=400_u32 {
         let gone = f64::from(tick) * 0.15e-3 / 12e-3;
-        hand[0] += if (tick / 100).is_multiple_of(2) {
+        reference[0] += if (tick / 100).is_multiple_of(2) {
             0.15e-3
         } else {
             -0.15e-3
         };
         reduction.raise(Flag::Frozen);
-        reduction.step(hand, None, f64::from(tick) * PERIOD);
+        reduction.step(reference, None, f64::from(tick) * PERIOD);
         let reaction = reduction.supervision().reaction;
         if gone < 3.9 {
             assert_eq!(reaction, Reaction::HoldEstimate, "after {gone} widths");

@@ -7,7 +7,7 @@ use crate::supervision::flags::Flag;
 use super::support::loops::{Loop, article_with};
 use super::support::{PERIOD, UNITS, safety};
 
-/// A loop that knows its slack, and the tip; in [`UNITS`] of the insertion.
+/// A loop with the true slack, and the tip; in [`UNITS`] of the insertion.
 struct Run {
     reduction: Loop<Paper>,
     input: f64,

@@ -1,0 +1,289 @@
+//! The vector law, by itself and within supervision: gain, rest, speed.
+
+use crate::adaptive::vector_law::VectorLaw;
+use crate::article::play::Play;
+use crate::article::play_limit::PlayLimit;
+use crate::dof::PerDof;
+use crate::estimation::ensemble::ScalarMeasurement;
+use crate::estimation::filter::Filter;
+use crate::supervision::flags::Flag;
+use crate::supervision::monitors::{Law, Monitors};
+
+use super::super::support::{PERIOD, UNITS, dofs, safety, settings};
+use super::{Count, LIMIT, Random, steps, walk};
+
+/// The vector law, with the bounds checked at every call.
+struct CheckedLaw {
+    law: VectorLaw,
+    filter: Filter,
+    reference: PerDof<f64>,
+    count: Count,
+}
+
+impl CheckedLaw {
+    fn new() -> Self {
+        let settings = settings(&safety());
+        let unit = settings.safety.width_limit.map(|width| width / 2.0);
+        let limits = [0, 1, 2].map(|dof| {
+            let safety = &settings.safety;
+            PlayLimit::new(safety.width_limit[dof], safety.offset_limit[dof]).unwrap()
+        });
+        let none = Play::new(0.0, 0.0).unwrap();
+        let start = dofs().map(|dof| dof.start_deviation);
+        let radius = settings.instrument.diameter / 2.0;
+        Self {
+            law: VectorLaw::new(
+                &settings.adaptive,
+                &dofs(),
+                &settings.control,
+                settings.safety.width_limit,
+                settings.safety.command_speed,
+                radius,
+                limits,
+            )
+            .unwrap(),
+            filter: Filter::new(settings.state_estimation, unit, start, [none; 3], radius).unwrap(),
+            reference: [f64::NAN; 3],
+            count: Count::default(),
+        }
+    }
+
+    /// An image with any measurement; the estimate changes as much as it can.
+    fn measure(&mut self, random: &mut Random) {
+        if !self.reference.iter().all(|value| value.is_finite()) {
+            return;
+        }
+        let now = (self.law.command(), self.reference);
+        self.filter.follow(core::iter::once(now));
+        let before = self.filter.nominal().hysteresis;
+        let dof = [0, 1, 2][usize::try_from(random.below(3)).unwrap()];
+        let std = UNITS[dof] * random.within(0.1, 3.0);
+        let tip = self.law.command()[dof] + UNITS[dof] * random.within(-30.0, 30.0);
+        let mut row = ScalarMeasurement {
+            output: [0.0; 3],
+            lag: [0.0; 3],
+            geometry: [0.0; 3],
+            value: tip / std,
+        };
+        row.output[dof] = 1.0 / std;
+        let mut seen = self.law.command();
+        seen[dof] = tip;
+        self.filter.update_with(&[row], seen, random.below(4) == 0);
+        let after = self.filter.nominal().hysteresis;
+        self.law.rate_limit_mut().update(
+            [before.half_width, before.centre],
+            [after.half_width, after.centre],
+        );
+        if random.below(50) == 0 {
+            self.filter.reset_position();
+        }
+    }
+
+    /// Bounds of a tick: of the norm over insertion and rotation, of bending to the last bit, and of each speed.
+    fn check(&mut self, reference: PerDof<f64>, before: PerDof<f64>) {
+        let (after, last) = (self.law.command(), self.reference);
+        if !reference
+            .iter()
+            .chain(&before)
+            .all(|value| value.is_finite())
+        {
+            if before.iter().all(|value| value.is_finite()) {
+                self.rest(before, after, &[0, 1, 2]);
+            }
+            return;
+        }
+        self.count.steps += 1;
+        let width = safety().width_limit;
+        let norm = |x: PerDof<f64>| (x[0] / width[0]).hypot(x[1] / width[1]);
+        let minus = |a: PerDof<f64>, b: PerDof<f64>| [0, 1, 2].map(|dof| a[dof] - b[dof]);
+        let (dc, du) = (minus(after, before), minus(reference, last));
+        if du[0] == 0.0 && du[1] == 0.0 {
+            self.rest(before, after, &[0, 1]);
+        }
+        let scale = [before, after, reference, last]
+            .into_iter()
+            .fold(f64::MIN_POSITIVE, |most, x| most.max(norm(x)));
+        let excess = (norm(dc) - LIMIT * norm(du)) / (f64::EPSILON * scale);
+        self.count.excess = self.count.excess.max(excess);
+        let farthest = before[2] + LIMIT * du[2];
+        let (low, high) = (before[2].min(farthest), before[2].max(farthest));
+        let limits = safety().command_speed.map(|speed| speed * PERIOD);
+        // A share of the compensation leaves the reference's own speed, which the gate limits.
+        let too_fast = [0, 1, 2]
+            .into_iter()
+            .any(|dof| dc[dof].abs() > limits[dof].max(du[dof].abs() * (1.0 + 1e-9)));
+        let within = excess <= 8.0 && (low..=high).contains(&after[2]) && !too_fast;
+        self.count.gain += u64::from(!within);
+        if du[2] == 0.0 {
+            self.rest(before, after, &[2]);
+        }
+    }
+
+    fn rest(&mut self, before: PerDof<f64>, after: PerDof<f64>, dofs: &[usize]) {
+        for dof in dofs {
+            self.count.event(before[*dof], after[*dof]);
+        }
+    }
+}
+
+impl Law for CheckedLaw {
+    fn command(&self) -> PerDof<f64> {
+        self.law.command()
+    }
+
+    fn step_within(
+        &mut self,
+        reference: PerDof<f64>,
+        limit: impl FnOnce(PerDof<f64>) -> PerDof<f64>,
+    ) {
+        let before = self.law.command();
+        self.law.step_within(reference, &mut self.filter, limit);
+        self.check(reference, before);
+        if reference.iter().all(|value| value.is_finite()) {
+            self.reference = reference;
+        }
+    }
+
+    fn shift_reference(&mut self, shift: PerDof<f64>) {
+        let before = self.law.command();
+        self.law.shift_reference(shift);
+        for (reference, shift) in self.reference.iter_mut().zip(shift) {
+            *reference += shift;
+        }
+        self.rest(before, self.law.command(), &[0, 1, 2]);
+    }
+
+    fn set_share(&mut self, share: f64) {
+        let before = self.law.command();
+        self.law.set_share(share);
+        self.rest(before, self.law.command(), &[0, 1, 2]);
+    }
+}
+
+/// Steps of one of the two tests, shared by the cores.
+fn on_each_core(walk: impl Fn(u64, u64) -> Count + Sync) -> Count {
+    let asked = std::env::var("TAUTSCOPE_STEPS").is_ok();
+    // Half for each of the two tests; without optimization a step takes 20 times as long.
+    let wanted = if asked || !cfg!(debug_assertions) {
+        steps() / 2
+    } else {
+        steps() / 20
+    };
+    let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get() as u64);
+    let mut count = Count::default();
+    std::thread::scope(|scope| {
+        let walk = &walk;
+        let parts: Vec<_> = (0..cores)
+            .map(|core| scope.spawn(move || walk(2026 + core, wanted.div_ceil(cores))))
+            .collect();
+        for part in parts {
+            count = count.with(&part.join().unwrap());
+        }
+    });
+    count
+}
+
+/// The next reference: each DOF mostly moves, and often rests.
+fn moved(random: &mut Random, reference: PerDof<f64>) -> PerDof<f64> {
+    let mut next = reference;
+    for (value, unit) in next.iter_mut().zip(UNITS) {
+        let place = walk(random, *value / (10.0 * unit));
+        if random.below(3) > 0 {
+            *value = place * 10.0 * unit;
+        }
+    }
+    next
+}
+
+/// By itself, with any estimate, share and shift; the law continues from what a limit leaves of a step.
+#[test]
+fn bounds_of_the_vector_law() {
+    on_each_core(vector_walk).report("best");
+}
+
+fn vector_walk(seed: u64, wanted: u64) -> Count {
+    let (mut random, mut checked) = (Random(seed), CheckedLaw::new());
+    checked.step_within([0.0; 3], |command| command);
+    while checked.count.steps < wanted {
+        let reference = checked.reference;
+        match random.below(400) {
+            0 | 1 => checked.measure(&mut random),
+            2 => checked.set_share([0.0, 1.0, 0.3][usize::try_from(random.below(3)).unwrap()]),
+            3 => checked.shift_reference(UNITS.map(|unit| unit * random.within(-1.0, 1.0))),
+            4 => checked.step_within([0.0, f64::NAN, 0.0], |command| command),
+            _ => {
+                let next = moved(&mut random, reference);
+                let part = if random.below(10) == 0 {
+                    random.within(0.0, 1.0)
+                } else {
+                    1.0
+                };
+                let before = checked.law.command();
+                checked.step_within(next, |command| {
+                    let mut limited = command;
+                    if part < 1.0 {
+                        for (limited, before) in limited.iter_mut().zip(before) {
+                            *limited = before + part * (*limited - before);
+                        }
+                    }
+                    limited
+                });
+            }
+        }
+    }
+    checked.count
+}
+
+/// Within supervision, through jumps, holds and fades: the bounds of the law, and |c - u| <= `width_limit`, but for the
+/// reference's motion of one tick.
+#[test]
+fn bounds_of_the_supervised_vector_law() {
+    on_each_core(supervised_walk).report("best");
+}
+
+fn supervised_walk(seed: u64, wanted: u64) -> Count {
+    let (mut random, mut checked) = (Random(seed), CheckedLaw::new());
+    let mut monitors = Monitors::new(&safety(), &dofs(), PERIOD, true).unwrap();
+    let (mut reference, mut time, mut ticks) = ([0.0; 3], 0.0, 0);
+    let mut led = [0.0_f64; 3];
+    let mut speed = [0.0; 3];
+    monitors.step(&mut checked, reference, None, time);
+    while checked.count.steps < wanted && ticks < 4 * wanted {
+        time += PERIOD;
+        ticks += 1;
+        match random.below(2000) {
+            0..10 => checked.measure(&mut random),
+            10 => monitors.raise(Flag::Frozen),
+            11 => monitors.raise(Flag::FollowingError),
+            12 => monitors.acknowledge(),
+            13..100 => monitors.engage(),
+            _ => {}
+        }
+        for (speed, unit) in speed.iter_mut().zip(UNITS) {
+            if random.below(100) == 0 {
+                *speed = if random.below(4) == 0 {
+                    0.0
+                } else {
+                    unit * random.within(-0.5, 0.5)
+                };
+            }
+        }
+        let mut next = reference;
+        for ((next, speed), unit) in next.iter_mut().zip(speed).zip(UNITS) {
+            *next = (*next + speed).clamp(-90.0 * unit, 190.0 * unit);
+            if random.below(20_000) == 0 {
+                *next += 40.0 * unit * random.within(-1.0, 1.0);
+            }
+        }
+        monitors.step(&mut checked, next, None, time);
+        reference = next;
+        for (dof, limit) in safety().width_limit.into_iter().enumerate() {
+            let lead = (checked.law.command()[dof] - checked.reference[dof]).abs();
+            // Motion that is discarded counts from where it was.
+            let discarded = UNITS[dof] * 1.001;
+            checked.count.gain += u64::from(lead > led[dof].max(limit) + discarded);
+            led[dof] = lead;
+        }
+    }
+    checked.count
+}

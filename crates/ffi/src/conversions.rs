@@ -1,0 +1,112 @@
+//! Results of the loop and of the detection as structures and enumerations of the header.
+
+use tautscope_core as core;
+use tautscope_vision as vision;
+
+use crate::types::{
+    TautscopeReaction, TautscopeRejection, TautscopeReport, TautscopeStatus, TautscopeSupervision,
+    TautscopeTrigger,
+};
+
+/// The bits of a set of flags.
+pub fn bits(flags: core::Flags) -> u32 {
+    let mut bits = 0;
+    for (index, flag) in core::Flag::ALL.iter().enumerate() {
+        bits |= u32::from(flags.contains(*flag)) << index;
+    }
+    bits
+}
+
+impl From<core::Status> for TautscopeStatus {
+    fn from(status: core::Status) -> Self {
+        match status {
+            core::Status::Ok => Self::Ok,
+            core::Status::Held => Self::Held,
+            core::Status::Partial => Self::Partial,
+            core::Status::NoMarkers => Self::NoMarkers,
+            core::Status::Stale => Self::Stale,
+            core::Status::Duplicate => Self::Duplicate,
+            core::Status::Refused => Self::Refused,
+        }
+    }
+}
+
+impl From<core::Reaction> for TautscopeReaction {
+    fn from(reaction: core::Reaction) -> Self {
+        match reaction {
+            core::Reaction::None => Self::None,
+            core::Reaction::Warn => Self::Warn,
+            core::Reaction::HoldEstimate => Self::HoldEstimate,
+            core::Reaction::Fade => Self::Fade,
+            core::Reaction::PassThrough => Self::PassThrough,
+            core::Reaction::HoldMotion => Self::HoldMotion,
+            core::Reaction::QuickStop => Self::QuickStop,
+            core::Reaction::Disable => Self::Disable,
+        }
+    }
+}
+
+impl From<Option<core::Trigger>> for TautscopeTrigger {
+    fn from(trigger: Option<core::Trigger>) -> Self {
+        match trigger {
+            None => Self::None,
+            Some(core::Trigger::Contact) => Self::Contact,
+            Some(core::Trigger::Violation) => Self::Violation,
+        }
+    }
+}
+
+impl From<Option<vision::Rejection>> for TautscopeRejection {
+    fn from(rejection: Option<vision::Rejection>) -> Self {
+        match rejection {
+            None => Self::None,
+            Some(vision::Rejection::NoRegion) => Self::NoRegion,
+            Some(vision::Rejection::NotPredicted) => Self::NotPredicted,
+            Some(vision::Rejection::Outside { .. }) => Self::Outside,
+            Some(vision::Rejection::Hidden { .. }) => Self::Hidden,
+            Some(vision::Rejection::Spill { .. }) => Self::Spill,
+            Some(vision::Rejection::MissingEdges { .. }) => Self::MissingEdges,
+            Some(vision::Rejection::NoInstrument) => Self::NoInstrument,
+            Some(vision::Rejection::Ambiguous) => Self::Ambiguous,
+            Some(vision::Rejection::Elsewhere { .. }) => Self::Elsewhere,
+        }
+    }
+}
+
+impl From<core::Supervision> for TautscopeSupervision {
+    fn from(now: core::Supervision) -> Self {
+        Self {
+            reaction: now.reaction.into(),
+            flags: bits(now.flags),
+            latched: bits(now.latched),
+            reserved: 0,
+            share: now.lead,
+        }
+    }
+}
+
+impl TautscopeReport {
+    /// The report of an image that was captured at a time in s.
+    pub fn new(report: &core::Report, captured_at: f64) -> Self {
+        Self {
+            // Checked against the caller's where it is written.
+            size: 0,
+            status: report.status.into(),
+            reaction: report.supervision.reaction.into(),
+            flags: bits(report.supervision.flags),
+            captured_at,
+            state_estimate: report.estimate.state,
+            predicted_state: report.predicted_state,
+            predicted_features: report.predicted_features,
+            innovation: report.estimate.innovation,
+            deviation: report.estimate.deviation,
+            state_deviation: report.state_deviation,
+            delta_minus: report.play.map(|play| play.delta_minus()),
+            delta_plus: report.play.map(|play| play.delta_plus()),
+            triggers_minus: report.triggers.map(|triggers| triggers.minus.into()),
+            triggers_plus: report.triggers.map(|triggers| triggers.plus.into()),
+            is_observable: report.estimate.observable.map(u32::from),
+            reserved: 0,
+        }
+    }
+}
