@@ -52,7 +52,7 @@ def test_options_have_one_meaning() -> None:
         assert {"-v", "--verbose", "--help"} <= options, words
         if words != "bench":  # its output is lines of JSON
             assert "--json" in options, words
-        if words not in ("recover", "export"):
+        if words not in ("recover", "export", "report"):
             assert "--config" in options, words
         assert "config" not in {a.dest for a in parser._actions if not a.option_strings}, words
 

@@ -1,7 +1,5 @@
 """The summary of flags: how many images, since when, and the reaction."""
 
-from types import SimpleNamespace
-
 import pytest
 from drawn import DrawnRig, short_experiment
 from tautscope.loop.references import SineSequence
@@ -16,7 +14,7 @@ def summarise(
 ) -> list[str]:
     flags = FlagSummary()
     for index, (reaction, warnings) in enumerate(images):
-        flags.add(0.04 * index, SimpleNamespace(reaction=reaction, warnings=warnings))
+        flags.add(0.04 * index, warnings, reaction)
     return list(flags.lines(latched))
 
 

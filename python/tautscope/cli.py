@@ -23,6 +23,7 @@ from tautscope.commands import (
     hardware,
     jog,
     log,
+    report,
     ros2,
 )
 from tautscope.errors import TautscopeError
@@ -91,6 +92,7 @@ def _parser() -> argparse.ArgumentParser:
     config.add_parser(verbs)
     analyze.add_parser(verbs)
     log.add_parsers(verbs)
+    report.add_parser(verbs)
     align.add_parser(verbs)
     hardware.add_parser(verbs)
     console.add_parser(verbs)

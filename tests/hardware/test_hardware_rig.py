@@ -272,7 +272,9 @@ def test_held_motion_ends_the_run_and_stops_the_motors(
     with pytest.raises(MotionHeldError, match=r"hold_motion: command_jump") as caught:
         run_on_hardware(one.config, folder, lambda share: None, make_rig=lambda _: one.rig)
     assert (one.motors.stopped, one.camera.closed) == (1, 1)
-    assert caught.value.__notes__ == [f"The log of the run is {folder / 'compensated.mcap'}"]
+    log = folder / "compensated.mcap"
+    note = f"The log of the run is {log}: `tautscope report {log}`"
+    assert caught.value.__notes__ == [note]
     ticks_recorded = len(caught.value.recording.trace)
     assert ticks_recorded == 20 + round(HELD_TIME / one.config.control.period)
 

@@ -19,6 +19,7 @@ from tautscope.loop.references import SineSequence
 
 if TYPE_CHECKING:
     from tautscope.report.operator_motion import OperatorResult
+    from tautscope.report.recorded_run import RecordedRun
     from tautscope.report.results import DofResult
 
 
@@ -90,14 +91,20 @@ def _run(options: argparse.Namespace) -> int:
         f"{timing['jitter_ms']['worst']:.2g} ms late; {timing['frames']} frames, age "
         f"{timing['frame_age_ms']['median']:.3g} ms (median)."
     )
-    for dof, result in found.results.items():
-        print(summary_line(dof, result))
-    for dof, tracking in found.operator_results.items():
-        print(tracking_line(dof, tracking))
+    for line in result_lines(found.recorded):
+        print(line)
     for warning in found.compensated.recording.warnings:
         print(f"Warning: {warning}.")
     print(f"Report, figures and traces: {folder / 'report.html'}")
     return 0
+
+
+def result_lines(run: RecordedRun) -> list[str]:
+    """A line of results per DOF."""
+    tip = "of the true tip" if run.is_tip_known else "by camera"
+    return [summary_line(dof, result) for dof, result in run.results.items()] + [
+        tracking_line(dof, tracking, tip) for dof, tracking in run.operator_results.items()
+    ]
 
 
 def summary_line(dof: Dof, result: DofResult) -> str:
@@ -110,13 +117,13 @@ def summary_line(dof: Dof, result: DofResult) -> str:
     return f"{line}; tracking error {_shown(dof, result.tracking_estimate)} RMS; by camera"
 
 
-def tracking_line(dof: Dof, result: OperatorResult) -> str:
+def tracking_line(dof: Dof, result: OperatorResult, tip: str = "by camera") -> str:
     """One line of the tracking of a recorded motion; a dash for unknown values."""
     line = f"{dof.label}: tracking error {_shown(dof, result.compensated_rms)} RMS"
     if not math.isnan(result.reduction):
         before = _shown(dof, result.uncompensated_rms)
         line += f", without compensation {before}, reduction {result.reduction:.0%}"
-    return f"{line}; largest {_shown(dof, result.largest)}; by camera"
+    return f"{line}; largest {_shown(dof, result.largest)}; {tip}"
 
 
 def _shown(dof: Dof, value: float) -> str:

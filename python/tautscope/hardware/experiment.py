@@ -104,7 +104,7 @@ def _run(
         except BaseException as error:
             log.warn(f"{type(error).__name__}: {error}")
             if monitored.has_begun:
-                error.add_note(f"The log of the run is {path}")
+                error.add_note(f"The log of the run is {path}: `tautscope report {path}`")
                 if isinstance(error, TautscopeError):
                     error.exit_status = STOPPED
             else:  # nothing to keep: the same folder can be used again

@@ -51,6 +51,8 @@ dt { color: #555; } dd { margin: 0; }
   h2 { break-after: avoid; } figure, tr { break-inside: avoid; } pre { white-space: pre-wrap; } }
 """
 
+_BY_CAMERA = "Measured by the camera: the true state of the tip is not known on hardware."
+
 
 @dataclass(frozen=True)
 class CaptionedFigure:
@@ -67,7 +69,7 @@ def run_report(
     figures: Sequence[CaptionedFigure],
     warnings: Sequence[str],
 ) -> str:
-    """The page of ``tautscope run``: one or two runs on hardware, as measured by the camera.
+    """The page of ``tautscope run`` and ``tautscope report``: one or two recorded runs.
 
     Args:
         config: Configuration of the run.
@@ -77,7 +79,7 @@ def run_report(
         warnings: Warnings of the run.
     """
     return page(
-        "on the drives and the camera named below",
+        "on the rig named below",
         f"""{section}
 {warning_list(warnings)}
 <h2>Figures</h2>
@@ -87,23 +89,27 @@ def run_report(
     )
 
 
-def table1_section(results: Results) -> str:
-    """Table 1 of a run on hardware."""
+def table1_section(results: Results, *, is_tip_known: bool = False) -> str:
+    """Table 1 of a recorded run."""
+    start = (
+        "Of the true tip where it is not said to be by camera."
+        if is_tip_known
+        else f"{_BY_CAMERA} The tracking error includes the first period, in which the contact "
+        "offsets are estimated."
+    )
     return f"""<h2>Table 1</h2>
 <div class="wide">{results_table({"rig": [results]}, by_camera=True)}</div>
-<p class="note">Measured by the camera: the true state of the tip is not known on hardware. The
-tracking error includes the first period, in which the contact offsets are estimated. The
-article&rsquo;s figures are of its own rig.</p>
+<p class="note">{start} The article&rsquo;s figures are of its own rig.</p>
 {row_explanations(measured_rows([results], ROWS))}"""
 
 
-def recorded_motion_section(results: OperatorResults) -> str:
-    """The tracking of a recorded motion on hardware."""
+def recorded_motion_section(results: OperatorResults, *, is_tip_known: bool = False) -> str:
+    """The tracking of a recorded motion."""
     rows = measured_rows([results], OPERATOR_ROWS)
     return f"""<h2>Recorded motion</h2>
 <div class="wide">{operator_table([results], rows)}</div>
-<p class="note">Measured by the camera: the true state of the tip is not known on hardware. The
-first 40&nbsp;s, or half of a shorter run, do not count: there the contact offsets are
+<p class="note">{"Of the true tip." if is_tip_known else _BY_CAMERA}
+The first 40&nbsp;s, or half of a shorter run, do not count: there the contact offsets are
 estimated.</p>
 {row_explanations(rows)}"""
 

@@ -234,7 +234,7 @@ class _ExperimentRecorder(RunRecorder):
 
     def add_report(self, now: float, frame: Frame, report: Report, elapsed: float) -> None:
         self.add_frame(frame_row(now, frame, report), report.delta_minus, report.delta_plus)
-        self.flags.add(elapsed, report)
+        self.flags.add(elapsed, report.warnings, report.reaction)
         detection = report.detection
         is_late = elapsed >= self._snapshot_after
         if (

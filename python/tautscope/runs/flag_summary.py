@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tautscope.loop.reduction import Report
 from tautscope.loop.safety import MEANINGS, REMEDIES, Reaction
 
 _CONSEQUENCES = {
@@ -34,14 +33,25 @@ class FlagSummary:
         self._images = 0
         self._counts: dict[str, _Count] = {}
 
-    def add(self, elapsed: float, report: Report) -> None:
-        """Add an image update; `elapsed` is the time since the start of the run [s]."""
+    def add(self, elapsed: float, flags: Sequence[str], reaction: Reaction) -> None:
+        """Add an image update.
+
+        Args:
+            elapsed: Time since the start of the run [s].
+            flags: In force at it.
+            reaction: To them.
+        """
         self._images += 1
-        for name in report.warnings:
+        for name in flags:
             if name in MEANINGS:
                 count = self._counts.setdefault(name, _Count(elapsed))
                 count.images += 1
-                count.reaction = max(count.reaction, report.reaction, key=lambda each: each.rank)
+                count.reaction = max(count.reaction, reaction, key=lambda each: each.rank)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The flags that were in force at an image."""
+        return tuple(self._counts)
 
     def lines(self, latched: Sequence[str]) -> tuple[str, ...]:
         """A line for each latched flag, by the names of `tautscope.loop.safety.DETECTORS`.

@@ -1,0 +1,151 @@
+"""A run as it is stored: a log, a run folder, or a folder of tables."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from tautscope.errors import MissingPathError, RecordError
+from tautscope.log import topics
+from tautscope.log.reader import Log, Update, read_log
+from tautscope.loop.safety import Reaction, disabled_monitors
+from tautscope.report.recorded_run import RecordedRun
+from tautscope.runs.flag_summary import FlagSummary
+from tautscope.runs.recording import Recording, Snapshot, per_dof, per_feature
+
+PLAIN = "_uncompensated"
+"""Suffix of the tables of a run without compensation."""
+LEAST_DURATION = 1.0
+"""Of a run that is evaluated [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class StoredRun:
+    """A stored run.
+
+    Attributes:
+        run: Its recordings, with their warnings. Of an experiment that ended early the segments
+            that are complete; if there is none, it counts as another motion.
+        source: Where the run with compensation was read from.
+    """
+
+    run: RecordedRun
+    source: Path
+
+
+def read_run(
+    path: str | PathLike[str], uncompensated: str | PathLike[str] | None = None
+) -> StoredRun:
+    """Read a run with compensation, and the one without beside it, if there is one.
+
+    Args:
+        path: A log; a folder with ``compensated.mcap`` and perhaps ``uncompensated.mcap``, or with
+            a single log; or a folder of `Recording.save` or `tautscope export`.
+        uncompensated: Log or folder of the run without compensation, in place of the one beside it.
+
+    Raises:
+        MissingPathError: There is no run at a path.
+        RecordError: It cannot be read, is shorter than 1 s, is not the run that is expected, or
+            both runs do not have the same reference.
+    """
+    source, compensated, plain = _find(Path(path))
+    if not compensated.compensated:
+        raise RecordError("run", str(path), "a run with compensation; this one had none")
+    if uncompensated is not None:
+        plain = _find(Path(uncompensated))[1]
+        if plain.compensated:
+            raise RecordError("--uncompensated", str(uncompensated), "a run without compensation")
+    if plain is not None:
+        _check_same_reference(plain, compensated, str(uncompensated or source))
+    return StoredRun(RecordedRun(compensated, plain), source)
+
+
+def _find(place: Path) -> tuple[Path, Recording, Recording | None]:
+    """Where a run was found, the run, and the one without compensation beside it."""
+    if place.is_dir():
+        logs = sorted(place.glob("*.mcap"))
+        pair = [place / f"{name}compensated.mcap" for name in ("", "un")]
+        if pair[0] in logs:
+            return pair[0], _from_log(pair[0]), _from_log(pair[1]) if pair[1] in logs else None
+        if (place / "recording.toml").is_file():
+            plain = place / f"recording{PLAIN}.toml"
+            tables = _from_tables(place)
+            return place, tables, _from_tables(place, PLAIN) if plain.is_file() else None
+        if len(logs) > 1:
+            raise RecordError("run", ", ".join(map(str, logs)), "one of these logs")
+        if not logs:
+            raise MissingPathError(
+                "run", str(place), "a log (.mcap), or a folder with a log or with recording.toml"
+            )
+        place = logs[0]
+    return place, _from_log(place), None
+
+
+def _from_tables(folder: Path, suffix: str = "") -> Recording:
+    unknown = "the tables of a run do not have its warnings; a log has them"
+    return _checked(replace(Recording.load(folder, suffix), warnings=(unknown,)), folder)
+
+
+def _from_log(path: Path) -> Recording:
+    log = read_log(path)
+    recording = _checked(log.recording(), path)
+    found = [*disabled_monitors(log.config), *_flags(log, recording), *log.warnings]
+    if log.damage:
+        found.append(f"{path.name} is damaged or truncated: {log.damage.lost_bytes} bytes lost")
+    if log.missing:
+        found.append(f"{log.missing} ticks or images of the run are not in {path.name}")
+    return replace(recording, warnings=tuple(found), snapshot=_snapshot(log, recording))
+
+
+def _updates(log: Log) -> list[tuple[int, Update]]:
+    """Indices and image updates, in the order of the recording's frames."""
+    return [(index, each) for index, each in log.events.items() if isinstance(each, Update)]
+
+
+def _flags(log: Log, recording: Recording) -> tuple[str, ...]:
+    """A line for each flag that was in force at an image."""
+    summary = FlagSummary()
+    elapsed = recording.frames["arrived_at"] - recording.trace["time"][0]
+    for at, (_, update) in zip(elapsed, _updates(log), strict=True):
+        (status,) = topics.decode(topics.STATUS, update.raw[topics.STATUS])["status"]
+        values = {each["key"]: each["value"] for each in status["values"]}
+        summary.add(float(at), values["warnings"].split(","), Reaction(values["reaction"]))
+    return summary.lines(summary.names)
+
+
+def _checked(recording: Recording, path: Path) -> Recording:
+    """The recording with its complete segments."""
+    time = recording.trace["time"]
+    lasted = float(time[-1] - time[0]) if len(time) else 0.0
+    if lasted < LEAST_DURATION:
+        raise RecordError("run", f"{path}: {lasted:.3g} s", f"at least {LEAST_DURATION:g} s")
+    complete = tuple(
+        segment for segment in recording.segments if segment.end <= lasted + 2 * lasted / len(time)
+    )
+    return replace(recording, segments=complete)
+
+
+def _snapshot(log: Log, recording: Recording) -> Snapshot | None:
+    """The image nearest to the middle of the run in which both bands were found, if any."""
+    frames = recording.frames
+    measured, predicted = (per_feature(frames, name) for name in ("features", "predicted_features"))
+    has_bands = np.isfinite(measured).all(axis=1) & np.isfinite(predicted).all(axis=1)
+    nearest = sorted(np.flatnonzero(has_bands), key=lambda k: abs(k - len(frames) / 2))
+    indices = [index for index, _ in _updates(log)]
+    for k in nearest if log.config.camera.pixel_format == "bgr" else ():
+        if log.has_image(indices[k]):
+            captured_at = float(frames["captured_at"][k])
+            return Snapshot(log.image(indices[k]), captured_at, measured[k], predicted[k])
+    return None
+
+
+def _check_same_reference(plain: Recording, compensated: Recording, path: str) -> None:
+    """The references agree to a hundredth of their range while both runs last."""
+    first, second = (per_dof(run.trace, "reference") for run in (plain, compensated))
+    count = min(len(first), len(second))
+    limit = 0.01 * np.ptp(second[:count], axis=0) + 1e-9
+    if (np.abs(first[:count] - second[:count]).max(axis=0) > limit).any():
+        raise RecordError("--uncompensated", path, "a run of the same reference")
