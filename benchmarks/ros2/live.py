@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 from common.paths import ROOT
-from ros2.lockstep import free_endpoint
+from ros2.peers import free_endpoint
 from tautscope.config import Config, dump_config, load_config
 from tautscope.hardware.realtime import OTHERS, realtime
 from tautscope.log.reader import read_log

@@ -1,7 +1,7 @@
 """Builds the units once, and the recordings of the loop in Python."""
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -11,6 +11,7 @@ sys.path[:0] = [str(HERE.parent), str(HERE.parents[1] / "examples" / "cpp")]
 
 import build  # noqa: E402
 import record  # noqa: E402
+from fmu import CONFIG, Unit  # noqa: E402
 from tautscope import Config  # noqa: E402
 from tautscope.config import Profile  # noqa: E402
 
@@ -44,3 +45,19 @@ def builder(tmp_path_factory: pytest.TempPathFactory) -> Builder:
         return made[key]
 
     return unit
+
+
+@pytest.fixture
+def opened(builder: Builder, tmp_path: Path) -> Iterator[Callable[..., Unit]]:
+    """Initialized units, released after the test."""
+    units: list[Unit] = []
+
+    def unit(kind: str, config: Config = CONFIG, **parameters: float | str) -> Unit:
+        # A folder of its own: a library that is loaded must not be written again.
+        folder = tmp_path / str(len(list(tmp_path.iterdir())))
+        units.append(Unit(builder(kind, config), folder, **parameters))
+        return units[-1]
+
+    yield unit
+    for unit_ in units:
+        unit_.close()

@@ -1,15 +1,10 @@
-"""The units in FMPy: the same numbers as in Python, and errors that say what was wrong."""
+"""The units in FMPy: the same numbers as in Python."""
 
 import ctypes
-import os
 import re
-import signal
-import subprocess
-import sys
 import time
 import zipfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 
 import build
@@ -18,112 +13,17 @@ import numpy as np
 import pytest
 import record
 from conftest import Builder
-from fmpy.fmi1 import FMICallException
-from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
-from numpy.typing import NDArray
-from tautscope import Config, HysteresisReduction, MarkerDetector, Twin
+from fmu import CONFIG, DOFS, PERIOD, Unit, motion
+from tautscope import HysteresisReduction, MarkerDetector, Twin
 from tautscope.config import Profile
 from tautscope.loop.reduction import Status
 
-CONFIG = Config().replace(**{"twin.seed": 3})
-PERIOD = CONFIG.control.period
-DOFS = tuple(build.DOFS)
 FEATURES = tuple(f"features_{name}" for name in build.COORDINATES)
 PRESSED = 2000
 """Ticks for which an action stays set: it acts once, and longer than until the next engagement."""
 
 KINDS = pytest.mark.parametrize("kind", ["twin", "loop"])
-
-
-class Unit:
-    """An initialized unit, its variables by name."""
-
-    def __init__(self, path: Path, folder: Path, **parameters: float | str) -> None:
-        description = fmpy.read_model_description(str(path))
-        self._types = {v.name: (v.type, v.valueReference) for v in description.modelVariables}
-        self.messages: list[str] = []
-        self._fmu = FMU3Slave(
-            guid=description.guid,
-            unzipDirectory=fmpy.extract(str(path), unzipdir=str(folder)),
-            modelIdentifier=description.coSimulation.modelIdentifier,
-            instanceName="unit",
-        )
-        self._fmu.instantiate(loggingOn=True, logMessage=self._log)
-        self._parameters = parameters
-        try:
-            self.initialize()
-        except FMICallException as error:
-            self.close()
-            raise RuntimeError(" ".join(self.messages)) from error
-
-    def initialize(self) -> None:
-        for name, value in self._parameters.items():
-            self.set(name, value)
-        self._fmu.enterInitializationMode()
-        self._fmu.exitInitializationMode()
-
-    def _log(self, environment: object, status: int, category: bytes, message: bytes) -> None:
-        self.messages.append(message.decode())
-
-    def set(self, name: str, value: float | str) -> None:
-        kind, reference = self._types[name]
-        getattr(self._fmu, f"set{kind}")([reference], [value])
-
-    def get(self, *names: str) -> NDArray[np.float64]:
-        values = []
-        for name in names:
-            kind, reference = self._types[name]
-            values += getattr(self._fmu, f"get{kind}")([reference])
-        return np.array(values, dtype=np.float64)
-
-    def set_all(self, prefix: str, values: NDArray[np.float64]) -> None:
-        for dof, value in zip(DOFS, values, strict=True):
-            self.set(f"{prefix}_{dof}", value)
-
-    def get_all(self, prefix: str) -> NDArray[np.float64]:
-        return self.get(*(f"{prefix}_{dof}" for dof in DOFS))
-
-    def step(self, at: float, size: float = PERIOD) -> None:
-        self._fmu.doStep(at, size)
-
-    def reset(self) -> None:
-        self._fmu.reset()
-        self.initialize()
-
-    def terminate(self) -> None:
-        self._fmu.terminate()
-
-    def close(self) -> None:
-        self._fmu.freeInstance()
-
-
-@pytest.fixture
-def opened(builder: Builder, tmp_path: Path) -> Iterator[Callable[..., Unit]]:
-    """Initialized units, released after the test."""
-    units: list[Unit] = []
-
-    def unit(kind: str, config: Config = CONFIG, **parameters: float | str) -> Unit:
-        # A folder of its own: a library that is loaded must not be written again.
-        folder = tmp_path / str(len(list(tmp_path.iterdir())))
-        units.append(Unit(builder(kind, config), folder, **parameters))
-        return units[-1]
-
-    yield unit
-    for unit_ in units:
-        unit_.close()
-
-
-@contextmanager
-def refused(unit: Unit, words: str) -> Iterator[None]:
-    with pytest.raises(FMICallException):
-        yield
-    assert words in " ".join(unit.messages), unit.messages
-
-
-def motion(time: float) -> NDArray[np.float64]:
-    """A command."""
-    return record.CENTRES + record.AMPLITUDES * np.sin(2 * np.pi * time / np.array([5, 7, 4]))
 
 
 @KINDS
@@ -275,68 +175,3 @@ def test_reset_starts_again(opened: Callable[..., Unit]) -> None:
     assert (unit.get_all("true") != start).any()
     unit.reset()
     np.testing.assert_array_equal(unit.get_all("true"), start)
-
-
-def test_bad_use_is_an_error_with_a_message(opened: Callable[..., Unit]) -> None:
-    twin, loop = opened("twin", has_camera=False), opened("loop")
-    with refused(twin, "got 0.007 s, expected one or more control periods of 0.005 s"):
-        twin.step(0.0, 0.007)
-    with refused(twin, "cannot be set after the initialization"):
-        twin.set("seed", 1)
-    with refused(twin, "because it is an output"):
-        twin.set("true_bending", 0.0)
-    with refused(loop, "reference"):
-        loop.set_all("reference", np.array([np.nan, 0, 0]))
-        loop.step(0.0)
-    with refused(loop, "not initialized, or has failed"):
-        loop.step(0.0)
-    with refused(twin, "command"):
-        twin.set_all("command", np.array([np.nan, 0, 0]))
-        twin.step(0.0)
-
-
-def test_an_interpreter_that_does_not_exist_is_named(opened: Callable[..., Unit]) -> None:
-    with pytest.raises(RuntimeError, match="/no/such/python cannot be started: No such file"):
-        opened("twin", python="/no/such/python")
-    with pytest.raises(
-        RuntimeError, match=r"has ended; was it started\? Parameter python: /bin/true"
-    ):
-        opened("twin", python="/bin/true")
-
-
-def test_a_killed_process_is_an_error_and_none_is_left(opened: Callable[..., Unit]) -> None:
-    def children() -> set[int]:
-        tasks = Path("/proc/self/task").glob("*/children")
-        return {int(child) for task in tasks for child in task.read_text().split()}
-
-    before = children()
-    unit = opened("twin", has_camera=False)
-    (process,) = children() - before
-    os.kill(process, signal.SIGKILL)
-    with refused(unit, "the Python process has ended"):
-        unit.step(0.0)
-    other = opened("twin", has_camera=False)
-    assert len(children() - before) == 2, "the killed one is waited for when its unit is released"
-    unit.reset()
-    assert process not in children()
-    other.terminate()
-    assert len(children() - before) == 1
-
-
-def test_the_process_ends_with_the_importer(builder: Builder, tmp_path: Path) -> None:
-    program = """
-import os, pathlib, sys, test_units
-unit = test_units.Unit(*map(pathlib.Path, sys.argv[1:]))
-print(pathlib.Path(f"/proc/self/task/{os.getpid()}/children").read_text(), flush=True)
-os.kill(os.getpid(), 9)
-"""
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    command = [sys.executable, "-c", program, str(builder("twin", CONFIG)), str(tmp_path)]
-    importer = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    assert importer.returncode == -signal.SIGKILL, importer.stderr
-    process = Path("/proc") / importer.stdout.strip()
-    assert process.name.isdigit()
-    deadline = time.monotonic() + 20
-    while process.exists() and "zombie" not in (process / "status").read_text():
-        assert time.monotonic() < deadline, "the process of the twin is still running"
-        time.sleep(0.05)

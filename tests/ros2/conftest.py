@@ -11,7 +11,7 @@ from tautscope.config import load_config
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
 
-from ros2.lockstep import Peers, peers
+from ros2.peers import Peers, peers
 
 
 @pytest.fixture

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from ros2.lockstep import Peers
+from ros2.peers import Peers
 
 START = np.array([0.025, 0.0, 0.9])
 

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from driving import START, commands, drive
-from ros2.lockstep import JOINTS, Peers, compare
+from ros2.lockstep import compare
+from ros2.peers import JOINTS, Peers
 from tautscope.config import load_config
 from tautscope.log import cdr
 from tautscope.log.reader import read_log

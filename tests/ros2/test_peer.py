@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from ros2.live import PEER
-from ros2.lockstep import free_endpoint
+from ros2.peers import free_endpoint
 
 
 @pytest.mark.skipif(not PEER.exists(), reason="tests/ros2/peer is not built: see benchmarks/ros2")

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 import zenoh
-from ros2.lockstep import JOINTS, free_endpoint
+from ros2.peers import JOINTS, free_endpoint
 from tautscope.cli import main
 from tautscope.log.reader import read_log
 from tautscope.log.replay import replay_same

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from driving import START, commands, drive, rest
-from ros2.lockstep import JOINTS, Peers, peers
+from ros2.peers import JOINTS, Peers, peers
 from tautscope.config import load_config
 from tautscope.ros2 import messages, types
 

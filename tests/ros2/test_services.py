@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 from driving import START, drive
-from ros2.lockstep import Peers
+from ros2.peers import Peers
 from tautscope.ros2 import messages, types, wire
 from tautscope.ros2.lifecycle import State
 
