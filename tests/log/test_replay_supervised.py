@@ -1,6 +1,7 @@
 """Replay of runs with supervisor actions and with images processed in the background."""
 
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from time import sleep
@@ -181,7 +182,6 @@ def test_a_replay_is_identical_where_the_supervisor_acted(
     reference.duration = SECONDS
     path = tmp_path / "run.mcap"
     rig = FaultyCameraRig(config)
-    # A detection that lasts as long as the history is not repeated: docs/anomalies.md.
     rig.tick_time = 0.004 if is_background else 0.0
     with ThreadPoolExecutor(1) as executor, LogWriter(path, config, wait=True) as log:
         aside = executor if is_background else None
@@ -198,4 +198,44 @@ def test_a_replay_is_identical_where_the_supervisor_acted(
     assert flags(run) >= {"reference_jump", "reference_late"}
     silent = run.trace["time"] - PAUSE > SILENT_FROM + config.safety.reference_age
     assert np.ptp(per_dof(run.trace[silent], "command"), axis=0).max() == 0.0
+    assert_replays_identically(read_log(path), run)
+
+
+class LateDetection(Future):
+    """The result of a detection, at hand when it was asked for a number of times."""
+
+    def __init__(self, detect: Callable[[], object], asked: int) -> None:
+        super().__init__()
+        self._left = asked
+        self.set_result(detect())
+
+    def done(self) -> bool:
+        self._left -= 1
+        return self._left < 0
+
+
+class LateExecutor(Executor):
+    """Detections that last longer and longer, as counted in control ticks."""
+
+    def __init__(self, most: int) -> None:
+        self._most, self._submitted = most, 0
+
+    def submit(self, detect: Callable[[], object]) -> LateDetection:  # type: ignore[override]
+        self._submitted += 1
+        return LateDetection(detect, 60 * self._submitted % self._most)
+
+
+@pytest.mark.parametrize("profile", ["paper", "best"])
+def test_a_replay_prepares_a_detection_when_the_run_did(
+    tmp_path: Path, config: Config, profile: str
+) -> None:
+    config = config.replace(profile=profile)
+    history = round(config.control.history / config.control.period)
+    reference = SineSequence(config.experiment)
+    reference.duration = SECONDS
+    path = tmp_path / "run.mcap"
+    with LogWriter(path, config, wait=True) as log:
+        executor = LateExecutor(2 * history)
+        run = run_experiment(DrawnRig(config), reference, config, log=log, executor=executor)
+    assert len(run.frames) > 2
     assert_replays_identically(read_log(path), run)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,12 @@ from tautscope.loop.safety import DETECTORS
 from tautscope.runs.recording import FEATURES, FRAME_COLUMNS, Recording
 from tautscope.runs.run_recorder import RunRecorder, frame_row
 
+if TYPE_CHECKING:
+    from tautscope.loop.vision import Detection
+
 Floats = NDArray[np.float64]
+PREPARE = "prepare_detection "
+"""Begin of the request to prepare the detection of a frame, before its sequence number."""
 Inputs = Iterator[Tick | tuple[float, Frame]]
 """Ticks, and frames with their arrival time [s], in the order of the run."""
 
@@ -70,6 +76,7 @@ def replay_same(log: Log) -> tuple[Comparison, Recording]:
     loop = HysteresisReduction(log.config, log.compensated)
     comparison, recorder = Comparison(), RunRecorder(log.config)
     clock = _clock(log)
+    detections: dict[int, tuple[float, Frame, Callable[[], Detection]]] = {}
     for index in range(1, max(log.events, default=0) + 1):
         event = log.events.get(index)
         if isinstance(event, Tick):
@@ -80,11 +87,19 @@ def replay_same(log: Log) -> tuple[Comparison, Recording]:
             comparison.ticks += 1
             where = f"tick at {sample.time:g} s"
             comparison.same_ticks += _is_same(comparison, event, replayed, where)
+        elif isinstance(event, Request) and event.text.startswith(PREPARE):
+            if (found := _prepared_frame(log, index, event.text)) is not None:
+                update, now, frame = found
+                detections[update] = now, frame, loop.prepare_detection(frame)
         elif isinstance(event, Request):
             _send_request(loop, event.text)
         elif event is not None and log.has_image(index):
-            now, frame = _frame(log, index, event)
-            report = loop.on_frame(frame)
+            if index in detections:
+                now, frame, detect = detections.pop(index)
+                report = loop.on_detection(frame, detect())
+            else:
+                now, frame = _frame(log, index, event)
+                report = loop.on_frame(frame)
             recorder.add_frame(frame_row(now, frame, report), report.delta_minus, report.delta_plus)
             replayed = msg.update_messages(clock, now, frame, report)
             comparison.updates += 1
@@ -97,6 +112,21 @@ def replay_same(log: Log) -> tuple[Comparison, Recording]:
     return comparison, Recording(*recorder.tables(), log.config, log.compensated, log.segments)
 
 
+def _prepared_frame(log: Log, after: int, request: str) -> tuple[int, float, Frame] | None:
+    """The next image update, its arrival time [s] and frame, if `request` prepared its detection.
+
+    None if the detection had not ended when the run did, or its image is not in the log.
+    """
+    for index in range(after + 1, max(log.events) + 1):
+        event = log.events.get(index)
+        if isinstance(event, Update):
+            if not log.has_image(index):
+                return None
+            now, frame = _frame(log, index, event)
+            return (index, now, frame) if request == f"{PREPARE}{frame.sequence}" else None
+    return None
+
+
 def _send_request(loop: HysteresisReduction, request: str) -> None:
     call, _, name = request.partition(" ")
     if request in ("engage", "acknowledge"):
@@ -106,7 +136,7 @@ def _send_request(loop: HysteresisReduction, request: str) -> None:
     elif call == "set_compensation":
         loop.set_compensation(_share(request, name))
     elif call != "note":
-        allowed = "engage, acknowledge, raise_flag, set_compensation, or a note"
+        allowed = "engage, acknowledge, raise_flag, set_compensation, prepare_detection, or a note"
         raise RecordError("log", request, allowed)
 
 

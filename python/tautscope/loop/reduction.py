@@ -134,9 +134,9 @@ class HysteresisReduction:
 
     Attributes:
         updates: Number of image updates so far.
-        on_event: Called at every `engage`, `acknowledge`, `set_compensation` and `raise_flag` with
-            the name of the call (and the share or the flag): a replay needs these beside references
-            and images.
+        on_event: Called at every `engage`, `acknowledge`, `set_compensation`, `raise_flag` and
+            `prepare_detection` with the name of the call (and the share, the flag or the sequence
+            of the frame): a replay needs these beside references and images.
     """
 
     def __init__(self, config: Config, compensate: bool = True) -> None:
@@ -188,7 +188,7 @@ class HysteresisReduction:
             FrameError: The image is not what the configured camera gives.
             SignalError: The capture time is not finite.
         """
-        return self.on_detection(frame, self.prepare_detection(frame)())
+        return self.on_detection(frame, self._detection(frame)())
 
     def prepare_detection(self, frame: Frame) -> Callable[[], Detection]:
         """First part of `on_frame`: a function that finds the markers, for any thread to call.
@@ -199,8 +199,9 @@ class HysteresisReduction:
         Raises:
             SignalError: The capture time is not finite.
         """
-        prediction = self.predict_state(check_time("captured_at", frame.captured_at))
-        return partial(self._detector.detect, frame.image, None, prediction)
+        detect = self._detection(frame)
+        self._notify(f"prepare_detection {frame.sequence}")
+        return detect
 
     def on_detection(self, frame: Frame, detection: Detection) -> Report:
         """Second part of `on_frame`: the update with the result of `prepare_detection`."""
@@ -313,6 +314,10 @@ class HysteresisReduction:
         from tautscope.loop.vision import MarkerDetector  # noqa: PLC0415
 
         return MarkerDetector(self._config)
+
+    def _detection(self, frame: Frame) -> Callable[[], Detection]:
+        prediction = self.predict_state(check_time("captured_at", frame.captured_at))
+        return partial(self._detector.detect, frame.image, None, prediction)
 
     def _notify(self, what: str) -> None:
         if self.on_event is not None:
