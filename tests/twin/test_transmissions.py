@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from tautscope.config import Config, FrictionConfig, TransmissionConfig
 from tautscope.dof import Dof
+from tautscope.errors import ConfigError
 from tautscope.report.metrics import loop_width
 from tautscope.twin.friction import (
     CABLE_SPEED,
@@ -158,6 +159,22 @@ def test_tension_shortens_the_section() -> None:
     shortened = CONFIG.instrument.bending_length - length
     assert shortened == pytest.approx(compliance * tension, rel=0.05)
     assert shortened > 0.2e-3
+
+
+def test_hardly_any_compliance_is_like_little() -> None:
+    positions = np.concatenate([ramp(Dof.BENDING, 0, 1, 3), ramp(Dof.BENDING, 1, -1, 5)])
+    ends = [
+        move(plant(**{"twin.cables.compliance": compliance}), Dof.BENDING, positions)[-1]
+        for compliance in (0.0, 5e-7, 8e-6)
+    ]
+    assert ends == pytest.approx([ends[0]] * 3, abs=0.06)
+
+
+def test_an_unstable_simulation_is_an_error() -> None:
+    simulated = plant()
+    simulated._data.qvel[0] = 1e12
+    with pytest.raises(ConfigError, match="unstable in the simulation"):
+        simulated.step(START)
 
 
 def width(simulated: Plant, dof: Dof, centre: float, amplitude: float, seconds: float) -> float:

@@ -95,7 +95,8 @@ class CableConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True
     plane: float = 0.0
     """Angle of the plane of bending at zero rotation [rad]."""
     compliance: NonNegative = 0.0
-    """Shortening of the section per tension of both cables [m/N]; the cables slacken with it."""
+    """Shortening of the section per tension of both cables [m/N]; the cables slacken with it. Below
+    6.7e-6 none."""
 
 
 class FrictionConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):

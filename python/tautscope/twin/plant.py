@@ -11,12 +11,18 @@ from numpy.typing import NDArray
 
 from tautscope.config import Config
 from tautscope.dof import Dof
+from tautscope.errors import ConfigError
 from tautscope.twin.friction import FrictionVariation
 from tautscope.twin.mjcf import MAX_TIMESTEP, SERVO_LAG, build, curvature_shape
 from tautscope.twin.transmission import Transmission
 
 _SETTLING = 1.0
 """Settling time in the start posture before a run [s]."""
+_UNSTABLE = (
+    mujoco.mjtWarning.mjWARN_BADQPOS,
+    mujoco.mjtWarning.mjWARN_BADQVEL,
+    mujoco.mjtWarning.mjWARN_BADQACC,
+)
 
 
 class Plant:
@@ -66,7 +72,11 @@ class Plant:
         self._start()
 
     def step(self, command: NDArray[np.float64]) -> None:
-        """Simulate one control period; the drives follow the command (3,) [m, rad, rad]."""
+        """Simulate one control period; the drives follow the command (3,) [m, rad, rad].
+
+        Raises:
+            ConfigError: The simulation is unstable.
+        """
         data, shaft = self._data, self._config.twin.shaft
         load = shaft.straight_load + shaft.load_per_bend * self.bends
         data.qfrc_applied[self._presses] = -load * self._load_share
@@ -82,6 +92,12 @@ class Plant:
             angles = data.qpos[self._turns] - shaft.set_angle
             data.qfrc_applied[self._turns] = -shaft.set_torque * np.sin(angles)
             mujoco.mj_step(self._model, data)
+        # MuJoCo starts anew when it happens.
+        if any(data.warning[each].number for each in _UNSTABLE):
+            when = f"unstable in the simulation at {self._time:.3f} s"
+            raise ConfigError(
+                "twin", when, "stiffnesses, masses and friction that can be simulated"
+            )
         self._time += self._config.control.period
 
     def _vary_friction(self) -> None:
