@@ -162,10 +162,11 @@ def test_motion_before_the_record_does_not_affect_a_fit(fit) -> None:
 
 
 def test_plays_need_only_the_essential_samples() -> None:
-    """Moves with rests and small reversals, a tip at every 40th sample."""
+    """Moves to random targets, the last ones with rests, and a tip at every 40th sample."""
     rng = np.random.default_rng(10)
-    turns = np.repeat(rng.uniform(-10, 10, 40), 2)
-    command = np.interp(np.linspace(0, 79, 4001), np.arange(80), turns)
+    turns = rng.uniform(-10, 10, 80)
+    turns = np.append(turns, np.repeat(turns[:10], 2))
+    command = np.interp(np.linspace(0, 99, 4001), np.arange(100), turns)
     measured = np.where(np.arange(4001) % 40 == 7, command, np.nan)
     fewer, tips = essential(command, measured)
     assert len(fewer) < 400
