@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from play_model import play
 from refused import failed
+from tautscope.analysis import output
 from tautscope.analysis.comparison import HORIZONS
 from tautscope.analysis.models.registry import MODELS
 from tautscope.cli import main
@@ -64,6 +65,22 @@ def test_analyze_finds_the_offsets_of_a_play(
         share = model["rmse"] / found["models"]["none"]["rmse"]
         assert model["share_of_no_model"] == pytest.approx(share)
         assert name == "none" or share < 0.1
+
+
+def test_files_have_nine_digits_and_figures_the_extremes_of_each_part() -> None:
+    rng = np.random.default_rng(11)
+    values = rng.normal(size=5000) * 10.0 ** rng.integers(-20, 9, 5000)
+    values[:3] = 0.0, np.nan, -1.0
+    expected = [float(f"{value:.9g}") for value in values]
+    np.testing.assert_allclose(output._rounded(values), expected, rtol=3e-16)
+    at, tip = np.arange(9 * output.PARTS + 5), rng.normal(size=9 * output.PARTS + 5)
+    x, y = output._envelope(at, tip)
+    np.testing.assert_array_equal(tip[x], y)
+    assert len(x) < len(at) / 4
+    for begin in range(0, len(at), 9):
+        part = (x >= begin) & (x < begin + 9)
+        assert y[part].min() == tip[begin : begin + 9].min(), begin
+        assert y[part].max() == tip[begin : begin + 9].max(), begin
 
 
 def test_analyze_prints_a_row_per_model(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -10,12 +11,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from play_model import play
+from tautscope._core import track_coefficients
 from tautscope.analysis.comparison import HORIZONS, analyze, seen_at
 from tautscope.analysis.models import last_tip, mixture
-from tautscope.analysis.models.components import Component, Signals
-from tautscope.analysis.models.task import Task, continued
+from tautscope.analysis.models.components import Component, Refit, Signals
+from tautscope.analysis.models.task import Task, continued, shared
 from tautscope.analysis.models.tracked_regression import NOISE, UNKNOWN, track
 from tautscope.config import load_config
+from tautscope.errors import SignalError
 from tautscope.report.metrics import rms
 from tautscope.runs.records import read_record
 
@@ -97,6 +100,96 @@ def test_a_tracked_regression_is_the_gaussian_conditional_mean(walks: tuple[floa
         gain = np.linalg.solve(inner, covariance[:-1, -1])
         expected = features[k, 0] + gain @ (tips[past] - features[past, 0])
         assert found[k] == pytest.approx(expected, abs=1e-6)
+
+
+def test_a_tracked_regression_is_a_kalman_filter_per_random_walk() -> None:
+    """Nine filters by the textbook's recursion, the covariance in Joseph's form."""
+    rng = np.random.default_rng(8)
+    samples, size, spread = 120, 4, 0.5
+    features, tips = rng.normal(size=(samples, size)), rng.normal(size=samples)
+    travel, at = np.cumsum(rng.uniform(0, 0.2, samples)), np.arange(5, samples, 2)
+    walks = np.array([(d, w) for d in (0.0, 0.1, 1.0) for w in (0.0, 0.05, 0.4)])
+    found = track(features, travel, tips, at, spread=spread, walks=walks)
+    for number, (disturbance, coefficient) in enumerate(walks):
+        prior = np.array([spread**2] * size + [UNKNOWN**2])
+        walk = np.array([(coefficient * spread) ** 2] * size + [disturbance**2])
+        x, covariance, last = np.eye(size + 1)[0], np.diag(prior), travel[at[0]]
+        for k in range(samples):
+            row = np.append(features[k], 1.0)
+            if k > at[0]:
+                assert found[k, number] == pytest.approx(row @ x, abs=1e-8), (k, walks[number])
+            if k in at:
+                covariance = covariance + np.diag(walk) * (travel[k] - last)
+                gain = covariance @ row / (row @ covariance @ row + NOISE**2)
+                x = x + gain * (tips[k] - row @ x)
+                rest = np.eye(size + 1) - np.outer(gain, row)
+                covariance = rest @ covariance @ rest.T + NOISE**2 * np.outer(gain, gain)
+                last = travel[k]
+
+
+@pytest.mark.parametrize(
+    ("name", "allowed"),
+    [("travel", "one per sample"), ("measured", "one per sample"), ("mean", "per coefficient")],
+)
+def test_a_tracked_regression_names_an_array_of_the_wrong_length(name: str, allowed: str) -> None:
+    arrays = {"travel": np.zeros(5), "measured": np.zeros(5), "mean": np.zeros(2)}
+    arrays[name] = np.zeros(3)
+    more = {"variance": np.ones(2), "growth": np.ones((1, 2)), "noise": 1.0}
+    with pytest.raises(SignalError, match=rf"{name}: got '3 values', expected .* {allowed}"):
+        track_coefficients(np.ones((5, 2)), **arrays, **more)
+
+
+@pytest.mark.parametrize("block", [7, 4096])
+def test_the_mixture_is_the_formula_written_out(
+    monkeypatch: pytest.MonkeyPatch, block: int
+) -> None:
+    """Sums over all past tips, with tips at every third sample, and errors that a fit replaces."""
+    monkeypatch.setattr(mixture, "BLOCK", block)
+    rng = np.random.default_rng(9)
+    samples, count = 150, 20
+    tips = np.where(np.arange(samples) % 3 == 1, rng.normal(size=samples), np.nan)
+    signals = Signals(moving(9, samples), tips)
+    variants = np.nan_to_num(tips)[:, None] + rng.normal(0, [0.1, 0.2, 0.3], (samples, 3))
+    refit = Refit(count, 4, rng.normal(0, 0.05, (count, 2)))
+    components = [Component("a", variants[:, :1]), Component("b", variants[:, 1:], [refit])]
+    found, shares = mixture.mix(components, signals)
+    errors = (variants - tips[:, None])[signals.at]
+
+    def weights(past: Floats, memory: float) -> Floats:
+        discounts = memory ** np.arange(len(past))[::-1]
+        losses = discounts @ (past**2 + mixture.FLOOR**2)
+        power = losses ** (-discounts.sum() / 2)
+        return power / power.sum()
+
+    totals, mixed, each = {}, [], np.full((len(mixture.MEMORIES), 3), 1 / 3)
+    for j in range(1, len(errors)):
+        mixed.append(each @ errors[j])
+        if j + 1 == count:
+            errors[:count, 1:] = refit.errors
+        first = 4 if j + 1 >= count else 1
+        each = np.array([weights(errors[first : j + 1], b) for b in mixture.MEMORIES])
+        totals[j] = weights(np.array(mixed), mixture.SECOND_MEMORY) @ each
+    assert np.isnan(found[: signals.at[1] + 1]).all()
+    for k in range(signals.at[1] + 1, samples):
+        total = totals[max(j for j in totals if signals.at[j] < k)]
+        assert found[k] == pytest.approx(total @ variants[k], rel=1e-9), k
+        assert shares["b"][k] == pytest.approx(total[1:].sum(), rel=1e-9), k
+
+
+def test_a_shared_result_is_computed_once_per_task() -> None:
+    calls = []
+
+    @shared
+    def scaled(record: Task, factor: float) -> Floats:
+        calls.append(factor)
+        return factor * record.command
+
+    record = task(np.arange(4.0), np.arange(4.0))
+    assert scaled(record, 2.0) is scaled(record, 2.0)
+    assert scaled(record, 3.0)[1] == 3
+    other = replace(record, command=-record.command)
+    assert scaled(other, 2.0)[1] == -2
+    assert calls == [2.0, 3.0, 2.0]
 
 
 def test_weights_are_posterior_probabilities() -> None:

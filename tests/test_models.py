@@ -15,7 +15,7 @@ from tautscope.analysis.models import bouc_wen, constant_play, prandtl_ishlinski
 from tautscope.analysis.models.bouc_wen import BoucWen, hysteretic_variable
 from tautscope.analysis.models.prandtl_ishlinskii import PrandtlIshlinskii
 from tautscope.analysis.models.registry import MODELS, Model
-from tautscope.analysis.models.task import Task
+from tautscope.analysis.models.task import Task, essential
 from tautscope.config import load_config
 from tautscope.dof import Dof
 from tautscope.report.metrics import rms
@@ -159,6 +159,21 @@ def test_motion_before_the_record_does_not_affect_a_fit(fit) -> None:
     assert fit(command, other) == fit(command, measured)
     other[late] += 2
     assert fit(command, other) != fit(command, measured)
+
+
+def test_plays_need_only_the_essential_samples() -> None:
+    """Moves to random targets, the last ones with rests, and a tip at every 40th sample."""
+    rng = np.random.default_rng(10)
+    turns = rng.uniform(-10, 10, 80)
+    turns = np.append(turns, np.repeat(turns[:10], 2))
+    command = np.interp(np.linspace(0, 99, 4001), np.arange(100), turns)
+    measured = np.where(np.arange(4001) % 40 == 7, command, np.nan)
+    fewer, tips = essential(command, measured)
+    assert len(fewer) < 400
+    for radius in (0.0, 0.5, 3.0, 8.0):
+        outputs = play(fewer, -radius, radius, start=1.0)[np.isfinite(tips)]
+        expected = play(command, -radius, radius, start=1.0)[np.isfinite(measured)]
+        np.testing.assert_array_equal(outputs, expected)
 
 
 def test_a_record_of_one_stroke_is_fitted_whole() -> None:

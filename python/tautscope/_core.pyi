@@ -21,6 +21,8 @@ __all__ = [
     "TipFilter",
     "__version__",
     "label_regions",
+    "move_along_curve",
+    "track_coefficients",
 ]
 
 __version__: str
@@ -227,6 +229,22 @@ class MarkerDetector:
     def mask(self, image: NDArray[np.uint8]) -> NDArray[np.bool_]: ...
 
 def label_regions(mask: NDArray[np.bool_]) -> list[_Region]: ...
+
+# Models of hysteresis: tautscope.analysis.
+
+def track_coefficients(
+    rows: ArrayLike,
+    travel: ArrayLike,
+    measured: ArrayLike,
+    *,
+    mean: ArrayLike,
+    variance: ArrayLike,
+    growth: ArrayLike,
+    noise: float,
+) -> _Floats: ...
+def move_along_curve(
+    command: ArrayLike, positions: ArrayLike, curve: ArrayLike, *, start: float, rate: float
+) -> _Floats: ...
 
 # Images of the twin: crates/render.
 

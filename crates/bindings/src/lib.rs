@@ -3,6 +3,7 @@
 // PyO3 hands arguments over by value.
 #![allow(clippy::needless_pass_by_value)]
 
+mod analysis;
 mod arrays;
 mod camera;
 mod compensator;
@@ -30,6 +31,8 @@ use pyo3::types::PyTuple;
 mod _core {
     use super::{Bound, PyModule, PyModuleMethods, PyResult, PyTuple};
 
+    #[pymodule_export]
+    use super::analysis::{move_along_curve, track_coefficients};
     #[pymodule_export]
     use super::camera::Camera;
     #[pymodule_export]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -181,13 +182,15 @@ def seen_at(task: Task, share: float) -> Task:
     """
     travel = np.cumsum(np.abs(np.diff(task.command, prepend=task.command[0])))
     step = share * float(np.ptp(task.command)) * (1 - 1e-9)
-    sights = np.full(len(task.measured), np.nan)
-    due = -np.inf
-    for k in np.flatnonzero(np.isfinite(task.measured)):
-        if travel[k] >= due:
-            sights[k] = task.measured[k]
-            due = travel[k] + step
-    return replace(task, measured=sights)
+    with_tip = np.flatnonzero(np.isfinite(task.measured))
+    travels = travel[with_tip].tolist()
+    sights, at = [], 0
+    while at < len(travels):
+        sights.append(with_tip[at])
+        at = bisect_left(travels, travels[at] + step, at + 1)
+    measured = np.full(len(task.measured), np.nan)
+    measured[sights] = task.measured[sights]
+    return replace(task, measured=measured)
 
 
 def _horizon_error(model: Model, seen: Task, task: Task, scored: NDArray[np.intp]) -> HorizonError:

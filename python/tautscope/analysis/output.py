@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from os import PathLike
+from typing import Any
 
 import numpy as np
+import polars as pl
 from matplotlib.figure import Figure, SubFigure
 from numpy.typing import NDArray
 
@@ -13,6 +15,9 @@ from tautscope.analysis.models.registry import LINEAR_FIT
 from tautscope.analysis.models.task import Floats
 from tautscope.figure_style import BLUE, GREY, PAGE, style
 from tautscope.runs.output_folder import new_folder
+
+PARTS = 2000
+"""Parts of the horizontal axis that are drawn, more than a panel has pixels."""
 
 
 def write_analysis(analysis: Analysis, folder: str | PathLike[str]) -> None:
@@ -24,15 +29,19 @@ def write_analysis(analysis: Analysis, folder: str | PathLike[str]) -> None:
     columns = _columns(analysis)
     figure = analysis_figure(analysis)
     with new_folder(folder) as place, style():
-        np.savetxt(
-            place / "analysis.csv",
-            np.column_stack(list(columns.values())),
-            delimiter=",",
-            header=",".join(columns),
-            comments="",
-            fmt=["%d", *["%.9g"] * (len(columns) - 1)],
-        )
+        table = pl.DataFrame({name: _rounded(values) for name, values in columns.items()})
+        table.fill_nan(None).write_csv(place / "analysis.csv", null_value="nan")
         figure.savefig(place / "analyze.png")
+
+
+def _rounded(values: Floats | NDArray[np.int64]) -> Floats | NDArray[np.int64]:
+    """Numbers of nine significant digits, and integers."""
+    if values.dtype.kind == "i":
+        return values
+    with np.errstate(divide="ignore"):
+        places = 8 - np.floor(np.log10(np.abs(values)))
+    scale = 10 ** np.clip(places, 0, 300)
+    return np.asarray(np.round(values * scale) / scale)
 
 
 def _columns(analysis: Analysis) -> dict[str, Floats | NDArray[np.int64]]:
@@ -83,6 +92,18 @@ def _draw_horizons(figure: SubFigure, analysis: Analysis) -> None:
     figure.legend(loc="outside right upper")
 
 
+def _envelope(x: Floats | NDArray[np.int64], y: Floats) -> tuple[NDArray[Any], Floats]:
+    """Samples with the least and the largest y of each of many parts: they draw the same line."""
+    size = len(y) // PARTS
+    if size <= 2:
+        return x, y
+    parts = y[: PARTS * size].reshape(PARTS, size)
+    begins = size * np.arange(PARTS)
+    ends = parts.argmin(axis=1) + begins, parts.argmax(axis=1) + begins
+    kept = np.unique(np.concatenate([*ends, np.arange(PARTS * size, len(y))]))
+    return x[kept], y[kept]
+
+
 def _draw_models(figure: SubFigure, analysis: Analysis) -> None:
     """A row per model: its error with every tip over the record, and its loop over the measured.
 
@@ -105,7 +126,7 @@ def _draw_models(figure: SubFigure, analysis: Analysis) -> None:
         strip, loop = axes[row]
         strip.axvspan(at[0], at[analysis.half], color="#f0f0f0", linewidth=0)
         strip.axhline(0, color=GREY, linewidth=0.5)
-        strip.plot(at[measured], errors[row][measured], color=BLUE, linewidth=0.7)
+        strip.plot(*_envelope(at[measured], errors[row][measured]), color=BLUE, linewidth=0.7)
         if not np.isfinite(errors[row][: analysis.half]).any():
             middle = (at[0] + at[analysis.half]) / 2
             strip.text(middle, 0, "calibration: no prediction", ha="center", va="bottom")

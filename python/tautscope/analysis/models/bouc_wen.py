@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from tautscope._core import move_along_curve
 from tautscope.analysis.models.task import Floats, Prediction, Task, fit_samples
 
 _LIMIT = 18.0
@@ -73,25 +74,7 @@ def hysteretic_variable(
     slope = _SLOPE / rate
     curve = np.concatenate([[0.0], np.cumsum((slope[1:] + slope[:-1]) * (_P[1] - _P[0]) / 2)])
     at = float(np.arctanh(np.clip(start, _W[0], _W[-1])))
-    places = np.empty_like(command)
-    places[0] = at
-    begin = 0
-    for end, direction in _monotonic_segments(command):
-        travelled = rho * np.abs(command[begin + 1 : end + 1] - command[begin])
-        along = np.interp(direction * at, _P, curve) + travelled
-        places[begin + 1 : end + 1] = direction * np.interp(along, curve, _P)
-        at, begin = float(places[end]), end
-    return np.tanh(places)
-
-
-def _monotonic_segments(command: Floats) -> list[tuple[int, float]]:
-    """Last sample and direction of each segment in which the command does not turn."""
-    steps = np.sign(np.diff(command))
-    moving = np.flatnonzero(steps)
-    turns = moving[1:][np.diff(steps[moving]) != 0]
-    ends = [*turns.tolist(), len(command) - 1]
-    first = [*moving[:1].tolist(), *turns.tolist()]
-    return [(end, float(steps[at])) for end, at in zip(ends, first, strict=False)]
+    return np.tanh(move_along_curve(command, _P, curve, start=at, rate=rho))
 
 
 def fit(command: Floats, measured: Floats) -> BoucWen:

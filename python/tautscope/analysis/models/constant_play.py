@@ -7,7 +7,15 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from tautscope._core import Play
-from tautscope.analysis.models.task import SWEEP, Floats, Prediction, Task, fit_line, fit_samples
+from tautscope.analysis.models.task import (
+    SWEEP,
+    Floats,
+    Prediction,
+    Task,
+    essential,
+    fit_line,
+    fit_samples,
+)
 
 _LARGEST = SWEEP / 2
 """Largest radius, as a share of the command's range; at 0.5 the play never moves."""
@@ -72,6 +80,7 @@ def fit(command: Floats, measured: Floats, gain: float | None = None) -> Constan
     """
     from scipy.optimize import least_squares  # noqa: PLC0415  takes a third of a second
 
+    command, measured = essential(command, measured)
     where = fit_samples(command, measured)
     target = measured[where]
     extent = float(np.ptp(command))
@@ -84,10 +93,11 @@ def fit(command: Floats, measured: Floats, gain: float | None = None) -> Constan
     def residual(parameters: Floats) -> Floats:
         return scaled(extent * parameters[0], parameters[1])[2]
 
+    is_forgotten = np.ptp(command[: np.argmax(where) + 1]) >= SWEEP * extent
     grid = [
         np.array([share, start])
         for share in np.linspace(0, _LARGEST, _GRID)
-        for start in (0.0, -1.0, 1.0)  # 0 if the start has no effect on the error
+        for start in ((0.0,) if is_forgotten else (0.0, -1.0, 1.0))
     ]
     best = min(grid, key=lambda parameters: float(np.sum(residual(parameters) ** 2)))
     bounds = (np.array([0.0, -1.0]), np.array([_LARGEST, 1.0]))

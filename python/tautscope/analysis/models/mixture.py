@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from itertools import pairwise
 
 import numpy as np
 
@@ -19,6 +20,8 @@ MEMORIES = (0.8, 0.9, 0.95, 0.98, 0.995)
 """Discounts of past squared errors, per measured tip: memories of 5 to 200 tips."""
 SECOND_MEMORY = 0.9
 """Discount by which the mixtures of all memories are weighted."""
+BLOCK = 1024
+"""Tips that are weighted at a time; the least discount to this power must be a normal number."""
 FLOOR = 1e-3
 """Least error that is told from none, as a share of the tip's range."""
 
@@ -77,38 +80,55 @@ def mix(components: list[Component], signals: Signals) -> tuple[Floats, dict[str
         for refit in component.refits:
             fits[refit.count].append((slice(end - refit.errors.shape[1], end), refit))
     discounts = np.array(MEMORIES)
-    forgotten = 1  # there is no prediction of the first tip
-    losses, counts = np.zeros((len(MEMORIES), errors.shape[1])), np.zeros(len(MEMORIES))
-    second, second_count = np.zeros(len(MEMORIES)), 0.0
-    weights = np.full((len(MEMORIES), errors.shape[1]), 1 / errors.shape[1])
+    # Discounted sums of squared errors, and in the last column their number, per memory.
+    sums, second = np.zeros((len(MEMORIES), errors.shape[1] + 1)), np.zeros((1, len(MEMORIES) + 1))
+    weights = np.full((1, len(MEMORIES), errors.shape[1]), 1 / errors.shape[1])
     samples = len(signals.command)
     predicted, shares = np.full(samples, np.nan), np.full((samples, len(components)), np.nan)
-    for j, k in enumerate(signals.at):
-        if j < forgotten:
-            continue
-        second = SECOND_MEMORY * second + (weights @ errors[j]) ** 2 + FLOOR**2
-        second_count = SECOND_MEMORY * second_count + 1
-        if j + 1 in fits:
-            for columns, refit in fits[j + 1]:
-                errors[: j + 1, columns] = refit.errors
-                forgotten = max(1, refit.forgotten)
-            past = discounts[:, None] ** np.arange(j - forgotten, -1, -1.0)
-            counts = past.sum(axis=1)
-            losses = past @ (errors[forgotten : j + 1] ** 2) + counts[:, None] * FLOOR**2
-        else:
-            counts = discounts * counts + 1
-            losses = discounts[:, None] * losses + errors[j] ** 2 + FLOOR**2
-        weights = _weights(losses, counts[:, None])
-        total = _weights(second, second_count) @ weights
-        until = signals.at[j + 1] + 1 if j + 1 < len(signals.at) else samples
-        predicted[k + 1 : until] = variants[k + 1 : until] @ total
-        shares[k + 1 : until] = np.add.reduceat(total, np.concatenate([[0], ends[:-1]]))
+    bounds = {
+        1,
+        *fits,
+        *range(BLOCK, len(tips), BLOCK),
+        len(tips),
+    }  # nothing predicts the first tip
+    for begin, end in pairwise(sorted(bounds)):
+        block = errors[begin:end].copy()
+        found = _discounted(_terms(block), discounts, sums)
+        for columns, refit in fits.get(end, []):
+            errors[:end, columns] = refit.errors
+            forgotten = max(1, refit.forgotten)
+            past = discounts[:, None] ** np.arange(end - 1 - forgotten, -1, -1.0)
+            found[-1] = past @ _terms(errors[forgotten:end])
+        before = weights[-1:]
+        weights = _weights(found)
+        before = np.concatenate([before, weights[:-1]])
+        mixed = _terms(np.einsum("jbi,ji->jb", before, block))
+        both = _discounted(mixed, np.array([SECOND_MEMORY]), second)
+        total = np.einsum("jb,jbi->ji", _weights(both)[:, 0], weights)
+        sums, second = found[-1], both[-1]
+        first = signals.at[begin] + 1
+        last = signals.at[end] + 1 if end < len(tips) else samples
+        lengths = np.diff(signals.at[begin:end] + 1, append=last)
+        shown = np.repeat(total, lengths, axis=0)
+        predicted[first:last] = np.einsum("ki,ki->k", variants[first:last], shown)
+        shares[first:last] = np.add.reduceat(shown, np.concatenate([[0], ends[:-1]]), axis=1)
     names = [component.name for component in components]
     return predicted, dict(zip(names, shares.T, strict=True))
 
 
-def _weights(losses: Floats, counts: Floats | float) -> Floats:
-    """Posterior probabilities along the last axis; computed relative to the largest."""
-    logarithm = -counts / 2 * np.log(losses)
+def _terms(errors: Floats) -> Floats:
+    """Summands of L and, in the last column, of N: (j, i + 1) for errors (j, i)."""
+    return np.column_stack([errors**2 + FLOOR**2, np.ones(len(errors))])
+
+
+def _discounted(terms: Floats, discounts: Floats, past: Floats) -> Floats:
+    """Discounted sums (j, b, i) of terms (j, i) up to each, for sums (b, i) before the first."""
+    growth = discounts[:, None] ** -np.arange(1.0, len(terms) + 1)[:, None, None]
+    return np.asarray((past + np.cumsum(terms[:, None] * growth, axis=0)) / growth)
+
+
+def _weights(sums: Floats) -> Floats:
+    """Posterior probabilities (j, b, i) for sums (j, b, i + 1), relative to the largest."""
+    logarithm = -sums[..., -1:] / 2 * np.log(sums[..., :-1])
     weight = np.exp(logarithm - logarithm.max(axis=-1, keepdims=True))
     return np.asarray(weight / weight.sum(axis=-1, keepdims=True))

@@ -10,7 +10,7 @@ import numpy as np
 
 from tautscope._core import Estimator, TipFilter
 from tautscope.analysis.models import constant_play
-from tautscope.analysis.models.task import Floats, Prediction, Task
+from tautscope.analysis.models.task import Floats, Prediction, Task, shared
 from tautscope.config import Config
 from tautscope.loop.construction import core_settings
 
@@ -52,6 +52,7 @@ class InputScale:
     used: int
 
 
+@shared
 def input_scale(task: Task) -> InputScale:
     """Gain and offset for an on-line estimator.
 
@@ -72,7 +73,7 @@ def predict(task: Task, make: Make) -> Prediction:
     The contact offsets are relative to gain * command.
     """
     scale, tip, minus, plus = run_estimator(task, make)
-    tip[: scale.used] = np.nan
+    tip = np.where(np.arange(len(tip)) < scale.used, np.nan, tip)
     parameters = {
         "gain": scale.gain,
         "update_distance": update_distance(task, scale),
@@ -83,6 +84,7 @@ def predict(task: Task, make: Make) -> Prediction:
     return Prediction(tip, parameters, {"delta_minus": minus, "delta_plus": plus})
 
 
+@shared
 def run_estimator(task: Task, make: Make) -> tuple[InputScale, Floats, Floats, Floats]:
     """Scale of the input, and (n,) each: tip, delta_minus and delta_plus.
 

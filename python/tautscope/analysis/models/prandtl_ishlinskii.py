@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from tautscope.analysis.models.constant_play import operator
-from tautscope.analysis.models.task import Floats, Prediction, Task, fit_samples
+from tautscope.analysis.models.task import Floats, Prediction, Task, essential, fit_samples
 
 OPERATORS = 32
 """Number of plays; their radii go evenly from 0 to just below half the command's range."""
@@ -56,6 +56,7 @@ def fit(
     if radii is None:
         largest = float(np.ptp(command)) / 2
         radii = tuple(largest * i / OPERATORS for i in range(OPERATORS))
+    command, measured = essential(command, measured)
     where = fit_samples(command, measured)
     target = measured[where]
     outputs = operators(command, radii)[where]
@@ -70,7 +71,7 @@ def fit(
 
 def operators(command: Floats, radii: tuple[float, ...]) -> Floats:
     """Outputs (n, m) of plays of m radii, each started in the middle of its backlash."""
-    return np.column_stack([operator(command, radius, 0.0) for radius in radii])
+    return np.array([operator(command, radius, 0.0) for radius in radii]).T
 
 
 def run(task: Task) -> Prediction:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from functools import wraps
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,8 @@ from numpy.typing import NDArray
 from tautscope.config import Config
 
 Floats = NDArray[np.float64]
+P = ParamSpec("P")
+T = TypeVar("T")
 
 SWEEP = 0.9
 """Share of its range that the command must have swept before a fit begins."""
@@ -28,6 +31,7 @@ class Task:
         gain: Tip travel per command travel in contact, if known.
         update_distance: tau of Eqs. (4)-(6) in the tip's unit, if given.
         config: Its insertion has the settings of the on-line estimators.
+        results: What several models compute, by function and arguments; see `shared`.
     """
 
     command: Floats
@@ -36,6 +40,7 @@ class Task:
     gain: float | None
     update_distance: float | None
     config: Config
+    results: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def first_half(self) -> tuple[Floats, Floats]:
@@ -58,6 +63,20 @@ class Prediction:
     traces: Mapping[str, Floats] = field(default_factory=dict)
 
 
+def shared(function: Callable[Concatenate[Task, P], T]) -> Callable[Concatenate[Task, P], T]:
+    """Decorator of a function of a task and hashable arguments: several models share its result."""
+
+    @wraps(function)
+    def stored(task: Task, /, *args: P.args, **kwargs: P.kwargs) -> T:
+        key = function, args, tuple(kwargs.items())
+        if key not in task.results:
+            task.results[key] = function(task, *args, **kwargs)
+        found: T = task.results[key]
+        return found
+
+    return stored
+
+
 def last_seen(measured: Floats) -> NDArray[np.intp]:
     """(n,) index of the last measured tip before each sample; -1 if there is none."""
     at = np.where(np.isfinite(measured), np.arange(len(measured)), -1)
@@ -71,6 +90,18 @@ def continued(predicted: Floats, measured: Floats) -> Floats:
     """
     at = last_seen(measured)
     return predicted + np.where(at >= 0, (measured - predicted)[at], 0.0)
+
+
+def essential(command: Floats, measured: Floats) -> tuple[Floats, Floats]:
+    """The samples with a tip, and those at which the command turns, stops or starts.
+
+    The others have no effect on the output of any play at the samples with a tip.
+    """
+    steps = np.sign(np.diff(command))
+    kept = np.isfinite(measured)
+    kept[[0, -1]] = True
+    kept[1:-1] |= steps[1:] != steps[:-1]
+    return command[kept], measured[kept]
 
 
 def fit_samples(command: Floats, measured: Floats) -> NDArray[np.bool_]:

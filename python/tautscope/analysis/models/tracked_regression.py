@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from tautscope._core import track_coefficients
 from tautscope.analysis.models.task import Floats
 
 NOISE = 1e-3
@@ -43,25 +44,15 @@ def track(
         (n, k) predicted tip; NaN up to the first measured tip. Sample j uses the tips before j.
     """
     samples, size = features.shape
-    rows = np.column_stack([features, np.ones(samples)])
-    diagonal = np.arange(size + 1)
-    state = np.zeros((len(walks), size + 1))
-    state[:, 0] = 1
-    covariance = np.zeros((len(walks), size + 1, size + 1))
-    covariance[:, diagonal, diagonal] = spread**2
-    covariance[:, size, size] = UNKNOWN**2
-    growth = np.empty((len(walks), size + 1))
-    growth[:, :size] = (walks[:, 1:] * spread) ** 2
-    growth[:, size] = walks[:, 0] ** 2
-    predicted = np.full((samples, len(walks)), np.nan)
-    moved = np.diff(travel[at], prepend=travel[at[0]])
-    for j, k in enumerate(at):
-        row = rows[k]
-        covariance[:, diagonal, diagonal] += growth * moved[j]
-        projected = covariance @ row
-        weight = projected / (projected @ row + NOISE**2)[:, None]
-        state += weight * (tips[k] - state @ row)[:, None]
-        covariance -= weight[:, :, None] * projected[:, None, :]
-        until = at[j + 1] + 1 if j + 1 < len(at) else samples
-        predicted[k + 1 : until] = rows[k + 1 : until] @ state.T
-    return predicted
+    seen = np.full(samples, np.nan)
+    seen[at] = tips[at]
+    coefficients = (walks[:, 1:] * spread) ** 2
+    return track_coefficients(
+        np.column_stack([features, np.ones(samples)]),
+        travel,
+        seen,
+        mean=np.arange(size + 1) == 0,
+        variance=np.append(np.full(size, spread**2), UNKNOWN**2),
+        growth=np.column_stack([np.repeat(coefficients, size, axis=1), walks[:, :1] ** 2]),
+        noise=NOISE,
+    )
