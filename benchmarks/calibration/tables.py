@@ -13,7 +13,7 @@ def error_table(outcomes: Sequence[Outcome]) -> str:
     """Median and worst error of each quantity, and the share of images with both bands."""
     lines = ["| error | median | 90th percentile | worst |", "|---|--:|--:|--:|"]
     for name in outcomes[0].errors:
-        sizes = np.abs([each.errors[name] for each in outcomes])
+        sizes = np.abs([each.errors[name] for each in outcomes]).round(9)
         values = np.median(sizes), np.percentile(sizes, 90), sizes.max()
         lines.append(f"| {name} | " + " | ".join(f"{value:.2g}" for value in values) + " |")
     first, last = np.array([each.found for each in outcomes]).T

@@ -45,24 +45,29 @@ def actual() -> Config:
     )
 
 
-def states_of(motors: Floats) -> Floats:
-    """Tips (n, 3) that lag behind motors (n, 3) by a play each."""
+def states_of(motors: Floats, elastic: float = 0.0) -> Floats:
+    """Tips (n, 3) that lag behind motors (n, 3) by a play each; insertion follows by a share."""
     columns = [
         play(motors[:, dof], -half, half, start=motors[0, dof])
         for dof, half in zip(Dof, HALF_WIDTHS, strict=True)
     ]
+    columns[0] = (1 - elastic) * columns[0] + elastic * motors[:, 0]
     return np.stack(columns, axis=1)
 
 
 def simulate(
-    seed: int = 0, noise: float = 0.3, duration: float = 60.0, rig: Config | None = None
+    seed: int = 0,
+    noise: float = 0.3,
+    duration: float = 60.0,
+    rig: Config | None = None,
+    elastic: float = 0.0,
 ) -> tuple[Recording, Floats]:
     """A record of the calibration motion, and the true states of its images."""
     rig = rig or actual()
     time = np.arange(0.0, duration, 0.01)
     reference = SweepReference(told(), duration)
     motors = np.array([reference(at) for at in time])
-    states = states_of(motors)[::8]
+    states = states_of(motors, elastic)[::8]
     features = build_feature_model(rig).predict_all(states, np.zeros(len(states)))[0]
     features += noise * np.random.default_rng(seed).standard_normal(features.shape)
     camera = rig.camera

@@ -87,6 +87,37 @@ def test_a_measured_distance_sets_the_scale() -> None:
     assert gain == pytest.approx(np.log(1 / 1.2), abs=0.05)
 
 
+def relative_scale(config: Config) -> float:
+    """Distance of the bands over the true one, minus 1."""
+    one, other = config.instrument, actual().instrument
+    return (one.marker_b - one.marker_a) / (other.marker_b - other.marker_a) - 1
+
+
+def asks_for_the_distance(found: GeometryFit) -> bool:
+    return any("--band-distance" in warning for warning in found.warnings)
+
+
+def test_a_tip_that_follows_within_its_play_costs_neither_scale_nor_delay() -> None:
+    """A soft channel: the tip moves by 30 % of the drive's travel while the shaft sticks."""
+    found = fit(simulate(elastic=0.3)[0], told())
+    assert found.is_plausible and asks_for_the_distance(found), found.warnings
+    assert abs(relative_scale(found.config)) < 0.02
+    key = "camera.source.delay"
+    assert abs(found.changes[key] - DELAY) < 3 * found.std[key] < 0.1
+    assert not asks_for_the_distance(plain_fit())
+
+
+def test_loops_that_no_play_has_are_reported_where_they_set_the_scale() -> None:
+    recording, _ = simulate()
+    motors = recording.motors.copy()
+    # An insertion drive whose position wanders by a millimetre.
+    motors[:, 0] += 1e-3 * np.sin(2 * np.pi * recording.time / 13.7)
+    wandering, rig = replace(recording, motors=motors), actual().instrument
+    assert asks_for_the_distance(fit(wandering, told()))
+    distance = rig.marker_b - rig.marker_a
+    assert not asks_for_the_distance(fit(wandering, told(), band_distance=distance))
+
+
 @pytest.mark.parametrize(("dof", "zero"), [(0, 3e-3), (1, 0.1)])
 def test_zeros_of_insertion_and_rotation_are_those_of_the_drives(dof: int, zero: float) -> None:
     """A drive whose zero is elsewhere moves the guide along the channel, or rolls it."""

@@ -166,3 +166,34 @@ def test_the_actual_rig_is_at_the_differences_of_its_parameters() -> None:
     whole = np.column_stack([STATES, np.zeros(len(STATES))])
     expected, _ = build_feature_model(rig).predict_all(STATES, np.zeros(len(STATES)))
     np.testing.assert_allclose(model.features(z, whole)[0], expected, atol=1e-9)
+
+
+def test_one_factor_of_all_lengths_and_of_insertion_changes_no_feature() -> None:
+    """Whatever the motors let expect: a deviation from it says nothing about the scale."""
+    recording, states = simulate(duration=10.0)
+    config = told()
+    config = config.replace(
+        **{"instrument.diameter": 1e-5, "instrument.band_length": 1e-5}  # they are not estimated
+    )
+    data = Data(recording.time, recording.motors, recording.captured_at, recording.features)
+    model = Model(config, data, None)
+    z, active = np.zeros(len(NAMES)), np.ones(len(NAMES), dtype=bool)
+    states = np.column_stack([states + np.array([2e-3, 0.1, -0.1]), np.zeros(len(states))])
+    by_z = model.by_parameters(z, states, active)
+    instrument = config.instrument
+    change = {
+        **dict(zip(NAMES[:3], config.camera.camera_from_guide.translation, strict=True)),
+        "instrument.bending_length": 1.0,  # a logarithm
+        "instrument.marker_a": instrument.marker_a,
+        "instrument.marker_b": instrument.marker_b,
+        "gain insertion": 1.0,
+        "zero insertion": recording.motors[0, 0],
+    }
+    by_scale = sum(
+        by_z[:, :, INDEX[name]] * size / model.prior_std[INDEX[name]]
+        for name, size in change.items()
+    )
+    alone = by_z[:, :, INDEX["gain insertion"]] / model.prior_std[INDEX["gain insertion"]]
+    is_visible = np.isfinite(by_scale).all(axis=1)
+    assert is_visible.sum() > 50
+    assert np.abs(by_scale[is_visible]).max() < 0.01 * np.abs(alone[is_visible]).max()

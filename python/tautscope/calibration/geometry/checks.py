@@ -34,6 +34,11 @@ LARGEST_DIFFERENCE = 4.0
 """From the configuration, and between the fit and that with free states [standard deviations]."""
 LARGEST_LAST_STEP = 0.5
 """Of the solver [standard deviations]."""
+ELASTIC_SHARE = 0.15
+"""Elastic share of insertion above which scale and delay depend on how it is modelled."""
+LARGEST_MISFIT = 0.025
+"""Root mean square deviation of insertion from its expectation, as a share of `width_limit`, above
+which a play does not describe its loops; 0.016 to 0.020 on twins."""
 UNDETERMINED = 0.9
 """Ratio of a standard deviation to that before the fit above which a value is not determined."""
 
@@ -102,6 +107,11 @@ def find_doubts(
                 f"{scale * deviation[dof]:.2g} {unit} RMS: are the motors in the order insertion, "
                 "rotation, bending, with the right signs, and all coupled?"
             )
+    if model.is_scale_of_drive and (misfit := _misfit(model, solution, float(deviation[0]))):
+        warnings.append(
+            f"{misfit}: scale and delay are less certain than their standard deviations say. "
+            "Measure the distance of the bands' centres and give it as --band-distance"
+        )
     if solution.last_step > LARGEST_LAST_STEP:
         doubts.append("The fit did not converge")
     std = np.sqrt(np.diag(solution.covariance))
@@ -118,6 +128,15 @@ def find_doubts(
     if contradiction := _contradiction(solution, free, active):
         doubts.append(contradiction)
     return doubts, warnings
+
+
+def _misfit(model: Model, solution: Solution, deviation: float) -> str:
+    """What of insertion's hysteresis a play does not describe; empty if nothing."""
+    if (share := model.elastic_share(solution.z)) > ELASTIC_SHARE:
+        return f"Within its play the tip follows {share:.0%} of the insertion drive's travel"
+    if deviation > LARGEST_MISFIT * model.width_limit[Dof.INSERTION]:
+        return f"Insertion deviates by {1e3 * deviation:.2g} mm RMS from its model of hysteresis"
+    return ""
 
 
 def _contradiction(solution: Solution, free: Solution, active: NDArray[np.bool_]) -> str:

@@ -11,9 +11,10 @@ from tautscope import _core
 from tautscope.calibration.geometry.parameters import (
     IMAGE,
     INDEX,
+    LARGEST_ELASTIC_SHARE,
     PARAMETERS,
+    TYPICAL_ELASTIC_SHARE,
     TYPICAL_LAG,
-    TYPICAL_ROUNDING,
     Geometry,
     prior_std,
 )
@@ -33,6 +34,7 @@ _SHARED = 1.4
 """Median of the prior of the logit of the share of friction that the shaft has in common."""
 _TICK = 0.02
 """Motor positions are interpolated straight over this time [s]."""
+_SCALE = INDEX["gain insertion"]
 _STEP = 1e-3
 """Step of the numerical derivatives, in standard deviations of the prior."""
 
@@ -66,9 +68,11 @@ class Model:
     besides that of the parameters theta,
 
         s = h(q, e0 + e1 (q3 - centre) + nu; theta)          the core's feature model
-        q ~ c0 + g (Play(c) - c0) + zero,   at the capture time less delay and lags
+        q ~ c0 + g ((1 - a) Play(c) + a c - c0) + zero,   at the capture time less delay and lags
 
     with the core's vector play of insertion and rotation, and c0 the first position of the motors.
+    The elastic share a of insertion is the slope of the tip within the play, where a channel gives
+    way under a shaft that sticks to it; for rotation and bending, a = 0.
 
     Args:
         config: The configuration that the parameters are differences from.
@@ -81,6 +85,7 @@ class Model:
         self.count = len(data.captured_at)
         self._config, self._band_distance = config, band_distance
         self.prior_std = prior_std(by_band_distance=band_distance is not None)
+        self.is_scale_of_drive = band_distance is None
         self._radius = config.instrument.diameter / 2
         self.width_limit = np.array(config.safety.width_limit)
         self._centre = config.experiment.bending.centre
@@ -116,29 +121,34 @@ class Model:
             return np.array([value[INDEX[f"{name} {dof.label}"]] for dof in Dof])
 
         half_width = _HALF_WIDTH * self.width_limit * np.exp(of("half width"))
-        rounding = min(TYPICAL_ROUNDING * float(np.exp(value[INDEX["rounding"]])), 0.9)
         shared = float(1 / (1 + np.exp(-_SHARED - value[INDEX["shared friction"]])))
         data = self.data
-        plays = [
-            _core.Hysteresis(
-                half_width=share * half_width,
-                centre=(0.0, 0.0, 0.0),
-                shared=shared,
-                radius=self._radius,
-            ).run(data.motors)
-            for share in (1 - rounding, 1 + rounding)
-        ]
-        tip = np.mean(plays, axis=0)
+        tip = _core.Hysteresis(
+            half_width=half_width, centre=(0.0, 0.0, 0.0), shared=shared, radius=self._radius
+        ).run(data.motors)
+        elastic = self.elastic_share(z)
+        tip[:, 0] = (1 - elastic) * tip[:, 0] + elastic * data.motors[:, 0]
         lags = value[INDEX["camera.source.delay"]] + TYPICAL_LAG * np.exp(of("lag"))
         at = [np.interp(data.captured_at - lags[dof], data.time, tip[:, dof]) for dof in Dof]
         start = data.motors[0]
         states = start + np.exp(of("gain")) * (np.stack(at, axis=1) - start) + of("zero")
         return np.column_stack([states, np.zeros(self.count)])
 
+    def elastic_share(self, z: Floats) -> float:
+        """Share of insertion's travel that the tip follows within its play."""
+        name = "elastic share insertion"
+        log = float((z * self.prior_std)[INDEX[name]])
+        return min(TYPICAL_ELASTIC_SHARE * float(np.exp(log)), LARGEST_ELASTIC_SHARE)
+
     def by_parameters(self, z: Floats, states: Floats, active: NDArray[np.bool_]) -> Floats:
         """Derivatives (n, 4, parameters) of the features by z, with the states at `states`.
 
         Parameters of the motion act through the expected state. NaN where a band is not visible.
+
+        Where the drive is the scale, the derivative by the gain of insertion is taken at `states`,
+        not at the expected ones: then one factor of all lengths and of this gain changes no
+        feature, as in an image. Otherwise the lengths would be estimated too short, because that
+        makes the deviations shorter (decision 0049).
         """
         result = np.zeros((self.count, 4, len(PARAMETERS)))
         _, by_state = self.features(z, states)
@@ -148,6 +158,9 @@ class Model:
             if IMAGE.start <= index < IMAGE.stop:
                 ahead, behind = (self._features_alone(z + way, states) for way in (step, -step))
                 result[:, :, index] = (ahead - behind) / (2 * _STEP)
+            elif index == _SCALE and self.is_scale_of_drive:
+                travel = (states[:, 0] - self.data.motors[0, 0]) * self.prior_std[index]
+                result[:, :, index] = by_state[:, :, Dof.INSERTION] * travel[:, None]
             else:
                 by_step = (self.expected(z + step) - self.expected(z - step)) / (2 * _STEP)
                 result[:, :, index] = np.einsum("nij,nj->ni", by_state, by_step)

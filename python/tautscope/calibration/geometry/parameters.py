@@ -63,7 +63,7 @@ _TIMES = (
 )
 _PLAY = (
     *(Parameter(f"half width {dof.label}", 0.5, 1, "log") for dof in Dof),
-    Parameter("rounding", 0.7, 1, "log"),
+    Parameter("elastic share insertion", 1.0, 1, "log"),
     Parameter("shared friction", 1.5, 1, "logit"),
     *(Parameter(f"gain {dof.label}", 0.2, 100, "%") for dof in Dof),
     Parameter("zero insertion", 1e-3, 1e3, "mm"),
@@ -77,14 +77,20 @@ IMAGE = slice(0, INDEX["unevenness over bending"] + 1)
 """The parameters that the features depend on; the others are of the motion of the tip."""
 RESULTS = slice(0, INDEX["camera.source.delay"] + 1)
 """The parameters that are results; the others are those of this motion alone."""
-TYPICAL_ROUNDING = 0.15
-"""Median of the prior of the rounding of the loops."""
+TYPICAL_ELASTIC_SHARE = 0.07
+"""Median of the prior of the share of insertion's travel that the tip follows within its play."""
+LARGEST_ELASTIC_SHARE = 0.9
 TYPICAL_LAG = 0.03
 """Median of the prior of the lag of the tip behind the motors [s]."""
 
 
-SCALE_STD = 0.01
-"""Prior standard deviation of the gain of insertion, where it is the scale of all lengths."""
+SCALE_STD = 0.02
+"""Prior standard deviation of the gain of insertion, where it is the scale of all lengths: what the
+play does not describe acts like a gain of 1 to 2 % (decision 0049)."""
+SECTION_SHAPE_STD = (0.03, 0.05)
+"""Standard deviation of the section's length from a shape that one unevenness does not describe, as
+a share of it: at the least, and per unevenness over bending [rad]. No residual shows it (decision
+0049)."""
 
 
 def prior_std(*, by_band_distance: bool) -> Floats:

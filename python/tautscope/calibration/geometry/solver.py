@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.calibration.geometry.model import FEATURE_STD, Model
-from tautscope.calibration.geometry.parameters import RESULTS
+from tautscope.calibration.geometry.parameters import INDEX, RESULTS, SECTION_SHAPE_STD
 
 Floats = NDArray[np.float64]
 TOLERANCE = 0.02
@@ -29,7 +29,8 @@ class Solution:
 
     Attributes:
         z: Parameters.
-        covariance: (parameters, parameters), robust against errors that last up to `BLOCK`.
+        covariance: (parameters, parameters), robust against errors that last up to `BLOCK`, with
+            `SECTION_SHAPE_STD`.
         states: (images, 4) most probable state and unevenness of each image.
         residuals: (images, 4) measured minus predicted features [px]; NaN where not visible.
         expected: (images, 4) states that the motors let expect.
@@ -103,6 +104,8 @@ def solve(
     last_step = float(sizes[RESULTS].max())
     covariance = np.zeros_like(information)
     covariance[pick] = _covariance(information[pick], scores[:, active], model.data.captured_at)
+    section = INDEX["instrument.bending_length"]
+    covariance[section, section] += (_section_shape_std(model, z) / model.prior_std[section]) ** 2
     residuals = model.data.features - model.features(z, images.states)[0]
     return Solution(z, covariance, images.states, residuals, model.expected(z), last_step)
 
@@ -157,6 +160,12 @@ def _covariance(information: Floats, scores: Floats, captured_at: Floats) -> Flo
     # With few blocks the robust one may be too small in some directions.
     scale = np.sqrt(np.maximum(np.diag(inverse) / np.diag(robust), 1.0))
     return np.asarray(robust * np.outer(scale, scale))
+
+
+def _section_shape_std(model: Model, z: Floats) -> float:
+    least, per_slope = SECTION_SHAPE_STD
+    slope = INDEX["unevenness over bending"]
+    return float(np.hypot(least, per_slope * z[slope] * model.prior_std[slope]))
 
 
 def _whitened(model: Model, z: Floats, states: Floats) -> tuple[Floats, Floats]:
