@@ -157,6 +157,8 @@ def test_everything_is_in_the_log_and_the_log_replays(tmp_path: Path) -> None:
         page.wait(lambda: page.state["motion"] == "stopped")
         while not (tmp_path / "still-1.png").exists():
             time.sleep(0.01)
+        while console.control.run.ticks <= 100:
+            time.sleep(0.01)
     log = read_log(tmp_path / "console-1.mcap")
     texts = [event.text for event in log.events.values() if isinstance(event, Request)]
     found = [text.partition(": ")[2] or text for text in texts]
