@@ -72,20 +72,19 @@ def _write(stored: StoredRun, folder: Path) -> None:
     from tautscope.figure_style import style  # noqa: PLC0415
     from tautscope.report import tables  # noqa: PLC0415
     from tautscope.report.figures import figure5  # noqa: PLC0415
-    from tautscope.report.report import CaptionedFigure, run_report  # noqa: PLC0415
+    from tautscope.report.report import (  # noqa: PLC0415
+        FIGURE5_CAPTION,
+        CaptionedFigure,
+        run_report,
+    )
     from tautscope.runs.output_folder import new_folder  # noqa: PLC0415
 
     run = stored.run
     recording = run.compensated
     pictures = [run.figure()]
     if recording.snapshot is not None:
-        caption = (
-            "Fig. 5. One image of the run: (a) the image, (b) the pixels above the discriminant's "
-            "threshold, (c) the regions of these pixels with markers A and B, and (d) measured and "
-            "predicted features."
-        )
         drawn = figure5(recording.snapshot, recording.config)
-        pictures.append(("fig5.png", CaptionedFigure(drawn, caption)))
+        pictures.append(("fig5.png", CaptionedFigure(drawn, FIGURE5_CAPTION)))
     time = recording.trace["time"]
     facts = {
         "run": str(stored.source),

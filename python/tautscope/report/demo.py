@@ -17,7 +17,7 @@ from tautscope.report.operator_motion import (
     evaluate_operator_motion,
     operator_motion,
 )
-from tautscope.report.report import CaptionedFigure
+from tautscope.report.report import FIGURE5_CAPTION, CaptionedFigure
 from tautscope.report.results import Results, evaluate
 from tautscope.report.rows import ROWS
 from tautscope.runs.output_folder import new_folder
@@ -172,9 +172,7 @@ def write_run_folder(demo: Demo, folder: str | PathLike[str]) -> None:
         captioned.append(
             CaptionedFigure(
                 figures.figure5(demo.compensated.snapshot, demo.config),
-                "Fig. 5. One frame of the compensated run: (a) the image, (b) the pixels above the "
-                "discriminant's threshold, (c) the regions of these pixels with markers A and B, "
-                "and (d) measured and predicted features.",
+                FIGURE5_CAPTION,
             )
         )
     operator_figure = draw_operator_motion(demo.operator_uncompensated, demo.operator_compensated)

@@ -51,6 +51,11 @@ dt { color: #555; } dd { margin: 0; }
   h2 { break-after: avoid; } figure, tr { break-inside: avoid; } pre { white-space: pre-wrap; } }
 """
 
+FIGURE5_CAPTION = (
+    "Fig. 5. One image of the run: (a) the image, (b) the pixels above the discriminant's "
+    "threshold, (c) the regions of these pixels with markers A and B, and (d) measured and "
+    "predicted features."
+)
 _BY_CAMERA = "Measured by the camera: the true state of the tip is not known on hardware."
 
 
