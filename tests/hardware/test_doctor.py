@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -81,6 +82,12 @@ def permitted(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     asked: list[int] = []
     monkeypatch.setattr(os, "sched_setscheduler", lambda pid, policy, of: asked.append(policy))
     return asked
+
+
+def set_free_space(monkeypatch: pytest.MonkeyPatch, free: float) -> None:
+    """Let every disk have `free` bytes left: the disk of the computer that tests may be full."""
+    usage = type("Usage", (), {"free": int(free)})
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: usage)
 
 
 @pytest.mark.parametrize("modes", [(7, 8), (1, 7)], ids=["csp", "article"])
@@ -168,6 +175,8 @@ def test_text_output_contains_the_remedy(
         raise PermissionError
 
     monkeypatch.setattr(os, "sched_setscheduler", refuse)
+    monkeypatch.setattr("tautscope.hardware.doctor.computer._speed", lambda folder, size: 1e9)
+    set_free_space(monkeypatch, 1e12)
     file = tmp_path / "rig.toml"
     file.write_text("[camera.source]\nurl = '/dev/video99'\n")
     assert main(["doctor", "--config", str(file)]) == 1
@@ -239,6 +248,7 @@ def test_missing_heartbeat_is_reported(hub: Hub, bench: Bench) -> None:
 def test_full_or_slow_disk_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     config = from_document({})
     where = "tautscope.hardware.doctor.computer"
+    set_free_space(monkeypatch, 1e12)
     monkeypatch.setattr(f"{where}._speed", lambda folder, size: 1e9)
     assert check_disk(config, tmp_path).status == "ok"
     # 720 x 576 x 3 bytes, 50 a second, 55 % of it: 34 MB/s, or 20 GB in ten minutes.
@@ -246,8 +256,7 @@ def test_full_or_slow_disk_is_reported(tmp_path: Path, monkeypatch: pytest.Monke
     slow = check_disk(config, tmp_path)
     assert (slow.status, "faster disk" in slow.todo) == ("missing", True)
     assert slow.data["needed_per_second"] == pytest.approx(34.2e6, rel=0.01)
-    used = type("Usage", (), {"free": 20e9})
-    monkeypatch.setattr(f"{where}.shutil.disk_usage", lambda folder: used)
+    set_free_space(monkeypatch, 20e9)
     assert "more space" in check_disk(config, tmp_path).todo
     monkeypatch.undo()
     assert "ls -ld" in check_disk(config, tmp_path / "none").todo
