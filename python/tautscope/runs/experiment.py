@@ -111,11 +111,12 @@ def run_experiment(
         segments = tuple(reference.segments)
         return Recording(trace, frames, config, compensate, segments, recorder.snapshot, warnings)
 
+    dated = reference if isinstance(reference, DatedReference) else None
     sample = rig.reset()
     start = sample.time
     while (elapsed := sample.time - start) < reference.duration:
         desired = reference(elapsed)
-        made_at = start + reference.made_at if isinstance(reference, DatedReference) else None
+        made_at = None if dated is None else start + dated.made_at
         if events is not None:
             events.write(sample.time)
         command = reduction.step(desired, time=sample.time, made_at=made_at)
