@@ -1,6 +1,6 @@
 """Write docs/traceability.md and docs/soup.md, for whoever assesses the risks of a rig.
 
-``uv run docs/assurance.py``; tests/test_assurance.py requires that both pages are up to date.
+``uv run docs/assurance.py``; tests/docs/test_assurance.py requires that both pages are up to date.
 """
 
 from __future__ import annotations

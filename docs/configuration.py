@@ -1,7 +1,7 @@
 """Write docs/configuration.md: every key, from the docstrings and types of the sections.
 
-``uv run docs/configuration.py``; tests/test_config_reference.py requires that the page is up to
-date.
+``uv run docs/configuration.py``; tests/config/test_config_reference.py requires that the page is
+up to date.
 """
 
 from __future__ import annotations

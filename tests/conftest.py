@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 import pytest
+from common.paths import DATA
 from drawn import DrawnRig, short_experiment
 from tautscope.loop.references import SineSequence
 from tautscope.runs.experiment import run_experiment
@@ -17,8 +18,7 @@ def shared_data(*parts: str) -> Path:
 
     If it does not exist, the test is skipped, on CI it fails.
     """
-    default = Path(__file__).resolve().parents[2] / "shared" / "data"
-    path = Path(os.environ.get("TAUTSCOPE_DATA", default)).joinpath(*parts)
+    path = DATA.joinpath(*parts)
     if not path.exists():
         reason = f"no {path}: set TAUTSCOPE_DATA to the folder of the shared data"
         if os.environ.get("CI") == "true":

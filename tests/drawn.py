@@ -1,16 +1,14 @@
 """The rig of examples/own_rig.py, for tests and for the worker processes they start."""
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
-EXAMPLES = Path(__file__).parents[1] / "examples"
-sys.path.insert(0, str(EXAMPLES))  # spawned workers inherit the path
+import own_rig
+from common.paths import ROOT
+from own_rig import BACKLASH, DrawnRig
+from tautscope.config import Config
+from tautscope.runs.trials import Trial
 
-import own_rig  # noqa: E402
-from own_rig import BACKLASH, DrawnRig  # noqa: E402
-from tautscope.config import Config  # noqa: E402
-from tautscope.runs.trials import Trial  # noqa: E402
+EXAMPLES = ROOT / "examples"
 
 __all__ = [
     "BACKLASH",

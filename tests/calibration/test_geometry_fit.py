@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from calibration.records import Case, Instrument
 from simulated_motion import DELAY, actual, simulate, told
 from tautscope.calibration.geometry import GeometryFit, Recording, fit, sweep
 from tautscope.config import Config
@@ -17,10 +16,6 @@ from tautscope.errors import FieldError, MotionHeldError, RecordError, SignalErr
 from tautscope.loop.rig import Sample
 from tautscope.twin import Twin
 from tautscope.twin.drawn_rig import draw_geometry
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
-
-from calibration.records import Case, Instrument
 
 
 @cache

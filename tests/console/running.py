@@ -6,7 +6,6 @@ Its limits of time are longer than in use, because the computer may be busy.
 
 from __future__ import annotations
 
-import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -17,17 +16,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from console import pages
+from console.pages import PERIOD
 from tautscope.config import Config, load_config
 from tautscope.console import lease, operator_input
 from tautscope.console.live_twin import LiveTwin
 from tautscope.console.rig_control import RigControl
 from tautscope.console.session import Session
 from tautscope.console.start import web_server
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
-
-from console import pages
-from console.pages import PERIOD
 
 TIMEOUT, AGE = 1.5, 4.0
 """In place of `COMMAND_TIMEOUT` and `COMMAND_AGE` [s]."""

@@ -11,11 +11,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from common.paths import ROOT
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 from running import AGE, RunningConsole, rests
 
 CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
-AXE = Path(__file__).resolve().parents[2] / "target" / "axe-core" / "package" / "axe.min.js"
+AXE = ROOT / "target" / "axe-core" / "package" / "axe.min.js"
 FLAGS = [
     "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-quic", "--disable-sync",
     "--disable-background-networking", "--disable-component-update",

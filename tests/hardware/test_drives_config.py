@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from common.paths import ROOT
 from drive_settings import AXES, drives_config, drives_document
 from tautscope.config import Config, dump_config, from_document, load_config
 from tautscope.dof import Dof
@@ -118,7 +119,7 @@ def test_import_loads_no_bus_library() -> None:
 
 
 def test_documented_configuration_is_valid() -> None:
-    page = Path(__file__).resolve().parents[2] / "docs" / "hardware.md"
+    page = ROOT / "docs" / "hardware.md"
     (block,) = re.findall(r"```toml\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
     drives = from_document(tomllib.loads(block)).drives
     assert drives is not None

@@ -1,12 +1,8 @@
 """A recording whose process is killed, as in `benchmarks/recordings --kills`."""
 
-import sys
 from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
-
 from recordings.kills import Scene, kill_one, make_scene
 
 

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 import zenoh
+from common.paths import ROOT
 from ros2.peers import JOINTS, free_endpoint
 from tautscope.cli import main
 from tautscope.log.reader import read_log
@@ -24,7 +25,6 @@ from tautscope.log.replay import replay_same
 from tautscope.ros2 import messages, types
 from tautscope.ros2.session import Node
 
-ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "interfaces" / "ros2.md").read_text(encoding="utf-8")
 START = np.array([0.025, 0.0, 0.9])
 TIMEOUT = 60.0

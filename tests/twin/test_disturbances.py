@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from conditions import frames as frames_of
 from numpy.typing import NDArray
 from tautscope.config import DISTURBANCES, Config
 from tautscope.loop.rig import Frame
@@ -18,9 +18,6 @@ from tautscope.twin.bands import Bands
 from tautscope.twin.camera import RenderedImage, TwinCamera
 from tautscope.twin.disturbances import NO_INSTRUMENT, TABLE
 from tautscope.twin.noise import TemporalNoise
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
-from conditions import frames as frames_of
 
 Array = NDArray[Any]
 

@@ -3,16 +3,14 @@
 import ast
 import re
 import tomllib
-from pathlib import Path
 
 import numpy as np
 import pytest
+from common.paths import ROOT
 from tautscope.config import Config, load_config
 from tautscope.dof import Dof
 from tautscope.report.metrics import loop_width
 from tautscope.twin.plant import Plant
-
-ROOT = Path(__file__).parents[2]
 
 
 def plant_for(seed=0, **changes):

@@ -2,23 +2,19 @@
 
 import json
 import math
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from tautscope.config import load_config
-from tautscope.dof import Dof
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
-
 from common.doc_pages import insert
 from hysteresis import ablation, tables
 from hysteresis.goals import GOALS
 from hysteresis.measures import fold_reduction
 from hysteresis.scenarios import SCENARIOS
 from hysteresis.simulation import Sines, uncompensated
+from tautscope.config import load_config
+from tautscope.dof import Dof
 
 NAME = "reduction of mean width"
 

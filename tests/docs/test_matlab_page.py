@@ -1,9 +1,9 @@
 """docs/interfaces/matlab.md: its code is what `.ci/matlab` runs, its tables name what there is."""
 
 import re
-from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
+from common.paths import ROOT
+
 PAGE = (ROOT / "docs" / "interfaces" / "matlab.md").read_text(encoding="utf-8")
 
 

@@ -5,11 +5,17 @@ from __future__ import annotations
 import re
 import sys
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from common.paths import ROOT
+from common.processes import run_parallel
+from instruments import properties, runs
+from instruments.explanation import explain
+from instruments.properties import TABLE, draw_instrument, markdown_table
+from instruments.rows import seed_rows, summary_rows, table
+from instruments.runs import Figures, Run, simulate
 from scipy.spatial.transform import Rotation
 from tautscope.config import Config, load_config
 from tautscope.dof import Dof
@@ -19,16 +25,6 @@ from tautscope.report.metrics import loop_width
 from tautscope.twin import Twin
 from tautscope.twin.plant import Plant
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
-
-from common.processes import run_parallel
-from instruments import properties, runs
-from instruments.explanation import explain
-from instruments.properties import TABLE, draw_instrument, markdown_table
-from instruments.rows import seed_rows, summary_rows, table
-from instruments.runs import Figures, Run, simulate
-
-ROOT = Path(__file__).resolve().parents[1]
 NEUTRAL = {
     each.name: 1.0 if each.name.split()[0] in {"width", "gain"} else 0.0 for each in TABLE
 } | {

@@ -5,11 +5,10 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
+from common.paths import ROOT
 
-ROOT = Path(__file__).resolve().parents[1]
 SEEDS = (200, 201)
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the campaign forks")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from common.paths import ROOT
 from tautscope.config import (
     Config,
     ControlConfig,
@@ -22,7 +23,7 @@ from tautscope.config import (
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError, MissingPathError
 
-CONFIGS = Path(__file__).parents[1] / "configs"
+CONFIGS = ROOT / "configs"
 
 
 def loaded(tmp_path: Path, text: str) -> Config:

@@ -6,23 +6,19 @@ import json
 import math
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
+from common.paths import ROOT
+from faults import campaign, envelopes, evaluation, runs, scenarios, tables
+from faults.operator_input import OperatorInput
+from faults.recorder import RunRecorder
 from tautscope.config import load_config
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError
 from tautscope.loop.safety import Reaction, Supervision
 from tautscope.twin.faults import KINDS, Fault
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
-
-from faults import campaign, envelopes, evaluation, runs, scenarios, tables
-from faults.operator_input import OperatorInput
-from faults.recorder import RunRecorder
-
-ROOT = Path(__file__).resolve().parents[1]
 CONFIG = load_config()
 needs_fork = pytest.mark.skipif(sys.platform == "win32", reason="the campaign forks")
 

@@ -5,10 +5,10 @@ import importlib
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
-from pathlib import Path
 
 import numpy as np
 import pytest
+from common.paths import ROOT
 from matplotlib.figure import Figure
 from tautscope.dof import Dof
 from tautscope.report import figures, tables
@@ -20,7 +20,6 @@ from tautscope.report.rows import ARTICLE, OPERATOR_ROWS, ROWS
 from tautscope.report.tables import article_cell, cell
 from tautscope.runs.recording import Recording
 
-ROOT = Path(__file__).resolve().parents[1]
 VOID = {"meta", "img", "br"}
 
 

@@ -1,10 +1,10 @@
 """Template and reference page of the configuration."""
 
 import re
-import sys
 import tomllib
 from pathlib import Path
 
+import configuration
 import msgspec
 import pytest
 from tautscope.config import RIGS, Config, config_file, load_config
@@ -12,11 +12,6 @@ from tautscope.config.descriptions import all_sections, keys
 from tautscope.config.placeholders import placeholders, refuse_placeholders
 from tautscope.config.template import template
 from tautscope.errors import ConfigError
-
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT / "docs"))
-
-import configuration  # noqa: E402
 
 CONFIGS = [None, *RIGS]
 

@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from play_model import play
-from tautscope.dof import Dof
-from tautscope.loop.rig import Rig
-from tautscope.report.metrics import loop_width
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
-
 from plants.__main__ import ESTIMATE_GOAL, GOAL, WORST_GOAL, table, to_rows
 from plants.simulated import GAIN, HALF, PlantRig
 from plants.tracking import Outcome
+from play_model import play
 from tautscope.config import load_config
+from tautscope.dof import Dof
+from tautscope.loop.rig import Rig
+from tautscope.report.metrics import loop_width
 
 Floats = NDArray[np.float64]
 CONFIG = load_config()

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from common.paths import ROOT
 from drawn import DrawnRig, short_experiment
 from tautscope.config import dump_config
 
-PAGES = Path(__file__).resolve().parents[1] / "docs" / "interfaces"
+PAGES = ROOT / "docs" / "interfaces"
 EXAMPLES = PAGES.parents[1] / "examples"
 
 

@@ -13,6 +13,7 @@ from importlib.metadata import packages_distributions
 from pathlib import Path
 
 import pytest
+from common.paths import ROOT
 from refused import failed
 from tautscope.cli import _parser, main
 from tautscope.errors import (
@@ -26,7 +27,6 @@ from tautscope.errors import (
 from tautscope.extras import MODULES, require_extras
 
 Capture = pytest.CaptureFixture[str]
-ROOT = Path(__file__).resolve().parents[1]
 COMMAND = [sys.executable, "-W", "error", "-m", "tautscope"]
 
 

@@ -4,11 +4,11 @@ import re
 from collections import defaultdict
 from collections.abc import Mapping
 from graphlib import CycleError, TopologicalSorter
-from pathlib import Path
 
 import pytest
+from common.paths import ROOT
 
-CRATES = Path(__file__).resolve().parents[1] / "crates"
+CRATES = ROOT / "crates"
 LAYERS = {
     "core": (
         {"math", "dof", "error", "settings"},

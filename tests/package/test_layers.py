@@ -8,8 +8,8 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
+from common.paths import ROOT
 
-ROOT = Path(__file__).resolve().parents[1]
 LINT = [Path(sys.executable).with_name("lint-imports"), "--no-cache"]
 
 

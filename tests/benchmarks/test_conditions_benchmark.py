@@ -2,14 +2,8 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
-
 from conditions import first_sight
 from conditions.frames import Evaluation, Job, evaluate
 from conditions.rows import table, to_rows, wrong_accepted

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from common.paths import ROOT
 from refused import failed
 from scipy.interpolate import interp1d
 from tautscope.config import Config, load_config
@@ -42,7 +43,7 @@ def test_the_approach_is_slow_and_meets_the_record() -> None:
 def rig(folder: Path) -> Path:
     """A rig's configuration without a rig."""
     file = folder / "rig.toml"
-    bench = Path(__file__).parents[1] / "configs" / "bench.toml"
+    bench = ROOT / "configs" / "bench.toml"
     text = bench.read_text(encoding="utf-8")
     file.write_text(text.replace("/tmp/tautscope-bench", f"{folder}/bench"), encoding="utf-8")
     return file

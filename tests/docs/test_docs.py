@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 import tautscope
+from common.paths import ROOT
 from tautscope.cli import _parser
 
-ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), ROOT / "paper" / "paper.md"])
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 PAPER = (ROOT / "docs" / "paper.md").read_text(encoding="utf-8")

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from common.paths import ROOT
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 from tautscope import figure_style as style
 
-ROOT = Path(__file__).resolve().parents[1]
 PALETTE = [
     style.BLACK, style.BLUE, style.ORANGE, style.GREEN, style.PURPLE, style.SKY, style.AMBER,
     style.YELLOW,

@@ -1,16 +1,12 @@
 """docs/safety.md names the test of every hazard, and contains the reactions of the source."""
 
 import re
-import sys
-from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
-
+from common.paths import ROOT
 from guarantees.goals import GOALS
 from reactions.__main__ import table
 from tautscope.loop.safety import DETECTORS, Reaction
 
-ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs" / "safety.md").read_text(encoding="utf-8")
 HAZARDS = {"V": 17, "E": 8, "C": 9, "D": 6, "P": 5, "L": 4, "N": 5, "M": 2, "U": 1}
 TEST = re.compile(r"`([\w./-]+\.(?:py|rs))::(\w+)`")

@@ -7,8 +7,8 @@ import sys
 from pathlib import Path
 
 import pytest
+from common.paths import ROOT
 
-ROOT = Path(__file__).resolve().parents[1]
 NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
 INDEX = ROOT / "docs" / "site" / "index.md"
 

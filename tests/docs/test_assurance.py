@@ -2,17 +2,12 @@
 
 import re
 import shutil
-import sys
-from pathlib import Path
 
+import assurance
 import pytest
+from common.paths import ROOT
 
-ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
-sys.path.insert(0, str(DOCS))
-
-import assurance  # noqa: E402
-
 SAFETY = (DOCS / "safety.md").read_text(encoding="utf-8")
 
 
