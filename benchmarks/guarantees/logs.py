@@ -20,7 +20,7 @@ from faults.scenarios import build_config
 from guarantees.goals import Measurement
 from tautscope import HysteresisReduction, Twin
 from tautscope.dof import Dof
-from tautscope.errors import RecordError
+from tautscope.errors import OutputError, RecordError
 from tautscope.log import journal
 from tautscope.log.reader import read_log
 from tautscope.log.writer import LogWriter
@@ -116,7 +116,10 @@ def _run(fails: int | None, sync_time: float) -> _LoggedRun:
         stack.enter_context(patch.object(journal, "_open", open_disk))
         stack.enter_context(patch.object(journal.os, "fsync", sync))
         path = Path(folder) / "run.mcap"
-        log = LogWriter(path, config, on_warning=lambda _: warnings.append(time.monotonic()))
+        try:
+            log = LogWriter(path, config, on_warning=lambda _: warnings.append(time.monotonic()))
+        except OutputError:  # the header does not fit: refused before any motion
+            return _LoggedRun(opened[0].writes, 0, 0.0, 0)
         loop, late, ticks = HysteresisReduction(config), 0, []
         for tick in range(round(DURATION / period)):
             reference = [0.025 + 1e-5 * tick, 0.0, 0.9]

@@ -1,9 +1,11 @@
 """Full or slow disks and failing runs: the run goes on, and what was written can be read."""
 
+import errno
 import os
 import time
+from io import FileIO
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
 import pytest
@@ -23,25 +25,56 @@ def test_an_existing_file_is_not_overwritten(tmp_path: Path, config: Config) -> 
     assert (tmp_path / "run.mcap").read_text() == "mine"
 
 
-def test_a_full_disk_ends_the_recording_and_not_the_run(
+def test_a_disk_that_is_full_at_the_start_is_refused(
     tmp_path: Path, config: Config, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(path: Path) -> IO[bytes]:
+        path.touch()
         return Path("/dev/full").open("wb", buffering=0)
 
     monkeypatch.setattr("tautscope.log.journal._open", full)
+    with pytest.raises(OutputError, match="No space left"):
+        LogWriter(tmp_path / "run.mcap", config)
+    assert not (tmp_path / "run.mcap").exists()
+
+
+class FillingDisk(FileIO):
+    """A file on a disk that gets full."""
+
+    is_full = False
+
+    def write(self, data: Any, /) -> int:
+        if self.is_full:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return super().write(data)
+
+
+def test_a_disk_that_gets_full_ends_the_recording_and_not_the_run(
+    tmp_path: Path, config: Config, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    disk = FillingDisk(tmp_path / "run.mcap", "xb")
+    monkeypatch.setattr("tautscope.log.journal._open", lambda path: disk)
     warned: list[str] = []
     log = LogWriter(tmp_path / "run.mcap", config, on_warning=warned.append)
+    disk.is_full = True
+    log.tick(Sample(0.0, np.zeros(3)), np.zeros(3), np.zeros(3))
     log._journal._thread.join()
-    for tick in range(5):
+    for tick in range(1, 6):
         log.tick(Sample(0.01 * tick, np.zeros(3)), np.zeros(3), np.zeros(3))
     summary = log.close()
     assert "No space left" in summary.failure
-    assert summary.dropped == log.dropped == 5
+    assert summary.dropped == log.dropped >= 5
     assert not summary.is_complete
     (text,) = warned
     assert "recording ended" in text
     assert "the run goes on" in text
+
+
+def test_the_header_is_written_before_the_first_tick(tmp_path: Path, config: Config) -> None:
+    log = LogWriter(tmp_path / "run.mcap", config)
+    (tmp_path / "killed.mcap").write_bytes((tmp_path / "run.mcap").read_bytes())
+    log.close()
+    assert read_log(tmp_path / "killed.mcap").config == config
 
 
 def test_a_blocked_disk_drops_messages_with_a_warning(tmp_path: Path, config: Config) -> None:

@@ -46,8 +46,11 @@ class Journal:
         failure: Why recording stopped; empty while it works.
         written: Topic -> number of messages.
 
+    The constructor writes the header, without which nothing of a log can be read: a process that is
+    killed at any later time leaves a readable log.
+
     Raises:
-        OutputError: The file exists already, or cannot be created.
+        OutputError: The file exists already, or cannot be created or written.
     """
 
     def __init__(self, path: Path, info: msg.RunInfo, on_warning: Callable[[str], None]) -> None:
@@ -59,12 +62,13 @@ class Journal:
         self.clock: msg.Clock | None = None
         self.dropped = self.dropped_images = 0
         self.failure = ""
-        self.written: Counter[str] = Counter()
-        self._info, self._on_warning = info, on_warning
+        self._on_warning = on_warning
         self._settings = info.config.recording
         self._codec = ImageCodec(info.config.camera, self._settings)
         self._is_closing, self._is_encoded, self._is_done = Event(), Event(), Event()
         self._file = _open(path)
+        self._log = _begin(path, self._file, info)
+        self.written: Counter[str] = self._log.counts
         self._thread = Thread(target=self._run_writer, name="recording", daemon=True)
         self._thread.start()
         Thread(target=self._run_encoder, name="image encoding", daemon=True).start()
@@ -104,12 +108,7 @@ class Journal:
             )
 
     def _write_log(self) -> None:
-        file = McapFile(self._file)
-        self.written = file.counts
-        stamp = time.time_ns()
-        for topic, data in msg.header_messages(self._info, stamp).items():
-            file.add(topic, data, 0, stamp)
-        file.flush()
+        file = self._log
         flushed = synced = time.monotonic()
         has_warned = False
         while True:
@@ -211,3 +210,19 @@ def _open(path: Path) -> IO[bytes]:
         raise OutputError("log", str(path), "a file that does not exist yet") from None
     except OSError as error:
         raise OutputError("log", str(path), f"a place that can be written ({error})") from None
+
+
+def _begin(path: Path, file: IO[bytes], info: msg.RunInfo) -> McapFile:
+    """Write the header; the file is removed if it cannot be written."""
+    stamp = time.time_ns()
+    try:
+        log = McapFile(file)
+        for topic, data in msg.header_messages(info, stamp).items():
+            log.add(topic, data, 0, stamp)
+        log.flush()
+    except OSError as error:
+        with suppress(OSError):
+            file.close()
+        path.unlink(missing_ok=True)
+        raise OutputError("log", str(path), f"a place that can be written ({error})") from None
+    return log

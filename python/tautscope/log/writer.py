@@ -71,7 +71,7 @@ class LogWriter:
             package's logger warns.
 
     Raises:
-        OutputError: The file exists already, or cannot be created.
+        OutputError: The file exists already, or cannot be created or written.
     """
 
     def __init__(
