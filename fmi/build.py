@@ -32,6 +32,11 @@ ROOT = HERE.parent
 DOFS = {"insertion": "m", "rotation": "rad", "bending": "rad"}
 COORDINATES = ("a_x", "a_y", "b_x", "b_y")
 LIBRARIES = ("-lpthread", "-ldl", "-lm")
+TIME_LIMIT = 60
+"""How long `twin.c` waits for an answer of its process [s], and 1 s more per control period.
+
+On a busy computer a start takes a tenth of it, most of it for imports.
+"""
 
 
 class Variable(NamedTuple):
@@ -179,6 +184,7 @@ def header(kind: str, config: Config) -> str:
         f"#define VARIABLE_TABLE {{{rows}}}\n"
         f"#define START_TEXT {quoted(text)}\n"
         f"#define PERIOD {config.control.period!r}\n"
+        f"#define TIME_LIMIT {TIME_LIMIT}\n"
         f"#define INSTANTIATION_TOKEN {quoted(token(kind, config))}\n"
     )
 

@@ -8,6 +8,8 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
 #include <spawn.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -29,47 +31,48 @@ typedef struct {
     int channel;
 } Twin;
 
-static int send_all(int channel, const void *data, size_t length) {
-    for (const char *next = data; length > 0;) {
-        const ssize_t sent = send(channel, next, length, MSG_NOSIGNAL);
-        if (sent < 0 && errno != EINTR) {
-            return 0;
-        }
-        next += sent > 0 ? sent : 0;
-        length -= sent > 0 ? (size_t)sent : 0;
-    }
-    return 1;
-}
+/* Receives from the process; 0, with a message, if it has ended or has not answered for `limit` seconds.
 
-static int receive_all(int channel, void *data, size_t length) {
+   Seconds of waiting are counted, so that the time for which the importer itself was stopped, as by Ctrl-Z, does not count. */
+static int receive_all(const Unit *unit, void *data, size_t length, long limit) {
+    struct pollfd channel = {.fd = ((Twin *)unit->content)->channel, .events = POLLIN};
+    long seconds = 0;
     for (char *next = data; length > 0;) {
-        const ssize_t received = recv(channel, next, length, 0);
-        if (received == 0 || (received < 0 && errno != EINTR)) {
+        const int ready = poll(&channel, 1, 1000);
+        if (ready > 0) {
+            const ssize_t received = recv(channel.fd, next, length, 0);
+            if (received <= 0) {
+                unit_log(unit, fmi3Error, "the Python process has ended; was it started? Parameter python: %s", unit->text);
+                return 0;
+            }
+            next += received;
+            length -= (size_t)received;
+        } else if ((ready == 0 || errno != EINTR) && ++seconds >= limit) {
+            unit_log(unit, fmi3Error,
+                     "the Python process has not answered for %ld s. Reset and initialize the unit: this ends the process and "
+                     "starts another. Parameter python: %s",
+                     seconds, unit->text);
             return 0;
         }
-        next += received > 0 ? received : 0;
-        length -= received > 0 ? (size_t)received : 0;
     }
     return 1;
 }
 
 /* A reply is a number: 0 and then the outputs in the order of the variables, or else the length of a message and the message. */
-static fmi3Status receive_outputs(Unit *unit) {
-    const int channel = ((Twin *)unit->content)->channel;
+static fmi3Status receive_outputs(Unit *unit, long periods) {
+    const long limit = TIME_LIMIT + periods;
     double length, outputs[OUTPUTS];
-    char message[TEXT_LENGTH];
-    if (!receive_all(channel, &length, sizeof length)) {
-        unit_log(unit, fmi3Error, "the Python process has ended; was it started? Parameter python: %s", unit->text);
+    char message[TEXT_LENGTH] = "";
+    if (!receive_all(unit, &length, sizeof length, limit)) {
         return fmi3Error;
     }
     if (length > 0.0) {
-        const size_t count = length < TEXT_LENGTH - 1 ? (size_t)length : TEXT_LENGTH - 1;
-        message[receive_all(channel, message, count) ? count : 0] = '\0';
-        unit_log(unit, fmi3Error, "%s", message);
+        if (receive_all(unit, message, length < TEXT_LENGTH - 1 ? (size_t)length : TEXT_LENGTH - 1, limit)) {
+            unit_log(unit, fmi3Error, "%s", message);
+        }
         return fmi3Error;
     }
-    if (!receive_all(channel, outputs, sizeof outputs)) {
-        unit_log(unit, fmi3Error, "the Python process has ended");
+    if (!receive_all(unit, outputs, sizeof outputs, limit)) {
         return fmi3Error;
     }
     memcpy(unit->values + APPLIED_INSERTION, outputs, sizeof outputs);
@@ -111,24 +114,27 @@ fmi3Status content_start(Unit *unit) {
         return fmi3Error;
     }
     unit->content = twin;
-    return receive_outputs(unit);
+    return receive_outputs(unit, 0);
 }
 
 fmi3Status content_step(Unit *unit, double time, long periods) {
     const double *command = unit->values + COMMAND_INSERTION;
     const double request[4] = {(double)periods, command[0], command[1], command[2]};
     (void)time;
-    /* A process that has ended may have left a message. */
-    (void)send_all(((Twin *)unit->content)->channel, request, sizeof request);
-    return receive_outputs(unit);
+    /* It does not block, as the process has read the one before. A process that has ended may have left a message. */
+    (void)send(((Twin *)unit->content)->channel, request, sizeof request, MSG_NOSIGNAL);
+    return receive_outputs(unit, periods);
 }
 
-/* The process ends when its channel is closed. */
+/* The process ends when its channel is closed, but one that hangs does not notice that. */
 void content_stop(Unit *unit) {
     Twin *twin = unit->content;
     if (twin) {
         close(twin->channel);
-        while (waitpid(twin->process, NULL, 0) < 0 && errno == EINTR) {
+        if (waitpid(twin->process, NULL, WNOHANG) == 0) {
+            kill(twin->process, SIGKILL);
+            while (waitpid(twin->process, NULL, 0) < 0 && errno == EINTR) {
+            }
         }
         free(twin);
         unit->content = NULL;

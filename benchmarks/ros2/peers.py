@@ -98,6 +98,7 @@ class Peers:
     """A node under test on a stepped clock, and another node that talks with it.
 
     Attributes:
+        endpoint: Where the node under test listens.
         clock: The clock of the node under test.
         control: The node under test.
         other: The other node, in a session of its own.
@@ -106,12 +107,12 @@ class Peers:
     def __init__(
         self, config: Config, folder: Path, *, drives: Drives = "ros", device: str = SERVO
     ) -> None:
-        endpoint = free_endpoint()
+        self.endpoint = free_endpoint()
         self.clock = SteppedClock()
         self.config = config
         # A busy computer must not drop what is compared.
-        self.node = Node("tautscope", connect="", listen=endpoint, is_blocking=True)
-        self.other = Node("other", connect=endpoint, is_blocking=True)
+        self.node = Node("tautscope", connect="", listen=self.endpoint, is_blocking=True)
+        self.other = Node("other", connect=self.endpoint, is_blocking=True)
         self.control: NodeControl = build_control(
             config, self.node, folder, InlineExecutor(), self.clock,
             drives=drives, device=device, layout=JoyAxes(),

@@ -9,11 +9,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import build
 import numpy as np
 import pytest
 from conftest import Builder
 from fmpy.fmi1 import FMICallException
-from fmu import CONFIG, Unit
+from fmu import CONFIG, PERIOD, Unit
 
 
 @contextmanager
@@ -50,11 +51,12 @@ def test_an_interpreter_that_does_not_exist_is_named(opened: Callable[..., Unit]
         opened("twin", python="/bin/true")
 
 
-def test_a_killed_process_is_an_error_and_none_is_left(opened: Callable[..., Unit]) -> None:
-    def children() -> set[int]:
-        tasks = Path("/proc/self/task").glob("*/children")
-        return {int(child) for task in tasks for child in task.read_text().split()}
+def children() -> set[int]:
+    tasks = Path("/proc/self/task").glob("*/children")
+    return {int(child) for task in tasks for child in task.read_text().split()}
 
+
+def test_a_killed_process_is_an_error_and_none_is_left(opened: Callable[..., Unit]) -> None:
     before = children()
     unit = opened("twin", has_camera=False)
     (process,) = children() - before
@@ -67,6 +69,44 @@ def test_a_killed_process_is_an_error_and_none_is_left(opened: Callable[..., Uni
     assert process not in children()
     other.terminate()
     assert len(children() - before) == 1
+
+
+HANGING = """#!{python} -IS
+import os, signal, socket
+channel = socket.socket(fileno=0)
+channel.send(bytes(8 * 14 * {replies}))
+os.kill(os.getpid(), signal.SIGSTOP)
+"""
+"""A process that sends replies and then stops, so that it neither answers nor ends."""
+
+
+def test_a_process_that_hangs_is_an_error_and_is_ended(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(build, "TIME_LIMIT", 3)
+    build.build("twin", tmp_path / "twin.fmu", CONFIG)
+    before = children()
+    hanging = tmp_path / "hanging"
+
+    def open_unit(replies: int) -> Unit:
+        hanging.write_text(HANGING.format(python=sys.executable, replies=replies))
+        hanging.chmod(0o755)
+        return Unit(tmp_path / "twin.fmu", tmp_path / f"unit_{replies}", python=str(hanging))
+
+    words = "s. Reset and initialize the unit: this ends the process"
+    with pytest.raises(RuntimeError, match=f"not answered for 3 {words}"):
+        open_unit(replies=0)
+    assert children() == before
+    unit = open_unit(replies=1)
+    with refused(unit, f"not answered for 4 {words}"):
+        unit.step(0.0)
+    assert len(children() - before) == 1
+    unit.reset()
+    with refused(unit, f"not answered for 5 {words}"):
+        unit.step(0.0, 2 * PERIOD)
+    unit.terminate()
+    assert children() == before
+    unit.close()
 
 
 def test_the_process_ends_with_the_importer(builder: Builder, tmp_path: Path) -> None:

@@ -64,8 +64,12 @@ class Desk:
         """Take the lease, let go, and hold."""
         self.lease.take(1)
         self.tick()
-        self.servo(is_holding=False)
-        self.servo()
+        self.press()
+
+    def press(self, client: int = 1) -> None:
+        """Let go, and hold."""
+        self.servo(is_holding=False, client=client)
+        self.servo(client=client)
 
 
 def test_a_held_key_moves_its_dof_alone() -> None:
@@ -80,13 +84,11 @@ def test_a_held_key_moves_its_dof_alone() -> None:
 def test_nobody_else_moves_anything(client: int) -> None:
     desk = Desk()
     for _ in range(50):
-        desk.servo(is_holding=False, client=client)
-        desk.servo(client=client)
+        desk.press(client)
         assert not desk.tick().any()
     desk.lease.take(1)
     for _ in range(50):
-        desk.servo(is_holding=False, client=client)
-        desk.servo(client=client)
+        desk.press(client)
         assert not desk.tick().any()
     assert sum(desk.input.refused.values()) == 200
 
@@ -102,8 +104,7 @@ def test_motion_stops_when_no_command_comes_and_needs_a_new_press() -> None:
     for _ in range(20):
         desk.servo()  # the same key, still held
         assert not desk.tick().any()
-    desk.servo(is_holding=False)
-    desk.servo()
+    desk.press()
     assert desk.tick().any()
 
 
@@ -136,14 +137,12 @@ def test_a_stop_lasts_until_it_is_ended() -> None:
     desk.engage()
     desk.input.stop("STOP")
     for _ in range(10):
-        desk.servo(is_holding=False)
-        desk.servo()
+        desk.press()
         assert not desk.tick().any()
     desk.input.enable()
     desk.servo()
     assert not desk.tick().any()
-    desk.servo(is_holding=False)
-    desk.servo()
+    desk.press()
     assert desk.tick().any()
 
 

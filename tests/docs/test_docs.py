@@ -61,7 +61,7 @@ def test_links_inside_the_repository_resolve(page: Path) -> None:
 @pages
 def test_commands_in_a_page_are_valid(page: Path) -> None:
     for command in commands(page.read_text(encoding="utf-8")):
-        tool, *arguments = shlex.split(command)
+        tool, *arguments = shlex.split(command, comments=True)
         if tool == "--project":  # beside a clone
             tool, *arguments = [word.removeprefix("tautscope/") for word in arguments[1:]]
         if tool == "tautscope":

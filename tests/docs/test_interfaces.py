@@ -52,7 +52,7 @@ def test_the_code_for_input_devices_runs(folder: Path) -> None:
     config = short_experiment()
     rows = [f"{0.1 * k},{25 + k},{0.01 * k},0.9" for k in range(10)]
     text = "\n".join(["time,insertion_mm,rotation,bending", *rows])
-    (folder / "hand.csv").write_text(text, encoding="utf-8")
+    (folder / "motion.csv").write_text(text, encoding="utf-8")
     recorded, dated = blocks("devices.md", "python")
     names: dict[str, Any] = {"rig": DrawnRig(config), "config": config}
     exec(recorded, names)

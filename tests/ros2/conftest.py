@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from ros2.peers import Peers, peers
+from service_client import Client
 from tautscope.config import load_config
 
 
@@ -14,4 +15,11 @@ from tautscope.config import load_config
 def both(tmp_path: Path) -> Iterator[Peers]:
     """A node with a driver in ROS, unconfigured, and another one."""
     with peers(load_config(), tmp_path) as found:
+        yield found
+
+
+@pytest.fixture
+def client(both: Peers) -> Iterator[Client]:
+    """A client of the services of the node under test."""
+    with Client(both) as found:
         yield found

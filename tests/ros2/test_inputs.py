@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
-from tautscope.config import load_config
-from tautscope.errors import MessageError
+from tautscope.config import CameraConfig, PixelFormat, load_config
+from tautscope.errors import ConfigError, MessageError
 from tautscope.ros2 import messages, types
 from tautscope.ros2.inputs import (
     FUTURE,
@@ -93,13 +93,30 @@ def test_only_later_stamps_pass(stamps: list[int]) -> None:
     assert passed == sorted(set(passed))
 
 
-def test_an_image_is_read_as_it_was_sent() -> None:
-    pixels = np.random.default_rng(1).integers(0, 256, (CAMERA.height, CAMERA.width, 3), np.uint8)
-    padded = np.pad(pixels.reshape(CAMERA.height, -1), ((0, 0), (0, 8)))
-    sent = image(data=padded.reshape(-1), step=padded.shape[1])
+@pytest.mark.parametrize(
+    ("pixel_format", "encoding", "shape"),
+    [
+        ("bgr", "bgr8", (4, 6, 3)),
+        ("rgb", "rgb8", (4, 6, 3)),
+        ("bgra", "bgra8", (4, 6, 4)),
+        ("yuyv", "yuv422_yuy2", (4, 6, 2)),
+        ("uyvy", "uyvy", (4, 6, 2)),
+        ("nv12", "nv12", (6, 6)),
+    ],
+)
+@pytest.mark.parametrize("padding", [0, 8])
+def test_an_image_is_read_as_it_was_sent(
+    pixel_format: PixelFormat, encoding: str, shape: tuple[int, ...], padding: int
+) -> None:
+    pixels = np.random.default_rng(1).integers(0, 256, shape, np.uint8)
+    padded = np.pad(pixels.reshape(shape[0], -1), ((0, 0), (0, padding)))
+    step, data = padded.shape[1], padded.reshape(-1)
+    sent = image(height=4, width=6, encoding=encoding, step=step, data=data)
     received = types.decode("sensor_msgs/msg/Image", types.encode(sent))
-    frame = ImageReader(TOPIC, CAMERA).read(received, 1.5, 7)
+    camera = CameraConfig(width=6, height=4, pixel_format=pixel_format)
+    frame = ImageReader(TOPIC, camera).read(received, 1.5, 7)
     assert (frame.image == pixels).all()
+    assert np.shares_memory(frame.image, received.data)
     assert (frame.captured_at, frame.sequence) == (1.5, 7)
 
 
@@ -122,7 +139,7 @@ def test_wrong_images_are_named(changes: dict[str, object], field: str) -> None:
 
 
 def test_a_format_that_ros_does_not_have_is_refused() -> None:
-    with pytest.raises(MessageError, match=r"camera\.pixel_format"):
+    with pytest.raises(ConfigError, match=r"camera\.pixel_format"):
         ImageReader(TOPIC, load_config().replace(**{"camera.pixel_format": "i420"}).camera)
 
 

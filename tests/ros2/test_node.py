@@ -13,7 +13,8 @@ from tautscope.config import load_config
 from tautscope.log import cdr
 from tautscope.log.reader import read_log
 from tautscope.log.replay import replay_same
-from tautscope.ros2 import types
+from tautscope.loop.rig import Frame
+from tautscope.ros2 import messages, types
 from tautscope.ros2.lifecycle import State
 from tautscope.ros2.wire import Qos
 
@@ -99,16 +100,7 @@ def test_the_tip_has_stamp_0_while_markers_are_lost(both: Peers) -> None:
         both.send_position(START)
         both.send_reference(START)
         pixels = rng.integers(40, 60, (camera.height, camera.width, 3), np.uint8)
-        image = types.make(
-            "sensor_msgs/msg/Image",
-            header=types.header(both.clock.wall(), "endoscope"),
-            height=camera.height,
-            width=camera.width,
-            encoding="bgr8",
-            is_bigendian=0,
-            step=3 * camera.width,
-            data=pixels.reshape(-1),
-        )
+        image = messages.image(both.clock.wall(), Frame(pixels, 0.0, 1), camera)
         both.images.publish(image)
         both.delivered()
 

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -102,10 +102,16 @@ def endpoint() -> str:
     return free_endpoint()
 
 
-@pytest.mark.parametrize(("end", "status"), [(signal.SIGTERM, 143), (signal.SIGINT, 0)])
-def test_the_driver_stops_and_the_log_replays_after_a_signal(
-    tmp_path: Path, endpoint: str, end: signal.Signals, status: int
-) -> None:
+class Enabled(NamedTuple):
+    """A node that moves a driver's motors, both as processes, and its operator."""
+
+    node: subprocess.Popen[str]
+    driver: subprocess.Popen[str]
+    user: Operator
+
+
+@pytest.fixture
+def enabled(tmp_path: Path, endpoint: str) -> Iterator[Enabled]:
     with (
         process(*node_command(tmp_path, endpoint, "--driver")) as node,
         process("examples/ros2/driver.py", endpoint) as driver,
@@ -113,39 +119,30 @@ def test_the_driver_stops_and_the_log_replays_after_a_signal(
     ):
         assert json.loads(line(node)) == {"node": "/tautscope"}
         user.wait("ENABLED", lambda: user.request("enable"))
-        user.move(1.0)
-        node.send_signal(end)
-        assert node.wait(TIMEOUT) == status
-        assert json.loads(line(driver))["event"] == "quick stop"
-        assert node.stderr is not None
-        assert "error" not in node.stderr.read().lower()
+        user.move(0.5)
+        yield Enabled(node, driver, user)
+
+
+@pytest.mark.parametrize(("end", "status"), [(signal.SIGTERM, 143), (signal.SIGINT, 0)])
+def test_the_driver_stops_and_the_log_replays_after_a_signal(
+    tmp_path: Path, enabled: Enabled, end: signal.Signals, status: int
+) -> None:
+    enabled.node.send_signal(end)
+    assert enabled.node.wait(TIMEOUT) == status
+    assert json.loads(line(enabled.driver))["event"] == "quick stop"
+    assert enabled.node.stderr is not None
+    assert "error" not in enabled.node.stderr.read().lower()
     same, _ = replay_same(read_log(tmp_path / "out" / "ros2-1.mcap"))
     assert same.is_identical
 
 
-def test_the_driver_stops_when_the_node_is_killed(tmp_path: Path, endpoint: str) -> None:
-    with (
-        process(*node_command(tmp_path, endpoint, "--driver")) as node,
-        process("examples/ros2/driver.py", endpoint) as driver,
-        operator(endpoint) as user,
-    ):
-        line(node)
-        user.wait("ENABLED", lambda: user.request("enable"))
-        user.move(0.5)
-        node.kill()
-        assert json.loads(line(driver))["event"] == "quick stop"
+def test_the_driver_stops_when_the_node_is_killed(enabled: Enabled) -> None:
+    enabled.node.kill()
+    assert json.loads(line(enabled.driver))["event"] == "quick stop"
 
 
-def test_a_device_that_ends_pauses_the_node(tmp_path: Path, endpoint: str) -> None:
-    with (
-        process(*node_command(tmp_path, endpoint, "--driver")) as node,
-        process("examples/ros2/driver.py", endpoint),
-        operator(endpoint) as user,
-    ):
-        line(node)
-        user.wait("ENABLED", lambda: user.request("enable"))
-        user.move(0.5)
-        user.wait("PAUSED")
+def test_a_device_that_ends_pauses_the_node(enabled: Enabled) -> None:
+    enabled.user.wait("PAUSED")
 
 
 def test_drives_of_a_configuration_stop_when_the_node_is_killed(

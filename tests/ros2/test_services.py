@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import random
-import time
 
 import numpy as np
 from driving import START, drive
 from ros2.peers import Peers
-from tautscope.ros2 import messages, types, wire
+from service_client import ATTACHMENT, Client
+from tautscope.ros2 import messages, types
 from tautscope.ros2.lifecycle import State
 
 STRING, GET = "crtk_msgs/msg/StringStamped", "rcl_interfaces/srv/GetParameters"
@@ -24,10 +24,9 @@ IMAGE_FIELDS = {
 }
 
 
-def test_services_change_and_read_the_state(both: Peers) -> None:
+def test_services_change_and_read_the_state(both: Peers, client: Client) -> None:
     def call(name: str, kind: str, **fields: object):
-        request = types.make(f"lifecycle_msgs/srv/{kind}_Request", **fields)
-        return service(both, f"/tautscope/{name}", f"lifecycle_msgs/srv/{kind}", request)
+        return client.call(name, f"lifecycle_msgs/srv/{kind}", **fields)
 
     def change(number: int, label: str = "") -> bool:
         transition = types.make("lifecycle_msgs/msg/Transition", id=number, label=label)
@@ -50,38 +49,24 @@ def test_services_change_and_read_the_state(both: Peers) -> None:
     assert both.control.run is None
 
 
-def test_parameters_are_read_and_set(both: Peers) -> None:
-    def call(kind: str, name: str, **fields: object):
-        request = types.make(f"rcl_interfaces/srv/{kind}_Request", **fields)
-        return service(both, f"/tautscope/{name}", f"rcl_interfaces/srv/{kind}", request)
-
-    def parameter(name: str, value: float):
-        fields = call("GetParameters", "get_parameters", names=["compensation"]).values[0]
-        fields.type, fields.double_value = 3, value
-        return types.make("rcl_interfaces/msg/Parameter", name=name, value=fields)
-
+def test_parameters_are_read_and_set(both: Peers, client: Client) -> None:
     both.enable(START)
-    (before,) = call("GetParameters", "get_parameters", names=["compensation"]).values
+    before = client.get_parameter("compensation")
     assert (before.type, before.double_value) == (3, 1.0)
-    asked = [
-        parameter("compensation", 0.5),
-        parameter("compensation", 1.5),
-        parameter("profile", 0),
-    ]
-    results = call("SetParameters", "set_parameters", parameters=asked).results
+    results = client.set_parameters(("compensation", 0.5), ("compensation", 1.5), ("profile", 0))
     assert [each.successful for each in results] == [True, False, False]
     assert "got 1.5, expected 0 to 1" in results[1].reason
-    assert both.control.parameters["compensation"] == 0.5
-    atomic = call(
-        "SetParametersAtomically",
-        "set_parameters_atomically",
-        parameters=[parameter("compensation", 0.1), parameter("profile", 0)],
-    )
+    assert client.get_parameter("compensation").double_value == 0.5
+    asked = [client.parameter("compensation", 0.1), client.parameter("profile", 0)]
+    kind = "rcl_interfaces/srv/SetParametersAtomically"
+    atomic = client.call("set_parameters_atomically", kind, parameters=asked)
     assert not atomic.result.successful
-    assert both.control.parameters["compensation"] == 0.5
+    assert client.get_parameter("compensation").double_value == 0.5
 
 
-def test_any_bytes_to_a_topic_or_service_are_answered_or_refused(both: Peers) -> None:
+def test_any_bytes_to_a_topic_or_service_are_answered_or_refused(
+    both: Peers, client: Client
+) -> None:
     both.enable(START)
     drive(both, 5)
     random_ = random.Random(20)
@@ -92,23 +77,22 @@ def test_any_bytes_to_a_topic_or_service_are_answered_or_refused(both: Peers) ->
         (both.positions, messages.joint_state(1, START)),
         (both.images, types.make(IMAGE, **IMAGE_FIELDS)),
     ]
-    get = wire.key(0, "/tautscope/get_parameters", GET, types.type_hash(GET))
-    attachment = wire.attachment(1, 2, b"c" * 16)
     replies = []
     for _ in range(150):
         for publisher, message in good:
             publisher.send(damaged(types.encode(message), random_))
         payload = damaged(types.encode(names), random_)
-        send = {"payload": payload, "attachment": damaged(attachment, random_)}
-        replies.append(both.other._session.get(get, **send))
+        attachment = damaged(ATTACHMENT, random_)
+        replies.append(client.send("get_parameters", GET, payload, attachment))
         drive(both, 1)
     assert both.control.operating_state == "ENABLED"
     assert both.control.run.loop.supervision.flags == ()  # type: ignore[union-attr]
+    client.get_parameter("compensation")  # answered after the others
     answers = [reply.try_recv() for reply in replies]
     assert any(each is not None and each.err is not None for each in answers)
-    assert {"/instrument/servo_jp", "/instrument/state_command"} <= {
-        field.split()[0] for field in both.control._telemetry.refused
-    }
+    shown = [each.data for each in both.drain(both.warnings)]
+    for topic in ("servo_jp", "state_command"):
+        assert any(text.startswith(f"refused: /instrument/{topic}") for text in shown), topic
 
 
 def damaged(data: bytes, random_: random.Random) -> bytes:
@@ -117,20 +101,3 @@ def damaged(data: bytes, random_: random.Random) -> bytes:
     for _ in range(1 + random_.randrange(4)):
         found[random_.randrange(min(len(found), 120))] = random_.randrange(256)
     return bytes(found[: random_.randrange(len(found))])
-
-
-def service(both: Peers, name: str, kind: str, request: object):
-    """Call a service of the node under test as rmw_zenoh does."""
-    key = wire.key(0, name, kind, types.type_hash(kind))
-    replies = both.other._session.get(
-        key, payload=types.encode(request), attachment=wire.attachment(1, 2, b"c" * 16)
-    )
-    both.delivered()
-    for _ in range(200):
-        both.control.serve()
-        if (reply := replies.try_recv()) is not None:
-            sequence, _, source = wire.read_attachment(reply.ok.attachment.to_bytes())
-            assert (sequence, source) == (1, b"c" * 16)
-            return types.decode(f"{kind}_Response", reply.ok.payload.to_bytes())
-        time.sleep(0.01)
-    raise AssertionError("no reply")

@@ -2,7 +2,6 @@
 
 from types import SimpleNamespace as Message
 
-import numpy as np
 import pytest
 from tautscope.config import CameraConfig
 from tautscope_node import messages
@@ -39,53 +38,6 @@ def test_a_message_without_all_joints_has_no_positions(message):
 def test_joints_are_three_different_names(joints):
     with pytest.raises(ValueError, match="expected three different names"):
         messages.check_joints(joints)
-
-
-def image(array, encoding, padding=0, height=None):
-    rows = array.reshape(array.shape[0], -1)
-    padded = np.pad(rows, ((0, 0), (0, padding)), constant_values=255)
-    return Message(
-        encoding=encoding,
-        width=array.shape[1],
-        height=height or array.shape[0],
-        step=padded.shape[1],
-        data=padded.tobytes(),
-    )
-
-
-@pytest.mark.parametrize("padding", [0, 16])
-@pytest.mark.parametrize(
-    ("pixel_format", "encoding", "shape"),
-    [
-        ("bgr", "bgr8", (4, 6, 3)),
-        ("rgb", "rgb8", (4, 6, 3)),
-        ("bgra", "bgra8", (4, 6, 4)),
-        ("yuyv", "yuv422_yuy2", (4, 6, 2)),
-        ("uyvy", "uyvy", (4, 6, 2)),
-        ("nv12", "nv12", (6, 6)),
-    ],
-)
-def test_pixels_are_those_of_the_message(pixel_format, encoding, shape, padding):
-    array = np.random.default_rng(5).integers(0, 256, shape, np.uint8)
-    camera = CameraConfig(width=6, height=4, pixel_format=pixel_format)
-    found = messages.pixels(image(array, encoding, padding, height=4), camera)
-    assert (found == array).all()
-
-
-@pytest.mark.parametrize(
-    ("change", "text"),
-    [
-        ({"encoding": "mono8"}, "encoding mono8: expected bgr8"),
-        ({"width": 5}, "5 x 4 px: expected 6 x 4 px"),
-        ({"step": 17}, "step 17"),
-        ({"data": b"1234"}, "4 bytes"),
-    ],
-)
-def test_another_image_is_refused_with_its_difference(change, text):
-    message = image(np.zeros((4, 6, 3), np.uint8), "bgr8")
-    vars(message).update(change)
-    with pytest.raises(ValueError, match=text):
-        messages.pixels(message, CameraConfig(width=6, height=4))
 
 
 def test_another_calibration_is_named():

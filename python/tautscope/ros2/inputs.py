@@ -5,6 +5,7 @@ An error names the topic and the field; the message then changes nothing.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from tautscope.config import CameraConfig
 from tautscope.dof import Dof
-from tautscope.errors import FrameError, MessageError
+from tautscope.errors import ConfigError, MessageError
 from tautscope.loop.frame_layout import FrameLayout
 from tautscope.loop.rig import Frame
 
@@ -27,9 +28,9 @@ ENCODINGS = {
     "bgra": ("bgra8",),
     "yuyv": ("yuv422_yuy2",),
     "uyvy": ("uyvy", "yuv422"),
+    "nv12": ("nv12",),
 }
 """`camera.pixel_format` -> values of ``encoding``, of sensor_msgs/image_encodings.hpp."""
-_CHANNELS = {"bgr": 3, "rgb": 3, "bgra": 4, "yuyv": 2, "uyvy": 2}
 
 
 class Stamps:
@@ -137,15 +138,15 @@ class ImageReader:
         camera: The camera; ``camera.pixel_format`` decides which encoding is taken.
 
     Raises:
-        MessageError: ROS has no encoding for the pixel format.
+        ConfigError: ROS has no encoding for the pixel format.
     """
 
     def __init__(self, topic: str, camera: CameraConfig) -> None:
         self._topic, self._camera = topic, camera
-        self._layout = FrameLayout(camera)
+        self._shape = FrameLayout(camera).shape
         if camera.pixel_format not in ENCODINGS:
             allowed = f"one of {', '.join(ENCODINGS)} for images of ROS"
-            raise MessageError("camera.pixel_format", camera.pixel_format, allowed)
+            raise ConfigError("camera.pixel_format", camera.pixel_format, allowed)
 
     def read(self, message: Any, captured_at: float, sequence: int) -> Frame:
         """The frame of an image, without a copy, captured at a time of the rig's clock [s].
@@ -161,17 +162,11 @@ class ImageReader:
         for field, size in (("width", camera.width), ("height", camera.height)):
             if getattr(message, field) != size:
                 raise MessageError(f"{topic} {field}", getattr(message, field), f"{size} px")
-        channels = _CHANNELS[camera.pixel_format]
-        if message.step < channels * camera.width:
-            least = f"at least {channels * camera.width} bytes a line"
-            raise MessageError(f"{topic} step", message.step, least)
-        if len(message.data) != message.step * camera.height:
-            allowed = f"step x height = {message.step * camera.height} bytes"
+        count, length = self._shape[0], math.prod(self._shape[1:])
+        if message.step < length:
+            raise MessageError(f"{topic} step", message.step, f"at least {length} bytes a line")
+        if len(message.data) != message.step * count:
+            allowed = f"step x {count} lines = {message.step * count} bytes"
             raise MessageError(f"{topic} data", f"{len(message.data)} bytes", allowed)
-        lines = np.asarray(message.data).reshape(camera.height, message.step)
-        pixels = lines[:, : channels * camera.width]
-        image = pixels.reshape(camera.height, camera.width, channels)
-        try:
-            return Frame(self._layout.checked(image), captured_at, sequence)
-        except FrameError as error:
-            raise MessageError(f"{topic} data", error.value, error.allowed) from None
+        lines = np.frombuffer(message.data, np.uint8).reshape(count, message.step)
+        return Frame(lines[:, :length].reshape(self._shape), captured_at, sequence)

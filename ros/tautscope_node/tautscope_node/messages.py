@@ -8,18 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from tautscope.config import CameraConfig
-from tautscope.loop.frame_layout import FrameLayout
 from tautscope.loop.reduction import Report, Status
 
-ENCODINGS = {
-    "bgr": ("bgr8",),
-    "rgb": ("rgb8",),
-    "bgra": ("bgra8",),
-    "yuyv": ("yuv422_yuy2",),
-    "uyvy": ("uyvy", "yuv422"),
-    "nv12": ("nv12",),
-}
-"""`camera.pixel_format` -> values of ``encoding``."""
 CALIBRATION_TOLERANCE = 0.01
 """Largest difference of focal length or principal point from the configuration, of the width."""
 MEASURED = (Status.OK, Status.HELD, Status.PARTIAL)
@@ -55,31 +45,6 @@ def positions(message: Any, joints: Sequence[str]) -> NDArray[np.float64] | None
     if len(values) < len(names) or not set(joints) <= set(names):
         return None
     return np.array([values[names.index(joint)] for joint in joints], np.float64)
-
-
-def pixels(message: Any, camera: CameraConfig) -> NDArray[np.uint8]:
-    """The array of an Image, of the shape of `tautscope.loop.frame_layout`, without a copy.
-
-    Raises:
-        ValueError: Encoding, size or step are not those of the configured camera.
-    """
-    allowed = ENCODINGS.get(camera.pixel_format, ())
-    if message.encoding not in allowed:
-        raise ValueError(
-            f"Image of encoding {message.encoding}: expected {' or '.join(allowed)}, as "
-            f"camera.pixel_format {camera.pixel_format}"
-        )
-    shape = FrameLayout(camera).shape
-    line = int(np.prod(shape[1:]))
-    step, data = int(message.step), np.frombuffer(message.data, np.uint8)
-    if (message.width, message.height) != (camera.width, camera.height):
-        raise ValueError(
-            f"Image of {message.width} x {message.height} px: expected {camera.width} x "
-            f"{camera.height} px, as camera.width and camera.height"
-        )
-    if step < line or len(data) < step * shape[0]:
-        raise ValueError(f"Image of step {step} and {len(data)} bytes: expected {line} a line")
-    return data[: step * shape[0]].reshape(shape[0], step)[:, :line].reshape(shape)
 
 
 def calibration_problem(message: Any, camera: CameraConfig) -> str:

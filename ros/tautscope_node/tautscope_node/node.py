@@ -22,8 +22,9 @@ from rclpy.time import Time
 from sensor_msgs.msg import CameraInfo, Image, JointState
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 from tautscope import Frame, load_config
-from tautscope.errors import ConfigError
+from tautscope.errors import ConfigError, MessageError
 from tautscope.loop.safety import Reaction
+from tautscope.ros2.inputs import ImageReader
 
 from tautscope_node.control_loop import ControlLoop, OperatingState
 from tautscope_node.messages import (
@@ -32,7 +33,6 @@ from tautscope_node.messages import (
     is_measured,
     nanoseconds,
     offsets,
-    pixels,
     positions,
 )
 from tautscope_node.status import REPORT_PERIOD, StatusPublisher
@@ -76,6 +76,8 @@ class InstrumentNode(LifecycleNode):
             check_joints(self._joints)
             path = Path(self.get_parameter("config").value)
             self._config = load_config(path)
+            self._image_topic = self.get_parameter("image_topic").value
+            self._reader = ImageReader(self._image_topic, self._config.camera)
             self._detection = ThreadPoolExecutor(1, "detection")
             self._control = ControlLoop(self._config, self._detection)
             self._control.loop.set_compensation(self.get_parameter("compensation").value)
@@ -147,9 +149,8 @@ class InstrumentNode(LifecycleNode):
         subscribe(OperatingStateMessage, "actuators/operating_state", self._on_actuators, LATEST)
         camera_info = self.get_parameter("camera_info_topic").value
         subscribe(CameraInfo, camera_info, self._on_camera_info, LATEST)
-        images = self.get_parameter("image_topic").value
         group = MutuallyExclusiveCallbackGroup()
-        subscribe(Image, images, self._on_image, SENSOR, callback_group=group)
+        subscribe(Image, self._image_topic, self._on_image, SENSOR, callback_group=group)
         assert self._control is not None
         self._status_publisher.publish_state(self._control)
 
@@ -213,16 +214,16 @@ class InstrumentNode(LifecycleNode):
             self.get_logger().error(self._problem, throttle_duration_sec=10.0)
 
     def _on_image(self, message: Image) -> None:
+        captured_at = 1e-9 * (nanoseconds(message.header.stamp) - self._origin)
         try:
-            image = pixels(message, self._config.camera)
-        except ValueError as error:
+            frame = self._reader.read(message, captured_at, self._sequence + 1)
+        except MessageError as error:
             self.get_logger().error(str(error), throttle_duration_sec=1.0)
             return
         self._sequence += 1
         self._arrived += 1
         self._replaced += self._newest is not None
-        captured_at = 1e-9 * (nanoseconds(message.header.stamp) - self._origin)
-        self._newest = Frame(image, captured_at, self._sequence)
+        self._newest = frame
 
     def _tick(self) -> None:
         control = self._control
