@@ -83,7 +83,7 @@ def test_demo_writes_a_run_folder_and_prints_one_json_object(
     assert captured.out.count("\n") == 1
     found = json.loads(captured.out)
     assert list(found) == [
-        "folder", "profile", "seeds", "dof", "operator_motion", "sim_seconds", "wall_seconds",
+        "folder", "profile", "seeds", "dof", "hand", "sim_seconds", "wall_seconds",
     ]  # fmt: skip
     assert found["folder"] == str(out)
     assert found["profile"] == "paper"
@@ -98,10 +98,10 @@ def test_demo_writes_a_run_folder_and_prints_one_json_object(
     assert insertion["marker_rms_px"] is None  # this rig has no true features
     assert found["sim_seconds"] == pytest.approx(4 * (36 + OPERATOR_DURATION), abs=0.1)
 
-    assert list(found["operator_motion"]) == list(found["dof"])
-    for dof in found["operator_motion"].values():
+    assert list(found["hand"]) == list(found["dof"])
+    for dof in found["hand"].values():
         assert list(dof) == OPERATOR_FIGURES
-    operator = found["operator_motion"]["insertion"]
+    operator = found["hand"]["insertion"]
     assert 1e-3 < operator["uncompensated_rms"] < 5e-3  # m, half of this rig's width at most
     assert operator["compensated_rms"] < 0.5 * operator["uncompensated_rms"]
 
@@ -146,7 +146,7 @@ def test_demo_writes_a_run_folder_and_prints_one_json_object(
     assert lines[0].split(",")[4] == "10"
     header, *lines = (out / "operator_motion.csv").read_text().splitlines()
     assert header.split(",") == ["dof", "unit", "profile", "source", *OPERATOR_FIGURES]
-    assert [line.split(",")[0] for line in lines[::4]] == list(found["operator_motion"])
+    assert [line.split(",")[0] for line in lines[::4]] == list(found["hand"])
     assert [line.split(",")[3] for line in lines[:4]] == ["seed 3", "seed 4", "median", "worst"]
     assert float(lines[2].split(",")[4]) == pytest.approx(
         1e3 * operator["uncompensated_rms"], rel=1e-5

@@ -232,10 +232,8 @@ def test_an_unknown_figure_is_null_in_json(demo: Demo) -> None:
         dof: replace(result, creep=float("nan")) for dof, result in demo.operator_results[0].items()
     }
     found = tables.to_json("paper", [0], [unknown], [figures], sim_seconds=1.0, wall_seconds=1.0)
-    assert found["operator_motion"]["bending"]["creep"] is None
-    assert (
-        found["operator_motion"]["insertion"]["largest"] == 2e-3
-    )  # in m, the rest of the object in mm
+    assert found["hand"]["bending"]["creep"] is None
+    assert found["hand"]["insertion"]["largest"] == 2e-3  # in m, the rest of the object in mm
     assert found["dof"]["rotation"]["tracking_rms"] is None
     assert found["dof"]["rotation"]["worst"]["tracking_rms"] is None
     assert found["dof"]["insertion"]["unit"] == "mm"

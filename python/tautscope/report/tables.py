@@ -142,15 +142,15 @@ def to_json(
     """The output of ``tautscope demo --json``; an unknown figure is None.
 
     Medians over the seeds, and under ``worst`` the worst values; insertion in mm. Under ``paper``
-    the results of the article's scheme, if it was run beside another one. Under
-    ``operator_motion`` the medians of the operator motion's figures, in m and rad.
+    the results of the article's scheme, if it was run beside another one. Under ``hand`` the
+    medians of the operator motion's figures, in m and rad.
     """
     return {
         "profile": profile,
         "seeds": list(seeds),
         "dof": _by_dof(results),
         **({"paper": _by_dof(article_results)} if article_results else {}),
-        "operator_motion": operator_to_json(median(operator_results)),
+        "hand": operator_to_json(median(operator_results)),
         "sim_seconds": sim_seconds,
         "wall_seconds": wall_seconds,
     }
