@@ -35,7 +35,7 @@ _STATUS = """exit status:
   0    success
   1    the result is negative: replay differs, align has no answer, doctor found something missing
   2    bad input: options, files, configuration, a missing extra
-  3    refused by the rig: bus, drive or camera; nothing moved
+  3    refused by the rig: bus, drive or camera; the loop has not begun
   4    stopped for safety: the motors are stopped, or motion of the loop is held
   130  interrupted, 141 output pipe closed, 143 terminated
 """
@@ -87,7 +87,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"tautscope {__version__}")
     arguments.add_verbose(parser)
-    verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
+    verbs = parser.add_subparsers(dest="verb", required=True, metavar="COMMAND")
     demo.add_parser(verbs)
     config.add_parser(verbs)
     analyze.add_parser(verbs)

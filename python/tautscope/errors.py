@@ -64,7 +64,7 @@ class MissingPathError(FieldError):
     def __str__(self) -> str:
         if Path(str(self.value)).exists():
             return super().__str__()
-        kind = "Folder" if "folder" in self.allowed else "File"
+        kind = "Folder" if self.allowed.startswith("a folder") else "File"
         return f"{kind} not found: {self.value}. Expected {self.allowed}"
 
 

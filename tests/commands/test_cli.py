@@ -234,7 +234,7 @@ def test_demo_names_an_invalid_input(capsys: pytest.CaptureFixture[str], tmp_pat
             "got '0', expected a number other than 0",
         ),
         (["fly"], "invalid choice: 'fly'"),
-        ([], "VERB"),
+        ([], "COMMAND"),
     ],
     ids=lambda value: " ".join(value) or "nothing" if isinstance(value, list) else "",
 )

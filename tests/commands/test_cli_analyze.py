@@ -186,9 +186,7 @@ def test_analyze_names_an_invalid_input(capsys: pytest.CaptureFixture[str], tmp_
     arguments = ["analyze", str(file), "--command", "c", "--measured"]
     out = ["--out", str(tmp_path / "out")]
     assert "line 3, column m: got 'oops'" in failed(capsys, *arguments, "m", *out)
-    assert "m2: got 'no such column', expected one; the header has c" in failed(
-        capsys, *arguments, "m2", *out
-    )
+    assert "got 'm2', expected one of its columns: c" in failed(capsys, *arguments, "m2", *out)
     file.write_text("c,m\n1,2\n1,3\n")
     assert "command: got '1 throughout the first half'" in failed(capsys, *arguments, "m", *out)
     file.write_text("c,m\n" + "".join(f"{c},7\n" for c in range(9)))

@@ -59,6 +59,12 @@ def test_nothing_moves_without_a_yes(
     assert not any(event.what == "operation enabled" for event in drives.events)
 
 
+def test_placeholders_of_the_drives_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    err = failed(capsys, "jog", "--config", "article_rig", "insertion", "0.001", "--yes")
+    assert "drives.insertion.counts_per_unit" in err
+    assert "without the word REPLACE" in err
+
+
 def test_a_rig_that_does_not_answer_refuses(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:

@@ -52,11 +52,11 @@ def test_a_run_folder_gives_the_figures_of_the_run(pair: tuple[Path, RecordedRun
 def test_tables_give_the_figures_of_the_run(pair: tuple[Path, RecordedRun], tmp_path: Path) -> None:
     _, run = pair
     assert run.uncompensated is not None
-    run.compensated.write(tmp_path)
+    run.main.write(tmp_path)
     run.uncompensated.write(tmp_path, "_uncompensated")
     stored = read_run(tmp_path).run
     assert stored.results == run.results
-    assert "do not have its warnings" in stored.compensated.warnings[0]
+    assert "do not have its warnings" in stored.main.warnings[0]
 
 
 def test_report_of_a_run_folder(
@@ -67,7 +67,7 @@ def test_report_of_a_run_folder(
     assert main(["report", str(folder), "--out", str(out), "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert document["folder"] == str(out)
-    assert document["ticks"] == len(run.compensated.trace)
+    assert document["ticks"] == len(run.main.trace)
     assert document["dof"] == run.to_json()
     names = {"report.html", "fig9.png", "fig5.png", "table1.csv"}
     assert {path.name for path in out.iterdir()} == names
@@ -88,15 +88,64 @@ def test_a_truncated_log_gives_the_part_that_it_has(
     assert main(["report", str(file), "--out", str(tmp_path / "out")]) == 0
     output = capsys.readouterr().out
     assert "truncated.mcap is damaged or truncated" in output
-    stored = read_run(file).run.compensated
+    stored = read_run(file).run.main
     count = len(stored.trace)
-    assert 100 < count < len(run.compensated.trace)
+    assert 100 < count < len(run.main.trace)
     lasted = stored.trace["time"][-1] - stored.trace["time"][0]
-    assert stored.segments == tuple(each for each in run.compensated.segments if each.end <= lasted)
+    assert stored.segments == tuple(each for each in run.main.segments if each.end <= lasted)
     # A file that ends within its first tick has no run.
     file.write_bytes(whole[: len(whole) // 100])
     with pytest.raises(RecordError):
         read_run(file)
+
+
+def test_report_of_a_run_without_compensation(
+    capsys: Capture, pair: tuple[Path, RecordedRun], tmp_path: Path
+) -> None:
+    folder, both = pair
+    log = folder / "uncompensated.mcap"
+    assert main(["report", str(log), "--out", str(tmp_path / "whole"), "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["is_compensated"] is False
+    for label, figures in both.to_json().items():
+        assert document["dof"][label]["uncompensated"] == figures["uncompensated"]
+        assert document["dof"][label]["compensated"] is None
+        assert document["dof"][label]["reduction"] is None
+    page = (tmp_path / "whole" / "report.html").read_text()
+    assert "uncompensated width" in page
+    assert "<td>compensated width" not in page
+
+
+def test_report_of_a_run_without_compensation_that_was_stopped(
+    capsys: Capture, pair: tuple[Path, RecordedRun], tmp_path: Path
+) -> None:
+    folder, both = pair
+    assert both.uncompensated is not None
+    # `run --compare` that is stopped before the run with compensation leaves this folder.
+    stopped = tmp_path / "stopped"
+    stopped.mkdir()
+    whole = (folder / "uncompensated.mcap").read_bytes()
+    (stopped / "uncompensated.mcap").write_bytes(whole[: len(whole) // 10])
+    assert main(["report", str(stopped), "--out", str(tmp_path / "out")]) == 0
+    output = capsys.readouterr().out
+    stored = read_run(stopped).run
+    assert not stored.main.segments
+    count = len(stored.main.trace)
+    assert 100 < count < len(both.uncompensated.trace)
+    # The tip is true and the run short: its second half counts.
+    time, tip, reference = (
+        stored.main.trace[name] for name in ("time", "true_insertion", "reference_insertion")
+    )
+    counts = time >= (time[0] + time[-1]) / 2
+    rms = 1e3 * np.sqrt(np.mean((tip - reference)[counts] ** 2))
+    expected = f"insertion: without compensation tracking error {rms:.3g} mm RMS, of the true tip"
+    assert expected in output
+    assert "largest error" not in (tmp_path / "out" / "report.html").read_text()
+    # Where motion is held, the tables are beside the log; without the log they are enough.
+    stored.main.write(stopped, "_uncompensated")
+    assert read_run(stopped).source == stopped / "uncompensated.mcap"
+    (stopped / "uncompensated.mcap").unlink()
+    assert read_run(stopped).run.to_json() == stored.to_json()
 
 
 def test_what_is_no_run_is_named(
@@ -105,16 +154,17 @@ def test_what_is_no_run_is_named(
     folder, _ = pair
     with pytest.raises(MissingPathError, match=r"recording\.toml"):
         read_run(tmp_path)
-    with pytest.raises(RecordError, match="a run with compensation; this one had none"):
-        read_run(folder / "uncompensated.mcap")
+    with pytest.raises(RecordError, match="a run with compensation; without --uncompensated"):
+        read_run(folder / "uncompensated.mcap", folder / "uncompensated.mcap")
     with pytest.raises(RecordError, match="a run without compensation"):
         read_run(folder / "compensated.mcap", folder / "compensated.mcap")
     for name in ("a", "b"):
         (tmp_path / f"{name}.mcap").write_bytes(recorded[0].read_bytes())
     with pytest.raises(RecordError, match="one of these logs"):
         read_run(tmp_path)
-    assert main(["report", str(tmp_path / "none.mcap")]) == 2
-    assert "none.mcap" in capsys.readouterr().err
+    assert main(["report", str(tmp_path / "none")]) == 2
+    assert "File not found" in (error := capsys.readouterr().err)
+    assert "or a folder with a log" in error
 
 
 def test_both_runs_have_the_same_reference(

@@ -86,9 +86,9 @@ def _draw_horizons(figure: SubFigure, analysis: Analysis) -> None:
         )
     axes.set_xticks(shares, [f"{share:.0f} %" for share in shares], minor=False)
     axes.minorticks_off()
-    axes.set_xlabel("travel of the command between sights, share of its range")
+    axes.set_xlabel("travel of the command between observed tips, share of its range")
     axes.set_ylabel("RMS error")
-    axes.set_title("RMS over the second half; tip seen only at sights")
+    axes.set_title("RMS over the second half; tip observed after each travel of the command")
     figure.legend(loc="outside right upper")
 
 

@@ -56,7 +56,7 @@ def add_parser(verbs: arguments.Verbs) -> None:
         nargs="+",
         default=[7, 8],
         metavar="N",
-        help="supported modes of operation [7 8]",
+        help="modes of operation that the drives support [7 8]",
     )
     bench.set_defaults(run=_bench)
 

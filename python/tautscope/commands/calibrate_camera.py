@@ -62,10 +62,14 @@ def add_parser(kinds: arguments.Verbs) -> None:
 
 def add_board_options(parser: argparse.ArgumentParser) -> None:
     """The board, the lens model, and the time limit of the live camera."""
-    parser.add_argument(
-        "--columns", type=arguments.positive, default=9, help="squares [%(default)s]"
-    )
-    parser.add_argument("--rows", type=arguments.positive, default=7, help="squares [%(default)s]")
+    for name, direction, count in (("--columns", "side by side", 9), ("--rows", "in a column", 7)):
+        parser.add_argument(
+            name,
+            type=arguments.positive,
+            default=count,
+            metavar="N",
+            help=f"squares of the board {direction} [%(default)s]",
+        )
     parser.add_argument(
         "--square",
         type=arguments.above_zero,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from tautscope.commands import arguments
 from tautscope.commands.question import ask
 from tautscope.config import Config, load_config
-from tautscope.config.placeholders import placeholders
+from tautscope.config.placeholders import MARK, placeholders
 from tautscope.errors import ConfigError, FieldError
 from tautscope.extras import require_extras
 
@@ -141,7 +141,7 @@ def refuse_wrong_limits(config: str) -> None:
     """
     marked = [key for key in placeholders(config) if key.startswith("drives.")]
     if marked:
-        allowed = "your values: the motors would move with wrong limits"
+        allowed = f"your values, and lines without the word {MARK}: the motors would move wrongly"
         raise ConfigError(", ".join(marked), f"placeholders of {config}", allowed)
 
 

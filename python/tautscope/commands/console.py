@@ -47,7 +47,9 @@ def _console(options: argparse.Namespace) -> int:
         from tautscope.console.log_player import play  # noqa: PLC0415
 
         return play(
-            options.replay, options.port, lambda url: _announce(options.json, url, "replay")
+            options.replay,
+            options.port,
+            lambda url: _announce(options.json, url, str(options.replay), "Nothing moves."),
         )
     require_extras("tautscope console", ["twin" if options.twin else "hardware"])
     from tautscope.console.start import start_console  # noqa: PLC0415
@@ -64,14 +66,14 @@ def _console(options: argparse.Namespace) -> int:
         config,
         folder,
         options.port,
-        lambda url: _announce(options.json, url, what),
+        lambda url: _announce(options.json, url, what, "Who has this address can move it."),
         is_twin=options.twin,
     )
 
 
-def _announce(is_json: bool, url: str, what: str) -> None:
+def _announce(is_json: bool, url: str, what: str, note: str) -> None:
     if is_json:
         print_json({"url": url})
     else:
-        print(f"The console of {what}: {url}\nWho has this address can move it. Ctrl-C ends.")
+        print(f"The console of {what}: {url}\n{note} Ctrl-C ends.")
     sys.stdout.flush()

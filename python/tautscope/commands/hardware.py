@@ -102,6 +102,15 @@ def _run(options: argparse.Namespace) -> int:
 def result_lines(run: RecordedRun) -> list[str]:
     """A line of results per DOF."""
     tip = "of the true tip" if run.is_tip_known else "by camera"
+    if not run.main.compensated:
+        shown = {
+            dof: f"slack {_shown(dof, result.uncompensated_estimate)}, by camera"
+            for dof, result in run.results.items()
+        } | {
+            dof: f"tracking error {_shown(dof, tracking.uncompensated_rms)} RMS, {tip}"
+            for dof, tracking in run.operator_results.items()
+        }
+        return [f"{dof.label}: without compensation {text}" for dof, text in shown.items()]
     return [summary_line(dof, result) for dof, result in run.results.items()] + [
         tracking_line(dof, tracking, tip) for dof, tracking in run.operator_results.items()
     ]

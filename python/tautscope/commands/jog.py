@@ -6,6 +6,7 @@ import argparse
 import sys
 
 from tautscope.commands import arguments
+from tautscope.commands.calibration_rig import refuse_wrong_limits
 from tautscope.commands.printing import print_json
 from tautscope.config import load_config
 from tautscope.dof import Dof
@@ -39,6 +40,7 @@ def _jog(options: argparse.Namespace) -> None:
     if config.drives is None:
         raise ConfigError("drives", None, "a section [drives] that names the motors")
     check_distance(dof, distance)
+    refuse_wrong_limits(options.config)
     if not options.yes:
         question = f"The {dof.label} motor will move by {distance:g} and back. Type y to start: "
         print(question, end="", file=sys.stderr, flush=True)

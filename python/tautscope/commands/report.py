@@ -22,8 +22,8 @@ def add_parser(verbs: arguments.Verbs) -> None:
         help="tables and figures of a stored run",
         description="Write report.html, figures and tables of a stored run: of a log of `run`, "
         "`console` or `ros2`, also a truncated one, of a run folder, or of tables of `export`. "
-        "Reductions need a run of the same reference without compensation. Of an experiment that "
-        "ended early, the degrees of freedom whose part is complete are evaluated.",
+        "Reductions need a run with compensation and one without, of the same reference. Of an "
+        "experiment that ended early, the degrees of freedom whose part is complete are evaluated.",
         extras=["hardware"],
     )
     report.add_argument("path", type=Path, metavar="PATH", help="FILE.mcap, or a folder with a run")
@@ -50,16 +50,17 @@ def _run(options: argparse.Namespace) -> None:
         return
     for line in result_lines(stored.run):
         print(line)
-    for warning in stored.run.compensated.warnings:
+    for warning in stored.run.main.warnings:
         print(f"Warning: {warning}.")
     print(f"Report and figures: {folder / 'report.html'}")
 
 
 def _to_json(stored: StoredRun) -> dict[str, Any]:
-    recording = stored.run.compensated
+    recording = stored.run.main
     return {
         "source": str(stored.source),
         "profile": recording.config.profile,
+        "is_compensated": recording.compensated,
         "ticks": len(recording.trace),
         "images": len(recording.frames),
         "is_tip_known": stored.run.is_tip_known,
@@ -80,7 +81,7 @@ def _write(stored: StoredRun, folder: Path) -> None:
     from tautscope.runs.output_folder import new_folder  # noqa: PLC0415
 
     run = stored.run
-    recording = run.compensated
+    recording = run.main
     pictures = [run.figure()]
     if recording.snapshot is not None:
         drawn = figure5(recording.snapshot, recording.config)

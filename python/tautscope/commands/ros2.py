@@ -35,7 +35,10 @@ def add_parser(verbs: arguments.Verbs) -> None:
         help="send set-points to a driver in ROS, and take images from ROS",
     )
     ros2.add_argument(
-        "--device", choices=["servo_jp", "joy"], default="servo_jp", help="reference [servo_jp]"
+        "--device",
+        choices=["servo_jp", "joy"],
+        default="servo_jp",
+        help="topic of the reference: positions, or a joystick [servo_jp]",
     )
     ros2.add_argument(
         "--axes",

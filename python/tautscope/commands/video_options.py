@@ -41,7 +41,7 @@ def check_video_options(options: argparse.Namespace) -> None:
         FieldError: There is not.
     """
     if (options.file is None) == (options.video is None):
-        given = "neither" if options.file is None else "both"
+        given = None if options.file is None else "a log and --video"
         raise FieldError(options.verb, given, "a log, or --video with --motors")
     if (options.video is None) != (options.motors is None):
         raise FieldError("--motors", options.motors, "a file of motor positions and --video")

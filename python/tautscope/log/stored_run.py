@@ -16,6 +16,8 @@ from tautscope.report.recorded_run import RecordedRun
 from tautscope.runs.flag_summary import FlagSummary
 from tautscope.runs.recording import Recording, Snapshot, per_dof, per_feature
 
+KINDS = "a log (.mcap), or a folder with a log or with recording.toml"
+"""What the path of a run may be."""
 PLAIN = "_uncompensated"
 """Suffix of the tables of a run without compensation."""
 LEAST_DURATION = 1.0
@@ -29,7 +31,7 @@ class StoredRun:
     Attributes:
         run: Its recordings, with their warnings. Of an experiment that ended early the segments
             that are complete; if there is none, it counts as another motion.
-        source: Where the run with compensation was read from.
+        source: Where its main run was read from.
     """
 
     run: RecordedRun
@@ -39,7 +41,7 @@ class StoredRun:
 def read_run(
     path: str | PathLike[str], uncompensated: str | PathLike[str] | None = None
 ) -> StoredRun:
-    """Read a run with compensation, and the one without beside it, if there is one.
+    """Read a run, and if it has compensation the one without beside it, if there is one.
 
     Args:
         path: A log; a folder with ``compensated.mcap`` and perhaps ``uncompensated.mcap``, or with
@@ -51,16 +53,18 @@ def read_run(
         RecordError: It cannot be read, is shorter than 1 s, is not the run that is expected, or
             both runs do not have the same reference.
     """
-    source, compensated, plain = _find(Path(path))
-    if not compensated.compensated:
-        raise RecordError("run", str(path), "a run with compensation; this one had none")
+    source, main, plain = _find(Path(path))
     if uncompensated is not None:
+        if not main.compensated:
+            raise RecordError(
+                "run", str(path), "a run with compensation; without --uncompensated any run"
+            )
         plain = _find(Path(uncompensated))[1]
         if plain.compensated:
             raise RecordError("--uncompensated", str(uncompensated), "a run without compensation")
     if plain is not None:
-        _check_same_reference(plain, compensated, str(uncompensated or source))
-    return StoredRun(RecordedRun(compensated, plain), source)
+        _check_same_reference(plain, main, str(uncompensated or source))
+    return StoredRun(RecordedRun(main, plain), source)
 
 
 def _find(place: Path) -> tuple[Path, Recording, Recording | None]:
@@ -70,17 +74,17 @@ def _find(place: Path) -> tuple[Path, Recording, Recording | None]:
         pair = [place / f"{name}compensated.mcap" for name in ("", "un")]
         if pair[0] in logs:
             return pair[0], _from_log(pair[0]), _from_log(pair[1]) if pair[1] in logs else None
-        if (place / "recording.toml").is_file():
-            plain = place / f"recording{PLAIN}.toml"
-            tables = _from_tables(place)
-            return place, tables, _from_tables(place, PLAIN) if plain.is_file() else None
+        kinds = [kind for kind in ("", PLAIN) if (place / f"recording{kind}.toml").is_file()]
+        if "" in kinds or (kinds and not logs):
+            tables = [_from_tables(place, kind) for kind in kinds]
+            return place, tables[0], tables[1] if len(tables) > 1 else None
         if len(logs) > 1:
             raise RecordError("run", ", ".join(map(str, logs)), "one of these logs")
         if not logs:
-            raise MissingPathError(
-                "run", str(place), "a log (.mcap), or a folder with a log or with recording.toml"
-            )
+            raise MissingPathError("run", str(place), KINDS)
         place = logs[0]
+    elif not place.exists():
+        raise MissingPathError("run", str(place), KINDS)
     return place, _from_log(place), None
 
 

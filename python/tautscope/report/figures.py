@@ -45,18 +45,18 @@ _ON_IMAGE: dict[str, Any] = {
 
 
 def figure9(
-    uncompensated: Recording | None, compensated: Recording, article: Recording | None = None
+    uncompensated: Recording | None, main: Recording, article: Recording | None = None
 ) -> Figure:
     """The article's Fig. 9: one column per DOF, with the true tip where it is known.
 
-    First row: reference, command, estimate, true tip and both contact offsets over time, with
-    compensation; second row likewise for another compensated run (`article`), if there is one. Last
-    row, the loops: tip over command without (if run) and over reference with compensation; a line
-    is the true tip, or the estimate if the tip is not known, and dots are the estimate. The first
-    period is thin.
+    First row: reference, command, estimate, true tip and both contact offsets over time; second row
+    likewise for another compensated run (`article`), if there is one. Last row, the loops: tip over
+    command without compensation, over reference with it; a line is the true tip, or the estimate if
+    the tip is not known, and dots are the estimate. The first period is thin.
     """
-    segments = compensated.segments
-    runs = [compensated] if article is None else [compensated, article]
+    segments = main.segments
+    runs = [main] if article is None else [main, article]
+    compared = [*([] if uncompensated is None else [uncompensated]), *runs[::-1]]
     letters = iter("abcdefghi")
     heights = (*[1.0] * len(runs), 1.25)
     with style():
@@ -66,17 +66,16 @@ def figure9(
             axes = part.subplots(1, len(segments), squeeze=False)[0]
             for axis, segment in zip(axes, segments, strict=True):
                 _over_time(axis, run, segment)
-                axis.set_title(
-                    f"({next(letters)}) {segment.dof.label}, profile {run.config.profile}"
-                )
-            if run is compensated:
+                how = f"profile {run.config.profile}" if run.compensated else "uncompensated"
+                axis.set_title(f"({next(letters)}) {segment.dof.label}, {how}")
+            if run is main:
                 lines, labels = axes[0].get_legend_handles_labels()
                 part.legend(lines, labels, loc="outside upper center", ncols=len(lines))
         axes = parts[-1].subplots(1, len(segments), squeeze=False)[0]
         for axis, segment in zip(axes, segments, strict=True):
-            _loops(axis, uncompensated, runs[::-1], segment)
+            _loops(axis, compared, segment)
             axis.set_title(f"({next(letters)}) {segment.dof.label}")
-        handles = list(_loop_legend(uncompensated, runs[::-1]))
+        handles = list(_loop_legend(compared))
         parts[-1].legend(handles=handles, loc="outside upper center", ncols=len(handles))
     return figure
 
@@ -104,15 +103,12 @@ def _over_time(axes: Axes, recording: Recording, segment: Segment) -> None:
     axes.set_xlim(0, segment.period * segment.periods)
 
 
-def _loops(
-    axes: Axes, uncompensated: Recording | None, compensated: list[Recording], segment: Segment
-) -> None:
+def _loops(axes: Axes, runs: list[Recording], segment: Segment) -> None:
     dof = segment.dof
     scale = dof.display_scale
-    runs = [*([] if uncompensated is None else [uncompensated]), *compensated]
     for run in runs:
-        x = "command" if run is uncompensated else "reference"
-        colour = _colour(run, compensated)
+        x = "reference" if run.compensated else "command"
+        colour = _colour(run, runs)
         tip, settled = (true_loop(run, segment, x, first) for first in (0, 1))
         estimate = estimated_loop(run, segment, x, 1)
         if not np.isfinite(tip[1]).any():
@@ -126,27 +122,28 @@ def _loops(
         axes.set(xticks=[], yticks=[])
     low, high = zip(axes.get_xlim(), axes.get_ylim(), strict=True)
     axes.axline((0, 0), slope=1, color=BLACK, linewidth=0.5, linestyle=(0, (4, 4)), zorder=0)
-    axes.set_xlabel(f"{'u' if uncompensated is None else 'c or u'} [{dof.display_unit}]")
+    over = sorted({"u" if run.compensated else "c" for run in runs})
+    axes.set_xlabel(f"{' or '.join(over)} [{dof.display_unit}]")
     axes.set_ylabel(f"tip [{dof.display_unit}]")
     axes.set_box_aspect(1)
     axes.set_xlim(min(low), max(high))
     axes.set_ylim(min(low), max(high))
 
 
-def _colour(run: Recording, compensated: list[Recording]) -> str:
+def _colour(run: Recording, runs: list[Recording]) -> str:
     """Of a run in the loops: the last compensated run is blue."""
     if not run.compensated:
         return GREY
-    return BLUE if run is compensated[-1] else ORANGE
+    return BLUE if run is runs[-1] else ORANGE
 
 
-def _loop_legend(uncompensated: Recording | None, compensated: list[Recording]) -> Iterator[Artist]:
-    if uncompensated is not None:
-        yield Line2D([], [], color=GREY, label="without compensation, over c")
-    for run in compensated:
-        colour = _colour(run, compensated)
-        yield Line2D([], [], color=colour, label=f"{run.config.profile}, over u")
-    is_true = np.isfinite(compensated[-1].trace["true_insertion"]).any()
+def _loop_legend(runs: list[Recording]) -> Iterator[Artist]:
+    for run in runs:
+        label = (
+            f"{run.config.profile}, over u" if run.compensated else "without compensation, over c"
+        )
+        yield Line2D([], [], color=_colour(run, runs), label=label)
+    is_true = np.isfinite(runs[-1].trace["true_insertion"]).any()
     if is_true:
         yield Line2D([], [], color=BLACK, label="true tip")
     yield Line2D([], [], color=BLACK, linestyle="", marker=".", markersize=3, label="estimate q̂")

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
-from matplotlib.ticker import MultipleLocator
+from matplotlib.ticker import MaxNLocator
 
 from tautscope.dof import Dof
 from tautscope.figure_style import BLACK, BLUE, GREY, ORANGE, PAGE, style
@@ -17,27 +17,28 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Runs = list[tuple[Recording, str]]
-"""Recordings with their colours; the last is the compensated one."""
+"""Recordings with their colours; the last is the one whose command is drawn."""
 WINDOW = 20.0
 """Part of the run in which the signals are drawn, from the start of the evaluation on [s]."""
 
 
-def draw_operator_motion(uncompensated: Recording | None, compensated: Recording) -> Figure:
-    """The operator motion: one row per DOF.
+def draw_operator_motion(uncompensated: Recording | None, main: Recording) -> Figure:
+    """The operator motion of a run, and of one without compensation: one row per DOF.
 
     (a)-(c): reference, command and tip over 20 s, the tip also without compensation.
     (d)-(f): tracking error of the tip over the whole run, without and with compensation.
     The tip is the true one where it is known, else that of the images.
     """
     runs = [(uncompensated, GREY)] if uncompensated is not None else []
-    runs.append((compensated, BLUE))
-    begin = evaluated_after(compensated)
+    runs.append((main, BLUE if main.compensated else GREY))
+    begin = evaluated_after(main)
+    end = float(main.trace["time"][-1] - main.trace["time"][0])
     with style():
         figure = Figure(figsize=(PAGE, 6.0), layout="constrained")
         panels = figure.subplots(len(Dof), 2, sharex="col", width_ratios=(1.25, 1))
         for dof, (signals, errors), letters in zip(Dof, panels, ("ad", "be", "cf"), strict=True):
             _draw_signals(signals, runs, dof)
-            signals.set_xlim(begin, begin + WINDOW)
+            signals.set_xlim(begin, min(begin + WINDOW, end))
             _draw_errors(errors, runs, dof)
             errors.axvspan(0, begin, color="#eeeeee", linewidth=0, zorder=0)
             signals.set_title(f"({letters[0]}) {dof.label}")
@@ -60,12 +61,11 @@ def draw_operator_motion(uncompensated: Recording | None, compensated: Recording
 
 
 def _draw_signals(axes: Axes, runs: Runs, dof: Dof) -> None:
-    compensated, _ = runs[-1]
-    trace = compensated.trace
+    trace = runs[-1][0].trace
     time = trace["time"] - trace["time"][0]
     for recording, colour in runs:
         stamps, tip, _ = tip_and_reference(recording, dof)
-        with_or_without = "with" if recording is compensated else "without"
+        with_or_without = "with" if recording.compensated else "without"
         axes.plot(
             stamps - recording.trace["time"][0],
             tip * dof.display_scale,
@@ -86,7 +86,7 @@ def _draw_signals(axes: Axes, runs: Runs, dof: Dof) -> None:
             label=name,
         )
     axes.set_ylabel(f"{dof.label} [{dof.display_unit}]")
-    axes.xaxis.set_major_locator(MultipleLocator(5))
+    axes.xaxis.set_major_locator(MaxNLocator("auto", integer=True, steps=[1, 2, 5, 10]))
 
 
 def _draw_errors(axes: Axes, runs: Runs, dof: Dof) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,6 +102,13 @@ def evaluate_operator_motion(
             bound=float(bounds[dof]),
         )
     return results
+
+
+def evaluate_uncompensated_motion(recording: Recording) -> OperatorResults:
+    """The figures of every DOF from a run without compensation; those of compensation are NaN."""
+    unknown = dict.fromkeys(("compensated_rms", "reduction", "largest", "bound"), np.nan)
+    found = evaluate_operator_motion(recording, recording)
+    return {dof: replace(result, **unknown) for dof, result in found.items()}
 
 
 def _tracking_errors(recording: Recording, dof: Dof) -> Floats:

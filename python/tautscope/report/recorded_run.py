@@ -7,46 +7,54 @@ from typing import Any
 
 import numpy as np
 
-from tautscope.report.operator_motion import OperatorResults, evaluate_operator_motion
+from tautscope.report.operator_motion import (
+    OperatorResults,
+    evaluate_operator_motion,
+    evaluate_uncompensated_motion,
+)
 from tautscope.report.report import CaptionedFigure, recorded_motion_section, table1_section
-from tautscope.report.results import Results, evaluate
+from tautscope.report.results import Results, evaluate, evaluate_uncompensated
 from tautscope.report.tables import finite_or_none, operator_to_json
 from tautscope.runs.recording import Recording, per_dof
 
 
 @dataclass(frozen=True)
 class RecordedRun:
-    """A run with compensation, and perhaps one of the same reference without.
+    """A run, and perhaps one of the same reference without compensation to compare it with.
 
     A run with segments is the article's experiment, one without is another motion.
 
     Attributes:
-        compensated: The run with compensation.
-        uncompensated: The run without, if there is one.
+        main: The run, with compensation or without.
+        uncompensated: One without, if `main` has compensation and there is one.
     """
 
-    compensated: Recording
+    main: Recording
     uncompensated: Recording | None = None
 
     @property
     def is_tip_known(self) -> bool:
         """Whether the true state of the tip is recorded; otherwise the camera measures it."""
-        return bool(np.isfinite(per_dof(self.compensated.trace, "true")).any())
+        return bool(np.isfinite(per_dof(self.main.trace, "true")).any())
 
     @property
     def results(self) -> Results:
-        """Table 1 of the experiment; NaN where it needs an uncompensated run, or the true tip.
+        """Table 1 of the experiment; NaN where it needs both runs, or the true tip.
 
         Empty for another motion.
         """
-        return evaluate(self.uncompensated, self.compensated)
+        if not self.main.compensated:
+            return evaluate_uncompensated(self.main)
+        return evaluate(self.uncompensated, self.main)
 
     @property
     def operator_results(self) -> OperatorResults:
         """Tracking of another motion, by the true tip if it is known; empty for the experiment."""
-        if self.compensated.segments:
+        if self.main.segments:
             return {}
-        return evaluate_operator_motion(self.uncompensated, self.compensated)
+        if not self.main.compensated:
+            return evaluate_uncompensated_motion(self.main)
+        return evaluate_operator_motion(self.uncompensated, self.main)
 
     def to_json(self) -> dict[str, Any]:
         """Per DOF the figures by camera, or of another motion by the true tip where it is known.
@@ -65,7 +73,7 @@ class RecordedRun:
 
     def section(self) -> str:
         """The tables as HTML."""
-        if self.compensated.segments:
+        if self.main.segments:
             return table1_section(self.results, is_tip_known=self.is_tip_known)
         return recorded_motion_section(self.operator_results, is_tip_known=self.is_tip_known)
 
@@ -76,16 +84,16 @@ class RecordedRun:
         from tautscope.report.operator_figure import draw_operator_motion  # noqa: PLC0415
 
         tip = "true tip" if self.is_tip_known else "tip as the camera measures it"
-        if self.compensated.segments:
+        if self.main.segments:
             return "fig9.png", CaptionedFigure(
-                figure9(self.uncompensated, self.compensated),
-                "Fig. 9. First row, with compensation: reference, command, estimate and both "
+                figure9(self.uncompensated, self.main),
+                "Fig. 9. First row: reference, command, estimate and both "
                 "contact offsets. Second row: loops of the estimate, and of the true tip where it "
                 "is known; a narrow loop on the dashed line, an ideal tip, is the goal. The first "
                 "period, in which the slack is estimated, is thin.",
             )
         return "tracking.png", CaptionedFigure(
-            draw_operator_motion(self.uncompensated, self.compensated),
+            draw_operator_motion(self.uncompensated, self.main),
             f"The recorded motion. (a)-(c) reference, command and the {tip}, in a part of the run. "
             "(d)-(f) tracking error over the whole run.",
         )

@@ -124,8 +124,8 @@ def page(where: str, body: str, facts: dict[str, str], config: Config) -> str:
     facts_list = "".join(f"<dt>{escape(k)}</dt><dd>{escape(v)}</dd>" for k, v in facts.items())
     return document(
         "Hysteresis reduction from the endoscope\u2019s images",
-        f"""The method of Reilink, Stramigioli and Misra (Mechatronics 23, 2013, 652, doi
-10.1016/j.mechatronics.2013.06.006) {where}.""",
+        f"""After Reilink, Stramigioli and Misra (Mechatronics 23, 2013, 652, doi
+10.1016/j.mechatronics.2013.06.006), {where}.""",
         f"""{body}
 <h2>Run</h2>
 <dl>{facts_list}</dl>

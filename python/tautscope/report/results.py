@@ -84,6 +84,20 @@ def evaluate(uncompensated: Recording | None, compensated: Recording) -> Results
     }
 
 
+def evaluate_uncompensated(recording: Recording) -> Results:
+    """The figures of every DOF with a segment, from a run without compensation.
+
+    Those of compensation are NaN.
+    """
+    unknown = {
+        field.name: np.nan
+        for field in fields(DofResult)
+        if field.name.startswith(("compensated", "reduction", "start"))
+    }
+    found = evaluate(recording, recording)
+    return {dof: replace(result, **unknown) for dof, result in found.items()}
+
+
 def combine(results: Sequence[dict[Dof, Figures]], how: dict[str, str] | str) -> dict[Dof, Figures]:
     """Combine seeds: ``"median"``, or per name of a figure ``"min"``, ``"max"`` or ``"median"``.
 

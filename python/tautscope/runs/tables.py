@@ -222,8 +222,7 @@ def _column(file: str, header: Sequence[str], name: str) -> str:
             return matches[0]
         if matches:
             raise RecordError(f"{file}: {name}", f"{len(matches)} columns of this name", "one")
-    known = f"the header has {', '.join(header)}"
-    raise RecordError(f"{file}: {name}", "no such column", f"one; {known}")
+    raise RecordError(file, name, f"one of its columns: {', '.join(header)}")
 
 
 def _numbers(series: pl.Series, file: str, line: str, name: str, rows: NDArray[np.int64]) -> Floats:
