@@ -116,6 +116,8 @@ def test_the_board_has_true_scale(capsys: Capture, tmp_path: Path) -> None:
 def test_refusals_write_nothing(capsys: Capture, tmp_path: Path, files: list[str]) -> None:
     rig = tmp_path / "rig.toml"
     rig.write_text("[camera]\nwidth = 720\n")
+    text = tmp_path / "text.mp4"
+    text.write_text("not a video")
     before = set(tmp_path.iterdir())
     out = ("--config", str(rig), "--write", "--out", str(tmp_path / "out"))
     assert main([*COMMAND, *files[:4], *out]) == 2
@@ -127,6 +129,7 @@ def test_refusals_write_nothing(capsys: Capture, tmp_path: Path, files: list[str
     assert "files or --twin" in failed(capsys, *COMMAND, files[0], "--twin")
     assert "--twin" in failed(capsys, *COMMAND)
     assert "File not found" in failed(capsys, *COMMAND, str(tmp_path / "none.mp4"))
+    assert "a video file that FFmpeg reads" in failed(capsys, *COMMAND, str(text))
     assert set(tmp_path.iterdir()) == before
     assert rig.read_text() == "[camera]\nwidth = 720\n"
 

@@ -14,7 +14,6 @@ from tautscope.commands.video_options import (
     read_motor_options,
 )
 from tautscope.config import load_config
-from tautscope.errors import USAGE, CameraError
 
 if TYPE_CHECKING:
     from tautscope.calibration.delay import DelayEstimate
@@ -62,11 +61,7 @@ def _run(options: argparse.Namespace) -> int:
     else:
         config = load_config(options.config)
         motors = read_motor_options(options, config)
-        try:
-            found, stamps = align_video_options(options, config, motors, limit=options.within)
-        except CameraError as error:  # of a file, not of a rig
-            error.exit_status = USAGE
-            raise
+        found, stamps = align_video_options(options, config, motors, limit=options.within)
         start = float(stamps[0]) - found.delay
         document["video_start"] = start if found.is_known else None
         remedy = f"The first image shows the motors at {start:.3f} s: --video-start {start:.3f}"

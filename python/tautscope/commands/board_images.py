@@ -101,12 +101,9 @@ def twin_images(config: Config, board: Board) -> BoardImages:
 
 
 def _video_images(file: Path) -> BoardImages:
-    from tautscope.errors import MissingPathError  # noqa: PLC0415
-    from tautscope.hardware.video import open_source, read_video  # noqa: PLC0415
+    from tautscope.hardware.video import open_video_file, read_video  # noqa: PLC0415
 
-    if not file.is_file():
-        raise MissingPathError("video", str(file), "a video file, or images")
-    with open_source(str(file)) as container:
+    with open_video_file(str(file)) as container:
         stream = container.streams.video[0]
         size = stream.width, stream.height
     camera = CameraConfig(width=size[0], height=size[1])

@@ -17,7 +17,7 @@ from tautscope.commands.video_options import (
     read_motor_options,
 )
 from tautscope.config import Config, load_config
-from tautscope.errors import USAGE, CameraError, FieldError
+from tautscope.errors import FieldError
 
 if TYPE_CHECKING:
     from tautscope.log.mcap_records import Damage
@@ -213,37 +213,33 @@ def _estimate_from_video(options: argparse.Namespace) -> int:
     config: Config = load_config(options.config, options.profile)
     folder = _folder(options)
     motors = read_motor_options(options, config)
-    try:
-        found, stamps = align_video_options(options, config, motors)
-        for note in implausible_motors(found):
-            _LOG.warning("%s", note)
-        start = float(stamps[0]) - (found.delay if found.is_known else 0.0)
-        frames = read_video(options.video, config.camera, float(stamps[0]))
-        if options.video_start is None:
-            if not found.is_known:
-                allowed = (
-                    "the time of the video's first frame in the motors' [s], because it could not "
-                    f"be estimated ({found.reason}). If both began together, type --video-start "
-                    f"{stamps[0]:g}"
-                )
-                raise FieldError("--video-start", None, allowed)
-            frames = retimed(frames, found)
-        elif not found.is_known:
-            _LOG.warning("--video-start was not checked: %s", found.reason)
-        elif abs(found.delay) > max(TOLERANCE, 3 * found.delay_std):
-            _LOG.warning(
-                "with --video-start %g the images are %.2f s %s, which is estimated as slack; "
-                "type --video-start %.3f, or leave it out",
-                options.video_start,
-                abs(found.delay),
-                "late" if found.delay > 0 else "early",
-                start,
+    found, stamps = align_video_options(options, config, motors)
+    for note in implausible_motors(found):
+        _LOG.warning("%s", note)
+    start = float(stamps[0]) - (found.delay if found.is_known else 0.0)
+    frames = read_video(options.video, config.camera, float(stamps[0]))
+    if options.video_start is None:
+        if not found.is_known:
+            allowed = (
+                "the time of the video's first frame in the motors' [s], because it could not "
+                f"be estimated ({found.reason}). If both began together, type --video-start "
+                f"{stamps[0]:g}"
             )
-        with progress_bar("estimation") as progress:
-            replayed = estimate_from_video(frames, *motors, config, progress)
-    except CameraError as error:  # of a file, not of a rig
-        error.exit_status = USAGE
-        raise
+            raise FieldError("--video-start", None, allowed)
+        frames = retimed(frames, found)
+    elif not found.is_known:
+        _LOG.warning("--video-start was not checked: %s", found.reason)
+    elif abs(found.delay) > max(TOLERANCE, 3 * found.delay_std):
+        _LOG.warning(
+            "with --video-start %g the images are %.2f s %s, which is estimated as slack; "
+            "type --video-start %.3f, or leave it out",
+            options.video_start,
+            abs(found.delay),
+            "late" if found.delay > 0 else "early",
+            start,
+        )
+    with progress_bar("estimation") as progress:
+        replayed = estimate_from_video(frames, *motors, config, progress)
     used = start if options.video_start is None else options.video_start
     facts = {"video_start": used, "delay": found.to_json()}
     write_estimates(folder, replayed, None, as_json=options.json, facts=facts)

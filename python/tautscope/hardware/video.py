@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.config import CameraConfig
-from tautscope.errors import CameraError, CameraMismatchError, MissingPathError, NoRigError
+from tautscope.errors import USAGE, CameraError, CameraMismatchError, MissingPathError, NoRigError
 from tautscope.extras import require_extras
 from tautscope.loop.frame_layout import FrameLayout
 from tautscope.loop.rig import Frame
@@ -78,13 +78,33 @@ def open_source(
             yield container
     except av.error.FFmpegError as error:
         if Path(url).is_file():
-            raise CameraError("video", url, f"a video file that FFmpeg reads ({error})") from None
+            allowed = f"a video file that FFmpeg reads ({error.strerror})"
+            raise CameraError("video", url, allowed) from None
         if url.startswith("unix:"):
             raise NoRigError("camera.source.url", url, "a running bench") from None
         hint = (
             "a source that can be opened and read; is it connected, and used by no other program?"
         )
-        raise CameraError("camera.source.url", url, f"{hint} ({error})") from None
+        raise CameraError("camera.source.url", url, f"{hint} ({error.strerror})") from None
+
+
+@contextmanager
+def open_video_file(path: str) -> Iterator[InputContainer]:
+    """Open a video file for the block. Errors of the block are of an input, not of a rig.
+
+    Raises:
+        MissingExtraError: PyAV is not installed.
+        MissingPathError: The file does not exist.
+        CameraError: It is no video.
+    """
+    if not Path(path).is_file():
+        raise MissingPathError("video", path, "a video file")
+    try:
+        with open_source(path) as container:
+            yield container
+    except CameraError as error:
+        error.exit_status = USAGE
+        raise
 
 
 class Decoder:
@@ -178,9 +198,7 @@ def read_video(path: str, camera: CameraConfig, start: float = 0.0) -> Iterator[
         MissingPathError: The file does not exist.
         CameraError: It is no video, has another size, or a frame has no time stamp.
     """
-    if not Path(path).is_file():
-        raise MissingPathError("video", path, "a video file")
-    with open_source(path) as container:
+    with open_video_file(path) as container:
         first: float | None = None
         for sequence, decoded in enumerate(Decoder(container, camera, live=False)):
             if decoded.stamp is None:
