@@ -66,7 +66,7 @@ def _console(options: argparse.Namespace) -> int:
         config,
         folder,
         options.port,
-        lambda url: _announce(options.json, url, what, "Who has this address can move it."),
+        lambda url: _announce(options.json, url, what, "Whoever has this address can move it."),
         is_twin=options.twin,
     )
 

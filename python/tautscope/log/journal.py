@@ -28,7 +28,8 @@ POLL_PERIOD = 0.01
 class Journal:
     """Queues that the loop fills and two threads empty into a file.
 
-    The queues are deques, whose append and pop need no lock.
+    The queues are deques, whose append and pop need no lock. The constructor writes the header,
+    without which nothing of a log can be read: the log of a process that is killed is readable.
 
     Args:
         path: New file.
@@ -45,9 +46,6 @@ class Journal:
         dropped_images: Number of dropped images.
         failure: Why recording stopped; empty while it works.
         written: Topic -> number of messages.
-
-    The constructor writes the header, without which nothing of a log can be read: a process that is
-    killed at any later time leaves a readable log.
 
     Raises:
         OutputError: The file exists already, or cannot be created or written.

@@ -1,0 +1,41 @@
+"""With camera images of the nominal twin, no image whose bands are visible is refused."""
+
+from contextlib import closing
+
+import numpy as np
+import pytest
+from instruments.rows import REFUSED
+from instruments.runs import LEAST_SEPARATION, LEAST_VISIBLE
+from tautscope.config import load_config
+from tautscope.loop.reduction import HysteresisReduction, Report
+from tautscope.loop.references import OperatorMotion
+from tautscope.loop.rig import Frame
+from tautscope.runs.experiment import run_experiment
+from tautscope.twin import Twin
+
+DURATION = 30.0
+MOST = 0.005
+"""Share of the images with visible bands that may be refused."""
+
+
+@pytest.mark.parametrize("seed", range(30, 35))
+def test_images_with_visible_bands_are_used(seed: int) -> None:
+    config = load_config().replace(**{"twin.seed": seed})
+    statuses: list[str] = []
+
+    def look(loop: HysteresisReduction, frame: Frame) -> Report:
+        report = loop.on_frame(frame)
+        assert frame.true_features is not None
+        assert frame.true_visible is not None
+        distance = np.hypot(*(frame.true_features[2:] - frame.true_features[:2]))
+        if frame.true_visible.min() >= LEAST_VISIBLE and distance >= LEAST_SEPARATION:
+            statuses.append(str(report.status))
+        return report
+
+    motion = OperatorMotion(config.experiment, seed, DURATION)
+    with closing(Twin(config)) as rig:
+        run_experiment(rig, motion, config, look=look)
+    refused = [status for status in statuses if status in REFUSED]
+    print(f"seed {seed}: {len(refused)} of {len(statuses)} refused")
+    assert len(statuses) > 400
+    assert len(refused) <= MOST * len(statuses)
