@@ -218,10 +218,14 @@ class MarkerDetector:
         model: FeatureModel,
         pixel_format: str,
         settings: Mapping[str, object],
-        workspace: NDArray[np.float64],
+        postures: NDArray[np.float64],
+        states: NDArray[np.float64],
+        std: NDArray[np.float64],
     ) -> Self: ...
     def detect(
-        self, image: NDArray[np.uint8], states: NDArray[np.float64], std: NDArray[np.float64]
+        self,
+        image: NDArray[np.uint8],
+        prior: tuple[NDArray[np.float64], NDArray[np.float64]] | None,
     ) -> tuple[_Floats, _Floats, _Floats, tuple[str, str], list[_Region], int]: ...
     def regions_in(
         self, image: NDArray[np.uint8], windows: Sequence[tuple[int, int, int, int]]

@@ -1,12 +1,13 @@
-"""With camera images of the nominal twin, no image whose bands are visible is refused."""
+"""With camera images, no image whose bands are visible is refused."""
 
 from contextlib import closing
 
 import numpy as np
 import pytest
+from instruments.properties import draw_instrument
 from instruments.rows import REFUSED
 from instruments.runs import LEAST_SEPARATION, LEAST_VISIBLE
-from tautscope.config import load_config
+from tautscope.config import Config, load_config
 from tautscope.loop.reduction import HysteresisReduction, Report
 from tautscope.loop.references import OperatorMotion
 from tautscope.loop.rig import Frame
@@ -16,11 +17,13 @@ from tautscope.twin import Twin
 DURATION = 30.0
 MOST = 0.005
 """Share of the images with visible bands that may be refused."""
+INSTRUMENT = 1000
+"""Seed of a drawn instrument with which settings were chosen: camera 0.9 deg and 1.9 mm off, focal
+length 2 %, bands 0.3 mm, uneven curvature, MJPEG."""
 
 
-@pytest.mark.parametrize("seed", range(30, 35))
-def test_images_with_visible_bands_are_used(seed: int) -> None:
-    config = load_config().replace(**{"twin.seed": seed})
+def refused_share(actual: Config, told: Config, seed: int) -> float:
+    """Share of the images with visible bands that are refused under an operator's motion."""
     statuses: list[str] = []
 
     def look(loop: HysteresisReduction, frame: Frame) -> Report:
@@ -32,10 +35,22 @@ def test_images_with_visible_bands_are_used(seed: int) -> None:
             statuses.append(str(report.status))
         return report
 
-    motion = OperatorMotion(config.experiment, seed, DURATION)
-    with closing(Twin(config)) as rig:
-        run_experiment(rig, motion, config, look=look)
+    motion = OperatorMotion(told.experiment, seed, DURATION)
+    with closing(Twin(actual)) as rig:
+        run_experiment(rig, motion, told, look=look)
     refused = [status for status in statuses if status in REFUSED]
     print(f"seed {seed}: {len(refused)} of {len(statuses)} refused")
     assert len(statuses) > 400
-    assert len(refused) <= MOST * len(statuses)
+    return len(refused) / len(statuses)
+
+
+@pytest.mark.parametrize("seed", range(30, 35))
+def test_images_with_visible_bands_are_used(seed: int) -> None:
+    config = load_config().replace(**{"twin.seed": seed})
+    assert refused_share(config, config, seed) <= MOST
+
+
+def test_they_are_used_where_the_loop_is_told_a_wrong_geometry() -> None:
+    """All but those of the first second, in which the filter takes the geometry for exact."""
+    drawn = draw_instrument(INSTRUMENT)
+    assert refused_share(drawn.actual, drawn.told, INSTRUMENT) <= MOST + 1 / DURATION

@@ -169,4 +169,11 @@ def test_settings_are_exactly_those_of_the_configuration(
 ) -> None:
     settings = msgspec.to_builtins(Config().vision) | change
     with pytest.raises(ConfigError, match=rf"^vision: got .*{found}"):
-        _core.MarkerDetector(build_feature_model(Config()), "bgr", settings, np.empty((0, 3)))
+        _core.MarkerDetector(
+            build_feature_model(Config()),
+            "bgr",
+            settings,
+            np.empty((0, 3)),
+            np.zeros((1, 3)),
+            np.ones(3),
+        )

@@ -22,39 +22,70 @@ fn outline(band: &core::BandImage) -> Outline {
 /// Standard deviations of a posture that was found in an image: those of the workspace over this.
 const NEAR: f64 = 8.0;
 
+/// Standard deviations of camera and bands from where they are configured, where neither prediction nor geometry are relied on:
+/// the range of drawn instruments, decision 0048.
+const GEOMETRY: core::GeometryDeviation = core::GeometryDeviation {
+    shift: 2e-3,
+    turn: 0.02,
+    band: 0.3e-3,
+};
+
+/// States (3,) [m, rad, rad] that together cover the workspace, each with the standard deviations `std` (3,).
+#[derive(Debug, Clone)]
+pub struct Workspace {
+    /// The states.
+    pub states: Vec<[f64; 3]>,
+    /// The standard deviations.
+    pub std: [f64; 3],
+}
+
 /// Predicts the marker bands of an image by the core's feature model, for [`tautscope_vision::Detector::recognise`].
 #[derive(Debug, Clone, Copy)]
 pub struct ModelPredictor<'a> {
     model: &'a core::FeatureModel,
-    beliefs: core::Beliefs<'a>,
-    /// The only state, where it was found in the image.
-    state: Option<[f64; 3]>,
+    model_deviation: f64,
+    workspace: &'a Workspace,
+    geometry: core::GeometryDeviation,
+    /// State and standard deviations; None: anywhere in the workspace.
+    prior: Option<([f64; 3], [f64; 3])>,
 }
 
 impl<'a> ModelPredictor<'a> {
-    /// From the state prediction of an image.
-    pub const fn new(model: &'a core::FeatureModel, beliefs: core::Beliefs<'a>) -> Self {
+    /// From the predicted state (3,) of an image with its standard deviations (3,) [m, rad, rad]; None if it may be anywhere
+    /// in the workspace. `model_deviation` is the standard deviation of a band from where the model has it (px).
+    pub const fn new(
+        model: &'a core::FeatureModel,
+        model_deviation: f64,
+        workspace: &'a Workspace,
+        prior: Option<([f64; 3], [f64; 3])>,
+    ) -> Self {
         Self {
             model,
-            beliefs,
-            state: None,
+            model_deviation,
+            workspace,
+            geometry: core::GeometryDeviation::EXACT,
+            prior,
         }
     }
 
-    fn beliefs(&self) -> core::Beliefs<'_> {
-        match &self.state {
-            Some(state) => core::Beliefs {
-                states: std::slice::from_ref(state),
-                ..self.beliefs
-            },
-            None => self.beliefs,
-        }
+    fn expect(&self, observed: [f64; 4], std: [f64; 4]) -> Option<core::Expected> {
+        let (states, deviation) = match &self.prior {
+            Some((state, std)) => (std::slice::from_ref(state), *std),
+            None => (self.workspace.states.as_slice(), self.workspace.std),
+        };
+        let beliefs = core::Beliefs {
+            states,
+            deviation,
+            model_deviation: self.model_deviation,
+            geometry: self.geometry,
+        };
+        self.model.expect(&beliefs, observed, std)
     }
 }
 
 impl BandPredictor for ModelPredictor<'_> {
     fn predict(&self, observed: [f64; 4], std: [f64; 4]) -> Option<BandPrediction> {
-        let expected = self.model.expect(&self.beliefs(), observed, std)?;
+        let expected = self.expect(observed, std)?;
         Some(BandPrediction {
             features: expected.features,
             covariance: expected.covariance,
@@ -63,32 +94,35 @@ impl BandPredictor for ModelPredictor<'_> {
     }
 
     fn section(&self, observed: [f64; 4], std: [f64; 4]) -> [Option<SectionDisc>; SECTION_DISCS] {
-        self.model.expect(&self.beliefs(), observed, std).map_or(
-            [None; SECTION_DISCS],
-            |expected| {
-                self.model.section(expected.state).map(|disc| {
+        self.expect(observed, std)
+            .map_or([None; SECTION_DISCS], |expected| {
+                expected.model.section(expected.state).map(|disc| {
                     disc.map(|disc| SectionDisc {
                         centre: disc.centre,
                         radius: disc.radius,
                         is_nearer: disc.is_nearer,
                     })
                 })
-            },
-        )
+            })
     }
 
     fn is_located(&self) -> bool {
-        self.beliefs().states.len() <= 1
+        self.prior.is_some()
     }
 
     fn near(&self, observed: [f64; 4]) -> Option<Self> {
-        let state = self.model.expect(&self.beliefs, observed, [2.0; 4])?.state;
+        let state = self.expect(observed, [2.0; 4])?.state;
         Some(Self {
-            state: Some(state),
-            beliefs: core::Beliefs {
-                deviation: self.beliefs.deviation.map(|std| std / NEAR),
-                ..self.beliefs
-            },
+            prior: Some((state, self.workspace.std.map(|std| std / NEAR))),
+            ..*self
+        })
+    }
+
+    fn freed(&self) -> Option<Self> {
+        let is_free = self.geometry != core::GeometryDeviation::EXACT;
+        (!is_free).then_some(Self {
+            geometry: GEOMETRY,
+            prior: None,
             ..*self
         })
     }

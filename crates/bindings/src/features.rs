@@ -108,9 +108,8 @@ impl FeatureModel {
             state: fixed("state", &state)?,
             deviation: fixed("state_std", &state_std)?,
         };
-        let found =
-            self.0
-                .nearest_state(&prior, fixed("features", &features)?, fixed("std", &std)?);
+        let observed = core::Observation::new(fixed("features", &features)?, fixed("std", &std)?);
+        let found = self.0.nearest_state(&prior, &observed);
         Ok(found.map(|(state, misfit)| (PyArray1::from_slice(py, &state), misfit)))
     }
 

@@ -11,7 +11,7 @@ use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2, PyReadonlyArrayDyn};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use tautscope_band_prediction::{ModelPredictor, outlines};
+use tautscope_band_prediction::{ModelPredictor, Workspace, outlines};
 use tautscope_core as core;
 use tautscope_vision::{
     ColorDiscriminant, Detector, Error, Frame, Labeller, MAX_SIDE, PixelFormat, Segmenter,
@@ -31,20 +31,24 @@ pub struct MarkerDetector {
     format: PixelFormat,
     model: core::FeatureModel,
     model_deviation: f64,
+    workspace: Workspace,
     segmenter: Segmenter,
     detector: Mutex<Detector>,
 }
 
 #[pymethods]
 impl MarkerDetector {
-    /// `settings` is the mapping of `VisionConfig`.
+    /// `settings` is the mapping of `VisionConfig`; `postures` (n, 3) cover the workspace densely, `states` (n, 3) with the
+    /// standard deviations `std` (3,) coarsely.
     #[new]
     fn new(
         py: Python<'_>,
         model: &FeatureModel,
         pixel_format: &str,
         settings: Bound<'_, PyAny>,
-        workspace: Vec<[f64; 3]>,
+        postures: Vec<[f64; 3]>,
+        states: Vec<[f64; 3]>,
+        std: [f64; 3],
     ) -> PyResult<Self> {
         let settings: Settings = from_mapping("vision", settings)?;
         let Settings {
@@ -55,13 +59,14 @@ impl MarkerDetector {
             ..
         } = settings;
         let discriminant = ColorDiscriminant::new(weights, threshold).map_err(rejected(py))?;
-        let postures = workspace
+        let postures = postures
             .iter()
             .filter_map(|state| outlines(&model.0, *state));
         Ok(Self {
             format: PixelFormat::named(pixel_format).map_err(rejected(py))?,
             model: model.0,
             model_deviation,
+            workspace: Workspace { states, std },
             segmenter: Segmenter::new(discriminant, smoothing),
             detector: Mutex::new(
                 Detector::new(settings)
@@ -73,21 +78,16 @@ impl MarkerDetector {
 
     /// Features (4,), covariance (4, 4), scores (2, 10), a reason per marker, regions, index of the discriminant.
     ///
-    /// `states` (n, 3): where the instrument may be, each with the standard deviations `std` (3,).
+    /// `prior`: predicted state (3,) and its standard deviations (3,); None: anywhere in the workspace.
     fn detect<'py>(
         &self,
         py: Python<'py>,
         image: PyReadonlyArrayDyn<'py, u8>,
-        states: Vec<[f64; 3]>,
-        std: [f64; 3],
+        prior: Option<([f64; 3], [f64; 3])>,
     ) -> PyResult<Detected<'py>> {
         let frame = ArrayFrame::new(&image, self.format)?;
-        let beliefs = core::Beliefs {
-            states: &states,
-            deviation: std,
-            model_deviation: self.model_deviation,
-        };
-        let predictor = ModelPredictor::new(&self.model, beliefs);
+        let predictor =
+            ModelPredictor::new(&self.model, self.model_deviation, &self.workspace, prior);
         let (found, regions) = py.detach(|| {
             let mut detector = self.detector.lock().unwrap_or_else(PoisonError::into_inner);
             let (found, regions) = detector.recognise(&frame, &predictor);

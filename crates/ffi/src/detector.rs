@@ -1,7 +1,7 @@
 //! `TautscopeDetector`: the marker bands in an image, Eq. (12) and Fig. 5.
 #![allow(unsafe_code)]
 
-use tautscope_band_prediction::{ModelPredictor, outlines};
+use tautscope_band_prediction::{ModelPredictor, Workspace, outlines};
 use tautscope_core as core;
 use tautscope_vision::{Detector, Frame, Image, PixelFormat};
 
@@ -20,7 +20,7 @@ pub struct TautscopeDetector {
     detector: Detector,
     model: core::FeatureModel,
     model_deviation: f64,
-    starts: (Vec<[f64; 3]>, [f64; 3]),
+    workspace: Workspace,
     size: [u32; 2],
     format: PixelFormat,
     is_broken: bool,
@@ -36,18 +36,19 @@ impl TautscopeDetector {
     fn new(text: &[u8]) -> Result<Self, TautscopeResult> {
         let (document, model, format) = detector_settings(text)?;
         let postures = document.experiment.postures();
-        let workspace = postures
+        let outlines = postures
             .iter()
             .filter_map(|posture| outlines(&model, *posture));
         let model_deviation = document.vision.model_deviation;
         let detector = Detector::new(document.vision)
             .map_err(|error| config(format_args!("vision.{error}")))?
-            .with_workspace(workspace);
+            .with_workspace(outlines);
+        let (states, std) = document.experiment.starts();
         Ok(Self {
             detector,
             model,
             model_deviation,
-            starts: document.experiment.starts(),
+            workspace: Workspace { states, std },
             size: [document.camera.width, document.camera.height],
             format,
             is_broken: false,
@@ -155,17 +156,16 @@ pub unsafe fn detect(
             format_args!("prediction: got {prediction:?}, expected finite numbers"),
         ));
     }
-    let (states, deviation) = match prediction {
-        Some(known) => (std::slice::from_ref(&known.state), known.std),
-        None => (handle.starts.0.as_slice(), handle.starts.1),
-    };
-    let beliefs = core::Beliefs {
-        states,
-        deviation,
-        model_deviation: handle.model_deviation,
-    };
-    let predictor = ModelPredictor::new(&handle.model, beliefs);
-    let (found, _) = handle.detector.recognise(&frame, &predictor);
+    let prior = prediction.map(|known| (known.state, known.std));
+    let TautscopeDetector {
+        detector,
+        model,
+        model_deviation,
+        workspace,
+        ..
+    } = handle;
+    let predictor = ModelPredictor::new(model, *model_deviation, workspace, prior);
+    let (found, _) = detector.recognise(&frame, &predictor);
     Ok(TautscopeDetection {
         features: found.features,
         covariance: found.covariance,

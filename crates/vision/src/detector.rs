@@ -38,7 +38,7 @@ impl Detector {
             discriminants.push(ColorDiscriminant::new(*weights, *threshold)?);
         }
         let scanner = Scanner::new(&discriminants, smoothing, minimum_area);
-        let [best, first] = [(); 2].map(|()| Vec::with_capacity(scanner.regions.capacity()));
+        let [best, first, kept] = [(); 3].map(|()| Vec::with_capacity(scanner.regions.capacity()));
         Ok(Self {
             unlocated: settings.unlocated(),
             settings,
@@ -47,6 +47,7 @@ impl Detector {
                 scanner,
                 best,
                 first,
+                kept,
                 blobs: BlobPostures::default(),
                 blur: BlurFitter::default(),
             },
@@ -66,8 +67,9 @@ impl Detector {
     /// Recognises the markers.
     ///
     /// With a prediction, near it: in the window around it, if that is small; there by a fit of the intensity, if the edges
-    /// give no clear result; in the whole frame, if no band was found there. Without one, in the whole frame, and again
-    /// near what was found there, if that is not clear.
+    /// give no clear result. Without one, in the whole frame, and again near what was found there, if that is not clear. If not
+    /// both bands are found, wherever they are clear, because prediction or geometry may be wrong; and if none is, with a
+    /// prediction in the whole frame.
     ///
     /// Returns the result and the regions it is based on, the largest first, at most
     /// [`MAX_REGIONS`](crate::MAX_REGIONS). Allocates only when a frame is larger than those before.
@@ -76,19 +78,42 @@ impl Detector {
         frame: &impl Frame,
         predictor: &impl BandPredictor,
     ) -> (Recognition, &[Region]) {
+        let mut found = self.search(frame, predictor).run();
+        let is_found = |found: &Recognition| found.rejections == [None; 2];
+        if is_found(&found) {
+            return (found, &self.memory.scanner.regions);
+        }
+        if let Some(freed) = predictor.freed() {
+            self.memory.keep();
+            let elsewhere = self.search(frame, &freed).run_clear();
+            if is_found(&elsewhere) {
+                return (elsewhere, &self.memory.scanner.regions);
+            }
+            self.memory.keep();
+        }
+        if predictor.is_located() && found.rejections.iter().all(Option::is_some) {
+            found = self.search(frame, predictor).run_whole(&found);
+        }
+        (found, &self.memory.scanner.regions)
+    }
+
+    fn search<'a, F: Frame, P: BandPredictor>(
+        &'a mut self,
+        frame: &'a F,
+        predictor: &'a P,
+    ) -> FrameSearch<'a, F, P> {
         let settings = if predictor.is_located() {
             &self.settings
         } else {
             &self.unlocated
         };
-        let search = FrameSearch {
+        FrameSearch {
             frame,
             predictor,
             settings,
             postures: &self.postures,
             memory: &mut self.memory,
-        };
-        (search.run(), &self.memory.scanner.regions)
+        }
     }
 
     /// The regions in windows, the largest first, at most [`MAX_REGIONS`](crate::MAX_REGIONS); each ends where its

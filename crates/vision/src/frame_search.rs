@@ -2,8 +2,8 @@
 
 use crate::blur::{BlurFit, BlurFitter};
 use crate::recognition::{
-    BLOBS, BandPredictor, BlobPostures, LEAST_CONTRAST, OutlineSearch, PostureTable, Recognition,
-    SECTION_DISCS, SectionDisc, section_contrast,
+    BLOBS, BandPrediction, BandPredictor, BlobPostures, LEAST_CONTRAST, OutlineSearch,
+    PostureTable, Recognition, SECTION_DISCS, SectionDisc, section_contrast,
 };
 use crate::scan::{Frame, Region, Scanner, Window};
 use crate::settings::Settings;
@@ -23,10 +23,19 @@ pub struct Memory {
     pub best: Vec<Region>,
     /// Regions of the result in the whole frame.
     pub first: Vec<Region>,
+    /// Regions of the result near the prediction.
+    pub kept: Vec<Region>,
     /// Postures of bands that are one region of some discriminant.
     pub blobs: BlobPostures,
     /// Fit of the intensity.
     pub blur: BlurFitter,
+}
+
+impl Memory {
+    /// Exchanges the regions of the last search and those that are kept.
+    pub const fn keep(&mut self) {
+        std::mem::swap(&mut self.kept, &mut self.scanner.regions);
+    }
 }
 
 /// Detection in one frame.
@@ -44,6 +53,12 @@ pub struct FrameSearch<'a, F, P> {
 }
 
 impl<F: Frame, P: BandPredictor> FrameSearch<'_, F, P> {
+    /// Recognises bands that the trained discriminant shows clearly, wherever they are.
+    pub fn run_clear(mut self) -> Recognition {
+        self.memory.blobs = [None; BLOBS];
+        self.by_discriminant(Window::whole(self.frame), 0)
+    }
+
     /// Recognises the bands.
     pub fn run(mut self) -> Recognition {
         if self.predictor.is_located() {
@@ -56,6 +71,19 @@ impl<F: Frame, P: BandPredictor> FrameSearch<'_, F, P> {
         } else {
             self.again(&found)
         }
+    }
+
+    /// The better of the result in the window around the prediction and that by the edges in the whole frame.
+    pub fn run_whole(mut self, found: &Recognition) -> Recognition {
+        if self.window().is_some() {
+            self.memory.keep();
+            let anywhere = self.by_edges(Window::whole(self.frame));
+            if self.is_better(&anywhere, found) {
+                return anywhere;
+            }
+            self.memory.keep();
+        }
+        *found
     }
 
     /// The best of a result without a prediction that is not clear, of a search for edges near it, and of the intensity fit
@@ -144,29 +172,29 @@ impl<F: Frame, P: BandPredictor> FrameSearch<'_, F, P> {
         best.map(|(_, features)| features)
     }
 
-    /// Searches in the window around the prediction first.
+    /// The prediction, and the window around it if that is small.
+    fn window(&self) -> Option<(BandPrediction, Window)> {
+        let prior = self.predictor.predict([0.0; 4], [f64::INFINITY; 4])?;
+        let window = prior.window(self.frame, self.settings.search_margin)?;
+        Some((prior, window))
+    }
+
+    /// Searches in the window around the prediction.
     fn near_prediction(&mut self) -> Recognition {
-        let prior = self.predictor.predict([0.0; 4], [f64::INFINITY; 4]);
-        let margin = self.settings.search_margin;
-        let near = prior.and_then(|prior| Some((prior, prior.window(self.frame, margin)?)));
+        let near = self.window();
         let whole = Window::whole(self.frame);
-        let mut found = self.by_edges(near.map_or(whole, |(_, window)| window));
+        let found = self.by_edges(near.map_or(whole, |(_, window)| window));
         if found.is_clear(self.settings) {
             return found;
         }
         // Intensity is less reliable than edges: it is used only near a known position.
-        if let Some((prior, window)) = near {
-            if let Some(fit) = self.by_intensity([found.centroids(), prior.features]) {
-                found = self.best_of(window, &found, &fit);
-            }
-            if found.rejections.iter().all(Option::is_some) {
-                let anywhere = self.by_edges(whole);
-                if self.is_better(&anywhere, &found) {
-                    found = anywhere;
-                }
-            }
+        let Some((prior, window)) = near else {
+            return found;
+        };
+        match self.by_intensity([found.centroids(), prior.features]) {
+            Some(fit) => self.best_of(window, &found, &fit),
+            None => found,
         }
-        found
     }
 
     fn is_better(&self, one: &Recognition, other: &Recognition) -> bool {

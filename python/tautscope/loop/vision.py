@@ -148,6 +148,9 @@ class MarkerDetector:
       `start_deviation`.
     - With neither, in the whole workspace of the experiment (decision 0032): both bands must be
       found, with an instrument between them.
+    - If not both are found, in the whole workspace wherever the trained discriminant shows them
+      clearly; camera and bands may then be 2 mm and 1 deg from where they are configured (decision
+      0048).
 
     The arithmetic is in fixed point. With the largest sum of weights of one sign s, a low-passed
     value is within (1.25 + smoothing) * 255 * s / 8190 of the exact one: 0.07 grey levels by
@@ -174,6 +177,7 @@ class MarkerDetector:
             config.camera.pixel_format,
             msgspec.to_builtins(config.vision),
             _workspace(config),
+            *self._starts,
         )
 
     def __repr__(self) -> str:
@@ -205,9 +209,8 @@ class MarkerDetector:
             FieldError: The prediction is not four numbers.
         """
         predicted = _checked_prediction(predicted_features)
-        states, std = self._prior(predicted, expectation)
         features, covariance, scores, reasons, regions, discriminant = self._core.detect(
-            self._layout.checked(image), states, std
+            self._layout.checked(image), self._prior(predicted, expectation)
         )
         a, b = (_band_score(row) for row in scores.tolist())
         found = tuple(map(Region._make, regions))
@@ -215,22 +218,22 @@ class MarkerDetector:
 
     def _prior(
         self, predicted: NDArray[np.float64] | None, expectation: StatePrediction | None
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """States the instrument may have (n, 3), and their common standard deviations (3,)."""
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """State (3,) and standard deviations (3,); None if it may be anywhere."""
         if expectation is not None:
-            return np.asarray(expectation.state)[None], np.asarray(expectation.std)
-        starts, broad = self._starts
+            return np.asarray(expectation.state), np.asarray(expectation.std)
         if predicted is None or not np.isfinite(predicted).all():
-            return starts, broad
+            return None
+        starts, broad = self._starts
         fits = [
             fit
             for start in starts
             if (fit := self._model.nearest_state(start, broad, predicted, np.full(4, 5.0)))
         ]
         if not fits:
-            return starts, broad
+            return None
         state, _ = min(fits, key=lambda fit: fit[1])
-        return state[None], self._start_deviation / 2
+        return state, self._start_deviation / 2
 
     def regions_in(
         self, image: NDArray[np.uint8], windows: Sequence[tuple[int, int, int, int]]

@@ -1,9 +1,11 @@
 //! Where the bands should be and how they look, before an image is looked at and while it is.
 
 use crate::dof::PerDof;
-use crate::estimation::posture::Belief;
+use crate::estimation::posture::{Belief, Observation};
 use crate::math::linear::square;
+use crate::math::whitening::diagonal;
 use crate::model::features::FeatureModel;
+use crate::model::geometry_error::GeometryDeviation;
 use crate::model::outline::BandImage;
 
 /// States from which the best is sought.
@@ -18,6 +20,8 @@ pub struct Beliefs<'a> {
     pub deviation: PerDof<f64>,
     /// Of a band from where the model has it: standard deviation (px).
     pub model_deviation: f64,
+    /// How far camera and bands may be from where they are configured.
+    pub geometry: GeometryDeviation,
 }
 
 /// What the model says of an image.
@@ -31,6 +35,8 @@ pub struct Expected {
     pub state: PerDof<f64>,
     /// The bands in it.
     pub bands: [BandImage; 2],
+    /// The model with the errors of its geometry that best explain what was seen.
+    pub model: FeatureModel,
 }
 
 impl FeatureModel {
@@ -38,9 +44,10 @@ impl FeatureModel {
     ///
     /// ```text
     /// q = the likeliest posture by `nearest_state`, over the believed states q0
-    /// features = h(q) + L(q) (q0 - q);    covariance = L diag(deviation^2) L' + model_deviation^2 I
+    /// features = h(q) + L(q) (q0 - q);    covariance = L diag(deviation^2) L' + model_deviation^2 I + G(q)
     /// ```
     ///
+    /// with the covariance G by errors of the geometry ([`GeometryDeviation`]), which the posture leaves to be explained by them.
     /// A feature of infinite deviation, or that is not finite, says nothing. With several states q0 is q.
     ///
     /// None where the model sees no band from any of the states, nor one deviation beside a single one.
@@ -56,13 +63,21 @@ impl FeatureModel {
         let bands = self.bands(posture)?;
         let [[ua, va], [ub, vb]] = bands.map(|band| band.centroid);
         let mut features = [ua, va, ub, vb];
-        let own = square(beliefs.model_deviation);
-        let mut covariance = [
-            [own, 0.0, 0.0, 0.0],
-            [0.0, own, 0.0, 0.0],
-            [0.0, 0.0, own, 0.0],
-            [0.0, 0.0, 0.0, own],
-        ];
+        let (mut covariance, model, bands) = if beliefs.geometry == GeometryDeviation::EXACT {
+            ([[0.0; 4]; 4], *self, bands)
+        } else {
+            let errors = self.geometry_errors(posture, &beliefs.geometry)?;
+            let observed = Observation::and_error(seen, deviation, errors.covariance())?;
+            let innovation = observed.innovation(&prediction);
+            let model = errors.explain(self, observed.whitener(), innovation);
+            (errors.covariance(), model, model.bands(posture)?)
+        };
+        let own = diagonal([square(beliefs.model_deviation); 4]);
+        for (row, own) in covariance.iter_mut().zip(own) {
+            for (entry, own) in row.iter_mut().zip(own) {
+                *entry += own;
+            }
+        }
         let dofs = believed.iter().zip(posture).zip(beliefs.deviation);
         for (column, ((believed, here), spread)) in prediction.columns.iter().zip(dofs) {
             for ((feature, row), by) in features.iter_mut().zip(&mut covariance).zip(column) {
@@ -77,6 +92,7 @@ impl FeatureModel {
             covariance,
             state: posture,
             bands,
+            model,
         })
     }
 
@@ -91,10 +107,17 @@ impl FeatureModel {
             state,
             deviation: beliefs.deviation,
         };
+        let observed = |state| {
+            if beliefs.geometry == GeometryDeviation::EXACT {
+                return Some(Observation::new(seen, deviation));
+            }
+            let errors = self.geometry_errors(state, &beliefs.geometry)?;
+            Observation::and_error(seen, deviation, errors.covariance())
+        };
         // The states that explain the features best as they are; one of them leads to the best of all.
         let mut starts: [Option<(f64, PerDof<f64>)>; STARTS] = [None; STARTS];
         let mut consider = |state: PerDof<f64>| {
-            let misfit = self.misfit(&belief(state), state, seen, deviation);
+            let misfit = observed(state).and_then(|seen| self.misfit(&belief(state), state, &seen));
             let mut moved = misfit.map(|misfit| (misfit, state));
             for place in &mut starts {
                 if let Some((misfit, _)) = moved
@@ -117,7 +140,7 @@ impl FeatureModel {
             }
         }
         let found = starts.iter().flatten().filter_map(|(_, state)| {
-            let (nearest, misfit) = self.nearest_state(&belief(*state), seen, deviation)?;
+            let (nearest, misfit) = self.nearest_state(&belief(*state), &observed(*state)?)?;
             Some((*state, nearest, misfit))
         });
         let (believed, posture, _) = found.min_by(|a, b| a.2.total_cmp(&b.2))?;

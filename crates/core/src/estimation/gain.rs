@@ -5,6 +5,8 @@ use crate::math::linear::square;
 /// Bounds of the gain.
 const LEAST: f64 = 0.5;
 const LARGEST: f64 = 1.5;
+/// Longest travel that one image stands for: after motion without an image the next one may be wrong.
+const LONGEST: f64 = 0.25;
 
 /// Linear regression of the measured tip on output and deflection of plays that no image corrects.
 ///
@@ -12,7 +14,7 @@ const LARGEST: f64 = 1.5;
 /// y = gain x + b d + constant
 /// ```
 ///
-/// by least squares, weighted by the travel of x, forgotten over `window`; x is the output, d = command - x the deflection,
+/// by least squares, weighted by the travel of x of at most 0.25, forgotten over `window`; x is the output, d = command - x the deflection,
 /// and y the tip, about the position at the start, in units of the DOF. `prior` is what the squares of gain - 1 and b cost. A
 /// half width that is wrong moves the two sides of the loop apart, by a share of the deflection: b takes it. Without b, a
 /// loop that is narrower than its estimate has the larger travel, and the difference would pass for a gain.
@@ -46,8 +48,9 @@ impl GainEstimate {
         let travel = self.last.map_or(0.0, |last| (output - last).abs());
         self.last = Some(output);
         let keep = libm::exp(-travel / window);
+        let weight = travel.min(LONGEST);
         let (x, d, off) = (output, deflection, tip - output);
-        let add = |sum: &mut f64, new: f64| *sum = keep * *sum + travel * new;
+        let add = |sum: &mut f64, new: f64| *sum = keep * *sum + weight * new;
         add(&mut self.weight, 1.0);
         for (sum, new) in self.sums.iter_mut().zip([x, d, off]) {
             add(sum, new);

@@ -4,7 +4,8 @@ use core::f64::consts::{FRAC_PI_2, PI};
 
 use crate::dof::{PerDof, all_finite};
 use crate::math::linear::{solve_symmetric, square};
-use crate::model::features::FeatureModel;
+use crate::math::whitening::{Features, Square, Whitener, diagonal};
+use crate::model::features::{FeatureModel, FeaturePrediction};
 
 const STEPS: usize = 8;
 
@@ -40,35 +41,96 @@ pub fn turn([insertion, rotation, bending]: PerDof<f64>, half_turn: f64) -> PerD
     [insertion, rotation + half_turn, side * bending]
 }
 
+/// Features (4,) of an image in px, and what whitens their errors.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Observation {
+    features: Features,
+    whitener: Whitener,
+}
+
+impl Observation {
+    /// Features (4,) in px with independent errors of standard deviations (4,) in px; one of infinite deviation, or that is not
+    /// finite, says nothing.
+    pub fn new(features: Features, mut deviation: Features) -> Self {
+        for (deviation, feature) in deviation.iter_mut().zip(features) {
+            if !feature.is_finite() {
+                *deviation = f64::INFINITY;
+            }
+        }
+        Self {
+            features,
+            whitener: Whitener::independent(deviation),
+        }
+    }
+
+    /// With another error of a covariance (4, 4) in px^2, which is not 0.
+    pub fn and_error(
+        features: Features,
+        deviation: Features,
+        mut covariance: Square,
+    ) -> Option<Self> {
+        let known = |index: usize| {
+            let of = |values: Features| values.get(index).is_some_and(|value| value.is_finite());
+            of(features) && of(deviation)
+        };
+        let used = [known(0) && known(1), known(2) && known(3)];
+        for (row, own) in covariance.iter_mut().zip(diagonal(deviation.map(square))) {
+            for (entry, own) in row.iter_mut().zip(own) {
+                *entry += own;
+            }
+        }
+        Some(Self {
+            features,
+            whitener: Whitener::new(&covariance, used)?,
+        })
+    }
+
+    /// What whitens the errors.
+    pub(crate) const fn whitener(&self) -> &Whitener {
+        &self.whitener
+    }
+
+    /// Features less the predicted ones.
+    pub(crate) fn innovation(&self, prediction: &FeaturePrediction) -> Features {
+        let mut innovation = self.features;
+        for (value, h) in innovation.iter_mut().zip(prediction.features) {
+            *value -= h;
+        }
+        innovation
+    }
+
+    fn misfit(&self, prediction: &FeaturePrediction) -> Features {
+        self.whitener.apply(self.innovation(prediction))
+    }
+}
+
 impl FeatureModel {
-    /// The most probable state, and what is minimised, for features (4,) in px measured with standard deviations (4,) in px:
+    /// The most probable state, and what is minimised, for an observation with the whitener W:
     ///
     /// ```text
-    /// argmin  sum_i ((h_i(q) - s_i) / deviation_i)^2 + sum_j ((q_j - belief_j) / deviation_j)^2
+    /// argmin  |W (h(q) - s)|^2 + sum_j ((q_j - belief_j) / deviation_j)^2
     /// ```
     ///
-    /// by at most eight Gauss-Newton steps, each halved while it makes things worse. A feature of
-    /// infinite deviation, or that is not finite, says nothing.
+    /// by at most eight Gauss-Newton steps, each halved while it makes things worse.
     ///
     /// It is for where and how large the bands should be; the loop's state estimate is Eq. (16), one step.
     /// None where the model sees no band. Wrong in another valley than the belief's.
     pub fn nearest_state(
         &self,
         belief: &Belief,
-        measured: [f64; 4],
-        deviation: [f64; 4],
+        observed: &Observation,
     ) -> Option<(PerDof<f64>, f64)> {
         let mut state = belief.state;
-        let mut cost = self.misfit(belief, state, measured, deviation)?;
+        let mut cost = self.misfit(belief, state, observed)?;
         for _ in 0..STEPS {
-            let step = self.gauss_newton(belief, state, measured, deviation)?;
+            let step = self.gauss_newton(belief, state, observed)?;
             let mut share = 1.0;
             let better = loop {
                 let mut trial = state;
                 for (value, step) in trial.iter_mut().zip(step) {
                     *value += share * step;
                 }
-                match self.misfit(belief, trial, measured, deviation) {
+                match self.misfit(belief, trial, observed) {
                     Some(less) if less < cost => break Some((trial, less)),
                     _ => share /= 2.0,
                 }
@@ -91,18 +153,11 @@ impl FeatureModel {
         &self,
         belief: &Belief,
         state: PerDof<f64>,
-        measured: [f64; 4],
-        deviation: [f64; 4],
+        observed: &Observation,
     ) -> Option<f64> {
-        let features = self.predict(state)?.features;
-        let seen = features.iter().zip(measured).zip(deviation);
-        let misfit: f64 = seen
-            .map(|((h, s), deviation)| {
-                square(weight(s, deviation) * (h - if s.is_finite() { s } else { *h }))
-            })
-            .sum();
+        let misfit = observed.misfit(&self.predict(state)?).map(square);
         let believed = state.iter().zip(belief.state).zip(belief.deviation);
-        let cost = misfit
+        let cost = misfit.iter().sum::<f64>()
             + believed
                 .map(|((q, q0), d)| square((q - q0) / d))
                 .sum::<f64>();
@@ -114,31 +169,26 @@ impl FeatureModel {
         &self,
         belief: &Belief,
         state: PerDof<f64>,
-        measured: [f64; 4],
-        deviation: [f64; 4],
+        observed: &Observation,
     ) -> Option<PerDof<f64>> {
         let prediction = self.predict(state)?;
-        let [s1, s2, s3] = belief.deviation;
         let mut normal = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let mut right = [0.0; 3];
-        for (((right, q), q0), scale) in right
+        let mut columns = prediction.columns;
+        for ((((right, column), q), q0), scale) in right
             .iter_mut()
+            .zip(&mut columns)
             .zip(state)
             .zip(belief.state)
             .zip(belief.deviation)
         {
             *right = (q0 - q) / scale;
+            *column = observed.whitener.apply(column.map(|by| by * scale));
         }
-        let [c1, c2, c3] = prediction.columns;
-        let rows = c1.iter().zip(c2).zip(c3);
-        let seen = prediction.features.iter().zip(measured).zip(deviation);
-        for (((a, b), c), ((h, s), deviation)) in rows.zip(seen) {
-            let weight = weight(s, deviation);
-            if weight == 0.0 {
-                continue;
-            }
-            let row = [a * s1, b * s2, c * s3].map(|value| value * weight);
-            let misfit = weight * (s - h);
+        let [c1, c2, c3] = columns;
+        let rows = c1.into_iter().zip(c2).zip(c3);
+        for (((a, b), c), misfit) in rows.zip(observed.misfit(&prediction)) {
+            let row = [a, b, c];
             for ((line, right), own) in normal.iter_mut().zip(&mut right).zip(row) {
                 *right += own * misfit;
                 for (entry, other) in line.iter_mut().zip(row) {
@@ -147,16 +197,9 @@ impl FeatureModel {
             }
         }
         let [x1, x2, x3] = solve_symmetric(normal, right)?;
+        let [s1, s2, s3] = belief.deviation;
         let step = [x1 * s1, x2 * s2, x3 * s3];
         all_finite(step).then_some(step)
-    }
-}
-
-fn weight(measured: f64, deviation: f64) -> f64 {
-    if measured.is_finite() {
-        1.0 / deviation
-    } else {
-        0.0
     }
 }
 

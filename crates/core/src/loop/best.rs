@@ -9,7 +9,7 @@ use crate::dof::PerDof;
 use crate::error::ConfigError;
 use crate::estimation::filter::Filter;
 use crate::estimation::history::{Entry, History};
-use crate::estimation::posture::Belief;
+use crate::estimation::posture::{Belief, Observation};
 use crate::r#loop::measurement::Measurement;
 use crate::r#loop::paper::state_estimator;
 use crate::r#loop::profile::{Image, ImageUpdate, ProfileBlocks};
@@ -231,7 +231,8 @@ impl ProfileBlocks for Best {
         };
         let corrected = self.feature_model(configured);
         let nearest = corrected.predict(belief.state).and_then(|expected| {
-            configured.nearest_state(&anywhere, expected.features, [APPARENT; 4])
+            let observed = Observation::new(expected.features, [APPARENT; 4]);
+            configured.nearest_state(&anywhere, &observed)
         });
         nearest.map_or(belief, |(state, _)| Belief { state, ..belief })
     }

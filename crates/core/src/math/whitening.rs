@@ -21,6 +21,7 @@ pub fn factor(&[[a, _, _], [b, c, _], [d, e, f]]: &Matrix) -> Option<Matrix> {
 }
 
 /// W with W R W' = I for the markers that are used; the other rows are 0.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Whitener([Features; 4]);
 
 impl Whitener {
@@ -66,6 +67,12 @@ impl Whitener {
             *whitener.get_mut(index)? = line;
         }
         Some(Self(whitener))
+    }
+
+    /// For independent features of these standard deviations; a feature of infinite or NaN deviation is not used.
+    pub fn independent([a, b, c, d]: Features) -> Self {
+        let weight = |std: f64| if std.is_finite() { 1.0 / std } else { 0.0 };
+        Self(diagonal([weight(a), weight(b), weight(c), weight(d)]))
     }
 
     /// W v, in which entries that are not used, and may be NaN, do not count.

@@ -138,33 +138,20 @@ impl Pose {
         for value in rotation_vector {
             require_finite("rotation", value)?;
         }
-        let [x, y, z] = rotation_vector;
-        let angle = libm::sqrt(x * x + y * y + z * z);
-        let turn = sinc(angle);
-        let half = sinc(angle / 2.0);
-        let versine = half * half / 2.0;
-        let diagonal = |a: f64, b: f64| 1.0 - versine * (a * a + b * b);
-        let rotation = [
-            [
-                diagonal(y, z),
-                versine * x * y - turn * z,
-                versine * x * z + turn * y,
-            ],
-            [
-                versine * x * y + turn * z,
-                diagonal(x, z),
-                versine * y * z - turn * x,
-            ],
-            [
-                versine * x * z - turn * y,
-                versine * y * z + turn * x,
-                diagonal(x, y),
-            ],
-        ];
         Ok(Self {
-            rotation,
+            rotation: rotation_matrix(rotation_vector),
             translation,
         })
+    }
+
+    /// Turned about the origin of the outer frame by a rotation vector (rad), then displaced by a vector (m).
+    pub(crate) fn moved(&self, shift: Vector, turn: Vector) -> Self {
+        let matrix = rotation_matrix(turn);
+        let [x, y, z] = transposed(&self.rotation).map(|column| rotate(&matrix, column));
+        Self {
+            rotation: transposed(&[x, y, z]),
+            translation: add(rotate(&matrix, self.translation), 1.0, shift),
+        }
     }
 
     /// Transforms a point from the inner frame to the outer.
@@ -176,4 +163,34 @@ impl Pose {
     pub(crate) fn rotate(&self, direction: Vector) -> Vector {
         rotate(&self.rotation, direction)
     }
+}
+
+/// The rotation by a vector, axis times angle in rad (Rodrigues).
+fn rotation_matrix([x, y, z]: Vector) -> Matrix {
+    let angle = libm::sqrt(x * x + y * y + z * z);
+    let turn = sinc(angle);
+    let half = sinc(angle / 2.0);
+    let versine = half * half / 2.0;
+    let diagonal = |a: f64, b: f64| 1.0 - versine * (a * a + b * b);
+    [
+        [
+            diagonal(y, z),
+            versine * x * y - turn * z,
+            versine * x * z + turn * y,
+        ],
+        [
+            versine * x * y + turn * z,
+            diagonal(x, z),
+            versine * y * z - turn * x,
+        ],
+        [
+            versine * x * z - turn * y,
+            versine * y * z + turn * x,
+            diagonal(x, y),
+        ],
+    ]
+}
+
+fn transposed(&[[a, b, c], [d, e, f], [g, h, i]]: &Matrix) -> Matrix {
+    [[a, d, g], [b, e, h], [c, f, i]]
 }

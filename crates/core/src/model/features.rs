@@ -122,6 +122,16 @@ impl FeatureModel {
         }
     }
 
+    /// The model of a camera that is displaced against the guide by `shift` (m) and turned about its own origin by the rotation
+    /// vector `turn` (rad), and of bands that are `bands` (m) farther from the section.
+    pub(crate) fn moved(&self, shift: Vector, turn: Vector, bands: [f64; 2]) -> Self {
+        Self {
+            instrument: self.instrument.with_bands_moved(bands),
+            camera_from_guide: self.camera_from_guide.moved(shift, turn),
+            ..*self
+        }
+    }
+
     /// Derivatives (4,) in px of the features by each geometry of [`FeatureModel::with_geometry`].
     ///
     /// None where [`FeatureModel::predict`] is.
@@ -174,6 +184,12 @@ impl FeatureModel {
     pub(crate) fn project(&self, point: Vector) -> Option<[f64; 2]> {
         let projection = self.camera.project(point)?;
         (!projection.is_folded()).then_some(projection.pixel)
+    }
+
+    /// Derivatives of the image (u, v) in px of a point in the camera frame by it (px/m); None where it has none.
+    pub(crate) fn pixel_by_point(&self, point: Vector) -> Option<[Vector; 2]> {
+        let projection = self.camera.project(point)?;
+        (!projection.is_folded()).then_some(projection.pixel_by_point)
     }
 
     /// The centroid (u, v) in px of the image of a band, and the derivatives of u and v by each DOF.

@@ -74,6 +74,16 @@ impl Instrument {
         Self { unevenness, ..self }
     }
 
+    /// The instrument whose bands A and B are farther from the section by (2,) in m.
+    #[must_use]
+    pub(crate) const fn with_bands_moved(self, [by_a, by_b]: [f64; 2]) -> Self {
+        let [a, b] = self.markers;
+        Self {
+            markers: [a + by_a, b + by_b],
+            ..self
+        }
+    }
+
     /// Displacement of the tip per unevenness (radial, axial), and its derivative by q3 [m, m/rad].
     fn displacement(&self, bending: f64) -> ([f64; 2], [f64; 2]) {
         let half = bending / 2.0;

@@ -3,6 +3,7 @@
 pub(crate) mod camera;
 pub(crate) mod features;
 pub(crate) mod friction;
+pub(crate) mod geometry_error;
 pub(crate) mod hysteresis;
 pub(crate) mod instrument;
 pub(crate) mod outline;

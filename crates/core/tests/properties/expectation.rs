@@ -3,6 +3,7 @@
 use crate::estimation::expectation::Beliefs;
 use crate::model::camera::{Camera, Pose};
 use crate::model::features::FeatureModel;
+use crate::model::geometry_error::GeometryDeviation;
 use crate::model::instrument::Instrument;
 use proptest::prelude::*;
 
@@ -28,6 +29,7 @@ fn beliefs(states: &[[f64; 3]], model_deviation: f64) -> Beliefs<'_> {
         states,
         deviation: DEVIATION,
         model_deviation,
+        geometry: GeometryDeviation::EXACT,
     }
 }
 

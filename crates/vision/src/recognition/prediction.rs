@@ -98,4 +98,13 @@ pub trait BandPredictor {
     {
         None
     }
+
+    /// The predictor that relies on neither the prior nor the configured geometry: bands anywhere in the workspace, in any pose of
+    /// camera and bands near the configured one. None if there is no such predictor, or if it is this one.
+    fn freed(&self) -> Option<Self>
+    where
+        Self: Sized,
+    {
+        None
+    }
 }
