@@ -79,14 +79,12 @@ impl Detector {
         predictor: &impl BandPredictor,
     ) -> (Recognition, &[Region]) {
         let mut found = self.search(frame, predictor).run();
-        let is_found = |found: &Recognition| found.rejections == [None; 2];
-        if is_found(&found) {
+        if found.rejections == [None; 2] {
             return (found, &self.memory.scanner.regions);
         }
         if let Some(freed) = predictor.freed() {
             self.memory.keep();
-            let elsewhere = self.search(frame, &freed).run_clear();
-            if is_found(&elsewhere) {
+            if let Some(elsewhere) = self.search(frame, &freed).run_clear() {
                 return (elsewhere, &self.memory.scanner.regions);
             }
             self.memory.keep();

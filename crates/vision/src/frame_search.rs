@@ -11,6 +11,9 @@ use crate::settings::Settings;
 /// Least sum of the edge shares of both bands for which the outlines are fitted again near them, without a prediction.
 const LEAST_EDGES: f64 = 1.0;
 
+/// Least coverage of each band that is recognised in any pose: outlines of any shape fit a piece of a band.
+const CLEAR_COVERAGE: f64 = 0.5;
+
 /// Standard deviation of the positions whose posture the section is drawn in (px).
 const SECTION_STD: [f64; 4] = [0.5; 4];
 
@@ -53,10 +56,14 @@ pub struct FrameSearch<'a, F, P> {
 }
 
 impl<F: Frame, P: BandPredictor> FrameSearch<'_, F, P> {
-    /// Recognises bands that the trained discriminant shows clearly, wherever they are.
-    pub fn run_clear(mut self) -> Recognition {
+    /// Recognises both bands where the trained discriminant shows them clearly, wherever they are.
+    pub fn run_clear(mut self) -> Option<Recognition> {
         self.memory.blobs = [None; BLOBS];
-        self.by_discriminant(Window::whole(self.frame), 0)
+        let found = self.by_discriminant(Window::whole(self.frame), 0);
+        let mut bands = found.scores.iter().zip(&found.rejections);
+        bands
+            .all(|(score, rejection)| rejection.is_none() && score.coverage >= CLEAR_COVERAGE)
+            .then_some(found)
     }
 
     /// Recognises the bands.
