@@ -102,7 +102,7 @@ def main() -> None:
         print(f"{seed_table(rows)}\n\n{text}")
     if options.write:
         insert(PAGE, "ranges", markdown_table())
-        insert(PAGE, "results", text)
+        insert(PAGE, "features" if options.features else "images", text)
 
 
 if __name__ == "__main__":

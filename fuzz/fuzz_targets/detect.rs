@@ -15,7 +15,7 @@ use tautscope_vision::{
     Settings, Window,
 };
 
-#[derive(Arbitrary, Debug)]
+#[derive(Arbitrary, Clone, Debug)]
 struct Input<'a> {
     format: u8,
     sides: [u8; 2],
@@ -59,6 +59,13 @@ impl BandPredictor for Input<'_> {
 
     fn is_located(&self) -> bool {
         self.is_located
+    }
+
+    fn freed(&self) -> Option<Self> {
+        self.is_located.then(|| Self {
+            is_located: false,
+            ..self.clone()
+        })
     }
 }
 

@@ -64,7 +64,7 @@ fn after_the_first_frame_nothing_is_allocated() {
 }
 
 #[test]
-fn nothing_is_allocated_where_the_posture_is_not_known() {
+fn nothing_is_allocated_where_the_posture_is_not_known_or_not_as_predicted() {
     // Discs on grey plastic in tissue, discs on tissue alone, and noise.
     let is_disc = |u: usize, v: usize| {
         [(30, 34), (30, 18)].iter().any(|(cu, cv)| {
@@ -93,18 +93,22 @@ fn nothing_is_allocated_where_the_posture_is_not_known() {
         Some(drawn.outlines)
     });
     let mut detector = Detector::new(SETTINGS).unwrap().with_workspace(postures);
-    let mut found = [0; 3];
-    for repeat in 0..2 {
-        for (data, found) in frames.iter().zip(&mut found) {
-            let frame = Image::new(data, PixelFormat::Bgr, [WIDTH, HEIGHT], 3 * WIDTH).unwrap();
-            let mut detect = || detector.recognise(&frame, &Anywhere::new()).0.rejections;
-            let rejections = if repeat == 0 {
-                detect()
-            } else {
-                assert_no_alloc(detect)
-            };
-            *found += rejections.iter().filter(|one| one.is_none()).count();
+    // Expected nowhere, and where they are not.
+    let elsewhere = Anywhere::expected_at([10.0, 40.0, 10.0, 24.0]);
+    for predictor in [Anywhere::new(), elsewhere] {
+        let mut found = [0; 3];
+        for repeat in 0..2 {
+            for (data, found) in frames.iter().zip(&mut found) {
+                let frame = Image::new(data, PixelFormat::Bgr, [WIDTH, HEIGHT], 3 * WIDTH).unwrap();
+                let mut detect = || detector.recognise(&frame, &predictor).0.rejections;
+                let rejections = if repeat == 0 {
+                    detect()
+                } else {
+                    assert_no_alloc(detect)
+                };
+                *found += rejections.iter().filter(|one| one.is_none()).count();
+            }
         }
+        assert_eq!(found, [4, 0, 0]);
     }
-    assert_eq!(found, [4, 0, 0]);
 }

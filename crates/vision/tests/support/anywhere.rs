@@ -19,6 +19,14 @@ impl Anywhere {
             is_known: false,
         }
     }
+
+    /// Discs that are expected at `features` (px), but may be anywhere.
+    pub fn expected_at(features: [f64; 4]) -> Self {
+        Self {
+            place: Discs::at(features),
+            is_known: true,
+        }
+    }
 }
 
 impl BandPredictor for Anywhere {
@@ -36,9 +44,10 @@ impl BandPredictor for Anywhere {
     }
 
     fn near(&self, observed: [f64; 4]) -> Option<Self> {
-        Some(Self {
-            place: Discs::at(observed),
-            is_known: true,
-        })
+        Some(Self::expected_at(observed))
+    }
+
+    fn freed(&self) -> Option<Self> {
+        self.is_known.then(Self::new)
     }
 }
