@@ -22,8 +22,8 @@ fn outline(band: &core::BandImage) -> Outline {
 /// Standard deviations of a posture that was found in an image: those of the workspace over this.
 const NEAR: f64 = 8.0;
 
-/// Standard deviations of camera and bands from where they are configured, where neither prediction nor geometry are relied on:
-/// the range of drawn instruments, decision 0048.
+/// Standard deviations of camera and bands from where they are configured, where neither prediction nor geometry is relied on:
+/// about the range of the drawn instruments of docs/instruments.md, decision 0048.
 const GEOMETRY: core::GeometryDeviation = core::GeometryDeviation {
     shift: 2e-3,
     turn: 0.02,

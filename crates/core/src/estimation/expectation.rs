@@ -3,7 +3,7 @@
 use crate::dof::PerDof;
 use crate::estimation::posture::{Belief, Observation};
 use crate::math::linear::square;
-use crate::math::whitening::diagonal;
+use crate::math::whitening::{add_matrix, diagonal};
 use crate::model::features::FeatureModel;
 use crate::model::geometry_error::GeometryDeviation;
 use crate::model::outline::BandImage;
@@ -73,11 +73,7 @@ impl FeatureModel {
             (errors.covariance(), model, model.bands(posture)?)
         };
         let own = diagonal([square(beliefs.model_deviation); 4]);
-        for (row, own) in covariance.iter_mut().zip(own) {
-            for (entry, own) in row.iter_mut().zip(own) {
-                *entry += own;
-            }
-        }
+        add_matrix(&mut covariance, &own);
         let dofs = believed.iter().zip(posture).zip(beliefs.deviation);
         for (column, ((believed, here), spread)) in prediction.columns.iter().zip(dofs) {
             for ((feature, row), by) in features.iter_mut().zip(&mut covariance).zip(column) {

@@ -5,7 +5,9 @@ use crate::dof::{PerDof, all_finite};
 use crate::estimation::ensemble::ScalarMeasurement;
 use crate::estimation::settings::StateEstimationSettings;
 use crate::math::linear::{Matrix, add, dot, solve_symmetric, square};
-use crate::math::whitening::{Features, Square, Whitener, add_product, diagonal, factor};
+use crate::math::whitening::{
+    Features, Square, Whitener, add_matrix, add_product, diagonal, factor,
+};
 use crate::model::features::{FeatureModel, FeaturePrediction, GEOMETRY};
 
 /// Gauss-Newton steps at most, and halvings of each.
@@ -87,11 +89,7 @@ impl Markers {
         let own = square(settings.marker_deviation);
         let mut covariance = covariance.copied().unwrap_or_else(|| diagonal([own; 4]));
         let model = diagonal([square(model_std); 4]);
-        for (row, added) in covariance.iter_mut().zip(model) {
-            for (entry, added) in row.iter_mut().zip(added) {
-                *entry += added;
-            }
-        }
+        add_matrix(&mut covariance, &model);
         Self {
             features,
             covariance,

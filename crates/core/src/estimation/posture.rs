@@ -4,7 +4,7 @@ use core::f64::consts::{FRAC_PI_2, PI};
 
 use crate::dof::{PerDof, all_finite};
 use crate::math::linear::{solve_symmetric, square};
-use crate::math::whitening::{Features, Square, Whitener, diagonal};
+use crate::math::whitening::{Features, Square, Whitener, add_matrix, diagonal};
 use crate::model::features::{FeatureModel, FeaturePrediction};
 
 const STEPS: usize = 8;
@@ -74,11 +74,7 @@ impl Observation {
             of(features) && of(deviation)
         };
         let used = [known(0) && known(1), known(2) && known(3)];
-        for (row, own) in covariance.iter_mut().zip(diagonal(deviation.map(square))) {
-            for (entry, own) in row.iter_mut().zip(own) {
-                *entry += own;
-            }
-        }
+        add_matrix(&mut covariance, &diagonal(deviation.map(square)));
         Some(Self {
             features,
             whitener: Whitener::new(&covariance, used)?,

@@ -87,6 +87,15 @@ impl Whitener {
     }
 }
 
+/// A + B.
+pub fn add_matrix(matrix: &mut Square, other: &Square) {
+    for (row, other) in matrix.iter_mut().zip(other) {
+        for (entry, other) in row.iter_mut().zip(other) {
+            *entry += other;
+        }
+    }
+}
+
 /// A + v v'.
 pub fn add_product(matrix: &mut Square, vector: Features) {
     for (row, own) in matrix.iter_mut().zip(vector) {
