@@ -11,8 +11,10 @@ use crate::settings::Settings;
 /// Least sum of the edge shares of both bands for which the outlines are fitted again near them, without a prediction.
 const LEAST_EDGES: f64 = 1.0;
 
-/// Least coverage of each band that is recognised in any pose: outlines of any shape fit a piece of a band.
+/// Least coverage, and least share inside the image, of each band that is recognised in any pose: outlines of any shape fit a
+/// piece of a band.
 const CLEAR_COVERAGE: f64 = 0.5;
+const CLEAR_INSIDE: f64 = 0.9;
 
 /// Standard deviation of the positions whose posture the section is drawn in (px).
 const SECTION_STD: [f64; 4] = [0.5; 4];
@@ -60,10 +62,12 @@ impl<F: Frame, P: BandPredictor> FrameSearch<'_, F, P> {
     pub fn run_clear(mut self) -> Option<Recognition> {
         self.memory.blobs = [None; BLOBS];
         let found = self.by_discriminant(Window::whole(self.frame), 0);
-        let mut bands = found.scores.iter().zip(&found.rejections);
-        bands
-            .all(|(score, rejection)| rejection.is_none() && score.coverage >= CLEAR_COVERAGE)
-            .then_some(found)
+        let is_clear = found.rejections == [None; 2]
+            && found
+                .scores
+                .iter()
+                .all(|score| score.coverage >= CLEAR_COVERAGE && score.inside >= CLEAR_INSIDE);
+        is_clear.then_some(found)
     }
 
     /// Recognises the bands.
