@@ -1,4 +1,4 @@
-"""A sweep whose configured pose is wrong, also by so much that no posture fits the bands."""
+"""A sweep whose configured pose is wrong, also so wrong that no posture fits the bands."""
 
 import numpy as np
 import pytest
