@@ -83,11 +83,11 @@ impl Detector {
             return (found, &self.memory.scanner.regions);
         }
         if let Some(freed) = predictor.freed() {
-            self.memory.keep();
+            self.memory.swap_kept();
             if let Some(elsewhere) = self.search(frame, &freed).run_clear() {
                 return (elsewhere, &self.memory.scanner.regions);
             }
-            self.memory.keep();
+            self.memory.swap_kept();
         }
         if predictor.is_located() && found.rejections.iter().all(Option::is_some) {
             found = self.search(frame, predictor).run_whole(&found);

@@ -38,7 +38,7 @@ pub struct Memory {
 
 impl Memory {
     /// Exchanges the regions of the last search and those that are kept.
-    pub const fn keep(&mut self) {
+    pub const fn swap_kept(&mut self) {
         std::mem::swap(&mut self.kept, &mut self.scanner.regions);
     }
 }
@@ -87,12 +87,12 @@ impl<F: Frame, P: BandPredictor> FrameSearch<'_, F, P> {
     /// The better of the result in the window around the prediction and that by the edges in the whole frame.
     pub fn run_whole(mut self, found: &Recognition) -> Recognition {
         if self.window().is_some() {
-            self.memory.keep();
+            self.memory.swap_kept();
             let anywhere = self.by_edges(Window::whole(self.frame));
             if self.is_better(&anywhere, found) {
                 return anywhere;
             }
-            self.memory.keep();
+            self.memory.swap_kept();
         }
         *found
     }
