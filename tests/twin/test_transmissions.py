@@ -25,6 +25,8 @@ CONFIG = Config()
 PERIOD = CONFIG.control.period
 START = np.array([CONFIG.experiment[dof].centre for dof in Dof])
 AMPLITUDE = np.array([CONFIG.experiment[dof].amplitude for dof in Dof])
+WIDTH = np.array([10e-3, 1.8, 1.1])
+"""Of the article's loops [m, rad, rad]."""
 STRAIGHT = {"twin.bends": 0.0}
 """Insertion has a width of about 2 mm."""
 EASY = {f"twin.cables.{name}": 0.0 for name in ("friction", "joint_friction", "slack")}
@@ -159,6 +161,21 @@ def test_tension_shortens_the_section() -> None:
     shortened = CONFIG.instrument.bending_length - length
     assert shortened == pytest.approx(compliance * tension, rel=0.05)
     assert shortened > 0.2e-3
+
+
+def test_friction_is_solved_beside_the_heavy_parts_of_a_compliant_section() -> None:
+    """The oracle is the same simulation, solved until it no longer improves."""
+    states = []
+    for tolerance in (None, 0.0):
+        simulated = plant(**{"twin.cables.compliance": 2e-5, "twin.friction.stick": (0.1, 0.1)})
+        if tolerance is not None:
+            simulated._model.opt.tolerance, simulated._model.opt.iterations = tolerance, 300
+        phases = 2 * np.pi * PERIOD * np.arange(round(12 / PERIOD))[:, None] / [7.0, 5.0, 3.0]
+        states.append(np.empty((len(phases), 3)))
+        for k, command in enumerate(START + AMPLITUDE * np.sin(phases)):
+            simulated.step(command)
+            states[-1][k] = simulated.true_state
+    assert np.max(np.abs(states[0] - states[1]) / WIDTH) < 2e-3
 
 
 def test_hardly_any_compliance_is_like_little() -> None:

@@ -55,6 +55,9 @@ def shortens(cables: CableConfig) -> bool:
 _CONTACT = 'solref="0.02 1" solimp="0.9 0.9 0.001 0.5 2"'
 _FRICTION = 'solreffriction="0.01 1" solimpfriction="0.9999 0.9999 0.001 0.5 2"'
 _IMPEDANCE_RATIO = 1000
+# MuJoCo divides the solver's improvement by the mean inertia before it compares it with this. Beside
+# inertias of 20 kg its default, 1e-8, ends the search before friction of light parts is found.
+_TOLERANCE = 1e-12
 _INERT = 'contype="0" conaffinity="0"'
 
 
@@ -65,7 +68,7 @@ def build(config: Config, timestep: float) -> str:
 <mujoco>
 <compiler angle="radian"/>
 <option timestep="{timestep}" integrator="implicitfast" cone="elliptic" jacobian="sparse"
-  impratio="{_IMPEDANCE_RATIO}" gravity="0 0 0"/>
+  impratio="{_IMPEDANCE_RATIO}" tolerance="{_TOLERANCE}" gravity="0 0 0"/>
 <default><geom size="0.001" mass="0.001" {_CONTACT}/></default>
 <worldbody>
   {_drives()}
