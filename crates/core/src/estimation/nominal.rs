@@ -5,6 +5,8 @@ use crate::model::hysteresis::{Hysteresis, PlayPosition};
 
 /// Least time constant of the velocity in s.
 const LEAST_LAG: f64 = 0.02;
+/// Time in s within which the deviation of the tip from its plays falls to 1/e.
+const DEVIATION_TIME: f64 = 0.3;
 
 /// The mean of the ensemble, propagated to now.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,14 +25,17 @@ pub struct Nominal {
     pub lag: PerDof<f64>,
     /// Velocity of the output with this lag (3,) [m/s, rad/s, rad/s].
     pub velocity: PerDof<f64>,
+    /// Deviation of the tip from the plays that the last images show (3,) [m, rad, rad].
+    pub deviation: PerDof<f64>,
 }
 
 impl Nominal {
-    /// The tip for an output of the plays (3,) [m, rad, rad].
+    /// The tip for an output of the plays (3,) [m, rad, rad]: origin + gain (output - origin) + deviation.
     pub fn tip(&self, output: PerDof<f64>) -> PerDof<f64> {
         let mut tip = output;
-        for ((tip, gain), origin) in tip.iter_mut().zip(self.gain).zip(self.origin) {
-            *tip = origin + gain * (*tip - origin);
+        let parts = self.gain.into_iter().zip(self.origin).zip(self.deviation);
+        for (tip, ((gain, origin), deviation)) in tip.iter_mut().zip(parts) {
+            *tip = origin + gain * (*tip - origin) + deviation;
         }
         tip
     }
@@ -43,9 +48,9 @@ impl Nominal {
         self.tip(output)
     }
 
-    /// Updates the velocity with a motion of the output (3,) from `before` to `after` within a time in s.
+    /// Updates velocity and deviation with a motion of the output (3,) from `before` to `after` within a time in s.
     ///
-    /// Times that are not above 0, of a clock that stands or is set back, say nothing of a velocity.
+    /// Times that are not above 0, of a clock that stands or is set back, change neither.
     pub fn follow(&mut self, before: PerDof<f64>, after: PerDof<f64>, time: f64) {
         if time.is_nan() || time <= 0.0 {
             return;
@@ -55,13 +60,16 @@ impl Nominal {
             let kept = libm::exp(-time / lag.max(LEAST_LAG));
             *velocity = kept * *velocity + (1.0 - kept) * (after - before) / time;
         }
+        let kept = libm::exp(-time / DEVIATION_TIME);
+        self.deviation = self.deviation.map(|deviation| kept * deviation);
     }
 
     /// The output of the plays for a tip (3,) [m, rad, rad].
     pub fn output(&self, tip: PerDof<f64>) -> PerDof<f64> {
         let mut output = tip;
-        for ((output, gain), origin) in output.iter_mut().zip(self.gain).zip(self.origin) {
-            *output = origin + (*output - origin) / gain;
+        let parts = self.gain.into_iter().zip(self.origin).zip(self.deviation);
+        for (output, ((gain, origin), deviation)) in output.iter_mut().zip(parts) {
+            *output = origin + (*output - deviation - origin) / gain;
         }
         output
     }
@@ -86,15 +94,41 @@ mod tests {
             origin: [0.0; 3],
             lag: [0.1; 3],
             velocity: [1.0, -2.0, 3.0],
+            deviation: [0.1, 0.2, -0.3],
         }
     }
 
     #[test]
-    fn a_clock_that_stands_or_goes_back_does_not_change_the_velocity() {
+    fn a_clock_that_stands_or_goes_back_changes_nothing() {
         for time in [0.0, -1.0, f64::NAN] {
             let mut nominal = moving();
             nominal.follow([0.0; 3], [0.0, 1.0, 2.0], time);
             assert_eq!(nominal, moving(), "{time}");
+        }
+    }
+
+    #[test]
+    fn the_output_of_a_tip_is_the_one_that_has_it() {
+        let nominal = Nominal {
+            gain: [0.6, 1.2, 1.0],
+            origin: [3.0, -1.0, 0.5],
+            ..moving()
+        };
+        let tip = [0.4, 5.0, -2.0];
+        for (found, value) in nominal.tip(nominal.output(tip)).into_iter().zip(tip) {
+            assert!((found - value).abs() < 1e-12, "{found}");
+        }
+    }
+
+    /// 0.3 s later it is 1/e, in whatever steps.
+    #[test]
+    fn a_deviation_that_no_image_shows_again_decays() {
+        let mut nominal = moving();
+        for _ in 0..60 {
+            nominal.follow([0.0; 3], [0.0; 3], 0.005);
+        }
+        for (found, value) in nominal.deviation.into_iter().zip(moving().deviation) {
+            assert!((found - value * libm::exp(-1.0)).abs() < 1e-12, "{found}");
         }
     }
 
