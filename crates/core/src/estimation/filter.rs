@@ -25,7 +25,7 @@ const MAP_SPACING: f64 = 0.7;
 /// in common, how far the tip lags behind the plays, and by how much the geometry differs from the configured one. Between
 /// images each is propagated by the exact plays along the commands; the travel of the reference adds a random walk. The
 /// image of a time updates the members at that time. The mean, propagated to now, is the prediction that the compensation
-/// uses; the tip's own deviation from its plays, of which an image tells the next one, is added to it. What else of camera and instrument is not as configured is an error of the feature model, which adapts to the
+/// uses; the residual of the tip in the last images is added to it. What else of camera and instrument is not as configured is an error of the feature model, which adapts to the
 /// misfit of the markers: an image is not refused for it.
 ///
 /// Wrong where an instrument is no play: by what its loop is rounded and an image does not show in time.
@@ -51,9 +51,9 @@ pub struct Filter {
     pub(super) command: PerDof<f64>,
     pub(super) reference: PerDof<f64>,
     pub(super) travel: PerDof<f64>,
-    /// Velocity of the mean output with its lag, and deviation of the tip from the plays, at that time (3,).
+    /// Velocity of the mean output with its lag, and residual of the tip, at that time (3,).
     pub(super) velocity: PerDof<f64>,
-    pub(super) deviation: PerDof<f64>,
+    pub(super) residual: PerDof<f64>,
     pub(super) nominal: Nominal,
 }
 
@@ -96,7 +96,7 @@ impl Filter {
             reference: [f64::NAN; 3],
             travel: [0.0; 3],
             velocity: [0.0; 3],
-            deviation: [0.0; 3],
+            residual: [0.0; 3],
             nominal: Nominal {
                 hysteresis: Hysteresis {
                     half_width: start_plays.map(|play| play.width() / 2.0),
@@ -110,7 +110,7 @@ impl Filter {
                 origin: [f64::NAN; 3],
                 lag: [settings.lag_deviation; 3],
                 velocity: [0.0; 3],
-                deviation: [0.0; 3],
+                residual: [0.0; 3],
             },
         })
     }

@@ -30,17 +30,17 @@ impl Filter {
         }
     }
 
-    /// Mean and covariance of the tip, with its deviation from the plays as noise.
+    /// Mean and covariance of the tip, with its deviation from the plays, which is taken for noise.
     pub(super) fn tips(&self) -> ([f64; 3], [[f64; 3]; 3]) {
         let nominal = Nominal {
             velocity: self.velocity,
-            deviation: [0.0; 3],
+            residual: [0.0; 3],
             ..self.nominal
         };
         let (mean, [[v1, a, b], [c, v2, d], [e, f, v3]]) = self
             .ensemble
             .covariance(|state| nominal.lagging_tip(position(state).output, lag(state)));
-        let [d1, d2, d3] = self.deviation_std();
+        let [d1, d2, d3] = self.deviation();
         let covariance = [
             [v1 + d1 * d1, a, b],
             [c, v2 + d2 * d2, d],
@@ -82,7 +82,7 @@ impl Filter {
     }
 
     /// Standard deviation of the tip from that of the plays (3,) [m, rad, rad].
-    pub(super) fn deviation_std(&self) -> PerDof<f64> {
+    pub(super) fn deviation(&self) -> PerDof<f64> {
         self.unit.map(|unit| self.settings.tip_deviation * unit)
     }
 }

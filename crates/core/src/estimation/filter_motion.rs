@@ -62,11 +62,11 @@ impl Filter {
         let after = position(&self.ensemble.mean()).output;
         let mut nominal = Nominal {
             velocity: self.velocity,
-            deviation: self.deviation,
+            residual: self.residual,
             ..self.nominal
         };
         nominal.follow(before, after, to.time - self.time);
-        (self.velocity, self.deviation) = (nominal.velocity, nominal.deviation);
+        (self.velocity, self.residual) = (nominal.velocity, nominal.residual);
         self.time = to.time;
     }
 
@@ -122,7 +122,7 @@ impl Filter {
     /// Propagates the prediction from the time of the ensemble to now.
     pub(super) fn catch_up<S: AsRef<[Entry]> + AsMut<[Entry]>>(&mut self, history: &History<S>) {
         let (mut from, mut time) = (self.command, self.time);
-        (self.nominal.velocity, self.nominal.deviation) = (self.velocity, self.deviation);
+        (self.nominal.velocity, self.nominal.residual) = (self.velocity, self.residual);
         for entry in history.since(self.time) {
             self.step(from, entry.command, entry.time - time);
             (from, time) = (entry.command, entry.time);

@@ -28,9 +28,9 @@ const GEOMETRY_CORRELATED: f64 = 0.1;
 /// Share of the update of the hysteresis by an image at rest.
 const AT_REST: f64 = 0.1;
 
-/// Share of the tip's deviation from its plays that an image tells, and its largest size in half of `width_limit`.
+/// Share of the tip's residual that an image tells, and the largest residual in half of `width_limit`.
 const TOLD: f64 = 0.5;
-const LARGEST_DEVIATION: f64 = 0.04;
+const LARGEST_RESIDUAL: f64 = 0.04;
 
 impl Filter {
     /// Markers (4,) of an image in px, with their covariance (4, 4) in px^2.
@@ -66,8 +66,7 @@ impl Filter {
         is_position_only: bool,
     ) {
         let Nominal { origin, gain, .. } = self.nominal;
-        let Some(rows) =
-            markers.linearize(estimate, origin, gain, self.velocity, self.deviation_std())
+        let Some(rows) = markers.linearize(estimate, origin, gain, self.velocity, self.deviation())
         else {
             return;
         };
@@ -115,7 +114,7 @@ impl Filter {
         self.travel = [0.0; 3];
         self.settle();
         if !is_position_only {
-            self.update_deviation(tip);
+            self.update_residual(tip);
         }
     }
 
@@ -134,7 +133,7 @@ impl Filter {
         let [_, _, _, _, _, _, _, _, c1, c2, c3, ..] = &mut std;
         (*c1, *c2, *c3) = (offset * h1, offset * h2, offset * h3);
         self.ensemble.add_noise(&std);
-        self.deviation = [0.0; 3];
+        self.residual = [0.0; 3];
         self.model_std = RESET_MODEL * self.settings.model_deviation;
     }
 
@@ -179,15 +178,15 @@ impl Filter {
 
     /// What the updated plays leave of a tip (3,) [m, rad, rad]. The ensemble takes it for noise: it says little of the plays,
     /// but is alike in the next images.
-    fn update_deviation(&mut self, tip: PerDof<f64>) {
+    fn update_residual(&mut self, tip: PerDof<f64>) {
         let (mean, _) = self.tips();
         let left = tip.into_iter().zip(mean).zip(self.unit);
-        for (deviation, ((tip, mean), unit)) in self.deviation.iter_mut().zip(left) {
-            let largest = LARGEST_DEVIATION * unit;
-            *deviation += TOLD * (tip - mean - *deviation);
-            *deviation = deviation.clamp(-largest, largest);
+        for (residual, ((tip, mean), unit)) in self.residual.iter_mut().zip(left) {
+            let largest = LARGEST_RESIDUAL * unit;
+            *residual += TOLD * (tip - mean - *residual);
+            *residual = residual.clamp(-largest, largest);
         }
-        self.nominal.deviation = self.deviation;
+        self.nominal.residual = self.residual;
     }
 
     /// Passes a share of the mean centre on to the map at the position of the tip.

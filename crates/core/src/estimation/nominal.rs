@@ -5,8 +5,8 @@ use crate::model::hysteresis::{Hysteresis, PlayPosition};
 
 /// Least time constant of the velocity in s.
 const LEAST_LAG: f64 = 0.02;
-/// Time in s within which the deviation of the tip from its plays falls to 1/e.
-const DEVIATION_TIME: f64 = 0.3;
+/// Time in s within which the residual of the tip falls to 1/e.
+const RESIDUAL_TIME: f64 = 0.3;
 
 /// The mean of the ensemble, propagated to now.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,17 +25,17 @@ pub struct Nominal {
     pub lag: PerDof<f64>,
     /// Velocity of the output with this lag (3,) [m/s, rad/s, rad/s].
     pub velocity: PerDof<f64>,
-    /// Deviation of the tip from the plays that the last images show (3,) [m, rad, rad].
-    pub deviation: PerDof<f64>,
+    /// Residual of the tip: what the plays leave of it in the last images (3,) [m, rad, rad].
+    pub residual: PerDof<f64>,
 }
 
 impl Nominal {
-    /// The tip for an output of the plays (3,) [m, rad, rad]: origin + gain (output - origin) + deviation.
+    /// The tip for an output of the plays (3,) [m, rad, rad]: origin + gain (output - origin) + residual.
     pub fn tip(&self, output: PerDof<f64>) -> PerDof<f64> {
         let mut tip = output;
-        let parts = self.gain.into_iter().zip(self.origin).zip(self.deviation);
-        for (tip, ((gain, origin), deviation)) in tip.iter_mut().zip(parts) {
-            *tip = origin + gain * (*tip - origin) + deviation;
+        let parts = self.gain.into_iter().zip(self.origin).zip(self.residual);
+        for (tip, ((gain, origin), residual)) in tip.iter_mut().zip(parts) {
+            *tip = origin + gain * (*tip - origin) + residual;
         }
         tip
     }
@@ -48,7 +48,7 @@ impl Nominal {
         self.tip(output)
     }
 
-    /// Updates velocity and deviation with a motion of the output (3,) from `before` to `after` within a time in s.
+    /// Updates velocity and residual with a motion of the output (3,) from `before` to `after` within a time in s.
     ///
     /// Times that are not above 0, of a clock that stands or is set back, change neither.
     pub fn follow(&mut self, before: PerDof<f64>, after: PerDof<f64>, time: f64) {
@@ -60,16 +60,16 @@ impl Nominal {
             let kept = libm::exp(-time / lag.max(LEAST_LAG));
             *velocity = kept * *velocity + (1.0 - kept) * (after - before) / time;
         }
-        let kept = libm::exp(-time / DEVIATION_TIME);
-        self.deviation = self.deviation.map(|deviation| kept * deviation);
+        let kept = libm::exp(-time / RESIDUAL_TIME);
+        self.residual = self.residual.map(|residual| kept * residual);
     }
 
     /// The output of the plays for a tip (3,) [m, rad, rad].
     pub fn output(&self, tip: PerDof<f64>) -> PerDof<f64> {
         let mut output = tip;
-        let parts = self.gain.into_iter().zip(self.origin).zip(self.deviation);
-        for (output, ((gain, origin), deviation)) in output.iter_mut().zip(parts) {
-            *output = origin + (*output - deviation - origin) / gain;
+        let parts = self.gain.into_iter().zip(self.origin).zip(self.residual);
+        for (output, ((gain, origin), residual)) in output.iter_mut().zip(parts) {
+            *output = origin + (*output - residual - origin) / gain;
         }
         output
     }
@@ -94,7 +94,7 @@ mod tests {
             origin: [0.0; 3],
             lag: [0.1; 3],
             velocity: [1.0, -2.0, 3.0],
-            deviation: [0.1, 0.2, -0.3],
+            residual: [0.1, 0.2, -0.3],
         }
     }
 
@@ -122,12 +122,12 @@ mod tests {
 
     /// 0.3 s later it is 1/e, in whatever steps.
     #[test]
-    fn a_deviation_that_no_image_shows_again_decays() {
+    fn a_residual_that_no_image_shows_again_decays() {
         let mut nominal = moving();
         for _ in 0..60 {
             nominal.follow([0.0; 3], [0.0; 3], 0.005);
         }
-        for (found, value) in nominal.deviation.into_iter().zip(moving().deviation) {
+        for (found, value) in nominal.residual.into_iter().zip(moving().residual) {
             assert!((found - value * libm::exp(-1.0)).abs() < 1e-12, "{found}");
         }
     }

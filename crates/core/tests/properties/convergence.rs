@@ -73,7 +73,7 @@ fn run_with(
             for dof in 0..3 {
                 let off = found[dof] - tip[dof];
                 squares[dof] += off.powi(2);
-                alone[dof] += (off - filter.nominal().deviation[dof]).powi(2);
+                alone[dof] += (off - filter.nominal().residual[dof]).powi(2);
             }
         }
         if tick % 8 == 0 {
@@ -168,21 +168,21 @@ fn the_prediction_follows_a_deviation_of_the_tip_that_lasts() {
 
 /// Neither wrong images nor an image that only shows the position make it large.
 #[test]
-fn the_deviation_is_bounded() {
+fn the_residual_is_bounded() {
     let (mut filter, start) = (new_filter(), command(0.0));
     filter.start(start, start);
     let far = start.map(|value| value + 10.0);
     filter.update_with(&[], far, true);
-    assert_eq!(filter.nominal().deviation, [0.0; 3]);
+    assert_eq!(filter.nominal().residual, [0.0; 3]);
     for _ in 0..5 {
         filter.update_with(&[], far, false);
     }
-    for (found, unit) in filter.nominal().deviation.into_iter().zip(UNIT) {
+    for (found, unit) in filter.nominal().residual.into_iter().zip(UNIT) {
         assert!((found - 0.04 * unit).abs() < 1e-12, "{found}");
     }
     filter.reset_position();
     filter.update_with(&[], start, false);
-    for (found, unit) in filter.nominal().deviation.into_iter().zip(UNIT) {
+    for (found, unit) in filter.nominal().residual.into_iter().zip(UNIT) {
         assert!(found.abs() < 0.04 * unit, "{found}");
     }
 }
