@@ -55,8 +55,8 @@ def shortens(cables: CableConfig) -> bool:
 _CONTACT = 'solref="0.02 1" solimp="0.9 0.9 0.001 0.5 2"'
 _FRICTION = 'solreffriction="0.01 1" solimpfriction="0.9999 0.9999 0.001 0.5 2"'
 _IMPEDANCE_RATIO = 1000
-# MuJoCo divides the solver's improvement by the mean inertia before it compares it with this. Beside
-# 20 kg its default, 1e-8, ends the search before the friction of light parts is found.
+# MuJoCo divides the solver's improvement by the mean inertia before it compares it with this.
+# Beside 20 kg its default, 1e-8, ends the search before the friction of light parts is found.
 _TOLERANCE = 1e-12
 _INERT = 'contype="0" conaffinity="0"'
 
