@@ -13,7 +13,7 @@ IDEAS: dict[str, dict[str, Any]] = {
     "separation of tremor and intended motion": {"adaptive.tremor_time": 0.0},
     "rate limit of the offsets": {"adaptive.change_rate": [100.0, 100.0, 100.0]},
     "centre as a function of position": {"state_estimation.map_rate": [0.0, 0.0, 0.0]},
-    "regression of the gain": {"state_estimation.gain_prior": 1e9},
+    "regression of the gain": {"state_estimation.gain_deviation": 1e-9},
     "widths that change": {"state_estimation.width_walk": 0.0},
     "centres that change": {"state_estimation.centre_walk": 0.0},
     "share of the common friction estimated (0.5 instead)": {

@@ -194,7 +194,6 @@ def test_the_centre_may_depend_on_position(seed: int) -> None:
 
 
 @SEEDS
-@pytest.mark.xfail(reason="width 1.05", strict=False)
 def test_the_width_may_change_over_time(seed: int) -> None:
     """Widths of 10, 2 and 10 mm; each change takes a period."""
 

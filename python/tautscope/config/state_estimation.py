@@ -47,7 +47,5 @@ class StateEstimationConfig(Section, frozen=True, forbid_unknown_fields=True, kw
     map_rate: tuple[NonNegative, NonNegative, NonNegative] = (0.25, 0.25, 0.0)
     """Share of the centre that its map over the position takes over per travel of 1, for each
     DOF."""
-    gain_window: Positive = 25.0
-    """Travel over which the regression of the gain forgets."""
-    gain_prior: Positive = 1.0
-    """Strength of the prior of a gain of 1: a variance of the position times a travel."""
+    gain_deviation: Positive = 0.3
+    """Standard deviation of a gain from 1."""

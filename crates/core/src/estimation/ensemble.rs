@@ -5,7 +5,6 @@ use core::array;
 use crate::dof::PerDof;
 use crate::estimation::centre_map::CentreMap;
 use crate::math::random::Normal;
-use crate::model::features::GEOMETRY;
 use crate::model::hysteresis::{Hysteresis, PlayPosition};
 
 /// Number of members.
@@ -15,7 +14,7 @@ const COUNT: f64 = 64.0;
 /// Largest lag in s.
 const LARGEST_LAG: f64 = 0.4;
 /// Length of a member's state.
-pub const STATE: usize = 18;
+pub const STATE: usize = 15;
 /// What an entry of a state describes.
 #[derive(Debug, Clone, Copy)]
 enum Local {
@@ -25,23 +24,18 @@ enum Local {
     Shaft,
     /// Hysteresis of bending.
     Bending,
-    /// Geometry of instrument and camera.
-    Geometry,
 }
 /// What each entry of a state describes.
 const LOCAL: [Local; STATE] = {
-    use Local::{Bending, Geometry, Position, Shaft};
+    use Local::{Bending, Position, Shaft};
     [
         Position, Position, Position, Position, Position, Shaft, Shaft, Bending, Shaft, Shaft,
-        Bending, Shaft, Shaft, Shaft, Bending, Geometry, Geometry, Geometry,
+        Bending, Shaft, Shaft, Shaft, Bending,
     ]
 };
 
 /// State of a member: output of the plays (3,) and of the shaft (2,), ln half width (3,), centre (3,) without the map,
-/// share of the friction that the DOFs have in common, lag (3,) of the tip behind the plays in s, and
-/// geometry, [`FeatureModel::with_geometry`].
-///
-/// [`FeatureModel::with_geometry`]: crate::model::features::FeatureModel::with_geometry
+/// share of the friction that the DOFs have in common, and lag (3,) of the tip behind the plays in s.
 pub type State = [f64; STATE];
 
 /// Hypotheses, each a complete state that the exact plays propagate.
@@ -58,8 +52,6 @@ pub struct ScalarMeasurement {
     pub output: PerDof<f64>,
     /// Derivative by the lag of each DOF.
     pub lag: PerDof<f64>,
-    /// Derivative by the geometry.
-    pub geometry: [f64; GEOMETRY],
     /// The measured value.
     pub value: f64,
 }
@@ -172,33 +164,32 @@ impl Ensemble {
     ///
     /// with y = row . x. Localised (Houtekamer, Mitchell, Monthly Weather Review 129, 2001), because few members have
     /// correlations by chance: in K of the hysteresis of a group of DOFs y is the group's part of it. `shares` (shaft,
-    /// bending, geometry) multiplies these K.
-    pub fn update(&mut self, measurement: &ScalarMeasurement, shares: [f64; 3]) {
-        let parts: [[f64; 3]; MEMBERS] = array::from_fn(|index| {
+    /// bending) multiplies these K.
+    pub fn update(&mut self, measurement: &ScalarMeasurement, shares: [f64; 2]) {
+        let parts: [[f64; 2]; MEMBERS] = array::from_fn(|index| {
             self.members
                 .get(index)
-                .map_or([0.0; 3], |member| measurement.predict(member))
+                .map_or([0.0; 2], |member| measurement.predict(member))
         });
-        let mut mean_part = [0.0; 3];
+        let mut mean_part = [0.0; 2];
         for part in parts {
             for (sum, value) in mean_part.iter_mut().zip(part) {
                 *sum += value / COUNT;
             }
         }
-        let [mean_shaft, mean_bending, mean_geometry] = mean_part;
-        let [shaft_share, bending_share, geometry_share] = shares;
+        let [mean_shaft, mean_bending] = mean_part;
+        let [shaft_share, bending_share] = shares;
         let mean = self.mean();
         let (mut covariance, mut variance) = ([0.0; STATE], 0.0);
-        for (member, [shaft, bending, geometry]) in self.members.iter().zip(parts) {
+        for (member, [shaft, bending]) in self.members.iter().zip(parts) {
             let shaft = (shaft - mean_shaft) / (COUNT - 1.0);
             let bending = (bending - mean_bending) / (COUNT - 1.0);
-            let geometry = geometry_share * (geometry - mean_geometry) / (COUNT - 1.0);
-            let all = shaft + bending + geometry;
+            let all = shaft + bending;
             variance += (COUNT - 1.0) * all * all;
             let entries = covariance.iter_mut().zip(member).zip(mean).zip(LOCAL);
             for (((covariance, entry), mean), local) in entries {
                 let away = match local {
-                    Local::Position | Local::Geometry => all,
+                    Local::Position => all,
                     Local::Shaft => shaft,
                     Local::Bending => bending,
                 };
@@ -210,15 +201,13 @@ impl Ensemble {
                 Local::Position => 1.0,
                 Local::Shaft => shaft_share,
                 Local::Bending => bending_share,
-                Local::Geometry => geometry_share,
             };
         }
         let total = variance + 1.0;
         let reduced = 1.0 / (1.0 + 1.0 / libm::sqrt(total));
-        let innovation = measurement.value - mean_shaft - mean_bending - mean_geometry;
-        for (member, [shaft, bending, geometry]) in self.members.iter_mut().zip(parts) {
-            let away = shaft - mean_shaft + bending - mean_bending
-                + geometry_share * (geometry - mean_geometry);
+        let innovation = measurement.value - mean_shaft - mean_bending;
+        for (member, [shaft, bending]) in self.members.iter_mut().zip(parts) {
+            let away = shaft - mean_shaft + bending - mean_bending;
             let step = (innovation - reduced * away) / total;
             for (entry, covariance) in member.iter_mut().zip(covariance) {
                 *entry += covariance * step;
@@ -230,26 +219,7 @@ impl Ensemble {
     /// within 0 to [`LARGEST_LAG`].
     pub fn limit(&mut self, least: PerDof<f64>, largest: PerDof<f64>) {
         let bounds = least.map(libm::log).into_iter().zip(largest.map(libm::log));
-        for [
-            _,
-            _,
-            _,
-            _,
-            _,
-            h1,
-            h2,
-            h3,
-            _,
-            _,
-            _,
-            share,
-            l1,
-            l2,
-            l3,
-            uneven,
-            ..,
-        ] in &mut self.members
-        {
+        for [_, _, _, _, _, h1, h2, h3, _, _, _, share, l1, l2, l3] in &mut self.members {
             for (half, (least, largest)) in [h1, h2, h3].into_iter().zip(bounds.clone()) {
                 *half = half.max(least).min(largest);
             }
@@ -257,7 +227,6 @@ impl Ensemble {
             for lag in [l1, l2, l3] {
                 *lag = lag.clamp(0.0, LARGEST_LAG);
             }
-            *uneven = uneven.clamp(-1.0, 1.0);
         }
     }
 
@@ -272,16 +241,11 @@ impl Ensemble {
 }
 
 impl ScalarMeasurement {
-    /// The parts of insertion with rotation, of bending, and of the geometry.
-    fn predict(&self, state: &State) -> [f64; 3] {
+    /// The parts of insertion with rotation, and of bending.
+    fn predict(&self, state: &State) -> [f64; 2] {
         let ([a, b, c], [d, e, f]) = (self.output, self.lag);
         let ([q1, q2, q3, ..], [l1, l2, l3]) = (state, lag(state));
-        let terms = self.geometry.iter().zip(geometry(state));
-        [
-            a * q1 + b * q2 + d * l1 + e * l2,
-            c * q3 + f * l3,
-            terms.map(|(by, value)| by * value).sum(),
-        ]
+        [a * q1 + b * q2 + d * l1 + e * l2, c * q3 + f * l3]
     }
 }
 
@@ -296,14 +260,8 @@ pub const fn position(state: &State) -> PlayPosition {
 
 /// Lags in a state, in s.
 pub const fn lag(state: &State) -> PerDof<f64> {
-    let [_, _, _, _, _, _, _, _, _, _, _, _, l1, l2, l3, ..] = *state;
+    let [.., l1, l2, l3] = *state;
     [l1, l2, l3]
-}
-
-/// Geometry in a state.
-pub const fn geometry(state: &State) -> [f64; GEOMETRY] {
-    let [.., unevenness, u, v] = *state;
-    [unevenness, u, v]
 }
 
 const fn set_position(state: &mut State, position: &PlayPosition) {

@@ -5,9 +5,9 @@ use crate::dof::PerDof;
 use crate::error::{ConfigError, require_positive};
 use crate::estimation::centre_map::CentreMap;
 use crate::estimation::ensemble::{Ensemble, STATE, State, hysteresis, lag, position};
-use crate::estimation::gain::GainEstimate;
 use crate::estimation::nominal::Nominal;
 use crate::estimation::settings::StateEstimationSettings;
+use crate::estimation::tip_regression::TipRegression;
 use crate::model::hysteresis::{Hysteresis, PlayPosition};
 
 /// Initial half width of a slack of unknown width, and its bounds, in half of `width_limit`.
@@ -22,8 +22,8 @@ const MAP_SPACING: f64 = 0.7;
 /// Ensemble filter over tip and hysteresis.
 ///
 /// Each member has the outputs of the plays, half widths, centres, the share of the friction that insertion and rotation have
-/// in common, how far the tip lags behind the plays, and by how much the geometry differs from the configured one. Between
-/// images each is propagated by the exact plays along the commands; the travel of the reference adds a random walk. The
+/// in common, and how far the tip lags behind the plays. A regression of the tip on plays that no image corrects has the gains,
+/// and by how much the geometry differs from the configured one. Between images each is propagated by the exact plays along the commands; the travel of the reference adds a random walk. The
 /// image of a time updates the members at that time. The mean, propagated to now, is the prediction that the compensation
 /// uses; the residual of the tip in the last images is added to it. What else of camera and instrument is not as configured is an error of the feature model, which adapts to the
 /// misfit of the markers: an image is not refused for it.
@@ -41,7 +41,7 @@ pub struct Filter {
     /// Standard deviation of the feature model in px.
     pub(super) model_std: f64,
     pub(super) maps: PerDof<CentreMap>,
-    pub(super) gain: PerDof<GainEstimate>,
+    pub(super) regression: TipRegression,
     /// Plays with the mean's half widths that no image corrects, about centres of 0.
     pub(super) uncorrected: PlayPosition,
     /// First reference; None before it.
@@ -88,7 +88,7 @@ impl Filter {
             ensemble: Ensemble::new(&zero, &zero, 0),
             model_std: settings.model_deviation,
             maps: unit.map(|unit| CentreMap::new(0.0, unit)),
-            gain: [GainEstimate::new(); 3],
+            regression: regression(&settings),
             uncorrected: blank,
             origin: None,
             time: f64::NEG_INFINITY,
@@ -172,9 +172,6 @@ impl Filter {
             lag,
             lag,
             lag,
-            0.0,
-            0.0,
-            0.0,
         ];
         let std: State = [
             d1,
@@ -192,11 +189,9 @@ impl Filter {
             lag,
             lag,
             lag,
-            self.settings.shape_deviation,
-            self.settings.image_deviation,
-            self.settings.image_deviation,
         ];
         self.ensemble = Ensemble::new(&mean, &std, 1);
+        self.regression = regression(&self.settings);
         for ((map, middle), unit) in self.maps.iter_mut().zip(reference).zip(self.unit) {
             *map = CentreMap::new(middle, MAP_SPACING * unit);
         }
@@ -239,4 +234,12 @@ impl Filter {
         }
         centre
     }
+}
+
+fn regression(settings: &StateEstimationSettings) -> TipRegression {
+    let shift = settings.image_deviation;
+    TipRegression::new(
+        settings.gain_deviation,
+        [settings.shape_deviation, shift, shift],
+    )
 }

@@ -1,12 +1,11 @@
 //! Means and covariances of the filter.
 
 use crate::dof::PerDof;
-use crate::estimation::ensemble::{State, geometry, lag, position};
+use crate::estimation::ensemble::{lag, position};
 use crate::estimation::filter::Filter;
 use crate::estimation::history::{Entry, History};
 use crate::estimation::nominal::Nominal;
 use crate::estimation::posture::Belief;
-use crate::math::linear::{dot, solve_symmetric};
 use crate::model::features::GEOMETRY;
 
 impl Filter {
@@ -49,36 +48,11 @@ impl Filter {
         (mean, covariance)
     }
 
-    /// Mean and covariance of the geometry.
+    /// Error of the geometry, [`FeatureModel::with_geometry`], and its covariance.
+    ///
+    /// [`FeatureModel::with_geometry`]: crate::model::features::FeatureModel::with_geometry
     pub fn geometry(&self) -> ([f64; GEOMETRY], [[f64; GEOMETRY]; GEOMETRY]) {
-        self.ensemble.covariance(geometry)
-    }
-
-    /// Mean of the geometry, and its covariance where the output of the plays is known: G - X' P^-1 X with the covariances G
-    /// of the geometry, P of the output and X of both.
-    pub(super) fn geometry_of_a_known_output(
-        &self,
-    ) -> ([f64; GEOMETRY], [[f64; GEOMETRY]; GEOMETRY]) {
-        let joint = |state: &State| {
-            let ([a, b, c], [d, e, f]) = (position(state).output, geometry(state));
-            [a, b, c, d, e, f]
-        };
-        let ([_, _, _, d, e, f], [a1, a2, a3, d1, e1, f1]) = self.ensemble.covariance(joint);
-        let split = |[x1, x2, x3, g1, g2, g3]: [f64; 6]| ([x1, x2, x3], [g1, g2, g3]);
-        let outputs = [a1, a2, a3].map(|row| split(row).0);
-        let (crosses, mut own) = (
-            [d1, e1, f1].map(|row| split(row).0),
-            [d1, e1, f1].map(|row| split(row).1),
-        );
-        for (row, cross) in own.iter_mut().zip(crosses) {
-            let Some(solved) = solve_symmetric(outputs, cross) else {
-                continue;
-            };
-            for (entry, other) in row.iter_mut().zip(crosses) {
-                *entry -= dot(solved, other);
-            }
-        }
-        ([d, e, f], own)
+        self.regression.geometry()
     }
 
     /// Standard deviation of the tip from that of the plays (3,) [m, rad, rad].

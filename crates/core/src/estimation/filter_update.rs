@@ -4,11 +4,13 @@ use crate::dof::PerDof;
 use crate::estimation::ensemble::{STATE, ScalarMeasurement};
 use crate::estimation::filter::Filter;
 use crate::estimation::history::{Entry, History};
-use crate::estimation::marker_measurement::{ImagePrediction, MarkerEstimate, Markers};
+use crate::estimation::marker_measurement::{
+    ImagePrediction, MarkerEstimate, Markers, TipMeasurement,
+};
 use crate::estimation::nominal::Nominal;
 use crate::estimation::posture::Belief;
-use crate::estimation::settings::StateEstimationSettings;
-use crate::model::features::FeatureModel;
+use crate::estimation::tip_regression::PlayReading;
+use crate::model::features::{FeatureModel, GEOMETRY};
 
 /// Standard deviation of the tip, in `start_deviation`, up to which images without markers make it uncertain, and by
 /// how much each does.
@@ -41,12 +43,8 @@ impl Filter {
     /// The most probable tip for the markers of an image at the time of the ensemble; None where the model sees no band.
     pub fn measure(&self, model: &FeatureModel, markers: &Markers) -> Option<MarkerEstimate> {
         self.origin?;
-        let (geometry, mut geometry_covariance) = self.geometry_of_a_known_output();
-        // At one bend the position has taken over what the geometry is wrong by.
-        let [_, _, bent] = self.travel;
-        for entry in geometry_covariance.iter_mut().flatten() {
-            *entry *= bent / (bent + GEOMETRY_CORRELATED);
-        }
+        let (geometry, _) = self.geometry();
+        let geometry_covariance = self.geometry_covariance();
         let (state, covariance) = self.tips();
         let prior = ImagePrediction {
             state,
@@ -57,6 +55,16 @@ impl Filter {
         markers.estimate(model, &prior, self.settings.outlier_distance)
     }
 
+    /// Covariance of the geometry by which an image is wrong: the position has taken over the error at the last bend.
+    fn geometry_covariance(&self) -> [[f64; GEOMETRY]; GEOMETRY] {
+        let (_, mut covariance) = self.geometry();
+        let [_, _, bent] = self.travel;
+        for entry in covariance.iter_mut().flatten() {
+            *entry *= bent / (bent + GEOMETRY_CORRELATED);
+        }
+        covariance
+    }
+
     /// Updates the ensemble with the markers of an estimate by [`Filter::measure`]; with `is_position_only` only the tip.
     pub fn update<S: AsRef<[Entry]> + AsMut<[Entry]>>(
         &mut self,
@@ -65,12 +73,13 @@ impl Filter {
         estimate: &MarkerEstimate,
         is_position_only: bool,
     ) {
-        let Nominal { origin, gain, .. } = self.nominal;
-        let Some(rows) = markers.linearize(estimate, origin, gain, self.velocity, self.deviation())
+        let geometry_covariance = self.geometry_covariance();
+        let Some(measurements) =
+            markers.linearize(estimate, self.deviation(), &geometry_covariance)
         else {
             return;
         };
-        self.update_with(&rows, estimate.measured, is_position_only);
+        self.update_with(&measurements, estimate.measured, is_position_only);
         if let Some(misfit) = estimate.misfit_squared {
             // Four features determine three DOFs: what is left is the error of one.
             let variance = self.model_std * self.model_std;
@@ -81,34 +90,30 @@ impl Filter {
         self.catch_up(history);
     }
 
-    /// Updates the ensemble at its time with measurements of the plays, which belong to a tip (3,) [m, rad, rad]; with
-    /// `is_position_only` only the tip.
+    /// Updates ensemble and regression at the time of the ensemble with measurements of the tip, which is at `tip` (3,) [m, rad,
+    /// rad]; with `is_position_only` only the tip.
     pub fn update_with(
         &mut self,
-        rows: &[ScalarMeasurement],
+        measurements: &[TipMeasurement],
         tip: PerDof<f64>,
         is_position_only: bool,
     ) {
         // Images within a short travel have the same error.
         let [t1, t2, t3] = self.travel;
-        let share = |travel: f64, correlated: f64, at_rest: f64| {
+        let share = |travel: f64| {
             if is_position_only {
                 0.0
             } else {
-                (travel + at_rest * correlated) / (travel + correlated)
+                (travel + AT_REST * CORRELATED) / (travel + CORRELATED)
             }
         };
-        // At one bend a wrong geometry looks like another position.
-        let shares = [
-            share(libm::sqrt(t1 * t1 + t2 * t2), CORRELATED, AT_REST),
-            share(t3, CORRELATED, AT_REST),
-            share(t3, GEOMETRY_CORRELATED, 0.0),
-        ];
-        for row in rows {
-            self.ensemble.update(row, shares);
+        let shares = [share(libm::sqrt(t1 * t1 + t2 * t2)), share(t3)];
+        for measurement in measurements {
+            let of_plays = self.of_plays(measurement);
+            self.ensemble.update(&of_plays, shares);
         }
         if !is_position_only {
-            self.update_gain(tip);
+            self.update_regression(measurements);
             self.update_maps();
         }
         self.travel = [0.0; 3];
@@ -133,6 +138,7 @@ impl Filter {
         let [_, _, _, _, _, _, _, _, c1, c2, c3, ..] = &mut std;
         (*c1, *c2, *c3) = (offset * h1, offset * h2, offset * h3);
         self.ensemble.add_noise(&std);
+        self.regression.forget_constants();
         self.residual = [0.0; 3];
         self.model_std = RESET_MODEL * self.settings.model_deviation;
     }
@@ -151,29 +157,46 @@ impl Filter {
         self.ensemble.disturb_position(step);
     }
 
-    fn update_gain(&mut self, mut tip: PerDof<f64>) {
-        let Nominal { gain, lag, .. } = self.nominal;
-        let late = gain.into_iter().zip(lag).zip(self.velocity);
-        for (tip, ((gain, lag), velocity)) in tip.iter_mut().zip(late) {
-            *tip += gain * lag * velocity;
+    /// A measurement of the tip as one of the plays, with the gain, their lag and the geometry as estimated.
+    fn of_plays(&self, measurement: &TipMeasurement) -> ScalarMeasurement {
+        let Nominal { gain, origin, .. } = self.nominal;
+        let (geometry, _) = self.geometry();
+        let mut value = measurement.value;
+        for (by, error) in measurement.by_geometry.iter().zip(geometry) {
+            value -= by * error;
         }
+        let (mut output, mut lag) = (measurement.by_tip, measurement.by_tip);
+        let dofs = output.iter_mut().zip(&mut lag);
+        let parts = gain.into_iter().zip(origin).zip(self.velocity);
+        for ((output, lag), ((gain, origin), velocity)) in dofs.zip(parts) {
+            value -= *output * origin * (1.0 - gain);
+            *output *= gain;
+            *lag = -*output * velocity;
+        }
+        ScalarMeasurement { output, lag, value }
+    }
+
+    fn update_regression(&mut self, measurements: &[TipMeasurement]) {
         let Some(origin) = self.origin else {
             return;
         };
-        let StateEstimationSettings {
-            gain_window,
-            gain_prior,
-            ..
-        } = self.settings;
-        let outputs = self.uncorrected.output.into_iter().zip(self.command);
-        let positions = outputs.zip(tip).zip(self.unit.into_iter().zip(origin));
-        let gains = self.gain.iter_mut().zip(&mut self.nominal.gain);
-        for ((regression, gain), (((output, command), tip), (unit, origin))) in gains.zip(positions)
-        {
-            let (x, y) = ((output - origin) / unit, (tip - origin) / unit);
-            regression.update(x, (command - output) / unit, y, gain_window);
-            *gain = regression.value(gain_prior);
+        let mut reading = PlayReading {
+            output: self.uncorrected.output,
+            deflection: self.command,
+        };
+        let plays = reading.output.iter_mut().zip(&mut reading.deflection);
+        for ((output, deflection), (unit, origin)) in plays.zip(self.unit.into_iter().zip(origin)) {
+            *deflection = (*deflection - *output) / unit;
+            *output = (*output - origin) / unit;
         }
+        let Nominal { gain, lag, .. } = self.nominal;
+        let mut late = self.velocity;
+        for (late, (gain, lag)) in late.iter_mut().zip(gain.into_iter().zip(lag)) {
+            *late *= gain * lag;
+        }
+        self.regression
+            .update(measurements, &reading, late, self.unit, origin);
+        self.nominal.gain = self.regression.gain();
     }
 
     /// What the updated plays leave of a tip (3,) [m, rad, rad]. The ensemble takes it for noise: it says little of the plays,

@@ -2,7 +2,6 @@
 
 use crate::article::state::found;
 use crate::dof::{PerDof, all_finite};
-use crate::estimation::ensemble::ScalarMeasurement;
 use crate::estimation::settings::StateEstimationSettings;
 use crate::math::linear::{Matrix, add, dot, solve_symmetric, square};
 use crate::math::whitening::{
@@ -68,6 +67,17 @@ pub struct MarkerEstimate {
     pub std: PerDof<f64>,
 }
 
+/// One scalar measurement of the tip, linear in tip and geometry, whose error has the standard deviation 1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TipMeasurement {
+    /// Derivative by the tip (3,).
+    pub by_tip: PerDof<f64>,
+    /// Derivative by the geometry.
+    pub by_geometry: [f64; GEOMETRY],
+    /// The measured value.
+    pub value: f64,
+}
+
 impl MarkerEstimate {
     /// The features (4,) that were used, NaN for the others.
     pub fn keep(&self, [ua, va, ub, vb]: Features) -> Features {
@@ -115,16 +125,7 @@ impl Markers {
         let seen = found(self.features);
         let price = square(outlier_distance);
         let by_geometry = model.by_geometry(prior.state)?;
-        let mut covariance = self.covariance;
-        for (column, row) in by_geometry.iter().zip(prior.geometry_covariance) {
-            for (other, cross) in by_geometry.iter().zip(row) {
-                for (line, value) in covariance.iter_mut().zip(column) {
-                    for (entry, with) in line.iter_mut().zip(other) {
-                        *entry += cross * value * with;
-                    }
-                }
-            }
-        }
+        let covariance = self.with_geometry(&by_geometry, &prior.geometry_covariance);
         let problem = |used: [bool; 2]| Problem::new(self, prior, used, covariance);
         let mut best = problem(seen)?.minimum(model, [0.0; 3])?;
         if best.distance_squared > price {
@@ -157,64 +158,70 @@ impl Markers {
         })
     }
 
+    /// Covariance of the features with that of the geometry.
+    fn with_geometry(
+        &self,
+        by_geometry: &[Features; GEOMETRY],
+        geometry: &[[f64; GEOMETRY]; GEOMETRY],
+    ) -> Square {
+        let mut covariance = self.covariance;
+        for (column, row) in by_geometry.iter().zip(geometry) {
+            for (other, cross) in by_geometry.iter().zip(row) {
+                for (line, value) in covariance.iter_mut().zip(column) {
+                    for (entry, with) in line.iter_mut().zip(other) {
+                        *entry += cross * value * with;
+                    }
+                }
+            }
+        }
+        covariance
+    }
+
     fn misfit_squared(&self, estimate: &MarkerEstimate) -> f64 {
         let features = self.features.into_iter().zip(estimate.prediction.features);
         features.map(|(measured, h)| square(measured - h)).sum()
     }
 
-    /// The markers used by an estimate as four independent measurements of standard deviation 1, linear about it; `gain`
-    /// (3,) is the travel of the tip over that of the output, about `origin` (3,), from which the tip deviates by `std`
-    /// (3,).
+    /// The markers used by an estimate as four independent measurements, linear about it, of a tip that deviates from its plays
+    /// by `std` (3,).
     pub fn linearize(
         &self,
         estimate: &MarkerEstimate,
-        origin: PerDof<f64>,
-        gain: PerDof<f64>,
-        velocity: PerDof<f64>,
         std: PerDof<f64>,
-    ) -> Option<[ScalarMeasurement; 4]> {
+        geometry_covariance: &[[f64; GEOMETRY]; GEOMETRY],
+    ) -> Option<[TipMeasurement; 4]> {
         let FeaturePrediction { features, columns } = estimate.prediction;
-        let mut covariance = self.covariance;
+        let mut covariance = self.with_geometry(&estimate.by_geometry, geometry_covariance);
         for (column, std) in columns.iter().zip(std) {
             add_product(&mut covariance, column.map(|by| by * std));
         }
         let whitener = Whitener::new(&covariance, estimate.used)?;
-        let mut misfit = self.features;
-        let offset = columns
-            .iter()
-            .zip(estimate.state)
-            .zip(origin.into_iter().zip(gain));
-        for (value, predicted) in misfit.iter_mut().zip(features) {
+        let mut value = self.features;
+        for (value, predicted) in value.iter_mut().zip(features) {
             *value -= predicted;
         }
-        for ((column, state), (origin, gain)) in offset {
-            let constant = state - origin * (1.0 - gain);
-            for (value, by) in misfit.iter_mut().zip(column) {
-                *value += by * constant;
+        let by_tip = columns.iter().zip(estimate.state);
+        let by_geometry = estimate.by_geometry.iter().zip(estimate.geometry);
+        for (column, at) in by_tip.chain(by_geometry) {
+            for (value, by) in value.iter_mut().zip(column) {
+                *value += by * at;
             }
         }
-        for (column, geometry) in estimate.by_geometry.iter().zip(estimate.geometry) {
-            for (value, by) in misfit.iter_mut().zip(column) {
-                *value += by * geometry;
-            }
-        }
-        let misfit = whitener.apply(misfit);
+        let value = whitener.apply(value);
+        let [q1, q2, q3] = columns.map(|column| whitener.apply(column));
         let [e1, e2, e3] = estimate.by_geometry.map(|column| whitener.apply(column));
-        let by_geometry = e1.into_iter().zip(e2).zip(e3);
-        let [c1, c2, c3] = columns.map(|column| whitener.apply(column));
-        let ([g1, g2, g3], [v1, v2, v3]) = (gain, velocity);
-        let mut rows = [ScalarMeasurement {
-            output: [0.0; 3],
-            lag: [0.0; 3],
-            geometry: [0.0; GEOMETRY],
+        let mut rows = [TipMeasurement {
+            by_tip: [0.0; 3],
+            by_geometry: [0.0; GEOMETRY],
             value: 0.0,
         }; 4];
-        let outputs = c1.into_iter().zip(c2).zip(c3.into_iter().zip(by_geometry));
-        for ((row, value), ((a, b), (c, ((d, e), f)))) in rows.iter_mut().zip(misfit).zip(outputs) {
-            *row = ScalarMeasurement {
-                output: [g1 * a, g2 * b, g3 * c],
-                lag: [-g1 * a * v1, -g2 * b * v2, -g3 * c * v3],
-                geometry: [d, e, f],
+        let tips = q1.into_iter().zip(q2).zip(q3);
+        let geometries = e1.into_iter().zip(e2).zip(e3);
+        let found = tips.zip(geometries).zip(value);
+        for (row, ((((a, b), c), ((d, e), f)), value)) in rows.iter_mut().zip(found) {
+            *row = TipMeasurement {
+                by_tip: [a, b, c],
+                by_geometry: [d, e, f],
                 value,
             };
         }

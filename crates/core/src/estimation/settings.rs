@@ -40,10 +40,8 @@ pub struct StateEstimationSettings {
     pub share_walk: f64,
     /// Share of the centre that its map over the position takes over per travel 1, for each DOF.
     pub map_rate: PerDof<f64>,
-    /// Travel over which the regression of the gain forgets.
-    pub gain_window: f64,
-    /// Strength of the prior of the gain, as a variance of the position times a travel.
-    pub gain_prior: f64,
+    /// Standard deviation of the gain from 1.
+    pub gain_deviation: f64,
 }
 
 impl StateEstimationSettings {
@@ -56,8 +54,7 @@ impl StateEstimationSettings {
             ("marker_deviation", self.marker_deviation),
             ("tip_deviation", self.tip_deviation),
             ("width_deviation", self.width_deviation),
-            ("gain_window", self.gain_window),
-            ("gain_prior", self.gain_prior),
+            ("gain_deviation", self.gain_deviation),
         ] {
             require_positive(field, value)?;
         }

@@ -2,8 +2,8 @@
 
 use crate::article::play::Play;
 use crate::error::ConfigError;
-use crate::estimation::ensemble::ScalarMeasurement;
 use crate::estimation::filter::Filter;
+use crate::estimation::marker_measurement::TipMeasurement;
 use crate::estimation::settings::StateEstimationSettings;
 use crate::model::features::GEOMETRY;
 
@@ -55,15 +55,13 @@ impl TipFilter {
         if !tip.is_finite() || self.command.is_none() {
             return;
         }
-        let nominal = self.filter.nominal();
-        let ([gain, ..], [origin, ..]) = (nominal.gain, nominal.origin);
-        let row = ScalarMeasurement {
-            output: [gain / self.std, 0.0, 0.0],
-            lag: [0.0; 3],
-            geometry: [0.0; GEOMETRY],
-            value: (tip - origin * (1.0 - gain)) / self.std,
+        let measurement = TipMeasurement {
+            by_tip: [1.0 / self.std, 0.0, 0.0],
+            by_geometry: [0.0; GEOMETRY],
+            value: tip / self.std,
         };
-        self.filter.update_with(&[row], [tip, 0.0, 0.0], false);
+        self.filter
+            .update_with(&[measurement], [tip, 0.0, 0.0], false);
     }
 
     /// The estimated play.

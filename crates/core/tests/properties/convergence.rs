@@ -2,8 +2,8 @@
 
 use crate::article::play::{Play, PlayState};
 use crate::dof::PerDof;
-use crate::estimation::ensemble::ScalarMeasurement;
 use crate::estimation::filter::Filter;
+use crate::estimation::marker_measurement::TipMeasurement;
 use crate::estimation::tip_filter::TipFilter;
 use crate::math::random::Normal;
 use crate::model::hysteresis::{Hysteresis, PlayPosition};
@@ -80,14 +80,12 @@ fn run_with(
             filter.follow(core::iter::once((next, next)));
             let seen = [0, 1, 2].map(|dof| tip[dof] + NOISE[dof] * noise.draw());
             let rows = [0, 1, 2].map(|dof| {
-                let (gain, origin) = (filter.nominal().gain[dof], filter.nominal().origin[dof]);
-                let mut output = [0.0; 3];
-                output[dof] = gain / STD[dof];
-                ScalarMeasurement {
-                    output,
-                    lag: [0.0; 3],
-                    geometry: [0.0; 3],
-                    value: (seen[dof] - origin * (1.0 - gain)) / STD[dof],
+                let mut by_tip = [0.0; 3];
+                by_tip[dof] = 1.0 / STD[dof];
+                TipMeasurement {
+                    by_tip,
+                    by_geometry: [0.0; 3],
+                    value: seen[dof] / STD[dof],
                 }
             });
             filter.update_with(&rows, seen, false);

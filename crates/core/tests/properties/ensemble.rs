@@ -15,21 +15,19 @@ fn row(measurement: &ScalarMeasurement) -> State {
     let mut row = [0.0; STATE];
     row[..3].copy_from_slice(&measurement.output);
     row[12..15].copy_from_slice(&measurement.lag);
-    row[15..].copy_from_slice(&measurement.geometry);
     row
 }
 
-/// Group of an entry: 0 position, 1 hysteresis of the shaft, 2 of bending, 3 geometry.
+/// Group of an entry: 0 position, 1 hysteresis of the shaft, 2 of bending.
 const fn group(index: usize) -> usize {
     match index {
         0..=4 => 0,
         7 | 10 | 14 => 2,
-        15.. => 3,
         _ => 1,
     }
 }
 
-/// The part of a row that updates an entry: all of it a position or the geometry, the group's the hysteresis.
+/// The part of a row that updates an entry: all of it a position, the group's the hysteresis.
 fn localised(index: usize, row: &State) -> State {
     let own = group(index);
     let mut part = *row;
@@ -39,7 +37,7 @@ fn localised(index: usize, row: &State) -> State {
             0 | 1 => 1,
             entry => group(entry),
         };
-        if (own == 1 || own == 2) && of != own {
+        if own != 0 && of != own {
             *value = 0.0;
         }
     }
@@ -89,21 +87,18 @@ fn square_root_filter(mean: &mut State, covariance: &mut Matrix, measurement: &S
 
 fn measurements() -> impl Strategy<Value = ScalarMeasurement> {
     let three = || prop::array::uniform3(-2.0..2.0);
-    (three(), three(), three(), -5.0..5.0).prop_map(|(output, lag, geometry, value)| {
-        ScalarMeasurement {
-            output,
-            lag,
-            geometry,
-            value,
-        }
+    (three(), three(), -5.0..5.0).prop_map(|(output, lag, value)| ScalarMeasurement {
+        output,
+        lag,
+        value,
     })
 }
 
 /// Members about a mean, with what motion and noise make of their covariance.
 fn ensembles() -> impl Strategy<Value = Ensemble> {
     (
-        prop::array::uniform18(-1.0..1.0),
-        prop::array::uniform18(0.1..2.0),
+        prop::array::uniform15(-1.0..1.0),
+        prop::array::uniform15(0.1..2.0),
         1..u64::MAX,
     )
         .prop_map(|(mean, std, seed)| Ensemble::new(&mean, &std, seed))
@@ -121,7 +116,7 @@ proptest! {
         let (mut mean, mut covariance) = ensemble.covariance(|state| *state);
         for measurement in &measurements {
             let (before, old) = (mean, covariance);
-            ensemble.update(measurement, [1.0; 3]);
+            ensemble.update(measurement, [1.0; 2]);
             square_root_filter(&mut mean, &mut covariance, measurement);
             let y = row(measurement);
             let product: Vec<f64> = old.iter().map(|line| (0..STATE).map(|k| line[k] * y[k]).sum()).collect();
@@ -145,17 +140,14 @@ proptest! {
         }
     }
 
-    /// A share of 0 leaves the hysteresis of a group, to the last bit; and the mean moves in proportion to the share. With a
-    /// share of 0 a geometry is a constant.
+    /// A share of 0 leaves the hysteresis of a group, to the last bit; and the mean moves in proportion to the share.
     #[test]
     fn a_group_is_updated_by_its_share(
         ensemble in ensembles(), measurement in measurements(), shares in prop::array::uniform2(0.0..1.0_f64),
-        has_geometry in any::<bool>(),
     ) {
-        let geometry = f64::from(u8::from(has_geometry));
-        let updated = |[shaft, bending]: [f64; 2]| {
+        let updated = |shares: [f64; 2]| {
             let mut ensemble = ensemble.clone();
-            ensemble.update(&measurement, [shaft, bending, geometry]);
+            ensemble.update(&measurement, shares);
             ensemble.mean()
         };
         let (before, all, none, some) = (ensemble.mean(), updated([1.0; 2]), updated([0.0; 2]), updated(shares));
@@ -167,15 +159,14 @@ proptest! {
             };
             let expected = before[index] + share * (all[index] - before[index]);
             prop_assert!((some[index] - expected).abs() <= 1e-9, "{index}");
-            let has_share = group(index) == 0 || (group(index) == 3 && has_geometry);
-            prop_assert_eq!(none[index], if has_share { all[index] } else { before[index] }, "{}", index);
+            prop_assert_eq!(none[index], if group(index) == 0 { all[index] } else { before[index] }, "{}", index);
         }
     }
 
     /// Mean and variance are those that were asked for, as far as 64 members have them; the shaft is at the output.
     #[test]
     fn members_are_drawn_with_mean_and_standard_deviation(
-        mean in prop::array::uniform18(-1.0..1.0), std in prop::array::uniform18(0.1..2.0), seed in 1..u64::MAX,
+        mean in prop::array::uniform15(-1.0..1.0), std in prop::array::uniform15(0.1..2.0), seed in 1..u64::MAX,
     ) {
         let ensemble = Ensemble::new(&mean, &std, seed);
         let (found, covariance) = ensemble.covariance(|state| *state);
@@ -200,7 +191,7 @@ proptest! {
             ensemble.disturb_position([0.1, 0.2, 0.3]);
             let path = [[0.1; 3], command].into_iter();
             ensemble.propagate(&NO_MAPS, 1.75, [0.0; 3], path);
-            ensemble.update(&measurement, [1.0, 0.5, 0.2]);
+            ensemble.update(&measurement, [1.0, 0.5]);
             ensemble.add_noise(&[0.1; STATE]);
             ensemble.limit([0.1; 3], [2.0; 3]);
             ensemble
@@ -236,7 +227,6 @@ fn parameters_are_kept_within_their_limits() {
     for index in 12..15 {
         seen(index, 0.0, 0.4);
     }
-    seen(15, -1.0, 1.0);
     let before = ensemble.mean();
     ensemble.shift_centres([0.1, 0.2, -0.3]);
     for (index, shift) in [(8, 0.1), (9, 0.2), (10, -0.3)] {

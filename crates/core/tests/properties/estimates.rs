@@ -1,10 +1,9 @@
-//! Gain, centre map, rate limit of the offsets, and direction of motion.
+//! Centre map, rate limit of the offsets, and direction of motion.
 
 use crate::adaptive::offset_rate_limit::OffsetRateLimit;
 use crate::adaptive::slip_direction::SlipDirection;
 use crate::adaptive::smoother::Smoother;
 use crate::estimation::centre_map::CentreMap;
-use crate::estimation::gain::GainEstimate;
 use crate::model::hysteresis::Hysteresis;
 use proptest::prelude::*;
 
@@ -12,48 +11,6 @@ use super::config;
 
 proptest! {
     #![proptest_config(config())]
-
-    /// The gain minimises the squares, weighted by travels of at most 0.25, of y - gain x - b d - offset, with a prior of gain 1 and b 0: no other gain
-    /// and b have less, by direct summation.
-    #[test]
-    fn the_gain_is_that_of_least_squares(
-        samples in prop::collection::vec((-5.0..5.0, -2.0..2.0, -0.3..0.3), 2..40), truth in (0.6..1.4, -1.0..1.0, -3.0..3.0),
-        window in 1.0..50.0, prior in 0.01..5.0, away in prop::array::uniform2(-0.1..0.1_f64),
-    ) {
-        let mut estimate = GainEstimate::new();
-        prop_assert_eq!(estimate.value(prior), 1.0);
-        let (gain, slope, offset) = truth;
-        let tip = |(x, d, noise): (f64, f64, f64)| gain * x + slope * d + offset + noise;
-        let (mut weights, mut last) = (vec![0.0; samples.len()], samples[0].0);
-        for (index, sample) in samples.iter().enumerate() {
-            let travel: f64 = sample.0 - last;
-            last = sample.0;
-            for weight in &mut weights {
-                *weight *= f64::exp(-travel.abs() / window);
-            }
-            weights[index] = travel.abs().min(0.25);
-            estimate.update(sample.0, sample.1, tip(*sample), window);
-        }
-        let total: f64 = weights.iter().sum();
-        let mean = |of: &dyn Fn(&(f64, f64, f64)) -> f64| {
-            samples.iter().zip(&weights).map(|(sample, weight)| weight * of(sample)).sum::<f64>() / total
-        };
-        let cost = |gain: f64, b: f64| {
-            let rest = |sample: &(f64, f64, f64)| tip(*sample) - gain * sample.0 - b * sample.1;
-            let middle = mean(&rest);
-            total * mean(&|sample| (rest(sample) - middle).powi(2)) + prior * ((gain - 1.0).powi(2) + b * b)
-        };
-        let found = estimate.value(prior);
-        prop_assume!(found > 0.5 && found < 1.5);
-        // The best b of a gain, by the minimum of a parabola through three points.
-        let least = |gain: f64| {
-            let [low, middle, high] = [-1.0, 0.0, 1.0].map(|b| cost(gain, b));
-            cost(gain, 0.5 * (low - high) / (low - 2.0 * middle + high))
-        };
-        for away in away {
-            prop_assert!(least(found + away) >= least(found) - 1e-7 * (1.0 + least(found)), "{found} {away}");
-        }
-    }
 
     /// Exact at its nodes and where it was changed, linear between nodes, constant beyond the last.
     #[test]

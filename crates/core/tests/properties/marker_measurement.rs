@@ -1,7 +1,8 @@
 //! The most probable state for the markers of an image, and its linear measurement.
 
-use crate::estimation::ensemble::ScalarMeasurement;
-use crate::estimation::marker_measurement::{ImagePrediction, MarkerEstimate, Markers};
+use crate::estimation::marker_measurement::{
+    ImagePrediction, MarkerEstimate, Markers, TipMeasurement,
+};
 use crate::estimation::settings::StateEstimationSettings;
 use crate::model::features::FeatureModel;
 use proptest::prelude::*;
@@ -194,14 +195,13 @@ proptest! {
         }
     }
 
-    /// The rows have the information of the markers: with R of markers, model and deviation of the tip, J of the features
-    /// by the tip, and the gain g, their sum of a (value - a . output - what lag and geometry add) is g J' R^-1 (s - h(tip)), and that of a a' is
-    /// g J' R^-1 J g.
+    /// The rows have the information of the markers: with R of markers, model, geometry and deviation of the tip, and J of the
+    /// features by the tip, their sum of a (value - a . tip - what the geometry adds) is J' R^-1 (s - h(tip)), and that of a a' is
+    /// J' R^-1 J.
     #[test]
     fn rows_have_the_information_of_the_markers(
         state in states(), covariance in covariances(), noise in prop::array::uniform4(-1.0..1.0_f64),
-        small in prop::array::uniform3(-1.0..1.0_f64), gain in prop::array::uniform3(0.7..1.2_f64),
-        deviation in 0.0..0.5_f64, lag in prop::array::uniform3(0.0..0.3_f64),
+        small in prop::array::uniform3(-1.0..1.0_f64), deviation in 0.0..0.5_f64, error in prop::array::uniform3(0.0..2.0_f64),
     ) {
         let model = model();
         let Some(seen) = model.predict(state) else { return Ok(()); };
@@ -210,40 +210,39 @@ proptest! {
             return Ok(());
         };
         prop_assume!(found.used == [true; 2]);
-        let origin = [0.02, 0.1, 0.5];
+        let error = [0.1 * error[0], error[1], error[2]];
+        let mut geometry = [[0.0; 3]; 3];
+        for (index, error) in error.into_iter().enumerate() {
+            geometry[index][index] = error * error;
+        }
         let std = STD.map(|std| deviation * std);
-        let velocity = [5e-3, -0.4, 0.3];
-        let rows = markers.linearize(&found, origin, gain, velocity, std).unwrap();
+        let rows = markers.linearize(&found, std, &geometry).unwrap();
         let tip = [0, 1, 2].map(|dof| found.state[dof] + 1e-3 * small[dof] * STD[dof]);
-        let output = [0, 1, 2].map(|dof| {
-            origin[dof] + (tip[dof] - origin[dof]) / gain[dof] + lag[dof] * velocity[dof]
-        });
         let columns = found.prediction.columns;
         let mut total = covariance;
         for a in 0..4 {
             total[a][a] += estimation().model_deviation.powi(2);
             for b in 0..4 {
                 total[a][b] += (0..3).map(|dof| columns[dof][a] * columns[dof][b] * std[dof].powi(2)).sum::<f64>();
+                total[a][b] += (0..3).map(|k| found.by_geometry[k][a] * found.by_geometry[k][b] * geometry[k][k]).sum::<f64>();
             }
         }
         let there = model.predict(tip).unwrap();
         let misfit = eliminate(total, [0, 1, 2, 3].map(|k| features[k] - there.features[k]));
         for dof in 0..3 {
-            let scale = gain[dof] * STD[dof];
-            let right: f64 = rows.iter().map(|row: &ScalarMeasurement| {
-                let rest = row.value - (0..3).map(|k| {
-                    row.output[k] * output[k] + row.lag[k] * lag[k] + row.geometry[k] * GEOMETRY[k]
-                }).sum::<f64>();
-                row.output[dof] * rest
+            let right: f64 = rows.iter().map(|row: &TipMeasurement| {
+                let rest = row.value - (0..3).map(|k| row.by_tip[k] * tip[k] + row.by_geometry[k] * GEOMETRY[k]).sum::<f64>();
+                row.by_tip[dof] * rest
             }).sum();
-            let direct: f64 = (0..4).map(|k| gain[dof] * columns[dof][k] * misfit[k]).sum();
+            let direct: f64 = (0..4).map(|k| columns[dof][k] * misfit[k]).sum();
             prop_assert!(((right - direct) * STD[dof]).abs() <= 1e-2, "{dof}: {right} {direct}");
             for other in 0..3 {
-                let product: f64 = rows.iter().map(|row| row.output[dof] * row.output[other]).sum();
+                let product: f64 = rows.iter().map(|row| row.by_tip[dof] * row.by_tip[other]).sum();
                 let solved = eliminate(total, columns[other]);
-                let direct: f64 = (0..4).map(|k| gain[dof] * gain[other] * columns[dof][k] * solved[k]).sum();
-                let off = (product - direct) * scale * STD[other];
-                prop_assert!(off.abs() <= 1e-6 * (1.0 + (direct * scale * STD[other]).abs()), "{dof} {other}: {product} {direct}");
+                let direct: f64 = (0..4).map(|k| columns[dof][k] * solved[k]).sum();
+                let scale = STD[dof] * STD[other];
+                let off = (product - direct) * scale;
+                prop_assert!(off.abs() <= 1e-6 * (1.0 + (direct * scale).abs()), "{dof} {other}: {product} {direct}");
             }
         }
     }
@@ -260,9 +259,9 @@ proptest! {
             return Ok(());
         };
         prop_assert_eq!(found.used, [lost == 1, lost == 0]);
-        let rows = markers.linearize(&found, [0.0; 3], [1.0; 3], [0.0; 3], [0.0; 3]).unwrap();
+        let rows = markers.linearize(&found, [0.0; 3], &[[0.0; 3]; 3]).unwrap();
         for row in [rows[2 * lost], rows[2 * lost + 1]] {
-            prop_assert_eq!((row.output, row.geometry, row.value), ([0.0; 3], [0.0; 3], 0.0));
+            prop_assert_eq!((row.by_tip, row.by_geometry, row.value), ([0.0; 3], [0.0; 3], 0.0));
         }
     }
 

@@ -40,6 +40,7 @@ mod supervised_law;
 mod supervisor;
 #[path = "../support/mod.rs"]
 mod support;
+mod tip_regression;
 mod whole;
 
 use crate::article::play::Play;

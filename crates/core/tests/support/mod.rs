@@ -131,8 +131,7 @@ pub fn settings(safety: &SafetySettings) -> Settings {
             share_walk: 0.02,
             lag_deviation: 0.05,
             map_rate: [0.25, 0.25, 0.0],
-            gain_window: 25.0,
-            gain_prior: 1.0,
+            gain_deviation: 0.3,
         },
     }
 }

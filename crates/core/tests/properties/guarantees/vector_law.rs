@@ -4,8 +4,8 @@ use crate::adaptive::vector_law::VectorLaw;
 use crate::article::play::Play;
 use crate::article::play_limit::PlayLimit;
 use crate::dof::PerDof;
-use crate::estimation::ensemble::ScalarMeasurement;
 use crate::estimation::filter::Filter;
+use crate::estimation::marker_measurement::TipMeasurement;
 use crate::supervision::flags::Flag;
 use crate::supervision::monitors::{Law, Monitors};
 
@@ -59,13 +59,12 @@ impl CheckedLaw {
         let dof = [0, 1, 2][usize::try_from(random.below(3)).unwrap()];
         let std = UNITS[dof] * random.within(0.1, 3.0);
         let tip = self.law.command()[dof] + UNITS[dof] * random.within(-30.0, 30.0);
-        let mut row = ScalarMeasurement {
-            output: [0.0; 3],
-            lag: [0.0; 3],
-            geometry: [0.0; 3],
+        let mut row = TipMeasurement {
+            by_tip: [0.0; 3],
+            by_geometry: [0.0; 3],
             value: tip / std,
         };
-        row.output[dof] = 1.0 / std;
+        row.by_tip[dof] = 1.0 / std;
         let mut seen = self.law.command();
         seen[dof] = tip;
         self.filter.update_with(&[row], seen, random.below(4) == 0);
