@@ -30,23 +30,25 @@ def test_a_replay_is_identical(recorded: Recorded) -> None:
 
 
 @pytest.mark.parametrize(
-    ("profile", "share"),
+    ("profile", "shares"),
     [
-        ("paper", 1e-9),
-        ("best", 0.05),
+        ("paper", (1e-9, 1e-9, 1e-9)),
+        ("best", (0.02, 0.1, 0.02)),
     ],
 )
 def test_estimates_with_the_same_configuration_are_the_same(
-    tmp_path: Path, config: Config, profile: str, share: float
+    tmp_path: Path, config: Config, profile: str, shares: tuple[float, ...]
 ) -> None:
     """Profile best has the travel of its random walks and the tremor from the reference, which the
-    estimation lacks."""
+    estimation lacks. Nothing shows the width of rotation while insertion moves alone: it drifts by
+    chance."""
     config = config.replace(profile=profile)
     recording, _ = record(tmp_path / "run.mcap", config, 6.0)
     replayed, _ = estimate_from_log(read_log(tmp_path / "run.mcap"), config)
     for group in ("estimate", "delta_minus", "delta_plus"):
         difference = per_dof(replayed.trace, group) - per_dof(recording.trace, group)
-        assert np.nanmax(np.abs(difference) / BACKLASH) < share, group
+        largest = np.nanmax(np.abs(difference) / BACKLASH, axis=0)
+        assert (largest < shares).all(), f"{group}: {largest}"
     np.testing.assert_array_equal(
         per_dof(replayed.trace, "command"), per_dof(recording.trace, "command")
     )
