@@ -23,10 +23,11 @@ const MAP_SPACING: f64 = 0.7;
 ///
 /// Each member has the outputs of the plays, half widths, centres, the share of the friction that insertion and rotation have
 /// in common, and how far the tip lags behind the plays. A regression of the tip on plays that no image corrects has the gains,
-/// and by how much the geometry differs from the configured one. Between images each is propagated by the exact plays along the commands; the travel of the reference adds a random walk. The
-/// image of a time updates the members at that time. The mean, propagated to now, is the prediction that the compensation
-/// uses; the residual of the tip in the last images is added to it. What else of camera and instrument is not as configured is an error of the feature model, which adapts to the
-/// misfit of the markers: an image is not refused for it.
+/// and by how much the geometry differs from the configured one. Between images each member is propagated by the exact plays
+/// along the commands; the travel of the reference adds a random walk. The image of a time updates the members at that time. The
+/// mean, propagated to now, is the prediction that the compensation uses; the residual of the tip in the last images is added to
+/// it. What else of camera and instrument is not as configured is an error of the feature model, which adapts to the misfit of
+/// the markers: an image is not refused for it.
 ///
 /// Wrong where an instrument is no play: by what its loop is rounded and an image does not show in time.
 #[derive(Debug, Clone, PartialEq)]

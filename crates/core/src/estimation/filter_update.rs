@@ -55,7 +55,8 @@ impl Filter {
         markers.estimate(model, &prior, self.settings.outlier_distance)
     }
 
-    /// Covariance of the geometry by which an image is wrong: the position has taken over the error at the last bend.
+    /// What of the covariance of the geometry is noise of an image: at the bend of the last image the position has taken the
+    /// error over.
     fn geometry_covariance(&self) -> [[f64; GEOMETRY]; GEOMETRY] {
         let (_, mut covariance) = self.geometry();
         let [_, _, bent] = self.travel;
@@ -90,8 +91,8 @@ impl Filter {
         self.catch_up(history);
     }
 
-    /// Updates ensemble and regression at the time of the ensemble with measurements of the tip, which is at `tip` (3,) [m, rad,
-    /// rad]; with `is_position_only` only the tip.
+    /// Updates ensemble and regression at the time of the ensemble with measurements of the tip, which is at `tip` (3,)
+    /// [m, rad, rad]; with `is_position_only` only the tip.
     pub fn update_with(
         &mut self,
         measurements: &[TipMeasurement],

@@ -13,7 +13,8 @@ const LARGEST_UNEVENNESS: f64 = 1.0;
 /// Initial standard deviations of b and c.
 pub const SLOPE: f64 = 0.3;
 pub const CONSTANT: f64 = 0.5;
-/// Standard deviations of random walks over a travel of 1: of the gain, of c, and of the geometry in initial standard deviations.
+/// Standard deviations of random walks over a travel of 1: of the gain, of c, and of the geometry in its initial standard
+/// deviations.
 pub const GAIN_WALK: f64 = 0.01;
 pub const CONSTANT_WALK: f64 = 0.03;
 pub const GEOMETRY_WALK: f64 = 0.02;

@@ -185,10 +185,11 @@ fn a_push_is_no_geometry() {
                 output,
                 deflection: output.map(|x| 0.3 * x * x),
             };
-            let rows = [0, 1, 2, 3].map(|row| {
+            let rows = [0_u8, 1, 2, 3].map(|row| {
+                let dof = usize::from(row % 3);
                 let mut by_tip = [0.0; 3];
-                by_tip[row % 3] = 20.0 / UNIT[row % 3];
-                let row = f64::from(u8::try_from(row).unwrap());
+                by_tip[dof] = 20.0 / UNIT[dof];
+                let row = f64::from(row);
                 let geometry = [
                     8.0 * (phase + row).cos(),
                     (0.3 * phase + row).sin(),
