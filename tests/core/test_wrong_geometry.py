@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
     "seed",
     [
         0,
-        pytest.param(1, marks=pytest.mark.xfail(strict=False, reason="2.6 mm; 14 and 17 px")),
+        pytest.param(1, marks=pytest.mark.xfail(reason="2.6 mm; 14 and 17 px")),
         2,
         3,
     ],
