@@ -22,8 +22,8 @@ fn outline(band: &core::BandImage) -> Outline {
 /// Standard deviations of a posture that was found in an image: those of the workspace over this.
 const NEAR: f64 = 8.0;
 
-/// Standard deviations of camera and bands from where they are configured, where neither prediction nor geometry is relied on:
-/// about the range of the drawn instruments of docs/instruments.md, decision 0048.
+/// Standard deviations of camera and bands from where they are configured, where the geometry is not relied on: about the range
+/// of the drawn instruments of docs/instruments.md, decisions 0048 and 0053.
 const GEOMETRY: core::GeometryDeviation = core::GeometryDeviation {
     shift: 2e-3,
     turn: 0.02,
@@ -118,10 +118,15 @@ impl BandPredictor for ModelPredictor<'_> {
         })
     }
 
-    fn freed(&self) -> Option<Self> {
-        let is_free = self.geometry != core::GeometryDeviation::EXACT;
-        (!is_free).then_some(Self {
+    fn in_any_pose(&self) -> Option<Self> {
+        Some(Self {
             geometry: GEOMETRY,
+            ..*self
+        })
+    }
+
+    fn anywhere(&self) -> Option<Self> {
+        Some(Self {
             prior: None,
             ..*self
         })

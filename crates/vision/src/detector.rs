@@ -68,8 +68,8 @@ impl Detector {
     ///
     /// With a prediction, near it: in the window around it, if that is small; there by a fit of the intensity, if the edges
     /// give no clear result. Without one, in the whole frame, and again near what was found there, if that is not clear. If not
-    /// both bands are found, wherever they are clear, because prediction or geometry may be wrong; and if none is, with a
-    /// prediction in the whole frame.
+    /// both bands are found, geometry or prediction may be wrong: near the prediction in any pose, then wherever they are clear;
+    /// and if none is, with a prediction in the whole frame.
     ///
     /// Returns the result and the regions it is based on, the largest first, at most
     /// [`MAX_REGIONS`](crate::MAX_REGIONS). Allocates only when a frame is larger than those before.
@@ -82,10 +82,15 @@ impl Detector {
         if found.rejections == [None; 2] {
             return (found, &self.memory.scanner.regions);
         }
-        if let Some(freed) = predictor.freed() {
+        if let Some(free) = predictor.in_any_pose() {
             self.memory.swap_kept();
-            if let Some(elsewhere) = self.search(frame, &freed).run_clear() {
-                return (elsewhere, &self.memory.scanner.regions);
+            let near = predictor
+                .is_located()
+                .then(|| self.search(frame, &free).run())
+                .filter(|near| near.rejections == [None; 2]);
+            let again = near.or_else(|| self.search(frame, &free.anywhere()?).run_clear());
+            if let Some(again) = again {
+                return (again, &self.memory.scanner.regions);
             }
             self.memory.swap_kept();
         }

@@ -55,8 +55,9 @@ impl Filter {
         markers.estimate(model, &prior, self.settings.outlier_distance)
     }
 
-    /// What of the covariance of the geometry is noise of an image: at the bend of the last image the position has taken the
-    /// error over.
+    /// The part of the geometry's covariance that counts as noise of this image: covariance * bent / (bent + 0.1), where bent
+    /// is the travel of bending since the last image, in half of `width_limit`. Without it, the position includes the error
+    /// already.
     fn geometry_covariance(&self) -> [[f64; GEOMETRY]; GEOMETRY] {
         let (_, mut covariance) = self.geometry();
         let [_, _, bent] = self.travel;
@@ -84,7 +85,8 @@ impl Filter {
         if let Some(misfit) = estimate.misfit_squared {
             // Four features determine three DOFs: what is left is the error of one.
             let variance = self.model_std * self.model_std;
-            let change = (misfit.min(MISFIT * variance) - variance) / MODEL_IMAGES;
+            self.images = (self.images + 1.0).min(MODEL_IMAGES);
+            let change = (misfit.min(MISFIT * variance) - variance) / self.images;
             let least = self.settings.model_deviation;
             self.model_std = libm::sqrt(variance + change).max(least);
         }

@@ -99,9 +99,17 @@ pub trait BandPredictor {
         None
     }
 
-    /// The predictor that relies on neither the prior nor the configured geometry: bands anywhere in the workspace, in any pose of
-    /// camera and bands near the configured one. None if there is no such predictor, or if it is this one.
-    fn freed(&self) -> Option<Self>
+    /// The predictor with the same prior that does not rely on the configured geometry: bands in any pose of camera and bands
+    /// near the configured one. None if there is no such predictor.
+    fn in_any_pose(&self) -> Option<Self>
+    where
+        Self: Sized,
+    {
+        None
+    }
+
+    /// The predictor without the prior: bands anywhere in the workspace. None if there is no such predictor.
+    fn anywhere(&self) -> Option<Self>
     where
         Self: Sized,
     {

@@ -47,7 +47,11 @@ impl BandPredictor for Anywhere {
         Some(Self::expected_at(observed))
     }
 
-    fn freed(&self) -> Option<Self> {
-        self.is_known.then(Self::new)
+    fn in_any_pose(&self) -> Option<Self> {
+        Some(*self)
+    }
+
+    fn anywhere(&self) -> Option<Self> {
+        Some(Self::new())
     }
 }
