@@ -68,8 +68,8 @@ impl Detector {
     ///
     /// With a prediction, near it: in the window around it, if that is small; there by a fit of the intensity, if the edges
     /// give no clear result. Without one, in the whole frame, and again near what was found there, if that is not clear. If not
-    /// both bands are found, geometry or prediction may be wrong: near the prediction in any pose, then wherever they are clear;
-    /// and if none is, with a prediction in the whole frame.
+    /// both bands are found, geometry or prediction may be wrong: near the prediction, relying less on the geometry; then, relying
+    /// on it even less, clear ones near the prediction, and anywhere; and if none is, with a prediction in the whole frame.
     ///
     /// Returns the result and the regions it is based on, the largest first, at most
     /// [`MAX_REGIONS`](crate::MAX_REGIONS). Allocates only when a frame is larger than those before.
@@ -82,13 +82,18 @@ impl Detector {
         if found.rejections == [None; 2] {
             return (found, &self.memory.scanner.regions);
         }
-        if let Some(free) = predictor.in_any_pose() {
+        if let Some(relaxed) = predictor.relaxed() {
             self.memory.swap_kept();
             let near = predictor
                 .is_located()
-                .then(|| self.search(frame, &free).run())
+                .then(|| self.search(frame, &relaxed).run())
                 .filter(|near| near.rejections == [None; 2]);
-            let again = near.or_else(|| self.search(frame, &free.anywhere()?).run_clear());
+            let again = near
+                .or_else(|| {
+                    let relaxed = relaxed.relaxed().filter(BandPredictor::is_located)?;
+                    self.search(frame, &relaxed).run_clear()
+                })
+                .or_else(|| self.search(frame, &relaxed.anywhere()?).run_clear());
             if let Some(again) = again {
                 return (again, &self.memory.scanner.regions);
             }

@@ -99,9 +99,9 @@ pub trait BandPredictor {
         None
     }
 
-    /// The predictor with the same prior that does not rely on the configured geometry: bands in any pose of camera and bands
-    /// near the configured one. None if there is no such predictor.
-    fn in_any_pose(&self) -> Option<Self>
+    /// The predictor with the same prior that relies less on the configured pose of camera and bands. None if there is no such
+    /// predictor.
+    fn relaxed(&self) -> Option<Self>
     where
         Self: Sized,
     {

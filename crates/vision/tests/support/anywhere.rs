@@ -47,7 +47,7 @@ impl BandPredictor for Anywhere {
         Some(Self::expected_at(observed))
     }
 
-    fn in_any_pose(&self) -> Option<Self> {
+    fn relaxed(&self) -> Option<Self> {
         Some(*self)
     }
 
