@@ -111,6 +111,7 @@ export class Charts {
     this.rows = DOFS.map(() => ({ reference: [], command: [], tip: [], minus: [], plus: [] }));
     this.next = 0;
     const rebuild = () => this.cards.forEach((card) => card.rebuild());
+    rebuild(); // the observer first calls when the page is rendered, which a hidden one is not
     new ResizeObserver(rebuild).observe(parent);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", rebuild);
     setInterval(() => this.#draw(), FRAME);
