@@ -119,7 +119,6 @@ def test_keys_move_while_they_are_held(console: RunningConsole, open_page) -> No
 def test_the_charts_are_drawn_where_the_page_is_not_rendered_at_first(open_page) -> None:
     page = open_page(script="window.ResizeObserver = class { observe() {} }")
     expect(page.locator(".chart canvas")).to_have_count(9, timeout=TIMEOUT)
-    page.wait_for_timeout(500)
 
 
 @pytest.mark.parametrize(

@@ -58,7 +58,7 @@ pub struct FrameSearch<'a, F, P> {
 }
 
 impl<F: Frame, P: BandPredictor> FrameSearch<'_, F, P> {
-    /// Recognises both bands where the trained discriminant shows them clearly, wherever they are.
+    /// Recognises both bands in the whole frame if the trained discriminant shows them clearly.
     pub fn run_clear(mut self) -> Option<Recognition> {
         self.memory.blobs = [None; BLOBS];
         let found = self.by_discriminant(Window::whole(self.frame), 0);

@@ -41,8 +41,8 @@ pub struct Filter {
     pub(super) ensemble: Ensemble,
     /// Standard deviation of the feature model in px.
     pub(super) model_std: f64,
-    /// Number of images of which it is the mean; the configured one counts as one.
-    pub(super) images: f64,
+    /// Number of images over which its square is averaged; the configured one counts as one.
+    pub(super) model_images: f64,
     pub(super) maps: PerDof<CentreMap>,
     pub(super) regression: TipRegression,
     /// Plays with the mean's half widths that no image corrects, about centres of 0.
@@ -90,7 +90,7 @@ impl Filter {
             radius,
             ensemble: Ensemble::new(&zero, &zero, 0),
             model_std: settings.model_deviation,
-            images: 1.0,
+            model_images: 1.0,
             maps: unit.map(|unit| CentreMap::new(0.0, unit)),
             regression: regression(&settings),
             uncorrected: blank,

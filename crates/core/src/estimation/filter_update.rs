@@ -16,7 +16,7 @@ use crate::model::features::{FeatureModel, GEOMETRY};
 /// how much each does.
 const MISSED: f64 = 0.15;
 const MISS: f64 = 0.03;
-/// Error of the feature model that a reset assumes, in `model_deviation`, and number of images over which it is adapted.
+/// Error of the feature model that a reset assumes, in `model_deviation`, and the most images over which its square is averaged.
 const RESET_MODEL: f64 = 30.0;
 const MODEL_IMAGES: f64 = 200.0;
 /// Largest squared misfit of an image that it is adapted to, in variances: a wrong band is in one image, a wrong geometry in
@@ -85,8 +85,8 @@ impl Filter {
         if let Some(misfit) = estimate.misfit_squared {
             // Four features determine three DOFs: what is left is the error of one.
             let variance = self.model_std * self.model_std;
-            self.images = (self.images + 1.0).min(MODEL_IMAGES);
-            let change = (misfit.min(MISFIT * variance) - variance) / self.images;
+            self.model_images = (self.model_images + 1.0).min(MODEL_IMAGES);
+            let change = (misfit.min(MISFIT * variance) - variance) / self.model_images;
             let least = self.settings.model_deviation;
             self.model_std = libm::sqrt(variance + change).max(least);
         }
