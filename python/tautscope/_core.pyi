@@ -281,4 +281,12 @@ class Renderer:
     def draw_scene(
         self, background: NDArray[np.uint8], points: _Floats, directions: _Floats
     ) -> tuple[NDArray[np.uint8], _Floats, _Floats, _Floats]: ...
+    def draw_rows(
+        self,
+        background: NDArray[np.uint8],
+        points: _Floats,
+        directions: _Floats,
+        image: NDArray[np.uint8],
+        rows: Sequence[int],
+    ) -> None: ...
     def add_noise(self, image: NDArray[np.uint8], sequence: int) -> None: ...

@@ -70,6 +70,17 @@ def test_a_rolling_shutter_skews_what_moves(readout: float) -> None:
     assert shift > (1.0 if readout < 0.02 else 3.0), "the skew is more than the tolerance"
 
 
+def test_each_strip_of_a_rolling_shutter_is_that_of_a_still_image() -> None:
+    config, camera = make(**QUIET)
+    points, tangents = bent(config, 22e-3, 0.3, 0.9)
+    strips = [(points + k * np.array([1e-3, 2e-3, 0.0]), tangents) for k in range(5)]
+    rolled = camera.draw_strips(strips, 0).image
+    height = config.camera.height
+    for k, strip in enumerate(strips):
+        rows = slice(round(height * k / 5), round(height * (k + 1) / 5))
+        np.testing.assert_array_equal(rolled[rows], camera.draw(*strip, 0).image[rows])
+
+
 def test_the_stamp_is_the_time_of_the_middle_row() -> None:
     """The truth of a frame with a rolling shutter is that of a still image at its stamp."""
     still = {f.captured_at: f.true_features for _, f in frames(1.0, **{"twin.frame_rate": 200.0})}

@@ -112,6 +112,24 @@ impl Renderer {
         Ok((image, features, visible, surface))
     }
 
+    /// As `draw_scene`, but only `rows` (first, end) of the image, uint8 (h, w, 3), in place.
+    fn draw_rows(
+        &mut self,
+        py: Python<'_>,
+        background: &Bound<'_, PyArray3<u8>>,
+        points: &Bound<'_, PyArray2<f64>>,
+        directions: &Bound<'_, PyArray2<f64>>,
+        image: &Bound<'_, PyArray3<u8>>,
+        rows: [usize; 2],
+    ) -> PyResult<()> {
+        self.read_frames(points, directions);
+        let (mut pixels, background) = (image.readwrite(), background.readonly());
+        let (target, tissue) = (pixels.as_slice_mut()?, background.as_slice()?);
+        let (inner, frames, [first, end]) = (&mut self.inner, &self.frames, rows);
+        py.detach(|| inner.draw_rows(tissue, frames, first..end, target));
+        Ok(())
+    }
+
     /// Adds the sensor's noise of image `sequence` to the image, uint8 (h, w, 3), in place.
     fn add_noise(
         &self,
@@ -142,6 +160,22 @@ impl Renderer {
         let target = pixels.as_slice_mut()?;
         let background = background.readonly();
         let tissue = background.as_slice()?;
+        self.read_frames(points, directions);
+        let (inner, frames, surface) = (&mut self.inner, &self.frames, &mut self.surface);
+        let truth = py.detach(|| match sequence {
+            Some(sequence) => inner.draw(tissue, frames, sequence, target),
+            None => inner.draw_scene(tissue, frames, target, surface),
+        });
+        drop(pixels);
+        Ok((image, truth))
+    }
+
+    /// Sets the frames from points and directions (n, 3).
+    fn read_frames(
+        &mut self,
+        points: &Bound<'_, PyArray2<f64>>,
+        directions: &Bound<'_, PyArray2<f64>>,
+    ) {
         let (points, directions) = (points.readonly(), directions.readonly());
         let (points, directions) = (points.as_array(), directions.as_array());
         self.frames.clear();
@@ -159,13 +193,6 @@ impl Renderer {
                     )
                 }),
         );
-        let (inner, frames, surface) = (&mut self.inner, &self.frames, &mut self.surface);
-        let truth = py.detach(|| match sequence {
-            Some(sequence) => inner.draw(tissue, frames, sequence, target),
-            None => inner.draw_scene(tissue, frames, target, surface),
-        });
-        drop(pixels);
-        Ok((image, truth))
     }
 }
 

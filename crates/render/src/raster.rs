@@ -27,6 +27,8 @@ pub(crate) struct Samples {
     paint: Vec<u32>,
     /// Samples drawn to, per row of samples.
     spans: Vec<Range<usize>>,
+    /// Rows of samples that are drawn.
+    rows: Range<usize>,
 }
 
 impl Samples {
@@ -39,7 +41,14 @@ impl Samples {
             nearness: vec![0.0; width * height],
             paint: vec![0; width * height],
             spans: vec![0..0; height],
+            rows: 0..height,
         }
+    }
+
+    /// Draws only within these rows of the image from now on.
+    pub(crate) fn clip(&mut self, rows: Range<usize>) {
+        let sample = |row: usize| (FINE * row).min(self.height);
+        self.rows = sample(rows.start)..sample(rows.end);
     }
 
     /// Draws one triangle of either orientation with colours interpolated between its corners.
@@ -60,7 +69,8 @@ impl Samples {
             (vb, vc) = (vc, vb);
         }
         let [a, b, c] = [va, vb, vc].map(|v| v.at.map(|x| FINE as f32 * (x + 0.5) - 0.5));
-        let (top, bottom) = (ceil(a[1], self.height), ceil(c[1], self.height));
+        let top = ceil(a[1], self.height).max(self.rows.start);
+        let bottom = ceil(c[1], self.height).min(self.rows.end);
         let area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
         if top >= bottom || area == 0.0 {
             return;

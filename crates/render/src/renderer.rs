@@ -1,3 +1,5 @@
+use core::ops::Range;
+
 use crate::Error;
 use crate::curve::Curve;
 use crate::features::{Patches, Piece, Truth};
@@ -100,6 +102,21 @@ impl Renderer {
         self.paint(background, frames, None, image, |piece| surface.push(piece))
     }
 
+    /// As [`Renderer::draw_scene`], but only these rows of `image`; the others stay as they are.
+    pub fn draw_rows(
+        &mut self,
+        background: &[u8],
+        frames: &[([f64; 3], [f64; 3])],
+        rows: Range<usize>,
+        image: &mut [u8],
+    ) {
+        let rows = rows.start..rows.end.min(self.height);
+        self.samples.clip(rows.clone());
+        self.sweep(frames);
+        self.samples.clip(0..self.height);
+        self.resolve(background, rows, None, image);
+    }
+
     /// Adds the sensor's noise of image `sequence` to `image`, saturating at 0 and 255.
     pub fn add_noise(&self, sequence: u64, image: &mut [u8]) {
         for (y, row) in image.chunks_mut(3 * self.width).enumerate() {
@@ -118,9 +135,21 @@ impl Renderer {
         self.sweep(frames);
         let tolerance = 0.25 * self.geometry.diameter as f32;
         let truth = self.bands.truth(&self.samples, tolerance, keep);
+        self.resolve(background, 0..self.height, noise, image);
+        truth
+    }
+
+    /// Completes these rows of the image, and clears their samples.
+    fn resolve(
+        &mut self,
+        background: &[u8],
+        rows: Range<usize>,
+        noise: Option<u64>,
+        image: &mut [u8],
+    ) {
         let stride = 3 * self.width;
-        let rows = image.chunks_mut(stride).zip(background.chunks(stride));
-        for (y, (row, tissue)) in rows.take(self.height).enumerate() {
+        let lines = image.chunks_mut(stride).zip(background.chunks(stride));
+        for (y, (row, tissue)) in lines.enumerate().take(rows.end).skip(rows.start) {
             for (value, below) in row.iter_mut().zip(tissue) {
                 *value = *below;
             }
@@ -129,7 +158,6 @@ impl Renderer {
                 self.noise.add(sequence, y as u64, row);
             }
         }
-        truth
     }
 
     fn sweep(&mut self, frames: &[([f64; 3], [f64; 3])]) {

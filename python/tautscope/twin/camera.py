@@ -144,14 +144,12 @@ class TwinCamera:
         if disturbances.hides_instrument:
             strips = [(np.full_like(points, np.nan), tangents) for points, tangents in strips]
         tissue = disturbances.apply_to_background(background, sequence)
-        drawn, features, visible, surface = self._renderer.draw_scene(
-            tissue, *strips[len(strips) // 2]
-        )
-        edges = np.linspace(0, len(drawn), len(strips) + 1).round().astype(int)
+        middle = len(strips) // 2
+        drawn, features, visible, surface = self._renderer.draw_scene(tissue, *strips[middle])
+        edges = np.linspace(0, len(drawn), len(strips) + 1).round().astype(int).tolist()
         for k, strip in enumerate(strips):
-            if k != len(strips) // 2:
-                rows = slice(edges[k], edges[k + 1])
-                drawn[rows] = self._renderer.draw_scene(tissue, *strip)[0][rows]
+            if k != middle:
+                self._renderer.draw_rows(tissue, *strip, drawn, edges[k : k + 2])
         bands = Bands.from_surface(surface)
         image, hidden = disturbances.apply_to_scene(drawn, bands, sequence)
         image = self._exposure.expose(image)
