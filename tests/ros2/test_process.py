@@ -65,7 +65,11 @@ class Operator:
         kind = "crtk_msgs/msg/StringStamped"
         self._requests.publish(types.make(kind, header=stamp, string=text))
 
-    def wait(self, state: str, meanwhile: Callable[[], None] = lambda: None) -> None:
+    def enable(self) -> None:
+        """Also where a late tick has paused the node since it was enabled."""
+        self.wait("ENABLED", lambda: [self.request(each) for each in ("enable", "resume")])
+
+    def wait(self, state: str, meanwhile: Callable[[], object] = lambda: None) -> None:
         begin = time.monotonic()
         while True:
             message = self._states.take()
@@ -118,7 +122,7 @@ def enabled(tmp_path: Path, endpoint: str) -> Iterator[Enabled]:
         operator(endpoint) as user,
     ):
         assert json.loads(line(node)) == {"node": "/tautscope"}
-        user.wait("ENABLED", lambda: user.request("enable"))
+        user.enable()
         user.move(0.5)
         yield Enabled(node, driver, user)
 
@@ -160,8 +164,7 @@ def test_drives_of_a_configuration_stop_when_the_node_is_killed(
             operator(endpoint) as user,
         ):
             line(node)
-            user.request("enable")
-            user.wait("ENABLED", lambda: user.request("enable"))
+            user.enable()
             user.move(0.5)
             node.kill()
             found: list[str] = []
@@ -185,7 +188,7 @@ def test_nodes_meet_at_a_router(tmp_path: Path, endpoint: str) -> None:
         operator(endpoint) as user,
     ):
         line(node)
-        user.wait("ENABLED", lambda: user.request("enable"))
+        user.enable()
 
 
 def test_the_first_steps_of_the_page_work_as_written(tmp_path: Path, endpoint: str) -> None:
