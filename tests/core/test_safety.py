@@ -22,6 +22,7 @@ from simulated_plays import (
     run,
 )
 from tautscope.errors import ConfigError
+from tautscope.loop.construction import build_feature_model
 from tautscope.loop.reduction import HysteresisReduction, Report, Status
 from tautscope.loop.safety import DETECTORS, Reaction, checksum
 
@@ -116,6 +117,19 @@ def test_a_fault_of_two_seconds_moves_the_tip_by_less_than_a_millimetre(
     assert flags & set(faulty.loop.supervision.latched), "a warning stays until it is acknowledged"
     faulty.loop.acknowledge()
     assert faulty.loop.supervision.latched == ()
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("away", [-3e-3, 3e-3])
+def test_a_tip_that_is_not_where_it_is_predicted_is_reported(away: float, seed: int) -> None:
+    """Images that show insertion 3 mm away; without, no flag is raised (above)."""
+    model = build_feature_model(config())
+    pair = [model.predict(REST + np.array([insertion, 0, 0])) for insertion in (away, 0.0)]
+    assert pair[0] is not None and pair[1] is not None
+    shift = pair[0][0] - pair[1][0]
+    found = during(run(config(), lambda now, start, generator: now + shift, seed))
+    reported = ["slack_changed" in report.warnings for report in found]
+    assert any(reported[:4]), f"seed {seed}: {[report.warnings for report in found[:6]]}"
 
 
 @pytest.mark.parametrize("profile", ["paper", "best"])

@@ -176,7 +176,7 @@ enum TautscopeFlag
     TAUTSCOPE_FLAG_OVERCOMPENSATION = 22,
     // Reference and tip oscillate with growing amplitude.
     TAUTSCOPE_FLAG_LIMIT_CYCLE = 23,
-    // The estimated slack changed after it had settled: the instrument has changed, or the images are wrong.
+    // Images show the tip elsewhere than predicted: the slack has changed, the instrument was pushed, or images or commands are wrong.
     TAUTSCOPE_FLAG_SLACK_CHANGED = 24,
     // The images contradict the configured camera: its pose or principal point seems wrong by more than a degree.
     TAUTSCOPE_FLAG_GEOMETRY_OFF = 25,

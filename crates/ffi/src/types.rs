@@ -260,7 +260,7 @@ pub enum TautscopeFlag {
     Overcompensation = 22,
     /// Reference and tip oscillate with growing amplitude.
     LimitCycle = 23,
-    /// The estimated slack changed after it had settled: the instrument has changed, or the images are wrong.
+    /// Images show the tip elsewhere than predicted: the slack has changed, the instrument was pushed, or images or commands are wrong.
     SlackChanged = 24,
     /// The images contradict the configured camera: its pose or principal point seems wrong by more than a degree.
     GeometryOff = 25,

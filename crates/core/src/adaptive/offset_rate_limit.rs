@@ -84,13 +84,4 @@ impl OffsetRateLimit {
         }
         used
     }
-
-    /// How far the half width or centre in use (3,) lags the estimate, whichever is farther.
-    pub fn lag(&self) -> PerDof<f64> {
-        let mut largest = self.half_width;
-        for (value, centre) in largest.iter_mut().zip(self.centre) {
-            *value = value.abs().max(centre.abs());
-        }
-        largest
-    }
 }

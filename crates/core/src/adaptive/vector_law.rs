@@ -314,11 +314,6 @@ impl VectorLaw {
     pub const fn rate_limit_mut(&mut self) -> &mut OffsetRateLimit {
         &mut self.rate_limit
     }
-
-    /// The rate limit of the offsets.
-    pub const fn rate_limit(&self) -> &OffsetRateLimit {
-        &self.rate_limit
-    }
 }
 
 fn subtract([a, b, c]: PerDof<f64>, [x, y, z]: PerDof<f64>) -> PerDof<f64> {

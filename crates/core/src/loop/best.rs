@@ -21,6 +21,7 @@ use crate::model::hysteresis::Hysteresis;
 use crate::settings::DofSettings;
 use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::monitors::Law;
+use crate::supervision::prediction_monitor::PredictionMonitor;
 
 /// Deflection over the half width from which on a DOF counts as in contact.
 const CONTACT: f64 = 0.98;
@@ -33,9 +34,6 @@ const CERTAIN: f64 = 3.0;
 /// Standard deviation in px of the bands in an apparent state.
 const APPARENT: f64 = 0.1;
 
-/// Lag of the offsets in use behind the estimate, in half of `width_limit`, beyond which the slack has changed.
-const CHANGED: f64 = 0.15;
-
 /// Profile `best`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Best {
@@ -43,8 +41,7 @@ pub struct Best {
     filter: Filter,
     limits: PerDof<PlayLimit>,
     observability: StateEstimator,
-    /// Largest lag of a half width or centre in use behind the estimate of a slack that has not changed.
-    change_limit: PerDof<f64>,
+    prediction: PredictionMonitor,
     /// Shorter focal length in px.
     focal: f64,
 }
@@ -99,7 +96,7 @@ impl ProfileBlocks for Best {
             )?,
             limits,
             observability: state_estimator(settings)?,
-            change_limit: unit.map(|unit| CHANGED * unit),
+            prediction: PredictionMonitor::new(unit),
             focal: settings.camera.fx.min(settings.camera.fy),
         })
     }
@@ -184,7 +181,7 @@ impl ProfileBlocks for Best {
     fn update<S: AsRef<[Entry]> + AsMut<[Entry]>>(
         &mut self,
         history: &History<S>,
-        _: &Entry,
+        past: &Entry,
         measurement: &Measurement,
         image: Image<'_>,
         updates_offsets: bool,
@@ -201,11 +198,10 @@ impl ProfileBlocks for Best {
         }
         let after = self.parameters();
         self.law.rate_limit_mut().update(before, after);
-        let lag = self.law.rate_limit().lag();
-        let has_changed = lag
-            .iter()
-            .zip(self.change_limit)
-            .any(|(w, limit)| *w > limit);
+        let measured = measurement.estimate.state;
+        let has_changed = self
+            .prediction
+            .update(past.time, past.predicted_state, measured);
         let is_limited = self
             .play()
             .iter()

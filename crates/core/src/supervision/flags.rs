@@ -83,7 +83,7 @@ flags! {
     Overcompensation = "overcompensation",
     /// Reference and tip oscillate with growing swings.
     LimitCycle = "limit_cycle",
-    /// The estimated slack changed after it had settled: the instrument has changed, or the images are wrong.
+    /// Images show the tip elsewhere than predicted: the slack has changed, the instrument was pushed, or images or commands are wrong.
     SlackChanged = "slack_changed",
     /// The images contradict the configured camera: its pose or principal point seems wrong by more than a degree.
     GeometryOff = "geometry_off",

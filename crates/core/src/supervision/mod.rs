@@ -6,6 +6,7 @@ pub(crate) mod frame_gate;
 pub(crate) mod input_device;
 pub(crate) mod monitors;
 pub(crate) mod motion_monitor;
+pub(crate) mod prediction_monitor;
 pub(crate) mod reactions;
 pub(crate) mod reference_gate;
 pub(crate) mod reference_limiter;

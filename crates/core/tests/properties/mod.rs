@@ -29,6 +29,7 @@ mod motion_bounds;
 mod motion_monitor;
 mod outline;
 mod play;
+mod prediction_monitor;
 mod recovery;
 mod reference_gate;
 mod reference_speed;

@@ -1,0 +1,64 @@
+//! Prediction monitor: a tip that images find elsewhere than predicted.
+
+use crate::dof::PerDof;
+
+/// Time constant of the low-pass in s.
+const TIME: f64 = 0.15;
+/// Limits of the low-passed error in half of `width_limit`.
+const LIMIT: PerDof<f64> = [0.13, 0.3, 0.13];
+
+/// Monitors the error of the predicted tip.
+///
+/// ```text
+/// e <- e + (1 - exp(-t / 0.15 s)) (m - q - e),      |e| > limit
+/// ```
+///
+/// with the measured tip m, its prediction q when the image was captured, and the time t since the last image, at most
+/// 0.15 s: the slack has changed, the instrument was pushed, or images or commands are wrong (decision 0054).
+///
+/// Blind to a fault that moves the tip as slowly as the estimate follows. Beyond the limits without a fault, too, where the
+/// prediction is poor: before the slack is known, and where the geometry is not as configured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PredictionMonitor {
+    limit: PerDof<f64>,
+    error: PerDof<f64>,
+    time: f64,
+}
+
+impl PredictionMonitor {
+    /// The monitor before the first image, for half of `width_limit` (3,) [m, rad, rad].
+    pub fn new(unit: PerDof<f64>) -> Self {
+        let mut limit = LIMIT;
+        for (limit, unit) in limit.iter_mut().zip(unit) {
+            *limit *= unit;
+        }
+        Self {
+            limit,
+            error: [0.0; 3],
+            time: f64::NAN,
+        }
+    }
+
+    /// Update with an image captured at `time` in s: the tip predicted for it and the measured one (3,) [m, rad, rad]. Whether
+    /// an error is beyond its limit.
+    pub fn update(&mut self, time: f64, predicted: PerDof<f64>, measured: PerDof<f64>) -> bool {
+        let passed = (time - self.time).clamp(0.0, TIME);
+        let share = if passed.is_nan() {
+            0.0
+        } else {
+            1.0 - libm::exp(-passed / TIME)
+        };
+        self.time = time;
+        for (error, (measured, predicted)) in self
+            .error
+            .iter_mut()
+            .zip(measured.into_iter().zip(predicted))
+        {
+            if measured.is_finite() && predicted.is_finite() {
+                *error += share * (measured - predicted - *error);
+            }
+        }
+        let mut errors = self.error.iter().zip(self.limit);
+        errors.any(|(error, limit)| error.abs() > limit)
+    }
+}
