@@ -46,6 +46,7 @@ type Hysteresis<'py> = (
 enum Profile {
     Paper(Loop<core::Paper>),
     Best(Loop<core::Best>),
+    Plays(Loop<core::FixedPlays>),
 }
 
 /// Evaluates an expression with the loop of either profile.
@@ -54,6 +55,7 @@ macro_rules! on_loop {
         match $reduction {
             Profile::Paper($name) => $body,
             Profile::Best($name) => $body,
+            Profile::Plays($name) => $body,
         }
     };
 }
@@ -64,7 +66,7 @@ pub struct Reduction(Profile);
 
 #[pymethods]
 impl Reduction {
-    /// From the settings of the loop, for profile "paper" or "best".
+    /// From the settings of the loop, for profile "paper", "best" or "plays".
     #[new]
     fn new(settings: Bound<'_, PyAny>, profile: &str) -> PyResult<Self> {
         let py = settings.py();
@@ -72,7 +74,15 @@ impl Reduction {
         match profile {
             "paper" => build(&settings).map(Profile::Paper),
             "best" => build(&settings).map(Profile::Best),
-            _ => return Err(errors::choice(py, "profile", profile, "paper or best")),
+            "plays" => build(&settings).map(Profile::Plays),
+            _ => {
+                return Err(errors::choice(
+                    py,
+                    "profile",
+                    profile,
+                    "paper, best or plays",
+                ));
+            }
         }
         .map(Self)
         .map_err(errors::config(py))
@@ -201,15 +211,16 @@ impl Reduction {
         PyArray1::from_slice(py, &on_loop!(&self.0, inner => inner.predicted_state()))
     }
 
-    /// In profile `best`: half widths (3,), standard deviations of their logarithms (3,), centres (3,), share of the
+    /// In the profiles `best` and `plays`: half widths (3,), standard deviations of their logarithms (3,), centres (3,), share of the
     /// friction in common, gains (3,), lags (3,), unevenness of the section, and shift of the image (2,) with standard
     /// deviations (2,).
     #[getter]
     fn hysteresis<'py>(&self, py: Python<'py>) -> Option<Hysteresis<'py>> {
-        let Profile::Best(inner) = &self.0 else {
-            return None;
+        let found = match &self.0 {
+            Profile::Paper(_) => return None,
+            Profile::Best(inner) => inner.hysteresis(),
+            Profile::Plays(inner) => inner.hysteresis(),
         };
-        let found = inner.hysteresis();
         let floats = |values| PyArray1::from_slice(py, values);
         Some((
             floats(&found.half_width),

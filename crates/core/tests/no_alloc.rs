@@ -6,7 +6,7 @@
 mod support;
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
-use support::loops::{Loop, adaptive_with, article_with, model};
+use support::loops::{Loop, adaptive_with, article_with, model, plays};
 use tautscope_core::{Flag, Play, Profile, Reaction, Status, Triggers};
 
 #[global_allocator]
@@ -19,7 +19,7 @@ fn step_and_image_update_do_not_allocate() {
     let wanted: u64 = wanted.map_or(0, |text| text.parse().unwrap());
     let mut ticks = 0;
     loop {
-        ticks += run_article() + run_best() + run_best_without_outliers();
+        ticks += run_article() + run_best() + run_best_without_outliers() + run_plays();
         if ticks >= wanted {
             break;
         }
@@ -36,6 +36,10 @@ fn run_article() -> u64 {
 
 fn run_best() -> u64 {
     run(adaptive_with(&support::safety(), 4.0))
+}
+
+fn run_plays() -> u64 {
+    run(plays())
 }
 
 fn run_best_without_outliers() -> u64 {

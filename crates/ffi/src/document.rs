@@ -55,6 +55,8 @@ pub enum Profile {
     Paper,
     /// The vector law on one ensemble filter.
     Best,
+    /// The vector law on one linear filter of fixed plays.
+    Plays,
 }
 
 /// Settings and profile of a loop.
@@ -66,9 +68,10 @@ pub fn loop_settings(text: &[u8]) -> Result<(core::Settings, Profile), Tautscope
     let profile = match profile.as_str() {
         "paper" => Profile::Paper,
         "best" => Profile::Best,
+        "plays" => Profile::Plays,
         other => {
             return Err(config(format_args!(
-                "profile: got {other:?}, expected \"paper\" or \"best\""
+                "profile: got {other:?}, expected \"paper\", \"best\" or \"plays\""
             )));
         }
     };

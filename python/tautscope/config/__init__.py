@@ -19,6 +19,7 @@ from tautscope.config.camera import (
 from tautscope.config.control import ControlConfig
 from tautscope.config.dof import DofConfig
 from tautscope.config.drives import AxisConfig, DrivesConfig
+from tautscope.config.estimation import EstimationConfig
 from tautscope.config.experiment import ExperimentConfig, Sine
 from tautscope.config.fields import (
     Fraction,
@@ -28,6 +29,7 @@ from tautscope.config.fields import (
     Vector3,
 )
 from tautscope.config.instrument import InstrumentConfig
+from tautscope.config.law import LawConfig
 from tautscope.config.load import RIGS, config_file, dump_config, load_config
 from tautscope.config.recording import ImageFormat, RecordingConfig
 from tautscope.config.root import Config, Profile, from_document, to_document
@@ -61,12 +63,14 @@ __all__ = [
     "DofConfig",
     "DriveConfig",
     "DrivesConfig",
+    "EstimationConfig",
     "ExperimentConfig",
     "Fraction",
     "FrictionConfig",
     "Gain",
     "ImageFormat",
     "InstrumentConfig",
+    "LawConfig",
     "NonNegative",
     "PixelFormat",
     "PoseConfig",

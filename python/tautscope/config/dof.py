@@ -18,6 +18,9 @@ class DofConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     observable_deviation: Positive
     """Largest standard deviation of the state per px of marker noise [m/px or rad/px] at which
     the DOF counts as observable; beyond it the DOF is held."""
+    expected_width: Positive
+    """Width of the slack that is expected [m or rad]; three quarters of it are the unit in which
+    profile ``plays`` estimates [ours]."""
     start_deviation: Positive
     """Standard deviation of the tip about the reference before the first image [m or rad]; about
     half the slack [ours]."""

@@ -14,8 +14,10 @@ from tautscope.config.checks import check_references
 from tautscope.config.control import ControlConfig
 from tautscope.config.dof import DofConfig
 from tautscope.config.drives import DrivesConfig
+from tautscope.config.estimation import EstimationConfig
 from tautscope.config.experiment import ExperimentConfig
 from tautscope.config.instrument import InstrumentConfig
+from tautscope.config.law import LawConfig
 from tautscope.config.recording import RecordingConfig
 from tautscope.config.safety import SafetyConfig
 from tautscope.config.section import Section, converted_value, without_numpy
@@ -24,7 +26,7 @@ from tautscope.config.twin import TwinConfig
 from tautscope.config.vision import VisionConfig
 from tautscope.dof import Dof
 
-Profile = Literal["paper", "best"]
+Profile = Literal["paper", "best", "plays"]
 
 
 class Config(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -32,22 +34,25 @@ class Config(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     profile: Profile = "best"
     """Scheme of compensation and estimation: ``paper`` is the article's, ``best`` that of
-    `AdaptiveConfig` and `StateEstimationConfig`."""
+    `AdaptiveConfig` and `StateEstimationConfig`, ``plays`` that of `LawConfig` and
+    `EstimationConfig`, which is to replace ``best``."""
     adaptive: AdaptiveConfig = field(default_factory=AdaptiveConfig)
     state_estimation: StateEstimationConfig = field(default_factory=StateEstimationConfig)
+    law: LawConfig = field(default_factory=LawConfig)
+    estimation: EstimationConfig = field(default_factory=EstimationConfig)
     insertion: DofConfig = field(
         default_factory=lambda: DofConfig(
-            update_distance=0.4e-3, observable_deviation=2e-3, start_deviation=5e-3
+            update_distance=0.4e-3, observable_deviation=2e-3, expected_width=8e-3, start_deviation=5e-3
         )
     )
     rotation: DofConfig = field(
         default_factory=lambda: DofConfig(
-            update_distance=0.04, observable_deviation=0.1, start_deviation=0.6
+            update_distance=0.04, observable_deviation=0.1, expected_width=1.75, start_deviation=0.6
         )
     )
     bending: DofConfig = field(
         default_factory=lambda: DofConfig(
-            update_distance=0.02, observable_deviation=0.1, start_deviation=0.5
+            update_distance=0.02, observable_deviation=0.1, expected_width=1.0, start_deviation=0.5
         )
     )
     instrument: InstrumentConfig = field(default_factory=InstrumentConfig)

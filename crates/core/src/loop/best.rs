@@ -175,6 +175,7 @@ impl ProfileBlocks for Best {
             state_deviation: estimate.std,
             distance: libm::sqrt(estimate.distance_squared),
             markers: Some(estimate),
+            bands: None,
         })
     }
 

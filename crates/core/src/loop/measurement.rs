@@ -3,6 +3,7 @@
 use crate::article::state::{StateEstimate, found};
 use crate::dof::{PerDof, all_finite};
 use crate::estimation::marker_measurement::MarkerEstimate;
+use crate::r#loop::fixed_plays::Bands;
 
 /// A state estimate from one image.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,6 +20,8 @@ pub struct Measurement {
     pub distance: f64,
     /// The most probable state for the markers, in profile `best`.
     pub markers: Option<MarkerEstimate>,
+    /// The same in profile `plays`.
+    pub bands: Option<Bands>,
 }
 
 impl Measurement {

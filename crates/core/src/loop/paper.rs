@@ -148,6 +148,7 @@ impl ProfileBlocks for Paper {
                 step_deviation(past, prior.state, state_deviation),
             ),
             markers: None,
+            bands: None,
         })
     }
 

@@ -1,4 +1,4 @@
-//! The interface of the profiles `paper` and `best`.
+//! The interface of the profiles.
 
 use crate::article::estimator::Triggers;
 use crate::article::play::Play;
@@ -13,7 +13,7 @@ use crate::model::features::FeatureModel;
 use crate::supervision::flags::Flags;
 use crate::supervision::monitors::Law;
 
-/// A profile of the loop, `Paper` or `Best`.
+/// A profile of the loop: `Paper`, `Best` or `FixedPlays`.
 #[expect(private_bounds, reason = "only this crate implements profiles")]
 pub trait Profile: ProfileBlocks {}
 

@@ -46,7 +46,7 @@ pub struct Report {
     pub supervision: Supervision,
 }
 
-/// The estimated hysteresis in profile `best`.
+/// The estimated hysteresis in the profiles `best` and `plays`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HysteresisEstimate {
     /// Half widths (3,) [m, rad, rad].
@@ -59,7 +59,7 @@ pub struct HysteresisEstimate {
     pub shared: f64,
     /// Travel of the tip over that of the command in contact (3,).
     pub gain: PerDof<f64>,
-    /// Lag of the tip behind the plays (3,) in s.
+    /// Lag of the tip behind the plays (3,) in s; 0 in profile `plays`, which has none.
     pub lag: PerDof<f64>,
     /// Unevenness of the section's curvature: half of the difference of its ends, over the mean.
     pub unevenness: f64,

@@ -1,11 +1,14 @@
 //! All settings of the loop, a table per block.
 
 use crate::adaptive::settings::AdaptiveSettings;
-use crate::dof::PerDof;
+use crate::dof::{Friction, PerDof};
 use crate::error::ConfigError;
+use crate::estimation::estimate_settings::EstimateSettings;
 use crate::estimation::history::history_entries;
 use crate::estimation::settings::StateEstimationSettings;
+use crate::law::settings::LawSettings;
 use crate::model::features::FeatureModel;
+use crate::model::plays::Transmission;
 use crate::model::settings::{CameraSettings, InstrumentSettings};
 use crate::settings::{ControlSettings, DofSettings};
 use crate::supervision::settings::SafetySettings;
@@ -34,12 +37,25 @@ pub struct Settings {
     pub adaptive: AdaptiveSettings,
     /// State estimation of profile `best`.
     pub state_estimation: StateEstimationSettings,
+    /// Compensation of profile `plays`.
+    pub law: LawSettings,
+    /// Estimation of profile `plays`.
+    pub estimation: EstimateSettings,
 }
 
 impl Settings {
     /// The three DOFs in their order.
     pub(crate) const fn dofs(&self) -> PerDof<DofSettings> {
         [self.insertion, self.rotation, self.bending]
+    }
+
+    /// The plays of profile `plays`: insertion and rotation share the friction of the shaft in its channel.
+    ///
+    /// # Errors
+    /// A diameter or an expected width is not a finite number above 0.
+    pub(crate) fn transmission(&self) -> Result<Transmission<3>, ConfigError> {
+        let friction = Friction::new([0, 0, 2], [1.0, self.instrument.diameter / 2.0, 1.0])?;
+        Transmission::new(friction, self.dofs().map(|dof| 0.75 * dof.expected_width))
     }
 
     /// Entries of the history that a loop with these settings needs.

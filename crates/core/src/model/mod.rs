@@ -7,5 +7,6 @@ pub(crate) mod geometry_error;
 pub(crate) mod hysteresis;
 pub(crate) mod instrument;
 pub(crate) mod outline;
+pub(crate) mod plays;
 pub(crate) mod section;
 pub(crate) mod settings;

@@ -1,10 +1,11 @@
-//! Loops of both profiles, with all monitors.
+//! Loops of all profiles, with all monitors.
 
 // No test uses all of it.
 #![allow(dead_code)]
 
 use tautscope_core::{
-    Best, Entry, FeatureModel, HysteresisReduction, Paper, Play, Profile, SafetySettings, Settings,
+    Best, Entry, FeatureModel, FixedPlays, HysteresisReduction, Paper, Play, Profile,
+    SafetySettings, Settings,
 };
 
 use super::{UNITS, safety, settings};
@@ -52,6 +53,11 @@ pub fn adaptive_with(safety: &SafetySettings, outlier_distance: f64) -> Loop<Bes
     let mut settings = settings(safety);
     settings.state_estimation.outlier_distance = outlier_distance;
     build(&settings)
+}
+
+/// Profile `plays`.
+pub fn plays() -> Loop<FixedPlays> {
+    build(&settings(&safety()))
 }
 
 fn build<P: Profile>(settings: &Settings) -> Loop<P> {

@@ -4,8 +4,9 @@ pub mod loops;
 pub mod plays;
 
 use tautscope_core::{
-    AdaptiveSettings, CameraSettings, ControlSettings, DofSettings, Flags, InstrumentSettings,
-    PoseSettings, SafetySettings, Settings, StateEstimationSettings,
+    AdaptiveSettings, CameraSettings, ControlSettings, DofSettings, EstimateSettings, Flags,
+    InstrumentSettings, LawSettings, PoseSettings, SafetySettings, Settings,
+    StateEstimationSettings,
 };
 
 pub const UNITS: [f64; 3] = [0.4e-3, 0.04, 0.02];
@@ -57,6 +58,7 @@ pub fn dofs() -> [DofSettings; 3] {
     let [insertion, rotation, bending] = UNITS.map(|unit| DofSettings {
         update_distance: unit,
         observable_deviation: 1.0,
+        expected_width: 8e-3,
         start_deviation: 5e-3,
         free_gain: 5.0,
         gain_limit: 5.0,
@@ -67,10 +69,12 @@ pub fn dofs() -> [DofSettings; 3] {
         delta_plus: 0.0,
     });
     let rotation = DofSettings {
+        expected_width: 1.75,
         start_deviation: 0.6,
         ..rotation
     };
     let bending = DofSettings {
+        expected_width: 1.0,
         start_deviation: 0.5,
         ..bending
     };
@@ -132,6 +136,26 @@ pub fn settings(safety: &SafetySettings) -> Settings {
             lag_deviation: 0.05,
             map_rate: [0.25, 0.25, 0.0],
             gain_deviation: 0.3,
+        },
+        law: LawSettings {
+            tip_gain: 1.85,
+            direction_travel: 0.01,
+            caution: 0.0,
+            change_rate: 100.0,
+        },
+        estimation: EstimateSettings {
+            marker_deviation: 0.3,
+            model_deviation: 0.3,
+            shape_deviation: 0.3,
+            image_deviation: 6.0,
+            outlier_distance: 4.0,
+            weight_deviation: 0.1,
+            offset_deviation: 0.2,
+            rest_deviation: 0.0,
+            tip_deviation: 0.12,
+            weight_travel: 800.0,
+            offset_travel: 22.0,
+            deviation_travel: 0.3,
         },
     }
 }

@@ -1,0 +1,64 @@
+//! Settings of the estimate of profile `plays`.
+
+use crate::error::{ConfigError, require, require_non_negative, require_positive};
+
+/// The estimate of profile `plays`. Names and units are those of the TOML keys; lengths and travels are in units of the DOF:
+/// three quarters of its `expected_width`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Deserialize))]
+pub struct EstimateSettings {
+    /// Standard deviation in px of a marker without a covariance.
+    pub marker_deviation: f64,
+    /// Standard deviation in px of the feature model beyond the markers' covariance.
+    pub model_deviation: f64,
+    /// Standard deviation of the unevenness of the section's curvature.
+    pub shape_deviation: f64,
+    /// Standard deviation in px of a shift of the image, by an error of the camera's pose or principal point.
+    pub image_deviation: f64,
+    /// Mahalanobis distance beyond which a marker is an outlier.
+    pub outlier_distance: f64,
+    /// Standard deviation of the weight of a play.
+    pub weight_deviation: f64,
+    /// Standard deviation of the offset.
+    pub offset_deviation: f64,
+    /// Standard deviation of the deviation of the tip from the plays.
+    pub rest_deviation: f64,
+    /// Standard deviation of the tip that is new in each image.
+    pub tip_deviation: f64,
+    /// Travel over which a weight returns to its prior.
+    pub weight_travel: f64,
+    /// Travel over which the offset returns to its prior.
+    pub offset_travel: f64,
+    /// Travel within which the tip deviates from the plays alike.
+    pub deviation_travel: f64,
+}
+
+impl EstimateSettings {
+    /// Checks the range of every setting.
+    ///
+    /// # Errors
+    /// One is out of range.
+    pub(super) fn check(&self) -> Result<(), ConfigError> {
+        for (field, value) in [
+            ("marker_deviation", self.marker_deviation),
+            ("weight_deviation", self.weight_deviation),
+            ("tip_deviation", self.tip_deviation),
+            ("weight_travel", self.weight_travel),
+            ("offset_travel", self.offset_travel),
+            ("deviation_travel", self.deviation_travel),
+        ] {
+            require_positive(field, value)?;
+        }
+        for (field, value) in [
+            ("model_deviation", self.model_deviation),
+            ("shape_deviation", self.shape_deviation),
+            ("image_deviation", self.image_deviation),
+            ("offset_deviation", self.offset_deviation),
+            ("rest_deviation", self.rest_deviation),
+        ] {
+            require_non_negative(field, value)?;
+        }
+        let outlier = self.outlier_distance;
+        require(outlier > 0.0, "outlier_distance", outlier, "above 0")
+    }
+}

@@ -1,0 +1,15 @@
+//! Settings of the compensation law of profile `plays`.
+
+/// Compensation of profile `plays`. Names are those of the TOML keys; travels are in units of the DOF.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Deserialize))]
+pub struct LawSettings {
+    /// Largest speed of the predicted tip over that of the reference.
+    pub tip_gain: f64,
+    /// Travel of the reference over which its direction is averaged.
+    pub direction_travel: f64,
+    /// Standard deviations of the half width by which the contact is expected earlier, when the speed of the tip is bounded.
+    pub caution: f64,
+    /// Largest change of the contact offsets in use, per travel of the reference.
+    pub change_rate: f64,
+}

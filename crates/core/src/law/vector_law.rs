@@ -1,0 +1,448 @@
+//! Compensation law of profile `plays`: the limited gain of Eq. (2) for DOFs that share a friction together.
+
+use crate::article::play_limit::PlayLimit;
+use crate::dof::all_finite;
+use crate::error::{ConfigError, require, require_non_negative, require_positive};
+use crate::estimation::estimate::Slack;
+use crate::law::direction::Direction;
+use crate::law::settings::LawSettings;
+use crate::model::plays::{
+    COEFFICIENTS, OFFSET, Plays, Row, Transmission, bent, gain_row, product, sign,
+};
+
+/// Share of `command_speed` that the law uses, so that rounding does not exceed it.
+const BELOW_LIMIT: f64 = 0.999;
+/// Steps in search of the largest motion whose predicted tip is slow enough.
+const STEPS: usize = 5;
+/// Steps in which the command of a steady slide is found, and in which the model corrects it.
+const SLIDES: usize = 3;
+const CORRECTIONS: usize = 3;
+/// Largest correction of the target by the model, in units.
+const LARGEST_CORRECTION: f64 = 0.2;
+/// Bounds of the slope of the tip over the command where that is inverted.
+const SLOPES: (f64, f64) = (0.5, 1.5);
+
+/// Vector law of limited gain for N DOFs.
+///
+/// With the reference u, the command c, the estimated coefficients, the direction w of the operator's motion, and norms over
+/// the DOFs of a friction group in units of each,
+///
+/// ```text
+/// steady    c0: the tip is at u while all plays slide along w
+/// target    c* = c0, then three times c* += (u - tip(c*)) / gain, within 0.2 of c0
+/// command   dc towards c* - c,   |dc| <= K_b |du|,   dc . du >= 0,   each |dc| <= command_speed period
+/// contact   |dq| <= tip_gain |du| for the predicted tip q, and q does not pass u along du
+/// ```
+///
+/// The steady command alone leaves the tip off the reference, because direction and plays keep turning. One DOF alone:
+/// 0 <= dc / du <= `K_b`, Eq. (2). Where all DOFs of a group rest, no command moves, but each moves where another does: while
+/// rotation turns, the friction that held the insertion is released.
+/// A share of the compensation s makes it dc = du + s (dc - du).
+///
+/// Wrong as far as the estimate is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VectorLaw<const N: usize> {
+    settings: LawSettings,
+    transmission: Transmission<N>,
+    /// Unit over `width_limit`: the bounds compare DOFs in `width_limit`, as the limiter of the command does.
+    weight: [f64; N],
+    /// `K_b` of each group.
+    gain: [f64; N],
+    /// Largest |dc| in a tick.
+    step_limit: [f64; N],
+    limits: [PlayLimit; N],
+    direction: Direction<N>,
+    reference: Option<[f64; N]>,
+    /// Reference less command.
+    lead: [f64; N],
+    command: [f64; N],
+    plays: Plays<N>,
+    origin: [f64; N],
+    /// Command at which the tip is at the reference, in units.
+    target: [f64; N],
+    rows: [Row; N],
+    caution: [f64; N],
+    share: f64,
+}
+
+/// Bounds of the law for N DOFs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bounds<const N: usize> {
+    /// `K_b`, 1 or above.
+    pub gain: [f64; N],
+    /// Largest slack that is compensated [m or rad], in which the bounds compare DOFs.
+    pub width_limit: [f64; N],
+    /// Largest |dc| in a tick [m or rad].
+    pub step: [f64; N],
+    /// Limits of the contact offsets.
+    pub offsets: [PlayLimit; N],
+}
+
+impl<const N: usize> VectorLaw<N> {
+    /// The law before the first reference.
+    ///
+    /// # Errors
+    /// A setting is out of range.
+    pub fn new(
+        settings: LawSettings,
+        transmission: Transmission<N>,
+        bounds: &Bounds<N>,
+    ) -> Result<Self, ConfigError> {
+        for gain in bounds.gain {
+            let is_gain = gain.is_finite() && gain >= 1.0;
+            require(is_gain, "free_gain", gain, "finite, 1 or above")?;
+        }
+        let tip_gain = settings.tip_gain;
+        require(tip_gain >= 1.0, "tip_gain", tip_gain, "1 or above")?;
+        require_positive("direction_travel", settings.direction_travel)?;
+        require_non_negative("caution", settings.caution)?;
+        require_positive("change_rate", settings.change_rate)?;
+        let friction = *transmission.friction();
+        let mut gain = [f64::INFINITY; N];
+        for (own, group) in bounds.gain.into_iter().zip(friction.group()) {
+            if let Some(gain) = gain.get_mut(group) {
+                *gain = gain.min(own);
+            }
+        }
+        Ok(Self {
+            settings,
+            weight: over(transmission.unit(), bounds.width_limit),
+            gain,
+            step_limit: bounds.step.map(|step| step * BELOW_LIMIT),
+            limits: bounds.offsets,
+            direction: Direction::new(friction, transmission.unit(), settings.direction_travel),
+            transmission,
+            reference: None,
+            lead: [0.0; N],
+            command: [f64::NAN; N],
+            plays: Plays::REST,
+            origin: [f64::NAN; N],
+            target: [0.0; N],
+            rows: [[0.0; COEFFICIENTS]; N],
+            caution: [0.0; N],
+            share: 1.0,
+        })
+    }
+
+    /// The command c (N,) [m or rad]; NaN before the first reference.
+    pub const fn command(&self) -> [f64; N] {
+        self.command
+    }
+
+    /// The plays that follow the command.
+    pub const fn plays(&self) -> &Plays<N> {
+        &self.plays
+    }
+
+    /// The plays after a motion to a command (N,) [m or rad].
+    pub fn follow(&self, plays: &Plays<N>, command: [f64; N]) -> Plays<N> {
+        let to = over(subtract(command, self.origin), self.transmission.unit());
+        self.transmission.advance(plays, &to)
+    }
+
+    /// First reference (N,) [m or rad]; NaN before it.
+    pub const fn origin(&self) -> [f64; N] {
+        self.origin
+    }
+
+    /// The command for the next reference (N,) [m or rad], for the estimated coefficients and slack.
+    ///
+    /// The first reference is passed through. A reference that is not finite moves nothing.
+    pub fn propose(
+        &mut self,
+        reference: [f64; N],
+        rows: &[Row; N],
+        slack: &[Slack; N],
+    ) -> [f64; N] {
+        if !all_finite(reference) {
+            return self.command;
+        }
+        let Some(last) = self.reference.replace(reference) else {
+            self.rows = *rows;
+            return reference;
+        };
+        let motion = subtract(reference, last);
+        if motion.iter().all(|motion| *motion == 0.0) {
+            return self.command;
+        }
+        self.direction.step(motion);
+        self.follow_estimate(rows, slack, motion);
+        let unit = self.transmission.unit();
+        let relative = over(subtract(reference, self.origin), unit);
+        let moved = over(motion, unit);
+        self.target = self.next_target(relative, slack);
+        let mut command = self.command;
+        for group in 0..N {
+            let members = self.transmission.friction().members(group);
+            let gain = self.gain.get(group).copied().unwrap_or(1.0);
+            let step = self.bounded_step(members, gain, relative, moved);
+            let is_still = moved
+                .iter()
+                .zip(members)
+                .all(|(moved, own)| !own || *moved == 0.0);
+            if is_still {
+                continue;
+            }
+            // Without gain there is no compensation.
+            let share = if gain > 1.0 { self.share } else { 0.0 };
+            let parts = step
+                .into_iter()
+                .zip(unit)
+                .zip(motion.into_iter().zip(members));
+            let own = command.iter_mut().zip(self.lead).zip(reference).zip(parts);
+            let is_alone = members.iter().filter(|own| **own).count() == 1;
+            for (((command, lead), reference), ((step, unit), (motion, own))) in own {
+                if own {
+                    let before = *command;
+                    *command = reference + lead + share * (step * unit - motion);
+                    if is_alone {
+                        // Eq. (2), to the last bit.
+                        let farthest = before + gain * motion;
+                        *command = command.max(before.min(farthest)).min(before.max(farthest));
+                    }
+                }
+            }
+        }
+        command
+    }
+
+    /// Continues from the command that was sent (N,) [m or rad].
+    pub fn commit(&mut self, command: [f64; N]) {
+        if !all_finite(command) {
+            return;
+        }
+        if self.origin.iter().any(|origin| origin.is_nan()) {
+            self.origin = self.reference.unwrap_or(command);
+        }
+        self.command = command;
+        if let Some(reference) = self.reference {
+            self.lead = subtract(command, reference);
+        }
+        self.plays = self.follow(&self.plays, command);
+    }
+
+    /// Moves the coefficients in use towards the estimated ones, as far as the contact offsets may change in this motion.
+    fn follow_estimate(&mut self, rows: &[Row; N], slack: &[Slack; N], motion: [f64; N]) {
+        let unit = self.transmission.unit();
+        let travel: f64 = motion
+            .iter()
+            .zip(unit)
+            .map(|(motion, unit)| motion.abs() / unit)
+            .sum();
+        let ahead = [1.0; N];
+        let (now, new) = (
+            self.transmission.deflection(&self.rows, &ahead),
+            self.transmission.deflection(rows, &ahead),
+        );
+        let phi = self.plays.regressors();
+        let dofs = self
+            .rows
+            .iter_mut()
+            .zip(rows)
+            .zip(now.into_iter().zip(new))
+            .zip(phi);
+        for (((used, estimated), (now, new)), phi) in dofs {
+            let tip = product(&phi, estimated) - product(&phi, used);
+            let change = (new - now).abs().max(tip.abs());
+            let share = (self.settings.change_rate * travel / change).min(1.0);
+            if share.is_finite() {
+                used.iter_mut()
+                    .zip(estimated)
+                    .for_each(|(used, new)| *used += share * (new - *used));
+            } else {
+                *used = *estimated;
+            }
+        }
+        let stds = slack
+            .iter()
+            .zip(unit)
+            .map(|(slack, unit)| self.settings.caution * slack.half_width_std / unit);
+        self.caution
+            .iter_mut()
+            .zip(stds)
+            .for_each(|(caution, std)| *caution = std);
+    }
+
+    /// The target for a reference (N,) in units.
+    fn next_target(&self, reference: [f64; N], slack: &[Slack; N]) -> [f64; N] {
+        let direction = self.direction.value();
+        let deflection = self.transmission.deflection(&self.rows, &direction);
+        let by_gain = gain_row();
+        let mut steady = self.target;
+        let mut slopes = [1.0; N];
+        let dofs = steady.iter_mut().zip(&mut slopes).zip(&self.rows);
+        let given = reference.into_iter().zip(deflection).zip(direction);
+        for (((to, slope), row), ((reference, deflection), direction)) in dofs.zip(given) {
+            *slope = product(&by_gain, row).clamp(SLOPES.0, SLOPES.1);
+            let linear: f64 = row
+                .iter()
+                .zip(by_gain)
+                .take(crate::model::plays::SHARED + crate::model::plays::OWN)
+                .map(|(w, _)| w)
+                .sum();
+            let constant = row.get(OFFSET).copied().unwrap_or(0.0)
+                + row.get(OFFSET + 1).copied().unwrap_or(0.0);
+            for _ in 0..SLIDES {
+                let (curved, _) = bent(row, *to, direction);
+                let tip = linear * *to - deflection + curved + constant;
+                *to += (reference - tip) / *slope;
+            }
+            *to = to.max(reference - 2.0).min(reference + 2.0);
+        }
+        let mut target = steady;
+        for _ in 0..CORRECTIONS {
+            let tip = self.tip(&self.transmission.advance(&self.plays, &target));
+            let dofs = target
+                .iter_mut()
+                .zip(steady)
+                .zip(reference.into_iter().zip(tip))
+                .zip(slopes);
+            for (((to, steady), (reference, tip)), slope) in dofs {
+                *to += (reference - tip) / slope;
+                *to = to
+                    .max(steady - LARGEST_CORRECTION)
+                    .min(steady + LARGEST_CORRECTION);
+            }
+        }
+        self.within_limits(target, reference, slack)
+    }
+
+    /// The target with contact offsets within their limits.
+    fn within_limits(
+        &self,
+        mut target: [f64; N],
+        reference: [f64; N],
+        slack: &[Slack; N],
+    ) -> [f64; N] {
+        let dofs = target.iter_mut().zip(reference).zip(slack).zip(self.limits);
+        for ((((to, reference), slack), limit), unit) in dofs.zip(self.transmission.unit()) {
+            let (minus, plus) = (
+                slack.centre - slack.half_width,
+                slack.centre + slack.half_width,
+            );
+            if limit.exceeds(minus, plus) {
+                let [minus, plus] = limit.clamp(minus, plus);
+                let middle = reference / slack.gain;
+                *to = to.max(middle + minus / unit).min(middle + plus / unit);
+            }
+        }
+        target
+    }
+
+    fn tip(&self, plays: &Plays<N>) -> [f64; N] {
+        let mut tip = [0.0; N];
+        let dofs = plays.regressors().into_iter().zip(&self.rows);
+        tip.iter_mut()
+            .zip(dofs)
+            .for_each(|(tip, (phi, row))| *tip = product(&phi, row));
+        tip
+    }
+
+    /// The motion of the commands of a group towards the target, within the bounds, for a reference and its motion (N,), all
+    /// in units.
+    fn bounded_step(
+        &self,
+        members: [bool; N],
+        gain: f64,
+        reference: [f64; N],
+        motion: [f64; N],
+    ) -> [f64; N] {
+        let (dot, norm) = (
+            |a, b| dot(self.weight, a, b),
+            |a| libm::sqrt(dot(self.weight, a, a)),
+        );
+        let motion = only(members, motion);
+        let moved = norm(motion);
+        let mut step = only(members, subtract(self.target, self.plays.command));
+        if moved == 0.0 {
+            return [0.0; N];
+        }
+        // Never against the reference.
+        let against = dot(step, motion).min(0.0) / (moved * moved);
+        step.iter_mut()
+            .zip(motion)
+            .for_each(|(step, motion)| *step -= against * motion);
+        let length = norm(step);
+        if length == 0.0 {
+            return step;
+        }
+        let mut share = (gain * moved / length).min(1.0);
+        for (step, (limit, unit)) in step
+            .iter()
+            .zip(self.step_limit.into_iter().zip(self.transmission.unit()))
+        {
+            share = share.min(limit / (step.abs() * unit));
+        }
+        let mut nearer = self.plays.command;
+        let early = nearer.iter_mut().zip(step).zip(self.caution);
+        early.for_each(|((command, step), caution)| *command += caution * sign(step));
+        let ahead_of_contact = self.transmission.advance(&self.plays, &nearer);
+        let (before, now) = (
+            only(members, self.tip(&ahead_of_contact)),
+            only(members, self.tip(&self.plays)),
+        );
+        let room = moved.max(dot(subtract(reference, now), motion) / moved);
+        let beside = |plays: &Plays<N>, share: f64| {
+            let mut to = plays.command;
+            to.iter_mut()
+                .zip(step)
+                .for_each(|(to, step)| *to += share * step);
+            only(members, self.tip(&self.transmission.advance(plays, &to)))
+        };
+        for _ in 0..STEPS {
+            let there = beside(&self.plays, share);
+            let mut fastest = norm(subtract(there, now));
+            if self.settings.caution > 0.0 {
+                fastest = fastest.max(norm(subtract(beside(&ahead_of_contact, share), before)));
+            }
+            let excess = (fastest / (self.settings.tip_gain * moved))
+                .max(dot(subtract(there, now), motion) / (moved * room));
+            if excess <= 1.0 {
+                break;
+            }
+            share *= (1.0 / excess).max(0.2);
+        }
+        step.map(|step| share * step)
+    }
+
+    /// Uses this share of the compensation: all with 1, none with 0. Bumpless.
+    pub const fn set_share(&mut self, share: f64) {
+        self.share = share;
+    }
+
+    /// Counts the reference from elsewhere by `shift` (N,); the command stays.
+    pub fn shift_reference(&mut self, shift: [f64; N]) {
+        if let Some(reference) = &mut self.reference {
+            for ((reference, lead), shift) in reference.iter_mut().zip(&mut self.lead).zip(shift) {
+                *reference += shift;
+                *lead -= shift;
+            }
+        }
+    }
+}
+
+fn subtract<const N: usize>(mut a: [f64; N], b: [f64; N]) -> [f64; N] {
+    a.iter_mut().zip(b).for_each(|(a, b)| *a -= b);
+    a
+}
+
+fn over<const N: usize>(mut a: [f64; N], b: [f64; N]) -> [f64; N] {
+    a.iter_mut().zip(b).for_each(|(a, b)| *a /= b);
+    a
+}
+
+fn only<const N: usize>(members: [bool; N], mut vector: [f64; N]) -> [f64; N] {
+    vector
+        .iter_mut()
+        .zip(members)
+        .filter(|(_, own)| !own)
+        .for_each(|(value, _)| *value = 0.0);
+    vector
+}
+
+fn dot<const N: usize>(weight: [f64; N], a: [f64; N], b: [f64; N]) -> f64 {
+    let pairs = a.into_iter().zip(b).zip(weight);
+    pairs
+        .map(|((a, b), weight)| (weight * a) * (weight * b))
+        .sum()
+}

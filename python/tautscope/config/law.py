@@ -1,0 +1,24 @@
+"""Settings of the compensation law of profile ``plays``."""
+
+from __future__ import annotations
+
+from tautscope.config.fields import Gain, NonNegative, Positive
+from tautscope.config.section import Section
+
+
+class LawConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Vector law of profile ``plays``, docs/plays.md. All [ours].
+
+    Travels are in the unit of each DOF, three quarters of its expected_width, so that one set
+    serves all. free_gain, gain_limit, delta_minus and delta_plus are those of `DofConfig`.
+    """
+
+    tip_gain: Gain = 1.85
+    """Largest speed of the predicted tip over that of the reference."""
+    direction_travel: Positive = 0.01
+    """Travel of the reference over which its direction is averaged."""
+    caution: NonNegative = 0.0
+    """Standard deviations of the half width by which the contact is expected earlier, when the
+    speed of the tip is bounded."""
+    change_rate: Positive = 100.0
+    """Largest change of the contact offsets in use, per travel of the reference."""
