@@ -39,8 +39,19 @@ pub struct Estimate<const N: usize, const G: usize, const D: usize> {
     settings: EstimateSettings,
     kalman: Kalman<D>,
     origin: [f64; N],
+    /// Travel over which each error of the geometry returns to 0.
+    memory: [f64; G],
     /// Travel of the command at the last image.
     travel: f64,
+}
+
+/// An error of the geometry before the first image: its standard deviation, and the travel over which it returns to 0.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GeometryPrior {
+    /// Standard deviation.
+    pub std: f64,
+    /// Travel in units.
+    pub travel: f64,
 }
 
 /// What is estimated of a DOF, in its unit.
@@ -66,7 +77,7 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
     pub fn new(
         settings: EstimateSettings,
         transmission: Transmission<N>,
-        geometry: [f64; G],
+        geometry: [GeometryPrior; G],
         start: &[Slack; N],
         start_std: [f64; N],
     ) -> Result<Self, ConfigError> {
@@ -86,8 +97,8 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
             mean.copy_from_slice(&row);
             variance.copy_from_slice(&spread);
         }
-        for (entry, std) in variance.iter_mut().skip(N * COEFFICIENTS).zip(geometry) {
-            *entry = std * std;
+        for (entry, own) in variance.iter_mut().skip(N * COEFFICIENTS).zip(geometry) {
+            *entry = own.std * own.std;
         }
         let mut kalman = Kalman::new(mean, variance);
         for (index, (start, unit)) in start_std.into_iter().zip(transmission.unit()).enumerate() {
@@ -100,6 +111,7 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
             settings,
             kalman,
             origin: [f64::NAN; N],
+            memory: geometry.map(|own| own.travel),
             travel: 0.0,
         })
     }
@@ -175,6 +187,9 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
                 DEVIATION => *share = deviation,
                 _ => {}
             }
+        }
+        for (share, memory) in shares.iter_mut().skip(N * COEFFICIENTS).zip(self.memory) {
+            *share = keep(memory);
         }
         self.kalman.decay(&shares);
     }

@@ -15,6 +15,10 @@ pub struct EstimateSettings {
     pub shape_deviation: f64,
     /// Standard deviation in px of a shift of the image, by an error of the camera's pose or principal point.
     pub image_deviation: f64,
+    /// Standard deviation in px of what else a feature errs.
+    pub misfit_deviation: f64,
+    /// Travel within which it errs alike.
+    pub misfit_travel: f64,
     /// Mahalanobis distance beyond which a marker is an outlier.
     pub outlier_distance: f64,
     /// Standard deviation of the weight of a play.
@@ -46,6 +50,7 @@ impl EstimateSettings {
             ("weight_travel", self.weight_travel),
             ("offset_travel", self.offset_travel),
             ("deviation_travel", self.deviation_travel),
+            ("misfit_travel", self.misfit_travel),
         ] {
             require_positive(field, value)?;
         }
@@ -55,6 +60,7 @@ impl EstimateSettings {
             ("image_deviation", self.image_deviation),
             ("offset_deviation", self.offset_deviation),
             ("rest_deviation", self.rest_deviation),
+            ("misfit_deviation", self.misfit_deviation),
         ] {
             require_non_negative(field, value)?;
         }

@@ -8,7 +8,7 @@ use crate::article::play_limit::PlayLimit;
 use crate::article::state::{StateEstimate, StateEstimator, found};
 use crate::dof::PerDof;
 use crate::error::ConfigError;
-use crate::estimation::estimate::{Estimate, Slack};
+use crate::estimation::estimate::{Estimate, GeometryPrior, Slack};
 use crate::estimation::estimate_settings::EstimateSettings;
 use crate::estimation::history::{Entry, History};
 use crate::estimation::measurement::{MostProbable, Observed, Sensor};
@@ -43,11 +43,14 @@ const MODEL_IMAGES: f64 = 200.0;
 /// all.
 const MISFIT: f64 = 25.0;
 
-/// Unevenness of the section, and shift of the image by u and v.
-type InstrumentEstimate = Estimate<3, GEOMETRY, { 3 * COEFFICIENTS + GEOMETRY }>;
+/// Errors of the geometry: those of the model, and of each feature.
+const ERRORS: usize = GEOMETRY + 4;
+
+/// The estimate of an instrument with two bands.
+type InstrumentEstimate = Estimate<3, ERRORS, { 3 * COEFFICIENTS + ERRORS }>;
 
 /// The bands of an image with their most probable state.
-pub type Bands = (Observed<4>, MostProbable<3, 4, GEOMETRY>);
+pub type Bands = (Observed<4>, MostProbable<3, 4, ERRORS>);
 
 /// The plays at a time of the history.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -105,24 +108,32 @@ impl Law for FixedPlays {
     }
 }
 
-impl Sensor<3, 4, GEOMETRY> for FeatureModel {
+/// Features (4,) of the bands with errors of the geometry: unevenness of the section, shift of the image (2,) in px, and what
+/// else the feature model errs (4,) in px.
+impl Sensor<3, 4, ERRORS> for FeatureModel {
     const POINT: usize = 2;
 
     fn features(
         &self,
         state: &[f64; 3],
-        geometry: &[f64; GEOMETRY],
+        [unevenness, u, v, rest @ ..]: &[f64; ERRORS],
     ) -> Option<([f64; 4], [[f64; 4]; 3])> {
-        let predicted = self.with_geometry(*geometry).predict(*state)?;
+        let mut predicted = self.with_geometry([*unevenness, *u, *v]).predict(*state)?;
+        for (feature, rest) in predicted.features.iter_mut().zip(rest) {
+            *feature += rest;
+        }
         Some((predicted.features, predicted.columns))
     }
 
     fn by_geometry(
         &self,
         state: &[f64; 3],
-        geometry: &[f64; GEOMETRY],
-    ) -> Option<[[f64; 4]; GEOMETRY]> {
-        FeatureModel::by_geometry(&self.with_geometry(*geometry), *state)
+        [unevenness, u, v, ..]: &[f64; ERRORS],
+    ) -> Option<[[f64; 4]; ERRORS]> {
+        let model = self.with_geometry([*unevenness, *u, *v]);
+        let [by_unevenness, by_u, by_v] = FeatureModel::by_geometry(&model, *state)?;
+        let one = |feature| core::array::from_fn(|index| if index == feature { 1.0 } else { 0.0 });
+        Some([by_unevenness, by_u, by_v, one(0), one(1), one(2), one(3)])
     }
 }
 
@@ -140,10 +151,23 @@ impl ProfileBlocks for FixedPlays {
         }
         let own = settings.estimation;
         let start_std = dofs.map(|dof| dof.start_deviation);
+        let lasting = |std| GeometryPrior {
+            std,
+            travel: own.weight_travel,
+        };
+        let rest = GeometryPrior {
+            std: own.misfit_deviation,
+            travel: own.misfit_travel,
+        };
+        let shift = lasting(own.image_deviation);
         let geometry = [
-            own.shape_deviation,
-            own.image_deviation,
-            own.image_deviation,
+            lasting(own.shape_deviation),
+            shift,
+            shift,
+            rest,
+            rest,
+            rest,
+            rest,
         ];
         let estimate = InstrumentEstimate::new(own, transmission, geometry, &slack, start_std)?;
         Ok(Self {
@@ -324,7 +348,10 @@ impl ProfileBlocks for FixedPlays {
     }
 
     fn feature_model(&self, configured: &FeatureModel) -> FeatureModel {
-        configured.with_geometry(self.estimate.geometry().0)
+        {
+            let ([unevenness, u, v, ..], _) = self.estimate.geometry();
+            configured.with_geometry([unevenness, u, v])
+        }
     }
 
     fn apparent(&self, configured: &FeatureModel, belief: Belief) -> Belief {
@@ -355,7 +382,7 @@ impl<S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<FixedPlays, S> {
     /// The estimated hysteresis.
     pub fn hysteresis(&self) -> HysteresisEstimate {
         let slack = &self.profile.slack;
-        let ([unevenness, u, v], [_, u_std, v_std]) = self.profile.estimate.geometry();
+        let ([unevenness, u, v, ..], [_, u_std, v_std, ..]) = self.profile.estimate.geometry();
         HysteresisEstimate {
             half_width: slack.map(|slack| slack.half_width),
             width_std: slack.map(|slack| slack.half_width_std / slack.half_width),
@@ -418,7 +445,7 @@ impl FixedPlays {
 
     /// Whether the shift of the image is larger than [`GEOMETRY_OFF`], and than what images leave uncertain.
     fn is_geometry_off(&self) -> bool {
-        let ([_, u, v], [_, u_std, v_std]) = self.estimate.geometry();
+        let ([_, u, v, ..], [_, u_std, v_std, ..]) = self.estimate.geometry();
         let shift = libm::hypot(u, v);
         shift > GEOMETRY_OFF * self.focal && shift > CERTAIN * libm::hypot(u_std, v_std)
     }

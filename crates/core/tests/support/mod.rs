@@ -149,6 +149,8 @@ pub fn settings(safety: &SafetySettings) -> Settings {
             shape_deviation: 0.3,
             image_deviation: 6.0,
             outlier_distance: 4.0,
+            misfit_deviation: 3.0,
+            misfit_travel: 1.0,
             weight_deviation: 0.1,
             offset_deviation: 0.2,
             rest_deviation: 0.0,
