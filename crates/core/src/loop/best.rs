@@ -51,12 +51,12 @@ impl Law for Best {
         self.law.command()
     }
 
-    fn step_within(
-        &mut self,
-        reference: PerDof<f64>,
-        limit: impl FnOnce(PerDof<f64>) -> PerDof<f64>,
-    ) {
-        self.law.step_within(reference, &mut self.filter, limit);
+    fn propose(&mut self, reference: PerDof<f64>) -> PerDof<f64> {
+        self.law.propose(reference, &self.filter)
+    }
+
+    fn commit(&mut self, command: PerDof<f64>) {
+        self.law.commit(command, &mut self.filter);
     }
 
     fn shift_reference(&mut self, shift: PerDof<f64>) {

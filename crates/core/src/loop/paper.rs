@@ -44,25 +44,18 @@ impl Law for Paper {
         self.axes.each_ref().map(|axis| axis.compensation.command())
     }
 
-    fn step_within(
-        &mut self,
-        [u1, u2, u3]: PerDof<f64>,
-        limit: impl FnOnce(PerDof<f64>) -> PerDof<f64>,
-    ) {
-        let [first, second, third] = &mut self.axes;
-        let (mut limited2, mut limited3) = (f64::NAN, f64::NAN);
-        // Each law has proposed its command before the limits are applied to all.
-        first.step_within(u1, |c1| {
-            let mut limited1 = f64::NAN;
-            second.step_within(u2, |c2| {
-                third.step_within(u3, |c3| {
-                    [limited1, limited2, limited3] = limit([c1, c2, c3]);
-                    limited3
-                });
-                limited2
-            });
-            limited1
-        });
+    fn propose(&mut self, reference: PerDof<f64>) -> PerDof<f64> {
+        let mut command = reference;
+        for (axis, value) in self.axes.iter_mut().zip(&mut command) {
+            *value = axis.compensator.propose(&mut axis.compensation, *value);
+        }
+        command
+    }
+
+    fn commit(&mut self, command: PerDof<f64>) {
+        for (axis, command) in self.axes.iter_mut().zip(command) {
+            axis.compensator.commit(&mut axis.compensation, command);
+        }
     }
 
     fn shift_reference(&mut self, shift: PerDof<f64>) {
@@ -259,11 +252,6 @@ impl ArticleAxis {
             estimation: EstimatorState::new(play),
             limit,
         })
-    }
-
-    fn step_within(&mut self, reference: f64, limit: impl FnOnce(f64) -> f64) {
-        self.compensator
-            .step_within(&mut self.compensation, reference, limit);
     }
 
     fn set_share(&mut self, share: f64) {

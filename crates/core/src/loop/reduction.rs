@@ -9,7 +9,7 @@ use crate::r#loop::profile::Profile;
 use crate::r#loop::settings::Settings;
 use crate::model::features::FeatureModel;
 use crate::supervision::flags::Flag;
-use crate::supervision::monitors::{Law, Monitors, Supervision};
+use crate::supervision::monitors::{Monitors, Supervision};
 
 /// Image-based hysteresis reduction, Fig. 6: reference in, command out; images update the estimate of the hysteresis.
 ///
@@ -22,8 +22,6 @@ pub struct HysteresisReduction<P, S = [Entry; 256]> {
     pub(super) monitors: Monitors,
     pub(super) last_used: f64,
     travel: PerDof<f64>,
-    /// Share of the compensation that the operator has chosen; the supervisor uses a share of it.
-    chosen: f64,
 }
 
 impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
@@ -46,7 +44,6 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
             monitors,
             last_used: f64::NEG_INFINITY,
             travel: [0.0; 3],
-            chosen: 1.0,
         })
     }
 
@@ -56,11 +53,8 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
     /// holds the command, which before the first reference is NaN.
     pub fn step(&mut self, reference: PerDof<f64>, stamp: Option<f64>, time: f64) -> PerDof<f64> {
         let (command_before, state_before) = (self.profile.command(), self.predicted_state());
-        let mut law = ChosenShare {
-            profile: &mut self.profile,
-            chosen: self.chosen,
-        };
-        self.monitors.step(&mut law, reference, stamp, time);
+        self.monitors
+            .step(&mut self.profile, reference, stamp, time);
         let (gated, command) = (self.monitors.reference(), self.profile.command());
         let mut moved = distance(command_before, command);
         if P::IS_COUPLED {
@@ -133,9 +127,7 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
     pub fn set_compensation(&mut self, share: f64) -> Result<(), ConfigError> {
         let is_share = (0.0..=1.0).contains(&share);
         require(is_share, "compensation", share, "a share from 0 to 1")?;
-        self.chosen = share;
-        self.profile
-            .set_share(share * self.monitors.supervision().lead);
+        self.monitors.choose_share(&mut self.profile, share);
         Ok(())
     }
 
@@ -152,34 +144,6 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
     /// Raise a flag that only the rig can detect.
     pub fn raise(&mut self, flag: Flag) {
         self.monitors.raise(flag);
-    }
-}
-
-/// A profile of which the supervisor's share is a share of what the operator has chosen.
-struct ChosenShare<'a, P> {
-    profile: &'a mut P,
-    chosen: f64,
-}
-
-impl<P: Law> Law for ChosenShare<'_, P> {
-    fn command(&self) -> PerDof<f64> {
-        self.profile.command()
-    }
-
-    fn step_within(
-        &mut self,
-        reference: PerDof<f64>,
-        limit: impl FnOnce(PerDof<f64>) -> PerDof<f64>,
-    ) {
-        self.profile.step_within(reference, limit);
-    }
-
-    fn shift_reference(&mut self, shift: PerDof<f64>) {
-        self.profile.shift_reference(shift);
-    }
-
-    fn set_share(&mut self, share: f64) {
-        self.profile.set_share(share * self.chosen);
     }
 }
 

@@ -32,13 +32,11 @@ pub trait Law {
     /// The command c (3,) [m, rad, rad]; NaN before the first reference.
     fn command(&self) -> PerDof<f64>;
 
-    /// Control tick: follow the next reference. `limit` is called exactly once, with the command of the law; the law
-    /// continues from what it returns.
-    fn step_within(
-        &mut self,
-        reference: PerDof<f64>,
-        limit: impl FnOnce(PerDof<f64>) -> PerDof<f64>,
-    );
+    /// Control tick: the law's command for the next reference, not yet adopted.
+    fn propose(&mut self, reference: PerDof<f64>) -> PerDof<f64>;
+
+    /// Continue from the command that was sent: the proposed one, as the limiter left it.
+    fn commit(&mut self, command: PerDof<f64>);
 
     /// Count the reference from elsewhere by `shift` (3,); the command stays.
     fn shift_reference(&mut self, shift: PerDof<f64>);
@@ -61,8 +59,9 @@ pub struct Monitors {
     unit: PerDof<f64>,
     off: Flags,
     time: f64,
-    /// The share of the compensation that the laws use.
+    /// Share of the compensation that the supervisor allows, as the law uses it, and that the operator has chosen.
     share: f64,
+    chosen: f64,
 }
 
 impl Monitors {
@@ -97,6 +96,7 @@ impl Monitors {
             off: safety.off,
             time: f64::NAN,
             share: 1.0,
+            chosen: 1.0,
         })
     }
 
@@ -137,7 +137,7 @@ impl Monitors {
         self.supervisor.update(&event);
     }
 
-    /// Step the law within the limiters.
+    /// Step the law within the limiters: propose, limit, commit.
     ///
     /// Where a limit binds, the share of the reference's motion that the command could not follow is discarded: never
     /// more than the reference moved, which crossing the slack takes for more.
@@ -148,35 +148,31 @@ impl Monitors {
         increments: PerDof<f64>,
         event: &mut Event,
     ) {
+        let before = law.command();
+        let proposed = law.propose(reference);
         if self.off.contains(Flag::Monitor) {
-            law.step_within(reference, |command| command);
+            law.commit(proposed);
             return;
         }
-        let before = law.command();
+        let (limited, results) = self.limiters.limit(reference, proposed);
+        law.commit(limited);
         let mut shifts = [0.0; 3];
-        let mut results = [LimiterResult::Unchanged; 3];
-        law.step_within(reference, |command| {
-            let limited;
-            (limited, results) = self.limiters.limit(reference, command);
-            let motions = limited.into_iter().zip(before).zip(command).zip(increments);
-            for (shift, (((limited, before), command), increment)) in shifts.iter_mut().zip(motions)
-            {
-                let followed = (limited - before) / (command - before);
-                *shift = -increment * (1.0 - followed.clamp(0.0, 1.0));
-            }
-            limited
-        });
-        for ((shift, increment), result) in shifts.iter_mut().zip(increments).zip(results) {
+        let motions = limited.into_iter().zip(before).zip(proposed);
+        let parts = motions.zip(increments.into_iter().zip(results));
+        for (shift, (((limited, before), proposed), (increment, result))) in
+            shifts.iter_mut().zip(parts)
+        {
             match result {
-                LimiterResult::Unchanged => {
-                    *shift = 0.0;
-                    continue;
-                }
-                LimiterResult::LeadLimited => *shift = 0.0,
+                LimiterResult::Unchanged => continue,
+                LimiterResult::LeadLimited => {}
                 LimiterResult::Limited | LimiterResult::Jump | LimiterResult::Violation => {
-                    if !shift.is_finite() {
-                        *shift = -increment;
-                    }
+                    let followed = (limited - before) / (proposed - before);
+                    let missed = -increment * (1.0 - followed.clamp(0.0, 1.0));
+                    *shift = if missed.is_finite() {
+                        missed
+                    } else {
+                        -increment
+                    };
                 }
             }
             let jump = Flags::when(result == LimiterResult::Jump, Flag::CommandJump);
@@ -199,8 +195,14 @@ impl Monitors {
         let share = self.supervisor.gain_share();
         if (share - self.share).abs() > 0.0 {
             self.share = share;
-            law.set_share(share);
+            law.set_share(share * self.chosen);
         }
+    }
+
+    /// Use this share of the compensation, of which the supervisor allows a share.
+    pub(crate) fn choose_share<L: Law>(&mut self, law: &mut L, share: f64) {
+        self.chosen = share;
+        law.set_share(share * self.supervisor.gain_share());
     }
 
     /// Check a frame on its arrival.
