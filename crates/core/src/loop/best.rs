@@ -31,6 +31,9 @@ const CONTACT: f64 = 0.98;
 const GEOMETRY_OFF: f64 = 0.02;
 const CERTAIN: f64 = 3.0;
 
+/// Limits of the low-passed error of the predicted tip, in half of `width_limit`.
+const SLACK_CHANGED: PerDof<f64> = [0.13, 0.3, 0.13];
+
 /// Standard deviation in px of the bands in an apparent state.
 const APPARENT: f64 = 0.1;
 
@@ -41,12 +44,12 @@ pub struct Best {
     filter: Filter,
     limits: PerDof<PlayLimit>,
     observability: StateEstimator,
-    prediction: PredictionMonitor,
+    prediction: PredictionMonitor<3>,
     /// Shorter focal length in px.
     focal: f64,
 }
 
-impl Law for Best {
+impl Law<3> for Best {
     fn command(&self) -> PerDof<f64> {
         self.law.command()
     }
@@ -96,7 +99,7 @@ impl ProfileBlocks for Best {
             )?,
             limits,
             observability: state_estimator(settings)?,
-            prediction: PredictionMonitor::new(unit),
+            prediction: PredictionMonitor::new(SLACK_CHANGED, unit),
             focal: settings.camera.fx.min(settings.camera.fy),
         })
     }

@@ -39,7 +39,7 @@ pub struct Paper {
     coupled_std: PerDof<f64>,
 }
 
-impl Law for Paper {
+impl Law<3> for Paper {
     fn command(&self) -> PerDof<f64> {
         self.axes.each_ref().map(|axis| axis.compensation.command())
     }

@@ -1,7 +1,7 @@
 //! The whole loop, Fig. 6.
 
 use crate::article::play::Play;
-use crate::dof::PerDof;
+use crate::dof::{Friction, PerDof, zip_with};
 use crate::error::{ConfigError, require};
 use crate::estimation::history::{Entry, History};
 use crate::estimation::posture::Belief;
@@ -19,7 +19,7 @@ pub struct HysteresisReduction<P, S = [Entry; 256]> {
     pub(super) profile: P,
     pub(super) feature_model: FeatureModel,
     pub(super) history: History<S>,
-    pub(super) monitors: Monitors,
+    pub(super) monitors: Monitors<3>,
     pub(super) last_used: f64,
     travel: PerDof<f64>,
 }
@@ -31,12 +31,12 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
     /// A setting is out of range, or the storage is too small.
     pub fn new(settings: &Settings, storage: S) -> Result<Self, ConfigError> {
         let control = &settings.control;
-        let monitors = Monitors::new(
-            &settings.safety,
-            &settings.dofs(),
-            control.period,
-            P::IS_COUPLED,
-        )?;
+        let friction = if P::IS_COUPLED {
+            settings.friction()?
+        } else {
+            Friction::independent()
+        };
+        let monitors = Monitors::new(&settings.safety, &settings.dofs(), control.period, friction)?;
         Ok(Self {
             profile: P::new(settings, monitors.play_limits())?,
             feature_model: settings.feature_model()?,
@@ -148,7 +148,5 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
 }
 
 fn distance(from: PerDof<f64>, to: PerDof<f64>) -> PerDof<f64> {
-    let [a, b, c] = from;
-    let [d, e, f] = to;
-    [(d - a).abs(), (e - b).abs(), (f - c).abs()]
+    zip_with(from, to, |from, to| (to - from).abs())
 }

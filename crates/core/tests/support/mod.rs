@@ -18,7 +18,7 @@ pub fn safety() -> SafetySettings {
 }
 
 /// Settings of the monitors with lengths in the given units.
-pub fn safety_in(units: [f64; 3]) -> SafetySettings {
+pub fn safety_in<const N: usize>(units: [f64; N]) -> SafetySettings<N> {
     SafetySettings {
         off: Flags::NONE,
         width_limit: units.map(|unit| 30.0 * unit),

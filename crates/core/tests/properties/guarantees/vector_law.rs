@@ -3,7 +3,7 @@
 use crate::adaptive::vector_law::VectorLaw;
 use crate::article::play::Play;
 use crate::article::play_limit::PlayLimit;
-use crate::dof::PerDof;
+use crate::dof::{Friction, PerDof};
 use crate::estimation::filter::Filter;
 use crate::estimation::marker_measurement::TipMeasurement;
 use crate::supervision::flags::Flag;
@@ -140,7 +140,7 @@ impl CheckedLaw {
     }
 }
 
-impl Law for CheckedLaw {
+impl Law<3> for CheckedLaw {
     fn command(&self) -> PerDof<f64> {
         self.law.command()
     }
@@ -249,7 +249,8 @@ fn bounds_of_the_supervised_vector_law() {
 
 fn supervised_walk(seed: u64, wanted: u64) -> Count {
     let (mut random, mut checked) = (Random(seed), CheckedLaw::new());
-    let mut monitors = Monitors::new(&safety(), &dofs(), PERIOD, true).unwrap();
+    let shaft = Friction::new([0, 0, 2], [1.0; 3]).unwrap();
+    let mut monitors = Monitors::new(&safety(), &dofs(), PERIOD, shaft).unwrap();
     let (mut reference, mut time, mut ticks) = ([0.0; 3], 0.0, 0);
     let mut led = [0.0_f64; 3];
     let mut speed = [0.0; 3];
