@@ -60,6 +60,28 @@ impl<const N: usize> Friction<N> {
     }
 }
 
+/// What `make` makes of each value, or its first error.
+///
+/// # Errors
+/// As `make`; there is no DOF.
+pub fn try_each<T: Copy, U: Copy, const N: usize>(
+    values: [T; N],
+    make: impl Fn(T) -> Result<U, ConfigError>,
+) -> Result<[U; N], ConfigError> {
+    let Some(first) = values.first() else {
+        return Err(ConfigError {
+            field: "dof",
+            value: 0.0,
+            allowed: "one or more",
+        });
+    };
+    let mut made = [make(*first)?; N];
+    for (made, value) in made.iter_mut().zip(values).skip(1) {
+        *made = make(value)?;
+    }
+    Ok(made)
+}
+
 /// `combine` of each value with that of another array.
 pub fn zip_with<T: Copy, U, const N: usize>(
     mut values: [T; N],

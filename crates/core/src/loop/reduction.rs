@@ -56,17 +56,16 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
         self.monitors
             .step(&mut self.profile, reference, stamp, time);
         let (gated, command) = (self.monitors.reference(), self.profile.command());
-        let mut moved = distance(command_before, command);
+        let distance = |to: f64, from: f64| (to - from).abs();
+        let mut moved = zip_with(command, command_before, distance);
         if P::IS_COUPLED {
             // Where another DOF takes up the friction, a tip moves although its command rests.
-            let released = distance(state_before, self.predicted_state());
-            for (moved, released) in moved.iter_mut().zip(released) {
-                *moved = moved.max(released);
-            }
+            let released = zip_with(self.predicted_state(), state_before, distance);
+            moved = zip_with(moved, released, f64::max);
         }
-        for (travel, moved) in self.travel.iter_mut().zip(moved) {
-            *travel += if moved.is_finite() { moved } else { 0.0 };
-        }
+        self.travel = zip_with(self.travel, moved, |travel, moved| {
+            travel + if moved.is_finite() { moved } else { 0.0 }
+        });
         let clock_went_back = self.history.push(Entry {
             time,
             reference: gated,
@@ -145,8 +144,4 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
     pub fn raise(&mut self, flag: Flag) {
         self.monitors.raise(flag);
     }
-}
-
-fn distance(from: PerDof<f64>, to: PerDof<f64>) -> PerDof<f64> {
-    zip_with(from, to, |from, to| (to - from).abs())
 }

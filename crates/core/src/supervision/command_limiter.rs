@@ -67,6 +67,7 @@ impl CommandLimiter {
     ///
     /// Where reference or command is not finite, this is the last command, or NaN before the first.
     fn limit(&mut self, reference: f64, command: f64, reach: Option<f64>) -> (f64, LimiterResult) {
+        use LimiterResult::{Jump, LeadLimited, Limited, Unchanged, Violation};
         let Self {
             gain_limit,
             step_limit,
@@ -76,20 +77,15 @@ impl CommandLimiter {
         } = *self;
         let Some((last_reference, last)) = last else {
             if !(reference.is_finite() && command.is_finite()) {
-                return (f64::NAN, LimiterResult::Violation);
+                return (f64::NAN, Violation);
             }
             let limited = command.max(least).min(largest);
             self.last = Some((reference, limited));
-            let result = result(
-                limited,
-                command,
-                LimiterResult::Unchanged,
-                LimiterResult::Limited,
-            );
+            let result = result(limited, command, Unchanged, Limited);
             return (limited, result);
         };
         if !reference.is_finite() {
-            return (last, LimiterResult::Violation);
+            return (last, Violation);
         }
         let increment = reference - last_reference;
         let (low, high) = reach.map_or_else(
@@ -106,12 +102,7 @@ impl CommandLimiter {
         };
         if (lawful - last).abs() > step_limit {
             self.last = Some((reference, last));
-            let result = result(
-                lawful,
-                command,
-                LimiterResult::Jump,
-                LimiterResult::Violation,
-            );
+            let result = result(lawful, command, Jump, Violation);
             return (last, result);
         }
         // Never beyond the last command's own distance, so that a limit cannot move anything by itself.
@@ -126,14 +117,9 @@ impl CommandLimiter {
         // Rounding of the bounds on c - u must not violate the law.
         let sent = limited.max(low).min(high);
         let sent = if sent.is_finite() { sent } else { last };
-        let bound = result(
-            limited,
-            led,
-            LimiterResult::LeadLimited,
-            LimiterResult::Limited,
-        );
-        let within_law = result(sent, command, LimiterResult::Unchanged, bound);
-        let result = result(lawful, command, within_law, LimiterResult::Violation);
+        let bound = result(limited, led, LeadLimited, Limited);
+        let within_law = result(sent, command, Unchanged, bound);
+        let result = result(lawful, command, within_law, Violation);
         self.last = Some((reference, sent));
         (sent, result)
     }
@@ -208,11 +194,10 @@ impl<const N: usize> CommandLimiters<N> {
         results: &mut [LimiterResult; N],
     ) {
         let bound = self.common_bound(members, reference);
-        let is_violated = bound.is_some_and(|bound| bound.shorten(commands));
+        let is_violated = bound.is_some_and(|bound| bound.length(*commands) > bound.reach);
         let dofs = self.dofs.iter_mut().zip(members).zip(reference);
-        for (((limiter, own), reference), (command, result)) in
-            dofs.zip(commands.iter_mut().zip(results.iter_mut()))
-        {
+        let outputs = commands.iter_mut().zip(results.iter_mut());
+        for (((limiter, own), reference), (command, result)) in dofs.zip(outputs) {
             if own {
                 let reach = bound.map(|bound| bound.reach * limiter.lead_limit);
                 (*command, *result) = limiter.limit(reference, *command, reach);
@@ -220,9 +205,8 @@ impl<const N: usize> CommandLimiters<N> {
         }
         let has_changed = bound.is_some_and(|bound| bound.bring_back(commands));
         let dofs = self.dofs.iter_mut().zip(members).zip(reference);
-        for (((limiter, own), reference), (command, result)) in
-            dofs.zip(commands.iter().zip(results))
-        {
+        let outputs = commands.iter().zip(results);
+        for (((limiter, own), reference), (command, result)) in dofs.zip(outputs) {
             if own && has_changed {
                 limiter.last = Some((reference, *command));
             }
@@ -287,64 +271,48 @@ struct CommonBound<const N: usize> {
 }
 
 impl<const N: usize> CommonBound<N> {
-    /// Brings commands of a longer motion within the bound; whether there were such.
-    fn shorten(&self, commands: &mut [f64; N]) -> bool {
-        let step = self.motion_of(*commands);
-        let length = libm::sqrt(dot(step, step));
-        let exceeds = length > self.reach;
-        if exceeds {
-            self.place(commands, step.map(|step| step * (self.reach / length)));
-        }
-        exceeds
-    }
-
-    /// Brings commands that the limits of single DOFs have moved beyond the bound back to it, towards the motion of the
-    /// reference, which is within every limit of a DOF; whether there were such.
+    /// Brings commands beyond the bound back to it, towards the motion of the reference, which is within every limit of a
+    /// DOF; whether there were such.
     fn bring_back(&self, commands: &mut [f64; N]) -> bool {
-        let step = self.motion_of(*commands);
+        let step = self.step(*commands);
         let bound = square(self.gain) * dot(self.motion, self.motion);
         let exceeds = dot(step, step) > bound * square(1.0 + ROUNDING) + square(SUM_ROUNDING);
-        if exceeds {
-            // Between no motion and the command, as near to the motion of the reference as may be.
-            let inner = zip_with(self.motion, step, |motion, step| {
-                motion.max(step.min(0.0)).min(step.max(0.0))
-            });
-            let rest = zip_with(step, inner, |step, inner| step - inner);
-            let (along, length) = (dot(inner, rest), dot(rest, rest));
-            let left = bound - dot(inner, inner);
-            let share = if left > 0.0 {
-                left / (along + libm::sqrt(square(along) + length * left))
-            } else {
-                0.0
-            };
-            let share = share.clamp(0.0, 1.0);
-            self.place(
-                commands,
-                zip_with(inner, rest, |inner, rest| inner + share * rest),
-            );
+        if !exceeds {
+            return false;
         }
-        exceeds
-    }
-
-    fn motion_of(&self, commands: [f64; N]) -> [f64; N] {
-        let raw = zip_with(commands, self.last, |command, last| command - last);
-        let motion = zip_with(raw, self.unit, |raw, unit| raw / unit);
-        zip_with(
-            motion,
-            self.members,
-            |motion, own| if own { motion } else { 0.0 },
-        )
-    }
-
-    fn place(&self, commands: &mut [f64; N], step: [f64; N]) {
-        let motion = zip_with(self.unit, step, |unit, step| unit * step);
-        let placed = zip_with(self.last, motion, |last, motion| last + motion);
-        let own = placed.into_iter().zip(self.members);
-        for (command, (placed, own)) in commands.iter_mut().zip(own) {
+        // Between no motion and the command, as near to the motion of the reference as may be.
+        let inner = zip_with(self.motion, step, |motion, step| {
+            motion.max(step.min(0.0)).min(step.max(0.0))
+        });
+        let rest = zip_with(step, inner, |step, inner| step - inner);
+        let (along, length) = (dot(inner, rest), dot(rest, rest));
+        let left = bound - dot(inner, inner);
+        let share = if left > 0.0 {
+            left / (along + libm::sqrt(square(along) + length * left))
+        } else {
+            0.0
+        };
+        let bounded = zip_with(inner, rest, |inner, rest| inner + share.min(1.0) * rest);
+        let bounded = zip_with(bounded, self.unit, |step, unit| unit * step);
+        let dofs = commands.iter_mut().zip(self.members);
+        for ((command, own), (last, step)) in dofs.zip(self.last.into_iter().zip(bounded)) {
             if own {
-                *command = placed;
+                *command = last + step;
             }
         }
+        true
+    }
+
+    /// Motion of the commands since the last ones.
+    fn step(&self, commands: [f64; N]) -> [f64; N] {
+        let step = zip_with(commands, self.last, |command, last| command - last);
+        let step = zip_with(step, self.unit, |step, unit| step / unit);
+        zip_with(step, self.members, |step, own| if own { step } else { 0.0 })
+    }
+
+    fn length(&self, commands: [f64; N]) -> f64 {
+        let step = self.step(commands);
+        libm::sqrt(dot(step, step))
     }
 }
 

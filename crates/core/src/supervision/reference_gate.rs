@@ -1,6 +1,6 @@
 //! Reference gate: validates the reference before the law, and clutches it (offset between input and reference).
 
-use crate::dof::all_finite;
+use crate::dof::{all_finite, zip_with};
 use crate::error::{ConfigError, require, require_positive};
 use crate::settings::DofSettings;
 use crate::supervision::flags::{Flag, Flags};
@@ -122,10 +122,7 @@ impl<const N: usize> ReferenceGate<N> {
         };
         let mut next = self.add_offset(reference, last);
         if !is_stopped {
-            let mut increments = reference;
-            for (increment, before) in increments.iter_mut().zip(self.input) {
-                *increment -= before;
-            }
+            let increments = zip_with(reference, self.input, |input, before| input - before);
             let wrong = self.device.update(increments, elapsed).difference(off);
             is_stopped = !wrong.is_empty();
             gated.raised = gated.raised.union(wrong);
@@ -139,14 +136,10 @@ impl<const N: usize> ReferenceGate<N> {
         if is_stopped {
             self.limiter.reset();
             self.device.reset();
-            for ((offset, last), input) in self.offset.iter_mut().zip(last).zip(reference) {
-                *offset = last - input;
-            }
+            self.offset = zip_with(last, reference, |last, input| last - input);
             return gated;
         }
-        for ((increment, next), last) in gated.increments.iter_mut().zip(next).zip(last) {
-            *increment = next - last;
-        }
+        gated.increments = zip_with(next, last, |next, last| next - last);
         self.output = Some(next);
         gated.reference = self.output;
         gated
