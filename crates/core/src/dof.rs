@@ -1,14 +1,9 @@
-//! Degrees of freedom (DOF), and which of them share a friction.
+//! Degrees of freedom (DOF): values per DOF, and which DOFs share a friction.
 
 use crate::error::{ConfigError, require, require_positive};
 
 /// One value per DOF, always in the order insertion, rotation, bending [m, rad, rad].
 pub type PerDof<T> = [T; 3];
-
-/// Whether every value is a finite number.
-pub fn all_finite<const N: usize>(values: [f64; N]) -> bool {
-    values.iter().all(|value| value.is_finite())
-}
 
 /// Friction of N DOFs: DOFs of one group share one friction force.
 ///
@@ -54,13 +49,52 @@ impl<const N: usize> Friction<N> {
         self.group.map(|own| own == group)
     }
 
-    /// Lever of each DOF.
-    pub const fn lever(&self) -> [f64; N] {
-        self.lever
-    }
-
     /// Group of each DOF.
     pub const fn group(&self) -> [usize; N] {
         self.group
     }
+
+    /// Lever of each DOF.
+    pub const fn lever(&self) -> [f64; N] {
+        self.lever
+    }
+}
+
+/// What `make` makes of each value, or its first error.
+///
+/// # Errors
+/// As `make`; there is no DOF.
+pub fn try_each<T: Copy, U: Copy, const N: usize>(
+    values: [T; N],
+    make: impl Fn(T) -> Result<U, ConfigError>,
+) -> Result<[U; N], ConfigError> {
+    let Some(first) = values.first() else {
+        return Err(ConfigError {
+            field: "dof",
+            value: 0.0,
+            allowed: "one or more",
+        });
+    };
+    let mut made = [make(*first)?; N];
+    for (made, value) in made.iter_mut().zip(values).skip(1) {
+        *made = make(value)?;
+    }
+    Ok(made)
+}
+
+/// `combine` of each value with that of another array.
+pub fn zip_with<T: Copy, U, const N: usize>(
+    mut values: [T; N],
+    others: [U; N],
+    combine: impl Fn(T, U) -> T,
+) -> [T; N] {
+    for (value, other) in values.iter_mut().zip(others) {
+        *value = combine(*value, other);
+    }
+    values
+}
+
+/// Whether every value is a finite number.
+pub fn all_finite<const N: usize>(values: [f64; N]) -> bool {
+    values.iter().all(|value| value.is_finite())
 }

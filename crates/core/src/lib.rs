@@ -69,6 +69,7 @@ pub use article::compensator::{Compensator, CompensatorState};
 pub use article::estimator::{Estimator, EstimatorState, Trigger, Triggers};
 pub use article::play::{Play, PlayState};
 pub use article::state::{StateEstimate, StateEstimator};
+pub use dof::Friction;
 pub use error::ConfigError;
 pub use estimation::axis_filter::AxisFilter;
 pub use estimation::estimate_settings::EstimateSettings;

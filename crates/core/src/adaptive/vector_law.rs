@@ -124,27 +124,16 @@ impl VectorLaw {
         self.command
     }
 
-    /// The command for the next reference (3,) [m, rad, rad]; `limit` is called exactly once, with the command of the
-    /// law, which goes on from what it returns. The filter follows the command.
+    /// The command for the next reference (3,) [m, rad, rad].
     ///
     /// The first reference is passed through. A reference that is not finite moves nothing.
-    pub fn step_within(
-        &mut self,
-        reference: PerDof<f64>,
-        filter: &mut Filter,
-        limit: impl FnOnce(PerDof<f64>) -> PerDof<f64>,
-    ) {
+    pub fn propose(&mut self, reference: PerDof<f64>, filter: &Filter) -> PerDof<f64> {
         if !all_finite(reference) {
-            let command = limit(self.command);
-            self.follow(command, filter);
-            return;
+            return self.command;
         }
         let Some(last) = self.reference.replace(reference) else {
             self.direction.step(reference);
-            self.command = limit(reference);
-            self.lead = subtract(self.command, reference);
-            filter.start(reference, self.command);
-            return;
+            return reference;
         };
         let motion = subtract(reference, last);
         self.direction.step(reference);
@@ -155,9 +144,21 @@ impl VectorLaw {
         self.rate_limit.step(travel);
         self.lag_lead.step(motion);
         let lead = self.next_lead(reference, motion, filter);
-        let command = limit(self.lawful(reference, motion, lead));
+        self.lawful(reference, motion, lead)
+    }
+
+    /// Continues from the command that was sent (3,) [m, rad, rad]. The filter follows it.
+    pub fn commit(&mut self, command: PerDof<f64>, filter: &mut Filter) {
+        let before = core::mem::replace(&mut self.command, command);
+        let Some(reference) = self.reference else {
+            return;
+        };
         self.lead = subtract(command, reference);
-        self.follow(command, filter);
+        if all_finite(before) {
+            filter.step(before, command, self.period);
+        } else {
+            filter.start(reference, command);
+        }
     }
 
     /// Reference plus lead, within the bounds despite rounding; of DOFs that rest the last command, bit for bit.
@@ -175,14 +176,6 @@ impl VectorLaw {
         let farthest = c3 + self.bending_gain * du3;
         let third = (u3 + l3).max(c3.min(farthest)).min(c3.max(farthest));
         [first, second, third]
-    }
-
-    fn follow(&mut self, command: PerDof<f64>, filter: &mut Filter) {
-        let before = self.command;
-        self.command = command;
-        if all_finite(before) && all_finite(command) {
-            filter.step(before, command, self.period);
-        }
     }
 
     /// The lead for a reference after its motion.

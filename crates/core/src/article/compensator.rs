@@ -43,6 +43,8 @@ pub struct CompensatorState {
     tip: PlayState,
     reference: Option<f64>,
     command: f64,
+    /// The command that the law proposed last; None if it is off the anchored law.
+    proposed: Option<f64>,
     /// c - u beyond the law: 0 until `retune` moves p.
     pub(crate) anchor: f64,
 }
@@ -55,6 +57,7 @@ impl CompensatorState {
             tip: PlayState { output: f64::NAN },
             reference: None,
             command: f64::NAN,
+            proposed: None,
             anchor: 0.0,
         }
     }
@@ -137,35 +140,35 @@ impl Compensator {
     /// The first reference is passed through. A reference that has not changed, or is not
     /// finite, repeats the last command, bit for bit.
     pub fn step(&self, state: &mut CompensatorState, reference: f64) -> f64 {
-        self.step_within(state, reference, |command| command)
+        let command = self.propose(state, reference);
+        self.commit(state, command);
+        command
     }
 
-    /// [`Compensator::step`] whose command `limit` may change before the state is updated with it.
-    ///
-    /// `limit` is called exactly once, with the command of the law.
-    pub(crate) fn step_within(
-        &self,
-        state: &mut CompensatorState,
-        reference: f64,
-        limit: impl FnOnce(f64) -> f64,
-    ) -> f64 {
-        let (proposed, is_anchored) = self
-            .propose(state, reference)
+    /// The command of [`Compensator::step`], which [`Compensator::commit`] adopts.
+    pub(crate) fn propose(&self, state: &mut CompensatorState, reference: f64) -> f64 {
+        let (command, is_anchored) = self
+            .next_command(state, reference)
             .unwrap_or((state.command, true));
-        let command = limit(proposed);
+        state.proposed = is_anchored.then_some(command);
+        command
+    }
+
+    /// Continues from the command that was sent, which may differ from the proposed one.
+    pub(crate) fn commit(&self, state: &mut CompensatorState, command: f64) {
         state.command = command;
         if state.tip.output.is_nan() {
             state.tip.output = command - state.play.clamp(0.0);
         }
         state.play.step(&mut state.tip, command);
-        if !is_anchored || (command - proposed).abs() > 0.0 {
+        let is_off = |proposed: f64| (command - proposed).abs() > 0.0;
+        if state.proposed.is_none_or(is_off) {
             self.hold(state);
         }
-        command
     }
 
     /// The command of the law for the next reference, and whether it is on the anchored law; None where nothing moves.
-    fn propose(&self, state: &mut CompensatorState, reference: f64) -> Option<(f64, bool)> {
+    fn next_command(&self, state: &mut CompensatorState, reference: f64) -> Option<(f64, bool)> {
         if !reference.is_finite() {
             return None;
         }

@@ -1,41 +1,41 @@
 //! History of control ticks: a frame is compared with the state at its capture, not at its arrival.
 
-use crate::dof::{PerDof, all_finite};
+use crate::dof::{all_finite, zip_with};
 use crate::error::{ConfigError, require, require_positive};
 
 /// One control tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Entry {
+pub struct Entry<const N: usize = 3> {
     /// Time in s, on the clock of the control tick.
     pub time: f64,
-    /// The reference u after the reference gate [m, rad, rad].
-    pub reference: PerDof<f64>,
-    /// The command c [m, rad, rad].
-    pub command: PerDof<f64>,
-    /// The predicted state q [m, rad, rad].
-    pub predicted_state: PerDof<f64>,
-    /// The sum of the changes of q by image updates so far [m, rad, rad].
-    pub corrected: PerDof<f64>,
-    /// Largest possible travel of the tip so far, the sum of absolute motions [m, rad, rad]: that of its command, or of the
+    /// The reference u after the reference gate [m or rad].
+    pub reference: [f64; N],
+    /// The command c [m or rad].
+    pub command: [f64; N],
+    /// The predicted state q [m or rad].
+    pub predicted_state: [f64; N],
+    /// The sum of the changes of q by image updates so far [m or rad].
+    pub corrected: [f64; N],
+    /// Largest possible travel of the tip so far, the sum of absolute motions [m or rad]: that of its command, or of the
     /// predicted state where another DOF takes up the friction that held the tip.
-    pub travel: PerDof<f64>,
+    pub travel: [f64; N],
 }
 
-impl Entry {
+impl<const N: usize> Entry<N> {
     /// Initial content of the storage of a history.
     pub const BLANK: Self = Self {
         time: 0.0,
-        reference: [0.0; 3],
-        command: [0.0; 3],
-        predicted_state: [0.0; 3],
-        corrected: [0.0; 3],
-        travel: [0.0; 3],
+        reference: [0.0; N],
+        command: [0.0; N],
+        predicted_state: [0.0; N],
+        corrected: [0.0; N],
+        travel: [0.0; N],
     };
 }
 
 /// Ring buffer of the latest control ticks in a storage `S`: an array, a vector, or a borrowed slice.
 #[derive(Debug, Clone)]
-pub struct History<S> {
+pub struct History<S, const N: usize = 3> {
     ring: S,
     /// Index of the next entry.
     next: usize,
@@ -44,7 +44,7 @@ pub struct History<S> {
     period: f64,
 }
 
-impl<S: AsRef<[Entry]> + AsMut<[Entry]>> History<S> {
+impl<S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, const N: usize> History<S, N> {
     /// A history of `span` in s for a control tick every `period` in s.
     ///
     /// # Errors
@@ -70,7 +70,7 @@ impl<S: AsRef<[Entry]> + AsMut<[Entry]>> History<S> {
     /// Stores a tick; returns whether its time is before the newest one, which clears the history.
     ///
     /// An entry of equal time replaces the newest one. An entry that is not finite is not stored.
-    pub fn push(&mut self, entry: Entry) -> bool {
+    pub fn push(&mut self, entry: Entry<N>) -> bool {
         let finite = all_finite(entry.command) && all_finite(entry.predicted_state);
         if !(finite && entry.time.is_finite()) {
             return false;
@@ -95,7 +95,7 @@ impl<S: AsRef<[Entry]> + AsMut<[Entry]>> History<S> {
     ///
     /// None before the oldest tick within the span, more than one period after the newest, and
     /// for a time that is not finite.
-    pub fn at(&self, time: f64) -> Option<Entry> {
+    pub fn at(&self, time: f64) -> Option<Entry<N>> {
         let newest = *self.newest()?;
         // Times that count ticks differ by rounding.
         let ahead = self.period * (1.0 + 1e-6);
@@ -120,13 +120,14 @@ impl<S: AsRef<[Entry]> + AsMut<[Entry]>> History<S> {
         }
         let (before, after) = (self.aged(sought)?, self.aged(later)?);
         let share = (time - before.time) / (after.time - before.time);
+        let between = |a, b| zip_with(a, b, |a: f64, b: f64| a + share * (b - a));
         Some(Entry {
             time,
-            reference: between(before.reference, after.reference, share),
-            command: between(before.command, after.command, share),
-            predicted_state: between(before.predicted_state, after.predicted_state, share),
-            corrected: between(before.corrected, after.corrected, share),
-            travel: between(before.travel, after.travel, share),
+            reference: between(before.reference, after.reference),
+            command: between(before.command, after.command),
+            predicted_state: between(before.predicted_state, after.predicted_state),
+            corrected: between(before.corrected, after.corrected),
+            travel: between(before.travel, after.travel),
         })
     }
 
@@ -136,7 +137,7 @@ impl<S: AsRef<[Entry]> + AsMut<[Entry]>> History<S> {
     }
 
     /// The ticks after `time`, oldest first.
-    pub fn since(&self, time: f64) -> impl Iterator<Item = &Entry> + Clone {
+    pub fn since(&self, time: f64) -> impl Iterator<Item = &Entry<N>> + Clone {
         let count = (0..self.len)
             .take_while(|age| self.aged(*age).is_some_and(|entry| entry.time > time))
             .count();
@@ -148,11 +149,11 @@ impl<S: AsRef<[Entry]> + AsMut<[Entry]>> History<S> {
         self.newest().map_or(f64::NAN, |newest| newest.time)
     }
 
-    fn newest(&self) -> Option<&Entry> {
+    fn newest(&self) -> Option<&Entry<N>> {
         self.aged(0)
     }
 
-    fn aged(&self, age: usize) -> Option<&Entry> {
+    fn aged(&self, age: usize) -> Option<&Entry<N>> {
         let place = (self.next + self.capacity() - 1).checked_sub(age)? % self.capacity();
         self.ring.as_ref().get(place).filter(|_| age < self.len)
     }
@@ -171,9 +172,4 @@ impl<S: AsRef<[Entry]> + AsMut<[Entry]>> History<S> {
 )]
 pub fn history_entries(span: f64, period: f64) -> usize {
     libm::ceil(span / period) as usize + 2
-}
-
-fn between([a0, a1, a2]: PerDof<f64>, [b0, b1, b2]: PerDof<f64>, share: f64) -> PerDof<f64> {
-    let mix = |a: f64, b: f64| a + share * (b - a);
-    [mix(a0, b0), mix(a1, b1), mix(a2, b2)]
 }

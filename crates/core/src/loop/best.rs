@@ -31,6 +31,9 @@ const CONTACT: f64 = 0.98;
 const GEOMETRY_OFF: f64 = 0.02;
 const CERTAIN: f64 = 3.0;
 
+/// Limits of the low-passed error of the predicted tip, in half of `width_limit`.
+pub const SLACK_CHANGED: PerDof<f64> = [0.13, 0.3, 0.13];
+
 /// Standard deviation in px of the bands in an apparent state.
 const APPARENT: f64 = 0.1;
 
@@ -41,22 +44,22 @@ pub struct Best {
     filter: Filter,
     limits: PerDof<PlayLimit>,
     observability: StateEstimator,
-    prediction: PredictionMonitor,
+    prediction: PredictionMonitor<3>,
     /// Shorter focal length in px.
     focal: f64,
 }
 
-impl Law for Best {
+impl Law<3> for Best {
     fn command(&self) -> PerDof<f64> {
         self.law.command()
     }
 
-    fn step_within(
-        &mut self,
-        reference: PerDof<f64>,
-        limit: impl FnOnce(PerDof<f64>) -> PerDof<f64>,
-    ) {
-        self.law.step_within(reference, &mut self.filter, limit);
+    fn propose(&mut self, reference: PerDof<f64>) -> PerDof<f64> {
+        self.law.propose(reference, &self.filter)
+    }
+
+    fn commit(&mut self, command: PerDof<f64>) {
+        self.law.commit(command, &mut self.filter);
     }
 
     fn shift_reference(&mut self, shift: PerDof<f64>) {
@@ -96,7 +99,7 @@ impl ProfileBlocks for Best {
             )?,
             limits,
             observability: state_estimator(settings)?,
-            prediction: PredictionMonitor::new(unit),
+            prediction: PredictionMonitor::new(SLACK_CHANGED, unit),
             focal: settings.camera.fx.min(settings.camera.fy),
         })
     }

@@ -14,6 +14,7 @@ use crate::estimation::history::{Entry, History};
 use crate::estimation::measurement::{MostProbable, Observed, Sensor};
 use crate::estimation::posture::{Belief, Observation};
 use crate::law::vector_law::{Bounds, VectorLaw};
+use crate::r#loop::best::SLACK_CHANGED;
 use crate::r#loop::measurement::Measurement;
 use crate::r#loop::paper::state_estimator;
 use crate::r#loop::profile::{Image, ImageUpdate, ProfileBlocks};
@@ -77,22 +78,21 @@ pub struct FixedPlays {
     model_images: f64,
     limits: PerDof<PlayLimit>,
     observability: StateEstimator,
-    prediction: PredictionMonitor,
+    prediction: PredictionMonitor<3>,
     /// Shorter focal length in px.
     focal: f64,
 }
 
-impl Law for FixedPlays {
+impl Law<3> for FixedPlays {
     fn command(&self) -> PerDof<f64> {
         self.law.command()
     }
 
-    fn step_within(
-        &mut self,
-        reference: PerDof<f64>,
-        limit: impl FnOnce(PerDof<f64>) -> PerDof<f64>,
-    ) {
-        let command = limit(self.law.propose(reference, &self.rows, &self.slack));
+    fn propose(&mut self, reference: PerDof<f64>) -> PerDof<f64> {
+        self.law.propose(reference, &self.rows, &self.slack)
+    }
+
+    fn commit(&mut self, command: PerDof<f64>) {
         self.law.commit(command);
         if self.estimate.origin().iter().any(|origin| origin.is_nan()) {
             self.estimate.start(self.law.origin());
@@ -197,7 +197,7 @@ impl ProfileBlocks for FixedPlays {
             model_images: 1.0,
             limits,
             observability: state_estimator(settings)?,
-            prediction: PredictionMonitor::new(transmission.unit()),
+            prediction: PredictionMonitor::new(SLACK_CHANGED, transmission.unit()),
             focal: settings.camera.fx.min(settings.camera.fy),
         })
     }

@@ -1,7 +1,7 @@
 //! The state estimate from one image, as both profiles provide it.
 
 use crate::article::state::{StateEstimate, found};
-use crate::dof::{PerDof, all_finite};
+use crate::dof::{PerDof, all_finite, zip_with};
 use crate::estimation::marker_measurement::MarkerEstimate;
 use crate::r#loop::fixed_plays::Bands;
 
@@ -27,13 +27,8 @@ pub struct Measurement {
 impl Measurement {
     /// The state of each DOF that the image determined, NaN for the others [m, rad, rad].
     pub(crate) fn observed_state(&self) -> PerDof<f64> {
-        let mut state = self.estimate.state;
-        for (value, observable) in state.iter_mut().zip(self.estimate.observable) {
-            if !observable {
-                *value = f64::NAN;
-            }
-        }
-        state
+        let observed = |value, is_observable| if is_observable { value } else { f64::NAN };
+        zip_with(self.estimate.state, self.estimate.observable, observed)
     }
 }
 

@@ -5,7 +5,7 @@ use crate::article::estimator::{Estimator, EstimatorState, Triggers};
 use crate::article::play::Play;
 use crate::article::play_limit::PlayLimit;
 use crate::article::state::{StateEstimate, StateEstimator, found};
-use crate::dof::PerDof;
+use crate::dof::{PerDof, try_each, zip_with};
 use crate::error::ConfigError;
 use crate::estimation::history::{Entry, History};
 use crate::estimation::posture::Belief;
@@ -29,43 +29,43 @@ const UNIT: [[f64; 4]; 4] = [
 /// Error of a linear step by that of another DOF, in `start_deviation`.
 const COUPLED: f64 = 0.08;
 
-/// Profile `paper`.
+/// Profile `paper`: compensators and estimators of N DOFs, and the state estimation `E`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Paper {
-    axes: PerDof<ArticleAxis>,
-    state_estimator: StateEstimator,
+pub struct Paper<const N: usize = 3, E = StateFromImages> {
+    axes: [ArticleAxis; N],
+    /// Sum of the changes of the predicted state by images so far.
+    corrected: [f64; N],
+    estimation: E,
+}
+
+/// State estimation from images, Eqs. (13)-(16), with its prediction.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StateFromImages {
+    estimator: StateEstimator,
     prediction: StatePrediction,
-    corrected: PerDof<f64>,
     coupled_std: PerDof<f64>,
 }
 
-impl Law for Paper {
-    fn command(&self) -> PerDof<f64> {
+impl<const N: usize, E> Law<N> for Paper<N, E> {
+    fn command(&self) -> [f64; N] {
         self.axes.each_ref().map(|axis| axis.compensation.command())
     }
 
-    fn step_within(
-        &mut self,
-        [u1, u2, u3]: PerDof<f64>,
-        limit: impl FnOnce(PerDof<f64>) -> PerDof<f64>,
-    ) {
-        let [first, second, third] = &mut self.axes;
-        let (mut limited2, mut limited3) = (f64::NAN, f64::NAN);
-        // Each law has proposed its command before the limits are applied to all.
-        first.step_within(u1, |c1| {
-            let mut limited1 = f64::NAN;
-            second.step_within(u2, |c2| {
-                third.step_within(u3, |c3| {
-                    [limited1, limited2, limited3] = limit([c1, c2, c3]);
-                    limited3
-                });
-                limited2
-            });
-            limited1
-        });
+    fn propose(&mut self, reference: [f64; N]) -> [f64; N] {
+        let mut command = reference;
+        for (axis, value) in self.axes.iter_mut().zip(&mut command) {
+            *value = axis.compensator.propose(&mut axis.compensation, *value);
+        }
+        command
     }
 
-    fn shift_reference(&mut self, shift: PerDof<f64>) {
+    fn commit(&mut self, command: [f64; N]) {
+        for (axis, command) in self.axes.iter_mut().zip(command) {
+            axis.compensator.commit(&mut axis.compensation, command);
+        }
+    }
+
+    fn shift_reference(&mut self, shift: [f64; N]) {
         for (axis, shift) in self.axes.iter_mut().zip(shift) {
             if shift != 0.0 {
                 axis.compensator
@@ -85,19 +85,13 @@ impl ProfileBlocks for Paper {
     const IS_COUPLED: bool = false;
 
     fn new(settings: &Settings, limits: PerDof<PlayLimit>) -> Result<Self, ConfigError> {
-        let [insertion, rotation, bending] = settings.dofs();
-        let [limit1, limit2, limit3] = limits;
-        Ok(Self {
-            axes: [
-                ArticleAxis::new(&insertion, limit1)?,
-                ArticleAxis::new(&rotation, limit2)?,
-                ArticleAxis::new(&bending, limit3)?,
-            ],
-            state_estimator: state_estimator(settings)?,
-            prediction: StatePrediction::new(settings.dofs().map(|dof| dof.start_deviation))?,
-            corrected: [0.0; 3],
-            coupled_std: settings.dofs().map(|dof| COUPLED * dof.start_deviation),
-        })
+        let dofs = settings.dofs();
+        let estimation = StateFromImages {
+            estimator: state_estimator(settings)?,
+            prediction: StatePrediction::new(dofs.map(|dof| dof.start_deviation))?,
+            coupled_std: dofs.map(|dof| COUPLED * dof.start_deviation),
+        };
+        Self::with_estimation(&dofs, limits, estimation)
     }
 
     fn predicted_state(&self) -> PerDof<f64> {
@@ -117,7 +111,7 @@ impl ProfileBlocks for Paper {
     fn keep_up<S: AsRef<[Entry]> + AsMut<[Entry]>>(&mut self, _: &History<S>, _: bool) {}
 
     fn predict<S: AsRef<[Entry]> + AsMut<[Entry]>>(&self, _: &History<S>, past: &Entry) -> Belief {
-        self.prediction.at(past)
+        self.estimation.prediction.at(past)
     }
 
     fn advance<S: AsRef<[Entry]> + AsMut<[Entry]>>(&mut self, _: &History<S>, _: &Entry) {}
@@ -126,7 +120,7 @@ impl ProfileBlocks for Paper {
     /// last images, because the DOFs that are held keep its error.
     fn measure(&self, model: &FeatureModel, past: &Entry, image: Image<'_>) -> Option<Measurement> {
         let used = found(image.features);
-        let prior = self.prediction.at(past);
+        let prior = self.estimation.prediction.at(past);
         let start = if used == [true; 2] {
             past.predicted_state
         } else {
@@ -134,7 +128,8 @@ impl ProfileBlocks for Paper {
         };
         let prediction = model.predict(start)?;
         let estimate = self
-            .state_estimator
+            .estimation
+            .estimator
             .estimate(start, &prediction, image.features);
         let state_deviation = estimate.state_deviation(image.covariance.unwrap_or(&UNIT));
         Some(Measurement {
@@ -142,7 +137,7 @@ impl ProfileBlocks for Paper {
             used,
             predicted_features: prediction.features,
             state_deviation,
-            distance: self.distance(
+            distance: self.estimation.distance(
                 &prior,
                 &estimate,
                 step_deviation(past, prior.state, state_deviation),
@@ -162,44 +157,73 @@ impl ProfileBlocks for Paper {
     ) -> ImageUpdate {
         let estimate = &measurement.estimate;
         let std = step_deviation(past, estimate.state, measurement.state_deviation);
-        self.prediction.update(past, estimate, std);
-        let mut update = ImageUpdate::default();
+        self.estimation.prediction.update(past, estimate, std);
         if !updates_offsets {
-            return update;
+            return ImageUpdate::default();
         }
-        let signals = estimate
-            .observable
-            .iter()
-            .zip(past.command)
-            .zip(estimate.state);
-        let axes = self.axes.iter_mut().zip(&mut self.corrected);
-        for ((axis, corrected), (triggers, ((observable, command), output))) in
-            axes.zip(update.triggers.iter_mut().zip(signals))
-        {
-            if !observable {
+        let (triggers, raised) =
+            self.update_offsets(past.command, estimate.state, estimate.observable);
+        ImageUpdate { triggers, raised }
+    }
+
+    fn miss(&mut self, past: &Entry) {
+        self.estimation.prediction.miss(past);
+    }
+
+    fn reset_prediction(&mut self, past: &Entry) {
+        self.estimation.prediction.reset(past);
+    }
+}
+
+impl<const N: usize, E> Paper<N, E> {
+    /// The profile at rest, with the limits of the offsets.
+    ///
+    /// # Errors
+    /// As [`Compensator::new`], [`Compensator::with_recovery`], [`Estimator::new`] and [`Play::new`].
+    pub(crate) fn with_estimation(
+        dofs: &[DofSettings; N],
+        limits: [PlayLimit; N],
+        estimation: E,
+    ) -> Result<Self, ConfigError> {
+        let axes = try_each(*dofs, |dof| ArticleAxis::new(&dof))?;
+        Ok(Self {
+            axes: zip_with(axes, limits, |axis, limit| ArticleAxis { limit, ..axis }),
+            corrected: [0.0; N],
+            estimation,
+        })
+    }
+
+    /// Updates the offsets of the DOFs that were `observed` from command and state of one instant: which were updated
+    /// and why, and the flags raised.
+    pub(crate) fn update_offsets(
+        &mut self,
+        command: [f64; N],
+        state: [f64; N],
+        observed: [bool; N],
+    ) -> ([Triggers; N], Flags) {
+        let (mut triggers, mut raised) = ([Triggers::default(); N], Flags::NONE);
+        let axes = self
+            .axes
+            .iter_mut()
+            .zip(&mut self.corrected)
+            .zip(&mut triggers);
+        let signals = command.into_iter().zip(state).zip(observed);
+        for (((axis, corrected), triggers), ((command, state), observed)) in axes.zip(signals) {
+            if !observed {
                 continue;
             }
             let before = axis.compensation.predicted_state();
             let is_limited;
-            (*triggers, is_limited) = axis.update_offsets(command, output);
-            let limited = Flags::when(is_limited, Flag::WidthLimit);
-            update.raised = update.raised.union(limited);
+            (*triggers, is_limited) = axis.update_offsets(command, state);
+            raised = raised.union(Flags::when(is_limited, Flag::WidthLimit));
             let moved = axis.compensation.predicted_state() - before;
             *corrected += if moved.is_finite() { moved } else { 0.0 };
         }
-        update
-    }
-
-    fn miss(&mut self, past: &Entry) {
-        self.prediction.miss(past);
-    }
-
-    fn reset_prediction(&mut self, past: &Entry) {
-        self.prediction.reset(past);
+        (triggers, raised)
     }
 }
 
-impl Paper {
+impl StateFromImages {
     /// Largest innovation of a DOF, measured less predicted state, in standard deviations of prediction and measurement
     /// together, and of what the error of another DOF makes of a linear step.
     fn distance(&self, prior: &Belief, estimate: &StateEstimate, std: PerDof<f64>) -> f64 {
@@ -239,11 +263,7 @@ pub struct ArticleAxis {
 }
 
 impl ArticleAxis {
-    /// One DOF from its settings, with the limit of its offsets.
-    ///
-    /// # Errors
-    /// As [`Compensator::new`], [`Compensator::with_recovery`], [`Estimator::new`] and [`Play::new`].
-    fn new(dof: &DofSettings, limit: PlayLimit) -> Result<Self, ConfigError> {
+    fn new(dof: &DofSettings) -> Result<Self, ConfigError> {
         let compensator =
             Compensator::new(dof.free_gain, dof.gain_limit)?.with_recovery(dof.recovery)?;
         let play = Play::new(dof.delta_minus, dof.delta_plus)?;
@@ -257,13 +277,8 @@ impl ArticleAxis {
             )?,
             compensation: CompensatorState::new(play),
             estimation: EstimatorState::new(play),
-            limit,
+            limit: PlayLimit::NONE,
         })
-    }
-
-    fn step_within(&mut self, reference: f64, limit: impl FnOnce(f64) -> f64) {
-        self.compensator
-            .step_within(&mut self.compensation, reference, limit);
     }
 
     fn set_share(&mut self, share: f64) {

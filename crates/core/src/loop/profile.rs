@@ -47,8 +47,8 @@ pub struct ImageUpdate {
 }
 
 /// Compensation law, offset estimates and state estimation.
-pub(crate) trait ProfileBlocks: Law + Sized {
-    /// Whether the motions of insertion and rotation are bounded together.
+pub(crate) trait ProfileBlocks: Law<3> + Sized {
+    /// Whether the DOFs that share a friction are bounded together.
     const IS_COUPLED: bool;
 
     /// A profile at rest.

@@ -1,7 +1,7 @@
 //! The whole loop, Fig. 6.
 
 use crate::article::play::Play;
-use crate::dof::PerDof;
+use crate::dof::{Friction, PerDof, zip_with};
 use crate::error::{ConfigError, require};
 use crate::estimation::history::{Entry, History};
 use crate::estimation::posture::Belief;
@@ -9,7 +9,7 @@ use crate::r#loop::profile::Profile;
 use crate::r#loop::settings::Settings;
 use crate::model::features::FeatureModel;
 use crate::supervision::flags::Flag;
-use crate::supervision::monitors::{Law, Monitors, Supervision};
+use crate::supervision::monitors::{Monitors, Supervision};
 
 /// Image-based hysteresis reduction, Fig. 6: reference in, command out; images update the estimate of the hysteresis.
 ///
@@ -19,11 +19,9 @@ pub struct HysteresisReduction<P, S = [Entry; 256]> {
     pub(super) profile: P,
     pub(super) feature_model: FeatureModel,
     pub(super) history: History<S>,
-    pub(super) monitors: Monitors,
+    pub(super) monitors: Monitors<3>,
     pub(super) last_used: f64,
     travel: PerDof<f64>,
-    /// Share of the compensation that the operator has chosen; the supervisor uses a share of it.
-    chosen: f64,
 }
 
 impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
@@ -33,12 +31,12 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
     /// A setting is out of range, or the storage is too small.
     pub fn new(settings: &Settings, storage: S) -> Result<Self, ConfigError> {
         let control = &settings.control;
-        let monitors = Monitors::new(
-            &settings.safety,
-            &settings.dofs(),
-            control.period,
-            P::IS_COUPLED,
-        )?;
+        let friction = if P::IS_COUPLED {
+            settings.friction()?
+        } else {
+            Friction::independent()
+        };
+        let monitors = Monitors::new(&settings.safety, &settings.dofs(), control.period, friction)?;
         Ok(Self {
             profile: P::new(settings, monitors.play_limits())?,
             feature_model: settings.feature_model()?,
@@ -46,7 +44,6 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
             monitors,
             last_used: f64::NEG_INFINITY,
             travel: [0.0; 3],
-            chosen: 1.0,
         })
     }
 
@@ -56,23 +53,19 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
     /// holds the command, which before the first reference is NaN.
     pub fn step(&mut self, reference: PerDof<f64>, stamp: Option<f64>, time: f64) -> PerDof<f64> {
         let (command_before, state_before) = (self.profile.command(), self.predicted_state());
-        let mut law = ChosenShare {
-            profile: &mut self.profile,
-            chosen: self.chosen,
-        };
-        self.monitors.step(&mut law, reference, stamp, time);
+        self.monitors
+            .step(&mut self.profile, reference, stamp, time);
         let (gated, command) = (self.monitors.reference(), self.profile.command());
-        let mut moved = distance(command_before, command);
+        let distance = |to: f64, from: f64| (to - from).abs();
+        let mut moved = zip_with(command, command_before, distance);
         if P::IS_COUPLED {
             // Where another DOF takes up the friction, a tip moves although its command rests.
-            let released = distance(state_before, self.predicted_state());
-            for (moved, released) in moved.iter_mut().zip(released) {
-                *moved = moved.max(released);
-            }
+            let released = zip_with(self.predicted_state(), state_before, distance);
+            moved = zip_with(moved, released, f64::max);
         }
-        for (travel, moved) in self.travel.iter_mut().zip(moved) {
-            *travel += if moved.is_finite() { moved } else { 0.0 };
-        }
+        self.travel = zip_with(self.travel, moved, |travel, moved| {
+            travel + if moved.is_finite() { moved } else { 0.0 }
+        });
         let clock_went_back = self.history.push(Entry {
             time,
             reference: gated,
@@ -133,9 +126,7 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
     pub fn set_compensation(&mut self, share: f64) -> Result<(), ConfigError> {
         let is_share = (0.0..=1.0).contains(&share);
         require(is_share, "compensation", share, "a share from 0 to 1")?;
-        self.chosen = share;
-        self.profile
-            .set_share(share * self.monitors.supervision().lead);
+        self.monitors.choose_share(&mut self.profile, share);
         Ok(())
     }
 
@@ -153,38 +144,4 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
     pub fn raise(&mut self, flag: Flag) {
         self.monitors.raise(flag);
     }
-}
-
-/// A profile of which the supervisor's share is a share of what the operator has chosen.
-struct ChosenShare<'a, P> {
-    profile: &'a mut P,
-    chosen: f64,
-}
-
-impl<P: Law> Law for ChosenShare<'_, P> {
-    fn command(&self) -> PerDof<f64> {
-        self.profile.command()
-    }
-
-    fn step_within(
-        &mut self,
-        reference: PerDof<f64>,
-        limit: impl FnOnce(PerDof<f64>) -> PerDof<f64>,
-    ) {
-        self.profile.step_within(reference, limit);
-    }
-
-    fn shift_reference(&mut self, shift: PerDof<f64>) {
-        self.profile.shift_reference(shift);
-    }
-
-    fn set_share(&mut self, share: f64) {
-        self.profile.set_share(share * self.chosen);
-    }
-}
-
-fn distance(from: PerDof<f64>, to: PerDof<f64>) -> PerDof<f64> {
-    let [a, b, c] = from;
-    let [d, e, f] = to;
-    [(d - a).abs(), (e - b).abs(), (f - c).abs()]
 }

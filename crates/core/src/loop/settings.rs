@@ -49,13 +49,21 @@ impl Settings {
         [self.insertion, self.rotation, self.bending]
     }
 
-    /// The plays of profile `plays`: insertion and rotation share the friction of the shaft in its channel.
+    /// Insertion and rotation share the friction of the shaft in its channel, whose surface a rotation moves by the radius.
+    ///
+    /// # Errors
+    /// The diameter is not a finite number above 0.
+    pub(crate) fn friction(&self) -> Result<Friction<3>, ConfigError> {
+        Friction::new([0, 0, 2], [1.0, self.instrument.diameter / 2.0, 1.0])
+    }
+
+    /// The plays of profile `plays`.
     ///
     /// # Errors
     /// A diameter or an expected width is not a finite number above 0.
     pub(crate) fn transmission(&self) -> Result<Transmission<3>, ConfigError> {
-        let friction = Friction::new([0, 0, 2], [1.0, self.instrument.diameter / 2.0, 1.0])?;
-        Transmission::new(friction, self.dofs().map(|dof| 0.75 * dof.expected_width))
+        let units = self.dofs().map(|dof| 0.75 * dof.expected_width);
+        Transmission::new(self.friction()?, units)
     }
 
     /// Entries of the history that a loop with these settings needs.

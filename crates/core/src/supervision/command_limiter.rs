@@ -1,12 +1,12 @@
 //! Limits of the command: the bounds of the law, checked by code and state that share nothing with it.
 
-use crate::dof::PerDof;
+use crate::dof::{Friction, zip_with};
 use crate::error::{ConfigError, require, require_positive};
 use crate::math::linear::square;
 use crate::settings::DofSettings;
 use crate::supervision::settings::SafetySettings;
 
-/// Share by which rounding may exceed the common bound of insertion and rotation.
+/// Share by which rounding may exceed the common bound of DOFs that share a friction.
 const ROUNDING: f64 = 1e-9;
 /// How far, in `width_limit`, rounding of a sum of reference and lead may do so.
 const SUM_ROUNDING: f64 = 1e-14;
@@ -22,7 +22,7 @@ const SUM_ROUNDING: f64 = 1e-14;
 /// two bounds, where another bound keeps it from entering at once, moves no farther out. The limited command is the
 /// one that is sent, and the one from which the law continues.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CommandLimiter {
+struct CommandLimiter {
     gain_limit: f64,
     /// Largest |dc| in a tick.
     step_limit: f64,
@@ -52,51 +52,22 @@ pub enum LimiterResult {
 }
 
 impl CommandLimiter {
-    /// The limiter of DOF number `index` before the first command, for a control period in s.
-    ///
-    /// # Errors
-    /// A limit is not above 0, `gain_limit` is below 1, or the ends of `command_travel` are not in order.
-    pub fn new(
-        safety: &SafetySettings,
-        dof: &DofSettings,
-        index: usize,
-        period: f64,
-    ) -> Result<Self, ConfigError> {
-        let gain_limit = dof.gain_limit;
-        let is_gain = gain_limit.is_finite() && gain_limit >= 1.0;
-        require(is_gain, "gain_limit", gain_limit, "finite, 1 or above")?;
-        let of = |values: [f64; 3]| values.get(index).copied().unwrap_or(f64::NAN);
-        let step_limit = of(safety.command_speed) * period;
-        require_positive("command_speed", step_limit)?;
-        let lead_limit = of(safety.width_limit);
-        require_positive("width_limit", lead_limit)?;
-        let least = of(safety.command_travel.map(|(least, _)| least));
-        let largest = of(safety.command_travel.map(|(_, largest)| largest));
+    fn check(&self) -> Result<(), ConfigError> {
+        let (least, largest) = self.travel;
+        let is_gain = self.gain_limit.is_finite() && self.gain_limit >= 1.0;
+        require(is_gain, "gain_limit", self.gain_limit, "finite, 1 or above")?;
+        require_positive("command_speed", self.step_limit)?;
+        require_positive("width_limit", self.lead_limit)?;
         let is_ordered = least < largest && (largest - least).is_finite();
-        require(
-            is_ordered,
-            "command_travel",
-            least,
-            "finite, below the largest position",
-        )?;
-        Ok(Self {
-            gain_limit,
-            step_limit,
-            travel: (least, largest),
-            lead_limit,
-            last: None,
-        })
+        let allowed = "finite, below the largest position";
+        require(is_ordered, "command_travel", least, allowed)
     }
 
     /// The limited command for a gated reference; the law's bound is 0 <= dc / du <= `gain_limit`, or |dc| <= `reach`.
     ///
     /// Where reference or command is not finite, this is the last command, or NaN before the first.
-    pub fn limit(
-        &mut self,
-        reference: f64,
-        command: f64,
-        reach: Option<f64>,
-    ) -> (f64, LimiterResult) {
+    fn limit(&mut self, reference: f64, command: f64, reach: Option<f64>) -> (f64, LimiterResult) {
+        use LimiterResult::{Jump, LeadLimited, Limited, Unchanged, Violation};
         let Self {
             gain_limit,
             step_limit,
@@ -106,20 +77,15 @@ impl CommandLimiter {
         } = *self;
         let Some((last_reference, last)) = last else {
             if !(reference.is_finite() && command.is_finite()) {
-                return (f64::NAN, LimiterResult::Violation);
+                return (f64::NAN, Violation);
             }
             let limited = command.max(least).min(largest);
             self.last = Some((reference, limited));
-            let result = result(
-                limited,
-                command,
-                LimiterResult::Unchanged,
-                LimiterResult::Limited,
-            );
+            let result = result(limited, command, Unchanged, Limited);
             return (limited, result);
         };
         if !reference.is_finite() {
-            return (last, LimiterResult::Violation);
+            return (last, Violation);
         }
         let increment = reference - last_reference;
         let (low, high) = reach.map_or_else(
@@ -136,12 +102,7 @@ impl CommandLimiter {
         };
         if (lawful - last).abs() > step_limit {
             self.last = Some((reference, last));
-            let result = result(
-                lawful,
-                command,
-                LimiterResult::Jump,
-                LimiterResult::Violation,
-            );
+            let result = result(lawful, command, Jump, Violation);
             return (last, result);
         }
         // Never beyond the last command's own distance, so that a limit cannot move anything by itself.
@@ -156,177 +117,207 @@ impl CommandLimiter {
         // Rounding of the bounds on c - u must not violate the law.
         let sent = limited.max(low).min(high);
         let sent = if sent.is_finite() { sent } else { last };
-        let bound = result(
-            limited,
-            led,
-            LimiterResult::LeadLimited,
-            LimiterResult::Limited,
-        );
-        let within_law = result(sent, command, LimiterResult::Unchanged, bound);
-        let result = result(lawful, command, within_law, LimiterResult::Violation);
+        let bound = result(limited, led, LeadLimited, Limited);
+        let within_law = result(sent, command, Unchanged, bound);
+        let result = result(lawful, command, within_law, Violation);
         self.last = Some((reference, sent));
         (sent, result)
     }
-
-    /// Motion of reference and command since the last tick; None before the first.
-    fn motion(&self, reference: f64, command: f64) -> Option<(f64, f64)> {
-        let (last_reference, last) = self.last?;
-        Some((reference - last_reference, command - last))
-    }
-
-    /// Moves the origin of the reference by `shift`.
-    pub fn shift_reference(&mut self, shift: f64) {
-        if let Some((reference, _)) = &mut self.last {
-            *reference += shift;
-        }
-    }
 }
 
-/// The limiters of the three DOFs.
+/// The limiters of N DOFs.
 ///
-/// Where insertion and rotation are `coupled`, their motions are bounded together, as the vector law has it,
+/// The motions of DOFs that share a friction are bounded together, as the vector law has it,
 ///
 /// ```text
-/// |dc| <= gain_limit |du|,   |x|^2 = (x1 / unit1)^2 + (x2 / unit2)^2
+/// |dc| <= gain_limit |du|,   |x|^2 = sum of (x / unit)^2 over the DOFs of the group
 /// ```
 ///
-/// with `width_limit` as unit and the smaller of both gains: each may move with the reference of the other.
+/// with `width_limit` as unit and the smallest of their gains: each may move with the reference of another.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CommandLimiters {
-    dofs: PerDof<CommandLimiter>,
-    is_coupled: bool,
+pub struct CommandLimiters<const N: usize> {
+    dofs: [CommandLimiter; N],
+    friction: Friction<N>,
 }
 
-impl CommandLimiters {
-    /// As [`CommandLimiter::new`], for each DOF.
+impl<const N: usize> CommandLimiters<N> {
+    /// The limiters before the first command, for a control period in s.
     ///
     /// # Errors
-    /// As [`CommandLimiter::new`].
+    /// A limit is not above 0, a `gain_limit` below 1, or the ends of a `command_travel` are not in order.
     pub fn new(
-        safety: &SafetySettings,
-        [first, second, third]: &PerDof<DofSettings>,
+        safety: &SafetySettings<N>,
+        dofs: &[DofSettings; N],
         period: f64,
-        is_coupled: bool,
+        friction: Friction<N>,
     ) -> Result<Self, ConfigError> {
+        let mut limiters = dofs.map(|dof| CommandLimiter {
+            gain_limit: dof.gain_limit,
+            step_limit: period,
+            travel: (f64::NAN, f64::NAN),
+            lead_limit: f64::NAN,
+            last: None,
+        });
+        let travels = safety.width_limit.into_iter().zip(safety.command_travel);
+        let limits = safety.command_speed.into_iter().zip(travels);
+        for (limiter, (speed, (width, travel))) in limiters.iter_mut().zip(limits) {
+            limiter.step_limit *= speed;
+            (limiter.lead_limit, limiter.travel) = (width, travel);
+            limiter.check()?;
+        }
         Ok(Self {
-            dofs: [
-                CommandLimiter::new(safety, first, 0, period)?,
-                CommandLimiter::new(safety, second, 1, period)?,
-                CommandLimiter::new(safety, third, 2, period)?,
-            ],
-            is_coupled,
+            dofs: limiters,
+            friction,
         })
     }
 
-    /// The limited commands (3,) for a gated reference (3,) [m, rad, rad], and what was limited.
+    /// The limited commands (N,) for a gated reference (N,) [m or rad], and what was limited.
     pub fn limit(
         &mut self,
-        reference: PerDof<f64>,
-        command: PerDof<f64>,
-    ) -> (PerDof<f64>, PerDof<LimiterResult>) {
-        let ([u1, u2, u3], [c1, c2, c3]) = (reference, command);
-        let ([c1, c2], [reach1, reach2], is_violated) = self.couple([u1, u2], [c1, c2]);
-        let [first, second, third] = &mut self.dofs;
-        let before = [first.last, second.last];
-        let (limited1, result1) = first.limit(u1, c1, reach1);
-        let (limited2, result2) = second.limit(u2, c2, reach2);
-        let (limited3, result3) = third.limit(u3, c3, None);
-        let ([limited1, limited2], has_changed) =
-            self.couple_again(before, [u1, u2], [limited1, limited2]);
-        let shaft = [result1, result2].map(|result| {
-            if is_violated {
-                LimiterResult::Violation
-            } else if has_changed && result == LimiterResult::Unchanged {
-                LimiterResult::LeadLimited
-            } else {
-                result
-            }
-        });
-        let [result1, result2] = shaft;
-        ([limited1, limited2, limited3], [result1, result2, result3])
-    }
-
-    /// Commands of insertion and rotation within their common bound, how far each may move, and whether they were not.
-    fn couple(&self, [u1, u2]: [f64; 2], [c1, c2]: [f64; 2]) -> ([f64; 2], [Option<f64>; 2], bool) {
-        let [first, second, _] = &self.dofs;
-        let (Some((du1, dc1)), Some((du2, dc2)), true) =
-            (first.motion(u1, c1), second.motion(u2, c2), self.is_coupled)
-        else {
-            return ([c1, c2], [None; 2], false);
-        };
-        let (unit1, unit2) = (first.lead_limit, second.lead_limit);
-        let norm = |x: f64, y: f64| libm::sqrt(square(x / unit1) + square(y / unit2));
-        let moved = norm(du1, du2);
-        let rounding = if moved > 0.0 { SUM_ROUNDING } else { 0.0 };
-        let gain = first.gain_limit.min(second.gain_limit);
-        let reach = gain * moved * (1.0 + ROUNDING) + rounding;
-        let length = norm(dc1, dc2);
-        let reaches = [Some(reach * unit1), Some(reach * unit2)];
-        if length.is_nan() || length <= reach {
-            return ([c1, c2], reaches, false);
+        reference: [f64; N],
+        command: [f64; N],
+    ) -> ([f64; N], [LimiterResult; N]) {
+        let (mut commands, mut results) = (command, [LimiterResult::Unchanged; N]);
+        for group in 0..N {
+            let members = self.friction.members(group);
+            self.limit_group(members, reference, &mut commands, &mut results);
         }
-        let kept = reach / length;
-        let commands = [c1 - (1.0 - kept) * dc1, c2 - (1.0 - kept) * dc2];
-        (commands, reaches, true)
+        (commands, results)
     }
 
-    /// Commands of insertion and rotation that their own limits have moved beyond the common bound, and whether there
-    /// were such: brought back to it towards the motion of the reference, which is within every limit of a DOF.
-    fn couple_again(
+    /// Limits the commands of the DOFs of a group.
+    fn limit_group(
         &mut self,
-        before: [Option<(f64, f64)>; 2],
-        reference: [f64; 2],
-        command: [f64; 2],
-    ) -> ([f64; 2], bool) {
-        let [first, second, _] = &mut self.dofs;
-        let ([Some((l1, b1)), Some((l2, b2))], true) = (before, self.is_coupled) else {
-            return (command, false);
+        members: [bool; N],
+        reference: [f64; N],
+        commands: &mut [f64; N],
+        results: &mut [LimiterResult; N],
+    ) {
+        let bound = self.common_bound(members, reference);
+        let is_violated = bound.is_some_and(|bound| bound.length(*commands) > bound.reach);
+        let dofs = self.dofs.iter_mut().zip(members).zip(reference);
+        let outputs = commands.iter_mut().zip(results.iter_mut());
+        for (((limiter, own), reference), (command, result)) in dofs.zip(outputs) {
+            if own {
+                let reach = bound.map(|bound| bound.reach * limiter.lead_limit);
+                (*command, *result) = limiter.limit(reference, *command, reach);
+            }
+        }
+        let has_changed = bound.is_some_and(|bound| bound.bring_back(commands));
+        let dofs = self.dofs.iter_mut().zip(members).zip(reference);
+        let outputs = commands.iter().zip(results);
+        for (((limiter, own), reference), (command, result)) in dofs.zip(outputs) {
+            if own && has_changed {
+                limiter.last = Some((reference, *command));
+            }
+            if own && is_violated {
+                *result = LimiterResult::Violation;
+            } else if own && has_changed && *result == LimiterResult::Unchanged {
+                *result = LimiterResult::LeadLimited;
+            }
+        }
+    }
+
+    /// The common bound of the DOFs of a group; None for a DOF by itself and before the first command.
+    fn common_bound(&self, members: [bool; N], reference: [f64; N]) -> Option<CommonBound<N>> {
+        if members.iter().filter(|own| **own).count() < 2 {
+            return None;
+        }
+        let last = self.dofs.map(|limiter| limiter.last);
+        let mut bound = CommonBound {
+            members,
+            unit: self.dofs.map(|limiter| limiter.lead_limit),
+            last: last.map(|last| last.map_or(f64::NAN, |(_, command)| command)),
+            motion: [0.0; N],
+            gain: f64::INFINITY,
+            reach: 0.0,
         };
-        let ([u1, u2], [c1, c2]) = (reference, command);
-        let units = [first.lead_limit, second.lead_limit];
-        let [unit1, unit2] = units;
-        let (du, dc) = (
-            [(u1 - l1) / unit1, (u2 - l2) / unit2],
-            [(c1 - b1) / unit1, (c2 - b2) / unit2],
-        );
-        let product = |[a, b]: [f64; 2], [c, d]: [f64; 2]| a * c + b * d;
-        let gain = first.gain_limit.min(second.gain_limit);
-        let bound = square(gain) * product(du, du);
-        let exceeds = product(dc, dc) > bound * square(1.0 + ROUNDING) + square(SUM_ROUNDING);
+        let motions = bound.motion.iter_mut().zip(members).zip(reference);
+        for (((motion, own), reference), limiter) in motions.zip(&self.dofs) {
+            if own {
+                let (last, _) = limiter.last?;
+                *motion = (reference - last) / limiter.lead_limit;
+                bound.gain = bound.gain.min(limiter.gain_limit);
+            }
+        }
+        let moved = libm::sqrt(dot(bound.motion, bound.motion));
+        let rounding = if moved > 0.0 { SUM_ROUNDING } else { 0.0 };
+        bound.reach = bound.gain * moved * (1.0 + ROUNDING) + rounding;
+        Some(bound)
+    }
+
+    /// Moves the origin of the reference by `shift` (N,).
+    pub fn shift_reference(&mut self, shift: [f64; N]) {
+        for (limiter, shift) in self.dofs.iter_mut().zip(shift) {
+            if let Some((reference, _)) = &mut limiter.last {
+                *reference += shift;
+            }
+        }
+    }
+}
+
+/// Common bound of the DOFs of a group in a tick. Motions are in `width_limit`, and 0 for the other DOFs.
+#[derive(Debug, Clone, Copy)]
+struct CommonBound<const N: usize> {
+    members: [bool; N],
+    unit: [f64; N],
+    /// Last commands.
+    last: [f64; N],
+    /// Motion of the reference.
+    motion: [f64; N],
+    gain: f64,
+    /// Largest length of the motion of the commands.
+    reach: f64,
+}
+
+impl<const N: usize> CommonBound<N> {
+    /// Brings commands beyond the bound back to it, towards the motion of the reference, which is within every limit of a
+    /// DOF; whether there were such.
+    fn bring_back(&self, commands: &mut [f64; N]) -> bool {
+        let step = self.step(*commands);
+        let bound = square(self.gain) * dot(self.motion, self.motion);
+        let exceeds = dot(step, step) > bound * square(1.0 + ROUNDING) + square(SUM_ROUNDING);
         if !exceeds {
-            return (command, false);
+            return false;
         }
         // Between no motion and the command, as near to the motion of the reference as may be.
-        let mut inner = du;
-        let mut rest = dc;
-        for ((inner, rest), dc) in inner.iter_mut().zip(&mut rest).zip(dc) {
-            *inner = inner.max(dc.min(0.0)).min(dc.max(0.0));
-            *rest -= *inner;
+        let inner = zip_with(self.motion, step, |motion, step| {
+            motion.max(step.min(0.0)).min(step.max(0.0))
+        });
+        let rest = zip_with(step, inner, |step, inner| step - inner);
+        let (along, length) = (dot(inner, rest), dot(rest, rest));
+        let left = bound - dot(inner, inner);
+        let share = if left > 0.0 {
+            left / (along + libm::sqrt(square(along) + length * left))
+        } else {
+            0.0
+        };
+        let bounded = zip_with(inner, rest, |inner, rest| inner + share.min(1.0) * rest);
+        let bounded = zip_with(bounded, self.unit, |step, unit| unit * step);
+        let dofs = commands.iter_mut().zip(self.members);
+        for ((command, own), (last, step)) in dofs.zip(self.last.into_iter().zip(bounded)) {
+            if own {
+                *command = last + step;
+            }
         }
-        let (along, length) = (product(inner, rest), product(rest, rest));
-        let left = (bound - product(inner, inner)).max(0.0);
-        let share = left / (along + libm::sqrt(square(along) + length * left));
-        let share = share.clamp(0.0, 1.0);
-        let ([i1, i2], [r1, r2]) = (inner, rest);
-        let bounded = [
-            b1 + unit1 * (i1 + share * r1),
-            b2 + unit2 * (i2 + share * r2),
-        ];
-        for (limiter, (reference, command)) in [first, second]
-            .into_iter()
-            .zip(reference.into_iter().zip(bounded))
-        {
-            limiter.last = Some((reference, command));
-        }
-        (bounded, true)
+        true
     }
 
-    /// Moves the origin of the reference by `shift` (3,).
-    pub fn shift_reference(&mut self, shift: PerDof<f64>) {
-        for (limiter, shift) in self.dofs.iter_mut().zip(shift) {
-            limiter.shift_reference(shift);
-        }
+    /// Motion of the commands since the last ones.
+    fn step(&self, commands: [f64; N]) -> [f64; N] {
+        let step = zip_with(commands, self.last, |command, last| command - last);
+        let step = zip_with(step, self.unit, |step, unit| step / unit);
+        zip_with(step, self.members, |step, own| if own { step } else { 0.0 })
     }
+
+    fn length(&self, commands: [f64; N]) -> f64 {
+        let step = self.step(commands);
+        libm::sqrt(dot(step, step))
+    }
+}
+
+fn dot<const N: usize>(a: [f64; N], b: [f64; N]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// `unchanged` if a bound has left the command as it was, bit for bit, else `changed`.

@@ -1,6 +1,5 @@
 //! Frame gate: whether a frame is used, by its times, by its image, and by the innovation (innovation gate).
 
-use crate::dof::PerDof;
 use crate::error::{ConfigError, require_positive};
 use crate::settings::DofSettings;
 use crate::supervision::flags::{Flag, Flags};
@@ -17,15 +16,15 @@ pub enum ImageIdentity {
 
 /// A frame on arrival.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FrameArrival {
+pub struct FrameArrival<const N: usize> {
     /// Capture time, in s.
     pub captured_at: f64,
     /// Time of the newest control tick, in s.
     pub now: f64,
     /// None if neither pixels nor features are known.
     pub image: Option<ImageIdentity>,
-    /// Path length of the command at the capture time [m, rad, rad]; None where the history does not reach.
-    pub travel: Option<PerDof<f64>>,
+    /// Path length of the command at the capture time [m or rad]; None where the history does not reach.
+    pub travel: Option<[f64; N]>,
 }
 
 /// Accepts or refuses frames, by their times, their images and their innovation.
@@ -33,22 +32,22 @@ pub struct FrameArrival {
 /// A frame is refused whose innovation is beyond `innovation_limit`, in standard deviations of prediction and measurement
 /// together (Mahalanobis distance).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FrameGate {
-    settings: SafetySettings,
-    /// [m, rad, rad], as all lengths below.
-    frozen_travel: PerDof<f64>,
+pub struct FrameGate<const N: usize> {
+    settings: SafetySettings<N>,
+    /// [m or rad], as all lengths below.
+    frozen_travel: [f64; N],
     captured_at: Option<f64>,
     arrived_at: Option<f64>,
     /// The image that frames since then repeat, and the path length of the command then.
-    repeated: Option<(ImageIdentity, PerDof<f64>)>,
+    repeated: Option<(ImageIdentity, [f64; N])>,
 }
 
-impl FrameGate {
+impl<const N: usize> FrameGate<N> {
     /// The gate before the first frame.
     ///
     /// # Errors
     /// A value is not a finite number above 0.
-    pub fn new(safety: &SafetySettings, dofs: &PerDof<DofSettings>) -> Result<Self, ConfigError> {
+    pub fn new(safety: &SafetySettings<N>, dofs: &[DofSettings; N]) -> Result<Self, ConfigError> {
         let frozen_travel = dofs.map(|dof| dof.update_distance * safety.frozen_travel);
         for (field, value) in [
             ("frame_age", safety.frame_age),
@@ -77,7 +76,7 @@ impl FrameGate {
     }
 
     /// Check the times and the image of a frame, before its features.
-    pub fn check_arrival(&mut self, arrival: &FrameArrival) -> Flags {
+    pub fn check_arrival(&mut self, arrival: &FrameArrival<N>) -> Flags {
         let FrameArrival {
             captured_at, now, ..
         } = *arrival;
@@ -97,7 +96,7 @@ impl FrameGate {
             .union(Flags::when(self.is_frozen(arrival), Flag::Frozen))
     }
 
-    fn is_frozen(&mut self, arrival: &FrameArrival) -> bool {
+    fn is_frozen(&mut self, arrival: &FrameArrival<N>) -> bool {
         let (Some(image), Some(travel)) = (arrival.image, arrival.travel) else {
             return false;
         };

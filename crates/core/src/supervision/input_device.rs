@@ -1,6 +1,5 @@
 //! Monitor of the operator's input device: silence, and jumps that no operator makes.
 
-use crate::dof::PerDof;
 use crate::error::{ConfigError, require_positive};
 use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::settings::SafetySettings;
@@ -25,23 +24,23 @@ use crate::supervision::settings::SafetySettings;
 /// a device has a coarser resolution than `reference_count` or gives fewer than about 30 values a second, so that a fast
 /// start passes for silence.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct InputDeviceMonitor {
+pub struct InputDeviceMonitor<const N: usize> {
     period: f64,
-    reference_speed: PerDof<f64>,
-    reference_count: PerDof<f64>,
+    reference_speed: [f64; N],
+    reference_count: [f64; N],
     reference_age: f64,
     /// v.
-    speeds: PerDof<f64>,
+    speeds: [f64; N],
     /// T.
-    repeated: PerDof<f64>,
+    repeated: [f64; N],
 }
 
-impl InputDeviceMonitor {
+impl<const N: usize> InputDeviceMonitor<N> {
     /// The monitor of an input at rest, for a control period in s.
     ///
     /// # Errors
     /// A value is not a finite number above 0.
-    pub fn new(safety: &SafetySettings, period: f64) -> Result<Self, ConfigError> {
+    pub fn new(safety: &SafetySettings<N>, period: f64) -> Result<Self, ConfigError> {
         require_positive("period", period)?;
         for (field, values) in [
             ("reference_speed", safety.reference_speed),
@@ -57,15 +56,15 @@ impl InputDeviceMonitor {
             reference_speed: safety.reference_speed,
             reference_count: safety.reference_count,
             reference_age: safety.reference_age,
-            speeds: [0.0; 3],
-            repeated: [0.0; 3],
+            speeds: [0.0; N],
+            repeated: [0.0; N],
         })
     }
 
-    /// Check the increments (3,) [m, rad, rad] of a tick that came `elapsed` in s after the last one.
+    /// Check the increments (N,) [m or rad] of a tick that came `elapsed` in s after the last one.
     ///
     /// Raises `ReferenceLate` after a silence, and `ReferenceJump` out of a motion.
-    pub fn update(&mut self, increments: PerDof<f64>, elapsed: f64) -> Flags {
+    pub fn update(&mut self, increments: [f64; N], elapsed: f64) -> Flags {
         let elapsed = elapsed.max(self.period);
         let axes = self.speeds.iter_mut().zip(&mut self.repeated);
         let limits = self.reference_speed.into_iter().zip(self.reference_count);
@@ -91,7 +90,7 @@ impl InputDeviceMonitor {
 
     /// Forget the motion before: the next increment is compared with an input at rest.
     pub const fn reset(&mut self) {
-        self.speeds = [0.0; 3];
-        self.repeated = [0.0; 3];
+        self.speeds = [0.0; N];
+        self.repeated = [0.0; N];
     }
 }

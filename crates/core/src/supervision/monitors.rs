@@ -2,7 +2,7 @@
 
 use crate::article::play::Play;
 use crate::article::play_limit::PlayLimit;
-use crate::dof::PerDof;
+use crate::dof::Friction;
 use crate::error::ConfigError;
 use crate::settings::DofSettings;
 use crate::supervision::command_limiter::{CommandLimiters, LimiterResult};
@@ -27,21 +27,19 @@ pub struct Supervision {
     pub lead: f64,
 }
 
-/// The law of the three DOFs, as far as supervision wraps it.
-pub trait Law {
-    /// The command c (3,) [m, rad, rad]; NaN before the first reference.
-    fn command(&self) -> PerDof<f64>;
+/// The law of N DOFs, as far as supervision wraps it.
+pub trait Law<const N: usize> {
+    /// The command c (N,) [m or rad]; NaN before the first reference.
+    fn command(&self) -> [f64; N];
 
-    /// Control tick: follow the next reference. `limit` is called exactly once, with the command of the law; the law
-    /// continues from what it returns.
-    fn step_within(
-        &mut self,
-        reference: PerDof<f64>,
-        limit: impl FnOnce(PerDof<f64>) -> PerDof<f64>,
-    );
+    /// Control tick: the law's command for the next reference, not yet adopted.
+    fn propose(&mut self, reference: [f64; N]) -> [f64; N];
 
-    /// Count the reference from elsewhere by `shift` (3,); the command stays.
-    fn shift_reference(&mut self, shift: PerDof<f64>);
+    /// Continue from the command that was sent: the proposed one, as the limiter left it.
+    fn commit(&mut self, command: [f64; N]);
+
+    /// Count the reference from elsewhere by `shift` (N,); the command stays.
+    fn shift_reference(&mut self, shift: [f64; N]);
 
     /// Use this share of the compensation: all with 1, none with 0. Bumpless.
     fn set_share(&mut self, share: f64);
@@ -51,65 +49,64 @@ pub trait Law {
 ///
 /// While no flag is raised, it changes no bit of the loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Monitors {
-    gate: ReferenceGate,
-    limiters: CommandLimiters,
-    pub(crate) frames: FrameGate,
-    motion: MotionMonitor,
-    supervisor: Supervisor,
-    play_limits: PerDof<PlayLimit>,
-    unit: PerDof<f64>,
+pub struct Monitors<const N: usize> {
+    gate: ReferenceGate<N>,
+    limiters: CommandLimiters<N>,
+    pub(crate) frames: FrameGate<N>,
+    motion: MotionMonitor<N>,
+    supervisor: Supervisor<N>,
+    play_limits: [PlayLimit; N],
+    unit: [f64; N],
     off: Flags,
     time: f64,
-    /// The share of the compensation that the laws use.
+    /// Share of the compensation that the supervisor allows, as the law uses it, and that the operator has chosen.
     share: f64,
+    chosen: f64,
 }
 
-impl Monitors {
-    /// Supervision of three DOFs with a control period in s; `is_coupled` as of [`CommandLimiters`].
+impl<const N: usize> Monitors<N> {
+    /// Supervision of N DOFs with a control period in s; those that share a friction are bounded together.
     ///
     /// # Errors
     /// A setting is out of range.
     pub fn new(
-        safety: &SafetySettings,
-        dofs: &PerDof<DofSettings>,
+        safety: &SafetySettings<N>,
+        dofs: &[DofSettings; N],
         period: f64,
-        is_coupled: bool,
+        friction: Friction<N>,
     ) -> Result<Self, ConfigError> {
-        let [w1, w2, w3] = safety.width_limit;
-        let [o1, o2, o3] = safety.offset_limit;
+        let mut play_limits = [PlayLimit::NONE; N];
+        if !safety.off.contains(Flag::WidthLimit) {
+            let limits = safety.width_limit.into_iter().zip(safety.offset_limit);
+            for (limit, (width, offset)) in play_limits.iter_mut().zip(limits) {
+                *limit = PlayLimit::new(width, offset)?;
+            }
+        }
         Ok(Self {
             gate: ReferenceGate::new(safety, dofs, period)?,
-            limiters: CommandLimiters::new(safety, dofs, period, is_coupled)?,
+            limiters: CommandLimiters::new(safety, dofs, period, friction)?,
             frames: FrameGate::new(safety, dofs)?,
             motion: MotionMonitor::new(safety, dofs, period)?,
             supervisor: Supervisor::new(safety)?,
-            play_limits: if safety.off.contains(Flag::WidthLimit) {
-                [PlayLimit::NONE; 3]
-            } else {
-                [
-                    PlayLimit::new(w1, o1)?,
-                    PlayLimit::new(w2, o2)?,
-                    PlayLimit::new(w3, o3)?,
-                ]
-            },
+            play_limits,
             unit: safety.width_limit,
             off: safety.off,
             time: f64::NAN,
             share: 1.0,
+            chosen: 1.0,
         })
     }
 
     /// Limits of the estimated offsets.
-    pub(crate) const fn play_limits(&self) -> PerDof<PlayLimit> {
+    pub(crate) const fn play_limits(&self) -> [PlayLimit; N] {
         self.play_limits
     }
 
     /// A control tick: gate, law, limiter.
-    pub(crate) fn step<L: Law>(
+    pub(crate) fn step<L: Law<N>>(
         &mut self,
         law: &mut L,
-        reference: PerDof<f64>,
+        reference: [f64; N],
         stamp: Option<f64>,
         time: f64,
     ) {
@@ -137,46 +134,42 @@ impl Monitors {
         self.supervisor.update(&event);
     }
 
-    /// Step the law within the limiters.
+    /// Step the law within the limiters: propose, limit, commit.
     ///
     /// Where a limit binds, the share of the reference's motion that the command could not follow is discarded: never
     /// more than the reference moved, which crossing the slack takes for more.
-    fn step_law<L: Law>(
+    fn step_law<L: Law<N>>(
         &mut self,
         law: &mut L,
-        reference: PerDof<f64>,
-        increments: PerDof<f64>,
+        reference: [f64; N],
+        increments: [f64; N],
         event: &mut Event,
     ) {
+        let before = law.command();
+        let proposed = law.propose(reference);
         if self.off.contains(Flag::Monitor) {
-            law.step_within(reference, |command| command);
+            law.commit(proposed);
             return;
         }
-        let before = law.command();
-        let mut shifts = [0.0; 3];
-        let mut results = [LimiterResult::Unchanged; 3];
-        law.step_within(reference, |command| {
-            let limited;
-            (limited, results) = self.limiters.limit(reference, command);
-            let motions = limited.into_iter().zip(before).zip(command).zip(increments);
-            for (shift, (((limited, before), command), increment)) in shifts.iter_mut().zip(motions)
-            {
-                let followed = (limited - before) / (command - before);
-                *shift = -increment * (1.0 - followed.clamp(0.0, 1.0));
-            }
-            limited
-        });
-        for ((shift, increment), result) in shifts.iter_mut().zip(increments).zip(results) {
+        let (limited, results) = self.limiters.limit(reference, proposed);
+        law.commit(limited);
+        let mut shifts = [0.0; N];
+        let motions = limited.into_iter().zip(before).zip(proposed);
+        let parts = motions.zip(increments.into_iter().zip(results));
+        for (shift, (((limited, before), proposed), (increment, result))) in
+            shifts.iter_mut().zip(parts)
+        {
             match result {
-                LimiterResult::Unchanged => {
-                    *shift = 0.0;
-                    continue;
-                }
-                LimiterResult::LeadLimited => *shift = 0.0,
+                LimiterResult::Unchanged => continue,
+                LimiterResult::LeadLimited => {}
                 LimiterResult::Limited | LimiterResult::Jump | LimiterResult::Violation => {
-                    if !shift.is_finite() {
-                        *shift = -increment;
-                    }
+                    let followed = (limited - before) / (proposed - before);
+                    let missed = -increment * (1.0 - followed.clamp(0.0, 1.0));
+                    *shift = if missed.is_finite() {
+                        missed
+                    } else {
+                        -increment
+                    };
                 }
             }
             let jump = Flags::when(result == LimiterResult::Jump, Flag::CommandJump);
@@ -188,23 +181,29 @@ impl Monitors {
                 event.severe = event.severe.union(Flags::of(Flag::Monitor));
             }
         }
-        if results != [LimiterResult::Unchanged; 3] {
+        if results != [LimiterResult::Unchanged; N] {
             law.shift_reference(shifts);
             self.limiters.shift_reference(shifts);
         }
         self.gate.shift(shifts);
     }
 
-    fn set_share<L: Law>(&mut self, law: &mut L) {
+    fn set_share<L: Law<N>>(&mut self, law: &mut L) {
         let share = self.supervisor.gain_share();
         if (share - self.share).abs() > 0.0 {
             self.share = share;
-            law.set_share(share);
+            law.set_share(share * self.chosen);
         }
     }
 
+    /// Use this share of the compensation, of which the supervisor allows a share.
+    pub(crate) fn choose_share<L: Law<N>>(&mut self, law: &mut L, share: f64) {
+        self.chosen = share;
+        law.set_share(share * self.supervisor.gain_share());
+    }
+
     /// Check a frame on its arrival.
-    pub(crate) fn check_arrival(&mut self, arrival: &FrameArrival) -> Flags {
+    pub(crate) fn check_arrival(&mut self, arrival: &FrameArrival<N>) -> Flags {
         let flags = self.frames.check_arrival(arrival);
         self.enabled(flags)
     }
@@ -214,18 +213,18 @@ impl Monitors {
         flags.difference(self.off)
     }
 
-    /// The reference behind the gate (3,) [m, rad, rad]; NaN before the first.
-    pub(crate) fn reference(&self) -> PerDof<f64> {
+    /// The reference behind the gate (N,) [m or rad]; NaN before the first.
+    pub(crate) fn reference(&self) -> [f64; N] {
         self.gate.reference()
     }
 
-    /// Check reference and measured tip (3,) [m, rad, rad] of an image of `time` in s, with the estimated play.
+    /// Check reference and measured tip (N,) [m or rad] of an image of `time` in s, with the estimated play.
     pub(crate) fn check_motion(
         &mut self,
         time: f64,
-        reference: PerDof<f64>,
-        measured: PerDof<f64>,
-        play: PerDof<Play>,
+        reference: [f64; N],
+        measured: [f64; N],
+        play: [Play; N],
     ) -> Flags {
         let flags = self
             .motion

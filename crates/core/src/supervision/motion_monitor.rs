@@ -1,7 +1,7 @@
 //! Motion monitor: tremor, overcompensation, and limit cycles of operator and instrument.
 
 use crate::article::play::Play;
-use crate::dof::PerDof;
+use crate::dof::zip_with;
 use crate::error::{ConfigError, require, require_positive};
 use crate::settings::DofSettings;
 use crate::supervision::flags::{Flag, Flags};
@@ -30,8 +30,8 @@ const TREMOR_TIME: f64 = 1.0;
 ///
 /// Wrong about overcompensation when the images' time stamps are wrong, because the tip is then measured too late.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MotionMonitor {
-    axes: PerDof<DofMotion>,
+pub struct MotionMonitor<const N: usize> {
+    axes: [DofMotion; N],
     /// exp(-period / 1 s).
     decay: f64,
     tremor_rate: f64,
@@ -48,14 +48,14 @@ struct StrokeLimits {
     cycle_time: f64,
 }
 
-impl MotionMonitor {
+impl<const N: usize> MotionMonitor<N> {
     /// The monitor before the first motion, for a control period in s.
     ///
     /// # Errors
     /// A value is not a finite number above 0, or `cycle_swings` is 0.
     pub fn new(
-        safety: &SafetySettings,
-        dofs: &PerDof<DofSettings>,
+        safety: &SafetySettings<N>,
+        dofs: &[DofSettings; N],
         period: f64,
     ) -> Result<Self, ConfigError> {
         let tremor_swing = dofs.map(|dof| dof.update_distance * safety.tremor_swing);
@@ -83,16 +83,13 @@ impl MotionMonitor {
         }
         let swings = safety.cycle_swings;
         require(swings > 0, "cycle_swings", f64::from(swings), "1 or above")?;
-        let [t1, t2, t3] = tremor_swing;
-        let [w1, w2, w3] = safety.width_limit;
-        let [b1, b2, b3] = turn;
-        let [a1, a2, a3] = ahead;
+        let axes = dofs.map(|dof| DofMotion::new(&dof, safety.tremor_swing));
         Ok(Self {
-            axes: [
-                DofMotion::new(t1, w1, b1, a1),
-                DofMotion::new(t2, w2, b2, a2),
-                DofMotion::new(t3, w3, b3, a3),
-            ],
+            axes: zip_with(axes, safety.width_limit, |axis, width| DofMotion {
+                width_limit: width,
+                ahead: safety.ahead_limit * width,
+                ..axis
+            }),
             decay: libm::exp(-period / TREMOR_TIME),
             tremor_rate: safety.tremor_rate,
             cycle_swings: swings,
@@ -106,7 +103,7 @@ impl MotionMonitor {
     }
 
     /// Update with the gated reference of a control tick.
-    pub fn update_reference(&mut self, reference: PerDof<f64>) -> Flags {
+    pub fn update_reference(&mut self, reference: [f64; N]) -> Flags {
         let mut is_tremor = false;
         for (axis, reference) in self.axes.iter_mut().zip(reference) {
             axis.reversals *= self.decay;
@@ -124,9 +121,9 @@ impl MotionMonitor {
     pub fn update_measurement(
         &mut self,
         time: f64,
-        reference: PerDof<f64>,
-        measured: PerDof<f64>,
-        play: PerDof<Play>,
+        reference: [f64; N],
+        measured: [f64; N],
+        play: [Play; N],
     ) -> Flags {
         let (mut is_ahead, mut cycles) = (false, false);
         let signals = reference.into_iter().zip(measured).zip(play);
@@ -164,19 +161,19 @@ struct DofMotion {
 }
 
 impl DofMotion {
-    const fn new(tremor_swing: f64, width_limit: f64, turn: f64, ahead: f64) -> Self {
+    const fn new(dof: &DofSettings, tremor_swing: f64) -> Self {
         let still = GrowingSwings {
             count: 0,
             swing: f64::INFINITY,
             time: f64::NAN,
         };
         Self {
-            width_limit,
-            ahead,
-            every_tick: TurningPoints::new(tremor_swing),
+            width_limit: f64::NAN,
+            ahead: f64::NAN,
+            every_tick: TurningPoints::new(dof.update_distance * tremor_swing),
             reversals: 0.0,
-            reference: TurningPoints::new(turn),
-            tip: TurningPoints::new(turn),
+            reference: TurningPoints::new(dof.update_distance),
+            tip: TurningPoints::new(dof.update_distance),
             extreme: (f64::NAN, f64::NAN),
             start: None,
             start_play: None,

@@ -1,11 +1,9 @@
 //! Prediction monitor: a tip that images find elsewhere than predicted.
 
-use crate::dof::PerDof;
+use crate::dof::zip_with;
 
 /// Time constant of the low-pass in s.
 const TIME: f64 = 0.15;
-/// Limits of the low-passed error in half of `width_limit`.
-const LIMIT: PerDof<f64> = [0.13, 0.3, 0.13];
 
 /// Monitors the error of the predicted tip.
 ///
@@ -19,29 +17,25 @@ const LIMIT: PerDof<f64> = [0.13, 0.3, 0.13];
 /// Blind to a fault that moves the tip as slowly as the estimate follows. Beyond the limits without a fault, too, where the
 /// prediction is poor: before the slack is known, and where the geometry is not as configured.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PredictionMonitor {
-    limit: PerDof<f64>,
-    error: PerDof<f64>,
+pub struct PredictionMonitor<const N: usize> {
+    limit: [f64; N],
+    error: [f64; N],
     time: f64,
 }
 
-impl PredictionMonitor {
-    /// The monitor before the first image, for half of `width_limit` (3,) [m, rad, rad].
-    pub fn new(unit: PerDof<f64>) -> Self {
-        let mut limit = LIMIT;
-        for (limit, unit) in limit.iter_mut().zip(unit) {
-            *limit *= unit;
-        }
+impl<const N: usize> PredictionMonitor<N> {
+    /// The monitor before the first image, for limits of the low-passed error (N,) in units (N,) [m or rad].
+    pub fn new(limit: [f64; N], unit: [f64; N]) -> Self {
         Self {
-            limit,
-            error: [0.0; 3],
+            limit: zip_with(limit, unit, |limit, unit| limit * unit),
+            error: [0.0; N],
             time: f64::NAN,
         }
     }
 
-    /// Update with an image captured at `time` in s: the tip predicted for it and the measured one (3,) [m, rad, rad]. Whether
+    /// Update with an image captured at `time` in s: the tip predicted for it and the measured one (N,) [m or rad]. Whether
     /// an error is beyond its limit.
-    pub fn update(&mut self, time: f64, predicted: PerDof<f64>, measured: PerDof<f64>) -> bool {
+    pub fn update(&mut self, time: f64, predicted: [f64; N], measured: [f64; N]) -> bool {
         let passed = (time - self.time).clamp(0.0, TIME);
         let share = if passed.is_nan() {
             0.0

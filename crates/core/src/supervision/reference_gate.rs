@@ -1,6 +1,6 @@
 //! Reference gate: validates the reference before the law, and clutches it (offset between input and reference).
 
-use crate::dof::{PerDof, all_finite};
+use crate::dof::{all_finite, zip_with};
 use crate::error::{ConfigError, require, require_positive};
 use crate::settings::DofSettings;
 use crate::supervision::flags::{Flag, Flags};
@@ -23,18 +23,18 @@ const ROUNDING: f64 = 1e-6;
 ///
 /// Wrong when an input runs away: slower than `reference_speed` it is followed as it is, and faster at the limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ReferenceGate {
+pub struct ReferenceGate<const N: usize> {
     period: f64,
     reference_age: f64,
     late_tick: f64,
     stall: f64,
-    limiter: ReferenceLimiter,
-    device: InputDeviceMonitor,
-    offset: PerDof<f64>,
+    limiter: ReferenceLimiter<N>,
+    device: InputDeviceMonitor<N>,
+    offset: [f64; N],
     /// The reference of the last tick, without the offset.
-    input: PerDof<f64>,
+    input: [f64; N],
     /// The gated reference of the last tick.
-    output: Option<PerDof<f64>>,
+    output: Option<[f64; N]>,
     time: Option<f64>,
     /// Whether the next reference sets the offset, wherever it is.
     is_engaging: bool,
@@ -42,25 +42,25 @@ pub struct ReferenceGate {
 
 /// A reference that has passed the gate.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GatedReference {
-    /// What the law follows (3,) [m, rad, rad]; None before the first reference that is finite.
-    pub reference: Option<PerDof<f64>>,
-    /// Its increments (3,) [m, rad, rad]; 0 for the first.
-    pub increments: PerDof<f64>,
+pub struct GatedReference<const N: usize> {
+    /// What the law follows (N,) [m or rad]; None before the first reference that is finite.
+    pub reference: Option<[f64; N]>,
+    /// Its increments (N,) [m or rad]; 0 for the first.
+    pub increments: [f64; N],
     /// What was wrong.
     pub raised: Flags,
     /// The flags in `raised` that go to their last reaction at once.
     pub severe: Flags,
 }
 
-impl ReferenceGate {
+impl<const N: usize> ReferenceGate<N> {
     /// The gate before the first reference, for a control period in s.
     ///
     /// # Errors
     /// A value is not a finite number above 0, or `late_tick` is not above 1.
     pub fn new(
-        safety: &SafetySettings,
-        dofs: &PerDof<DofSettings>,
+        safety: &SafetySettings<N>,
+        dofs: &[DofSettings; N],
         period: f64,
     ) -> Result<Self, ConfigError> {
         require_positive("period", period)?;
@@ -79,8 +79,8 @@ impl ReferenceGate {
             stall: safety.stall,
             limiter: ReferenceLimiter::new(safety, dofs, period)?,
             device: InputDeviceMonitor::new(safety, period)?,
-            offset: [0.0; 3],
-            input: [f64::NAN; 3],
+            offset: [0.0; N],
+            input: [f64::NAN; N],
             output: None,
             time: None,
             is_engaging: false,
@@ -92,12 +92,12 @@ impl ReferenceGate {
     /// The detectors in `off` are switched off.
     pub fn step(
         &mut self,
-        reference: PerDof<f64>,
+        reference: [f64; N],
         time: f64,
         stamp: Option<f64>,
         is_held: bool,
         off: Flags,
-    ) -> GatedReference {
+    ) -> GatedReference<N> {
         let elapsed = self.elapsed(time);
         let (late, severe) = self.check_times(elapsed, time, stamp);
         let invalid = Flags::when(!all_finite(reference), Flag::ReferenceInvalid);
@@ -105,7 +105,7 @@ impl ReferenceGate {
         let mut is_stopped = is_held || self.is_engaging || !late.union(severe).is_empty();
         let mut gated = GatedReference {
             reference: self.output,
-            increments: [0.0; 3],
+            increments: [0.0; N],
             raised: late.union(invalid.difference(off)),
             severe,
         };
@@ -122,10 +122,7 @@ impl ReferenceGate {
         };
         let mut next = self.add_offset(reference, last);
         if !is_stopped {
-            let mut increments = reference;
-            for (increment, before) in increments.iter_mut().zip(self.input) {
-                *increment -= before;
-            }
+            let increments = zip_with(reference, self.input, |input, before| input - before);
             let wrong = self.device.update(increments, elapsed).difference(off);
             is_stopped = !wrong.is_empty();
             gated.raised = gated.raised.union(wrong);
@@ -139,20 +136,16 @@ impl ReferenceGate {
         if is_stopped {
             self.limiter.reset();
             self.device.reset();
-            for ((offset, last), input) in self.offset.iter_mut().zip(last).zip(reference) {
-                *offset = last - input;
-            }
+            self.offset = zip_with(last, reference, |last, input| last - input);
             return gated;
         }
-        for ((increment, next), last) in gated.increments.iter_mut().zip(next).zip(last) {
-            *increment = next - last;
-        }
+        gated.increments = zip_with(next, last, |next, last| next - last);
         self.output = Some(next);
         gated.reference = self.output;
         gated
     }
 
-    fn add_offset(&self, reference: PerDof<f64>, last: PerDof<f64>) -> PerDof<f64> {
+    fn add_offset(&self, reference: [f64; N], last: [f64; N]) -> [f64; N] {
         let mut sums = last;
         let inputs = reference.into_iter().zip(self.input).zip(self.offset);
         for (sum, ((input, before), offset)) in sums.iter_mut().zip(inputs) {
@@ -164,13 +157,13 @@ impl ReferenceGate {
         sums
     }
 
-    /// The gated reference (3,) [m, rad, rad]; NaN before the first.
-    pub fn reference(&self) -> PerDof<f64> {
-        self.output.unwrap_or([f64::NAN; 3])
+    /// The gated reference (N,) [m or rad]; NaN before the first.
+    pub fn reference(&self) -> [f64; N] {
+        self.output.unwrap_or([f64::NAN; N])
     }
 
-    /// Discard `shift` (3,) [m, rad, rad] of the motion: the part by which the command could not follow.
-    pub fn shift(&mut self, shift: PerDof<f64>) {
+    /// Discard `shift` (N,) [m or rad] of the motion: the part by which the command could not follow.
+    pub fn shift(&mut self, shift: [f64; N]) {
         let Some(output) = &mut self.output else {
             return;
         };

@@ -1,6 +1,5 @@
 //! Speed limit of the reference: a reference that is too fast is followed at the limit, and lags.
 
-use crate::dof::PerDof;
 use crate::error::{ConfigError, require_positive};
 use crate::settings::DofSettings;
 use crate::supervision::flags::{Flag, Flags};
@@ -34,26 +33,26 @@ const ROUNDING: f64 = 1e-9;
 /// until the input has come back to it. It never travels farther than the input, and where the lag has gone it equals
 /// the input again.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ReferenceLimiter {
+pub struct ReferenceLimiter<const N: usize> {
     /// k.
     decay: f64,
     /// `reference_speed` period / (1 - k).
-    travel_limit: PerDof<f64>,
+    travel_limit: [f64; N],
     /// period `command_speed` / `gain_limit`.
-    step_limit: PerDof<f64>,
-    travel: PerDof<f64>,
+    step_limit: [f64; N],
+    travel: [f64; N],
     /// n.
-    ticks: PerDof<f64>,
+    ticks: [f64; N],
 }
 
-impl ReferenceLimiter {
+impl<const N: usize> ReferenceLimiter<N> {
     /// The limiter of a reference at rest, for a control period in s.
     ///
     /// # Errors
     /// A time or a speed is not a finite number above 0.
     pub fn new(
-        safety: &SafetySettings,
-        dofs: &PerDof<DofSettings>,
+        safety: &SafetySettings<N>,
+        dofs: &[DofSettings; N],
         period: f64,
     ) -> Result<Self, ConfigError> {
         require_positive("period", period)?;
@@ -69,20 +68,15 @@ impl ReferenceLimiter {
             decay,
             travel_limit: safety.reference_speed.map(|speed| speed * steady),
             step_limit,
-            travel: [0.0; 3],
-            ticks: [0.0; 3],
+            travel: [0.0; N],
+            ticks: [0.0; N],
         })
     }
 
-    /// Limit the motion from `last` to `next` (3,) [m, rad, rad], in place.
+    /// Limit the motion from `last` to `next` (N,) [m or rad], in place.
     ///
-    /// The input has moved by `increments` (3,) [m, rad, rad]. Raises `ReferenceFast` where a bound is exceeded.
-    pub fn limit(
-        &mut self,
-        next: &mut PerDof<f64>,
-        last: PerDof<f64>,
-        increments: PerDof<f64>,
-    ) -> Flags {
+    /// The input has moved by `increments` (N,) [m or rad]. Raises `ReferenceFast` where a bound is exceeded.
+    pub fn limit(&mut self, next: &mut [f64; N], last: [f64; N], increments: [f64; N]) -> Flags {
         let mut is_fast = false;
         let outputs = next.iter_mut().zip(last).zip(increments);
         let states = self.travel.iter_mut().zip(&mut self.ticks);
@@ -115,6 +109,6 @@ impl ReferenceLimiter {
 
     /// Forget the motion before.
     pub const fn reset(&mut self) {
-        (self.travel, self.ticks) = ([0.0; 3], [0.0; 3]);
+        (self.travel, self.ticks) = ([0.0; N], [0.0; N]);
     }
 }

@@ -1,32 +1,37 @@
 //! Settings of all monitors and of the supervisor.
 
-use crate::dof::PerDof;
 use crate::supervision::flags::Flags;
 
 /// Section `safety` of the configuration: the same names, units and meaning as in `python/tautscope/config/safety.py`,
 /// which has the defaults.
 ///
-/// Lengths of a degree of freedom are in [m, rad, rad]. A constructor checks the settings that it reads, and converts
+/// Lengths of a degree of freedom are in m or rad. A constructor checks the settings that it reads, and converts
 /// those that are in multiples of another length.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Deserialize))]
-pub struct SafetySettings {
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Deserialize),
+    serde(bound(
+        deserialize = "[f64; N]: serde::Deserialize<'de>, [(f64, f64); N]: serde::Deserialize<'de>"
+    ))
+)]
+pub struct SafetySettings<const N: usize = 3> {
     /// Detectors that are switched off.
     pub off: Flags,
-    /// Largest estimated width of the slack [m, rad, rad]; also the largest |c - u|, and the unit of the travels below.
-    pub width_limit: PerDof<f64>,
-    /// Largest absolute value of an estimated contact offset [m, rad, rad].
-    pub offset_limit: PerDof<f64>,
-    /// Largest speed of the reference over `reference_time` at which it is followed [m/s, rad/s, rad/s].
-    pub reference_speed: PerDof<f64>,
+    /// Largest estimated width of the slack [m or rad]; also the largest |c - u|, and the unit of the travels below.
+    pub width_limit: [f64; N],
+    /// Largest absolute value of an estimated contact offset [m or rad].
+    pub offset_limit: [f64; N],
+    /// Largest speed of the reference over `reference_time` at which it is followed [m/s or rad/s].
+    pub reference_speed: [f64; N],
     /// Time constant of the mean of the reference's speed, in s.
     pub reference_time: f64,
-    /// Largest speed of the command [m/s, rad/s, rad/s].
-    pub command_speed: PerDof<f64>,
-    /// Least and largest command [m, rad, rad].
-    pub command_travel: PerDof<(f64, f64)>,
-    /// Resolution of the input device, or its largest step from rest [m, rad, rad].
-    pub reference_count: PerDof<f64>,
+    /// Largest speed of the command [m/s or rad/s].
+    pub command_speed: [f64; N],
+    /// Least and largest command [m or rad].
+    pub command_travel: [(f64, f64); N],
+    /// Resolution of the input device, or its largest step from rest [m or rad].
+    pub reference_count: [f64; N],
     /// Largest age of a reference, and longest time for which a moving input device repeats its value, in s.
     pub reference_age: f64,
     /// Longest time between two control ticks whose motion is followed, in control periods.

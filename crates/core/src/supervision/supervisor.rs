@@ -34,8 +34,8 @@ pub struct Event {
 /// itself; while the estimate or motion is held, it stays. Compensation returns without an acknowledgement, which only
 /// clears the list of warnings.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Supervisor {
-    settings: SafetySettings,
+pub struct Supervisor<const N: usize> {
+    settings: SafetySettings<N>,
     active: [Option<ActiveFlag>; TABLE.len()],
     reaction: Reaction,
     flags: Flags,
@@ -54,12 +54,12 @@ struct ActiveFlag {
     good_events: u32,
 }
 
-impl Supervisor {
+impl<const N: usize> Supervisor<N> {
     /// The supervisor before the first event.
     ///
     /// # Errors
     /// A travel is not above 0, a time or the travel of a hold negative, a count 0, or one not finite.
-    pub fn new(settings: &SafetySettings) -> Result<Self, ConfigError> {
+    pub fn new(settings: &SafetySettings<N>) -> Result<Self, ConfigError> {
         require_non_negative("hold_time", settings.hold_time)?;
         require_non_negative("hold_travel", settings.hold_travel)?;
         require_positive("fade_travel", settings.fade_travel)?;
@@ -182,10 +182,10 @@ impl Supervisor {
 /// Update a flag with an event. Returns whether the flag is new or has escalated.
 // Not inlined, as above.
 #[inline(never)]
-fn update_flag(
+fn update_flag<const N: usize>(
     active: &mut Option<ActiveFlag>,
     rule: &Rule,
-    settings: &SafetySettings,
+    settings: &SafetySettings<N>,
     event: &Event,
     (time, travel): (f64, f64),
 ) -> bool {
@@ -228,7 +228,13 @@ fn update_flag(
 
 impl ActiveFlag {
     /// The level of a flag that is raised again.
-    fn next_level(&self, rule: &Rule, settings: &SafetySettings, time: f64, travel: f64) -> usize {
+    fn next_level<const N: usize>(
+        &self,
+        rule: &Rule,
+        settings: &SafetySettings<N>,
+        time: f64,
+        travel: f64,
+    ) -> usize {
         let is_over = time - self.since >= settings.hold_time
             || travel - self.since_travel >= settings.hold_travel;
         if rule.escalates && is_over {

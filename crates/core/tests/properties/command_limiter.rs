@@ -1,8 +1,9 @@
 //! The command limiter: its output keeps the law for any input.
 
+use crate::dof::Friction;
 use crate::error::ConfigError;
 use crate::settings::DofSettings;
-use crate::supervision::command_limiter::{CommandLimiter, LimiterResult};
+use crate::supervision::command_limiter::{CommandLimiters, LimiterResult};
 use crate::supervision::settings::SafetySettings;
 use proptest::prelude::*;
 
@@ -13,50 +14,47 @@ fn any_number() -> impl Strategy<Value = f64> {
     prop_oneof![8 => -300.0..300.0, 1 => any::<f64>(), 1 => Just(f64::NAN)]
 }
 
-fn settings() -> SafetySettings {
-    safety_in([1.0; 3])
+fn settings() -> SafetySettings<1> {
+    safety_in([1.0])
 }
 
-fn with(settings: &SafetySettings) -> Result<CommandLimiter, ConfigError> {
-    CommandLimiter::new(settings, &dofs()[1], 1, PERIOD)
+fn with(settings: &SafetySettings<1>, gain_limit: f64) -> Result<CommandLimiters<1>, ConfigError> {
+    let [_, dof, _] = dofs();
+    let dof = DofSettings { gain_limit, ..dof };
+    CommandLimiters::new(settings, &[dof], PERIOD, Friction::independent())
 }
 
 /// A limiter whose DOF moves by itself.
-struct Single(CommandLimiter);
+struct Single(CommandLimiters<1>);
 
 impl Single {
     fn limit(&mut self, reference: f64, command: f64) -> (f64, LimiterResult) {
-        self.0.limit(reference, command, None)
+        let ([limited], [result]) = self.0.limit([reference], [command]);
+        (limited, result)
     }
 }
 
 fn new_limiter() -> Single {
-    Single(with(&settings()).unwrap())
+    Single(with(&settings(), 5.0).unwrap())
 }
 
 #[test]
 fn settings_out_of_range_are_named() {
-    type Change = fn(&mut SafetySettings);
+    type Change = fn(&mut SafetySettings<1>);
     let changes: [(&str, Change); 4] = [
-        ("command_speed", |s| s.command_speed[1] = 0.0),
-        ("width_limit", |s| s.width_limit[1] = f64::NAN),
-        ("command_travel", |s| s.command_travel[1] = (1.0, 1.0)),
+        ("command_speed", |s| s.command_speed[0] = 0.0),
+        ("width_limit", |s| s.width_limit[0] = f64::NAN),
+        ("command_travel", |s| s.command_travel[0] = (1.0, 1.0)),
         ("command_travel", |s| {
-            s.command_travel[1] = (f64::NEG_INFINITY, 1.0);
+            s.command_travel[0] = (f64::NEG_INFINITY, 1.0);
         }),
     ];
     for (field, change) in changes {
         let mut wrong = settings();
         change(&mut wrong);
-        assert_eq!(with(&wrong).unwrap_err().field, field);
+        assert_eq!(with(&wrong, 5.0).unwrap_err().field, field);
     }
-    let [dof, ..] = dofs();
-    let wrong = DofSettings {
-        gain_limit: 0.9,
-        ..dof
-    };
-    let error = CommandLimiter::new(&settings(), &wrong, 0, PERIOD).unwrap_err();
-    assert_eq!(error.field, "gain_limit");
+    assert_eq!(with(&settings(), 0.9).unwrap_err().field, "gain_limit");
 }
 
 #[test]
@@ -191,7 +189,7 @@ fn a_shift_of_the_reference_is_no_motion() {
     for shift in [0.7, -0.7] {
         let mut limiter = new_limiter();
         limiter.limit(2.0, 3.0);
-        limiter.0.shift_reference(shift);
+        limiter.0.shift_reference([shift]);
         assert_eq!(
             limiter.limit(2.0 + shift, 3.1),
             (3.0, LimiterResult::Violation)

@@ -9,7 +9,7 @@ use proptest::prelude::*;
 use super::config;
 use super::support::{UNITS, dofs, safety};
 
-fn new_gate() -> FrameGate {
+fn new_gate() -> FrameGate<3> {
     FrameGate::new(&safety(), &dofs()).unwrap()
 }
 
@@ -47,7 +47,7 @@ proptest! {
 }
 
 /// The flags of a frame's times.
-fn arrive(gate: &mut FrameGate, captured_at: f64, now: f64, is_in_history: bool) -> Flags {
+fn arrive(gate: &mut FrameGate<3>, captured_at: f64, now: f64, is_in_history: bool) -> Flags {
     let travel = is_in_history.then_some([0.0; 3]);
     gate.check_arrival(&FrameArrival {
         captured_at,

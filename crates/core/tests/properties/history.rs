@@ -173,7 +173,7 @@ fn times_outside_the_history_have_no_entry() {
     );
     assert!(history.at(f64::NAN).is_none());
     assert!(
-        History::new(0.5, PERIOD, [Entry::BLANK; 102])
+        History::new(0.5, PERIOD, [Entry::<3>::BLANK; 102])
             .unwrap()
             .at(0.0)
             .is_none(),
@@ -209,7 +209,7 @@ fn equal_times_replace_and_entries_that_are_not_finite_are_ignored() {
 
 #[test]
 fn bad_spans_are_named() {
-    let new = |span, period| History::new(span, period, [Entry::BLANK; 12]);
+    let new = |span, period| History::new(span, period, [Entry::<3>::BLANK; 12]);
     assert_eq!(new(0.0, 0.1).unwrap_err().field, "span");
     assert_eq!(new(1.0, f64::NAN).unwrap_err().field, "period");
     assert!(new(1.0, 0.1).is_ok());

@@ -23,7 +23,7 @@ fn settings() -> SafetySettings {
     }
 }
 
-fn new_monitor() -> InputDeviceMonitor {
+fn new_monitor() -> InputDeviceMonitor<3> {
     InputDeviceMonitor::new(&settings(), PERIOD).unwrap()
 }
 

@@ -3,6 +3,7 @@
 // Where these compare floats for equality, equality to the last bit is what they claim.
 #![allow(clippy::float_cmp)]
 
+mod any_dofs;
 mod camera;
 mod command_limiter;
 mod compensator;

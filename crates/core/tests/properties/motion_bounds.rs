@@ -14,7 +14,7 @@ use super::support::{dofs, safety};
 const MORE: f64 = 1.0 + 1e-12;
 const LESS: f64 = 1.0 - 1e-12;
 
-fn new_monitor(tremor_rate: f64) -> MotionMonitor {
+fn new_monitor(tremor_rate: f64) -> MotionMonitor<3> {
     let settings = SafetySettings {
         width_limit: [4.0; 3],
         tremor_swing: 1.0,

@@ -14,7 +14,7 @@ const UNIT: f64 = UNITS[0];
 /// Control ticks from frame to frame.
 const FRAME: u32 = 8;
 
-fn new_monitor() -> MotionMonitor {
+fn new_monitor() -> MotionMonitor<3> {
     MotionMonitor::new(&safety(), &dofs(), PERIOD).unwrap()
 }
 

@@ -13,7 +13,7 @@ const TIME: f64 = 0.15;
 
 /// Whether each of some images is conspicuous, the first of which has no error; errors are of one DOF, in its unit.
 fn conspicuous(dof: usize, interval: f64, errors: &[f64]) -> Vec<bool> {
-    let mut monitor = PredictionMonitor::new(UNIT);
+    let mut monitor = PredictionMonitor::new(LIMIT, UNIT);
     let start = 2.0;
     assert!(!monitor.update(start, [0.0; 3], [0.0; 3]));
     let images = errors.iter().zip(1_u32..);
@@ -59,7 +59,7 @@ proptest! {
     /// Neither a DOF that is not known, nor a clock that stands or is set back, raises or hides anything.
     #[test]
     fn what_is_not_known_changes_nothing(time in -5.0..2.0_f64, error in 0.3..5.0_f64) {
-        let mut monitor = PredictionMonitor::new(UNIT);
+        let mut monitor = PredictionMonitor::new(LIMIT, UNIT);
         let off = [error * UNIT[0], 0.0, 0.0];
         prop_assert!(!monitor.update(2.0, [0.0; 3], off));
         prop_assert!(!monitor.update(2.5, [f64::NAN; 3], off));

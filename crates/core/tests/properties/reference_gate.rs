@@ -10,7 +10,7 @@ use super::support::{PERIOD, UNITS, dofs, safety};
 
 /// A gate whose input moves all DOFs, in units.
 struct Bench {
-    gate: ReferenceGate,
+    gate: ReferenceGate<3>,
     time: f64,
     input: f64,
 }
@@ -28,7 +28,7 @@ impl Bench {
         bench
     }
 
-    fn to(&mut self, input: f64, is_held: bool) -> GatedReference {
+    fn to(&mut self, input: f64, is_held: bool) -> GatedReference<3> {
         (self.input, self.time) = (input, self.time + PERIOD);
         let reference = UNITS.map(|unit| input * unit);
         self.gate
@@ -104,16 +104,21 @@ proptest! {
     }
 }
 
-fn step(gate: &mut ReferenceGate, input: f64, time: f64, stamp: Option<f64>) -> GatedReference {
+fn step(
+    gate: &mut ReferenceGate<3>,
+    input: f64,
+    time: f64,
+    stamp: Option<f64>,
+) -> GatedReference<3> {
     gate.step([input; 3], time, stamp, false, Flags::NONE)
 }
 
 /// A gate whose input was at 0 at time 0.
-fn started() -> ReferenceGate {
+fn started() -> ReferenceGate<3> {
     started_with(&safety())
 }
 
-fn started_with(settings: &SafetySettings) -> ReferenceGate {
+fn started_with(settings: &SafetySettings) -> ReferenceGate<3> {
     let mut gate = ReferenceGate::new(settings, &dofs(), PERIOD).unwrap();
     assert!(gate.reference().iter().all(|value| value.is_nan()));
     assert_eq!(step(&mut gate, 0.0, 0.0, None).raised, Flags::NONE);

@@ -16,7 +16,7 @@ const FAST: Flags = Flags::of(Flag::ReferenceFast);
 
 /// A gate whose input moves one DOF, and what it has let pass, in units.
 struct Bench {
-    gate: ReferenceGate,
+    gate: ReferenceGate<3>,
     dof: usize,
     tick: u32,
     input: f64,

@@ -11,7 +11,7 @@ use super::support::{PERIOD, UNITS, dofs, safety};
 
 /// One DOF, in units.
 struct Bench {
-    watch: MotionMonitor,
+    watch: MotionMonitor<3>,
     dof: usize,
     time: f64,
 }

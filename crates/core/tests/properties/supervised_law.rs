@@ -38,11 +38,11 @@ fn the_law_continues_from_a_limited_command() {
             compensator.step(&mut state, reference);
         }
         let before = state.command();
-        let limited = compensator.step_within(&mut state, 10.5, |command| {
-            assert!(close(command, before + 0.5));
-            before + 0.2
-        });
-        assert_eq!((limited, state.command()), (before + 0.2, before + 0.2));
+        assert!(close(compensator.propose(&mut state, 10.5), before + 0.5));
+        assert_eq!(state.command(), before);
+        let limited = before + 0.2;
+        compensator.commit(&mut state, limited);
+        assert_eq!(state.command(), limited);
         assert!(close(state.position(), 2.0));
         let next = compensator.step(&mut state, 10.6);
         assert!(close(next - limited, 0.1), "{}", next - limited);

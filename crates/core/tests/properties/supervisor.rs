@@ -9,7 +9,7 @@ use proptest::prelude::*;
 use super::config;
 use super::support::safety;
 
-fn supervisor() -> Supervisor {
+fn supervisor() -> Supervisor<3> {
     Supervisor::new(&safety()).unwrap()
 }
 
@@ -52,7 +52,7 @@ fn actions() -> impl Strategy<Value = Vec<Action>> {
     prop::collection::vec(action, 0..100)
 }
 
-fn apply(supervisor: &mut Supervisor, now: &mut f64, action: &Action, more: Flags) {
+fn apply(supervisor: &mut Supervisor<3>, now: &mut f64, action: &Action, more: Flags) {
     match action {
         Action::Update(source, step, travel, raised, severe) => {
             *now += if step.is_finite() { *step } else { 0.0 };
@@ -116,7 +116,7 @@ fn every_level_is_reached_and_cleared_as_the_table_says() {
             assert_eq!(supervisor.reaction(), *reaction, "{rule:?}");
             assert_eq!(supervisor.latched(), flag);
             assert_eq!(supervisor.flags(), flag);
-            let good = |supervisor: &mut Supervisor, count: u32| {
+            let good = |supervisor: &mut Supervisor<3>, count: u32| {
                 for _ in 0..count {
                     supervisor.update(&event(rule.source, now, 0.0, Flags::NONE));
                 }

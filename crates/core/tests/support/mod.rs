@@ -18,7 +18,7 @@ pub fn safety() -> SafetySettings {
 }
 
 /// Settings of the monitors with lengths in the given units.
-pub fn safety_in(units: [f64; 3]) -> SafetySettings {
+pub fn safety_in<const N: usize>(units: [f64; N]) -> SafetySettings<N> {
     SafetySettings {
         off: Flags::NONE,
         width_limit: units.map(|unit| 30.0 * unit),
@@ -55,7 +55,15 @@ pub fn safety_in(units: [f64; 3]) -> SafetySettings {
 
 /// Settings of the DOFs, with lengths in [`UNITS`].
 pub fn dofs() -> [DofSettings; 3] {
-    let [insertion, rotation, bending] = UNITS.map(|unit| DofSettings {
+    let [insertion, mut rotation, mut bending] = dofs_in(UNITS);
+    (rotation.expected_width, rotation.start_deviation) = (1.75, 0.6);
+    (bending.expected_width, bending.start_deviation) = (1.0, 0.5);
+    [insertion, rotation, bending]
+}
+
+/// Settings of DOFs with lengths in the given units.
+pub fn dofs_in<const N: usize>(units: [f64; N]) -> [DofSettings; N] {
+    units.map(|unit| DofSettings {
         update_distance: unit,
         observable_deviation: 1.0,
         expected_width: 8e-3,
@@ -67,18 +75,7 @@ pub fn dofs() -> [DofSettings; 3] {
         smoothing_factor: 0.25,
         delta_minus: 0.0,
         delta_plus: 0.0,
-    });
-    let rotation = DofSettings {
-        expected_width: 1.75,
-        start_deviation: 0.6,
-        ..rotation
-    };
-    let bending = DofSettings {
-        expected_width: 1.0,
-        start_deviation: 0.5,
-        ..bending
-    };
-    [insertion, rotation, bending]
+    })
 }
 
 /// Settings of a loop with these settings of the monitors.

@@ -3,7 +3,7 @@
 use crate::adaptive::vector_law::VectorLaw;
 use crate::article::play::Play;
 use crate::article::play_limit::PlayLimit;
-use crate::dof::PerDof;
+use crate::dof::{Friction, PerDof};
 use crate::estimation::filter::Filter;
 use crate::estimation::marker_measurement::TipMeasurement;
 use crate::supervision::flags::Flag;
@@ -17,6 +17,8 @@ struct CheckedLaw {
     law: VectorLaw,
     filter: Filter,
     reference: PerDof<f64>,
+    /// The reference of the proposed command.
+    next: PerDof<f64>,
     count: Count,
 }
 
@@ -44,8 +46,21 @@ impl CheckedLaw {
             .unwrap(),
             filter: Filter::new(settings.state_estimation, unit, start, [none; 3], radius).unwrap(),
             reference: [f64::NAN; 3],
+            next: [f64::NAN; 3],
             count: Count::default(),
         }
+    }
+
+    /// A tick whose command is cut to a part of its motion.
+    fn step(&mut self, reference: PerDof<f64>, part: f64) {
+        let before = self.law.command();
+        let mut command = self.propose(reference);
+        if part < 1.0 {
+            for (command, before) in command.iter_mut().zip(before) {
+                *command = before + part * (*command - before);
+            }
+        }
+        self.commit(command);
     }
 
     /// An image with any measurement; the estimate changes as much as it can.
@@ -125,21 +140,22 @@ impl CheckedLaw {
     }
 }
 
-impl Law for CheckedLaw {
+impl Law<3> for CheckedLaw {
     fn command(&self) -> PerDof<f64> {
         self.law.command()
     }
 
-    fn step_within(
-        &mut self,
-        reference: PerDof<f64>,
-        limit: impl FnOnce(PerDof<f64>) -> PerDof<f64>,
-    ) {
+    fn propose(&mut self, reference: PerDof<f64>) -> PerDof<f64> {
+        self.next = reference;
+        self.law.propose(reference, &self.filter)
+    }
+
+    fn commit(&mut self, command: PerDof<f64>) {
         let before = self.law.command();
-        self.law.step_within(reference, &mut self.filter, limit);
-        self.check(reference, before);
-        if reference.iter().all(|value| value.is_finite()) {
-            self.reference = reference;
+        self.law.commit(command, &mut self.filter);
+        self.check(self.next, before);
+        if self.next.iter().all(|value| value.is_finite()) {
+            self.reference = self.next;
         }
     }
 
@@ -202,14 +218,14 @@ fn bounds_of_the_vector_law() {
 
 fn vector_walk(seed: u64, wanted: u64) -> Count {
     let (mut random, mut checked) = (Random(seed), CheckedLaw::new());
-    checked.step_within([0.0; 3], |command| command);
+    checked.step([0.0; 3], 1.0);
     while checked.count.steps < wanted {
         let reference = checked.reference;
         match random.below(400) {
             0 | 1 => checked.measure(&mut random),
             2 => checked.set_share([0.0, 1.0, 0.3][usize::try_from(random.below(3)).unwrap()]),
             3 => checked.shift_reference(UNITS.map(|unit| unit * random.within(-1.0, 1.0))),
-            4 => checked.step_within([0.0, f64::NAN, 0.0], |command| command),
+            4 => checked.step([0.0, f64::NAN, 0.0], 1.0),
             _ => {
                 let next = moved(&mut random, reference);
                 let part = if random.below(10) == 0 {
@@ -217,16 +233,7 @@ fn vector_walk(seed: u64, wanted: u64) -> Count {
                 } else {
                     1.0
                 };
-                let before = checked.law.command();
-                checked.step_within(next, |command| {
-                    let mut limited = command;
-                    if part < 1.0 {
-                        for (limited, before) in limited.iter_mut().zip(before) {
-                            *limited = before + part * (*limited - before);
-                        }
-                    }
-                    limited
-                });
+                checked.step(next, part);
             }
         }
     }
@@ -242,7 +249,8 @@ fn bounds_of_the_supervised_vector_law() {
 
 fn supervised_walk(seed: u64, wanted: u64) -> Count {
     let (mut random, mut checked) = (Random(seed), CheckedLaw::new());
-    let mut monitors = Monitors::new(&safety(), &dofs(), PERIOD, true).unwrap();
+    let shaft = Friction::new([0, 0, 2], [1.0; 3]).unwrap();
+    let mut monitors = Monitors::new(&safety(), &dofs(), PERIOD, shaft).unwrap();
     let (mut reference, mut time, mut ticks) = ([0.0; 3], 0.0, 0);
     let mut led = [0.0_f64; 3];
     let mut speed = [0.0; 3];
