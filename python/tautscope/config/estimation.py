@@ -23,10 +23,10 @@ class EstimationConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only
     image_deviation: NonNegative = 6.0
     """Standard deviation of a shift of the image, by an error of the camera's pose or principal
     point [px]."""
-    misfit_deviation: NonNegative = 3.0
+    misfit_deviation: NonNegative = 4.0
     """Standard deviation of what else a feature errs, by a geometry that is not as configured
     [px]."""
-    misfit_travel: Positive = 1.0
+    misfit_travel: Positive = 2.0
     """Travel within which it errs alike."""
     outlier_distance: Positive = 4.0
     """Mahalanobis distance beyond which a marker is an outlier."""
