@@ -142,6 +142,29 @@ proptest! {
         }
     }
 
+    /// Mean of command less tip over the gain, of strokes in both directions.
+    #[test]
+    fn the_centre_is_that_of_the_predicted_contact_offsets(gain in 0.7..1.3_f64, centre in -0.3..0.3_f64, seed in 1..u64::MAX) {
+        let (mut truth, mut random, mut direct) = (Truth::new(0.6, centre, gain), Random(seed), Direct::new());
+        for (count, command) in commands(&mut random, 30).into_iter().enumerate() {
+            let tip = truth.step(command);
+            direct.step(command);
+            if count % 8 == 0 {
+                direct.update(tip, false);
+            }
+        }
+        let (slack, mut sum) = (direct.slack(), 0.0);
+        for side in [-1.0, 1.0] {
+            direct.step(ORIGIN + 4.0 * side * UNIT);
+            for part in -10..=10 {
+                let command = ORIGIN - 0.1 * f64::from(part) * side * UNIT;
+                let tip = direct.step(command);
+                sum += (command - ORIGIN - (tip - ORIGIN) / slack.gain) / 42.0;
+            }
+        }
+        prop_assert!((slack.centre - sum).abs() <= 0.04 * UNIT, "{slack:?} {sum}");
+    }
+
     /// The weights and the offset stay to the last bit.
     #[test]
     fn an_update_of_the_position_changes_the_deviation_alone(seed in 1..u64::MAX, push in -1.0..1.0_f64) {
