@@ -7,7 +7,8 @@ use crate::estimation::estimate_settings::EstimateSettings;
 use crate::estimation::kalman::Kalman;
 use crate::estimation::measurement::{Linear, Prior};
 use crate::model::plays::{
-    COEFFICIENTS, DEVIATION, OFFSET, OWN, Plays, Row, SHARED, Transmission, gain_row, product,
+    COEFFICIENTS, DEVIATION, OFFSET, OWN, Plays, Row, SHARED, Transmission, gain_row, middle_row,
+    product,
 };
 
 /// Expected half width, and its spread, in units: of the Gaussian weights of the plays over their radii.
@@ -322,11 +323,10 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
             let deviation = |row: &SVector<f64, D>| {
                 libm::sqrt(row.dot(&self.kalman.covariance_with(row)).max(0.0))
             };
-            let [.., offset, rest] = row;
             *slack = Slack {
                 half_width: unit * half.max(0.0),
                 half_width_std: unit * deviation(&by_half),
-                centre: -unit * (offset + rest) / gain_used,
+                centre: -unit * product(&middle_row(), &row) / gain_used,
                 gain: gain_used,
                 gain_std: deviation(&gains),
             };

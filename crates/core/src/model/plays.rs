@@ -316,6 +316,19 @@ pub fn gain_row() -> Row {
     row
 }
 
+/// Coefficients whose sum is the tip in the middle of the slack about the origin: offset, deviation, and of the bent plays the
+/// mean from -1 to 1.
+pub fn middle_row() -> Row {
+    let means = (0..OWN / 2).flat_map(|_| KNOTS.map(|knot: f64| (1.0 - knot) * (1.0 - knot) / 4.0));
+    let mut row = [0.0; COEFFICIENTS];
+    let values = means.chain([1.0, 1.0]);
+    row.iter_mut()
+        .skip(SHARED + OWN)
+        .zip(values)
+        .for_each(|(a, b)| *a = b);
+    row
+}
+
 /// Regressors times coefficients.
 pub fn product(a: &Row, b: &Row) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()

@@ -1,0 +1,334 @@
+//! Guarantees of the law of profile `plays`, for any number of DOFs and any estimate.
+
+use crate::article::play_limit::PlayLimit;
+use crate::dof::Friction;
+use crate::estimation::estimate::Slack;
+use crate::law::settings::LawSettings;
+use crate::law::vector_law::{Bounds, VectorLaw};
+use crate::model::plays::{
+    COEFFICIENTS, DEVIATION, OFFSET, OWN, Plays, Row, SHARED, Transmission, product,
+};
+
+use super::guarantees::Random;
+use super::support::{safety, settings};
+
+/// So that the coefficients in use are always the given ones.
+const AT_ONCE: f64 = 1e300;
+
+/// Excess that the law's search in a few steps may leave of the bound of the predicted tip.
+const SEARCH: f64 = 0.01;
+
+/// A law whose bounds are checked at every tick.
+struct Checked<const N: usize> {
+    law: VectorLaw<N>,
+    transmission: Transmission<N>,
+    bounds: Bounds<N>,
+    settings: LawSettings,
+    reference: [f64; N],
+    share: f64,
+    rows: [Row; N],
+    slack: [Slack; N],
+    /// Largest speed of the predicted tip over its bound.
+    fastest: f64,
+    /// Ticks in which a command moved otherwise than the reference.
+    compensated: u32,
+}
+
+/// Coefficients of any tip: a gain about 1, of plays some of which count negatively.
+fn row(random: &mut Random) -> Row {
+    let mut row = [0.0; COEFFICIENTS];
+    for weight in row.iter_mut().take(SHARED + OWN) {
+        *weight = random.within(-0.05, 0.2);
+    }
+    let sum: f64 = row.iter().sum();
+    let gain = random.within(0.6, 1.4);
+    row.iter_mut().for_each(|weight| *weight *= gain / sum);
+    for weight in row.iter_mut().take(OFFSET).skip(SHARED + OWN) {
+        *weight = random.within(-0.03, 0.03);
+    }
+    row[OFFSET] = random.within(-0.5, 0.5);
+    row[DEVIATION] = random.within(-0.1, 0.1);
+    row
+}
+
+impl<const N: usize> Checked<N> {
+    fn new(
+        group: [usize; N],
+        gain: [f64; N],
+        caution: f64,
+        change_rate: f64,
+        random: &mut Random,
+    ) -> Self {
+        let sizes = |random: &mut Random, low, high| {
+            core::array::from_fn::<_, N, _>(|_| random.within(low, high))
+        };
+        let friction = Friction::new(group, sizes(random, 0.5, 2.0)).unwrap();
+        let unit = sizes(random, 0.01, 1.0);
+        let transmission = Transmission::new(friction, unit).unwrap();
+        let settings = LawSettings {
+            caution,
+            change_rate,
+            ..settings(&safety()).law
+        };
+        let bounds = Bounds {
+            gain,
+            width_limit: unit.map(|unit| unit * random.within(1.0, 3.0)),
+            step: unit.map(|unit| unit * random.within(0.05, 0.2)),
+            offsets: unit.map(|unit| PlayLimit::new(2.0 * unit, 1.5 * unit).unwrap()),
+        };
+        let mut checked = Self {
+            law: VectorLaw::new(settings, transmission, &bounds).unwrap(),
+            transmission,
+            bounds,
+            settings,
+            reference: [0.0; N],
+            share: 1.0,
+            rows: [[0.0; COEFFICIENTS]; N],
+            slack: [Slack::default(); N],
+            fastest: 0.0,
+            compensated: 0,
+        };
+        checked.change_estimate(random);
+        let command = checked.law.propose([0.0; N], &checked.rows, &checked.slack);
+        assert_eq!(command, [0.0; N], "the first reference is passed through");
+        checked.law.commit(command);
+        checked
+    }
+
+    fn change_estimate(&mut self, random: &mut Random) {
+        for (row, (slack, unit)) in self
+            .rows
+            .iter_mut()
+            .zip(self.slack.iter_mut().zip(self.transmission.unit()))
+        {
+            *row = self::row(random);
+            *slack = Slack {
+                half_width: unit * random.within(0.0, 2.0),
+                half_width_std: unit * random.within(0.0, 0.5),
+                centre: unit * random.within(-1.0, 1.0),
+                gain: random.within(0.6, 1.4),
+                gain_std: 0.1,
+            };
+        }
+    }
+
+    /// Product over the DOFs of a group, in their `width_limit`.
+    fn dot(&self, members: [bool; N], a: [f64; N], b: [f64; N]) -> f64 {
+        let width = self.bounds.width_limit;
+        let parts = (0..N).filter(|dof| members[*dof]);
+        parts
+            .map(|dof| a[dof] / width[dof] * (b[dof] / width[dof]))
+            .sum()
+    }
+
+    /// Tip that the given coefficients predict.
+    fn tip(&self, plays: &Plays<N>) -> [f64; N] {
+        let (unit, phi) = (self.transmission.unit(), plays.regressors());
+        core::array::from_fn(|dof| unit[dof] * product(&phi[dof], &self.rows[dof]))
+    }
+
+    /// A tick in which `part` of the command's motion is sent.
+    fn step(&mut self, reference: [f64; N], part: f64) {
+        let (before, tip) = (self.law.command(), self.tip(self.law.plays()));
+        let proposed = self.law.propose(reference, &self.rows, &self.slack);
+        assert_eq!(self.law.command(), before, "a proposal moves nothing");
+        if !reference.iter().all(|value| value.is_finite()) {
+            assert_eq!(proposed, before);
+            return;
+        }
+        let last = core::mem::replace(&mut self.reference, reference);
+        let sent = if part < 1.0 {
+            core::array::from_fn(|dof| before[dof] + part * (proposed[dof] - before[dof]))
+        } else {
+            proposed
+        };
+        self.law.commit(sent);
+        assert_eq!(self.law.command(), sent);
+        for group in 0..N {
+            self.check_group(group, last, before, proposed);
+            if part >= 1.0 && self.share >= 1.0 && self.settings.change_rate >= AT_ONCE {
+                self.check_tip(group, last, tip);
+            }
+        }
+        for dof in 0..N {
+            let (dc, du) = (proposed[dof] - before[dof], reference[dof] - last[dof]);
+            // A share of the compensation leaves the reference's own motion.
+            let most = if self.share < 1.0 {
+                self.bounds.step[dof].max(du.abs() * (1.0 + 1e-9))
+            } else {
+                self.bounds.step[dof]
+            };
+            let has_gain = self.bounds.gain.iter().all(|gain| *gain > 1.0);
+            let rounding = 4.0 * f64::EPSILON * before[dof].abs();
+            assert!(
+                !has_gain || dc.abs() <= most + rounding,
+                "{dc} for {du}, at most {most}"
+            );
+            self.compensated += u32::from((dc - du).abs() > 1e-9);
+        }
+    }
+
+    fn check_group(&self, group: usize, last: [f64; N], before: [f64; N], after: [f64; N]) {
+        let members = self.transmission.friction().members(group);
+        let own = || (0..N).filter(|dof| members[*dof]);
+        let minus = |a: [f64; N], b: [f64; N]| core::array::from_fn(|dof| a[dof] - b[dof]);
+        let (dc, du): ([f64; N], [f64; N]) = (minus(after, before), minus(self.reference, last));
+        let norm = |a: [f64; N]| self.dot(members, a, a).sqrt();
+        if own().all(|dof| du[dof] == 0.0) {
+            assert!(own().all(|dof| after[dof].to_bits() == before[dof].to_bits()));
+            return;
+        }
+        let gain = own().map(|dof| self.bounds.gain[dof]);
+        let gain = gain.fold(f64::INFINITY, f64::min);
+        let scale = [before, after, self.reference, last]
+            .into_iter()
+            .fold(0.0_f64, |most, x| most.max(norm(x)));
+        let rounding = 8.0 * f64::EPSILON * scale;
+        let facts = format!("group {group}: {dc:?} for {du:?}");
+        assert!(
+            norm(dc) <= gain * norm(du) * (1.0 + 1e-12) + rounding,
+            "{facts}"
+        );
+        let product = self.dot(members, dc, du);
+        assert!(product >= -rounding * norm(du), "{facts}: {product}");
+        if gain <= 1.0 {
+            assert!(norm(minus(dc, du)) <= rounding, "{facts}");
+        }
+        if own().count() == 1 {
+            for dof in own() {
+                let farthest = before[dof] + gain * du[dof];
+                let within = before[dof].min(farthest)..=before[dof].max(farthest);
+                assert!(within.contains(&after[dof]), "{facts}");
+            }
+        }
+    }
+
+    /// |dq| <= `tip_gain` |du|, and q does not pass u.
+    fn check_tip(&mut self, group: usize, last: [f64; N], before: [f64; N]) {
+        let members = self.transmission.friction().members(group);
+        let after = self.tip(self.law.plays());
+        let minus = |a: [f64; N], b: [f64; N]| core::array::from_fn(|dof| a[dof] - b[dof]);
+        let (dq, du) = (minus(after, before), minus(self.reference, last));
+        let moved = self.dot(members, du, du).sqrt();
+        // Below this, rounding counts; without gain the command is the reference.
+        let has_gain = self.bounds.gain.iter().all(|gain| *gain > 1.0);
+        if moved < 1e-6 || !has_gain {
+            return;
+        }
+        let speed = self.dot(members, dq, dq).sqrt() / (self.settings.tip_gain * moved);
+        let room = self.dot(members, minus(self.reference, before), du) / moved;
+        let passed = self.dot(members, dq, du) / (moved * moved.max(room));
+        self.fastest = self.fastest.max(speed.max(passed));
+    }
+}
+
+fn walk<const N: usize>(
+    group: [usize; N],
+    gain: [f64; N],
+    caution: f64,
+    change_rate: f64,
+    seed: u64,
+) {
+    let mut random = Random(seed);
+    let mut checked = Checked::new(group, gain, caution, change_rate, &mut random);
+    let unit = checked.transmission.unit();
+    let mut speed = [0.0; N];
+    for _ in 0..1000 {
+        let command = checked.law.command();
+        match random.below(100) {
+            0 | 1 => checked.change_estimate(&mut random),
+            2 => {
+                checked.share = [0.0, 1.0, 0.3][usize::try_from(random.below(3)).unwrap()];
+                checked.law.set_share(checked.share);
+            }
+            3 => {
+                let shift = unit.map(|unit| unit * random.within(-0.2, 0.2));
+                checked.law.shift_reference(shift);
+                for (reference, shift) in checked.reference.iter_mut().zip(shift) {
+                    *reference += shift;
+                }
+            }
+            4 => {
+                let mut reference = checked.reference;
+                reference[N - 1] = f64::NAN;
+                checked.step(reference, 1.0);
+            }
+            5..15 => {
+                let dof = usize::try_from(random.below(N as u64)).unwrap();
+                speed[dof] = if random.below(3) == 0 {
+                    0.0
+                } else {
+                    0.02 * unit[dof] * random.within(-1.0, 1.0)
+                };
+            }
+            _ => {
+                let mut reference = checked.reference;
+                let jump = random.below(50) == 0;
+                for (dof, value) in reference.iter_mut().enumerate() {
+                    let mut next = *value + speed[dof];
+                    if jump {
+                        next += random.within(-0.1, 0.1) * unit[dof];
+                    }
+                    if next.abs() > 4.0 * unit[dof] {
+                        speed[dof] = -speed[dof];
+                    } else {
+                        *value = next;
+                    }
+                }
+                let part = if random.below(10) == 0 {
+                    random.within(0.0, 1.0)
+                } else {
+                    1.0
+                };
+                checked.step(reference, part);
+                continue;
+            }
+        }
+        assert_eq!(
+            checked.law.command(),
+            command,
+            "only the reference moves a command"
+        );
+    }
+    println!(
+        "{group:?} {gain:?}: predicted tip at {} of its bound",
+        checked.fastest
+    );
+    assert!(checked.fastest <= 1.0 + SEARCH, "{}", checked.fastest);
+    let has_gain = gain.iter().all(|gain| *gain > 1.0);
+    assert!(
+        !has_gain || checked.compensated > 200,
+        "{}",
+        checked.compensated
+    );
+}
+
+#[test]
+fn one_dof() {
+    for (seed, gain) in [(1, 5.0), (2, 2.0), (3, 1.0)] {
+        walk([0], [gain], 0.0, AT_ONCE, seed);
+        walk([0], [gain], 0.3, 0.5, seed);
+    }
+}
+
+#[test]
+fn two_dofs_that_share_a_friction() {
+    for (seed, gain) in [(1, 5.0), (2, 2.0), (3, 1.0)] {
+        walk([0, 0], [gain, 5.0], 0.0, AT_ONCE, seed);
+        walk([1, 1], [gain, gain], 0.3, 0.5, seed);
+    }
+}
+
+#[test]
+fn three_dofs_of_the_instrument() {
+    for seed in 1..4 {
+        walk([0, 0, 2], [5.0; 3], 0.0, AT_ONCE, seed);
+        walk([0, 0, 2], [5.0, 4.0, 3.0], 0.3, 0.5, seed);
+    }
+}
+
+#[test]
+fn eight_dofs() {
+    walk([0, 1, 1, 3, 0, 0, 7, 5], [5.0; 8], 0.0, AT_ONCE, 1);
+    walk([0, 1, 2, 3, 4, 5, 6, 7], [3.0; 8], 0.3, 0.5, 2);
+}
