@@ -86,7 +86,7 @@ def simulate(run: Run) -> Figures:
     )
     figures = Figures()
     compensate = run.variant != "none"
-    actual = instrument.actual if run.images else _with_small_images(instrument.actual)
+    actual = instrument.actual if run.images else without_image_effects(instrument.actual)
     rig = Twin(actual, images=compensate)
     try:
         recording = run_experiment(
@@ -114,7 +114,7 @@ def _told(instrument: DrawnInstrument, variant: Variant) -> Config:
     return instrument.actual if variant == "best exact" else instrument.told
 
 
-def _with_small_images(config: Config) -> Config:
+def without_image_effects(config: Config) -> Config:
     """Small images for the truth alone: without compression, exposure and rolling shutter."""
     return with_small_images(config).replace(
         **{

@@ -1,6 +1,8 @@
 """Prediction of the tip on records, by the weighted mixture and all other models of `analyze`.
 
-Records of real tools (TAUTSCOPE_DATA), and synthetic families. `--write` updates docs/models.md.
+Records of real tools (TAUTSCOPE_DATA), and synthetic families; and the loop's own filter by itself
+on the records of real tools and of a real continuum robot (`--only loop`). `--write` updates
+docs/models.md.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from common.doc_pages import insert
 from common.paths import ROOT
 from common.processes import add_arguments, run_parallel
 from common.rows import goal_row
+from records import loop
 from records.evaluation import Job, Result, evaluate
 from records.families import FAMILIES
 from records.tools import SPLICED, tools
@@ -104,18 +107,8 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seeds", type=int, default=SEEDS, help="per family [%(default)s]")
-    parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help="[%(default)s]")
-    parser.add_argument("--only", choices=["tools", "families"], help="[both]")
-    add_arguments(parser)
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.add_argument("--write", action="store_true", help="update docs/models.md")
-    options = parser.parse_args()
-    if options.write and (options.only or not tools()):
-        parser.error("--write updates the whole table: use it without --only, with TAUTSCOPE_DATA")
-    seeds = range(options.first_seed, options.first_seed + options.seeds)
+def measure(options: argparse.Namespace, seeds: Sequence[int]) -> Results:
+    """Evaluate the models of `analyze` on the records and families."""
     jobs: list[Job] = []
     if options.only != "families":
         if not tools():
@@ -128,12 +121,69 @@ def main() -> None:
     results: Results = {}
     for job in jobs:
         results.setdefault(job[0], []).append(done[job])
-    rows = to_rows(results)
-    shown = table(rows)
-    print(json.dumps({"rows": rows, "seeds": list(seeds)}) if options.json else shown)
-    if options.write:
-        text = f"Families: seeds {seeds[0]} to {seeds[-1]}, median (worst).\n\n{shown}"
-        insert(ROOT / "docs" / "models.md", "records", text)
+    return results
+
+
+def measure_filter(options: argparse.Namespace) -> dict[str, loop.Errors]:
+    """Evaluate the loop's filter on all real records."""
+    names = loop.records()
+    if not names:
+        print("No real records in TAUTSCOPE_DATA.", file=sys.stderr)
+    done: dict[str, loop.Errors] = {}
+    for name, errors in run_parallel(loop.evaluate, names, options.workers, options.scheduler):
+        done[name] = errors
+        print(f"{len(done)} of {len(names)}: {name}", file=sys.stderr)
+    return {name: done[name] for name in names}
+
+
+def arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seeds", type=int, default=SEEDS, help="per family [%(default)s]")
+    parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help="[%(default)s]")
+    parser.add_argument("--only", choices=["tools", "families", "loop"], help="[all]")
+    parser.add_argument(
+        "--baseline",
+        type=Path,
+        metavar="FILE",
+        help="output of --only loop --json with another state, to compare the filter with",
+    )
+    add_arguments(parser)
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument("--write", action="store_true", help="update docs/models.md")
+    options = parser.parse_args()
+    if options.write and (options.only not in (None, "loop") or not tools()):
+        parser.error(
+            "--write updates whole tables: use it with TAUTSCOPE_DATA, and without --only or with "
+            "--only loop"
+        )
+    return options
+
+
+def main() -> None:
+    options = arguments()
+    seeds = range(options.first_seed, options.first_seed + options.seeds)
+    rows: list[dict[str, Any]] = []
+    parts: list[tuple[str, str]] = []
+    facts: dict[str, Any] = {"seeds": list(seeds)}
+    if options.only != "loop":
+        rows = to_rows(measure(options, seeds))
+        conditions = f"Families: seeds {seeds[0]} to {seeds[-1]}, median (worst)."
+        parts.append(("records", f"{conditions}\n\n{table(rows)}"))
+    if options.only in (None, "loop"):
+        errors = measure_filter(options)
+        baseline = None
+        if options.baseline is not None:
+            baseline = json.loads(options.baseline.read_text(encoding="utf-8"))["errors"]
+        of_filter = loop.to_rows(errors, baseline)
+        rows += of_filter
+        parts.append(("loop", loop.table(errors, of_filter)))
+        facts["errors"] = errors
+    if options.json:
+        print(json.dumps({"rows": rows, **facts}))
+    else:
+        print("\n\n".join(text for _, text in parts))
+    for name, text in parts if options.write else ():
+        insert(ROOT / "docs" / "models.md", name, text)
 
 
 if __name__ == "__main__":

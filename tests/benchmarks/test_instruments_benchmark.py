@@ -125,7 +125,7 @@ def test_loops_are_as_wide_as_drawn(dof: Dof, width: float, gain: float, complia
 def test_features_are_those_of_the_full_image() -> None:
     """Without images the truth comes from small ones; the noise of 0.2 px is on top."""
     actual = draw_instrument(2).actual
-    small, large = (Twin(each) for each in (runs._with_small_images(actual), actual))
+    small, large = (Twin(each) for each in (runs.without_image_effects(actual), actual))
     seen: list[np.ndarray] = []
 
     class Loop:

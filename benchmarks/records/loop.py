@@ -1,0 +1,126 @@
+"""The loop's own filter on real records, beside the trivial predictors and the mixture."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from common.rows import goal_row
+from numpy.typing import NDArray
+from records import continuum, tools
+from tautscope.analysis.comparison import HORIZONS, analyze
+from tautscope.analysis.models.registry import MODELS
+from tautscope.config import load_config
+from tautscope.runs.records import Cleaning, Record
+
+Floats = NDArray[np.float64]
+Errors = dict[str, list[float]]
+"""By name of the model: RMS error at each of `HORIZONS` [tip's unit]; NaN with too few sights."""
+FILTER, MIXTURE = "filter", "best"
+TRIVIAL = ("last_tip", "last_tip_gain")
+COMPARED = (FILTER, *TRIVIAL, MIXTURE)
+TRIVIAL_GOAL = {0.01: 1.05, 0.03: 1.0, 0.10: 1.05}
+"""Largest ratio to the better trivial predictor on any record, by horizon."""
+MIXTURE_GOAL = 1.15
+"""Largest median of the ratio to the mixture."""
+BASELINE_GOAL = 0.6
+"""Largest median of the ratio to stored errors of another state of the filter."""
+SHOWN = 0.03
+"""Horizon whose errors are in the table."""
+
+
+def records() -> list[str]:
+    """Names of the records: tools, tools spliced, axes of the continuum robot."""
+    found = tools.tools()
+    return [*found, *(tools.SPLICED if found else ()), *continuum.robots()]
+
+
+def evaluate(name: str) -> Errors:
+    """Errors of the compared models on a record."""
+    source = continuum if name in continuum.RECORDS else tools
+    command, measured = source.read(name)
+    record = Record(command, measured, None, np.arange(len(command)), Cleaning())
+    models = tuple(model for model in MODELS if model.name in COMPARED)
+    entries = analyze(record, load_config(profile="best"), models=models).entries
+    return {entry.model.name: [each.rmse for each in entry.horizons] for entry in entries}
+
+
+def trivial_ratio(errors: Errors, at: int) -> float:
+    """Error of the filter over that of the better trivial predictor, at a horizon."""
+    return errors[FILTER][at] / min(errors[name][at] for name in TRIVIAL)
+
+
+def to_rows(
+    found: Mapping[str, Errors], baseline: Mapping[str, Errors] | None = None
+) -> list[dict[str, Any]]:
+    """Rows per record and horizon, then over all records.
+
+    Args:
+        found: Errors by record.
+        baseline: Errors of another state, by record; adds the ratio to its filter.
+    """
+    rows = []
+
+    def add(name: str, share: float, what: str, values: Sequence[float], goal: float) -> None:
+        row = goal_row(f"{name}, {share:.0%}: {what}", "1", values, goal, profile=FILTER)
+        rows.append(row | {"record": name, "horizon": share, "quantity": what})
+
+    for at, share in enumerate(HORIZONS):
+        known = {name: each for name, each in found.items() if np.isfinite(each[FILTER][at])}
+        trivial = {name: trivial_ratio(each, at) for name, each in known.items()}
+        mixture = [each[FILTER][at] / each[MIXTURE][at] for each in known.values()]
+        for name, ratio in trivial.items():
+            what = "filter over the better trivial predictor"
+            add(name, share, what, [ratio], TRIVIAL_GOAL[share])
+        if known:
+            add("records", share, "filter over the mixture", mixture, MIXTURE_GOAL)
+            worst = [max(trivial.values())]
+            what = "filter over the better trivial predictor, worst"
+            add("records", share, what, worst, TRIVIAL_GOAL[share])
+        before = [
+            each[FILTER][at] / baseline[name][FILTER][at]
+            for name, each in known.items()
+            if baseline is not None and name in baseline
+        ]
+        if before:
+            what = "filter over the baseline's"
+            add("records", share, what, before, BASELINE_GOAL)
+    return rows
+
+
+def table(found: Mapping[str, Errors], rows: Sequence[dict[str, Any]]) -> str:
+    """Markdown: per record the ratios at all horizons and the errors at one, then the medians."""
+    shares = " | ".join(f"{100 * share:.0f} %" for share in HORIZONS)
+    lines = [
+        f"| record | {shares} | {shares} | filter | last tip | last tip + gain | mixture |",
+        f"|---|{'--:|' * (2 * len(HORIZONS) + len(COMPARED))}",
+    ]
+    shown = HORIZONS.index(SHOWN)
+    for name, errors in found.items():
+        ratios = [
+            *(trivial_ratio(errors, at) for at in range(len(HORIZONS))),
+            *np.divide(errors[FILTER], errors[MIXTURE]),
+        ]
+        cells = [f"{ratio:.2f}" for ratio in ratios]
+        cells += [f"{errors[model][shown]:.3g}" for model in COMPARED]
+        lines.append(f"| {name} | {' | '.join(cells)} |")
+    for row in rows:
+        if row["record"] != "records":
+            continue
+        verdict = "holds" if row["holds"] else "missed"
+        lines += [
+            "",
+            f"At {100 * row['horizon']:.0f} %: {row['quantity']}: {_summary(row)}; "
+            f"goal {row['goal']:g} {verdict}.",
+        ]
+    for at, share in enumerate(HORIZONS):
+        behind = sum(trivial_ratio(errors, at) > 1 for errors in found.values())
+        lines += ["", f"At {100 * share:.0f} %, worse than trivial: {behind} of {len(found)}."]
+    return "\n".join(lines)
+
+
+def _summary(row: dict[str, Any]) -> str:
+    if row["n"] == 1:
+        return f"{row['median']:.2f}"
+    return f"median of {row['n']} {row['median']:.2f}, largest {row['worst']:.2f}"

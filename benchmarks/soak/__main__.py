@@ -1,0 +1,92 @@
+"""Tracking error of profile `best` over two hours of strokes shorter and longer than the slack.
+
+On ideal plays with features, and on the twin with its true features and noise. Every tenth of a
+run is judged by itself. `--write` updates docs/soak.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from dataclasses import asdict
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from common.doc_pages import insert
+from common.paths import ROOT
+from common.processes import add_arguments, run_parallel
+from soak.cases import PLANTS, Case, Outcome, simulate
+from soak.references import MOTIONS
+from soak.rows import table, to_rows
+from tautscope.commands.progress import progress_bar
+
+STROKES = (0.3, 0.6, 1.0, 2.0)
+"""Over the width of the slack."""
+SECONDS = 7200.0
+FIRST_SEED, SEEDS = 700, 1
+PAGE = ROOT / "docs" / "soak.md"
+
+
+def arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seconds", type=float, default=SECONDS, help="of a run [%(default)s]")
+    parser.add_argument(
+        "--stroke", type=float, action="append", help="only this one, over the slack's width [all]"
+    )
+    parser.add_argument("--motion", choices=MOTIONS, action="append", help="only this one [both]")
+    parser.add_argument("--plant", choices=PLANTS, action="append", help="only this one [both]")
+    parser.add_argument("--seeds", type=int, default=SEEDS, help="number of seeds [%(default)s]")
+    parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help="[%(default)s]")
+    add_arguments(parser)
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument("--write", action="store_true", help=f"update {PAGE.relative_to(ROOT)}")
+    options = parser.parse_args()
+    if options.write and (options.stroke or options.motion or options.plant):
+        parser.error("--write updates the whole table: use it without a selection of cases")
+    return options
+
+
+def measure(options: argparse.Namespace) -> dict[Case, Outcome]:
+    """Simulate; Ctrl-C ends with the runs that are finished."""
+    cases = [
+        Case(plant, motion, stroke, seed, options.seconds)
+        for plant in options.plant or PLANTS
+        for motion in options.motion or MOTIONS
+        for stroke in options.stroke or STROKES
+        for seed in range(options.first_seed, options.first_seed + options.seeds)
+    ]
+    # The longest runs first.
+    jobs = sorted(cases, key=lambda case: case.plant != "twin")
+    done: dict[Case, Outcome] = {}
+    with progress_bar("soak") as show_progress:
+        try:
+            for case, outcome in run_parallel(simulate, jobs, options.workers, options.scheduler):
+                done[case] = outcome
+                show_progress(len(done) / len(jobs))
+        except KeyboardInterrupt:
+            pass
+    return {case: done[case] for case in cases if case in done}
+
+
+def main() -> None:
+    options = arguments()
+    found = measure(options)
+    if not found:
+        raise SystemExit("No run is finished.")
+    shown = table(found)
+    if options.json:
+        cases = [asdict(case) | asdict(outcome) for case, outcome in found.items()]
+        print(json.dumps({"rows": to_rows(found), "cases": cases}))
+    else:
+        print(shown)
+    if options.write:
+        last = options.first_seed + options.seeds - 1
+        seeds = f"{options.first_seed}" if options.seeds == 1 else f"{options.first_seed} to {last}"
+        text = f"Seed {seeds}, {options.seconds:g} s; errors are RMS, per DOF.\n\n{shown}"
+        insert(PAGE, "soak", text)
+
+
+if __name__ == "__main__":
+    main()

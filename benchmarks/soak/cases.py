@@ -1,0 +1,149 @@
+"""One case of the soak: a run of hours, judged tenth by tenth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from common.features import NOISE, update_from_features
+from common.small_images import full_size, with_small_images
+from numpy.typing import NDArray
+from plants.simulated import HALF, PlantRig
+from soak.references import PARTS, Motion, make_reference
+from tautscope.config import Config, load_config
+from tautscope.loop.reduction import HysteresisReduction
+from tautscope.loop.rig import Frame, Rig
+from tautscope.loop.safety import Reaction
+from tautscope.twin import Twin
+
+Floats = NDArray[np.float64]
+PlantName = Literal["plays", "twin"]
+PLANTS: tuple[PlantName, ...] = ("plays", "twin")
+GAIN = 1.0
+"""Gain of the ideal plays."""
+SIGMAS = 3.0
+"""Half of an interval, in standard deviations."""
+SAMPLE_EVERY = 1.0
+"""Time between two comparisons of the intervals with the truth [s]."""
+LEAST_VISIBLE = 0.5
+"""A band is measured if at least this share of it is visible."""
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """Complete description of a run.
+
+    Attributes:
+        plant: Independent ideal plays, or the twin with its true features and noise.
+        motion: ``sines``, or ``hand``, an operator's motion.
+        stroke: Longest stroke over the width of the slack.
+        seed: Of noise and motion.
+        seconds: Duration [s].
+    """
+
+    plant: PlantName
+    motion: Motion
+    stroke: float
+    seed: int
+    seconds: float
+
+    @property
+    def name(self) -> str:
+        """Name without the seed."""
+        return f"{self.plant}, {self.motion}, stroke {self.stroke:g}"
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """Figures of a run.
+
+    Attributes:
+        errors: (10, 3) RMS of (true tip - reference) in each tenth [m, rad, rad].
+        held: Share of the images that arrived while motion was held.
+        coverage: By "width" and "gain": per DOF the share of the time from the second tenth on in
+            which the 3-sigma interval contains the truth. Only of ideal plays, and only what the
+            estimate has a standard deviation of.
+    """
+
+    errors: list[list[float]]
+    held: float
+    coverage: dict[str, list[float]]
+
+
+def simulate(case: Case) -> Outcome:
+    """Simulate a run."""
+    config = load_config(profile="best").replace(**{"twin.seed": case.seed})
+    reference = make_reference(config, case.motion, case.stroke, case.seed, case.seconds)
+    rig, loop = _make_rig(case, config), HysteresisReduction(config)
+    noise = np.random.default_rng([case.seed, 1])
+    squares, counts = np.zeros((PARTS, 3)), np.zeros(PARTS)
+    images = held = 0
+    coverage = _Coverage()
+    sample = rig.reset()
+    start = sample.time
+    due = case.seconds / PARTS
+    while (elapsed := sample.time - start) < case.seconds:
+        desired = reference(elapsed)
+        command = loop.step(desired, time=sample.time)
+        assert sample.true_state is not None
+        part = min(int(elapsed * PARTS / case.seconds), PARTS - 1)
+        squares[part] += (sample.true_state - desired) ** 2
+        counts[part] += 1
+        if sample.frame is not None:
+            _update(loop, sample.frame, case.plant, noise)
+            images += 1
+            if _is_held(loop):
+                held += 1
+                loop.engage()
+        if case.plant == "plays" and elapsed >= due:
+            due += SAMPLE_EVERY
+            coverage.add(loop.hysteresis)
+        sample = rig.step(command)
+    rig.close()
+    errors = np.sqrt(squares / counts[:, None])
+    return Outcome(errors.tolist(), held / max(images, 1), coverage.shares())
+
+
+def _make_rig(case: Case, config: Config) -> Rig:
+    if case.plant == "plays":
+        return PlantRig(config, "independent plays")
+    return Twin(with_small_images(config))
+
+
+def _update(
+    loop: HysteresisReduction, frame: Frame, plant: PlantName, noise: np.random.Generator
+) -> None:
+    if plant == "plays":
+        update_from_features(loop, frame)
+        return
+    assert frame.true_features is not None and frame.true_visible is not None
+    is_visible = frame.true_visible >= LEAST_VISIBLE
+    features = full_size(frame.true_features) + NOISE * noise.standard_normal(4)
+    features[~np.repeat(is_visible, 2)] = np.nan
+    loop.on_features(features if is_visible.any() else None, frame.captured_at)
+
+
+def _is_held(loop: HysteresisReduction) -> bool:
+    return loop.supervision.reaction.rank >= Reaction.HOLD_MOTION.rank
+
+
+class _Coverage:
+    """Counts how often the intervals of the estimate contain the truth of the ideal plays."""
+
+    def __init__(self) -> None:
+        self._count = 0
+        self._inside: dict[str, Floats] = {}
+
+    def add(self, estimate: object) -> None:
+        # An estimate has both standard deviations, absolute, or none that can be compared.
+        if not all(hasattr(estimate, name) for name in ("width_std", "gain_std")):
+            return
+        self._count += 1
+        for name, value, truth in (("width", "half_width", HALF), ("gain", "gain", GAIN)):
+            off = np.abs(getattr(estimate, value) - truth)
+            is_inside = off <= SIGMAS * getattr(estimate, f"{name}_std")
+            self._inside[name] = self._inside.get(name, np.zeros(3)) + is_inside
+
+    def shares(self) -> dict[str, list[float]]:
+        return {name: (inside / self._count).tolist() for name, inside in self._inside.items()}

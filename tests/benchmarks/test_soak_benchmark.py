@@ -1,0 +1,93 @@
+"""The soak: its references, its tenths, and the goals of its rows."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from common.paths import ROOT
+from numpy.typing import NDArray
+from plants.simulated import HALF
+from soak.cases import PLANTS, Case, Outcome, PlantName, _Coverage, simulate
+from soak.references import MOTIONS, PARTS, RETURN, Motion, make_reference
+from soak.rows import table, to_rows
+from tautscope.config import load_config
+from tautscope.dof import Dof
+
+CONFIG = load_config()
+CENTRE = np.array([CONFIG.experiment[dof].centre for dof in Dof])
+SECONDS, INTERVAL = 2000.0, 0.02
+
+
+def positions(motion: Motion, stroke: float) -> NDArray[np.float64]:
+    reference = make_reference(CONFIG, motion, stroke, 3, SECONDS)
+    return np.array([reference(time) for time in np.arange(0, SECONDS, INTERVAL)])
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
+def test_the_longest_stroke_is_a_multiple_of_the_slack(motion: Motion) -> None:
+    found = positions(motion, 0.6)
+    np.testing.assert_allclose(found[0], CENTRE, atol=1e-12)
+    longest = np.ptp(found, axis=0) / (2 * HALF)
+    assert np.all(longest <= 0.6 + 1e-9) and np.all(longest > 0.48), longest
+    assert np.abs(np.diff(found, axis=0) / HALF).max() < 0.04
+
+
+def test_an_operators_motion_is_the_same_in_every_part() -> None:
+    found = positions("hand", 1.0)
+    parts = (found - CENTRE).reshape(PARTS, -1, 3)
+    np.testing.assert_allclose(parts, np.broadcast_to(parts[0], parts.shape), atol=1e-9)
+    last = round(RETURN / INTERVAL)
+    assert np.ptp(parts[0][-last:], axis=0).max() > 0
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+def test_every_tenth_is_judged_by_itself(plant: PlantName) -> None:
+    outcome = simulate(Case(plant, "sines", 1.6, 1, 20.0))
+    errors = np.array(outcome.errors)
+    assert errors.shape == (PARTS, 3)
+    # The sine of insertion without compensation has an error of about half a half width.
+    assert np.all(errors > 0) and np.all(errors < 1.2 * HALF), errors
+    assert outcome.held == 0
+    assert not outcome.coverage or plant == "plays"
+
+
+def outcome(*insertion: float, coverage: dict[str, list[float]] | None = None) -> Outcome:
+    errors = [[value, 1.0, 1.0] for value in insertion]
+    return Outcome(errors, 0.0, coverage or {})
+
+
+def test_a_row_compares_the_later_tenths_with_the_second() -> None:
+    growing = outcome(9.0, 1.0, 1.1, 1.3, *[1.0] * 6, coverage={"width": [0.99, 0.94, 1.0]})
+    case = Case("plays", "sines", 0.6, 0, 7200.0)
+    rows = {(row["quantity"], row["dof"]): row for row in to_rows({case: growing})}
+    row = rows["error over the second tenth's", "insertion"]
+    assert row["median"] == pytest.approx(1.3) and row["goal"] == 1.15 and not row["holds"]
+    assert rows["error over the second tenth's", "bending"]["holds"]
+    assert rows["width within 3 sigma", "insertion"]["holds"]
+    assert not rows["width within 3 sigma", "rotation"]["holds"]
+    assert ("gain within 3 sigma", "insertion") not in rows
+    assert "1.30 (missed) | 99 % | - |" in table({case: growing})
+
+
+def test_intervals_are_compared_with_the_truth_of_the_plays() -> None:
+    coverage = _Coverage()
+    coverage.add(None)
+    coverage.add(SimpleNamespace(half_width=HALF, width_std=HALF, gain=np.ones(3)))
+    assert coverage.shares() == {}
+    for off in (0.0, 0.2, 0.4, 0.6):
+        coverage.add(
+            SimpleNamespace(
+                half_width=HALF * (1 + off),
+                width_std=0.1 * HALF,
+                gain=np.array([1.0, 1 - off, 1.0]),
+                gain_std=np.full(3, 0.15),
+            )
+        )
+    assert coverage.shares() == {"width": [0.5] * 3, "gain": [1.0, 0.75, 1.0]}
+
+
+def test_the_page_has_a_section_for_the_table() -> None:
+    page = (ROOT / "docs" / "soak.md").read_text(encoding="utf-8")
+    assert page.index("<!-- soak: begin -->") < page.index("<!-- soak: end -->")
