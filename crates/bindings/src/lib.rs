@@ -5,7 +5,6 @@
 
 mod analysis;
 mod arrays;
-mod axis_filter;
 mod camera;
 mod compensator;
 mod description;
@@ -34,8 +33,6 @@ mod _core {
 
     #[pymodule_export]
     use super::analysis::{move_along_curve, track_coefficients};
-    #[pymodule_export]
-    use super::axis_filter::AxisFilter;
     #[pymodule_export]
     use super::camera::Camera;
     #[pymodule_export]

@@ -11,17 +11,17 @@ use crate::error::ConfigError;
 use crate::estimation::estimate::{Estimate, GeometryPrior, Slack};
 use crate::estimation::estimate_settings::EstimateSettings;
 use crate::estimation::history::{Entry, History};
-use crate::estimation::measurement::{MostProbable, Observed, Sensor};
+use crate::estimation::measurement::{Observed, Sensor};
 use crate::estimation::posture::{Belief, Observation};
 use crate::law::vector_law::{Bounds, VectorLaw};
 use crate::r#loop::best::SLACK_CHANGED;
-use crate::r#loop::measurement::Measurement;
+use crate::r#loop::measurement::{ERRORS, Measurement};
 use crate::r#loop::paper::state_estimator;
 use crate::r#loop::profile::{Image, ImageUpdate, ProfileBlocks};
 use crate::r#loop::reduction::HysteresisReduction;
 use crate::r#loop::report::HysteresisEstimate;
 use crate::r#loop::settings::Settings;
-use crate::model::features::{FeatureModel, FeaturePrediction, GEOMETRY};
+use crate::model::features::{FeatureModel, FeaturePrediction};
 use crate::model::plays::{COEFFICIENTS, Plays, Row};
 use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::monitors::Law;
@@ -44,14 +44,8 @@ const MODEL_IMAGES: f64 = 200.0;
 /// all.
 const MISFIT: f64 = 25.0;
 
-/// Errors of the geometry: those of the model, and of each feature.
-const ERRORS: usize = GEOMETRY + 4;
-
 /// The estimate of an instrument with two bands.
 type InstrumentEstimate = Estimate<3, ERRORS, { 3 * COEFFICIENTS + ERRORS }>;
-
-/// The bands of an image with their most probable state.
-pub type Bands = (Observed<4>, MostProbable<3, 4, ERRORS>);
 
 /// The plays at a time of the history.
 #[derive(Debug, Clone, Copy, PartialEq)]
