@@ -42,7 +42,9 @@ fn row(random: &mut Random) -> Row {
     }
     let sum: f64 = row.iter().sum();
     let gain = random.within(0.6, 1.4);
-    row.iter_mut().for_each(|weight| *weight *= gain / sum);
+    for weight in &mut row {
+        *weight *= gain / sum;
+    }
     for weight in row.iter_mut().take(OFFSET).skip(SHARED + OWN) {
         *weight = random.within(-0.03, 0.03);
     }
