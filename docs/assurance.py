@@ -221,7 +221,9 @@ def crate_rows() -> Iterator[str]:
                 collect(dependency["pkg"], is_built)
 
     collect(root, False)
-    for key in sorted(linked | built, key=lambda key: packages[key]["name"]):
+    for key in sorted(
+        linked | built, key=lambda key: (packages[key]["name"], packages[key]["version"])
+    ):
         package = packages[key]
         if not package["name"].startswith("tautscope"):
             mark = "" if key in linked else "at build time"

@@ -148,7 +148,11 @@ def test_an_empty_document_is_the_default() -> None:
         (lambda: ControlConfig(period=1e-4), "history"),
         (
             lambda: DofConfig(
-                update_distance=1.0, observable_deviation=1.0, start_deviation=1.0, free_gain=6.0
+                expected_width=8e-3,
+                update_distance=1.0,
+                observable_deviation=1.0,
+                start_deviation=1.0,
+                free_gain=6.0,
             ),
             "free_gain",
         ),

@@ -42,7 +42,10 @@ class Config(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     estimation: EstimationConfig = field(default_factory=EstimationConfig)
     insertion: DofConfig = field(
         default_factory=lambda: DofConfig(
-            update_distance=0.4e-3, observable_deviation=2e-3, expected_width=8e-3, start_deviation=5e-3
+            update_distance=0.4e-3,
+            observable_deviation=2e-3,
+            expected_width=8e-3,
+            start_deviation=5e-3,
         )
     )
     rotation: DofConfig = field(

@@ -30,8 +30,8 @@ const SIDE_RADII: [f64; SHARED] = [
 ];
 /// Positions at which plays are bent.
 const KNOTS: [f64; 3] = [-1.0, 0.0, 1.0];
-/// Newton steps of the return to the friction ellipse; one motion of a control tick needs two.
-const STEPS: usize = 3;
+/// Newton steps of the return to the friction ellipse; the motion of a control tick needs two, that to the law's target four.
+const STEPS: usize = 4;
 
 /// Regressors of a DOF, or their coefficients.
 pub type Row = [f64; COEFFICIENTS];
@@ -212,27 +212,29 @@ impl<const N: usize> Transmission<N> {
         };
         let mut free = [[0.0; SHARED]; N];
         let (mut square, mut largest) = ([0.0; SHARED], [0.0; SHARED]);
+        let mut multiplier = [0.0; SHARED];
         let dofs = (0..N).zip(free.iter_mut().zip(shared.iter()).zip(to));
         let own = self.half.iter().zip(&self.ease);
         for ((_, ((free, play), to)), (half, ease)) in
             dofs.zip(own).filter(|((index, _), _)| of_group(index))
         {
-            let sums = square.iter_mut().zip(&mut largest).zip(ease);
-            for (((free, play), half), ((square, largest), ease)) in
+            let bounds = largest.iter_mut().zip(&mut multiplier);
+            let sums = square.iter_mut().zip(bounds).zip(ease);
+            for (((free, play), half), ((square, (largest, multiplier)), ease)) in
                 free.iter_mut().zip(play).zip(half).zip(sums)
             {
                 *free = (to - play) / half;
                 *square += *free * *free;
                 *largest = f64::max(*largest, *ease);
+                *multiplier = f64::max(*multiplier, (free.abs() - 1.0) / ease);
             }
         }
         if square.iter().all(|square| *square <= 1.0) {
             return;
         }
         // Newton's method from below the root of sum (free / (1 + ease l))^2 = 1, which is convex in l.
-        let mut multiplier = [0.0; SHARED];
         for ((multiplier, square), largest) in multiplier.iter_mut().zip(square).zip(largest) {
-            *multiplier = (libm::sqrt(square) - 1.0).max(0.0) / largest;
+            *multiplier = multiplier.max((libm::sqrt(square) - 1.0) / largest);
         }
         for _ in 0..STEPS {
             let (mut value, mut slope) = ([-1.0; SHARED], [0.0; SHARED]);
