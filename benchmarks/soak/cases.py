@@ -11,7 +11,7 @@ from common.small_images import full_size, with_small_images
 from numpy.typing import NDArray
 from plants.simulated import HALF, PlantRig
 from soak.references import PARTS, Motion, make_reference
-from tautscope.config import Config, load_config
+from tautscope.config import Config, Profile, load_config
 from tautscope.loop.reduction import HysteresisReduction
 from tautscope.loop.rig import Frame, Rig
 from tautscope.loop.safety import Reaction
@@ -40,6 +40,7 @@ class Case:
         stroke: Longest stroke over the width of the slack.
         seed: Of noise and motion.
         seconds: Duration [s].
+        profile: Of the loop.
     """
 
     plant: PlantName
@@ -47,11 +48,12 @@ class Case:
     stroke: float
     seed: int
     seconds: float
+    profile: Profile = "best"
 
     @property
     def name(self) -> str:
         """Name without the seed."""
-        return f"{self.plant}, {self.motion}, stroke {self.stroke:g}"
+        return f"`{self.profile}`: {self.plant}, {self.motion}, stroke {self.stroke:g}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +75,7 @@ class Outcome:
 
 def simulate(case: Case) -> Outcome:
     """Simulate a run."""
-    config = load_config(profile="best").replace(**{"twin.seed": case.seed})
+    config = load_config(profile=case.profile).replace(**{"twin.seed": case.seed})
     reference = make_reference(config, case.motion, case.stroke, case.seed, case.seconds)
     rig, loop = _make_rig(case, config), HysteresisReduction(config)
     noise = np.random.default_rng([case.seed, 1])
