@@ -15,32 +15,25 @@ class EstimationConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only
 
     marker_deviation: Positive = 0.3
     """Standard deviation of a marker without a covariance [px]."""
-    model_deviation: NonNegative = 0.3
-    """Standard deviation of the feature model beyond the markers' covariance [px]."""
     shape_deviation: NonNegative = 0.3
     """Standard deviation of the unevenness of the section's curvature: half of the difference of
     its ends, over the mean."""
     image_deviation: NonNegative = 6.0
     """Standard deviation of a shift of the image, by an error of the camera's pose or principal
     point [px]."""
-    misfit_deviation: NonNegative = 4.0
-    """Standard deviation of what else a feature errs, by a geometry that is not as configured
-    [px]."""
+    misfit_deviation: NonNegative = 2.0
+    """Standard deviation of what else the feature model errs [px]."""
     misfit_travel: Positive = 2.0
     """Travel within which it errs alike."""
     outlier_distance: Positive = 4.0
     """Mahalanobis distance beyond which a marker is an outlier."""
-    weight_deviation: Positive = 0.1
+    weight_deviation: Positive = 0.2
     """Standard deviation of the weight of a play."""
     offset_deviation: NonNegative = 0.2
     """Standard deviation of the offset."""
-    rest_deviation: NonNegative = 0.0
-    """Standard deviation of the deviation of the tip from the plays."""
     tip_deviation: Positive = 0.12
     """Standard deviation of the tip that is new in each image."""
     weight_travel: Positive = 800.0
     """Travel over which a weight returns to its prior."""
     offset_travel: Positive = 22.0
     """Travel over which the offset returns to its prior."""
-    deviation_travel: Positive = 0.3
-    """Travel within which the tip deviates from the plays alike."""

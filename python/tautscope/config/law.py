@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tautscope.config.fields import Gain, NonNegative, Positive
+from tautscope.config.fields import Gain, Positive
 from tautscope.config.section import Section
 
 
@@ -17,8 +17,3 @@ class LawConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Largest speed of the predicted tip over that of the reference."""
     direction_travel: Positive = 0.01
     """Travel of the reference over which its direction is averaged."""
-    caution: NonNegative = 0.0
-    """Standard deviations of the half width by which the contact is expected earlier, when the
-    speed of the tip is bounded."""
-    change_rate: Positive = 100.0
-    """Largest change of the contact offsets in use, per travel of the reference."""

@@ -7,8 +7,7 @@ use crate::estimation::estimate_settings::EstimateSettings;
 use crate::estimation::kalman::Kalman;
 use crate::estimation::measurement::{Linear, Prior};
 use crate::model::plays::{
-    COEFFICIENTS, DEVIATION, OFFSET, OWN, Plays, Row, SHARED, Transmission, gain_row, middle_row,
-    product,
+    COEFFICIENTS, OFFSET, OWN, Plays, Row, SHARED, Transmission, gain_row, middle_row, product,
 };
 
 /// Expected half width, and its spread, in units: of the Gaussian weights of the plays over their radii.
@@ -18,6 +17,8 @@ const SPREAD: f64 = 0.2;
 const OWN_SHARE: f64 = 0.4;
 /// Standard deviation of a bent play over that of a play.
 const BENT_SHARE: f64 = 0.4;
+/// Standard deviation of the gain: the tip follows its motor about one to one.
+const GAIN_DEVIATION: f64 = 0.1;
 /// Bounds of the gain: a tip that moves less than half or more than half as much again as its motor is another instrument.
 const GAINS: (f64, f64) = (0.5, 1.5);
 /// Distance from which on an image counts less, in standard deviations of a feature.
@@ -30,10 +31,9 @@ const ROBUST: f64 = 2.5;
 /// ```
 ///
 /// Width, rounding, gain, asymmetry, slack over position and share of friction are all coefficients, and each image measures
-/// tip and geometry linearly. What the plays leave of the tip is one coefficient, too, the deviation: it is alike within a
-/// travel of `deviation_travel`, so that the images within it count as one for the plays.
+/// tip and geometry linearly.
 ///
-/// Wrong for a tip that is no sum of plays: by what its deviation changes between images.
+/// Wrong for a tip that is no sum of plays: by what it deviates from one beyond `tip_deviation`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate<const N: usize, const G: usize, const D: usize> {
     transmission: Transmission<N>,
@@ -60,14 +60,19 @@ pub struct GeometryPrior {
 pub struct Slack {
     /// Half of the width of the backlash.
     pub half_width: f64,
-    /// Its standard deviation.
-    pub half_width_std: f64,
     /// Centre of the contact offsets, command less tip over the gain, from the origin.
     pub centre: f64,
     /// Travel of the tip over that of the command in contact.
     pub gain: f64,
-    /// Its standard deviation.
-    pub gain_std: f64,
+}
+
+/// Standard deviations of the slack of a DOF, in its unit.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SlackDeviation {
+    /// Of the half width.
+    pub half_width: f64,
+    /// Of the gain.
+    pub gain: f64,
 }
 
 impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
@@ -101,11 +106,14 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
         for (entry, own) in variance.iter_mut().skip(N * COEFFICIENTS).zip(geometry) {
             *entry = own.std * own.std;
         }
-        let mut kalman = Kalman::new(mean, variance);
+        let mut kalman = Kalman::new(mean, variance, COEFFICIENTS);
+        for index in 0..N {
+            kalman.know_sum(&of_dof(index, &gain_row()), GAIN_DEVIATION);
+        }
         for (index, (start, unit)) in start_std.into_iter().zip(transmission.unit()).enumerate() {
             require_positive("start_deviation", start)?;
             let start = start / unit;
-            kalman.add_variance(index * COEFFICIENTS + DEVIATION, start * start);
+            kalman.add_variance(index * COEFFICIENTS + OFFSET, start * start);
         }
         Ok(Self {
             transmission,
@@ -176,18 +184,10 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
         self.travel = travel;
         let settings = &self.settings;
         let keep = |memory: f64| libm::exp(-passed / memory);
-        let (weights, offset, deviation) = (
-            keep(settings.weight_travel),
-            keep(settings.offset_travel),
-            keep(settings.deviation_travel),
-        );
-        let mut shares = SVector::<f64, D>::repeat(weights);
-        for (index, share) in shares.iter_mut().enumerate().take(N * COEFFICIENTS) {
-            match index % COEFFICIENTS {
-                OFFSET => *share = offset,
-                DEVIATION => *share = deviation,
-                _ => {}
-            }
+        let mut shares = SVector::<f64, D>::repeat(keep(settings.weight_travel));
+        let offset = keep(settings.offset_travel);
+        for share in offsets::<N, D>(&mut shares) {
+            *share = offset;
         }
         for (share, memory) in shares.iter_mut().skip(N * COEFFICIENTS).zip(self.memory) {
             *share = keep(memory);
@@ -198,12 +198,14 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
     /// State and geometry at plays, after [`Estimate::advance`] to them.
     pub fn prior(&self, plays: &Plays<N>) -> Prior<N, G> {
         let rows = self.rows(plays);
+        let with = self.crosses(&rows);
         let (mut covariance, mut cross) =
             (SMatrix::<f64, N, N>::zeros(), SMatrix::<f64, G, N>::zeros());
-        for (column, row) in rows.iter().enumerate() {
-            let with = self.kalman.covariance_with(row);
-            for (line, other) in rows.iter().enumerate() {
-                set(&mut covariance, line, column, other.dot(&with));
+        for (column, with) in with.column_iter().enumerate() {
+            let with = with.as_slice();
+            for (line, row) in rows.iter().enumerate() {
+                let value = product_at(line * COEFFICIENTS, row, with);
+                set(&mut covariance, line, column, value);
             }
             for (line, value) in with.iter().skip(N * COEFFICIENTS).enumerate() {
                 set(&mut cross, line, column, *value);
@@ -242,7 +244,7 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
     }
 
     /// Updates the coefficients with a linear measurement at plays, at a Mahalanobis distance; with `is_position_only` the
-    /// deviation alone.
+    /// offsets alone.
     pub fn update<const M: usize>(
         &mut self,
         plays: &Plays<N>,
@@ -250,48 +252,41 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
         distance: f64,
         is_position_only: bool,
     ) {
-        let mut weight = SVector::<f64, D>::zeros();
+        let mut only = SVector::<f64, D>::zeros();
         if is_position_only {
-            let deviations = weight
-                .iter_mut()
-                .take(N * COEFFICIENTS)
-                .skip(DEVIATION)
-                .step_by(COEFFICIENTS);
-            deviations.for_each(|entry| *entry = 1.0);
+            offsets::<N, D>(&mut only).for_each(|entry| *entry = 1.0);
         }
-        let weight = is_position_only.then_some(&weight);
-        let rows = self.rows(plays);
-        let origin = SVector::from(self.origin);
+        let only = is_position_only.then_some(&only);
+        let regressors = self.rows(plays);
+        let (mut rows, mut cross) = (
+            SMatrix::<f64, D, M>::zeros(),
+            self.crosses(&regressors) * measurement.by_state.transpose(),
+        );
+        for (mut row, by) in rows.column_iter_mut().zip(measurement.by_state.row_iter()) {
+            let blocks = row.as_mut_slice().chunks_exact_mut(COEFFICIENTS);
+            for (entries, (own, by)) in blocks.zip(regressors.iter().zip(by.iter())) {
+                entries.iter_mut().zip(own).for_each(|(a, b)| *a = by * b);
+            }
+        }
+        for (index, by) in measurement.by_geometry.column_iter().enumerate() {
+            let index = N * COEFFICIENTS + index;
+            rows.row_mut(index).tr_copy_from(&by);
+            let with = SVector::<f64, D>::from_fn(|other, _| self.kalman.covariance(other, index));
+            cross.ger(1.0, &with, &by, 1.0);
+        }
         #[expect(clippy::cast_precision_loss, reason = "a few features")]
         let variance = (distance / (ROBUST * libm::sqrt(M as f64))).max(1.0);
-        for index in 0..M {
-            let by_state = measurement.by_state.row(index);
-            let mut row = SVector::<f64, D>::zeros();
-            for (by, own) in by_state.iter().zip(&rows) {
-                row.axpy(*by, own, 1.0);
-            }
-            let by_geometry = measurement.by_geometry.row(index);
-            let geometry = row.iter_mut().skip(N * COEFFICIENTS);
-            geometry
-                .zip(by_geometry.iter())
-                .for_each(|(entry, by)| *entry = *by);
-            let known: f64 = by_state
-                .iter()
-                .zip(origin.iter())
-                .map(|(by, origin)| by * origin)
-                .sum();
-            let value = measurement.value.get(index).copied().unwrap_or(0.0) - known;
-            self.kalman.update(&row, value, variance, weight);
-        }
+        let value = measurement.value - measurement.by_state * SVector::from(self.origin);
+        self.kalman.update(&rows, &cross, &value, variance, only);
         self.bound_gains();
     }
 
-    /// Makes the deviation of every tip less certain by standard deviations (N,) [m or rad].
+    /// Makes the offset of every tip less certain by standard deviations (N,) [m or rad].
     pub fn loosen(&mut self, std: [f64; N]) {
         for (index, (std, unit)) in std.into_iter().zip(self.transmission.unit()).enumerate() {
             let std = std / unit;
             self.kalman
-                .add_variance(index * COEFFICIENTS + DEVIATION, std * std);
+                .add_variance(index * COEFFICIENTS + OFFSET, std * std);
         }
     }
 
@@ -304,31 +299,38 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
             .into_iter()
             .zip(self.coefficients())
             .zip(self.transmission.unit());
-        for (index, (slack, ((radii, row), unit))) in found.iter_mut().zip(dofs).enumerate() {
-            let by_gain = gain_row();
-            let by_width = width_row(&radii);
-            let (gain, width) = (product(&by_gain, &row), product(&by_width, &row));
-            let gain_used = gain.clamp(GAINS.0, GAINS.1);
-            let half = width / gain_used;
-            let place = |row: Row| {
-                let mut all = SVector::<f64, D>::zeros();
-                all.iter_mut()
-                    .skip(index * COEFFICIENTS)
-                    .zip(row)
-                    .for_each(|(a, b)| *a = b);
-                all
-            };
-            let (gains, widths) = (place(by_gain), place(by_width));
-            let by_half = (widths - gains * half) / gain_used;
-            let deviation = |row: &SVector<f64, D>| {
-                libm::sqrt(row.dot(&self.kalman.covariance_with(row)).max(0.0))
-            };
+        for (slack, ((radii, row), unit)) in found.iter_mut().zip(dofs) {
+            let gain = product(&gain_row(), &row).clamp(GAINS.0, GAINS.1);
+            let half = product(&width_row(&radii), &row) / gain;
             *slack = Slack {
                 half_width: unit * half.max(0.0),
-                half_width_std: unit * deviation(&by_half),
-                centre: -unit * product(&middle_row(), &row) / gain_used,
-                gain: gain_used,
-                gain_std: deviation(&gains),
+                centre: -unit * product(&middle_row(), &row) / gain,
+                gain,
+            };
+        }
+        found
+    }
+
+    /// Standard deviations of the slack of each DOF.
+    pub fn slack_deviation(&self) -> [SlackDeviation; N] {
+        let mut found = [SlackDeviation::default(); N];
+        let dofs = self.transmission.radii().into_iter().zip(self.slack());
+        for (index, (found, (radii, slack))) in found.iter_mut().zip(dofs).enumerate() {
+            let first = index * COEFFICIENTS;
+            let deviation = |row: &Row| {
+                let cross = self.kalman.covariance_with(first, row);
+                libm::sqrt(product_at(first, row, cross.as_slice()).max(0.0))
+            };
+            let unit = self.transmission.unit().get(index).copied();
+            let unit = unit.unwrap_or(f64::NAN);
+            let half = slack.half_width / unit;
+            let mut by_half = width_row(&radii);
+            for (entry, gain) in by_half.iter_mut().zip(gain_row()) {
+                *entry = (*entry - half * gain) / slack.gain;
+            }
+            *found = SlackDeviation {
+                half_width: unit * deviation(&by_half),
+                gain: deviation(&gain_row()),
             };
         }
         found
@@ -355,13 +357,23 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
         (shared / all).clamp(0.0, 1.0)
     }
 
-    /// Rows (D,) whose product with the coefficients is the tip of each DOF from the origin [m or rad].
-    fn rows(&self, plays: &Plays<N>) -> [SVector<f64, D>; N] {
-        let mut rows = [SVector::<f64, D>::zeros(); N];
-        let parts = plays.regressors().into_iter().zip(self.transmission.unit());
-        for (index, (row, (phi, unit))) in rows.iter_mut().zip(parts).enumerate() {
-            let own = row.iter_mut().skip(index * COEFFICIENTS);
-            own.zip(phi).for_each(|(entry, phi)| *entry = unit * phi);
+    /// Covariance of all coefficients with the tip of each DOF, for its regressors.
+    fn crosses(&self, rows: &[Row; N]) -> SMatrix<f64, D, N> {
+        let mut with = SMatrix::<f64, D, N>::zeros();
+        for (index, (mut column, row)) in with.column_iter_mut().zip(rows).enumerate() {
+            let own = self.kalman.covariance_with(index * COEFFICIENTS, row);
+            column.copy_from(&own);
+        }
+        with
+    }
+
+    /// Regressors of each DOF in its unit: their product with the coefficients is the tip from the origin [m or rad].
+    fn rows(&self, plays: &Plays<N>) -> [Row; N] {
+        let mut rows = plays.regressors();
+        for (row, unit) in rows.iter_mut().zip(self.transmission.unit()) {
+            for entry in row.iter_mut() {
+                *entry *= unit;
+            }
         }
         rows
     }
@@ -369,20 +381,38 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
     /// Moves the means to the nearest ones, in the metric of their covariance, whose gains are within [`GAINS`].
     fn bound_gains(&mut self) {
         for index in 0..N {
-            let mut row = SVector::<f64, D>::zeros();
-            row.iter_mut()
-                .skip(index * COEFFICIENTS)
-                .zip(gain_row())
-                .for_each(|(a, b)| *a = b);
-            let gain = row.dot(self.kalman.mean());
+            let (first, row) = (index * COEFFICIENTS, gain_row());
+            let gain = product_at(first, &row, self.kalman.mean().as_slice());
             let excess = gain - gain.clamp(GAINS.0, GAINS.1);
             if excess != 0.0 {
-                let with = self.kalman.covariance_with(&row);
-                let step = -excess / row.dot(&with);
+                let with = self.kalman.covariance_with(first, &row);
+                let step = -excess / product_at(first, &row, with.as_slice());
                 self.kalman.mean_mut().axpy(step, &with, 1.0);
             }
         }
     }
+}
+
+/// A row times the coefficients of the DOF that begin at `first`.
+fn product_at(first: usize, row: &Row, all: &[f64]) -> f64 {
+    let own = all.iter().skip(first);
+    row.iter().zip(own).map(|(a, b)| a * b).sum()
+}
+
+/// The entries of the offsets of N DOFs.
+fn offsets<const N: usize, const D: usize>(
+    row: &mut SVector<f64, D>,
+) -> impl Iterator<Item = &mut f64> {
+    let of_dofs = row.iter_mut().take(N * COEFFICIENTS);
+    of_dofs.skip(OFFSET).step_by(COEFFICIENTS)
+}
+
+/// A row (D,) of the coefficients of one DOF.
+fn of_dof<const D: usize>(index: usize, row: &Row) -> SVector<f64, D> {
+    let mut all = SVector::<f64, D>::zeros();
+    let own = all.iter_mut().skip(index * COEFFICIENTS);
+    own.zip(row).for_each(|(entry, value)| *entry = *value);
+    all
 }
 
 /// Coefficients whose sum is the half width times the gain: radius of each play, and of the bent ones with their mean slope.
@@ -396,8 +426,6 @@ fn width_row(radii: &[f64; SHARED + OWN]) -> Row {
     row.iter_mut()
         .zip(radii.iter().copied().chain(bent))
         .for_each(|(entry, radius)| *entry *= radius);
-    let [.., offset, rest] = &mut row;
-    (*offset, *rest) = (0.0, 0.0);
     row
 }
 
@@ -436,11 +464,10 @@ fn prior(
     for variance in variance.iter_mut().skip(SHARED + OWN) {
         *variance = BENT_SHARE * BENT_SHARE * own;
     }
-    let [.., centre, _] = &mut mean;
+    let [.., centre] = &mut mean;
     *centre = -start.centre / unit;
-    let [.., offset, deviation] = &mut variance;
+    let [.., offset] = &mut variance;
     *offset = settings.offset_deviation * settings.offset_deviation;
-    *deviation = settings.rest_deviation * settings.rest_deviation;
     (mean, variance)
 }
 

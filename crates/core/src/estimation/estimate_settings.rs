@@ -9,13 +9,11 @@ use crate::error::{ConfigError, require, require_non_negative, require_positive}
 pub struct EstimateSettings {
     /// Standard deviation in px of a marker without a covariance.
     pub marker_deviation: f64,
-    /// Standard deviation in px of the feature model beyond the markers' covariance.
-    pub model_deviation: f64,
     /// Standard deviation of the unevenness of the section's curvature.
     pub shape_deviation: f64,
     /// Standard deviation in px of a shift of the image, by an error of the camera's pose or principal point.
     pub image_deviation: f64,
-    /// Standard deviation in px of what else a feature errs.
+    /// Standard deviation in px of what else the feature model errs.
     pub misfit_deviation: f64,
     /// Travel within which it errs alike.
     pub misfit_travel: f64,
@@ -25,16 +23,12 @@ pub struct EstimateSettings {
     pub weight_deviation: f64,
     /// Standard deviation of the offset.
     pub offset_deviation: f64,
-    /// Standard deviation of the deviation of the tip from the plays.
-    pub rest_deviation: f64,
     /// Standard deviation of the tip that is new in each image.
     pub tip_deviation: f64,
     /// Travel over which a weight returns to its prior.
     pub weight_travel: f64,
     /// Travel over which the offset returns to its prior.
     pub offset_travel: f64,
-    /// Travel within which the tip deviates from the plays alike.
-    pub deviation_travel: f64,
 }
 
 impl EstimateSettings {
@@ -49,17 +43,14 @@ impl EstimateSettings {
             ("tip_deviation", self.tip_deviation),
             ("weight_travel", self.weight_travel),
             ("offset_travel", self.offset_travel),
-            ("deviation_travel", self.deviation_travel),
             ("misfit_travel", self.misfit_travel),
         ] {
             require_positive(field, value)?;
         }
         for (field, value) in [
-            ("model_deviation", self.model_deviation),
             ("shape_deviation", self.shape_deviation),
             ("image_deviation", self.image_deviation),
             ("offset_deviation", self.offset_deviation),
-            ("rest_deviation", self.rest_deviation),
             ("misfit_deviation", self.misfit_deviation),
         ] {
             require_non_negative(field, value)?;

@@ -1,6 +1,6 @@
 //! Kalman filter of coefficients that return to their prior.
 
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{DVectorView, SMatrix, SVector};
 
 /// Normally distributed coefficients.
 ///
@@ -10,20 +10,43 @@ use nalgebra::{SMatrix, SVector};
 #[derive(Debug, Clone, PartialEq)]
 pub struct Kalman<const D: usize> {
     prior_mean: SVector<f64, D>,
-    prior_variance: SVector<f64, D>,
+    prior: PriorCovariance<D>,
     mean: SVector<f64, D>,
     covariance: SMatrix<f64, D, D>,
 }
 
+/// A covariance diag(v) - t t' within each block of coefficients, and 0 between blocks: of independent coefficients of
+/// variances v, of each block a weighted sum is known as well.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct PriorCovariance<const D: usize> {
+    variance: SVector<f64, D>,
+    tie: SVector<f64, D>,
+    block: usize,
+}
+
 impl<const D: usize> Kalman<D> {
-    /// At the prior: means and variances (D,).
-    pub fn new(mean: SVector<f64, D>, variance: SVector<f64, D>) -> Self {
+    /// At the prior: means and variances (D,) of coefficients in blocks of `block`.
+    pub fn new(mean: SVector<f64, D>, variance: SVector<f64, D>, block: usize) -> Self {
         Self {
             prior_mean: mean,
-            prior_variance: variance,
+            prior: PriorCovariance {
+                variance,
+                tie: SVector::zeros(),
+                block,
+            },
             mean,
             covariance: SMatrix::from_diagonal(&variance),
         }
+    }
+
+    /// Makes the prior of row . x as certain as `std`, where `row` (D,) is of one block, of which no other sum is known yet.
+    pub fn know_sum(&mut self, row: &SVector<f64, D>, std: f64) {
+        let cross = row.component_mul(&self.prior.variance);
+        let total = row.dot(&cross);
+        let known = 1.0 - (std * std / total).min(1.0);
+        let tie = cross * libm::sqrt(known / total);
+        self.prior.tie += tie;
+        self.covariance.syger(-1.0, &tie, &tie, 1.0);
     }
 
     /// Means (D,).
@@ -49,11 +72,37 @@ impl<const D: usize> Kalman<D> {
         &mut self.mean
     }
 
-    /// Covariance of all coefficients with row . x.
-    pub fn covariance_with(&self, row: &SVector<f64, D>) -> SVector<f64, D> {
+    /// Covariance of all coefficients with row . x, for a row of the coefficients from `first` on.
+    pub fn covariance_with(&self, first: usize, row: &[f64]) -> SVector<f64, D> {
+        let row = DVectorView::from_slice(row, row.len());
+        let (width, end) = (row.len(), first + row.len());
         let mut out = SVector::<f64, D>::zeros();
-        out.sygemv(1.0, &self.covariance, row, 0.0);
+        // Only the lower triangle is kept.
+        let left = self.covariance.view((first, 0), (width, first));
+        out.rows_mut(0, first).gemv_tr(1.0, &left, &row, 0.0);
+        let own = self.covariance.view((first, first), (width, width));
+        out.rows_mut(first, width).sygemv(1.0, &own, &row, 0.0);
+        let below = self.covariance.view((end, first), (D - end, width));
+        out.rows_mut(end, D - end).gemv(1.0, &below, &row, 0.0);
         out
+    }
+
+    /// Covariance of the coefficients of 1 in `only` (D,) with rows (D, M) of these alone; 0 for the others.
+    fn cross_of<const M: usize>(
+        &self,
+        only: &SVector<f64, D>,
+        rows: &SMatrix<f64, D, M>,
+    ) -> SMatrix<f64, D, M> {
+        let own = |index: usize| only.get(index).is_some_and(|own| *own != 0.0);
+        let mut cross = SMatrix::<f64, D, M>::zeros();
+        for a in (0..D).filter(|a| own(*a)) {
+            for b in (0..D).filter(|b| own(*b)) {
+                let part = rows.row(b) * self.covariance(a, b);
+                let mut entries = cross.row_mut(a);
+                entries += part;
+            }
+        }
+        cross
     }
 
     /// Adds an independent variance to a coefficient.
@@ -66,46 +115,89 @@ impl<const D: usize> Kalman<D> {
     /// Return to the prior by the shares `keep` (D,) of what is kept:
     ///
     /// ```text
-    /// x <- x0 + keep (x - x0),    P <- keep P keep + (1 - keep^2) P0
+    /// x <- x0 + keep (x - x0),    P <- keep (P - P0) keep + P0
     /// ```
     pub fn decay(&mut self, keep: &SVector<f64, D>) {
         for (mean, (prior, keep)) in self.mean.iter_mut().zip(self.prior_mean.iter().zip(keep)) {
             *mean = prior + keep * (*mean - prior);
         }
-        for (mut column, by) in self.covariance.column_iter_mut().zip(keep) {
-            column.component_mul_assign(keep);
-            column *= *by;
+        let columns = self.covariance.as_mut_slice().chunks_exact_mut(D);
+        for (index, (column, by)) in columns.zip(keep).enumerate() {
+            let below = column.iter_mut().zip(keep.as_slice()).skip(index);
+            below.for_each(|(entry, keep)| *entry *= keep * by);
         }
-        let noise = self
-            .prior_variance
-            .zip_map(keep, |prior, keep| (1.0 - keep * keep) * prior);
+        let PriorCovariance {
+            variance,
+            tie,
+            block,
+        } = self.prior;
+        let noise = variance.zip_map(keep, |prior, keep| (1.0 - keep * keep) * prior);
         for (index, variance) in noise.iter().enumerate() {
             self.add_variance(index, *variance);
         }
+        for column in 0..D {
+            let by = |values: &SVector<f64, D>| values.get(column).copied().unwrap_or(0.0);
+            let (known, kept) = (by(&tie), by(keep));
+            let end = D.min((column / block + 1) * block);
+            let mut rows = self.covariance.view_range_mut(column..end, column);
+            let others = tie.rows_range(column..end);
+            for (entry, (other, keep)) in rows
+                .iter_mut()
+                .zip(others.iter().zip(keep.rows_range(column..end).iter()))
+            {
+                *entry -= (1.0 - kept * keep) * known * other;
+            }
+        }
     }
 
-    /// Update with row . x = value + noise of a variance; `weight` (D,) multiplies the gain of each coefficient.
+    /// Update with M measurements row . x = value of independent noise of a variance each.
     ///
     /// ```text
-    /// s = h' P h + r,   k = weight P h / s,   x <- x + k (value - h' x),   P <- (I - k h') P (I - k h')' + r k k'
+    /// C = P H',  S = H C + r I,  K = C S^-1,  x <- x + K (value - H x),  P <- (I - K H) P (I - K H)' + r K K'
     /// ```
-    pub fn update(
+    ///
+    /// `rows` are H' (D, M) and `cross` is C. With `only` (D,) of 0 and 1, K is that of a filter that knows all coefficients
+    /// but those of 1, so that a correlation with the others turns no step around. No update where S is not positive.
+    pub fn update<const M: usize>(
         &mut self,
-        row: &SVector<f64, D>,
-        value: f64,
+        rows: &SMatrix<f64, D, M>,
+        cross: &SMatrix<f64, D, M>,
+        value: &SVector<f64, M>,
         variance: f64,
-        weight: Option<&SVector<f64, D>>,
+        only: Option<&SVector<f64, D>>,
     ) {
-        let cross = self.covariance_with(row);
-        let total = row.dot(&cross) + variance;
-        let mut gain = cross / total;
-        if let Some(weight) = weight {
-            gain.component_mul_assign(weight);
+        let noise = SMatrix::<f64, M, M>::identity() * variance;
+        let gain = |cross: &SMatrix<f64, D, M>| {
+            let factor = (rows.tr_mul(cross) + noise).cholesky()?;
+            Some(cross * factor.inverse())
+        };
+        let gain = match only {
+            None => gain(cross),
+            Some(only) => gain(&self.cross_of(only, rows)),
+        };
+        let Some(gain) = gain else {
+            return;
+        };
+        let total = rows.tr_mul(cross) + noise;
+        let innovation = value - rows.tr_mul(&self.mean);
+        self.mean += gain * innovation;
+        let half = cross - gain * total * 0.5;
+        let pairs = || {
+            let gains = gain.as_slice().chunks_exact(D);
+            gains.zip(half.as_slice().chunks_exact(D))
+        };
+        let columns = self.covariance.as_mut_slice().chunks_exact_mut(D);
+        for (index, column) in columns.enumerate() {
+            let below = column.get_mut(index..).unwrap_or_default();
+            for (gain, half) in pairs() {
+                let parts = (gain.get(index..), half.get(index..));
+                if let (Some(gain @ [g, ..]), Some(half @ [h, ..])) = parts {
+                    let parts = gain.iter().zip(half);
+                    for (entry, (gain, half)) in below.iter_mut().zip(parts) {
+                        *entry -= g * half + h * gain;
+                    }
+                }
+            }
         }
-        let innovation = value - row.dot(&self.mean);
-        self.mean.axpy(innovation, &gain, 1.0);
-        let half = cross - gain * (0.5 * total);
-        self.covariance.syger(-1.0, &gain, &half, 1.0);
-        self.covariance.syger(-1.0, &half, &gain, 1.0);
     }
 }

@@ -50,7 +50,7 @@ pub struct Observed<const M: usize> {
 
 /// The most probable state.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MostProbable<const N: usize, const M: usize, const G: usize> {
+pub struct MostProbable<const N: usize, const M: usize> {
     /// State (N,).
     pub state: [f64; N],
     /// Its standard deviations (N,).
@@ -63,8 +63,6 @@ pub struct MostProbable<const N: usize, const M: usize, const G: usize> {
     pub predicted: [f64; M],
     /// dh/dq there.
     pub by_state: [[f64; M]; N],
-    /// dh/dg there.
-    pub by_geometry: [[f64; M]; G],
 }
 
 /// Independent scalar measurements of standard deviation 1 that are linear in state and geometry:
@@ -97,7 +95,7 @@ impl<const M: usize> Observed<M> {
         prior: &Prior<N, G>,
         starts: &[SVector<f64, N>],
         price: f64,
-    ) -> Option<MostProbable<N, M, G>> {
+    ) -> Option<MostProbable<N, M>> {
         let geometry = prior.geometry.into();
         let by_geometry = SMatrix::from(sensor.by_geometry(&prior.state.into(), &geometry)?);
         let problem = |used| Problem::new(self, sensor, prior, by_geometry, used);
@@ -130,41 +128,39 @@ impl<const M: usize> Observed<M> {
                 }
             }
         }
-        best.by_geometry = sensor.by_geometry(&best.state, &geometry)?;
         Some(best)
     }
 
-    /// The measurement about a most probable state, of a state that deviates by `std` (N,) from what is estimated.
-    pub fn linearize<const N: usize, const G: usize>(
+    /// The measurement of the features that are `used` about the prior's state, of a state that deviates by `std` (N,) from
+    /// what is estimated.
+    ///
+    /// About the most probable state its errors would be those of the image: the derivatives would be correlated with the
+    /// noise, and where state and geometry are hardly told apart, the filter would become certain of directions that no image
+    /// measured and drift along them (Huang, Mourikis, Roumeliotis, Int. J. Robotics Research 29, 2010).
+    pub fn linearize<const N: usize, const G: usize, S: Sensor<N, M, G>>(
         &self,
-        about: &MostProbable<N, M, G>,
-        geometry: &SVector<f64, G>,
+        sensor: &S,
+        prior: &Prior<N, G>,
+        used: [bool; M],
         std: &[f64; N],
     ) -> Option<Linear<N, M, G>> {
-        let by_state = SMatrix::<f64, M, N>::from(about.by_state);
-        let by_geometry = SMatrix::<f64, M, G>::from(about.by_geometry);
+        let (state, geometry) = (prior.state.into(), prior.geometry.into());
+        let (predicted, by_state) = sensor.features(&state, &geometry)?;
+        let by_state = SMatrix::<f64, M, N>::from(by_state);
+        let by_geometry = SMatrix::<f64, M, G>::from(sensor.by_geometry(&state, &geometry)?);
         let mut spread = by_state;
         for (mut column, std) in spread.column_iter_mut().zip(std) {
             column *= *std;
         }
-        let whitener = Whitener::new(self.covariance + spread * spread.transpose(), about.used)?;
-        let value = self.features - SVector::from(about.predicted)
-            + by_state * SVector::from(about.state)
-            + by_geometry * geometry;
+        let value = self.features - SVector::from(predicted)
+            + by_state * prior.state
+            + by_geometry * prior.geometry;
+        let whitener = Whitener::new(self.covariance + spread * spread.transpose(), used)?;
         Some(Linear {
             by_state: whitener.apply(by_state)?,
             by_geometry: whitener.apply(by_geometry)?,
             value: whitener.apply(value)?,
         })
-    }
-
-    /// Sum of the squares of the misfit of all features; None unless all were seen.
-    pub fn misfit_squared<const N: usize, const G: usize>(
-        &self,
-        about: &MostProbable<N, M, G>,
-    ) -> Option<f64> {
-        let misfit = self.features - SVector::from(about.predicted);
-        (self.seen == [true; M]).then(|| misfit.norm_squared())
     }
 }
 
@@ -253,7 +249,7 @@ impl<'a, const N: usize, const M: usize, const G: usize, S: Sensor<N, M, G>>
         cost.is_finite().then_some(cost)
     }
 
-    fn minimum(&self, start: SVector<f64, N>) -> Option<MostProbable<N, M, G>> {
+    fn minimum(&self, start: SVector<f64, N>) -> Option<MostProbable<N, M>> {
         let mut x = start;
         let mut here = self.at(&x)?;
         let mut cost = self.cost(&x, &here.0)?;
@@ -283,7 +279,6 @@ impl<'a, const N: usize, const M: usize, const G: usize, S: Sensor<N, M, G>>
             used: self.used,
             predicted: here.0,
             by_state: here.1,
-            by_geometry: [[0.0; M]; G],
         })
     }
 

@@ -8,8 +8,4 @@ pub struct LawSettings {
     pub tip_gain: f64,
     /// Travel of the reference over which its direction is averaged.
     pub direction_travel: f64,
-    /// Standard deviations of the half width by which the contact is expected earlier, when the speed of the tip is bounded.
-    pub caution: f64,
-    /// Largest change of the contact offsets in use, per travel of the reference.
-    pub change_rate: f64,
 }

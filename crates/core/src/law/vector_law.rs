@@ -2,12 +2,12 @@
 
 use crate::article::play_limit::PlayLimit;
 use crate::dof::all_finite;
-use crate::error::{ConfigError, require, require_non_negative, require_positive};
+use crate::error::{ConfigError, require, require_positive};
 use crate::estimation::estimate::Slack;
 use crate::law::direction::Direction;
 use crate::law::settings::LawSettings;
 use crate::model::plays::{
-    COEFFICIENTS, OFFSET, Plays, Row, Transmission, bent, gain_row, product, sign,
+    COEFFICIENTS, OFFSET, OWN, Plays, Row, SHARED, Transmission, bent, gain_row, product,
 };
 
 /// Share of `command_speed` that the law uses, so that rounding does not exceed it.
@@ -42,7 +42,7 @@ const SLOPES: (f64, f64) = (0.5, 1.5);
 /// Wrong as far as the estimate is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VectorLaw<const N: usize> {
-    settings: LawSettings,
+    tip_gain: f64,
     transmission: Transmission<N>,
     /// Unit over `width_limit`: the bounds compare DOFs in `width_limit`, as the limiter of the command does.
     weight: [f64; N],
@@ -61,7 +61,6 @@ pub struct VectorLaw<const N: usize> {
     /// Command at which the tip is at the reference, in units.
     target: [f64; N],
     rows: [Row; N],
-    caution: [f64; N],
     share: f64,
 }
 
@@ -95,8 +94,6 @@ impl<const N: usize> VectorLaw<N> {
         let tip_gain = settings.tip_gain;
         require(tip_gain >= 1.0, "tip_gain", tip_gain, "1 or above")?;
         require_positive("direction_travel", settings.direction_travel)?;
-        require_non_negative("caution", settings.caution)?;
-        require_positive("change_rate", settings.change_rate)?;
         let friction = *transmission.friction();
         let mut gain = [f64::INFINITY; N];
         for (own, group) in bounds.gain.into_iter().zip(friction.group()) {
@@ -105,7 +102,7 @@ impl<const N: usize> VectorLaw<N> {
             }
         }
         Ok(Self {
-            settings,
+            tip_gain,
             weight: over(transmission.unit(), bounds.width_limit),
             gain,
             step_limit: bounds.step.map(|step| step * BELOW_LIMIT),
@@ -119,7 +116,6 @@ impl<const N: usize> VectorLaw<N> {
             origin: [f64::NAN; N],
             target: [0.0; N],
             rows: [[0.0; COEFFICIENTS]; N],
-            caution: [0.0; N],
             share: 1.0,
         })
     }
@@ -158,7 +154,6 @@ impl<const N: usize> VectorLaw<N> {
             return self.command;
         }
         let Some(last) = self.reference.replace(reference) else {
-            self.rows = *rows;
             return reference;
         };
         let motion = subtract(reference, last);
@@ -166,7 +161,7 @@ impl<const N: usize> VectorLaw<N> {
             return self.command;
         }
         self.direction.step(motion);
-        self.follow_estimate(rows, slack, motion);
+        self.rows = *rows;
         let unit = self.transmission.unit();
         let relative = over(subtract(reference, self.origin), unit);
         let moved = over(motion, unit);
@@ -221,48 +216,6 @@ impl<const N: usize> VectorLaw<N> {
         self.plays = self.follow(&self.plays, command);
     }
 
-    /// Moves the coefficients in use towards the estimated ones, as far as the contact offsets may change in this motion.
-    fn follow_estimate(&mut self, rows: &[Row; N], slack: &[Slack; N], motion: [f64; N]) {
-        let unit = self.transmission.unit();
-        let travel: f64 = motion
-            .iter()
-            .zip(unit)
-            .map(|(motion, unit)| motion.abs() / unit)
-            .sum();
-        let ahead = [1.0; N];
-        let (now, new) = (
-            self.transmission.deflection(&self.rows, &ahead),
-            self.transmission.deflection(rows, &ahead),
-        );
-        let phi = self.plays.regressors();
-        let dofs = self
-            .rows
-            .iter_mut()
-            .zip(rows)
-            .zip(now.into_iter().zip(new))
-            .zip(phi);
-        for (((used, estimated), (now, new)), phi) in dofs {
-            let tip = product(&phi, estimated) - product(&phi, used);
-            let change = (new - now).abs().max(tip.abs());
-            let share = (self.settings.change_rate * travel / change).min(1.0);
-            if share.is_finite() {
-                used.iter_mut()
-                    .zip(estimated)
-                    .for_each(|(used, new)| *used += share * (new - *used));
-            } else {
-                *used = *estimated;
-            }
-        }
-        let stds = slack
-            .iter()
-            .zip(unit)
-            .map(|(slack, unit)| self.settings.caution * slack.half_width_std / unit);
-        self.caution
-            .iter_mut()
-            .zip(stds)
-            .for_each(|(caution, std)| *caution = std);
-    }
-
     /// The target for a reference (N,) in units.
     fn next_target(&self, reference: [f64; N], slack: &[Slack; N]) -> [f64; N] {
         let direction = self.direction.value();
@@ -274,14 +227,8 @@ impl<const N: usize> VectorLaw<N> {
         let given = reference.into_iter().zip(deflection).zip(direction);
         for (((to, slope), row), ((reference, deflection), direction)) in dofs.zip(given) {
             *slope = product(&by_gain, row).clamp(SLOPES.0, SLOPES.1);
-            let linear: f64 = row
-                .iter()
-                .zip(by_gain)
-                .take(crate::model::plays::SHARED + crate::model::plays::OWN)
-                .map(|(w, _)| w)
-                .sum();
-            let constant = row.get(OFFSET).copied().unwrap_or(0.0)
-                + row.get(OFFSET + 1).copied().unwrap_or(0.0);
+            let linear: f64 = row.iter().take(SHARED + OWN).sum();
+            let constant = row.get(OFFSET).copied().unwrap_or(0.0);
             for _ in 0..SLIDES {
                 let (curved, _) = bent(row, *to, direction);
                 let tip = linear * *to - deflection + curved + constant;
@@ -291,7 +238,8 @@ impl<const N: usize> VectorLaw<N> {
         }
         let mut target = steady;
         for _ in 0..CORRECTIONS {
-            let tip = self.tip(&self.transmission.advance(&self.plays, &target));
+            let ahead = self.transmission.advance(&self.plays, &target);
+            let tip = ahead.tip(&self.rows, [true; N]);
             let dofs = target
                 .iter_mut()
                 .zip(steady)
@@ -329,15 +277,6 @@ impl<const N: usize> VectorLaw<N> {
         target
     }
 
-    fn tip(&self, plays: &Plays<N>) -> [f64; N] {
-        let mut tip = [0.0; N];
-        let dofs = plays.regressors().into_iter().zip(&self.rows);
-        tip.iter_mut()
-            .zip(dofs)
-            .for_each(|(tip, (phi, row))| *tip = product(&phi, row));
-        tip
-    }
-
     /// The motion of the commands of a group towards the target, within the bounds, for a reference and its motion (N,), all
     /// in units.
     fn bounded_step(
@@ -373,30 +312,18 @@ impl<const N: usize> VectorLaw<N> {
         {
             share = share.min(limit / (step.abs() * unit));
         }
-        let mut nearer = self.plays.command;
-        let early = nearer.iter_mut().zip(step).zip(self.caution);
-        early.for_each(|((command, step), caution)| *command += caution * sign(step));
-        let ahead_of_contact = self.transmission.advance(&self.plays, &nearer);
-        let (before, now) = (
-            only(members, self.tip(&ahead_of_contact)),
-            only(members, self.tip(&self.plays)),
-        );
+        let now = self.plays.tip(&self.rows, members);
         let room = moved.max(dot(subtract(reference, now), motion) / moved);
-        let beside = |plays: &Plays<N>, share: f64| {
-            let mut to = plays.command;
+        for _ in 0..STEPS {
+            let mut there = self.plays;
+            let mut to = there.command;
             to.iter_mut()
                 .zip(step)
                 .for_each(|(to, step)| *to += share * step);
-            only(members, self.tip(&self.transmission.advance(plays, &to)))
-        };
-        for _ in 0..STEPS {
-            let there = beside(&self.plays, share);
-            let mut fastest = norm(subtract(there, now));
-            if self.settings.caution > 0.0 {
-                fastest = fastest.max(norm(subtract(beside(&ahead_of_contact, share), before)));
-            }
-            let excess = (fastest / (self.settings.tip_gain * moved))
-                .max(dot(subtract(there, now), motion) / (moved * room));
+            self.transmission.move_group(&mut there, members, &to);
+            let change = subtract(there.tip(&self.rows, members), now);
+            let excess =
+                (norm(change) / (self.tip_gain * moved)).max(dot(change, motion) / (moved * room));
             if excess <= 1.0 {
                 break;
             }

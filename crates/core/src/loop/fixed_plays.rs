@@ -37,13 +37,6 @@ const CERTAIN: f64 = 3.0;
 const APPARENT: f64 = 0.1;
 /// Standard deviation by which an image without markers makes the tip less certain, in `start_deviation`.
 const MISS: f64 = 0.03;
-/// Error of the feature model that a reset assumes, in `model_deviation`, and the most images over which its square is averaged.
-const RESET_MODEL: f64 = 30.0;
-const MODEL_IMAGES: f64 = 200.0;
-/// Largest squared misfit of an image that it is adapted to, in variances: a wrong band is in one image, a wrong geometry in
-/// all.
-const MISFIT: f64 = 25.0;
-
 /// The estimate of an instrument with two bands.
 type InstrumentEstimate = Estimate<3, ERRORS, { 3 * COEFFICIENTS + ERRORS }>;
 
@@ -66,10 +59,6 @@ pub struct FixedPlays {
     rows: [Row; 3],
     slack: [Slack; 3],
     start_std: PerDof<f64>,
-    /// Standard deviation of the feature model in px, and the number of images over which its square is averaged; the
-    /// configured one counts as one.
-    model_std: f64,
-    model_images: f64,
     limits: PerDof<PlayLimit>,
     observability: StateEstimator,
     prediction: PredictionMonitor<3>,
@@ -187,8 +176,6 @@ impl ProfileBlocks for FixedPlays {
             slack: estimate.slack(),
             estimate,
             start_std,
-            model_std: own.model_deviation,
-            model_images: 1.0,
             limits,
             observability: state_estimator(settings)?,
             prediction: PredictionMonitor::new(SLACK_CHANGED, transmission.unit()),
@@ -261,7 +248,8 @@ impl ProfileBlocks for FixedPlays {
         let starts = mirrored(&prior.covariance);
         let markers =
             observed.most_probable(model, &prior, &starts, self.settings.outlier_distance)?;
-        let start = self.feature_model(model).predict(prior.state.into())?;
+        let (expected, _) = Sensor::features(model, &prior.state.into(), &prior.geometry.into())?;
+        let linear = observed.linearize(model, &prior, markers.used, &self.estimate.noise())?;
         let prediction = FeaturePrediction {
             features: markers.predicted,
             columns: markers.by_state,
@@ -271,7 +259,7 @@ impl ProfileBlocks for FixedPlays {
             *value = if used { *value } else { f64::NAN };
         }
         let mut innovation = image.features;
-        for (value, predicted) in innovation.iter_mut().zip(start.features) {
+        for (value, predicted) in innovation.iter_mut().zip(expected) {
             *value -= predicted;
         }
         let about = self
@@ -285,11 +273,11 @@ impl ProfileBlocks for FixedPlays {
                 ..about
             },
             used: [a, b],
-            predicted_features: start.features,
+            predicted_features: expected,
             state_deviation: markers.std,
             distance: libm::sqrt(markers.distance_squared),
             markers: None,
-            bands: Some((observed, markers)),
+            bands: Some(linear),
         })
     }
 
@@ -301,26 +289,15 @@ impl ProfileBlocks for FixedPlays {
         _: Image<'_>,
         updates_offsets: bool,
     ) -> ImageUpdate {
-        let Some((observed, markers)) = &measurement.bands else {
-            return ImageUpdate::default();
-        };
-        let geometry = SVector::from(self.estimate.geometry().0);
-        let Some(linear) = observed.linearize(markers, &geometry, &self.estimate.noise()) else {
+        let Some(linear) = &measurement.bands else {
             return ImageUpdate::default();
         };
         self.estimate.update(
             &self.past.plays,
-            &linear,
+            linear,
             measurement.distance,
             !updates_offsets,
         );
-        if let Some(misfit) = observed.misfit_squared(markers) {
-            // Four features determine three DOFs: what is left is the error of one.
-            let variance = self.model_std * self.model_std;
-            self.model_images = (self.model_images + 1.0).min(MODEL_IMAGES);
-            let change = (misfit.min(MISFIT * variance) - variance) / self.model_images;
-            self.model_std = libm::sqrt(variance + change).max(self.settings.model_deviation);
-        }
         self.rows = self.estimate.coefficients();
         if !updates_offsets {
             return ImageUpdate::default();
@@ -342,10 +319,8 @@ impl ProfileBlocks for FixedPlays {
     }
 
     fn feature_model(&self, configured: &FeatureModel) -> FeatureModel {
-        {
-            let ([unevenness, u, v, ..], _) = self.estimate.geometry();
-            configured.with_geometry([unevenness, u, v])
-        }
+        let ([unevenness, u, v, ..], _) = self.estimate.geometry();
+        configured.with_geometry([unevenness, u, v])
     }
 
     fn apparent(&self, configured: &FeatureModel, belief: Belief) -> Belief {
@@ -367,8 +342,6 @@ impl ProfileBlocks for FixedPlays {
 
     fn reset_prediction(&mut self, _: &Entry) {
         self.estimate.loosen(self.start_std);
-        self.model_std = RESET_MODEL * self.settings.model_deviation;
-        self.model_images = 1.0;
     }
 }
 
@@ -376,10 +349,18 @@ impl<S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<FixedPlays, S> {
     /// The estimated hysteresis.
     pub fn hysteresis(&self) -> HysteresisEstimate {
         let slack = &self.profile.slack;
+        let mut width_std = self
+            .profile
+            .estimate
+            .slack_deviation()
+            .map(|own| own.half_width);
+        for (std, slack) in width_std.iter_mut().zip(slack) {
+            *std /= slack.half_width;
+        }
         let ([unevenness, u, v, ..], [_, u_std, v_std, ..]) = self.profile.estimate.geometry();
         HysteresisEstimate {
             half_width: slack.map(|slack| slack.half_width),
-            width_std: slack.map(|slack| slack.half_width_std / slack.half_width),
+            width_std,
             centre: slack.map(|slack| slack.centre),
             shared: self.profile.estimate.shared(),
             gain: slack.map(|slack| slack.gain),
@@ -410,11 +391,10 @@ impl FixedPlays {
         let covariance = image
             .covariance
             .map_or(own, |rows| SMatrix::<f64, 4, 4>::from(*rows));
-        let model = SMatrix::<f64, 4, 4>::from_diagonal_element(self.model_std * self.model_std);
         let [a, b] = found(image.features);
         Observed {
             features: SVector::from(image.features),
-            covariance: covariance + model,
+            covariance,
             seen: [a, a, b, b],
         }
     }

@@ -90,11 +90,7 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
     fn check_innovation(&self, past: &Entry, measurement: &Measurement, image: Image<'_>) -> Flags {
         let frames = &self.monitors.frames;
         let flags = frames.check_innovation(measurement.distance);
-        let prior = self.profile.predict(&self.history, past);
-        let model = self.profile.feature_model(&self.feature_model);
-        let expected = model.predict(prior.state);
-        let is_exchanged =
-            expected.is_some_and(|expected| is_reversed(expected.features, image.features));
+        let is_exchanged = is_reversed(measurement.predicted_features, image.features);
         if !is_exchanged && flags.is_empty() {
             return Flags::NONE;
         }

@@ -3,14 +3,14 @@
 use crate::article::state::{StateEstimate, found};
 use crate::dof::{PerDof, all_finite, zip_with};
 use crate::estimation::marker_measurement::MarkerEstimate;
-use crate::estimation::measurement::{MostProbable, Observed};
+use crate::estimation::measurement::Linear;
 use crate::model::features::GEOMETRY;
 
 /// Errors of the geometry in profile `plays`: those of the model, and of each feature.
 pub const ERRORS: usize = GEOMETRY + 4;
 
-/// The bands of an image with their most probable state.
-pub type Bands = (Observed<4>, MostProbable<3, 4, ERRORS>);
+/// Linear measurement of the bands of an image.
+pub type Bands = Linear<3, 4, ERRORS>;
 
 /// A state estimate from one image.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,7 +27,7 @@ pub struct Measurement {
     pub distance: f64,
     /// The most probable state for the markers, in profile `best`.
     pub markers: Option<MarkerEstimate>,
-    /// The same in profile `plays`.
+    /// The linear measurement, in profile `plays`.
     pub bands: Option<Bands>,
 }
 

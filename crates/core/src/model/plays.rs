@@ -9,11 +9,10 @@ pub const SHARED: usize = 12;
 pub const OWN: usize = 6;
 /// Bent plays: every second own play, bent at each of [`KNOTS`].
 pub const BENT: usize = OWN / 2 * KNOTS.len();
-/// Coefficients of a DOF: the plays, the bent plays, the offset and the deviation of the tip from all of these.
-pub const COEFFICIENTS: usize = SHARED + OWN + BENT + 2;
-/// Index of the offset and of the deviation.
-pub const OFFSET: usize = COEFFICIENTS - 2;
-pub const DEVIATION: usize = COEFFICIENTS - 1;
+/// Coefficients of a DOF: of the plays, of the bent plays, and the offset.
+pub const COEFFICIENTS: usize = SHARED + OWN + BENT + 1;
+/// Index of the offset.
+pub const OFFSET: usize = COEFFICIENTS - 1;
 
 /// Radii of the own plays; 1 is half as large again as the expected half width.
 const OWN_RADII: [f64; OWN] = [0.0, 0.25, 0.5, 0.75, 1.0, 1.25];
@@ -30,8 +29,10 @@ const SIDE_RADII: [f64; SHARED] = [
 ];
 /// Positions at which plays are bent.
 const KNOTS: [f64; 3] = [-1.0, 0.0, 1.0];
-/// Newton steps of the return to the friction ellipse; the motion of a control tick needs two, that to the law's target four.
+/// Newton steps of the return to the friction ellipse at most, and the error of its equation at which they end: the motion of
+/// a control tick needs two, that to the law's target four.
 const STEPS: usize = 4;
+const EXACT: f64 = 1e-9;
 
 /// Regressors of a DOF, or their coefficients.
 pub type Row = [f64; COEFFICIENTS];
@@ -59,27 +60,46 @@ impl<const N: usize> Plays<N> {
     /// Regressors of each DOF:
     ///
     /// ```text
-    /// phi = (shared plays, own plays p, max(p - knot, 0) of every second own play, 1, 1)
+    /// phi = (shared plays, own plays p, max(p - knot, 0) of every second own play, 1)
     /// ```
     pub fn regressors(&self) -> [Row; N] {
         let mut rows = [[0.0; COEFFICIENTS]; N];
-        for (row, (shared, own)) in rows.iter_mut().zip(self.shared.iter().zip(&self.own)) {
-            let bent = own
-                .iter()
-                .step_by(2)
-                .flat_map(|play| KNOTS.map(|knot| (play - knot).max(0.0)));
-            let values = shared
-                .iter()
-                .chain(own)
-                .copied()
-                .chain(bent)
-                .chain([1.0, 1.0]);
-            row.iter_mut()
-                .zip(values)
-                .for_each(|(entry, value)| *entry = value);
+        for (row, dof) in rows.iter_mut().zip(self.dofs()) {
+            *row = regressors(dof);
         }
         rows
     }
+
+    /// Regressors times coefficients of each of some DOFs, 0 for the others.
+    #[inline]
+    pub fn tip(&self, rows: &[Row; N], members: [bool; N]) -> [f64; N] {
+        let mut tip = [0.0; N];
+        let dofs = tip.iter_mut().zip(self.dofs()).zip(rows).zip(members);
+        for (((tip, dof), row), _) in dofs.filter(|(_, member)| *member) {
+            *tip = product(&regressors(dof), row);
+        }
+        tip
+    }
+
+    fn dofs(&self) -> impl Iterator<Item = (&[f64; SHARED], &[f64; OWN])> {
+        self.shared.iter().zip(&self.own)
+    }
+}
+
+#[inline]
+fn regressors((shared, own): (&[f64; SHARED], &[f64; OWN])) -> Row {
+    let mut row = [1.0; COEFFICIENTS];
+    let (plays, rest) = row.split_at_mut(SHARED);
+    plays.copy_from_slice(shared);
+    let (plays, curved) = rest.split_at_mut(OWN);
+    plays.copy_from_slice(own);
+    let bent = curved.chunks_exact_mut(KNOTS.len());
+    for (bent, play) in bent.zip(own.iter().step_by(2)) {
+        for (entry, knot) in bent.iter_mut().zip(KNOTS) {
+            *entry = (play - knot).max(0.0);
+        }
+    }
+    row
 }
 
 /// The plays of N DOFs, some of which share a friction.
@@ -103,6 +123,7 @@ pub struct Transmission<const N: usize> {
     unit: [f64; N],
     /// Half widths of the shared plays.
     half: [[f64; SHARED]; N],
+    inverse_half: [[f64; SHARED]; N],
     /// Motion of a sliding output by the same force, over that of the first DOF of the group.
     ease: [[f64; SHARED]; N],
     is_alone: [bool; N],
@@ -146,6 +167,7 @@ impl<const N: usize> Transmission<N> {
         Ok(Self {
             friction,
             unit,
+            inverse_half: half.map(|half| half.map(|half| 1.0 / half)),
             half,
             ease,
             is_alone,
@@ -181,21 +203,8 @@ impl<const N: usize> Transmission<N> {
     #[must_use]
     pub fn advance(&self, plays: &Plays<N>, to: &[f64; N]) -> Plays<N> {
         let mut next = *plays;
-        for (play, to) in next.own.iter_mut().zip(to) {
-            for (output, radius) in play.iter_mut().zip(OWN_RADII) {
-                *output = output.max(to - radius).min(to + radius);
-            }
-        }
-        let alone = next.shared.iter_mut().zip(self.half).zip(self.is_alone);
-        for (((play, half), _), to) in alone.zip(to).filter(|((_, is_alone), _)| *is_alone) {
-            for (output, radius) in play.iter_mut().zip(half) {
-                *output = output.max(to - radius).min(to + radius);
-            }
-        }
-        if !self.is_alone.iter().all(|is_alone| *is_alone) {
-            for group in 0..N {
-                self.slide(self.friction.members(group), to, &mut next.shared);
-            }
+        for group in 0..N {
+            self.move_group(&mut next, self.friction.members(group), to);
         }
         for (command, to) in next.command.iter_mut().zip(to) {
             next.travel += (to - *command).abs();
@@ -204,69 +213,80 @@ impl<const N: usize> Transmission<N> {
         next
     }
 
+    /// Moves the plays of the DOFs of one friction group to a command (N,), in units.
+    pub fn move_group(&self, plays: &mut Plays<N>, members: [bool; N], to: &[f64; N]) {
+        let Plays { shared, own, .. } = plays;
+        let parts = self.half.iter().zip(self.is_alone);
+        let mut is_together = false;
+        let dofs = shared.iter_mut().zip(own).zip(parts).zip(to).zip(members);
+        for ((((shared, own), (half, is_alone)), to), _) in dofs.filter(|(_, member)| *member) {
+            follow(own, &OWN_RADII, *to);
+            if is_alone {
+                follow(shared, half, *to);
+            } else {
+                is_together = true;
+            }
+        }
+        if is_together {
+            self.slide(members, to, shared);
+        }
+    }
+
     /// Vector plays of the DOFs of one group.
-    fn slide(&self, members: [bool; N], to: &[f64; N], shared: &mut [[f64; SHARED]; N]) {
-        let of_group = |index: &usize| {
-            let own = members.get(*index).copied().unwrap_or(false);
-            own && !self.is_alone.get(*index).copied().unwrap_or(true)
-        };
+    fn slide(&self, members: [bool; N], to: &[f64; N], shared: &mut [Lanes; N]) {
         let mut free = [[0.0; SHARED]; N];
         let (mut square, mut largest) = ([0.0; SHARED], [0.0; SHARED]);
-        let mut multiplier = [0.0; SHARED];
-        let dofs = (0..N).zip(free.iter_mut().zip(shared.iter()).zip(to));
-        let own = self.half.iter().zip(&self.ease);
-        for ((_, ((free, play), to)), (half, ease)) in
-            dofs.zip(own).filter(|((index, _), _)| of_group(index))
+        let parts = free.iter_mut().zip(&*shared).zip(to);
+        let own = self.inverse_half.iter().zip(&self.ease).zip(members);
+        for (((free, play), to), ((inverse, ease), _)) in
+            parts.zip(own).filter(|(_, (_, own))| *own)
         {
-            let bounds = largest.iter_mut().zip(&mut multiplier);
-            let sums = square.iter_mut().zip(bounds).zip(ease);
-            for (((free, play), half), ((square, (largest, multiplier)), ease)) in
-                free.iter_mut().zip(play).zip(half).zip(sums)
-            {
-                *free = (to - play) / half;
-                *square += *free * *free;
-                *largest = f64::max(*largest, *ease);
-                *multiplier = f64::max(*multiplier, (free.abs() - 1.0) / ease);
-            }
+            *free = map(play, inverse, |play, inverse| (to - play) * inverse);
+            square = map(&square, free, |square, free| square + free * free);
+            largest = map(&largest, ease, f64::max);
         }
         if square.iter().all(|square| *square <= 1.0) {
             return;
         }
-        // Newton's method from below the root of sum (free / (1 + ease l))^2 = 1, which is convex in l.
-        for ((multiplier, square), largest) in multiplier.iter_mut().zip(square).zip(largest) {
-            *multiplier = multiplier.max((libm::sqrt(square) - 1.0) / largest);
-        }
+        // Newton's method from below the root of sum (free / (1 + ease l))^2 = 1, which is convex in l:
+        // sqrt(s) - 1 >= (s - 1) / (s + 1).
+        let mut multiplier = map(&square, &largest, |square, largest| {
+            ((square - 1.0) / ((square + 1.0) * largest)).max(0.0)
+        });
         for _ in 0..STEPS {
             let (mut value, mut slope) = ([-1.0; SHARED], [0.0; SHARED]);
-            for ((_, free), ease) in (0..N)
-                .zip(&free)
-                .zip(&self.ease)
-                .filter(|((i, _), _)| of_group(i))
-            {
-                let sums = value.iter_mut().zip(&mut slope).zip(multiplier);
-                for ((free, ease), ((value, slope), multiplier)) in free.iter().zip(ease).zip(sums)
-                {
-                    let part = 1.0 / (1.0 + ease * multiplier);
-                    let term = free * free * part * part;
-                    *value += term;
-                    *slope += ease * term * part;
-                }
+            let dofs = free.iter().zip(&self.ease).zip(members);
+            for ((free, ease), _) in dofs.filter(|(_, own)| *own) {
+                let part = map(ease, &multiplier, |ease, l| 1.0 / (1.0 + ease * l));
+                let scaled = map(free, &part, |free, part| free * part);
+                let term = map(&scaled, &scaled, |a, b| a * b);
+                value = map(&value, &term, |value, term| value + term);
+                let steep = map(ease, &part, |ease, part| ease * part);
+                let change = map(&steep, &term, |steep, term| steep * term);
+                slope = map(&slope, &change, |slope, change| slope + change);
             }
-            for ((multiplier, value), slope) in multiplier.iter_mut().zip(value).zip(slope) {
-                *multiplier += value / (2.0 * slope);
+            let step = map(&value, &slope, |value, slope| value / (2.0 * slope));
+            multiplier = map(&multiplier, &step, |l, step| l + step);
+            let off = map(
+                &square,
+                &value,
+                |square, value| {
+                    if square > 1.0 { value } else { 0.0 }
+                },
+            );
+            if off.iter().all(|off| *off < EXACT) {
+                break;
             }
         }
-        let dofs = (0..N).zip(free.iter().zip(shared.iter_mut()).zip(to));
-        let own = self.half.iter().zip(&self.ease);
-        for ((_, ((free, play), to)), (half, ease)) in
-            dofs.zip(own).filter(|((index, _), _)| of_group(index))
-        {
-            let sizes = half.iter().zip(ease).zip(square.iter().zip(multiplier));
-            for ((free, play), ((half, ease), (square, multiplier))) in
-                free.iter().zip(play).zip(sizes)
-            {
-                let moved = to - half * free / (1.0 + ease * multiplier);
-                *play = if *square > 1.0 { moved } else { *play };
+        let parts = free.iter().zip(shared).zip(to);
+        let own = self.half.iter().zip(&self.ease).zip(members);
+        for (((free, play), to), ((half, ease), _)) in parts.zip(own).filter(|(_, (_, own))| *own) {
+            let part = map(ease, &multiplier, |ease, l| 1.0 + ease * l);
+            let back = map(half, free, |half, free| half * free);
+            let back = map(&back, &part, |back, part| back / part);
+            let own = play.iter_mut().zip(back).zip(square);
+            for ((play, back), square) in own {
+                *play = if square > 1.0 { to - back } else { *play };
             }
         }
     }
@@ -287,6 +307,26 @@ impl<const N: usize> Transmission<N> {
             *sum = shared * direction + own * sign(*direction);
         }
         sums
+    }
+}
+
+/// A value of each shared play.
+type Lanes = [f64; SHARED];
+
+#[inline]
+fn map(a: &Lanes, b: &Lanes, combine: impl Fn(f64, f64) -> f64) -> Lanes {
+    let mut values = *a;
+    for (value, other) in values.iter_mut().zip(b) {
+        *value = combine(*value, *other);
+    }
+    values
+}
+
+/// Scalar plays of given radii after a motion of their command.
+#[inline]
+fn follow<const K: usize>(outputs: &mut [f64; K], radii: &[f64; K], to: f64) {
+    for (output, radius) in outputs.iter_mut().zip(radii) {
+        *output = output.max(to - radius).min(to + radius);
     }
 }
 
@@ -318,12 +358,11 @@ pub fn gain_row() -> Row {
     row
 }
 
-/// Coefficients whose sum is the tip in the middle of the slack about the origin: offset, deviation, and of the bent plays the
-/// mean from -1 to 1.
+/// Coefficients whose sum is the tip in the middle of the slack about the origin: offset, and of the bent plays the mean from -1 to 1.
 pub fn middle_row() -> Row {
     let means = (0..OWN / 2).flat_map(|_| KNOTS.map(|knot: f64| (1.0 - knot) * (1.0 - knot) / 4.0));
     let mut row = [0.0; COEFFICIENTS];
-    let values = means.chain([1.0, 1.0]);
+    let values = means.chain([1.0]);
     row.iter_mut()
         .skip(SHARED + OWN)
         .zip(values)
@@ -332,8 +371,24 @@ pub fn middle_row() -> Row {
 }
 
 /// Regressors times coefficients.
+#[inline]
 pub fn product(a: &Row, b: &Row) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+    // Four sums at once: one alone waits for each addition.
+    let mut sums = [0.0; 4];
+    let (a, b) = (a.chunks_exact(4), b.chunks_exact(4));
+    let rest: f64 = a
+        .remainder()
+        .iter()
+        .zip(b.remainder())
+        .map(|(a, b)| a * b)
+        .sum();
+    for (a, b) in a.zip(b) {
+        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
+            *sum += a * b;
+        }
+    }
+    let [p, q, r, s] = sums;
+    (p + q) + (r + s) + rest
 }
 
 /// -1, 0 or 1.

@@ -137,24 +137,19 @@ pub fn settings(safety: &SafetySettings) -> Settings {
         law: LawSettings {
             tip_gain: 1.85,
             direction_travel: 0.01,
-            caution: 0.0,
-            change_rate: 100.0,
         },
         estimation: EstimateSettings {
             marker_deviation: 0.3,
-            model_deviation: 0.3,
             shape_deviation: 0.3,
             image_deviation: 6.0,
             outlier_distance: 4.0,
-            misfit_deviation: 3.0,
-            misfit_travel: 1.0,
-            weight_deviation: 0.1,
+            misfit_deviation: 2.0,
+            misfit_travel: 2.0,
+            weight_deviation: 0.2,
             offset_deviation: 0.2,
-            rest_deviation: 0.0,
             tip_deviation: 0.12,
             weight_travel: 800.0,
             offset_travel: 22.0,
-            deviation_travel: 0.3,
         },
     }
 }
