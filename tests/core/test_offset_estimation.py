@@ -118,7 +118,7 @@ def test_the_gain_of_a_play_is_estimated(gain: float, seed: int) -> None:
     command = 40 * np.sin(2 * np.pi * steps / 250) + 15 * np.sin(2 * np.pi * steps / 97)
     measured = gain * play(command, -10, 10, 0)
     measured += np.random.default_rng(seed).normal(0, 0.2, len(steps))
-    found = TipFilter(core_settings(CONFIG), unit=15.0, std=0.2)
+    found = TipFilter(core_settings(CONFIG), expected_width=20.0, std=0.2)
     found.run(command, measured)
     assert abs(found.gain - gain) < 0.1, f"seed {seed}: {found.gain}"
 

@@ -15,21 +15,21 @@ type Run<'py> = (
     Bound<'py, PyArray1<f64>>,
 );
 
-/// The estimate of profile `best` for one DOF whose tip is measured directly.
+/// The estimate of profile `plays` for one DOF whose tip is measured directly.
 ///
-/// Half widths are at most `unit`; a measured tip has the standard deviation `std`, both in the unit of the command.
+/// The slack is about `expected_width` wide; a measured tip has the standard deviation `std`, both in the unit of the command.
 /// Raises `ConfigError`.
 #[pyclass(name = "TipFilter", module = "tautscope._core")]
-pub struct TipFilter(pub core::TipFilter);
+pub struct TipFilter(pub core::AxisFilter);
 
 #[pymethods]
 impl TipFilter {
     #[new]
-    #[pyo3(signature = (settings, *, unit, std))]
-    fn new(settings: Bound<'_, PyAny>, unit: f64, std: f64) -> PyResult<Self> {
+    #[pyo3(signature = (settings, *, expected_width, std))]
+    fn new(settings: Bound<'_, PyAny>, expected_width: f64, std: f64) -> PyResult<Self> {
         let py = settings.py();
         let settings: core::Settings = from_mapping("config", settings)?;
-        core::TipFilter::new(settings.state_estimation, unit, std)
+        core::AxisFilter::new(settings.estimation, expected_width, std)
             .map(Self)
             .map_err(errors::config(py))
     }

@@ -77,7 +77,6 @@ pub use estimation::expectation::{Beliefs, Expected};
 pub use estimation::history::Entry;
 pub use estimation::posture::{Belief, Observation};
 pub use estimation::settings::StateEstimationSettings;
-pub use estimation::tip_filter::TipFilter;
 pub use law::settings::LawSettings;
 pub use r#loop::best::Best;
 pub use r#loop::fixed_plays::FixedPlays;

@@ -18,11 +18,9 @@ const OWN_SHARE: f64 = 0.4;
 /// Standard deviation of a bent play over that of a play.
 const BENT_SHARE: f64 = 0.4;
 /// Standard deviation of the gain: the tip follows its motor about one to one.
-const GAIN_DEVIATION: f64 = 0.1;
-/// Bounds of the gain: a tip that moves less than half or more than half as much again as its motor is another instrument.
-const GAINS: (f64, f64) = (0.5, 1.5);
-/// Distance from which on an image counts less, in standard deviations of a feature.
-const ROBUST: f64 = 2.5;
+const GAIN_DEVIATION: f64 = 0.3;
+/// Bounds of the gain: outside of them it is another instrument.
+const GAINS: (f64, f64) = (0.6, 1.3);
 
 /// Normally distributed coefficients of the plays of N DOFs, and G errors of the geometry: D = N `COEFFICIENTS` + G.
 ///
@@ -243,8 +241,10 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
             .map(|unit| self.settings.tip_deviation * unit)
     }
 
-    /// Updates the coefficients with a linear measurement at plays, at a Mahalanobis distance; with `is_position_only` the
-    /// offsets alone.
+    /// Updates the coefficients with a linear measurement at plays; with `is_position_only` the offsets alone.
+    ///
+    /// A measurement whose squared Mahalanobis `distance` is above the M that are expected has a variance larger by as much
+    /// (Birge's ratio).
     pub fn update<const M: usize>(
         &mut self,
         plays: &Plays<N>,
@@ -275,7 +275,7 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
             cross.ger(1.0, &with, &by, 1.0);
         }
         #[expect(clippy::cast_precision_loss, reason = "a few features")]
-        let variance = (distance / (ROBUST * libm::sqrt(M as f64))).max(1.0);
+        let variance = (distance * distance / M as f64).max(1.0);
         let value = measurement.value - measurement.by_state * SVector::from(self.origin);
         self.kalman.update(&rows, &cross, &value, variance, only);
         self.bound_gains();

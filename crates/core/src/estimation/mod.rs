@@ -19,5 +19,4 @@ pub(crate) mod path;
 pub(crate) mod posture;
 pub(crate) mod settings;
 pub(crate) mod state_prediction;
-pub(crate) mod tip_filter;
 pub(crate) mod tip_regression;

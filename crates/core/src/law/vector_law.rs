@@ -42,7 +42,7 @@ const SLOPES: (f64, f64) = (0.5, 1.5);
 /// Wrong as far as the estimate is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VectorLaw<const N: usize> {
-    tip_gain: f64,
+    settings: LawSettings,
     transmission: Transmission<N>,
     /// Unit over `width_limit`: the bounds compare DOFs in `width_limit`, as the limiter of the command does.
     weight: [f64; N],
@@ -94,6 +94,7 @@ impl<const N: usize> VectorLaw<N> {
         let tip_gain = settings.tip_gain;
         require(tip_gain >= 1.0, "tip_gain", tip_gain, "1 or above")?;
         require_positive("direction_travel", settings.direction_travel)?;
+        require_positive("change_rate", settings.change_rate)?;
         let friction = *transmission.friction();
         let mut gain = [f64::INFINITY; N];
         for (own, group) in bounds.gain.into_iter().zip(friction.group()) {
@@ -102,7 +103,7 @@ impl<const N: usize> VectorLaw<N> {
             }
         }
         Ok(Self {
-            tip_gain,
+            settings,
             weight: over(transmission.unit(), bounds.width_limit),
             gain,
             step_limit: bounds.step.map(|step| step * BELOW_LIMIT),
@@ -154,6 +155,7 @@ impl<const N: usize> VectorLaw<N> {
             return self.command;
         }
         let Some(last) = self.reference.replace(reference) else {
+            self.rows = *rows;
             return reference;
         };
         let motion = subtract(reference, last);
@@ -161,7 +163,7 @@ impl<const N: usize> VectorLaw<N> {
             return self.command;
         }
         self.direction.step(motion);
-        self.rows = *rows;
+        self.follow_estimate(rows, motion);
         let unit = self.transmission.unit();
         let relative = over(subtract(reference, self.origin), unit);
         let moved = over(motion, unit);
@@ -214,6 +216,27 @@ impl<const N: usize> VectorLaw<N> {
             self.lead = subtract(command, reference);
         }
         self.plays = self.follow(&self.plays, command);
+    }
+
+    /// Moves the coefficients in use towards the estimated ones, as far as the contact offsets and the predicted tip may change
+    /// in this motion: wrong images move nothing at once, and right ones can take back what they did.
+    fn follow_estimate(&mut self, rows: &[Row; N], motion: [f64; N]) {
+        let parts = motion.iter().zip(self.transmission.unit());
+        let travel: f64 = parts.map(|(motion, unit)| motion.abs() / unit).sum();
+        let ahead = [1.0; N];
+        let now = self.transmission.deflection(&self.rows, &ahead);
+        let new = self.transmission.deflection(rows, &ahead);
+        let tip = self.plays.tip(rows, [true; N]);
+        let off = subtract(tip, self.plays.tip(&self.rows, [true; N]));
+        let dofs = self.rows.iter_mut().zip(rows);
+        for (((used, estimated), (now, new)), off) in dofs.zip(now.into_iter().zip(new)).zip(off) {
+            let change = (new - now).abs().max(off.abs());
+            // Without a change this is infinite or NaN, of which `min` makes 1.
+            let share = (self.settings.change_rate * travel / change).min(1.0);
+            for (used, new) in used.iter_mut().zip(estimated) {
+                *used += share * (new - *used);
+            }
+        }
     }
 
     /// The target for a reference (N,) in units.
@@ -322,8 +345,8 @@ impl<const N: usize> VectorLaw<N> {
                 .for_each(|(to, step)| *to += share * step);
             self.transmission.move_group(&mut there, members, &to);
             let change = subtract(there.tip(&self.rows, members), now);
-            let excess =
-                (norm(change) / (self.tip_gain * moved)).max(dot(change, motion) / (moved * room));
+            let excess = (norm(change) / (self.settings.tip_gain * moved))
+                .max(dot(change, motion) / (moved * room));
             if excess <= 1.0 {
                 break;
             }

@@ -192,12 +192,17 @@ impl ProfileBlocks for FixedPlays {
     }
 
     fn play(&self) -> PerDof<Play> {
-        self.slack.map(|slack| {
+        let mut plays = self.slack.map(|slack| {
             Play::from_ordered(
                 slack.centre - slack.half_width,
                 slack.centre + slack.half_width,
             )
-        })
+        });
+        for (play, limit) in plays.iter_mut().zip(self.limits) {
+            let [minus, plus] = limit.clamp(play.delta_minus(), play.delta_plus());
+            *play = Play::from_ordered(minus, plus);
+        }
+        plays
     }
 
     fn keep_up<S: AsRef<[Entry]> + AsMut<[Entry]>>(
@@ -307,9 +312,12 @@ impl ProfileBlocks for FixedPlays {
         let has_changed = self
             .prediction
             .update(past.time, past.predicted_state, measured);
-        let mut plays = self.play().into_iter().zip(self.limits);
-        let is_limited =
-            plays.any(|(play, limit)| limit.exceeds(play.delta_minus(), play.delta_plus()));
+        let is_limited = self.slack.iter().zip(self.limits).any(|(slack, limit)| {
+            limit.exceeds(
+                slack.centre - slack.half_width,
+                slack.centre + slack.half_width,
+            )
+        });
         ImageUpdate {
             triggers: self.triggers(past),
             raised: Flags::when(is_limited, Flag::WidthLimit)

@@ -55,7 +55,11 @@ impl<const N: usize> Checked<N> {
         let friction = Friction::new(group, sizes(random, 0.5, 2.0)).unwrap();
         let unit = sizes(random, 0.01, 1.0);
         let transmission = Transmission::new(friction, unit).unwrap();
-        let settings = settings(&safety()).law;
+        // So that the coefficients in use are always the given ones.
+        let settings = LawSettings {
+            change_rate: f64::MAX,
+            ..settings(&safety()).law
+        };
         let bounds = Bounds {
             gain,
             width_limit: unit.map(|unit| unit * random.within(1.0, 3.0)),
@@ -309,4 +313,51 @@ fn three_dofs_of_the_instrument() {
 fn eight_dofs() {
     walk([0, 1, 1, 3, 0, 0, 7, 5], [5.0; 8], 1);
     walk([0, 1, 2, 3, 4, 5, 6, 7], [3.0; 8], 2);
+}
+
+/// With a play of one radius whose coefficient changes at once: the tip that the law predicts, and so its command, follow as
+/// far as the reference travels.
+#[test]
+fn coefficients_in_use_change_no_faster_than_their_rate() {
+    let own = settings(&safety()).law;
+    let transmission = Transmission::new(Friction::independent(), [1.0]).unwrap();
+    let bounds = Bounds {
+        gain: [5.0],
+        width_limit: [10.0],
+        step: [1.0],
+        offsets: [PlayLimit::new(10.0, 10.0).unwrap()],
+    };
+    let mut law = VectorLaw::new(own, transmission, &bounds).unwrap();
+    let mut rows = [[0.0; COEFFICIENTS]; 1];
+    // The own play of radius 0: the tip is the command.
+    rows[0][SHARED] = 1.0;
+    let slack = [Slack {
+        gain: 1.0,
+        ..Slack::default()
+    }];
+    let step = |law: &mut VectorLaw<1>, rows: &[Row; 1], reference: f64| {
+        let command = law.propose([reference], rows, &slack);
+        law.commit(command);
+        command[0] - reference
+    };
+    let mut reference = 0.0;
+    step(&mut law, &rows, reference);
+    rows[0][OFFSET] = 0.5;
+    let (travel, mut ticks) = (0.01, 0);
+    loop {
+        let before = law.command()[0] - reference;
+        reference += travel;
+        let lead = step(&mut law, &rows, reference);
+        assert!(
+            (lead - before).abs() <= own.change_rate * travel + 1e-12,
+            "{lead} {before}"
+        );
+        ticks += 1;
+        if (lead + 0.5).abs() < 1e-9 {
+            break;
+        }
+        assert!(ticks < 10_000, "{lead}");
+    }
+    let least = 0.5 / (own.change_rate * travel);
+    assert!(f64::from(ticks) >= least, "{ticks} {least}");
 }

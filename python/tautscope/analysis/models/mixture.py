@@ -1,4 +1,4 @@
-"""Weighted mixture of models: profile ``best``'s filter, other models of hysteresis, and none."""
+"""Weighted mixture of models: profile ``plays``'s filter, other models of hysteresis, and none."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ def run(task: Task) -> Prediction:
     middle, zero = float(command.min() + command.max()) / 2, float(with_tip.mean())
     signals = Signals((task.command - middle) / span, (task.measured - zero) / unit)
     trivial = np.column_stack([last_tip.last_tip(task, gain) for gain in (0, last_tip.gain(task))])
-    scale, estimated, _, _ = online.run_estimator(task, online.ensemble)
+    scale, estimated, _, _ = online.run_estimator(task, online.fixed_plays)
     components = [
         Component("last_tip", (trivial - zero) / unit),
-        Component("ensemble_filter", (estimated[:, None] - zero) / unit),
+        Component("fixed_plays", (estimated[:, None] - zero) / unit),
         *refitted_models(signals),
         *adaptive_operators(signals),
     ]

@@ -1,4 +1,4 @@
-"""On-line estimators: the article's, Eqs. (4)-(6), and that of profile ``best``."""
+"""On-line estimators: the article's, Eqs. (4)-(6), and that of profile ``plays``."""
 
 from __future__ import annotations
 
@@ -18,8 +18,17 @@ UPDATE_SHARE = 0.01
 """Default update distance, as a share of the command's range in the first half."""
 
 
-HALF_WIDTH, TIP_STD = 15.0, 0.5
-"""Largest half width, and standard deviation of a measured tip [in update distances]."""
+EXPECTED_WIDTH, TIP_STD = 48.0, 0.1
+"""Width that the filter expects, about half of the command's range, and standard deviation of a
+measured tip [in update distances]."""
+RECORD = {
+    "estimation.weight_deviation": 0.43,
+    "estimation.offset_deviation": 1.0,
+    "estimation.weight_travel": 300.0,
+    "estimation.offset_travel": 50.0,
+    "estimation.tip_deviation": 0.01,
+}
+"""Prior of a record: nothing is known of its slack, and its tip is measured directly."""
 
 
 class OnlineEstimator(Protocol):
@@ -115,7 +124,10 @@ def paper(config: Config, update_distance: float) -> OnlineEstimator:
     )
 
 
-def ensemble(config: Config, update_distance: float) -> OnlineEstimator:
-    """The ensemble filter of profile ``best``."""
-    unit = HALF_WIDTH * update_distance
-    return TipFilter(core_settings(config), unit=unit, std=TIP_STD * update_distance)
+def fixed_plays(config: Config, update_distance: float) -> OnlineEstimator:
+    """The filter of profile ``plays`` with the prior `RECORD`."""
+    return TipFilter(
+        core_settings(config.replace(**RECORD)),
+        expected_width=EXPECTED_WIDTH * update_distance,
+        std=TIP_STD * update_distance,
+    )

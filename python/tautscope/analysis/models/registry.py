@@ -51,7 +51,11 @@ MODELS = (
         "paper", "article's estimator", "on-line", partial(online.predict, make=online.paper), True
     ),
     Model(
-        "filter", "ensemble filter", "on-line", partial(online.predict, make=online.ensemble), True
+        "filter",
+        "fixed plays",
+        "on-line",
+        partial(online.predict, make=online.fixed_plays),
+        True,
     ),
     Model("best", "weighted mixture", "on-line", mixture.run, True),
 )
