@@ -21,9 +21,9 @@ RADII = 0.5 * (np.arange(12) / 12) ** 1.5
 """Radii of the plays; small ones are closer to each other."""
 KNOTS = (-0.25, 0.0, 0.25)
 """Where the generalised operator bends the output of every second play."""
-SPREAD, BENT_SPREAD, REFIT_SPREAD = 0.5, 0.2, 0.1
-"""Prior standard deviation of a coefficient: of the plays; of plays and their bent outputs, more of
-them than few tips determine; and of the scale of a fitted model."""
+SPREAD, REFIT_SPREAD = 0.2, 0.1
+"""Prior standard deviation of a coefficient: of plays and their bent outputs, more of them than few
+tips determine; and of the scale of a fitted model."""
 WALKS = np.array([(d, w) for d in (0.003, 0.03, 0.3) for w in (0.0, 0.1)])
 REFIT_WALKS = np.array([(d, 0.0) for d in (0.003, 0.01, 0.03, 0.1, 0.3)])
 """Random walks of disturbance and coefficients, see `track`."""
@@ -90,22 +90,23 @@ class Signals:
         object.__setattr__(self, "travel", np.cumsum(moved))
 
 
-def adaptive_operators(signals: Signals) -> Iterator[Component]:
-    """Prandtl-Ishlinskii operators whose weights are tracked on-line.
+def adaptive_operator(signals: Signals) -> Component:
+    """Generalised Prandtl-Ishlinskii operator whose weights are tracked on-line.
 
-    Plain: the weights of the plays. Generalised: besides, those of max(P_i - knot, 0), which bend
-    the output of a play, so that gain and slack may depend on position.
+    The weights are those of the plays P_i and of max(P_i - knot, 0), which bend the output of a
+    play, so that gain and slack may depend on position.
     """
     plain = prandtl_ishlinskii.operators(signals.command, tuple(RADII.tolist()))
     bent = [np.maximum(plain[:, ::2] - knot, 0) for knot in KNOTS]
-    for name, features, spread in (
-        ("adaptive_plays", plain, SPREAD),
-        ("adaptive_bent_plays", np.column_stack([plain, *bent]), BENT_SPREAD),
-    ):
-        predicted = track(
-            features, signals.travel, signals.measured, signals.at, spread=spread, walks=WALKS
-        )
-        yield Component(name, predicted)
+    predicted = track(
+        np.column_stack([plain, *bent]),
+        signals.travel,
+        signals.measured,
+        signals.at,
+        spread=SPREAD,
+        walks=WALKS,
+    )
+    return Component("adaptive_bent_plays", predicted)
 
 
 def refitted_models(signals: Signals) -> Iterator[Component]:

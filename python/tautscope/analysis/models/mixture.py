@@ -11,7 +11,7 @@ from tautscope.analysis.models import last_tip, linear_fit, online
 from tautscope.analysis.models.components import (
     Component,
     Signals,
-    adaptive_operators,
+    adaptive_operator,
     refitted_models,
 )
 from tautscope.analysis.models.task import Floats, Prediction, Task
@@ -40,7 +40,7 @@ def run(task: Task) -> Prediction:
         Component("last_tip", (trivial - zero) / unit),
         Component("fixed_plays", (estimated[:, None] - zero) / unit),
         *refitted_models(signals),
-        *adaptive_operators(signals),
+        adaptive_operator(signals),
     ]
     predicted, weights = mix(components, signals)
     tip = zero + unit * predicted
