@@ -63,6 +63,10 @@ class InlineExecutor(Executor):
         return future
 
 
+BARRIER = "/barrier"
+"""Beginning of the names of the barriers' topics."""
+
+
 def free_endpoint() -> str:
     """A free port of this computer, as an endpoint."""
     with socket.socket() as listener:
@@ -74,7 +78,7 @@ class Barrier:
     """A topic whose messages arrive after all that was published before with the same priority."""
 
     def __init__(self, sender: Node, receiver: Node, kind: int) -> None:
-        topic = f"/barrier{kind}"
+        topic = f"{BARRIER}{kind}"
         # Deep enough that none which is sent again replaces another: that would count as missed.
         self._in = receiver.subscription(topic, NUMBER, Qos(depth=1000))
         self._out = sender.publisher(topic, NUMBER, Qos(is_reliable=kind == 0))
