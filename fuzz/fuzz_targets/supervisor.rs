@@ -6,7 +6,7 @@ mod support;
 
 use arbitrary::Arbitrary;
 use libfuzzer_sys::fuzz_target;
-use support::loops::{Loop, adaptive, article, model};
+use support::loops::{Loop, article, best, model};
 use support::{PERIOD, UNITS};
 use tautscope_core::{Flag, Play, Profile, Reaction};
 
@@ -34,9 +34,9 @@ enum Action {
 }
 
 fuzz_target!(|input: (bool, Vec<Action>)| {
-    let (is_adaptive, actions) = input;
-    if is_adaptive {
-        run(adaptive(), actions);
+    let (is_best, actions) = input;
+    if is_best {
+        run(best(), actions);
     } else {
         let play = |unit| Play::new(-12.0 * unit, 12.0 * unit).unwrap();
         run(article(play), actions);

@@ -52,7 +52,6 @@ extern crate self as tautscope_core;
 #[path = "../tests/properties/mod.rs"]
 mod properties;
 
-mod adaptive;
 mod article;
 mod dof;
 mod error;
@@ -64,7 +63,6 @@ mod model;
 mod settings;
 mod supervision;
 
-pub use adaptive::settings::AdaptiveSettings;
 pub use article::compensator::{Compensator, CompensatorState};
 pub use article::estimator::{Estimator, EstimatorState, Trigger, Triggers};
 pub use article::play::{Play, PlayState};
@@ -76,10 +74,8 @@ pub use estimation::estimate_settings::EstimateSettings;
 pub use estimation::expectation::{Beliefs, Expected};
 pub use estimation::history::Entry;
 pub use estimation::posture::{Belief, Observation};
-pub use estimation::settings::StateEstimationSettings;
 pub use law::settings::LawSettings;
 pub use r#loop::best::Best;
-pub use r#loop::fixed_plays::FixedPlays;
 pub use r#loop::paper::Paper;
 pub use r#loop::profile::Profile;
 pub use r#loop::reduction::HysteresisReduction;

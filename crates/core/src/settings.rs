@@ -8,7 +8,7 @@ pub struct DofSettings {
     pub update_distance: f64,
     /// Largest standard deviation of the state per px of marker noise at which the DOF is observable [m/px or rad/px].
     pub observable_deviation: f64,
-    /// Width of the slack that is expected [m or rad]: three quarters of it are the unit of profile `plays`.
+    /// Width of the slack that is expected [m or rad]: three quarters of it are the unit of profile `best`.
     pub expected_width: f64,
     /// Standard deviation of the tip about the reference before the first image [m or rad].
     pub start_deviation: f64,

@@ -6,7 +6,7 @@
 mod support;
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
-use support::loops::{Loop, adaptive_with, article_with, model, plays};
+use support::loops::{Loop, article_with, best_with, model};
 use tautscope_core::{Flag, Play, Profile, Reaction, Status, Triggers};
 
 #[global_allocator]
@@ -19,7 +19,7 @@ fn step_and_image_update_do_not_allocate() {
     let wanted: u64 = wanted.map_or(0, |text| text.parse().unwrap());
     let mut ticks = 0;
     loop {
-        ticks += run_article() + run_best() + run_best_without_outliers() + run_plays();
+        ticks += run_article() + run_best() + run_best_without_outliers();
         if ticks >= wanted {
             break;
         }
@@ -35,15 +35,11 @@ fn run_article() -> u64 {
 }
 
 fn run_best() -> u64 {
-    run(adaptive_with(&support::safety(), 4.0))
-}
-
-fn run_plays() -> u64 {
-    run(plays())
+    run(best_with(&support::safety(), 4.0))
 }
 
 fn run_best_without_outliers() -> u64 {
-    run(adaptive_with(&support::safety(), f64::INFINITY))
+    run(best_with(&support::safety(), f64::INFINITY))
 }
 
 /// Runs a loop; returns the number of ticks.

@@ -9,7 +9,7 @@
 mod support;
 
 use support::PERIOD;
-use support::loops::{Loop, adaptive, article, article_with};
+use support::loops::{Loop, article, article_with, best};
 use support::plays::{ThreePlays, real, reference};
 use tautscope_core::{Play, Profile, Reaction};
 
@@ -102,7 +102,7 @@ fn soak<P: Profile>(law: &str, mut reduction: Loop<P>) -> String {
 fn nothing_grows_and_nothing_drifts() {
     let none = |_| Play::new(0.0, 0.0).unwrap();
     let grown =
-        soak("best", adaptive()) + &soak("recovering", article_with(&support::safety(), 0.1, none));
+        soak("best", best()) + &soak("recovering", article_with(&support::safety(), 0.1, none));
     soak("paper", article(none));
     assert!(grown.is_empty(), "{grown}");
 }

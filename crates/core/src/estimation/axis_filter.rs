@@ -1,4 +1,4 @@
-//! The estimate of profile `plays` for one DOF whose tip is measured directly.
+//! The estimate of profile `best` for one DOF whose tip is measured directly.
 
 use nalgebra::{SMatrix, SVector};
 

@@ -1,4 +1,4 @@
-//! The estimate of profile `plays`: the tip as a linear combination of fixed plays, by one Kalman filter.
+//! The estimate of profile `best`: the tip as a linear combination of fixed plays, by one Kalman filter.
 
 use nalgebra::{SMatrix, SVector};
 

@@ -1,8 +1,8 @@
-//! Settings of the estimate of profile `plays`.
+//! Settings of the estimate of profile `best`.
 
 use crate::error::{ConfigError, require, require_non_negative, require_positive};
 
-/// The estimate of profile `plays`. Names and units are those of the TOML keys; lengths and travels are in units of the DOF:
+/// The estimate of profile `best`. Names and units are those of the TOML keys; lengths and travels are in units of the DOF:
 /// three quarters of its `expected_width`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Deserialize))]

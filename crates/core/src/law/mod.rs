@@ -1,4 +1,4 @@
-//! Compensation law of profile `plays`.
+//! Compensation law of profile `best`.
 
 pub(crate) mod direction;
 pub(crate) mod settings;

@@ -1,6 +1,6 @@
-//! Settings of the compensation law of profile `plays`.
+//! Settings of the compensation law of profile `best`.
 
-/// Compensation of profile `plays`. Names are those of the TOML keys; travels are in units of the DOF.
+/// Compensation of profile `best`. Names are those of the TOML keys; travels are in units of the DOF.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Deserialize))]
 pub struct LawSettings {

@@ -1,4 +1,4 @@
-//! Compensation law of profile `plays`: the limited gain of Eq. (2) for DOFs that share a friction together.
+//! Compensation law of profile `best`: the limited gain of Eq. (2) for DOFs that share a friction together.
 
 use crate::article::play_limit::PlayLimit;
 use crate::dof::all_finite;

@@ -83,7 +83,7 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
             return self.report_unused(Status::Refused, Some(past));
         }
         self.last_used = captured_at;
-        self.accept(&past, &measurement, image, raised)
+        self.accept(&past, &measurement, features, raised)
     }
 
     /// Flags for which the image is refused.
@@ -116,7 +116,7 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
         &mut self,
         past: &Entry,
         measurement: &Measurement,
-        image: Image<'_>,
+        features: [f64; 4],
         raised: &mut Flags,
     ) -> Report {
         let estimate = measurement.estimate;
@@ -126,7 +126,7 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
             _ => Status::Held,
         };
         // Of two markers with an outlier, the other one may be wrong, too.
-        let has_outlier = measurement.used != found(image.features);
+        let has_outlier = measurement.used != found(features);
         let outlier = self
             .monitors
             .enabled(Flags::when(has_outlier, Flag::Innovation));
@@ -144,9 +144,7 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
         let ImageUpdate {
             triggers,
             raised: conspicuous,
-        } = self
-            .profile
-            .update(&self.history, past, measurement, image, updates_offsets);
+        } = self.profile.update(past, measurement, updates_offsets);
         *raised = motion.union(
             self.monitors.enabled(
                 conspicuous

@@ -2,11 +2,10 @@
 
 use crate::article::state::{StateEstimate, found};
 use crate::dof::{PerDof, all_finite, zip_with};
-use crate::estimation::marker_measurement::MarkerEstimate;
 use crate::estimation::measurement::Linear;
 use crate::model::features::GEOMETRY;
 
-/// Errors of the geometry in profile `plays`: those of the model, and of each feature.
+/// Errors of the geometry in profile `best`: those of the model, and of each feature.
 pub const ERRORS: usize = GEOMETRY + 4;
 
 /// Linear measurement of the bands of an image.
@@ -25,9 +24,7 @@ pub struct Measurement {
     pub state_deviation: PerDof<f64>,
     /// Mahalanobis distance of the innovation.
     pub distance: f64,
-    /// The most probable state for the markers, in profile `best`.
-    pub markers: Option<MarkerEstimate>,
-    /// The linear measurement, in profile `plays`.
+    /// The linear measurement, in profile `best`.
     pub bands: Option<Bands>,
 }
 

@@ -1,7 +1,6 @@
 //! The whole loop, Fig. 6.
 
 pub(crate) mod best;
-pub(crate) mod fixed_plays;
 pub(crate) mod image_update;
 pub(crate) mod measurement;
 pub(crate) mod paper;

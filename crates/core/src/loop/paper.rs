@@ -142,17 +142,14 @@ impl ProfileBlocks for Paper {
                 &estimate,
                 step_deviation(past, prior.state, state_deviation),
             ),
-            markers: None,
             bands: None,
         })
     }
 
-    fn update<S: AsRef<[Entry]> + AsMut<[Entry]>>(
+    fn update(
         &mut self,
-        _: &History<S>,
         past: &Entry,
         measurement: &Measurement,
-        _: Image<'_>,
         updates_offsets: bool,
     ) -> ImageUpdate {
         let estimate = &measurement.estimate;

@@ -13,7 +13,7 @@ use crate::model::features::FeatureModel;
 use crate::supervision::flags::Flags;
 use crate::supervision::monitors::Law;
 
-/// A profile of the loop: `Paper`, `Best` or `FixedPlays`.
+/// A profile of the loop: `Paper` or `Best`.
 #[expect(private_bounds, reason = "only this crate implements profiles")]
 pub trait Profile: ProfileBlocks {}
 
@@ -61,7 +61,9 @@ pub(crate) trait ProfileBlocks: Law<3> + Sized {
     fn predicted_state(&self) -> PerDof<f64>;
 
     /// The sum of the changes of q by images so far (3,) [m, rad, rad].
-    fn corrected(&self) -> PerDof<f64>;
+    fn corrected(&self) -> PerDof<f64> {
+        [0.0; 3]
+    }
 
     /// The estimated play of each DOF.
     fn play(&self) -> PerDof<Play>;
@@ -87,12 +89,10 @@ pub(crate) trait ProfileBlocks: Law<3> + Sized {
     fn measure(&self, model: &FeatureModel, past: &Entry, image: Image<'_>) -> Option<Measurement>;
 
     /// Updates the state prediction with an accepted image, and with `updates_offsets` the offsets.
-    fn update<S: AsRef<[Entry]> + AsMut<[Entry]>>(
+    fn update(
         &mut self,
-        history: &History<S>,
         past: &Entry,
         measurement: &Measurement,
-        image: Image<'_>,
         updates_offsets: bool,
     ) -> ImageUpdate;
 

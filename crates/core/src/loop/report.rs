@@ -46,21 +46,21 @@ pub struct Report {
     pub supervision: Supervision,
 }
 
-/// The estimated hysteresis in the profiles `best` and `plays`.
+/// The estimated hysteresis in profile `best`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HysteresisEstimate {
     /// Half widths (3,) [m, rad, rad].
     pub half_width: PerDof<f64>,
-    /// Standard deviations of their logarithms (3,).
+    /// Standard deviations of the half widths (3,) [m, rad, rad].
     pub width_std: PerDof<f64>,
-    /// Centres of the contact offsets (3,), input minus output, at the present position [m, rad, rad].
+    /// Centres of the contact offsets (3,), input minus output, [m, rad, rad].
     pub centre: PerDof<f64>,
     /// Share of the friction that insertion and rotation have in common, 0 to 1.
     pub shared: f64,
     /// Travel of the tip over that of the command in contact (3,).
     pub gain: PerDof<f64>,
-    /// Lag of the tip behind the plays (3,) in s; 0 in profile `plays`, which has none.
-    pub lag: PerDof<f64>,
+    /// Standard deviations of the gains (3,).
+    pub gain_std: PerDof<f64>,
     /// Unevenness of the section's curvature: half of the difference of its ends, over the mean.
     pub unevenness: f64,
     /// Shift of the image (2,) in px against the configured camera.

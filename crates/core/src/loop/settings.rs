@@ -1,11 +1,9 @@
 //! All settings of the loop, a table per block.
 
-use crate::adaptive::settings::AdaptiveSettings;
 use crate::dof::{Friction, PerDof};
 use crate::error::ConfigError;
 use crate::estimation::estimate_settings::EstimateSettings;
 use crate::estimation::history::history_entries;
-use crate::estimation::settings::StateEstimationSettings;
 use crate::law::settings::LawSettings;
 use crate::model::features::FeatureModel;
 use crate::model::plays::Transmission;
@@ -34,12 +32,8 @@ pub struct Settings {
     /// Supervision.
     pub safety: SafetySettings,
     /// Compensation of profile `best`.
-    pub adaptive: AdaptiveSettings,
-    /// State estimation of profile `best`.
-    pub state_estimation: StateEstimationSettings,
-    /// Compensation of profile `plays`.
     pub law: LawSettings,
-    /// Estimation of profile `plays`.
+    /// Estimation of profile `best`.
     pub estimation: EstimateSettings,
 }
 
@@ -57,7 +51,7 @@ impl Settings {
         Friction::new([0, 0, 2], [1.0, self.instrument.diameter / 2.0, 1.0])
     }
 
-    /// The plays of profile `plays`.
+    /// The plays of profile `best`.
     ///
     /// # Errors
     /// A diameter or an expected width is not a finite number above 0.

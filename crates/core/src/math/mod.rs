@@ -1,5 +1,4 @@
 //! Vectors and small linear systems.
 
 pub(crate) mod linear;
-pub(crate) mod random;
 pub(crate) mod whitening;

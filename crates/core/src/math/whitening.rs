@@ -1,24 +1,12 @@
-//! Whitening of the features of two markers, and factors of covariances.
+//! Whitening of the features of two markers.
 
 use core::array;
 
 use crate::dof::all_finite;
-use crate::math::linear::Matrix;
 
 /// A vector of features (4,), and a symmetric matrix of their size.
 pub type Features = [f64; 4];
 pub type Square = [[f64; 4]; 4];
-
-/// Lower factor F of a covariance, F F' = P; None if it is not positive definite.
-pub fn factor(&[[a, _, _], [b, c, _], [d, e, f]]: &Matrix) -> Option<Matrix> {
-    let f11 = libm::sqrt(a);
-    let (f21, f31) = (b / f11, d / f11);
-    let f22 = libm::sqrt(c - f21 * f21);
-    let f32 = (e - f31 * f21) / f22;
-    let f33 = libm::sqrt(f - f31 * f31 - f32 * f32);
-    let rows = [[f11, 0.0, 0.0], [f21, f22, 0.0], [f31, f32, f33]];
-    rows.iter().all(|row| all_finite(*row)).then_some(rows)
-}
 
 /// W with W R W' = I for the markers that are used; the other rows are 0.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,4 +1,4 @@
-//! Hysteresis of the three DOFs: the model of the estimate and of the compensation law of profile `best`.
+//! Hysteresis of the three DOFs with constant parameters, for simulated instruments.
 
 use crate::dof::PerDof;
 use crate::model::friction::slide;
@@ -6,7 +6,7 @@ use crate::model::friction::slide;
 /// Share of the friction below which the DOFs count as independent; the vector play needs a width.
 const LEAST_SHARE: f64 = 1e-3;
 
-/// Hysteresis of insertion, rotation and bending at one position of the tip.
+/// Hysteresis of insertion, rotation and bending.
 ///
 /// ```text
 /// shaft:  vector play of (c1 - m1, c2 - m2) with half widths f h     friction that insertion and rotation share
@@ -48,7 +48,7 @@ impl PlayPosition {
 impl Hysteresis {
     /// The plays after a straight motion of the command [m, rad, rad]; `radius` is the shaft's, in m.
     ///
-    /// Plays outside of their half widths, because these have changed, are moved to the nearest position within.
+    /// Plays outside of their half widths are moved to the nearest position within.
     #[must_use]
     pub fn propagate(
         &self,
@@ -79,27 +79,4 @@ impl Hysteresis {
             ],
         }
     }
-
-    /// Command minus output, less the centre, while the tip slides steadily [m, rad, rad]: f h w + (1 - f) h sign(w), of
-    /// bending h sign(w3); w (3,) is the direction of motion, with |(w1, w2)| = 1 or 0.
-    pub fn steady_deflection(&self, direction: PerDof<f64>) -> PerDof<f64> {
-        let ([h1, h2, h3], [w1, w2, w3]) = (self.half_width, direction);
-        let own = 1.0 - self.shared;
-        [
-            h1 * (self.shared * w1 + own * sign(w1)),
-            h2 * (self.shared * w2 + own * sign(w2)),
-            h3 * sign(w3),
-        ]
-    }
-
-    /// Contact offsets (minus, plus) of each DOF that moves alone [m, rad, rad].
-    pub fn offsets(&self) -> PerDof<(f64, f64)> {
-        let ([h1, h2, h3], [m1, m2, m3]) = (self.half_width, self.centre);
-        [(h1, m1), (h2, m2), (h3, m3)].map(|(half, centre)| (centre - half, centre + half))
-    }
-}
-
-/// -1, 0 or 1.
-fn sign(value: f64) -> f64 {
-    if value == 0.0 { 0.0 } else { value.signum() }
 }

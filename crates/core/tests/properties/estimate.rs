@@ -1,4 +1,4 @@
-//! The estimate of profile `plays`, on ideal plays whose tip is measured directly.
+//! The estimate of profile `best`, on ideal plays whose tip is measured directly.
 
 use crate::article::play::{Play, PlayState};
 use crate::article::play_limit::PlayLimit;

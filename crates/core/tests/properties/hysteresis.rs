@@ -2,7 +2,6 @@
 
 use crate::article::play::{Play, PlayState};
 use crate::dof::PerDof;
-use crate::estimation::path::straight_pieces;
 use crate::model::friction::slide;
 use crate::model::hysteresis::{Hysteresis, PlayPosition};
 use proptest::prelude::*;
@@ -27,6 +26,14 @@ fn commands() -> impl Strategy<Value = Vec<PerDof<f64>>> {
     prop::collection::vec(command, 1..20)
 }
 
+/// Contact offsets of each DOF that moves alone [m, rad, rad].
+fn offsets(hysteresis: &Hysteresis) -> PerDof<(f64, f64)> {
+    [0, 1, 2].map(|dof| {
+        let (half, centre) = (hysteresis.half_width[dof], hysteresis.centre[dof]);
+        (centre - half, centre + half)
+    })
+}
+
 fn run(
     hysteresis: &Hysteresis,
     commands: &[PerDof<f64>],
@@ -44,47 +51,6 @@ fn run(
 
 proptest! {
     #![proptest_config(config())]
-
-    /// Straight pieces end at ticks of the path, at its end too, and the plays after them are those of every tick, but for
-    /// the distance of the path from its pieces.
-    #[test]
-    fn straight_pieces_move_the_plays_alike(
-        hysteresis in hystereses(0.0..1.0), commands in commands(), bent in prop::collection::vec(-1.0..1.0_f64, 20), ticks in 1..12_u32,
-    ) {
-        let unit = [6e-3, 1.3, 0.75];
-        // Each motion in ticks, along an arc that is up to a fifth of a unit from straight.
-        let (mut path, mut last) = (Vec::new(), [0.0; 3]);
-        for (command, bent) in commands.iter().zip(bent) {
-            for tick in 1..=ticks {
-                let share = f64::from(tick) / f64::from(ticks);
-                let side = 0.8 * bent * share * (1.0 - share);
-                path.push([0, 1, 2].map(|dof| {
-                    last[dof] + share * (command[dof] - last[dof]) + [side, -side, 0.0][dof] * unit[dof]
-                }));
-            }
-            last = *command;
-        }
-        let pieces: Vec<_> = straight_pieces(path.iter().copied(), [0.0; 3], unit).collect();
-        prop_assert_eq!(pieces.last(), path.last());
-        prop_assert!(pieces.iter().all(|end| path.contains(end)));
-        let (mut each, mut few) = (Vec::new(), Vec::new());
-        run(&hysteresis, &path, |_, position| each.push(*position));
-        run(&hysteresis, &pieces, |_, position| few.push(*position));
-        let (each, few) = (each[each.len() - 1], few[few.len() - 1]);
-        for (dof, unit) in unit.into_iter().enumerate() {
-            let off = (each.output[dof] - few.output[dof]).abs() / unit;
-            prop_assert!(off <= 0.01 * f64::from(u8::from(dof < 2)) + 1e-9, "{dof}: {off} after {} of {}", pieces.len(), path.len());
-        }
-    }
-
-    /// Of a straight line at any speed one piece remains.
-    #[test]
-    fn a_short_straight_line_is_one_piece(end in prop::array::uniform3(-0.05..0.05_f64), mut shares in prop::collection::vec(0.0..1.0_f64, 1..20)) {
-        shares.sort_by(f64::total_cmp);
-        let path: Vec<_> = shares.iter().map(|share| end.map(|end| share * end)).collect();
-        let pieces: Vec<_> = straight_pieces(path.iter().copied(), [0.0; 3], [1.0; 3]).collect();
-        prop_assert_eq!(pieces, vec![path[path.len() - 1]]);
-    }
 
     /// A share of 1: the deflection is that of the vector play, and the output is the shaft.
     #[test]
@@ -108,7 +74,7 @@ proptest! {
     /// A share of 0 is three plays of Eq. (1), but for the little that a vector play needs; bending always is one.
     #[test]
     fn no_friction_in_common_is_three_plays(hysteresis in hystereses(Just(0.0)), commands in commands()) {
-        let plays = hysteresis.offsets().map(|(minus, plus)| Play::new(minus, plus).unwrap());
+        let plays = offsets(&hysteresis).map(|(minus, plus)| Play::new(minus, plus).unwrap());
         let mut tips = [PlayState { output: 0.0 }; 3];
         for (play, tip) in plays.iter().zip(&mut tips) {
             play.step(tip, 0.0);
@@ -127,7 +93,7 @@ proptest! {
     #[test]
     fn a_dof_alone_is_its_play(hysteresis in hystereses(0.0..1.0), commands in commands(), dof in 0..3_usize) {
         let hysteresis = Hysteresis { centre: [0.0; 3], ..hysteresis };
-        let (minus, plus) = hysteresis.offsets()[dof];
+        let (minus, plus) = offsets(&hysteresis)[dof];
         let (play, mut tip) = (Play::new(minus, plus).unwrap(), PlayState { output: 0.0 });
         let alone: Vec<PerDof<f64>> = commands
             .iter()
@@ -150,7 +116,7 @@ proptest! {
     ) {
         run(&before, &commands, |command, position| {
             let moved = after.propagate(RADIUS, position, command, command);
-            for (dof, (minus, plus)) in after.offsets().into_iter().enumerate() {
+            for (dof, (minus, plus)) in offsets(&after).into_iter().enumerate() {
                 let offset = command[dof] - moved.output[dof];
                 let rounding = 1e-12 * (1.0 + command[dof].abs());
                 assert!((minus - rounding..=plus + rounding).contains(&offset), "{dof}: {offset}");
@@ -158,27 +124,6 @@ proptest! {
             let again = after.propagate(RADIUS, &moved, command, command);
             for dof in 0..3 {
                 assert!((again.output[dof] - moved.output[dof]).abs() <= 1e-12);
-            }
-        });
-    }
-
-    /// Where the tip slides steadily, command less output is the centre and the steady deflection.
-    #[test]
-    fn steady_sliding_has_the_steady_deflection(
-        hysteresis in hystereses(0.01..1.0), heading in -3.1..3.1_f64, up in any::<bool>(),
-    ) {
-        let (w, third) = ([heading.cos(), heading.sin()], if up { 1.0 } else { -1.0 });
-        // The surface moves along w: (dq1, r dq2).
-        let far = [0.5 * w[0], 0.5 * w[1] / RADIUS, 5.0 * third];
-        run(&hysteresis, &[far], |command, position| {
-            let steady = hysteresis.steady_deflection([w[0], w[1], third]);
-            for dof in 0..3 {
-                let lead = command[dof] - position.output[dof] - hysteresis.centre[dof];
-                let size = hysteresis.half_width[dof];
-                // The plays of each DOF by itself add to it only where that DOF moves.
-                if far[dof].abs() > 0.1 {
-                    assert!((lead - steady[dof]).abs() <= 1e-6 * size, "{dof}: {lead} {}", steady[dof]);
-                }
             }
         });
     }

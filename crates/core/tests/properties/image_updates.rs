@@ -6,7 +6,7 @@ use crate::r#loop::profile::Profile;
 use crate::supervision::flags::Flag;
 use crate::supervision::reactions::Reaction;
 
-use super::support::loops::{Loop, adaptive, article, model, plays};
+use super::support::loops::{Loop, article, best, model};
 use super::support::{PERIOD, UNITS};
 
 const CENTRES: PerDof<f64> = [0.025, 0.0, 0.9];
@@ -89,12 +89,7 @@ fn measurements_update_profile_paper_unless_the_estimate_is_held() {
 
 #[test]
 fn measurements_update_profile_best_unless_the_estimate_is_held() {
-    is_estimated_and_held(adaptive(), 2.5);
-}
-
-#[test]
-fn measurements_update_profile_plays_unless_the_estimate_is_held() {
-    is_estimated_and_held(plays(), 2.5);
+    is_estimated_and_held(best(), 2.5);
 }
 
 #[test]

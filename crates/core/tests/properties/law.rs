@@ -1,4 +1,4 @@
-//! Guarantees of the law of profile `plays`, for any number of DOFs and any estimate.
+//! Guarantees of the law of profile `best`, for any number of DOFs and any estimate.
 
 use crate::article::play_limit::PlayLimit;
 use crate::dof::Friction;

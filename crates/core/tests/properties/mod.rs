@@ -7,11 +7,8 @@ mod any_dofs;
 mod camera;
 mod command_limiter;
 mod compensator;
-mod convergence;
 mod discarded_motion;
-mod ensemble;
 mod estimate;
-mod estimates;
 mod estimator;
 mod expectation;
 mod fading;
@@ -27,7 +24,6 @@ mod kalman;
 mod law;
 mod limits;
 mod linear;
-mod marker_measurement;
 mod measurement;
 mod monitors;
 mod motion_bounds;
@@ -47,7 +43,6 @@ mod supervised_law;
 mod supervisor;
 #[path = "../support/mod.rs"]
 mod support;
-mod tip_regression;
 mod whole;
 
 use crate::article::play::Play;

@@ -6,7 +6,7 @@ use crate::r#loop::profile::Profile;
 use crate::r#loop::report::Status;
 use crate::supervision::reactions::Reaction;
 
-use super::support::loops::{Loop, adaptive, model};
+use super::support::loops::{Loop, best, model};
 use super::support::plays::{WIDTH, reference};
 use super::support::{PERIOD, UNITS};
 use crate::article::play::{Play, PlayState};
@@ -74,6 +74,6 @@ const DISPLACEMENTS: [PerDof<f64>; 4] = [
 #[test]
 fn profile_best_uses_images_again_after_the_tip_was_pushed() {
     for displacement in DISPLACEMENTS {
-        recovers(adaptive(), displacement, 5.0);
+        recovers(best(), displacement, 5.0);
     }
 }

@@ -7,7 +7,7 @@ use crate::r#loop::report::Status;
 use crate::supervision::flags::Flag;
 use crate::supervision::reactions::Reaction;
 
-use super::support::loops::{Loop, adaptive, article, model};
+use super::support::loops::{Loop, article, best, model};
 use super::support::{self, PERIOD, UNITS};
 
 /// Xorshift.
@@ -170,7 +170,7 @@ fn every_command_keeps_the_law_in_profile_paper() {
 
 #[test]
 fn every_command_keeps_the_law_in_profile_best() {
-    stress(adaptive(), 652, steps(20_000));
+    stress(best(), 652, steps(20_000));
 }
 
 /// c - u - (1 - 1 / `K_b`) p is what it was, however many reversals came.

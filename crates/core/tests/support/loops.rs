@@ -4,8 +4,7 @@
 #![allow(dead_code)]
 
 use tautscope_core::{
-    Best, Entry, FeatureModel, FixedPlays, HysteresisReduction, Paper, Play, Profile,
-    SafetySettings, Settings,
+    Best, Entry, FeatureModel, HysteresisReduction, Paper, Play, Profile, SafetySettings, Settings,
 };
 
 use super::{UNITS, safety, settings};
@@ -44,20 +43,15 @@ pub fn article_with(
 }
 
 /// Profile `best`.
-pub fn adaptive() -> Loop<Best> {
-    adaptive_with(&safety(), 4.0)
+pub fn best() -> Loop<Best> {
+    best_with(&safety(), 4.0)
 }
 
-/// [`adaptive`] with other settings of the monitors and another Mahalanobis distance of outliers.
-pub fn adaptive_with(safety: &SafetySettings, outlier_distance: f64) -> Loop<Best> {
+/// [`best`] with other settings of the monitors and another Mahalanobis distance of outliers.
+pub fn best_with(safety: &SafetySettings, outlier_distance: f64) -> Loop<Best> {
     let mut settings = settings(safety);
-    settings.state_estimation.outlier_distance = outlier_distance;
+    settings.estimation.outlier_distance = outlier_distance;
     build(&settings)
-}
-
-/// Profile `plays`.
-pub fn plays() -> Loop<FixedPlays> {
-    build(&settings(&safety()))
 }
 
 fn build<P: Profile>(settings: &Settings) -> Loop<P> {

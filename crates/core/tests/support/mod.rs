@@ -4,9 +4,8 @@ pub mod loops;
 pub mod plays;
 
 use tautscope_core::{
-    AdaptiveSettings, CameraSettings, ControlSettings, DofSettings, EstimateSettings, Flags,
-    InstrumentSettings, LawSettings, PoseSettings, SafetySettings, Settings,
-    StateEstimationSettings,
+    CameraSettings, ControlSettings, DofSettings, EstimateSettings, Flags, InstrumentSettings,
+    LawSettings, PoseSettings, SafetySettings, Settings,
 };
 
 pub const UNITS: [f64; 3] = [0.4e-3, 0.04, 0.02];
@@ -108,32 +107,6 @@ pub fn settings(safety: &SafetySettings) -> Settings {
             history: 2.0,
         },
         safety: *safety,
-        adaptive: AdaptiveSettings {
-            tip_gain: 1.85,
-            caution: 0.3,
-            tremor_time: 0.15,
-            direction_travel: 0.01,
-            change_rate: [0.07, 0.07, 100.0],
-            known_travel: 10.0,
-        },
-        state_estimation: StateEstimationSettings {
-            marker_deviation: 0.3,
-            model_deviation: 0.3,
-            shape_deviation: 0.3,
-            image_deviation: 6.0,
-            outlier_distance: 4.0,
-            tip_deviation: 0.08,
-            width_deviation: 0.35,
-            centre_deviation: 0.25,
-            share_deviation: 0.25,
-            tip_walk: 0.012,
-            width_walk: 0.05,
-            centre_walk: 0.012,
-            share_walk: 0.02,
-            lag_deviation: 0.05,
-            map_rate: [0.25, 0.25, 0.0],
-            gain_deviation: 0.3,
-        },
         law: LawSettings {
             tip_gain: 1.85,
             direction_travel: 0.01,

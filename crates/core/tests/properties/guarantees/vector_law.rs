@@ -1,21 +1,22 @@
 //! The vector law, by itself and within supervision: gain, rest, speed.
 
-use crate::adaptive::vector_law::VectorLaw;
-use crate::article::play::Play;
 use crate::article::play_limit::PlayLimit;
 use crate::dof::{Friction, PerDof};
-use crate::estimation::filter::Filter;
-use crate::estimation::marker_measurement::TipMeasurement;
+use crate::estimation::estimate::{Estimate, Slack};
+use crate::estimation::measurement::Linear;
+use crate::law::vector_law::{Bounds, VectorLaw};
+use crate::model::plays::COEFFICIENTS;
 use crate::supervision::flags::Flag;
 use crate::supervision::monitors::{Law, Monitors};
+use nalgebra::{SMatrix, SVector};
 
 use super::super::support::{PERIOD, UNITS, dofs, safety, settings};
 use super::{Count, LIMIT, Random, steps, walk};
 
 /// The vector law, with the bounds checked at every call.
 struct CheckedLaw {
-    law: VectorLaw,
-    filter: Filter,
+    law: VectorLaw<3>,
+    estimate: Estimate<3, 0, { 3 * COEFFICIENTS }>,
     reference: PerDof<f64>,
     /// The reference of the proposed command.
     next: PerDof<f64>,
@@ -25,26 +26,29 @@ struct CheckedLaw {
 impl CheckedLaw {
     fn new() -> Self {
         let settings = settings(&safety());
-        let unit = settings.safety.width_limit.map(|width| width / 2.0);
-        let limits = [0, 1, 2].map(|dof| {
-            let safety = &settings.safety;
-            PlayLimit::new(safety.width_limit[dof], safety.offset_limit[dof]).unwrap()
-        });
-        let none = Play::new(0.0, 0.0).unwrap();
+        let transmission = settings.transmission().unwrap();
+        let width_limit = settings.safety.width_limit;
+        let bounds = Bounds {
+            gain: dofs().map(|dof| dof.free_gain),
+            width_limit,
+            step: settings.safety.command_speed.map(|speed| speed * PERIOD),
+            offsets: [0, 1, 2].map(|dof| {
+                PlayLimit::new(width_limit[dof], settings.safety.offset_limit[dof]).unwrap()
+            }),
+        };
         let start = dofs().map(|dof| dof.start_deviation);
-        let radius = settings.instrument.diameter / 2.0;
+        let mut estimate = Estimate::new(
+            settings.estimation,
+            transmission,
+            [],
+            &[Slack::default(); 3],
+            start,
+        )
+        .unwrap();
+        estimate.start([0.0; 3]);
         Self {
-            law: VectorLaw::new(
-                &settings.adaptive,
-                &dofs(),
-                &settings.control,
-                settings.safety.width_limit,
-                settings.safety.command_speed,
-                radius,
-                limits,
-            )
-            .unwrap(),
-            filter: Filter::new(settings.state_estimation, unit, start, [none; 3], radius).unwrap(),
+            law: VectorLaw::new(settings.law, transmission, &bounds).unwrap(),
+            estimate,
             reference: [f64::NAN; 3],
             next: [f64::NAN; 3],
             count: Count::default(),
@@ -68,28 +72,22 @@ impl CheckedLaw {
         if !self.reference.iter().all(|value| value.is_finite()) {
             return;
         }
-        let now = (self.law.command(), self.reference);
-        self.filter.follow(core::iter::once(now));
-        let before = self.filter.nominal().hysteresis;
-        let dof = [0, 1, 2][usize::try_from(random.below(3)).unwrap()];
+        let dof = usize::try_from(random.below(3)).unwrap();
         let std = UNITS[dof] * random.within(0.1, 3.0);
         let tip = self.law.command()[dof] + UNITS[dof] * random.within(-30.0, 30.0);
-        let mut row = TipMeasurement {
-            by_tip: [0.0; 3],
-            by_geometry: [0.0; 3],
-            value: tip / std,
+        let mut by_state = SMatrix::<f64, 1, 3>::zeros();
+        by_state[dof] = 1.0 / std;
+        let measurement = Linear {
+            by_state,
+            by_geometry: SMatrix::zeros(),
+            value: SVector::from([tip / std]),
         };
-        row.by_tip[dof] = 1.0 / std;
-        let mut seen = self.law.command();
-        seen[dof] = tip;
-        self.filter.update_with(&[row], seen, random.below(4) == 0);
-        let after = self.filter.nominal().hysteresis;
-        self.law.rate_limit_mut().update(
-            [before.half_width, before.centre],
-            [after.half_width, after.centre],
-        );
+        let plays = self.law.plays();
+        self.estimate.advance(plays.travel);
+        self.estimate
+            .update(plays, &measurement, 0.0, random.below(4) == 0);
         if random.below(50) == 0 {
-            self.filter.reset_position();
+            self.estimate.loosen(dofs().map(|dof| dof.start_deviation));
         }
     }
 
@@ -147,12 +145,16 @@ impl Law<3> for CheckedLaw {
 
     fn propose(&mut self, reference: PerDof<f64>) -> PerDof<f64> {
         self.next = reference;
-        self.law.propose(reference, &self.filter)
+        self.law.propose(
+            reference,
+            &self.estimate.coefficients(),
+            &self.estimate.slack(),
+        )
     }
 
     fn commit(&mut self, command: PerDof<f64>) {
         let before = self.law.command();
-        self.law.commit(command, &mut self.filter);
+        self.law.commit(command);
         self.check(self.next, before);
         if self.next.iter().all(|value| value.is_finite()) {
             self.reference = self.next;
