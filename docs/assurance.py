@@ -29,8 +29,7 @@ CONTROLS = {
     "E1": ["python/tautscope/config/checks.py"],
     "E5": ["crates/core/src/article/play.rs", "crates/core/src/article/estimator.rs"],
     "E7": ["python/tautscope/config/section.py", "python/tautscope/config/checks.py"],
-    "E8": ["crates/core/src/adaptive/vector_law.rs"],
-    "C1": ["crates/core/src/adaptive/smoother.rs"],
+    "E8": ["crates/core/src/law/vector_law.rs"],
     "C2": ["crates/core/src/article/compensator.rs"],
     "C3": [
         "python/tautscope/loop/signal_checks.py",

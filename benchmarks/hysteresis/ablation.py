@@ -8,23 +8,15 @@ from typing import Any
 from hysteresis.tables import Row, show
 
 IDEAS: dict[str, dict[str, Any]] = {
-    "bound of the predicted tip's speed": {"adaptive.tip_gain": 100.0},
-    "less compensation of uncertain widths": {"adaptive.caution": 0.0},
-    "separation of tremor and intended motion": {"adaptive.tremor_time": 0.0},
-    "rate limit of the offsets": {"adaptive.change_rate": [100.0, 100.0, 100.0]},
-    "centre as a function of position": {"state_estimation.map_rate": [0.0, 0.0, 0.0]},
-    "regression of the gain": {"state_estimation.gain_deviation": 1e-9},
-    "widths that change": {"state_estimation.width_walk": 0.0},
-    "centres that change": {"state_estimation.centre_walk": 0.0},
-    "share of the common friction estimated (0.5 instead)": {
-        "state_estimation.share_deviation": 0.0,
-        "state_estimation.share_walk": 0.0,
-    },
-    "deviation of the tip from the plays": {"state_estimation.tip_deviation": 1e-3},
-    "lag of the tip": {"state_estimation.lag_deviation": 0.0},
-    "uneven curvature": {"state_estimation.shape_deviation": 0.0},
-    "shift of the image": {"state_estimation.image_deviation": 0.0},
-    "rejection of a marker": {"state_estimation.outlier_distance": 1e6},
+    "bound of the predicted tip's speed": {"law.tip_gain": 100.0},
+    "rate limit of the estimate in use": {"law.change_rate": 1e9},
+    "offset that images measure": {"estimation.offset_deviation": 0.0},
+    "deviation of the tip from the plays": {"estimation.tip_deviation": 1e-3},
+    "weights that change": {"estimation.weight_travel": 1e9},
+    "uneven curvature": {"estimation.shape_deviation": 0.0},
+    "shift of the image": {"estimation.image_deviation": 0.0},
+    "errors of the features that are alike": {"estimation.misfit_deviation": 0.0},
+    "rejection of a marker": {"estimation.outlier_distance": 1e6},
 }
 """Name of each idea, and the configuration changes that disable it."""
 

@@ -21,9 +21,7 @@ from soak.cases import PLANTS, Case, Outcome, simulate
 from soak.references import MOTIONS
 from soak.rows import table, to_rows
 from tautscope.commands.progress import progress_bar
-from tautscope.config import Profile
 
-PROFILES: tuple[Profile, ...] = ("best", "plays")
 STROKES = (0.3, 0.6, 1.0, 2.0)
 """Over the width of the slack."""
 SECONDS = 7200.0
@@ -39,14 +37,13 @@ def arguments() -> argparse.Namespace:
     )
     parser.add_argument("--motion", choices=MOTIONS, action="append", help="only this one [both]")
     parser.add_argument("--plant", choices=PLANTS, action="append", help="only this one [both]")
-    parser.add_argument("--profile", choices=PROFILES, action="append", help="only this one [both]")
     parser.add_argument("--seeds", type=int, default=SEEDS, help="number of seeds [%(default)s]")
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help="[%(default)s]")
     add_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--write", action="store_true", help=f"update {PAGE.relative_to(ROOT)}")
     options = parser.parse_args()
-    if options.write and (options.stroke or options.motion or options.profile):
+    if options.write and (options.stroke or options.motion):
         parser.error("--write updates the whole table: use it without a selection of cases")
     return options
 
@@ -54,8 +51,7 @@ def arguments() -> argparse.Namespace:
 def measure(options: argparse.Namespace) -> dict[Case, Outcome]:
     """Simulate; Ctrl-C ends with the runs that are finished."""
     cases = [
-        Case(plant, motion, stroke, seed, options.seconds, profile)
-        for profile in options.profile or PROFILES
+        Case(plant, motion, stroke, seed, options.seconds)
         for plant in options.plant or PLANTS
         for motion in options.motion or MOTIONS
         for stroke in options.stroke or STROKES

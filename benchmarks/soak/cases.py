@@ -11,8 +11,8 @@ from common.small_images import full_size, with_small_images
 from numpy.typing import NDArray
 from plants.simulated import HALF, PlantRig
 from soak.references import PARTS, Motion, make_reference
-from tautscope.config import Config, Profile, load_config
-from tautscope.loop.reduction import HysteresisReduction
+from tautscope.config import Config, load_config
+from tautscope.loop.reduction import HysteresisEstimate, HysteresisReduction
 from tautscope.loop.rig import Frame, Rig
 from tautscope.loop.safety import Reaction
 from tautscope.twin import Twin
@@ -40,7 +40,6 @@ class Case:
         stroke: Longest stroke over the width of the slack.
         seed: Of noise and motion.
         seconds: Duration [s].
-        profile: Of the loop.
     """
 
     plant: PlantName
@@ -48,12 +47,11 @@ class Case:
     stroke: float
     seed: int
     seconds: float
-    profile: Profile = "best"
 
     @property
     def name(self) -> str:
         """Name without the seed."""
-        return f"`{self.profile}`: {self.plant}, {self.motion}, stroke {self.stroke:g}"
+        return f"{self.plant}, {self.motion}, stroke {self.stroke:g}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,8 +62,7 @@ class Outcome:
         errors: (10, 3) RMS of (true tip - reference) in each tenth [m, rad, rad].
         held: Share of the images that arrived while motion was held.
         coverage: By "width" and "gain": per DOF the share of the time from the second tenth on in
-            which the 3-sigma interval contains the truth. Only of ideal plays, and only what the
-            estimate has a standard deviation of.
+            which the 3-sigma interval contains the truth. Only of ideal plays.
     """
 
     errors: list[list[float]]
@@ -75,7 +72,7 @@ class Outcome:
 
 def simulate(case: Case) -> Outcome:
     """Simulate a run."""
-    config = load_config(profile=case.profile).replace(**{"twin.seed": case.seed})
+    config = load_config().replace(**{"twin.seed": case.seed})
     reference = make_reference(config, case.motion, case.stroke, case.seed, case.seconds)
     rig, loop = _make_rig(case, config), HysteresisReduction(config)
     noise = np.random.default_rng([case.seed, 1])
@@ -100,6 +97,7 @@ def simulate(case: Case) -> Outcome:
                 loop.engage()
         if case.plant == "plays" and elapsed >= due:
             due += SAMPLE_EVERY
+            assert loop.hysteresis is not None
             coverage.add(loop.hysteresis)
         sample = rig.step(command)
     rig.close()
@@ -137,10 +135,7 @@ class _Coverage:
         self._count = 0
         self._inside: dict[str, Floats] = {}
 
-    def add(self, estimate: object) -> None:
-        # An estimate has both standard deviations, absolute, or none that can be compared.
-        if not all(hasattr(estimate, name) for name in ("width_std", "gain_std")):
-            return
+    def add(self, estimate: HysteresisEstimate) -> None:
         self._count += 1
         for name, value, truth in (("width", "half_width", HALF), ("gain", "gain", GAIN)):
             off = np.abs(getattr(estimate, value) - truth)

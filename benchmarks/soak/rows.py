@@ -28,9 +28,7 @@ def ratio(outcome: Outcome, dof: Dof) -> float:
 def to_rows(found: Mapping[Case, Outcome]) -> list[Row]:
     """Rows of each case and DOF, a value per seed."""
     rows = []
-    profiles = {case.name: case.profile for case in found}
     for name, outcomes in _by_name(found).items():
-        profile = profiles[name]
         for dof in Dof:
             for what, values, goal, sense in _quantities(outcomes, dof):
                 row = goal_row(
@@ -40,7 +38,7 @@ def to_rows(found: Mapping[Case, Outcome]) -> list[Row]:
                     goal,
                     sense,
                     dof=dof.label,
-                    profile=profile,
+                    profile="best",
                 )
                 rows.append({**row, "case": name, "quantity": what})
     return rows

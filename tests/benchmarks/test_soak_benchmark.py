@@ -73,8 +73,6 @@ def test_a_row_compares_the_later_tenths_with_the_second() -> None:
 
 def test_intervals_are_compared_with_the_truth_of_the_plays() -> None:
     coverage = _Coverage()
-    coverage.add(None)
-    coverage.add(SimpleNamespace(half_width=HALF, width_std=HALF, gain=np.ones(3)))
     assert coverage.shares() == {}
     for off in (0.0, 0.2, 0.4, 0.6):
         coverage.add(

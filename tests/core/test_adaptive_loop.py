@@ -92,10 +92,10 @@ def test_tremor_is_not_amplified() -> None:
 @pytest.mark.parametrize(
     ("field", "value"),
     [
-        ("adaptive.tip_gain", 0.5),
-        ("adaptive.direction_travel", 0.0),
-        ("state_estimation.tip_deviation", 0.0),
-        ("state_estimation.map_rate", [0.1, 0.1]),
+        ("law.tip_gain", 0.5),
+        ("law.direction_travel", 0.0),
+        ("estimation.tip_deviation", 0.0),
+        ("law.change_rate", 0.0),
         ("profile", "better"),
     ],
 )

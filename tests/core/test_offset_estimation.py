@@ -46,12 +46,9 @@ class Trial:
         periods: int = 5,
         dof: Dof = Dof.INSERTION,
         amplitude: float = AMPLITUDE,
-        **settings: float | tuple[float, float, float],
     ) -> None:
         unit = CONFIG[dof].update_distance
-        changes = {f"state_estimation.{name}": value for name, value in settings.items()}
         config = CONFIG.replace(
-            **changes,
             **{
                 f"{dof.label}.delta_minus": start[0] * unit,
                 f"{dof.label}.delta_plus": start[1] * unit,
@@ -187,10 +184,7 @@ def test_the_centre_may_depend_on_position(seed: int) -> None:
         return centre - 9.0, centre + 9.0
 
     trial = Trial(contacts, seed=seed)
-    constant_centre = Trial(contacts, seed=seed, map_rate=(0.0, 0.0, 0.0))
-    errors = [np.abs(x.tip - x.reference)[-4000:].mean() for x in (trial, constant_centre)]
     assert abs(trial.width(3, 5)) < 0.05 * 18, f"seed {seed}: {trial.width(3, 5)}"
-    assert errors[0] < 0.85 * errors[1], f"seed {seed}: {errors}"
 
 
 @SEEDS

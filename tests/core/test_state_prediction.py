@@ -169,10 +169,10 @@ def test_the_first_estimate_of_best_is_that_of_scipys_least_squares(seed: int) -
     config = CONFIG.replace(
         profile="best",
         **{
-            "state_estimation.model_deviation": 0.0,
-            "state_estimation.shape_deviation": 0.0,
-            "state_estimation.image_deviation": 0.0,
-            "state_estimation.outlier_distance": 1e6,
+            "estimation.shape_deviation": 0.0,
+            "estimation.image_deviation": 0.0,
+            "estimation.misfit_deviation": 0.0,
+            "estimation.outlier_distance": 1e6,
             "safety.off": ["innovation"],
         },
         **{f"{dof.label}.start_deviation": 5 * CONFIG[dof].start_deviation for dof in Dof},

@@ -15,7 +15,7 @@ LAYERS = {
         {"model"},
         {"article"},
         {"estimation"},
-        {"adaptive", "law"},
+        {"law"},
         {"supervision"},
         {"loop"},
     ),

@@ -7,7 +7,7 @@ use tautscope_core as core;
 use crate::arrays::{Table, Vector, fixed, rows, table};
 use crate::errors;
 
-/// Hysteresis of the three DOFs with constant parameters: the model of profile `best`.
+/// Hysteresis of the three DOFs with constant parameters, for simulated instruments.
 ///
 /// `half_width` (3,) and `centre` (3,) of the contact offsets, input minus output [m, rad, rad]; `shared`, 0 to 1, is the
 /// share of the friction that insertion and rotation have in common; `radius` is the shaft's in m. Raises `ConfigError`.

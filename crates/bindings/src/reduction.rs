@@ -46,7 +46,6 @@ type Hysteresis<'py> = (
 enum Profile {
     Paper(Loop<core::Paper>),
     Best(Loop<core::Best>),
-    Plays(Loop<core::FixedPlays>),
 }
 
 /// Evaluates an expression with the loop of either profile.
@@ -55,7 +54,6 @@ macro_rules! on_loop {
         match $reduction {
             Profile::Paper($name) => $body,
             Profile::Best($name) => $body,
-            Profile::Plays($name) => $body,
         }
     };
 }
@@ -66,7 +64,7 @@ pub struct Reduction(Profile);
 
 #[pymethods]
 impl Reduction {
-    /// From the settings of the loop, for profile "paper", "best" or "plays".
+    /// From the settings of the loop, for profile "paper" or "best".
     #[new]
     fn new(settings: Bound<'_, PyAny>, profile: &str) -> PyResult<Self> {
         let py = settings.py();
@@ -74,14 +72,8 @@ impl Reduction {
         match profile {
             "paper" => build(&settings).map(Profile::Paper),
             "best" => build(&settings).map(Profile::Best),
-            "plays" => build(&settings).map(Profile::Plays),
             _ => {
-                return Err(errors::choice(
-                    py,
-                    "profile",
-                    profile,
-                    "paper, best or plays",
-                ));
+                return Err(errors::choice(py, "profile", profile, "paper or best"));
             }
         }
         .map(Self)
@@ -211,15 +203,13 @@ impl Reduction {
         PyArray1::from_slice(py, &on_loop!(&self.0, inner => inner.predicted_state()))
     }
 
-    /// In the profiles `best` and `plays`: half widths (3,), standard deviations of their logarithms (3,), centres (3,), share of the
-    /// friction in common, gains (3,), lags (3,), unevenness of the section, and shift of the image (2,) with standard
-    /// deviations (2,).
+    /// In profile `best`: half widths (3,) with standard deviations (3,), centres (3,), share of the friction in common, gains
+    /// (3,) with standard deviations (3,), unevenness of the section, and shift of the image (2,) with standard deviations (2,).
     #[getter]
     fn hysteresis<'py>(&self, py: Python<'py>) -> Option<Hysteresis<'py>> {
         let found = match &self.0 {
             Profile::Paper(_) => return None,
             Profile::Best(inner) => inner.hysteresis(),
-            Profile::Plays(inner) => inner.hysteresis(),
         };
         let floats = |values| PyArray1::from_slice(py, values);
         Some((
@@ -228,7 +218,7 @@ impl Reduction {
             floats(&found.centre),
             found.shared,
             floats(&found.gain),
-            floats(&found.lag),
+            floats(&found.gain_std),
             found.unevenness,
             floats(&found.image_shift),
             floats(&found.image_shift_std),

@@ -15,7 +15,7 @@ type Run<'py> = (
     Bound<'py, PyArray1<f64>>,
 );
 
-/// The estimate of profile `plays` for one DOF whose tip is measured directly.
+/// The estimate of profile `best` for one DOF whose tip is measured directly.
 ///
 /// The slack is about `expected_width` wide; a measured tip has the standard deviation `std`, both in the unit of the command.
 /// Raises `ConfigError`.

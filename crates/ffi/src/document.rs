@@ -53,10 +53,8 @@ struct ProfileDocument {
 pub enum Profile {
     /// The article's blocks.
     Paper,
-    /// The vector law on one ensemble filter.
-    Best,
     /// The vector law on one linear filter of fixed plays.
-    Plays,
+    Best,
 }
 
 /// Settings and profile of a loop.
@@ -68,10 +66,9 @@ pub fn loop_settings(text: &[u8]) -> Result<(core::Settings, Profile), Tautscope
     let profile = match profile.as_str() {
         "paper" => Profile::Paper,
         "best" => Profile::Best,
-        "plays" => Profile::Plays,
         other => {
             return Err(config(format_args!(
-                "profile: got {other:?}, expected \"paper\", \"best\" or \"plays\""
+                "profile: got {other:?}, expected \"paper\" or \"best\""
             )));
         }
     };

@@ -21,7 +21,6 @@ pub struct TautscopeLoop {
 pub(crate) enum Blocks {
     Paper(Reduction<core::Paper>),
     Best(Reduction<core::Best>),
-    Plays(Reduction<core::FixedPlays>),
 }
 
 /// Evaluates an expression with the loop of either profile.
@@ -30,7 +29,6 @@ macro_rules! on_loop {
         match &mut $handle.profile {
             $crate::reduction::Blocks::Paper($name) => $body,
             $crate::reduction::Blocks::Best($name) => $body,
-            $crate::reduction::Blocks::Plays($name) => $body,
         }
     };
 }
@@ -49,7 +47,6 @@ impl TautscopeLoop {
             profile: match profile {
                 Profile::Paper => Blocks::Paper(build(&settings)?),
                 Profile::Best => Blocks::Best(build(&settings)?),
-                Profile::Plays => Blocks::Plays(build(&settings)?),
             },
             period: settings.control.period,
             command: [f64::NAN; 3],

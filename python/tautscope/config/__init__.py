@@ -5,7 +5,6 @@ default: [paper] is Reilink et al. 2013, [ours] is chosen here, [geometry] is a 
 that no publication describes. Missing keys have their defaults.
 """
 
-from tautscope.config.adaptive import AdaptiveConfig
 from tautscope.config.calibration import CalibrationConfig, CalibrationRecord
 from tautscope.config.camera import (
     CameraClock,
@@ -34,7 +33,6 @@ from tautscope.config.load import RIGS, config_file, dump_config, load_config
 from tautscope.config.recording import ImageFormat, RecordingConfig
 from tautscope.config.root import Config, Profile, from_document, to_document
 from tautscope.config.safety import SafetyConfig
-from tautscope.config.state_estimation import StateEstimationConfig
 from tautscope.config.twin import (
     DISTURBANCES,
     CableConfig,
@@ -50,7 +48,6 @@ from tautscope.config.vision import VisionConfig
 __all__ = [
     "DISTURBANCES",
     "RIGS",
-    "AdaptiveConfig",
     "AxisConfig",
     "CableConfig",
     "CalibrationConfig",
@@ -82,7 +79,6 @@ __all__ = [
     "ShaftConfig",
     "Sine",
     "SourceConfig",
-    "StateEstimationConfig",
     "TransmissionConfig",
     "TwinConfig",
     "Vector3",

@@ -20,7 +20,7 @@ class DofConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     the DOF counts as observable; beyond it the DOF is held."""
     expected_width: Positive
     """Width of the slack that is expected [m or rad]; three quarters of it are the unit in which
-    profile ``plays`` estimates [ours]."""
+    profile ``best`` estimates [ours]."""
     start_deviation: Positive
     """Standard deviation of the tip about the reference before the first image [m or rad]; about
     half the slack [ours]."""

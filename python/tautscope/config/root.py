@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import logging
 from typing import Any, Literal
 
 import msgspec
 from msgspec import field
 
-from tautscope.config.adaptive import AdaptiveConfig
 from tautscope.config.calibration import CalibrationConfig
 from tautscope.config.camera import CameraConfig
 from tautscope.config.checks import check_references
@@ -21,12 +21,18 @@ from tautscope.config.law import LawConfig
 from tautscope.config.recording import RecordingConfig
 from tautscope.config.safety import SafetyConfig
 from tautscope.config.section import Section, converted_value, without_numpy
-from tautscope.config.state_estimation import StateEstimationConfig
 from tautscope.config.twin import TwinConfig
 from tautscope.config.vision import VisionConfig
 from tautscope.dof import Dof
 
-Profile = Literal["paper", "best", "plays"]
+_LOG = logging.getLogger(__name__)
+
+Profile = Literal["paper", "best"]
+
+_WITHOUT_EFFECT = ("adaptive", "state_estimation")
+"""Sections that older documents have and that set nothing."""
+_RENAMED: dict[str, Profile] = {"plays": "best"}
+"""Profiles by the names in older documents."""
 
 
 class Config(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -34,10 +40,7 @@ class Config(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     profile: Profile = "best"
     """Scheme of compensation and estimation: ``paper`` is the article's, ``best`` that of
-    `AdaptiveConfig` and `StateEstimationConfig`, ``plays`` that of `LawConfig` and
-    `EstimationConfig`, which is to replace ``best``."""
-    adaptive: AdaptiveConfig = field(default_factory=AdaptiveConfig)
-    state_estimation: StateEstimationConfig = field(default_factory=StateEstimationConfig)
+    `LawConfig` and `EstimationConfig`."""
     law: LawConfig = field(default_factory=LawConfig)
     estimation: EstimationConfig = field(default_factory=EstimationConfig)
     insertion: DofConfig = field(
@@ -92,15 +95,28 @@ class Config(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
             for section in sections:
                 place = place.setdefault(section, {})
             place[key] = value
-        return from_document(document)
+        return _checked(document)
 
 
 def from_document(document: dict[str, Any]) -> Config:
     """Make a checked `Config` of a nested dictionary; keys not in it keep their defaults.
 
+    Sections that only older documents have are ignored with a warning.
+
     Raises:
         ConfigError: As `load_config`.
     """
+    document = dict(document)
+    ignored = [f"[{name}]" for name in _WITHOUT_EFFECT if document.pop(name, None) is not None]
+    if ignored:
+        _LOG.warning("%s in the configuration: ignored, they set nothing", ", ".join(ignored))
+    profile = document.get("profile")
+    if isinstance(profile, str) and profile in _RENAMED:
+        document["profile"] = _RENAMED[profile]
+    return _checked(document)
+
+
+def _checked(document: dict[str, Any]) -> Config:
     document = _merged(to_document(Config()), without_numpy(document))
     config: Config = converted_value("", document, Config)
     return config

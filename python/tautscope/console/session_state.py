@@ -62,7 +62,7 @@ def _add_run(state: State, run: ControlRun) -> None:
     state.tip = _three(loop.predicted_state)
     state.delta_minus, state.delta_plus = _three(loop.delta_minus), _three(loop.delta_plus)
     if (hysteresis := loop.hysteresis) is not None:
-        state.width_std = _known(hysteresis.width_std)
+        state.width_std = _known(2 * hysteresis.width_std)
     supervision = loop.supervision
     state.reaction, state.flags = str(supervision.reaction), supervision.flags
     state.latched = tuple((name, MEANINGS[name]) for name in supervision.latched)

@@ -56,7 +56,7 @@ class State(Struct):
         motion: ``off``, ``stopped``, ``held``, ``moving``, ``ready``.
         message: What is in force and why, in one line.
         reference, command, applied, tip, delta_minus, delta_plus: (3,).
-        width_std: (3,) relative standard deviations of the slack; None where not known.
+        width_std: (3,) standard deviations of the slack's width; None where not known.
         reaction: The supervisor's reaction in force.
         flags: The active flags.
         latched: The flags since the last acknowledgement, with their meanings.

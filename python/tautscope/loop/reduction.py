@@ -103,11 +103,11 @@ class HysteresisEstimate:
 
     Attributes:
         half_width: (3,) half widths of the slack of each DOF that moves alone.
-        width_std: (3,) standard deviations of their logarithms.
-        centre: (3,) centres of the contact offsets at the present position, input minus output.
+        width_std: (3,) standard deviations of the half widths.
+        centre: (3,) centres of the contact offsets, input minus output.
         shared: Share of the friction that insertion and rotation have in common, 0 to 1.
         gain: (3,) travel of the tip over that of the command in contact.
-        lag: (3,) lag of the tip behind the plays [s].
+        gain_std: (3,) its standard deviations.
         unevenness: Of the section's curvature: half of the difference of its ends, over the mean.
         image_shift: (2,) shift of the image against the configured camera [px], from a wrong pose
             or principal point; `camera.fx` px are about a radian.
@@ -119,7 +119,7 @@ class HysteresisEstimate:
     centre: NDArray[np.float64]
     shared: float
     gain: NDArray[np.float64]
-    lag: NDArray[np.float64]
+    gain_std: NDArray[np.float64]
     unevenness: float
     image_shift: NDArray[np.float64]
     image_shift_std: NDArray[np.float64]

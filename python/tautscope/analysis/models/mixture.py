@@ -1,4 +1,4 @@
-"""Weighted mixture of models: profile ``plays``'s filter, other models of hysteresis, and none."""
+"""Weighted mixture of models: profile ``best``'s filter, other models of hysteresis, and none."""
 
 from __future__ import annotations
 

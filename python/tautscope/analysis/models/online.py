@@ -1,4 +1,4 @@
-"""On-line estimators: the article's, Eqs. (4)-(6), and that of profile ``plays``."""
+"""On-line estimators: the article's, Eqs. (4)-(6), and that of profile ``best``."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def paper(config: Config, update_distance: float) -> OnlineEstimator:
 
 
 def fixed_plays(config: Config, update_distance: float) -> OnlineEstimator:
-    """The filter of profile ``plays`` with the prior `RECORD`."""
+    """The filter of profile ``best`` with the prior `RECORD`."""
     return TipFilter(
         core_settings(config.replace(**RECORD)),
         expected_width=EXPECTED_WIDTH * update_distance,

@@ -141,7 +141,7 @@ export class Charts {
       card.error.textContent = state.tip[k] === null ? "–" : number(state.reference[k] - state.tip[k]);
       const deviation = number(state.image.deviation[k]);
       const slack = state.delta_plus[k] - state.delta_minus[k];
-      const certainty = state.width_std[k] === null ? "" : ` ± ${Math.round(100 * state.width_std[k])} %`;
+      const certainty = state.width_std[k] === null ? "" : ` ± ${number(state.width_std[k])}`;
       card.offsets.textContent = `tip ± ${deviation}, slack ${number(slack)}${certainty}`;
     });
   }
