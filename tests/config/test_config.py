@@ -189,3 +189,16 @@ def test_shipped_configurations_have_names(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.chdir(tmp_path)
     Path("bench").write_text("profile = 'paper'")
     assert load_config("bench").profile == "paper"
+
+
+def test_sections_of_older_documents_are_ignored_with_one_warning(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    text = (
+        'profile = "plays"\n[adaptive]\ntip_gain = 1.5\n[state_estimation]\ntip_deviation = 0.1\n'
+    )
+    assert loaded(tmp_path, text) == Config()
+    (record,) = (each for each in caplog.records if each.levelname == "WARNING")
+    assert "[adaptive], [state_estimation]" in record.getMessage()
+    with pytest.raises(ConfigError, match="adaptive"):
+        Config().replace(**{"adaptive.tip_gain": 1.5})

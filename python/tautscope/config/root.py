@@ -109,7 +109,7 @@ def from_document(document: dict[str, Any]) -> Config:
     document = dict(document)
     ignored = [f"[{name}]" for name in _WITHOUT_EFFECT if document.pop(name, None) is not None]
     if ignored:
-        _LOG.warning("%s in the configuration: ignored, they set nothing", ", ".join(ignored))
+        _LOG.warning("ignored sections of an older configuration: %s", ", ".join(ignored))
     profile = document.get("profile")
     if isinstance(profile, str) and profile in _RENAMED:
         document["profile"] = _RENAMED[profile]
