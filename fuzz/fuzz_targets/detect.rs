@@ -61,7 +61,7 @@ impl BandPredictor for Input<'_> {
         self.is_located
     }
 
-    fn freed(&self) -> Option<Self> {
+    fn anywhere(&self) -> Option<Self> {
         self.is_located.then(|| Self {
             is_located: false,
             ..self.clone()
