@@ -7,7 +7,7 @@ from tautscope.config.section import Section
 
 
 class EstimationConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Kalman filter on fixed plays of profile ``best``, docs/plays.md. All [ours].
+    """Kalman filter on fixed plays of profile ``best``, docs/best.md. All [ours].
 
     Lengths and travels are in the unit of each DOF, three quarters of its expected_width, so that
     one set serves all.

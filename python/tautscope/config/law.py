@@ -7,7 +7,7 @@ from tautscope.config.section import Section
 
 
 class LawConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Vector law of profile ``best``, docs/plays.md. All [ours].
+    """Vector law of profile ``best``, docs/best.md. All [ours].
 
     Travels are in the unit of each DOF, three quarters of its expected_width, so that one set
     serves all. free_gain, gain_limit, delta_minus and delta_plus are those of `DofConfig`.

@@ -89,7 +89,7 @@ fn norm_squared([a, b]: [f64; 2]) -> f64 {
 }
 
 /// The vector scaled to length 1.
-pub fn unit([a, b]: [f64; 2]) -> [f64; 2] {
+fn unit([a, b]: [f64; 2]) -> [f64; 2] {
     let length = libm::sqrt(a * a + b * b);
     [a / length, b / length]
 }
