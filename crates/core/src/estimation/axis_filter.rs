@@ -5,10 +5,11 @@ use nalgebra::{SMatrix, SVector};
 use crate::article::play::Play;
 use crate::dof::Friction;
 use crate::error::{ConfigError, require_positive};
-use crate::estimation::estimate::{Estimate, Slack};
+use crate::estimation::estimate::Estimate;
 use crate::estimation::estimate_settings::EstimateSettings;
 use crate::estimation::measurement::Linear;
 use crate::model::plays::{COEFFICIENTS, Plays, Transmission};
+use crate::model::slack::Slack;
 
 /// Filter of one DOF with measurements of its tip, for records of other instruments.
 #[derive(Debug, Clone, PartialEq)]

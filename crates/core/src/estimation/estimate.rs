@@ -7,8 +7,9 @@ use crate::estimation::estimate_settings::EstimateSettings;
 use crate::estimation::kalman::Kalman;
 use crate::estimation::measurement::{Linear, Prior};
 use crate::model::plays::{
-    COEFFICIENTS, OFFSET, OWN, Plays, Row, SHARED, Transmission, gain_row, middle_row, product,
+    COEFFICIENTS, OFFSET, OWN, Plays, Row, SHARED, Transmission, gain_row, product,
 };
+use crate::model::slack::{GAINS, Slack, width_row};
 
 /// Expected half width, and its spread, in units: of the Gaussian weights of the plays over their radii.
 const EXPECTED: f64 = 2.0 / 3.0;
@@ -19,8 +20,8 @@ const OWN_SHARE: f64 = 0.4;
 const BENT_SHARE: f64 = 0.4;
 /// Standard deviation of the gain: the tip follows its motor about one to one.
 const GAIN_DEVIATION: f64 = 0.3;
-/// Bounds of the gain: outside of them it is another instrument.
-const GAINS: (f64, f64) = (0.6, 1.3);
+/// Images over which their misfit is averaged.
+const RECENT: f64 = 8.0;
 
 /// Normally distributed coefficients of the plays of N DOFs, and G errors of the geometry: D = N `COEFFICIENTS` + G.
 ///
@@ -42,6 +43,8 @@ pub struct Estimate<const N: usize, const G: usize, const D: usize> {
     memory: [f64; G],
     /// Travel of the command at the last image.
     travel: f64,
+    /// Mean Birge's ratio of the last images.
+    ratio: f64,
 }
 
 /// An error of the geometry before the first image: its standard deviation, and the travel over which it returns to 0.
@@ -51,17 +54,6 @@ pub struct GeometryPrior {
     pub std: f64,
     /// Travel in units.
     pub travel: f64,
-}
-
-/// What is estimated of a DOF, in its unit.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Slack {
-    /// Half of the width of the backlash.
-    pub half_width: f64,
-    /// Centre of the contact offsets, command less tip over the gain, from the origin.
-    pub centre: f64,
-    /// Travel of the tip over that of the command in contact.
-    pub gain: f64,
 }
 
 /// Standard deviations of the slack of a DOF, in its unit.
@@ -120,12 +112,18 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
             origin: [f64::NAN; N],
             memory: geometry.map(|own| own.travel),
             travel: 0.0,
+            ratio: 1.0,
         })
     }
 
     /// Begins at the first reference (N,) [m or rad].
     pub const fn start(&mut self, origin: [f64; N]) {
         self.origin = origin;
+    }
+
+    /// Mean of Birge's ratio over the last images.
+    pub const fn ratio(&self) -> f64 {
+        self.ratio
     }
 
     /// The plays.
@@ -276,6 +274,7 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
         }
         #[expect(clippy::cast_precision_loss, reason = "a few features")]
         let variance = (distance * distance / M as f64).max(1.0);
+        self.ratio += (variance - self.ratio) / RECENT;
         let value = measurement.value - measurement.by_state * SVector::from(self.origin);
         self.kalman.update(&rows, &cross, &value, variance, only);
         self.bound_gains();
@@ -292,23 +291,7 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
 
     /// Slack of each DOF that moves alone.
     pub fn slack(&self) -> [Slack; N] {
-        let mut found = [Slack::default(); N];
-        let dofs = self
-            .transmission
-            .radii()
-            .into_iter()
-            .zip(self.coefficients())
-            .zip(self.transmission.unit());
-        for (slack, ((radii, row), unit)) in found.iter_mut().zip(dofs) {
-            let gain = product(&gain_row(), &row).clamp(GAINS.0, GAINS.1);
-            let half = product(&width_row(&radii), &row) / gain;
-            *slack = Slack {
-                half_width: unit * half.max(0.0),
-                centre: -unit * product(&middle_row(), &row) / gain,
-                gain,
-            };
-        }
-        found
+        self.transmission.slack(&self.coefficients())
     }
 
     /// Standard deviations of the slack of each DOF.
@@ -413,20 +396,6 @@ fn of_dof<const D: usize>(index: usize, row: &Row) -> SVector<f64, D> {
     let own = all.iter_mut().skip(index * COEFFICIENTS);
     own.zip(row).for_each(|(entry, value)| *entry = *value);
     all
-}
-
-/// Coefficients whose sum is the half width times the gain: radius of each play, and of the bent ones with their mean slope.
-fn width_row(radii: &[f64; SHARED + OWN]) -> Row {
-    let mut row = gain_row();
-    let bent = radii
-        .iter()
-        .skip(SHARED)
-        .step_by(2)
-        .flat_map(|radius| [*radius; 3]);
-    row.iter_mut()
-        .zip(radii.iter().copied().chain(bent))
-        .for_each(|(entry, radius)| *entry *= radius);
-    row
 }
 
 /// Mean and variance of the coefficients of a DOF before the first image.

@@ -3,24 +3,25 @@
 use crate::article::play_limit::PlayLimit;
 use crate::dof::all_finite;
 use crate::error::{ConfigError, require, require_positive};
-use crate::estimation::estimate::Slack;
 use crate::law::direction::Direction;
 use crate::law::settings::LawSettings;
 use crate::model::plays::{
     COEFFICIENTS, OFFSET, OWN, Plays, Row, SHARED, Transmission, bent, gain_row, product,
 };
+use crate::model::slack::Slack;
 
 /// Share of `command_speed` that the law uses, so that rounding does not exceed it.
 const BELOW_LIMIT: f64 = 0.999;
 /// Steps in search of the largest motion whose predicted tip is slow enough.
 const STEPS: usize = 5;
+const GAINK: f64 = 2.0;
+/// Contact
+const CONTACT: f64 = 2.0;
 /// Steps in which the command of a steady slide is found, and in which the model corrects it.
 const SLIDES: usize = 3;
 const CORRECTIONS: usize = 3;
 /// Largest correction of the target by the model, in units.
 const LARGEST_CORRECTION: f64 = 0.2;
-/// Bounds of the slope of the tip over the command where that is inverted.
-const SLOPES: (f64, f64) = (0.5, 1.5);
 
 /// Vector law of limited gain for N DOFs.
 ///
@@ -145,12 +146,7 @@ impl<const N: usize> VectorLaw<N> {
     /// The command for the next reference (N,) [m or rad], for the estimated coefficients and slack.
     ///
     /// The first reference is passed through. A reference that is not finite moves nothing.
-    pub fn propose(
-        &mut self,
-        reference: [f64; N],
-        rows: &[Row; N],
-        slack: &[Slack; N],
-    ) -> [f64; N] {
+    pub fn propose(&mut self, reference: [f64; N], rows: &[Row; N], ratio: f64) -> [f64; N] {
         if !all_finite(reference) {
             return self.command;
         }
@@ -163,11 +159,11 @@ impl<const N: usize> VectorLaw<N> {
             return self.command;
         }
         self.direction.step(motion);
-        self.follow_estimate(rows, motion);
+        self.follow_estimate(rows, motion, ratio);
         let unit = self.transmission.unit();
         let relative = over(subtract(reference, self.origin), unit);
         let moved = over(motion, unit);
-        self.target = self.next_target(relative, slack);
+        self.target = self.next_target(relative);
         let mut command = self.command;
         for group in 0..N {
             let members = self.transmission.friction().members(group);
@@ -220,9 +216,10 @@ impl<const N: usize> VectorLaw<N> {
 
     /// Moves the coefficients in use towards the estimated ones, as far as the contact offsets and the predicted tip may change
     /// in this motion: wrong images move nothing at once, and right ones can take back what they did.
-    fn follow_estimate(&mut self, rows: &[Row; N], motion: [f64; N]) {
+    fn follow_estimate(&mut self, rows: &[Row; N], motion: [f64; N], ratio: f64) {
         let parts = motion.iter().zip(self.transmission.unit());
         let travel: f64 = parts.map(|(motion, unit)| motion.abs() / unit).sum();
+        let by_gain = gain_row();
         let ahead = [1.0; N];
         let now = self.transmission.deflection(&self.rows, &ahead);
         let new = self.transmission.deflection(rows, &ahead);
@@ -230,9 +227,10 @@ impl<const N: usize> VectorLaw<N> {
         let off = subtract(tip, self.plays.tip(&self.rows, [true; N]));
         let dofs = self.rows.iter_mut().zip(rows);
         for (((used, estimated), (now, new)), off) in dofs.zip(now.into_iter().zip(new)).zip(off) {
-            let change = (new - now).abs().max(off.abs());
+            let steeper = product(&by_gain, estimated) - product(&by_gain, used);
+            let change = (new - now).abs().max(off.abs()).max(GAINK * steeper.abs());
             // Without a change this is infinite or NaN, of which `min` makes 1.
-            let share = (self.settings.change_rate * travel / change).min(1.0);
+            let share = (self.settings.change_rate * travel / (change * ratio * ratio)).min(1.0);
             for (used, new) in used.iter_mut().zip(estimated) {
                 *used += share * (new - *used);
             }
@@ -240,22 +238,20 @@ impl<const N: usize> VectorLaw<N> {
     }
 
     /// The target for a reference (N,) in units.
-    fn next_target(&self, reference: [f64; N], slack: &[Slack; N]) -> [f64; N] {
+    fn next_target(&self, reference: [f64; N]) -> [f64; N] {
         let direction = self.direction.value();
         let deflection = self.transmission.deflection(&self.rows, &direction);
-        let by_gain = gain_row();
+        let slack = self.transmission.slack(&self.rows);
         let mut steady = self.target;
-        let mut slopes = [1.0; N];
-        let dofs = steady.iter_mut().zip(&mut slopes).zip(&self.rows);
+        let dofs = steady.iter_mut().zip(&self.rows).zip(&slack);
         let given = reference.into_iter().zip(deflection).zip(direction);
-        for (((to, slope), row), ((reference, deflection), direction)) in dofs.zip(given) {
-            *slope = product(&by_gain, row).clamp(SLOPES.0, SLOPES.1);
+        for (((to, row), slack), ((reference, deflection), direction)) in dofs.zip(given) {
             let linear: f64 = row.iter().take(SHARED + OWN).sum();
             let constant = row.get(OFFSET).copied().unwrap_or(0.0);
             for _ in 0..SLIDES {
                 let (curved, _) = bent(row, *to, direction);
                 let tip = linear * *to - deflection + curved + constant;
-                *to += (reference - tip) / *slope;
+                *to += (reference - tip) / slack.gain;
             }
             *to = to.max(reference - 2.0).min(reference + 2.0);
         }
@@ -267,15 +263,15 @@ impl<const N: usize> VectorLaw<N> {
                 .iter_mut()
                 .zip(steady)
                 .zip(reference.into_iter().zip(tip))
-                .zip(slopes);
-            for (((to, steady), (reference, tip)), slope) in dofs {
-                *to += (reference - tip) / slope;
+                .zip(&slack);
+            for (((to, steady), (reference, tip)), slack) in dofs {
+                *to += (reference - tip) / slack.gain;
                 *to = to
                     .max(steady - LARGEST_CORRECTION)
                     .min(steady + LARGEST_CORRECTION);
             }
         }
-        self.within_limits(target, reference, slack)
+        self.within_limits(target, reference, &slack)
     }
 
     /// The target with contact offsets within their limits.
@@ -287,10 +283,7 @@ impl<const N: usize> VectorLaw<N> {
     ) -> [f64; N] {
         let dofs = target.iter_mut().zip(reference).zip(slack).zip(self.limits);
         for ((((to, reference), slack), limit), unit) in dofs.zip(self.transmission.unit()) {
-            let (minus, plus) = (
-                slack.centre - slack.half_width,
-                slack.centre + slack.half_width,
-            );
+            let [minus, plus] = slack.offsets();
             if limit.exceeds(minus, plus) {
                 let [minus, plus] = limit.clamp(minus, plus);
                 let middle = reference / slack.gain;
@@ -345,7 +338,8 @@ impl<const N: usize> VectorLaw<N> {
                 .for_each(|(to, step)| *to += share * step);
             self.transmission.move_group(&mut there, members, &to);
             let change = subtract(there.tip(&self.rows, members), now);
-            let excess = (norm(change) / (self.settings.tip_gain * moved))
+            let fastest = (CONTACT * norm(change)).min(share * length);
+            let excess = (fastest / (self.settings.tip_gain * moved))
                 .max(dot(change, motion) / (moved * room));
             if excess <= 1.0 {
                 break;

@@ -8,7 +8,7 @@ use crate::article::play_limit::PlayLimit;
 use crate::article::state::{StateEstimate, StateEstimator, found};
 use crate::dof::PerDof;
 use crate::error::ConfigError;
-use crate::estimation::estimate::{Estimate, GeometryPrior, Slack};
+use crate::estimation::estimate::{Estimate, GeometryPrior};
 use crate::estimation::estimate_settings::EstimateSettings;
 use crate::estimation::history::{Entry, History};
 use crate::estimation::measurement::{Observed, Sensor};
@@ -22,6 +22,7 @@ use crate::r#loop::report::HysteresisEstimate;
 use crate::r#loop::settings::Settings;
 use crate::model::features::{FeatureModel, FeaturePrediction};
 use crate::model::plays::{COEFFICIENTS, Plays, Row};
+use crate::model::slack::Slack;
 use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::monitors::Law;
 use crate::supervision::prediction_monitor::PredictionMonitor;
@@ -73,7 +74,8 @@ impl Law<3> for Best {
     }
 
     fn propose(&mut self, reference: PerDof<f64>) -> PerDof<f64> {
-        self.law.propose(reference, &self.rows, &self.slack)
+        self.law
+            .propose(reference, &self.rows, self.estimate.ratio())
     }
 
     fn commit(&mut self, command: PerDof<f64>) {
@@ -190,10 +192,8 @@ impl ProfileBlocks for Best {
 
     fn play(&self) -> PerDof<Play> {
         let mut plays = self.slack.map(|slack| {
-            Play::from_ordered(
-                slack.centre - slack.half_width,
-                slack.centre + slack.half_width,
-            )
+            let [minus, plus] = slack.offsets();
+            Play::from_ordered(minus, plus)
         });
         for (play, limit) in plays.iter_mut().zip(self.limits) {
             let [minus, plus] = limit.clamp(play.delta_minus(), play.delta_plus());
@@ -306,10 +306,8 @@ impl ProfileBlocks for Best {
             .prediction
             .update(past.time, past.predicted_state, measured);
         let is_limited = self.slack.iter().zip(self.limits).any(|(slack, limit)| {
-            limit.exceeds(
-                slack.centre - slack.half_width,
-                slack.centre + slack.half_width,
-            )
+            let [minus, plus] = slack.offsets();
+            limit.exceeds(minus, plus)
         });
         ImageUpdate {
             triggers: self.triggers(past),

@@ -10,3 +10,4 @@ pub(crate) mod outline;
 pub(crate) mod plays;
 pub(crate) mod section;
 pub(crate) mod settings;
+pub(crate) mod slack;

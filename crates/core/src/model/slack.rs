@@ -1,0 +1,56 @@
+//! Width, centre and gain of the slack that coefficients of plays make.
+
+use crate::model::plays::{OWN, Row, SHARED, Transmission, gain_row, middle_row, product};
+
+/// Bounds of the gain: outside of them it is another instrument.
+pub const GAINS: (f64, f64) = (0.6, 1.3);
+
+/// The slack of a DOF, in its unit.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Slack {
+    /// Half of the width of the backlash.
+    pub half_width: f64,
+    /// Centre of the contact offsets, command less tip over the gain, from the origin.
+    pub centre: f64,
+    /// Travel of the tip over that of the command in contact.
+    pub gain: f64,
+}
+
+impl Slack {
+    /// Contact offsets, the lower one first.
+    pub fn offsets(&self) -> [f64; 2] {
+        [self.centre - self.half_width, self.centre + self.half_width]
+    }
+}
+
+impl<const N: usize> Transmission<N> {
+    /// Slack of each DOF that moves alone, for the coefficients of its plays.
+    pub fn slack(&self, rows: &[Row; N]) -> [Slack; N] {
+        let mut found = [Slack::default(); N];
+        let dofs = self.radii().into_iter().zip(rows).zip(self.unit());
+        for (slack, ((radii, row), unit)) in found.iter_mut().zip(dofs) {
+            let gain = product(&gain_row(), row).clamp(GAINS.0, GAINS.1);
+            let half = product(&width_row(&radii), row) / gain;
+            *slack = Slack {
+                half_width: unit * half.max(0.0),
+                centre: -unit * product(&middle_row(), row) / gain,
+                gain,
+            };
+        }
+        found
+    }
+}
+
+/// Coefficients whose sum is the half width times the gain: radius of each play, and of the bent ones with their mean slope.
+pub fn width_row(radii: &[f64; SHARED + OWN]) -> Row {
+    let mut row = gain_row();
+    let bent = radii
+        .iter()
+        .skip(SHARED)
+        .step_by(2)
+        .flat_map(|radius| [*radius; 3]);
+    row.iter_mut()
+        .zip(radii.iter().copied().chain(bent))
+        .for_each(|(entry, radius)| *entry *= radius);
+    row
+}
