@@ -2,7 +2,8 @@
 
 use tautscope_core::{Best, HysteresisReduction, Paper};
 
-/// With the default storage of 256 control ticks, which takes 32 kB of each.
+/// With the default storage of 256 control ticks, which takes 32 kB of each; the smallest default stack of a thread is musl's,
+/// 128 KiB.
 #[test]
 fn a_loop_fits_on_a_stack() {
     let [paper, best] = [
@@ -10,5 +11,5 @@ fn a_loop_fits_on_a_stack() {
         size_of::<HysteresisReduction<Best>>(),
     ];
     println!("paper {paper}, best {best}");
-    assert!(paper <= 40_000 && best <= 100_000, "{paper} {best}");
+    assert!(paper <= 40_000 && best <= 120_000, "{paper} {best}");
 }

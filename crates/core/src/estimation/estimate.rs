@@ -20,7 +20,7 @@ const OWN_SHARE: f64 = 0.4;
 const BENT_SHARE: f64 = 0.4;
 /// Standard deviation of the gain: the tip follows its motor about one to one.
 const GAIN_DEVIATION: f64 = 0.3;
-/// Images over which their misfit is averaged.
+/// Images over which Birge's ratio is averaged.
 const RECENT: f64 = 8.0;
 
 /// Normally distributed coefficients of the plays of N DOFs, and G errors of the geometry: D = N `COEFFICIENTS` + G.
@@ -121,7 +121,7 @@ impl<const N: usize, const G: usize, const D: usize> Estimate<N, G, D> {
         self.origin = origin;
     }
 
-    /// Mean of Birge's ratio over the last images.
+    /// Mean of Birge's ratio over the last images, 1 or above: how much less they fit than expected.
     pub const fn ratio(&self) -> f64 {
         self.ratio
     }

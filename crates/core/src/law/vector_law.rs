@@ -14,9 +14,13 @@ use crate::model::slack::Slack;
 const BELOW_LIMIT: f64 = 0.999;
 /// Steps in search of the largest motion whose predicted tip is slow enough.
 const STEPS: usize = 5;
-const GAINK: f64 = 2.0;
-/// Contact
-const CONTACT: f64 = 2.0;
+/// Speed of the tip over the predicted one, at most that of the command: while few plays slide, a tip that is a single play
+/// rests or moves like the command.
+const EARLY: f64 = 2.0;
+/// Distance from the origin, in units, at which a change of the gain counts as one of the tip.
+const FAR: f64 = 2.0;
+/// Travel of a DOF, in units, within which its coefficients in use may change faster: at the start they are not known.
+const START: f64 = 3.0;
 /// Steps in which the command of a steady slide is found, and in which the model corrects it.
 const SLIDES: usize = 3;
 const CORRECTIONS: usize = 3;
@@ -32,9 +36,12 @@ const LARGEST_CORRECTION: f64 = 0.2;
 /// steady    c0: the tip is at u while all plays slide along w
 /// target    c* = c0, then three times c* += (u - tip(c*)) / gain, within 0.2 of c0
 /// command   dc towards c* - c,   |dc| <= K_b |du|,   dc . du >= 0,   each |dc| <= command_speed period
-/// contact   |dq| <= tip_gain |du| for the predicted tip q, and q does not pass u along du
+/// contact   max(|dq|, min(2 |dq|, |dc|)) <= tip_gain |du| for the predicted tip q, and q does not pass u along du
+/// in use    coefficients follow the estimated ones, contact offsets and q by at most rate |du|:
+///           rate = change_rate (1 + (START / travel)^2) / ratio^2
 /// ```
 ///
+/// with Birge's ratio of the last images: images that do not fit change little.
 /// The steady command alone leaves the tip off the reference, because direction and plays keep turning. One DOF alone:
 /// 0 <= dc / du <= `K_b`, Eq. (2). Where all DOFs of a group rest, no command moves, but each moves where another does: while
 /// rotation turns, the friction that held the insertion is released.
@@ -61,6 +68,8 @@ pub struct VectorLaw<const N: usize> {
     origin: [f64; N],
     /// Command at which the tip is at the reference, in units.
     target: [f64; N],
+    /// Travel of the reference, in units.
+    travel: [f64; N],
     rows: [Row; N],
     share: f64,
 }
@@ -117,6 +126,7 @@ impl<const N: usize> VectorLaw<N> {
             plays: Plays::REST,
             origin: [f64::NAN; N],
             target: [0.0; N],
+            travel: [0.0; N],
             rows: [[0.0; COEFFICIENTS]; N],
             share: 1.0,
         })
@@ -143,7 +153,7 @@ impl<const N: usize> VectorLaw<N> {
         self.origin
     }
 
-    /// The command for the next reference (N,) [m or rad], for the estimated coefficients and slack.
+    /// The command for the next reference (N,) [m or rad], for the estimated coefficients and Birge's ratio of the last images.
     ///
     /// The first reference is passed through. A reference that is not finite moves nothing.
     pub fn propose(&mut self, reference: [f64; N], rows: &[Row; N], ratio: f64) -> [f64; N] {
@@ -214,23 +224,31 @@ impl<const N: usize> VectorLaw<N> {
         self.plays = self.follow(&self.plays, command);
     }
 
-    /// Moves the coefficients in use towards the estimated ones, as far as the contact offsets and the predicted tip may change
-    /// in this motion: wrong images move nothing at once, and right ones can take back what they did.
+    /// Moves the coefficients in use towards the estimated ones, as far as contact offsets, gain and predicted tip may change in
+    /// this motion: wrong images move nothing at once, and right ones can take back what they did.
     fn follow_estimate(&mut self, rows: &[Row; N], motion: [f64; N], ratio: f64) {
-        let parts = motion.iter().zip(self.transmission.unit());
-        let travel: f64 = parts.map(|(motion, unit)| motion.abs() / unit).sum();
+        let moved = over(motion.map(f64::abs), self.transmission.unit());
+        let travel: f64 = moved.iter().sum();
+        self.travel
+            .iter_mut()
+            .zip(moved)
+            .for_each(|(sum, own)| *sum += own);
         let by_gain = gain_row();
         let ahead = [1.0; N];
         let now = self.transmission.deflection(&self.rows, &ahead);
         let new = self.transmission.deflection(rows, &ahead);
         let tip = self.plays.tip(rows, [true; N]);
         let off = subtract(tip, self.plays.tip(&self.rows, [true; N]));
-        let dofs = self.rows.iter_mut().zip(rows);
-        for (((used, estimated), (now, new)), off) in dofs.zip(now.into_iter().zip(new)).zip(off) {
+        let dofs = self.rows.iter_mut().zip(rows).zip(self.travel);
+        for ((((used, estimated), own), (now, new)), off) in
+            dofs.zip(now.into_iter().zip(new)).zip(off)
+        {
             let steeper = product(&by_gain, estimated) - product(&by_gain, used);
-            let change = (new - now).abs().max(off.abs()).max(GAINK * steeper.abs());
+            let change = (new - now).abs().max(off.abs()).max(FAR * steeper.abs());
             // Without a change this is infinite or NaN, of which `min` makes 1.
-            let share = (self.settings.change_rate * travel / (change * ratio * ratio)).min(1.0);
+            let known = START / own;
+            let rate = self.settings.change_rate * (1.0 + known * known);
+            let share = (rate * travel / (change * ratio * ratio)).min(1.0);
             for (used, new) in used.iter_mut().zip(estimated) {
                 *used += share * (new - *used);
             }
@@ -338,7 +356,8 @@ impl<const N: usize> VectorLaw<N> {
                 .for_each(|(to, step)| *to += share * step);
             self.transmission.move_group(&mut there, members, &to);
             let change = subtract(there.tip(&self.rows, members), now);
-            let fastest = (CONTACT * norm(change)).min(share * length);
+            let tip = norm(change);
+            let fastest = tip.max((EARLY * tip).min(share * length));
             let excess = (fastest / (self.settings.tip_gain * moved))
                 .max(dot(change, motion) / (moved * room));
             if excess <= 1.0 {

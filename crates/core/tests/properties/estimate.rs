@@ -4,10 +4,11 @@ use crate::article::play::{Play, PlayState};
 use crate::article::play_limit::PlayLimit;
 use crate::dof::Friction;
 use crate::estimation::axis_filter::AxisFilter;
-use crate::estimation::estimate::{Estimate, Slack, SlackDeviation};
+use crate::estimation::estimate::{Estimate, SlackDeviation};
 use crate::estimation::measurement::Linear;
 use crate::law::vector_law::{Bounds, VectorLaw};
 use crate::model::plays::{COEFFICIENTS, OFFSET, Plays, Transmission, gain_row, product};
+use crate::model::slack::Slack;
 use nalgebra::{SMatrix, SVector};
 use proptest::prelude::*;
 
@@ -245,8 +246,8 @@ fn soak(half: f64, centre: f64, mut reference: impl FnMut(u32) -> f64) -> [f64; 
     let (mut errors, tenth) = ([0.0; 10], ticks() / 10);
     for tick in 0..ticks() {
         let to = ORIGIN + UNIT * reference(tick);
-        let (rows, slack) = (direct.estimate.coefficients(), direct.estimate.slack());
-        let command = law.propose([to], &rows, &slack);
+        let rows = direct.estimate.coefficients();
+        let command = law.propose([to], &rows, 1.0);
         law.commit(command);
         let tip = truth.step(command[0]);
         direct.step(command[0]);

