@@ -244,7 +244,7 @@ impl Reduction {
     }
 }
 
-fn build<P: core::Profile>(settings: &core::Settings) -> Result<Loop<P>, core::ConfigError> {
+fn build<P: core::BandProfile>(settings: &core::Settings) -> Result<Loop<P>, core::ConfigError> {
     let storage = vec![core::Entry::BLANK; settings.history_entries()];
     core::HysteresisReduction::new(settings, storage).map(Box::new)
 }

@@ -7,7 +7,7 @@ mod support;
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use support::loops::{Loop, article_with, best_with, model};
-use tautscope_core::{Flag, Play, Profile, Reaction, Status, Triggers};
+use tautscope_core::{BandProfile, Flag, Play, Reaction, Status, Triggers};
 
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;
@@ -43,7 +43,7 @@ fn run_best_without_outliers() -> u64 {
 }
 
 /// Runs a loop; returns the number of ticks.
-fn run<P: Profile>(mut reduction: Loop<P>) -> u64 {
+fn run<P: BandProfile>(mut reduction: Loop<P>) -> u64 {
     let mut ticks = 1;
     let (mut used, mut updated, mut worst) = (0, 0, Reaction::None);
     let truth = model();

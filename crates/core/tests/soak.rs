@@ -11,7 +11,7 @@ mod support;
 use support::PERIOD;
 use support::loops::{Loop, article, article_with, best};
 use support::plays::{ThreePlays, real, reference};
-use tautscope_core::{Play, Profile, Reaction};
+use tautscope_core::{BandProfile, Play, Reaction};
 
 const TICKS_PER_FRAME: u64 = 8;
 const TENTHS: u8 = 10;
@@ -33,7 +33,7 @@ fn hours() -> f64 {
 }
 
 /// Runs a loop; returns a description of what grew or drifted, empty if nothing did.
-fn soak<P: Profile>(law: &str, mut reduction: Loop<P>) -> String {
+fn soak<P: BandProfile>(law: &str, mut reduction: Loop<P>) -> String {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,

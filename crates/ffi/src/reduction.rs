@@ -55,7 +55,7 @@ impl TautscopeLoop {
     }
 }
 
-fn build<P: core::Profile>(settings: &core::Settings) -> Result<Reduction<P>, TautscopeResult> {
+fn build<P: core::BandProfile>(settings: &core::Settings) -> Result<Reduction<P>, TautscopeResult> {
     let storage = vec![core::Entry::BLANK; settings.history_entries()];
     core::HysteresisReduction::new(settings, storage)
         .map(Box::new)

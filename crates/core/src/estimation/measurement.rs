@@ -11,7 +11,7 @@ const SMALL: f64 = 1e-4;
 /// A sensor: what it measures of a state of N DOFs, M features, of which G errors of its geometry are estimated.
 pub trait Sensor<const N: usize, const M: usize, const G: usize> {
     /// Features that are right or wrong together: 2 for the points of an image.
-    const POINT: usize;
+    fn point(&self) -> usize;
 
     /// Features h (M,) in a state (N,) with an error (G,) of the geometry, and dh/dq, a column (M,) for each DOF.
     ///
@@ -93,7 +93,7 @@ impl<const M: usize> Observed<M> {
         &self,
         sensor: &S,
         prior: &Prior<N, G>,
-        starts: &[SVector<f64, N>],
+        starts: impl Iterator<Item = SVector<f64, N>>,
         price: f64,
     ) -> Option<MostProbable<N, M>> {
         let geometry = prior.geometry.into();
@@ -103,7 +103,7 @@ impl<const M: usize> Observed<M> {
         let mut best = problem(self.seen)?.minimum(SVector::zeros())?;
         if best.distance_squared > price {
             for start in starts {
-                if let Some(other) = problem(self.seen)?.minimum(*start)
+                if let Some(other) = problem(self.seen)?.minimum(start)
                     && other.distance_squared < best.distance_squared
                 {
                     best = other;
@@ -111,9 +111,9 @@ impl<const M: usize> Observed<M> {
             }
         }
         if best.distance_squared > price {
-            for first in (0..M).step_by(S::POINT) {
+            for first in (0..M).step_by(sensor.point()) {
                 let mut used = self.seen;
-                for used in used.iter_mut().skip(first).take(S::POINT) {
+                for used in used.iter_mut().skip(first).take(sensor.point()) {
                     *used = false;
                 }
                 if used == self.seen || used == [false; M] {

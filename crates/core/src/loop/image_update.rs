@@ -1,78 +1,90 @@
-//! The image update of the loop: checks of the monitors, state estimate, offset estimates.
+//! The update of the loop by a measurement: checks of the monitors, state estimate, offset estimates.
 
 use crate::article::estimator::Triggers;
 use crate::article::state::{StateEstimate, found};
 use crate::estimation::history::Entry;
-use crate::r#loop::measurement::{Measurement, is_reversed, is_usable};
-use crate::r#loop::profile::{Image, ImageUpdate, Profile};
+use crate::r#loop::measurement::{Measurement, Sight, is_reversed, is_usable};
+use crate::r#loop::profile::{BandBlocks, BandProfile, BandsView, Image, Profile, Seen, Updated};
 use crate::r#loop::reduction::HysteresisReduction;
 use crate::r#loop::report::{Report, Status};
+use crate::model::features::FeatureModel;
 use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::frame_gate::{FrameArrival, ImageIdentity};
 
-impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
-    /// Image update: the features (4,) in px measured in a frame captured at `captured_at` in s, and their
-    /// covariance (4, 4) in px^2; None is 1 px^2 for each, or `marker_deviation` of profile `best`.
-    ///
-    /// Two NaN mark a band that was not found; None, or any other value that is not finite, means that no band was. A
-    /// `checksum` of the pixels identifies a frozen image; without it, equal features do.
-    pub fn on_features(
+/// Result of an update by a measurement, of which the sensor has the view `V`.
+pub(super) struct Outcome<const N: usize, V> {
+    pub(super) status: Status,
+    /// The loop at the time of capture.
+    pub(super) past: Option<Entry<N>>,
+    /// What was used.
+    pub(super) seen: Option<V>,
+    pub(super) triggers: [Triggers; N],
+}
+
+impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
+    HysteresisReduction<P, S, V, N>
+{
+    /// Update by what one of the sensors saw at `captured_at` in s.
+    pub(super) fn update_by<I: Sight<P, N>>(
         &mut self,
-        measured: Option<[f64; 4]>,
-        covariance: Option<&[[f64; 4]; 4]>,
+        sight: &I,
         captured_at: f64,
-        checksum: Option<u64>,
-    ) -> Report {
+        sensor: usize,
+        image: Option<ImageIdentity>,
+    ) -> Outcome<N, I::View> {
         let past = self.history.at(captured_at);
-        let mut raised = self.monitors.check_arrival(&FrameArrival {
+        let arrival = FrameArrival {
             captured_at,
             now: self.history.newest_time(),
-            image: checksum.map_or_else(
-                || measured.map(|features| ImageIdentity::Features(features.map(f64::to_bits))),
-                |sum| Some(ImageIdentity::Checksum(sum)),
-            ),
+            image,
             travel: past.map(|past| past.travel),
-        });
-        let mut report = self.image_update(measured, covariance, captured_at, past, &mut raised);
+        };
+        let mut raised = self.monitors.check_arrival(&arrival, sensor);
+        let outcome = self.examine(sight, captured_at, sensor, past, &mut raised);
         self.monitors.react_to_frame(raised);
-        report.supervision = self.monitors.supervision();
-        report
+        outcome
     }
 
-    fn image_update(
+    fn examine<I: Sight<P, N>>(
         &mut self,
-        measured: Option<[f64; 4]>,
-        covariance: Option<&[[f64; 4]; 4]>,
+        sight: &I,
         captured_at: f64,
-        past: Option<Entry>,
+        sensor: usize,
+        past: Option<Entry<N>>,
         raised: &mut Flags,
-    ) -> Report {
-        if captured_at <= self.last_used {
+    ) -> Outcome<N, I::View> {
+        let unused = |status, past| Outcome {
+            status,
+            past,
+            seen: None,
+            triggers: Updated::NOTHING.triggers,
+        };
+        let is_repeated = self
+            .last_used
+            .get(sensor)
+            .is_some_and(|last| captured_at <= *last);
+        if is_repeated {
             *raised = self
                 .monitors
                 .enabled(raised.union(Flags::of(Flag::Duplicate)));
-            return self.report_unused(Status::Duplicate, None);
+            return unused(Status::Duplicate, None);
         }
         let Some(past) = past else {
-            return self.report_unused(Status::Stale, None);
+            return unused(Status::Stale, None);
         };
         if !raised.is_empty() {
-            return self.report_unused(Status::Refused, Some(past));
+            return unused(Status::Refused, Some(past));
         }
         self.profile.advance(&self.history, &past);
-        let Some(features) = measured.filter(|features| is_usable(*features)) else {
+        if !sight.is_usable() {
             self.profile.miss(&past);
             *raised = self.monitors.enabled(Flags::of(Flag::Lost));
-            return self.report_unused(Status::NoMarkers, Some(past));
+            return unused(Status::NoMarkers, Some(past));
+        }
+        let Some((measurement, view)) = sight.measure(&self.profile, &past) else {
+            return unused(Status::Held, Some(past));
         };
-        let image = Image {
-            features,
-            covariance,
-        };
-        let Some(measurement) = self.profile.measure(&self.feature_model, &past, image) else {
-            return self.report_unused(Status::Held, Some(past));
-        };
-        *raised = self.check_innovation(&past, &measurement, image);
+        *raised = self.check_innovation(sight, &past, measurement.distance, &view);
         if !raised.is_empty() {
             // Bands that contradict the prediction for as long as a hold lasts are more credible than the prediction.
             if self.monitors.is_fading() {
@@ -80,27 +92,35 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
             } else {
                 self.profile.miss(&past);
             }
-            return self.report_unused(Status::Refused, Some(past));
+            return unused(Status::Refused, Some(past));
         }
-        self.last_used = captured_at;
-        self.accept(&past, &measurement, features, raised)
+        if let Some(last) = self.last_used.get_mut(sensor) {
+            *last = captured_at;
+        }
+        let (status, triggers) = self.accept(&past, &measurement, raised);
+        Outcome {
+            status,
+            past: Some(past),
+            seen: Some(view),
+            triggers,
+        }
     }
 
-    /// Flags for which the image is refused.
-    fn check_innovation(&self, past: &Entry, measurement: &Measurement, image: Image<'_>) -> Flags {
-        let frames = &self.monitors.frames;
-        let flags = frames.check_innovation(measurement.distance);
-        let is_exchanged = is_reversed(measurement.predicted_features, image.features);
+    /// Flags for which the measurement is refused.
+    fn check_innovation<I: Sight<P, N>>(
+        &self,
+        sight: &I,
+        past: &Entry<N>,
+        distance: f64,
+        view: &I::View,
+    ) -> Flags {
+        let flags = self.monitors.check_innovation(distance);
+        let is_exchanged = sight.is_exchanged(view);
         if !is_exchanged && flags.is_empty() {
             return Flags::NONE;
         }
-        let exchanged = self
-            .profile
-            .measure(&self.feature_model, past, image.exchanged());
-        let is_swapped = is_exchanged
-            || exchanged.is_some_and(|other| {
-                other.used == [true; 2] && frames.check_innovation(other.distance).is_empty()
-            });
+        let fits = |distance| self.monitors.check_innovation(distance).is_empty();
+        let is_swapped = is_exchanged || sight.fits_exchanged(&self.profile, past, fits);
         let swapped = self
             .monitors
             .enabled(Flags::when(is_swapped, Flag::Swapped));
@@ -114,22 +134,21 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
     /// Updates the estimates from a measurement that has passed the checks.
     fn accept(
         &mut self,
-        past: &Entry,
-        measurement: &Measurement,
-        features: [f64; 4],
+        past: &Entry<N>,
+        measurement: &Measurement<N, P::Evidence>,
         raised: &mut Flags,
-    ) -> Report {
-        let estimate = measurement.estimate;
-        let status = match (measurement.used, estimate.observable) {
-            ([true, false] | [false, true], _) => Status::Partial,
-            ([true, true], [true, true, true]) => Status::Ok,
-            _ => Status::Held,
+    ) -> (Status, [Triggers; N]) {
+        let status = if measurement.is_partial {
+            Status::Partial
+        } else if measurement.observable == [true; N] {
+            Status::Ok
+        } else {
+            Status::Held
         };
         // Of two markers with an outlier, the other one may be wrong, too.
-        let has_outlier = measurement.used != found(features);
         let outlier = self
             .monitors
-            .enabled(Flags::when(has_outlier, Flag::Innovation));
+            .enabled(Flags::when(measurement.has_outlier, Flag::Innovation));
         let updates_offsets = outlier.is_empty() && self.monitors.permits_updates();
         let mut motion = Flags::NONE;
         if updates_offsets {
@@ -141,7 +160,7 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
                 play,
             );
         }
-        let ImageUpdate {
+        let Updated {
             triggers,
             raised: conspicuous,
         } = self.profile.update(past, measurement, updates_offsets);
@@ -152,27 +171,59 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
                     .union(Flags::when(status == Status::Held, Flag::Unobservable)),
             ),
         );
+        (status, triggers)
+    }
+}
+
+impl<P: BandProfile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
+    /// Image update: the features (4,) in px measured in a frame captured at `captured_at` in s, and their
+    /// covariance (4, 4) in px^2; None is 1 px^2 for each, or `marker_deviation` of profile `best`.
+    ///
+    /// Two NaN mark a band that was not found; None, or any other value that is not finite, means that no band was. A
+    /// `checksum` of the pixels identifies a frozen image; without it, equal features do.
+    pub fn on_features(
+        &mut self,
+        measured: Option<[f64; 4]>,
+        covariance: Option<&[[f64; 4]; 4]>,
+        captured_at: f64,
+        checksum: Option<u64>,
+    ) -> Report {
+        let identity = checksum.map_or_else(
+            || measured.map(|features| ImageIdentity::Features(features.map(f64::to_bits))),
+            |sum| Some(ImageIdentity::Checksum(sum)),
+        );
+        let bands = Bands {
+            model: self.view,
+            image: measured.map(|features| Image {
+                features,
+                covariance,
+            }),
+        };
+        let Outcome {
+            status,
+            past,
+            seen,
+            triggers,
+        } = self.update_by(&bands, captured_at, 0, identity);
+        let predicted_state = past.map_or([f64::NAN; 3], |past| past.predicted_state);
+        let seen = seen.unwrap_or_else(|| self.unseen(predicted_state));
         Report {
             status,
-            predicted_state: past.predicted_state,
-            predicted_features: measurement.predicted_features,
+            predicted_state,
+            predicted_features: seen.predicted_features,
             triggers,
-            estimate,
-            state_deviation: measurement.state_deviation,
+            estimate: seen.estimate,
+            state_deviation: seen.state_deviation,
             play: self.play(),
             supervision: self.monitors.supervision(),
         }
     }
 
-    /// The report on a frame that updated nothing.
-    fn report_unused(&self, status: Status, past: Option<Entry>) -> Report {
-        let predicted_state = past.map_or([f64::NAN; 3], |past| past.predicted_state);
-        let model = self.profile.feature_model(&self.feature_model);
+    /// The view of a frame that updated nothing.
+    fn unseen(&self, predicted_state: [f64; 3]) -> BandsView {
+        let model = self.profile.feature_model(&self.view);
         let prediction = model.predict(predicted_state);
-        Report {
-            status,
-            predicted_state,
-            predicted_features: prediction.map_or([f64::NAN; 4], |prediction| prediction.features),
+        BandsView {
             estimate: StateEstimate {
                 state: predicted_state,
                 observable: [false; 3],
@@ -180,10 +231,44 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
                 innovation: [f64::NAN; 4],
                 inverse: [[0.0; 4]; 3],
             },
+            used: [false; 2],
+            predicted_features: prediction.map_or([f64::NAN; 4], |prediction| prediction.features),
             state_deviation: [f64::NAN; 3],
-            triggers: [Triggers::default(); 3],
-            play: self.play(),
-            supervision: self.monitors.supervision(),
         }
     }
+}
+
+/// The bands of an image, with the configured feature model.
+struct Bands<'a> {
+    model: FeatureModel,
+    image: Option<Image<'a>>,
+}
+
+impl<P: BandBlocks> Sight<P, 3> for Bands<'_> {
+    type View = BandsView;
+
+    fn is_usable(&self) -> bool {
+        self.image.is_some_and(|image| is_usable(image.features))
+    }
+
+    fn measure(&self, profile: &P, past: &Entry) -> Option<Seen<P::Evidence>> {
+        profile.measure(&self.model, past, self.image?)
+    }
+
+    fn is_exchanged(&self, view: &BandsView) -> bool {
+        self.image
+            .is_some_and(|image| is_reversed(view.predicted_features, image.features))
+    }
+
+    fn fits_exchanged(&self, profile: &P, past: &Entry, fits: impl Fn(f64) -> bool) -> bool {
+        let image = self.image.map(Image::exchanged);
+        let exchanged = image.and_then(|image| profile.measure(&self.model, past, image));
+        exchanged.is_some_and(|(other, view)| view.used == [true; 2] && fits(other.distance))
+    }
+}
+
+/// Whether one of two markers was used, and whether one that was found was not.
+pub(super) fn completeness(used: [bool; 2], features: [f64; 4]) -> (bool, bool) {
+    let is_partial = matches!(used, [true, false] | [false, true]);
+    (is_partial, used != found(features))
 }

@@ -1,38 +1,58 @@
-//! The state estimate from one image, as both profiles provide it.
+//! A measurement of the tip, as profiles and sensors provide it.
 
-use crate::article::state::{StateEstimate, found};
-use crate::dof::{PerDof, all_finite, zip_with};
-use crate::estimation::measurement::Linear;
-use crate::model::features::GEOMETRY;
+use crate::article::state::found;
+use crate::dof::{all_finite, zip_with};
+use crate::estimation::history::Entry;
+use crate::r#loop::profile::ProfileBlocks;
 
-/// Errors of the geometry in profile `best`: those of the model, and of each feature.
-pub const ERRORS: usize = GEOMETRY + 4;
-
-/// Linear measurement of the bands of an image.
-pub type Bands = Linear<3, 4, ERRORS>;
-
-/// A state estimate from one image.
+/// A measurement of the state, with what the update of a profile needs of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Measurement {
-    /// `q_hat`, innovation and which DOFs are observable.
-    pub estimate: StateEstimate,
-    /// Which markers were used.
-    pub used: [bool; 2],
-    /// h in px of the state the estimate started from.
-    pub predicted_features: [f64; 4],
-    /// Standard deviation of each DOF of `q_hat` [m, rad, rad].
-    pub state_deviation: PerDof<f64>,
+pub struct Measurement<const N: usize, E> {
+    /// The most probable state (N,) [m or rad]; a DOF that is not observable has its prediction here.
+    pub state: [f64; N],
+    /// Which DOFs the measurement determined.
+    pub observable: [bool; N],
     /// Mahalanobis distance of the innovation.
     pub distance: f64,
-    /// The linear measurement, in profile `best`.
-    pub bands: Option<Bands>,
+    /// Whether a part of what is measured was missing.
+    pub is_partial: bool,
+    /// Whether a part of it was left out as an outlier.
+    pub has_outlier: bool,
+    /// What the profile needs beside them.
+    pub evidence: E,
 }
 
-impl Measurement {
-    /// The state of each DOF that the image determined, NaN for the others [m, rad, rad].
-    pub(crate) fn observed_state(&self) -> PerDof<f64> {
+impl<const N: usize, E> Measurement<N, E> {
+    /// The state of each DOF that was determined, NaN for the others [m or rad].
+    pub(crate) fn observed_state(&self) -> [f64; N] {
         let observed = |value, is_observable| if is_observable { value } else { f64::NAN };
-        zip_with(self.estimate.state, self.estimate.observable, observed)
+        zip_with(self.state, self.observable, observed)
+    }
+}
+
+/// What a sensor saw at one time, before a profile has looked at it.
+pub(crate) trait Sight<P: ProfileBlocks<N>, const N: usize> {
+    /// What a report says of it.
+    type View: Copy;
+
+    /// Whether anything was seen.
+    fn is_usable(&self) -> bool;
+
+    /// The measurement; None where the model of the sensor sees nothing.
+    fn measure(
+        &self,
+        profile: &P,
+        past: &Entry<N>,
+    ) -> Option<(Measurement<N, P::Evidence>, Self::View)>;
+
+    /// Whether its two markers look exchanged.
+    fn is_exchanged(&self, _: &Self::View) -> bool {
+        false
+    }
+
+    /// Whether it `fits` with its two markers exchanged, by its distance.
+    fn fits_exchanged(&self, _: &P, _: &Entry<N>, _: impl Fn(f64) -> bool) -> bool {
+        false
     }
 }
 

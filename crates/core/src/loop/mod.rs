@@ -1,5 +1,6 @@
 //! The whole loop, Fig. 6.
 
+pub(crate) mod bands;
 pub(crate) mod best;
 pub(crate) mod image_update;
 pub(crate) mod measurement;

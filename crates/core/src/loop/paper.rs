@@ -10,8 +10,9 @@ use crate::error::ConfigError;
 use crate::estimation::history::{Entry, History};
 use crate::estimation::posture::Belief;
 use crate::estimation::state_prediction::{StatePrediction, step_deviation};
+use crate::r#loop::image_update::completeness;
 use crate::r#loop::measurement::Measurement;
-use crate::r#loop::profile::{Image, ImageUpdate, ProfileBlocks};
+use crate::r#loop::profile::{BandBlocks, BandsView, Image, ProfileBlocks, Seen, Updated};
 use crate::r#loop::settings::Settings;
 use crate::model::features::FeatureModel;
 use crate::settings::DofSettings;
@@ -81,18 +82,10 @@ impl<const N: usize, E> Law<N> for Paper<N, E> {
     }
 }
 
-impl ProfileBlocks for Paper {
-    const IS_COUPLED: bool = false;
+impl ProfileBlocks<3> for Paper {
+    type Evidence = (StateEstimate, PerDof<f64>);
 
-    fn new(settings: &Settings, limits: PerDof<PlayLimit>) -> Result<Self, ConfigError> {
-        let dofs = settings.dofs();
-        let estimation = StateFromImages {
-            estimator: state_estimator(settings)?,
-            prediction: StatePrediction::new(dofs.map(|dof| dof.start_deviation))?,
-            coupled_std: dofs.map(|dof| COUPLED * dof.start_deviation),
-        };
-        Self::with_estimation(&dofs, limits, estimation)
-    }
+    const IS_COUPLED: bool = false;
 
     fn predicted_state(&self) -> PerDof<f64> {
         self.axes
@@ -110,15 +103,57 @@ impl ProfileBlocks for Paper {
 
     fn keep_up<S: AsRef<[Entry]> + AsMut<[Entry]>>(&mut self, _: &History<S>, _: bool) {}
 
+    fn advance<S: AsRef<[Entry]> + AsMut<[Entry]>>(&mut self, _: &History<S>, _: &Entry) {}
+
+    fn update(
+        &mut self,
+        past: &Entry,
+        measurement: &Measurement<3, Self::Evidence>,
+        updates_offsets: bool,
+    ) -> Updated<3> {
+        let (estimate, state_deviation) = &measurement.evidence;
+        let std = step_deviation(past, estimate.state, *state_deviation);
+        self.estimation.prediction.update(past, estimate, std);
+        if !updates_offsets {
+            return Updated::NOTHING;
+        }
+        let (triggers, raised) =
+            self.update_offsets(past.command, estimate.state, estimate.observable);
+        Updated { triggers, raised }
+    }
+
+    fn miss(&mut self, past: &Entry) {
+        self.estimation.prediction.miss(past);
+    }
+
+    fn reset_prediction(&mut self, past: &Entry) {
+        self.estimation.prediction.reset(past);
+    }
+}
+
+impl BandBlocks for Paper {
+    fn new(settings: &Settings, limits: PerDof<PlayLimit>) -> Result<Self, ConfigError> {
+        let dofs = settings.dofs();
+        let estimation = StateFromImages {
+            estimator: state_estimator(&dofs)?,
+            prediction: StatePrediction::new(dofs.map(|dof| dof.start_deviation))?,
+            coupled_std: dofs.map(|dof| COUPLED * dof.start_deviation),
+        };
+        Self::with_estimation(&dofs, limits, estimation)
+    }
+
     fn predict<S: AsRef<[Entry]> + AsMut<[Entry]>>(&self, _: &History<S>, past: &Entry) -> Belief {
         self.estimation.prediction.at(past)
     }
 
-    fn advance<S: AsRef<[Entry]> + AsMut<[Entry]>>(&mut self, _: &History<S>, _: &Entry) {}
-
     /// One linear step from the prediction, Eqs. (13)-(16). With one band the step starts from the state prediction of the
     /// last images, because the DOFs that are held keep its error.
-    fn measure(&self, model: &FeatureModel, past: &Entry, image: Image<'_>) -> Option<Measurement> {
+    fn measure(
+        &self,
+        model: &FeatureModel,
+        past: &Entry,
+        image: Image<'_>,
+    ) -> Option<Seen<Self::Evidence>> {
         let used = found(image.features);
         let prior = self.estimation.prediction.at(past);
         let start = if used == [true; 2] {
@@ -132,43 +167,26 @@ impl ProfileBlocks for Paper {
             .estimator
             .estimate(start, &prediction, image.features);
         let state_deviation = estimate.state_deviation(image.covariance.unwrap_or(&UNIT));
-        Some(Measurement {
-            estimate,
-            used,
-            predicted_features: prediction.features,
-            state_deviation,
+        let (is_partial, has_outlier) = completeness(used, image.features);
+        let measurement = Measurement {
+            state: estimate.state,
+            observable: estimate.observable,
             distance: self.estimation.distance(
                 &prior,
                 &estimate,
                 step_deviation(past, prior.state, state_deviation),
             ),
-            bands: None,
-        })
-    }
-
-    fn update(
-        &mut self,
-        past: &Entry,
-        measurement: &Measurement,
-        updates_offsets: bool,
-    ) -> ImageUpdate {
-        let estimate = &measurement.estimate;
-        let std = step_deviation(past, estimate.state, measurement.state_deviation);
-        self.estimation.prediction.update(past, estimate, std);
-        if !updates_offsets {
-            return ImageUpdate::default();
-        }
-        let (triggers, raised) =
-            self.update_offsets(past.command, estimate.state, estimate.observable);
-        ImageUpdate { triggers, raised }
-    }
-
-    fn miss(&mut self, past: &Entry) {
-        self.estimation.prediction.miss(past);
-    }
-
-    fn reset_prediction(&mut self, past: &Entry) {
-        self.estimation.prediction.reset(past);
+            is_partial,
+            has_outlier,
+            evidence: (estimate, state_deviation),
+        };
+        let view = BandsView {
+            estimate,
+            used,
+            predicted_features: prediction.features,
+            state_deviation,
+        };
+        Some((measurement, view))
     }
 }
 
@@ -243,8 +261,8 @@ impl StateFromImages {
 ///
 /// # Errors
 /// An `observable_deviation` is not above 0.
-pub fn state_estimator(settings: &Settings) -> Result<StateEstimator, ConfigError> {
-    StateEstimator::new(settings.dofs().map(|dof| dof.observable_deviation))
+pub fn state_estimator(dofs: &PerDof<DofSettings>) -> Result<StateEstimator, ConfigError> {
+    StateEstimator::new(dofs.map(|dof| dof.observable_deviation))
 }
 
 /// Compensator and estimator of one DOF, each with its state.

@@ -3,6 +3,7 @@
 use crate::article::estimator::Triggers;
 use crate::article::play::Play;
 use crate::article::play_limit::PlayLimit;
+use crate::article::state::StateEstimate;
 use crate::dof::PerDof;
 use crate::error::ConfigError;
 use crate::estimation::history::{Entry, History};
@@ -13,11 +14,17 @@ use crate::model::features::FeatureModel;
 use crate::supervision::flags::Flags;
 use crate::supervision::monitors::Law;
 
-/// A profile of the loop: `Paper` or `Best`.
+/// A profile of the loop with N DOFs: `Paper` or `Best`.
 #[expect(private_bounds, reason = "only this crate implements profiles")]
-pub trait Profile: ProfileBlocks {}
+pub trait Profile<const N: usize = 3>: ProfileBlocks<N> {}
 
-impl<P: ProfileBlocks> Profile for P {}
+impl<const N: usize, P: ProfileBlocks<N>> Profile<N> for P {}
+
+/// A profile of the article's instrument, which a camera sees by two bands.
+#[expect(private_bounds, reason = "only this crate implements profiles")]
+pub trait BandProfile: BandBlocks {}
+
+impl<P: BandBlocks> BandProfile for P {}
 
 /// An image: features (4,) in px with two NaN for a band that was not found, and their covariance (4, 4) in px^2, if known.
 #[derive(Debug, Clone, Copy)]
@@ -37,43 +44,97 @@ impl Image<'_> {
     }
 }
 
-/// Result of an update with an image.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct ImageUpdate {
+/// Result of an update with a measurement.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Updated<const N: usize> {
     /// Which offsets were updated, and why.
-    pub triggers: PerDof<Triggers>,
+    pub triggers: [Triggers; N],
     /// What was conspicuous.
     pub raised: Flags,
 }
 
+impl<const N: usize> Updated<N> {
+    /// Nothing was updated.
+    pub const NOTHING: Self = Self {
+        triggers: [Triggers {
+            minus: None,
+            plus: None,
+        }; N],
+        raised: Flags::NONE,
+    };
+}
+
 /// Compensation law, offset estimates and state estimation.
-pub(crate) trait ProfileBlocks: Law<3> + Sized {
+pub(crate) trait ProfileBlocks<const N: usize>: Law<N> + Sized {
+    /// What an update needs of a measurement beside state and distance.
+    type Evidence: Copy;
+
     /// Whether the DOFs that share a friction are bounded together.
     const IS_COUPLED: bool;
 
+    /// The predicted state q (N,) [m or rad]; NaN before the first reference.
+    fn predicted_state(&self) -> [f64; N];
+
+    /// The sum of the changes of q by measurements so far (N,) [m or rad].
+    fn corrected(&self) -> [f64; N] {
+        [0.0; N]
+    }
+
+    /// The estimated play of each DOF.
+    fn play(&self) -> [Play; N];
+
+    /// Keeps up with the history at the end of a control tick.
+    fn keep_up<S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>>(
+        &mut self,
+        history: &History<S, N>,
+        has_clock_gone_back: bool,
+    );
+
+    /// Propagates the state prediction to the time of a measurement.
+    fn advance<S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>>(
+        &mut self,
+        history: &History<S, N>,
+        past: &Entry<N>,
+    );
+
+    /// Updates the state prediction with an accepted measurement, and with `updates_offsets` the offsets.
+    fn update(
+        &mut self,
+        past: &Entry<N>,
+        measurement: &Measurement<N, Self::Evidence>,
+        updates_offsets: bool,
+    ) -> Updated<N>;
+
+    /// Makes the state prediction less certain after an image without markers.
+    fn miss(&mut self, past: &Entry<N>);
+
+    /// Makes the state prediction as uncertain as at the start.
+    fn reset_prediction(&mut self, past: &Entry<N>);
+}
+
+/// A state estimate from the bands of an image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BandsView {
+    /// `q_hat`, innovation and which DOFs are observable.
+    pub estimate: StateEstimate,
+    /// Which markers were used.
+    pub used: [bool; 2],
+    /// h in px of the state the estimate started from.
+    pub predicted_features: [f64; 4],
+    /// Standard deviation of each DOF of `q_hat` [m, rad, rad].
+    pub state_deviation: PerDof<f64>,
+}
+
+/// A measurement of a profile, and what the image showed.
+pub type Seen<E> = (Measurement<3, E>, BandsView);
+
+/// The parts of a profile that know the article's instrument.
+pub(crate) trait BandBlocks: ProfileBlocks<3> {
     /// A profile at rest.
     ///
     /// # Errors
     /// A setting is out of range.
     fn new(settings: &Settings, limits: PerDof<PlayLimit>) -> Result<Self, ConfigError>;
-
-    /// The predicted state q (3,) [m, rad, rad]; NaN before the first reference.
-    fn predicted_state(&self) -> PerDof<f64>;
-
-    /// The sum of the changes of q by images so far (3,) [m, rad, rad].
-    fn corrected(&self) -> PerDof<f64> {
-        [0.0; 3]
-    }
-
-    /// The estimated play of each DOF.
-    fn play(&self) -> PerDof<Play>;
-
-    /// Keeps up with the history at the end of a control tick.
-    fn keep_up<S: AsRef<[Entry]> + AsMut<[Entry]>>(
-        &mut self,
-        history: &History<S>,
-        has_clock_gone_back: bool,
-    );
 
     /// The state prediction at a tick of the history.
     fn predict<S: AsRef<[Entry]> + AsMut<[Entry]>>(
@@ -82,19 +143,13 @@ pub(crate) trait ProfileBlocks: Law<3> + Sized {
         past: &Entry,
     ) -> Belief;
 
-    /// Propagates the state prediction to the time of an image.
-    fn advance<S: AsRef<[Entry]> + AsMut<[Entry]>>(&mut self, history: &History<S>, past: &Entry);
-
     /// The state estimate from an image of that time; None where a band is not visible.
-    fn measure(&self, model: &FeatureModel, past: &Entry, image: Image<'_>) -> Option<Measurement>;
-
-    /// Updates the state prediction with an accepted image, and with `updates_offsets` the offsets.
-    fn update(
-        &mut self,
+    fn measure(
+        &self,
+        model: &FeatureModel,
         past: &Entry,
-        measurement: &Measurement,
-        updates_offsets: bool,
-    ) -> ImageUpdate;
+        image: Image<'_>,
+    ) -> Option<Seen<Self::Evidence>>;
 
     /// The feature model as far as images have corrected the configured one.
     fn feature_model(&self, configured: &FeatureModel) -> FeatureModel {
@@ -107,10 +162,4 @@ pub(crate) trait ProfileBlocks: Law<3> + Sized {
         let _ = configured;
         belief
     }
-
-    /// Makes the state prediction less certain after an image without markers.
-    fn miss(&mut self, past: &Entry);
-
-    /// Makes the state prediction as uncertain as at the start.
-    fn reset_prediction(&mut self, past: &Entry);
 }

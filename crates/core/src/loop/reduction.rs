@@ -1,57 +1,99 @@
 //! The whole loop, Fig. 6.
 
 use crate::article::play::Play;
-use crate::dof::{Friction, PerDof, zip_with};
+use crate::article::play_limit::PlayLimit;
+use crate::dof::{Friction, zip_with};
 use crate::error::{ConfigError, require};
 use crate::estimation::history::{Entry, History};
 use crate::estimation::posture::Belief;
-use crate::r#loop::profile::Profile;
-use crate::r#loop::settings::Settings;
+use crate::r#loop::profile::{BandProfile, Profile};
+use crate::r#loop::settings::{LoopSettings, Settings};
 use crate::model::features::FeatureModel;
 use crate::supervision::flags::Flag;
-use crate::supervision::monitors::{Monitors, Supervision};
+use crate::supervision::monitors::{Monitors, SENSORS, Supervision};
 
-/// Image-based hysteresis reduction, Fig. 6: reference in, command out; images update the estimate of the hysteresis.
+/// Image-based hysteresis reduction, Fig. 6: reference in, command out; measurements update the estimate of the hysteresis.
 ///
-/// `P` is the profile, `Paper` or `Best`; `S` the storage of the latest control ticks, by default of 1.27 s at 5 ms.
+/// `P` is the profile, `Paper` or `Best`; `S` the storage of the latest control ticks, by default of 1.27 s at 5 ms; `V` the
+/// configured view of the instrument, where the loop has one; N the number of DOFs.
 #[derive(Debug, Clone)]
-pub struct HysteresisReduction<P, S = [Entry; 256]> {
+pub struct HysteresisReduction<P, S = [Entry; 256], V = FeatureModel, const N: usize = 3> {
     pub(super) profile: P,
-    pub(super) feature_model: FeatureModel,
-    pub(super) history: History<S>,
-    pub(super) monitors: Monitors<3>,
-    pub(super) last_used: f64,
-    travel: PerDof<f64>,
+    pub(super) view: V,
+    pub(super) history: History<S, N>,
+    pub(super) monitors: Monitors<N>,
+    /// Time of capture of the last measurement of each sensor that was used.
+    pub(super) last_used: [f64; SENSORS],
+    travel: [f64; N],
 }
 
-impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
+impl<P: BandProfile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
     /// A loop at rest, with storage for at least `control.history`, e.g. `[Entry::BLANK; 256]`.
     ///
     /// # Errors
     /// A setting is out of range, or the storage is too small.
     pub fn new(settings: &Settings, storage: S) -> Result<Self, ConfigError> {
+        let of_loop = settings.of_loop()?;
+        let make = |limits| P::new(settings, limits);
+        Self::with_profile(&of_loop, make, settings.feature_model()?, storage)
+    }
+
+    /// The predicted state (3,) [m, rad, rad] at `captured_at` in s with its standard deviation: the prior of the marker
+    /// detection, corrected by the last images.
+    ///
+    /// It is the state in which the configured geometry has the bands where they are expected; where images have corrected
+    /// the geometry, the tip is elsewhere.
+    ///
+    /// None beyond the history.
+    pub fn predict_state(&self, captured_at: f64) -> Option<Belief> {
+        let past = self.history.at(captured_at)?;
+        let belief = self.profile.predict(&self.history, &past);
+        Some(self.profile.apparent(&self.view, belief))
+    }
+
+    /// Predicted features (4,) in px of a frame captured at `captured_at` in s.
+    ///
+    /// None beyond the history and where a band is not visible.
+    pub fn predicted_features(&self, captured_at: f64) -> Option<[f64; 4]> {
+        let past = self.history.at(captured_at)?;
+        let model = self.profile.feature_model(&self.view);
+        let prediction = model.predict(past.predicted_state)?;
+        Some(prediction.features)
+    }
+}
+
+impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
+    HysteresisReduction<P, S, V, N>
+{
+    /// A loop at rest with the profile that `make` makes for limits of the offsets.
+    pub(super) fn with_profile(
+        settings: &LoopSettings<N>,
+        make: impl FnOnce([PlayLimit; N]) -> Result<P, ConfigError>,
+        view: V,
+        storage: S,
+    ) -> Result<Self, ConfigError> {
         let control = &settings.control;
         let friction = if P::IS_COUPLED {
-            settings.friction()?
+            settings.friction
         } else {
             Friction::independent()
         };
-        let monitors = Monitors::new(&settings.safety, &settings.dofs(), control.period, friction)?;
+        let monitors = Monitors::new(&settings.safety, &settings.dofs, control.period, friction)?;
         Ok(Self {
-            profile: P::new(settings, monitors.play_limits())?,
-            feature_model: settings.feature_model()?,
+            profile: make(monitors.play_limits())?,
+            view,
             history: History::new(control.history, control.period, storage)?,
             monitors,
-            last_used: f64::NEG_INFINITY,
-            travel: [0.0; 3],
+            last_used: [f64::NEG_INFINITY; SENSORS],
+            travel: [0.0; N],
         })
     }
 
-    /// Control tick at `time` in s: reference (3,) in, command (3,) out [m, rad, rad].
+    /// Control tick at `time` in s: reference (N,) in, command (N,) out [m or rad].
     ///
     /// `stamp` is the time in s at which the reference was generated, if known. A reference that is not finite
     /// holds the command, which before the first reference is NaN.
-    pub fn step(&mut self, reference: PerDof<f64>, stamp: Option<f64>, time: f64) -> PerDof<f64> {
+    pub fn step(&mut self, reference: [f64; N], stamp: Option<f64>, time: f64) -> [f64; N] {
         let (command_before, state_before) = (self.profile.command(), self.predicted_state());
         self.monitors
             .step(&mut self.profile, reference, stamp, time);
@@ -75,42 +117,19 @@ impl<P: Profile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, S> {
             travel: self.travel,
         });
         if clock_went_back {
-            self.last_used = f64::NEG_INFINITY;
+            self.last_used = [f64::NEG_INFINITY; SENSORS];
         }
         self.profile.keep_up(&self.history, clock_went_back);
         command
     }
 
-    /// The predicted state (3,) [m, rad, rad] at `captured_at` in s with its standard deviation: the prior of the marker
-    /// detection, corrected by the last images.
-    ///
-    /// It is the state in which the configured geometry has the bands where they are expected; where images have corrected
-    /// the geometry, the tip is elsewhere.
-    ///
-    /// None beyond the history.
-    pub fn predict_state(&self, captured_at: f64) -> Option<Belief> {
-        let past = self.history.at(captured_at)?;
-        let belief = self.profile.predict(&self.history, &past);
-        Some(self.profile.apparent(&self.feature_model, belief))
-    }
-
-    /// Predicted features (4,) in px of a frame captured at `captured_at` in s.
-    ///
-    /// None beyond the history and where a band is not visible.
-    pub fn predicted_features(&self, captured_at: f64) -> Option<[f64; 4]> {
-        let past = self.history.at(captured_at)?;
-        let model = self.profile.feature_model(&self.feature_model);
-        let prediction = model.predict(past.predicted_state)?;
-        Some(prediction.features)
-    }
-
-    /// The predicted state q now [m, rad, rad]; NaN before the first reference.
-    pub fn predicted_state(&self) -> PerDof<f64> {
+    /// The predicted state q now [m or rad]; NaN before the first reference.
+    pub fn predicted_state(&self) -> [f64; N] {
         self.profile.predicted_state()
     }
 
     /// The estimated play of each DOF now.
-    pub fn play(&self) -> PerDof<Play> {
+    pub fn play(&self) -> [Play; N] {
         self.profile.play()
     }
 

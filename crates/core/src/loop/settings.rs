@@ -37,7 +37,52 @@ pub struct Settings {
     pub estimation: EstimateSettings,
 }
 
+/// Settings of a loop with N DOFs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LoopSettings<const N: usize> {
+    /// The DOFs in the order of every array.
+    pub dofs: [DofSettings; N],
+    /// Which DOFs share a friction.
+    pub friction: Friction<N>,
+    /// The loop's clock.
+    pub control: ControlSettings,
+    /// Supervision.
+    pub safety: SafetySettings<N>,
+    /// Compensation of profile `best`.
+    pub law: LawSettings,
+    /// Estimation of profile `best`.
+    pub estimation: EstimateSettings,
+}
+
+impl<const N: usize> LoopSettings<N> {
+    /// The plays of profile `best`.
+    ///
+    /// # Errors
+    /// An expected width is not a finite number above 0.
+    pub(crate) fn transmission(&self) -> Result<Transmission<N>, ConfigError> {
+        Transmission::new(
+            self.friction,
+            self.dofs.map(|dof| 0.75 * dof.expected_width),
+        )
+    }
+}
+
 impl Settings {
+    /// What does not depend on the instrument.
+    ///
+    /// # Errors
+    /// The diameter is not a finite number above 0.
+    pub(crate) fn of_loop(&self) -> Result<LoopSettings<3>, ConfigError> {
+        Ok(LoopSettings {
+            dofs: self.dofs(),
+            friction: self.friction()?,
+            control: self.control,
+            safety: self.safety,
+            law: self.law,
+            estimation: self.estimation,
+        })
+    }
+
     /// The three DOFs in their order.
     pub(crate) const fn dofs(&self) -> PerDof<DofSettings> {
         [self.insertion, self.rotation, self.bending]
@@ -49,15 +94,6 @@ impl Settings {
     /// The diameter is not a finite number above 0.
     pub(crate) fn friction(&self) -> Result<Friction<3>, ConfigError> {
         Friction::new([0, 0, 2], [1.0, self.instrument.diameter / 2.0, 1.0])
-    }
-
-    /// The plays of profile `best`.
-    ///
-    /// # Errors
-    /// A diameter or an expected width is not a finite number above 0.
-    pub(crate) fn transmission(&self) -> Result<Transmission<3>, ConfigError> {
-        let units = self.dofs().map(|dof| 0.75 * dof.expected_width);
-        Transmission::new(self.friction()?, units)
     }
 
     /// Entries of the history that a loop with these settings needs.

@@ -14,6 +14,9 @@ use crate::supervision::reference_gate::ReferenceGate;
 use crate::supervision::settings::SafetySettings;
 use crate::supervision::supervisor::{Event, Supervisor};
 
+/// Sensors that a loop may have, each with its own rate and delay.
+pub const SENSORS: usize = 4;
+
 /// State of the supervision.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Supervision {
@@ -52,7 +55,8 @@ pub trait Law<const N: usize> {
 pub struct Monitors<const N: usize> {
     gate: ReferenceGate<N>,
     limiters: CommandLimiters<N>,
-    pub(crate) frames: FrameGate<N>,
+    /// A gate for each sensor.
+    frames: [FrameGate<N>; SENSORS],
     motion: MotionMonitor<N>,
     supervisor: Supervisor<N>,
     play_limits: [PlayLimit; N],
@@ -85,7 +89,7 @@ impl<const N: usize> Monitors<N> {
         Ok(Self {
             gate: ReferenceGate::new(safety, dofs, period)?,
             limiters: CommandLimiters::new(safety, dofs, period, friction)?,
-            frames: FrameGate::new(safety, dofs)?,
+            frames: [FrameGate::new(safety, dofs)?; SENSORS],
             motion: MotionMonitor::new(safety, dofs, period)?,
             supervisor: Supervisor::new(safety)?,
             play_limits,
@@ -118,7 +122,7 @@ impl<const N: usize> Monitors<N> {
             travel: 0.0,
             raised: gated
                 .raised
-                .union(self.frames.check_gap(time).difference(self.off)),
+                .union(self.check_gap(time).difference(self.off)),
             severe: gated.severe,
         };
         for (increment, unit) in gated.increments.iter().zip(self.unit) {
@@ -202,10 +206,22 @@ impl<const N: usize> Monitors<N> {
         law.set_share(share * self.supervisor.gain_share());
     }
 
-    /// Check a frame on its arrival.
-    pub(crate) fn check_arrival(&mut self, arrival: &FrameArrival<N>) -> Flags {
-        let flags = self.frames.check_arrival(arrival);
+    /// Check a frame of one of the sensors on its arrival.
+    pub(crate) fn check_arrival(&mut self, arrival: &FrameArrival<N>, sensor: usize) -> Flags {
+        let gate = self.frames.get_mut(sensor);
+        let flags = gate.map_or(Flags::NONE, |gate| gate.check_arrival(arrival));
         self.enabled(flags)
+    }
+
+    /// Check the Mahalanobis distance of an innovation.
+    pub(crate) fn check_innovation(&self, distance: f64) -> Flags {
+        let [gate, ..] = &self.frames;
+        gate.check_innovation(distance)
+    }
+
+    fn check_gap(&self, time: f64) -> Flags {
+        let gates = self.frames.iter();
+        gates.fold(Flags::NONE, |flags, gate| flags.union(gate.check_gap(time)))
     }
 
     /// The flags of a set whose detectors are not switched off.

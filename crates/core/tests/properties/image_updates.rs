@@ -2,7 +2,7 @@
 
 use crate::article::play::{Play, PlayState};
 use crate::dof::PerDof;
-use crate::r#loop::profile::Profile;
+use crate::r#loop::profile::BandProfile;
 use crate::supervision::flags::Flag;
 use crate::supervision::reactions::Reaction;
 
@@ -21,7 +21,7 @@ struct Run<P> {
     tick: u32,
 }
 
-impl<P: Profile> Run<P> {
+impl<P: BandProfile> Run<P> {
     fn new(reduction: Loop<P>, minus: f64, plus: f64) -> Self {
         Self {
             reduction,
@@ -60,7 +60,7 @@ impl<P: Profile> Run<P> {
 }
 
 /// With each offset within `tolerance` units.
-fn is_estimated_and_held<P: Profile>(reduction: Loop<P>, tolerance: f64) {
+fn is_estimated_and_held<P: BandProfile>(reduction: Loop<P>, tolerance: f64) {
     let mut run = Run::new(reduction, -6.0, 9.0);
     run.swing(4);
     let (minus, plus) = run.estimated();

@@ -19,7 +19,9 @@ type Joint = SMatrix<f64, ALL, ALL>;
 struct Plane(SMatrix<f64, M, ALL>);
 
 impl Sensor<N, M, 1> for Plane {
-    const POINT: usize = 2;
+    fn point(&self) -> usize {
+        2
+    }
 
     fn features(&self, state: &[f64; N], geometry: &[f64; 1]) -> Option<([f64; M], [[f64; M]; N])> {
         let all = SVector::from([state[0], state[1], geometry[0]]);
@@ -135,7 +137,7 @@ proptest! {
     fn the_most_probable_state_is_the_mean_of_the_posterior(problem in problems(), hidden in 0..7_u8) {
         let seen = without(hidden);
         let found = problem.observed(seen);
-        let found = found.most_probable(&Plane(problem.rows), &problem.prior(), &[], f64::INFINITY);
+        let found = found.most_probable(&Plane(problem.rows), &problem.prior(), core::iter::empty(), f64::INFINITY);
         let found = found.unwrap();
         let (mean, covariance, distance_squared) = problem.posterior(seen);
         prop_assert_eq!(found.used, seen);
@@ -198,7 +200,7 @@ proptest! {
             prop_assume!(wrong.posterior(without(1 << other)).2 > 2.0 * price * price);
         }
         let observed = wrong.observed(ALL_SEEN);
-        let found = observed.most_probable(&Plane(wrong.rows), &wrong.prior(), &[], price).unwrap();
+        let found = observed.most_probable(&Plane(wrong.rows), &wrong.prior(), core::iter::empty(), price).unwrap();
         prop_assert_eq!(found.used, used);
         prop_assert!((State::from(found.state) - mean.fixed_rows::<N>(0)).amax() <= 1e-6);
         prop_assert!((found.distance_squared - rest - price * price).abs() <= 1e-6 * price * price);
@@ -214,7 +216,9 @@ proptest! {
 struct Mirror;
 
 impl Sensor<N, 4, 0> for Mirror {
-    const POINT: usize = 2;
+    fn point(&self) -> usize {
+        2
+    }
 
     fn features(&self, [q, p]: &[f64; N], _: &[f64; 0]) -> Option<([f64; 4], [[f64; 4]; N])> {
         let features = [q * q, 0.3 * q, *p, 0.5 * p];
@@ -247,7 +251,7 @@ proptest! {
             geometry_covariance: SMatrix::zeros(),
         };
         let off = |starts: &[State], price| {
-            let found = observed.most_probable(&Mirror, &prior, starts, price).unwrap();
+            let found = observed.most_probable(&Mirror, &prior, starts.iter().copied(), price).unwrap();
             (found.state[0] - truth[0]).abs()
         };
         let starts = [-2.0, 2.0].map(|start| State::from([start, 0.0]));
@@ -262,7 +266,9 @@ proptest! {
 fn a_sensor_that_sees_nothing_measures_nothing() {
     struct Blind;
     impl Sensor<1, 1, 0> for Blind {
-        const POINT: usize = 1;
+        fn point(&self) -> usize {
+            1
+        }
         fn features(&self, _: &[f64; 1], _: &[f64; 0]) -> Option<([f64; 1], [[f64; 1]; 1])> {
             None
         }
@@ -284,7 +290,7 @@ fn a_sensor_that_sees_nothing_measures_nothing() {
     };
     assert!(
         observed
-            .most_probable(&Blind, &prior, &[], f64::INFINITY)
+            .most_probable(&Blind, &prior, core::iter::empty(), f64::INFINITY)
             .is_none()
     );
 }

@@ -2,7 +2,7 @@
 //! for ever.
 
 use crate::dof::PerDof;
-use crate::r#loop::profile::Profile;
+use crate::r#loop::profile::BandProfile;
 use crate::r#loop::report::Status;
 use crate::supervision::reactions::Reaction;
 
@@ -12,7 +12,7 @@ use super::support::{PERIOD, UNITS};
 use crate::article::play::{Play, PlayState};
 
 /// Three plays whose tips are pushed by `displacement` [m, rad, rad] after 30 s.
-fn recovers<P: Profile>(mut reduction: Loop<P>, displacement: PerDof<f64>, tolerance: f64) {
+fn recovers<P: BandProfile>(mut reduction: Loop<P>, displacement: PerDof<f64>, tolerance: f64) {
     let plays = UNITS.map(|unit| Play::new(-0.4 * WIDTH * unit, 0.6 * WIDTH * unit).unwrap());
     let mut tips = reference(0.0).map(|output| PlayState { output });
     let (mut used, mut errors, mut images) = (0, [0.0; 3], 0);

@@ -2,7 +2,7 @@
 
 use crate::article::play::Play;
 use crate::dof::PerDof;
-use crate::r#loop::profile::Profile;
+use crate::r#loop::profile::BandProfile;
 use crate::r#loop::report::Status;
 use crate::supervision::flags::Flag;
 use crate::supervision::reactions::Reaction;
@@ -54,7 +54,7 @@ fn check_coupled(moved: PerDof<f64>, pulled: PerDof<f64>, place: &str) {
 
 /// Motion, rest, tremor and jumps of the reference, late ticks, images of every kind, and an operator who re-engages: every
 /// command keeps the law.
-fn stress<P: Profile>(mut reduction: Loop<P>, seed: u64, steps: u64) {
+fn stress<P: BandProfile>(mut reduction: Loop<P>, seed: u64, steps: u64) {
     let mut chance = Chance(seed);
     let truth = model();
     let (mut reference, mut speed, mut time) = ([0.025, 0.0, 0.9], [0.0; 3], 0.0);

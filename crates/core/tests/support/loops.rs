@@ -4,7 +4,8 @@
 #![allow(dead_code)]
 
 use tautscope_core::{
-    Best, Entry, FeatureModel, HysteresisReduction, Paper, Play, Profile, SafetySettings, Settings,
+    BandProfile, Best, Entry, FeatureModel, HysteresisReduction, Paper, Play, SafetySettings,
+    Settings,
 };
 
 use super::{UNITS, safety, settings};
@@ -54,7 +55,7 @@ pub fn best_with(safety: &SafetySettings, outlier_distance: f64) -> Loop<Best> {
     build(&settings)
 }
 
-fn build<P: Profile>(settings: &Settings) -> Loop<P> {
+fn build<P: BandProfile>(settings: &Settings) -> Loop<P> {
     let storage = vec![Entry::BLANK; settings.history_entries()];
     HysteresisReduction::new(settings, storage).unwrap()
 }

@@ -27,7 +27,7 @@ struct CheckedLaw {
 impl CheckedLaw {
     fn new() -> Self {
         let settings = settings(&safety());
-        let transmission = settings.transmission().unwrap();
+        let transmission = settings.of_loop().unwrap().transmission().unwrap();
         let width_limit = settings.safety.width_limit;
         let bounds = Bounds {
             gain: dofs().map(|dof| dof.free_gain),
