@@ -14,9 +14,10 @@ from tautscope._core import __version__
 if TYPE_CHECKING:
     from tautscope import metrics, replay
     from tautscope._core import Camera, Compensator, Estimator, Instrument, Play
-    from tautscope.config import Config, load_config
+    from tautscope.config import Config, axes, load_config
     from tautscope.dof import Dof
     from tautscope.errors import TautscopeError
+    from tautscope.loop.measurement import Points, Pose, Tip
     from tautscope.loop.reduction import HysteresisReduction, Report
     from tautscope.loop.rig import Frame, Rig, Sample
     from tautscope.loop.vision import Detection, MarkerDetector
@@ -36,12 +37,16 @@ _LOCATIONS = {
     "Instrument": "_core",
     "MarkerDetector": "loop.vision",
     "Play": "_core",
+    "Points": "loop.measurement",
+    "Pose": "loop.measurement",
     "Recording": "runs.recording",
     "Report": "loop.reduction",
     "Rig": "loop.rig",
     "Sample": "loop.rig",
     "TautscopeError": "errors",
+    "Tip": "loop.measurement",
     "Twin": "twin",
+    "axes": "config",
     "load_config": "config",
     "run_experiment": "runs.experiment",
 }
@@ -59,13 +64,17 @@ __all__ = [
     "Instrument",
     "MarkerDetector",
     "Play",
+    "Points",
+    "Pose",
     "Recording",
     "Report",
     "Rig",
     "Sample",
     "TautscopeError",
+    "Tip",
     "Twin",
     "__version__",
+    "axes",
     "load_config",
     "metrics",
     "replay",

@@ -1,4 +1,4 @@
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Self, final
 
 import numpy as np
@@ -202,8 +202,49 @@ class Reduction:
     def hysteresis(
         self,
     ) -> (
-        tuple[_Floats, _Floats, _Floats, float, _Floats, _Floats, float, _Floats, _Floats] | None
+        tuple[_Floats, _Floats, _Floats, _Floats, _Floats, float, float, _Floats, _Floats] | None
     ): ...
+    @property
+    def predicted_state(self) -> _Floats: ...
+    @property
+    def delta_minus(self) -> _Floats: ...
+    @property
+    def delta_plus(self) -> _Floats: ...
+
+@final
+class AxesReduction:
+    def __new__(cls, settings: Mapping[str, Any], dofs: int) -> AxesReduction: ...
+    def step(self, reference: ArrayLike, time: float, stamp: float | None = None) -> _Floats: ...
+    def on_reading(
+        self,
+        values: ArrayLike,
+        covariance: ArrayLike,
+        captured_at: float,
+        predict: Callable[[_Floats], tuple[_Floats, _Floats] | None],
+        point: int,
+        sensor: int = 0,
+    ) -> tuple[
+        str,
+        _Floats,
+        _Floats,
+        _Floats,
+        _Floats,
+        _Flags,
+        _Floats,
+        _Floats,
+        tuple[_Triggers, ...],
+        _Floats,
+        _Floats,
+    ]: ...
+    @property
+    def supervision(self) -> tuple[str, list[str], list[str], float]: ...
+    def engage(self) -> None: ...
+    def acknowledge(self) -> None: ...
+    def set_compensation(self, share: float) -> None: ...
+    def raise_flag(self, name: str) -> None: ...
+    def state_at(self, captured_at: float) -> _Floats | None: ...
+    @property
+    def hysteresis(self) -> tuple[_Floats, _Floats, _Floats, _Floats, _Floats]: ...
     @property
     def predicted_state(self) -> _Floats: ...
     @property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from enum import IntEnum
+from typing import Protocol
 
 
 class Dof(IntEnum):
@@ -29,9 +30,28 @@ class Dof(IntEnum):
         return 1e3 if self is Dof.INSERTION else 1.0
 
 
-def display_text(values: Iterable[float]) -> str:
-    """Values (3,) [m, rad, rad] with their display units: ``9.81 mm, 1.76 rad, 1.02 rad``."""
+class NamedDof(Protocol):
+    """A degree of freedom by name and unit: `Dof`, or an entry of [[dof]]."""
+
+    @property
+    def label(self) -> str:
+        """The name in columns and tables."""
+        ...
+
+    @property
+    def display_unit(self) -> str:
+        """The unit in tables and figures."""
+        ...
+
+    @property
+    def display_scale(self) -> float:
+        """Factor from m or rad to `display_unit`."""
+        ...
+
+
+def display_text(values: Iterable[float], dofs: Iterable[NamedDof] = Dof) -> str:
+    """Values (n,) [m or rad] with their display units: ``9.81 mm, 1.76 rad, 1.02 rad``."""
     return ", ".join(
         f"{value * dof.display_scale:.3g} {dof.display_unit}"
-        for dof, value in zip(Dof, values, strict=True)
+        for dof, value in zip(dofs, values, strict=True)
     )

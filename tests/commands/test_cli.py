@@ -259,3 +259,13 @@ def test_every_verb_has_help(capsys: pytest.CaptureFixture[str], verb: str) -> N
         main([verb, "--help"] if verb else ["--help"])
     assert stop.value.code == 0
     assert "usage: tautscope" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("verb", ["demo", "console", "doctor", "ros2"])
+def test_commands_for_the_articles_instrument_refuse_another_robot(
+    verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "robot.toml"
+    file.write_text('[[dof]]\nname = "bend_x"\nwidth_limit = 1.0\n', encoding="utf-8")
+    assert main([verb, "--config", str(file)]) == 2
+    assert "dof: got 'bend_x'" in capsys.readouterr().err

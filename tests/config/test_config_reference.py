@@ -39,7 +39,8 @@ def test_every_key_of_the_template_has_its_meaning_and_range() -> None:
 def test_uncommented_drives_need_only_what_is_required() -> None:
     lines = template(Config()).splitlines()
     start = lines.index("# [drives]")
-    text = "\n".join(line.removeprefix("# ") for line in lines[start:])
+    end = lines.index("# [[dof]]")
+    text = "\n".join(line.removeprefix("# ") for line in lines[start:end])
     values = {"node": "", "travel": "[0, 1]", "counts_per_unit": "1e4"}
     nodes = iter(range(1, 4))
     text = re.sub(

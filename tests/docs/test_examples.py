@@ -33,6 +33,11 @@ def test_hysteresis_of_your_own_rig_is_reduced(example: str) -> None:
     assert all(90 <= reduction <= 101 for reduction in reductions)
 
 
+def test_a_catheter_of_your_own_is_compensated() -> None:
+    for before, after in zip(*[iter(numbers("own_catheter.py"))] * 2, strict=True):
+        assert after < 0.25 * before
+
+
 def test_offsets_of_your_own_record_are_estimated() -> None:
     minus, plus, without, with_model = numbers("own_record.py")
     assert minus == pytest.approx(-1, abs=0.15)

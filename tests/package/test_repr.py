@@ -87,10 +87,14 @@ def test_the_loop_and_its_reports_print_their_state() -> None:
             report = loop.on_frame(sample.frame)
     assert report.detection is not None
     texts = {
-        repr(loop): ["profile paper", "1 image updates", display_text(report.delta_plus)[:1]],
-        repr(report): [f"{report.captured_at:.3f} s", report.status, " mm"],
+        repr(loop): ["profile paper", "1 updates", display_text(report.delta_plus)[:1]],
+        repr(report): [
+            f"{report.captured_at:.3f} s",
+            report.status,
+            f"tip at {report.state_estimate[0]:.3g}, ",
+        ],
         repr(report.detection): ["band A at (", f"{report.detection.features[2]:.1f}"],
-        repr(sample): [f"{sample.time:.3f} s", "frame 0", display_text(sample.applied)],
+        repr(sample): [f"{sample.time:.3f} s", "frame 0", f"applied {sample.applied[0]:.3g}, "],
         repr(sample.frame): ["720 x 576"],
         repr(twin): [f"at {twin.time:.3f} s"],
         repr(MarkerDetector(settings)): ["bgr", "576, 720"],
@@ -104,7 +108,7 @@ def test_the_loop_and_its_reports_print_their_state() -> None:
 
 def test_a_recording_prints_its_length(compensated: Recording) -> None:
     ticks, images = len(compensated.trace), len(compensated.frames)
-    assert f"{ticks} ticks" in repr(compensated) and f"{images} images" in repr(compensated)
+    assert f"{ticks} ticks" in repr(compensated) and f"{images} updates" in repr(compensated)
     assert "with compensation" in repr(compensated)
 
 

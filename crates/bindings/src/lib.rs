@@ -5,6 +5,7 @@
 
 mod analysis;
 mod arrays;
+mod axes;
 mod camera;
 mod compensator;
 mod description;
@@ -33,6 +34,8 @@ mod _core {
 
     #[pymodule_export]
     use super::analysis::{move_along_curve, track_coefficients};
+    #[pymodule_export]
+    use super::axes::AxesReduction;
     #[pymodule_export]
     use super::camera::Camera;
     #[pymodule_export]

@@ -35,9 +35,9 @@ type Hysteresis<'py> = (
     Floats<'py>,
     Floats<'py>,
     Floats<'py>,
+    Floats<'py>,
+    Floats<'py>,
     f64,
-    Floats<'py>,
-    Floats<'py>,
     f64,
     Floats<'py>,
     Floats<'py>,
@@ -203,8 +203,8 @@ impl Reduction {
         PyArray1::from_slice(py, &on_loop!(&self.0, inner => inner.predicted_state()))
     }
 
-    /// In profile `best`: half widths (3,) with standard deviations (3,), centres (3,), share of the friction in common, gains
-    /// (3,) with standard deviations (3,), unevenness of the section, and shift of the image (2,) with standard deviations (2,).
+    /// In profile `best`: half widths (3,) with standard deviations (3,), centres (3,), gains (3,) with standard
+    /// deviations (3,), share of the friction in common, unevenness of the section, and shift of the image (2,) with standard deviations (2,).
     #[getter]
     fn hysteresis<'py>(&self, py: Python<'py>) -> Option<Hysteresis<'py>> {
         let found = match &self.0 {
@@ -216,9 +216,9 @@ impl Reduction {
             floats(&found.half_width),
             floats(&found.width_std),
             floats(&found.centre),
-            found.shared,
             floats(&found.gain),
             floats(&found.gain_std),
+            found.shared,
             found.unevenness,
             floats(&found.image_shift),
             floats(&found.image_shift_std),
@@ -249,7 +249,7 @@ fn build<P: core::BandProfile>(settings: &core::Settings) -> Result<Loop<P>, cor
     core::HysteresisReduction::new(settings, storage).map(Box::new)
 }
 
-fn status_name(status: core::Status) -> &'static str {
+pub fn status_name(status: core::Status) -> &'static str {
     match status {
         core::Status::Ok => "ok",
         core::Status::Held => "held",

@@ -72,9 +72,12 @@ pub use error::ConfigError;
 pub use estimation::axis_filter::AxisFilter;
 pub use estimation::estimate_settings::EstimateSettings;
 pub use estimation::expectation::{Beliefs, Expected};
-pub use estimation::history::Entry;
+pub use estimation::history::{Entry, history_entries};
 pub use estimation::posture::{Belief, Observation};
 pub use law::settings::LawSettings;
+pub use r#loop::axes::{
+    Axes, AxesHysteresis, AxesReduction, AxesReport, DOFS, Predict, Reading, VALUES,
+};
 pub use r#loop::best::Best;
 pub use r#loop::paper::Paper;
 pub use r#loop::profile::{BandProfile, Profile};
@@ -87,7 +90,7 @@ pub use model::geometry_error::GeometryDeviation;
 pub use model::hysteresis::{Hysteresis, PlayPosition};
 pub use model::instrument::Instrument;
 pub use model::outline::BandImage;
-pub use model::plays::Plays;
+pub use model::plays::{COEFFICIENTS, Plays};
 pub use model::section::{SECTION_DISCS, SectionDisc};
 pub use model::settings::{CameraSettings, InstrumentSettings, PoseSettings};
 pub use settings::{ControlSettings, DofSettings};

@@ -46,6 +46,8 @@ struct Sine {
 #[derive(Deserialize)]
 struct ProfileDocument {
     profile: String,
+    #[serde(default)]
+    dof: Vec<serde::de::IgnoredAny>,
 }
 
 /// The profiles of the loop.
@@ -62,7 +64,13 @@ pub enum Profile {
 /// # Errors
 /// The text is not TOML in UTF-8, a key is missing, or a value is of the wrong kind.
 pub fn loop_settings(text: &[u8]) -> Result<(core::Settings, Profile), TautscopeResult> {
-    let ProfileDocument { profile } = parsed(text)?;
+    let ProfileDocument { profile, dof } = parsed(text)?;
+    if !dof.is_empty() {
+        return Err(config(format_args!(
+            "dof: got {} degrees of freedom, expected none: the article's instrument",
+            dof.len()
+        )));
+    }
     let profile = match profile.as_str() {
         "paper" => Profile::Paper,
         "best" => Profile::Best,

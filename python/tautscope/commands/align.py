@@ -6,6 +6,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from tautscope.commands import arguments
+from tautscope.commands.article_config import article_config
 from tautscope.commands.printing import print_json
 from tautscope.commands.video_options import (
     add_video_options,
@@ -13,7 +14,6 @@ from tautscope.commands.video_options import (
     check_video_options,
     read_motor_options,
 )
-from tautscope.config import load_config
 
 if TYPE_CHECKING:
     from tautscope.calibration.delay import DelayEstimate
@@ -59,7 +59,7 @@ def _run(options: argparse.Namespace) -> int:
         document["camera_delay"] = camera_delay if found.is_known else None
         remedy = f"To correct it, set camera.source.delay = {camera_delay:.3f}"
     else:
-        config = load_config(options.config)
+        config = article_config(options.config)
         motors = read_motor_options(options, config)
         found, stamps = align_video_options(options, config, motors, limit=options.within)
         start = float(stamps[0]) - found.delay

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
-from tautscope.config import load_config
+from tautscope.commands.article_config import article_config
 from tautscope.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def _bench(options: argparse.Namespace) -> None:
     )
     from tautscope.hardware.signals import exit_on_signals  # noqa: PLC0415
 
-    config = load_config(options.config)
+    config = article_config(options.config)
     if options.drawn is not None:
         from tautscope.twin.drawn_rig import draw_rig  # noqa: PLC0415
 

@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
+from tautscope.commands.article_config import article_config
 from tautscope.commands.calibrate_camera import add_board_options
 from tautscope.commands.calibration_rig import add_rig_options, refuse_wrong_limits
 from tautscope.commands.printing import print_json
 from tautscope.commands.question import ask
-from tautscope.config import Config, load_config
+from tautscope.config import Config
 from tautscope.errors import TautscopeError
 
 if TYPE_CHECKING:
@@ -55,7 +56,7 @@ def _run(options: argparse.Namespace) -> int:
     from tautscope.commands.calibration_steps import STEPS  # noqa: PLC0415
     from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
 
-    config = load_config(options.config)
+    config = article_config(options.config)
     if options.twin:
         options.seed = config.twin.seed if options.seed is None else options.seed
     else:

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from tautscope.commands import arguments
+from tautscope.commands.article_config import article_config
 from tautscope.commands.board_images import BoardImages, file_images, live_images, twin_images
 from tautscope.commands.calibration_output import add_options, check_options, finish
 from tautscope.commands.printing import print_json
-from tautscope.config import load_config
 from tautscope.errors import FieldError
 
 if TYPE_CHECKING:
@@ -149,7 +149,7 @@ def _images(options: argparse.Namespace, board: Board) -> BoardImages:
         raise FieldError("--twin", True, "files or --twin, not both")
     if options.files:
         return file_images(options.files)
-    config = load_config(options.config)
+    config = article_config(options.config)
     if options.twin:
         from tautscope.twin.drawn_rig import draw_rig  # noqa: PLC0415
 

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
+from tautscope.commands.article_config import article_config
 from tautscope.commands.calibration_output import add_options, check_options, finish
 from tautscope.commands.calibration_rig import add_rig_options, rig_for_calibration
 from tautscope.commands.printing import print_json
-from tautscope.config import load_config
 from tautscope.errors import FieldError
 
 if TYPE_CHECKING:
@@ -159,7 +159,7 @@ def _moving(options: argparse.Namespace, file: Path) -> list[LabelledImage]:
     if file.suffix == ".mcap":
         found = log_motion(file)
     elif options.motors is not None:
-        config = load_config(options.config)
+        config = article_config(options.config)
         found = video_motion(file, options.motors, options.video_start, config.camera)
     else:
         allowed = "a log (.mcap), a video with --motors, an image with --click, IMAGE MASK ..."

@@ -11,10 +11,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
+from tautscope.commands.article_config import article_config
 from tautscope.commands.calibration_output import add_options, check_options, finish
 from tautscope.commands.calibration_rig import add_rig_options, confirm_motion, open_rig
 from tautscope.commands.printing import print_json
-from tautscope.config import Config, load_config
+from tautscope.config import Config
 from tautscope.errors import FieldError, RecordError
 from tautscope.extras import require_extras
 
@@ -122,7 +123,7 @@ def _from_log(options: argparse.Namespace) -> _Source:
     from tautscope.runs.recording import FRAME_COLUMNS  # noqa: PLC0415
 
     log = read_log(options.file)
-    config = log.config if options.config is None else load_config(options.config)
+    config = log.config if options.config is None else article_config(options.config)
     recorder = Recorder(config)
     captured = (FRAME_COLUMNS.names or ()).index("captured_at")
     for index, event in log.events.items():
@@ -140,7 +141,7 @@ def _from_video(options: argparse.Namespace) -> _Source:
     from tautscope.hardware.video import read_video  # noqa: PLC0415
     from tautscope.runs.records import read_motors  # noqa: PLC0415
 
-    config = load_config(options.config)
+    config = article_config(options.config)
     times, positions = read_motors(options.motors)
     recorder = Recorder(config)
     for time, position in zip(times, positions, strict=True):
@@ -158,7 +159,7 @@ def _from_twin(options: argparse.Namespace) -> _Source:
     from tautscope.twin import Twin  # noqa: PLC0415
     from tautscope.twin.drawn_rig import draw_geometry  # noqa: PLC0415
 
-    config = load_config(options.config)
+    config = article_config(options.config)
     seed = config.twin.seed if options.seed is None else options.seed
     rig = Twin(draw_geometry(config, seed))
     try:
@@ -175,7 +176,7 @@ def _from_hardware(options: argparse.Namespace) -> _Source:
 
     if options.config is None:
         raise FieldError("--config", None, "the configuration of a rig; or a file, or --twin")
-    config = load_config(options.config)
+    config = article_config(options.config)
     confirm_motion(options)
     with (
         realtime_executor("vision", VISION) as executor,

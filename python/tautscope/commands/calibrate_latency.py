@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
 from tautscope.commands.align import NO_ANSWER, print_delay
+from tautscope.commands.article_config import article_config
 from tautscope.commands.calibration_output import add_options, check_options, finish
 from tautscope.commands.calibration_rig import (
     add_rig_options,
@@ -17,7 +18,7 @@ from tautscope.commands.calibration_rig import (
     simulated_experiment,
 )
 from tautscope.commands.printing import print_json
-from tautscope.config import Config, load_config
+from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import CalibrationError, ConfigError
 
@@ -127,7 +128,7 @@ def _recording(options: argparse.Namespace) -> tuple[Recording, Mapping[str, str
         from tautscope.log.reader import read_log  # noqa: PLC0415
 
         return read_log(options.file).recording(), {}
-    config = load_config(options.config)
+    config = article_config(options.config)
     if not options.twin:
         if config.drives is None:
             allowed = "a section [drives] that names the motors, a log, or --twin"

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
+from tautscope.commands.article_config import article_config
 from tautscope.commands.question import ask
-from tautscope.config import Config, load_config
+from tautscope.config import Config
 from tautscope.config.placeholders import MARK, placeholders
 from tautscope.errors import ConfigError, FieldError
 from tautscope.extras import require_extras
@@ -70,7 +71,7 @@ def rig_for_calibration(options: argparse.Namespace) -> Iterator[Setup]:
             whether the motors may move is not answered with y.
         TautscopeError: Errors of the rig.
     """
-    config = load_config(options.config)
+    config = article_config(options.config)
     if options.twin:
         require_extras("--twin", ["twin"])
         from tautscope.twin.rig import Twin  # noqa: PLC0415
@@ -159,5 +160,5 @@ def confirm_motion(options: argparse.Namespace) -> None:
         "THE MOTORS WILL MOVE, in the range of [experiment]. Hold the scope still, keep tissue and "
         "hands away, the emergency stop within reach. Type y to start: "
     )
-    if ask(question, load_config(options.config).camera).strip() not in ("y", "yes"):
+    if ask(question, article_config(options.config).camera).strip() not in ("y", "yes"):
         raise FieldError("answer", "no", "y, or the option --yes; nothing moved")

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from tautscope.config import Config, dump_config, load_config
+from tautscope.commands.article_config import article_config
+from tautscope.config import Config, dump_config
 from tautscope.config.edit import writable_file, write_values
 from tautscope.errors import ConfigError
 
@@ -83,7 +84,7 @@ class CalibrationSession:
     @property
     def config(self) -> Config:
         """The configuration as it is now."""
-        return load_config(self.file)
+        return article_config(self.file)
 
     def finish_step(self, name: str, result: CalibrationResult | None) -> None:
         """Write the values, figures and notes of a step, then note it as done.

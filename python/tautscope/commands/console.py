@@ -7,8 +7,8 @@ import sys
 from pathlib import Path
 
 from tautscope.commands import arguments
+from tautscope.commands.article_config import article_config
 from tautscope.commands.printing import print_json
-from tautscope.config import load_config
 from tautscope.config.placeholders import refuse_placeholders
 from tautscope.errors import ConfigError
 from tautscope.extras import require_extras
@@ -55,7 +55,7 @@ def _console(options: argparse.Namespace) -> int:
     from tautscope.console.start import start_console  # noqa: PLC0415
     from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
 
-    config = load_config(options.config, options.profile)
+    config = article_config(options.config, options.profile)
     if not options.twin:
         refuse_placeholders(options.config)
         if config.drives is None:

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tautscope.commands import arguments
+from tautscope.commands.article_config import article_config
 from tautscope.commands.held_run import recording_saved
 from tautscope.commands.printing import announce, console, print_json
-from tautscope.config import DISTURBANCES, Config, load_config
+from tautscope.config import DISTURBANCES, Config
 from tautscope.errors import MissingPathError
 from tautscope.loop.references import SineSequence
 
@@ -117,7 +118,7 @@ def _duration(trial: Trial) -> float:
 
 
 def _load(options: argparse.Namespace) -> Config:
-    config = load_config(options.config, options.profile)
+    config = article_config(options.config, options.profile)
     changes: dict[str, Any] = {}
     if options.seed is not None:
         changes["twin.seed"] = options.seed

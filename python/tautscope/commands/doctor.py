@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
+from tautscope.commands.article_config import article_config
 from tautscope.commands.printing import print_json
-from tautscope.config import load_config
 from tautscope.config.placeholders import MARK, placeholders
 from tautscope.extras import missing_modules
 
@@ -84,7 +84,7 @@ def run_checks(config: Config, *, is_rig: bool, folder: Path) -> Iterator[CheckR
 def _doctor(options: argparse.Namespace) -> int:
     from tautscope.hardware.signals import exit_on_signals  # noqa: PLC0415
 
-    config = load_config(options.config)
+    config = article_config(options.config)
     marked = placeholders(options.config)
     findings: list[CheckResult] = []
     with exit_on_signals():

@@ -8,10 +8,10 @@ import sys
 from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
+from tautscope.commands.article_config import article_config
 from tautscope.commands.held_run import recording_saved
 from tautscope.commands.positions import add_reference, read_reference
 from tautscope.commands.printing import announce, print_json
-from tautscope.config import load_config
 from tautscope.config.placeholders import refuse_placeholders
 from tautscope.dof import Dof
 from tautscope.errors import FieldError
@@ -63,7 +63,7 @@ def _run(options: argparse.Namespace) -> int:
     from tautscope.hardware.run_results import write_run_folder  # noqa: PLC0415
     from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
 
-    config = load_config(options.config, options.profile)
+    config = article_config(options.config, options.profile)
     refuse_placeholders(options.config)
     if options.periods is not None:
         if options.reference is not None:

@@ -6,9 +6,9 @@ import argparse
 import sys
 
 from tautscope.commands import arguments
+from tautscope.commands.article_config import article_config
 from tautscope.commands.calibration_rig import refuse_wrong_limits
 from tautscope.commands.printing import print_json
-from tautscope.config import load_config
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError, FieldError
 
@@ -36,7 +36,11 @@ def add_parser(verbs: arguments.Verbs) -> None:
 def _jog(options: argparse.Namespace) -> None:
     from tautscope.hardware.jog import check_distance, jog  # noqa: PLC0415
 
-    config, dof, distance = load_config(options.config), Dof[options.dof.upper()], options.distance
+    config, dof, distance = (
+        article_config(options.config),
+        Dof[options.dof.upper()],
+        options.distance,
+    )
     if config.drives is None:
         raise ConfigError("drives", None, "a section [drives] that names the motors")
     check_distance(dof, distance)

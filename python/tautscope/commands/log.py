@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
+from tautscope.commands.article_config import article_config
 from tautscope.commands.printing import print_json
 from tautscope.commands.video_options import (
     add_video_options,
@@ -16,7 +17,7 @@ from tautscope.commands.video_options import (
     check_video_options,
     read_motor_options,
 )
-from tautscope.config import Config, load_config
+from tautscope.config import Config
 from tautscope.errors import FieldError
 
 if TYPE_CHECKING:
@@ -192,7 +193,7 @@ def _estimate_from_log(options: argparse.Namespace, log: Log) -> int:
     if options.config is None:
         config = log.config.replace(profile=options.profile)
     else:
-        config = load_config(options.config, options.profile)
+        config = article_config(options.config, options.profile)
     folder = _folder(options)
     replayed, skipped = estimate_from_log(log, config)
     write_estimates(folder, replayed, log.recording(), as_json=options.json)
@@ -210,7 +211,7 @@ def _estimate_from_video(options: argparse.Namespace) -> int:
     from tautscope.log.alignment import implausible_motors  # noqa: PLC0415
     from tautscope.log.replay import estimate_from_video, retimed  # noqa: PLC0415
 
-    config: Config = load_config(options.config, options.profile)
+    config: Config = article_config(options.config, options.profile)
     folder = _folder(options)
     motors = read_motor_options(options, config)
     found, stamps = align_video_options(options, config, motors)

@@ -5,6 +5,7 @@ default: [paper] is Reilink et al. 2013, [ours] is chosen here, [geometry] is a 
 that no publication describes. Missing keys have their defaults.
 """
 
+from tautscope.config.axes import DofEntry, KinematicsConfig, MeasurementConfig
 from tautscope.config.calibration import CalibrationConfig, CalibrationRecord
 from tautscope.config.camera import (
     CameraClock,
@@ -29,7 +30,7 @@ from tautscope.config.fields import (
 )
 from tautscope.config.instrument import InstrumentConfig
 from tautscope.config.law import LawConfig
-from tautscope.config.load import RIGS, config_file, dump_config, load_config
+from tautscope.config.load import RIGS, axes, config_file, dump_config, load_config
 from tautscope.config.recording import ImageFormat, RecordingConfig
 from tautscope.config.root import Config, Profile, from_document, to_document
 from tautscope.config.safety import SafetyConfig
@@ -58,6 +59,7 @@ __all__ = [
     "ControlConfig",
     "Deinterlace",
     "DofConfig",
+    "DofEntry",
     "DriveConfig",
     "DrivesConfig",
     "EstimationConfig",
@@ -67,7 +69,9 @@ __all__ = [
     "Gain",
     "ImageFormat",
     "InstrumentConfig",
+    "KinematicsConfig",
     "LawConfig",
+    "MeasurementConfig",
     "NonNegative",
     "PixelFormat",
     "PoseConfig",
@@ -84,6 +88,7 @@ __all__ = [
     "Vector3",
     "Vector8",
     "VisionConfig",
+    "axes",
     "config_file",
     "dump_config",
     "from_document",

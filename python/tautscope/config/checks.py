@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from tautscope._core import DETECTORS
+from tautscope.config.axes import RANGE, DofEntry
 from tautscope.config.control import ControlConfig
 from tautscope.config.dof import DofConfig
 from tautscope.config.drives import DrivesConfig
@@ -20,6 +21,7 @@ from tautscope.config.twin import DISTURBANCES, TwinConfig
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError
 
+MOST_DOFS = 8
 _RANGE = "the lower limit, then the upper"
 
 
@@ -91,6 +93,45 @@ def check_references(
             f"less than a third of {dof.label}.contact_tolerance times "
             f"{dof.label}.update_distance = {tolerance:.3g}",
         )
+
+
+@relation(DofEntry)
+def _check_dof_entry(dof: DofEntry) -> None:
+    if dof.range is not None:
+        low, high = dof.range
+        _require(low < high, "range", dof.range, _RANGE)
+        most = 2 * RANGE * dof.width_limit
+        degrees = "; in m and rad, not mm and degrees" if high - low > most else ""
+        _require(not degrees, "range", dof.range, f"at most {most:.3g} wide{degrees}")
+    if dof.expected_width is not None:
+        _require_at_most("", dof, "expected_width", "width_limit")
+    _require_at_most("", dof, "delta_minus", "delta_plus")
+
+
+_PER_DOF = (
+    "width_limit",
+    "offset_limit",
+    "reference_speed",
+    "command_speed",
+    "command_travel",
+    "reference_count",
+    "state_noise",
+)
+
+
+def check_axes(dofs: Sequence[DofEntry], profile: str, safety: SafetyConfig) -> None:
+    """Check the entries of [[dof]] with each other; keys from the root."""
+    if not dofs:
+        return
+    _require(len(dofs) <= MOST_DOFS, "dof", f"{len(dofs)} degrees of freedom", "1 to 8")
+    _require(profile == "best", "profile", profile, '"best" with [[dof]]')
+    for index, dof in enumerate(dofs):
+        names = [other.name for other in dofs[:index]]
+        _require(dof.name not in names, f"dof[{index}].name", dof.name, "a name used once")
+    for name in _PER_DOF:
+        value = getattr(safety, name)
+        default = getattr(SafetyConfig(), name)
+        _require(value == default, f"safety.{name}", value, "its default: [[dof]] has its own")
 
 
 @relation(DrivesConfig)

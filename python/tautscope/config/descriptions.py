@@ -42,6 +42,7 @@ class Key:
         default: Default value; None without one.
         is_required: Whether it must be given.
         section: Type of the section that it is, else None.
+        is_list: Whether it is a list of sections.
     """
 
     name: str
@@ -51,6 +52,7 @@ class Key:
     default: Any
     is_required: bool
     section: type[Section] | None
+    is_list: bool = False
 
 
 def package_text() -> str:
@@ -87,6 +89,7 @@ def keys(section: type[Section]) -> Iterator[Key]:
                 default,
                 is_required,
                 _section(hints[field.name]),
+                get_origin(hints[field.name]) is tuple,
             )
         )
     yield from (key for key in found if key.section is None)
@@ -100,7 +103,8 @@ def all_sections(
     yield path, section
     for key in keys(section):
         if key.section is not None:
-            yield from all_sections(key.section, f"{path}.{key.name}".lstrip("."))
+            name = f"[{key.name}]" if key.is_list else key.name
+            yield from all_sections(key.section, f"{path}.{name}".lstrip("."))
 
 
 @cache
@@ -129,7 +133,7 @@ def _plain(text: str) -> str:
 
 
 def _section(kind: Any) -> type[Section] | None:
-    members = get_args(kind) if get_origin(kind) in (Union, UnionType) else (kind,)
+    members = get_args(kind) if get_origin(kind) in (Union, UnionType, tuple) else (kind,)
     return next(
         (one for one in members if isinstance(one, type) and issubclass(one, Section)), None
     )

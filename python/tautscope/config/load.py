@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import tomllib
+from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -63,3 +64,40 @@ def _resolve_paths(document: dict[str, Any], folder: Path) -> None:
     for axis in drives.values() if isinstance(drives, dict) else ():
         if isinstance(axis, dict) and isinstance(axis.get("eds"), str):
             axis["eds"] = str(folder / axis["eds"])
+
+
+def axes(
+    count: int,
+    *,
+    width_limit: float | Sequence[float],
+    unit: str | Sequence[str] = "rad",
+    names: Sequence[str] | None = None,
+    **keys: Any,
+) -> Config:
+    """The shortest configuration of a robot: degrees of freedom that are measured as they are.
+
+    Args:
+        count: How many, 1 to 8.
+        width_limit: Largest width of the slack that is compensated [m or rad], one or one each.
+        unit: "m" or "rad", one or one each.
+        names: By default ``axis_1``, ``axis_2``, ...
+        keys: Further keys of each degree of freedom (`DofEntry`), one or a list of one each.
+
+    Raises:
+        ConfigError: A value is out of range, or a list has another length.
+    """
+    default = [f"axis_{index + 1}" for index in range(count)]
+    given = {"name": list(names or default), "width_limit": width_limit, "unit": unit, **keys}
+    entries: list[dict[str, Any]] = [{} for _ in range(count)]
+    for key, value in given.items():
+        each = value if isinstance(value, Sequence) and not isinstance(value, str) else None
+        if key == "range" and each is not None and not isinstance(each[0], Sequence):
+            each = None
+        each = [value] * count if each is None else each
+        if len(each) != count:
+            raise ConfigError(key, value, f"one value, or {count}")
+        for entry, one in zip(entries, each, strict=True):
+            entry[key] = one
+    if not entries:
+        raise ConfigError("count", count, "1 to 8")
+    return from_document({"dof": entries})

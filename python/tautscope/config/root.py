@@ -8,9 +8,10 @@ from typing import Any, Literal
 import msgspec
 from msgspec import field
 
+from tautscope.config.axes import DofEntry, KinematicsConfig, MeasurementConfig
 from tautscope.config.calibration import CalibrationConfig
 from tautscope.config.camera import CameraConfig
-from tautscope.config.checks import check_references
+from tautscope.config.checks import check_axes, check_references
 from tautscope.config.control import ControlConfig
 from tautscope.config.dof import DofConfig
 from tautscope.config.drives import DrivesConfig
@@ -23,7 +24,7 @@ from tautscope.config.safety import SafetyConfig
 from tautscope.config.section import Section, converted_value, without_numpy
 from tautscope.config.twin import TwinConfig
 from tautscope.config.vision import VisionConfig
-from tautscope.dof import Dof
+from tautscope.dof import Dof, NamedDof
 
 _LOG = logging.getLogger(__name__)
 
@@ -72,10 +73,20 @@ class Config(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     calibration: CalibrationConfig = field(default_factory=CalibrationConfig)
     drives: DrivesConfig | None = None
     """Motors of a rig; they have no default."""
+    dof: tuple[DofEntry, ...] = ()
+    """The degrees of freedom of another robot; without them those of the article."""
+    kinematics: KinematicsConfig = field(default_factory=KinematicsConfig)
+    measurement: MeasurementConfig = field(default_factory=MeasurementConfig)
 
     def __post_init__(self) -> None:
         Section.__post_init__(self)
         check_references(self.safety, self.experiment, {dof: self[dof] for dof in Dof})
+        check_axes(self.dof, self.profile, self.safety)
+
+    @property
+    def dofs(self) -> tuple[NamedDof, ...]:
+        """The degrees of freedom in the order of every array, with name and unit."""
+        return self.dof or tuple(Dof)
 
     def __getitem__(self, dof: Dof) -> DofConfig:
         """The settings of one DOF."""

@@ -44,6 +44,10 @@ def _section(
     for key in keys(kind):
         value = key.default if values is None else getattr(values, key.name)
         place = f"{path}.{key.name}".lstrip(".")
+        if key.is_list and key.section is not None:
+            for entry in value or (None,):
+                yield from _section(entry, key.section, f"[{key.name}]", marked, described)
+            continue
         if key.section is not None:
             yield from _section(value, key.section, place, marked, described)
             continue

@@ -13,13 +13,31 @@ from numpy.typing import ArrayLike, NDArray
 
 from tautscope.config import Config
 from tautscope.dof import display_text
-from tautscope.loop.construction import build_loop
+from tautscope.errors import SignalError
+from tautscope.loop.construction import build_axes, build_loop
+from tautscope.loop.kinematics import Predict, build_kinematics
+from tautscope.loop.measurement import (
+    MOST_VALUES,
+    SENSORS,
+    Measurement,
+    Pose,
+    Reading,
+    Sensors,
+    Tip,
+)
 from tautscope.loop.rig import Frame
 from tautscope.loop.safety import Reaction, Supervision, checksum, disabled_monitors
-from tautscope.loop.signal_checks import check_features, check_signal, check_time
+from tautscope.loop.signal_checks import (
+    check_covariance,
+    check_features,
+    check_numbers,
+    check_signal,
+    check_time,
+)
 from tautscope.loop.state_prediction import StatePrediction
 
 if TYPE_CHECKING:
+    from tautscope import _core
     from tautscope.loop.vision import Detection, MarkerDetector
 
 Triggers = tuple[str | None, str | None]
@@ -46,27 +64,32 @@ class Status(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """Result of an image update. Every (3,) array is [m, rad, rad]; NaN is not known.
+    """Result of an update by an image or another measurement; NaN is not known.
+
+    Every (n,) array has an entry per degree of freedom [m or rad]: for the article's instrument
+    insertion, rotation, bending [m, rad, rad].
 
     Attributes:
         detection: What the marker detector found, if it was used.
         captured_at: When the frame was captured [s].
         status: Result of the update.
-        state_estimate: q_hat (3,). Profile ``paper``: Eq. (16), the prediction where a DOF is not
+        state_estimate: q_hat (n,). Profile ``paper``: Eq. (16), the prediction where a DOF is not
             observable. Profile ``best``: the most probable state, decision 0030.
-        predicted_state: q (3,) at the capture time.
+        predicted_state: q (n,) at the capture time.
         predicted_features: h (4,) [px], Eq. (9), of the state the estimation started from: q, or
-            with one band alone or profile ``best`` the state prediction of `predict_state`.
+            with one band alone or profile ``best`` the state prediction of `predict_state`. Of
+            another measurement the values (m,) expected, as all of the next two.
         innovation: Measured minus predicted features (4,) [px]; NaN for a band not found.
-        observable: (3,) which DOFs the image determined.
-        deviation: (3,) standard deviation per px of marker noise [m/px, rad/px].
-        state_deviation: (3,) standard deviation of `state_estimate` from the detection's
+        observable: (n,) which DOFs the image determined.
+        deviation: (n,) standard deviation per px of marker noise [m/px, rad/px]; NaN without
+            bands.
+        state_deviation: (n,) standard deviation of `state_estimate` from the detection's
             covariance, or for 1 px of noise without one; with profile ``paper`` NaN for a DOF
             that was held.
         triggers: Per DOF why (delta_minus, delta_plus) were updated: "contact", Eq. (4),
             "violation", Eq. (5), or None.
-        delta_minus: (3,) contact offsets after this frame, input minus output.
-        delta_plus: (3,) contact offsets after this frame, input minus output.
+        delta_minus: (n,) contact offsets after this frame, input minus output.
+        delta_plus: (n,) contact offsets after this frame, input minus output.
         reaction: The reaction in force after this frame.
         warnings: The flags in force, by the names of `tautscope.loop.safety.DETECTORS`, and a line
             for every monitor that ``safety.off`` disables.
@@ -82,7 +105,7 @@ class Report:
     observable: NDArray[np.bool_]
     deviation: NDArray[np.float64]
     state_deviation: NDArray[np.float64]
-    triggers: tuple[Triggers, Triggers, Triggers]
+    triggers: tuple[Triggers, ...]
     delta_minus: NDArray[np.float64]
     delta_plus: NDArray[np.float64]
     reaction: Reaction
@@ -90,24 +113,27 @@ class Report:
 
     def __repr__(self) -> str:
         warnings = f", warnings {', '.join(self.warnings)}" if self.warnings else ""
+        tip = ", ".join(f"{value:.3g}" for value in self.state_estimate)
+        slack = ", ".join(f"{value:.3g}" for value in self.delta_plus - self.delta_minus)
         return (
             f"<Report of {self.captured_at:.3f} s: {self.status}, "
-            f"tip at {display_text(self.state_estimate)}, "
-            f"slack {display_text(self.delta_plus - self.delta_minus)}{warnings}>"
+            f"tip at {tip}, slack {slack} [m or rad]{warnings}>"
         )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HysteresisEstimate:
-    """The estimated hysteresis in profile ``best``; (3,) arrays are [m, rad, rad].
+    """The estimated hysteresis in profile ``best``; (n,) arrays are [m or rad].
+
+    The last four are of the article's instrument, None of another robot.
 
     Attributes:
-        half_width: (3,) half widths of the slack of each DOF that moves alone.
-        width_std: (3,) standard deviations of the half widths.
-        centre: (3,) centres of the contact offsets, input minus output.
+        half_width: (n,) half widths of the slack of each DOF that moves alone.
+        width_std: (n,) standard deviations of the half widths.
+        centre: (n,) centres of the contact offsets, input minus output.
+        gain: (n,) travel of the tip over that of the command in contact.
+        gain_std: (n,) its standard deviations.
         shared: Share of the friction that insertion and rotation have in common, 0 to 1.
-        gain: (3,) travel of the tip over that of the command in contact.
-        gain_std: (3,) its standard deviations.
         unevenness: Of the section's curvature: half of the difference of its ends, over the mean.
         image_shift: (2,) shift of the image against the configured camera [px], from a wrong pose
             or principal point; `camera.fx` px are about a radian.
@@ -117,16 +143,20 @@ class HysteresisEstimate:
     half_width: NDArray[np.float64]
     width_std: NDArray[np.float64]
     centre: NDArray[np.float64]
-    shared: float
     gain: NDArray[np.float64]
     gain_std: NDArray[np.float64]
-    unevenness: float
-    image_shift: NDArray[np.float64]
-    image_shift_std: NDArray[np.float64]
+    shared: float | None = None
+    unevenness: float | None = None
+    image_shift: NDArray[np.float64] | None = None
+    image_shift_std: NDArray[np.float64] | None = None
 
 
 class HysteresisReduction:
     """Image-based hysteresis reduction, Fig. 6: `step` at the control rate, `on_frame` per image.
+
+    Of a robot with [[dof]] every array has n entries in its order, and in place of images there are
+    `on_tip`, `on_pose`, `on_points` and `on_measurement`. What is late, repeated or out of order is
+    treated as an image; of several sensors each counts by itself.
 
     Args:
         config: All settings of the loop.
@@ -144,13 +174,21 @@ class HysteresisReduction:
         self._ticks = self.updates = 0
         self.on_event: Callable[[str], None] | None = None
         self._disabled = disabled_monitors(config)
-        self._loop = build_loop(config, compensate)
+        self._dofs = len(config.dofs)
+        self._loop: _core.Reduction | _core.AxesReduction
+        self._bands: _core.Reduction | None = None
+        self._axes: _core.AxesReduction | None = None
+        if config.dof:
+            self._loop = self._axes = build_axes(config, compensate)
+            self._sensors = Sensors(config, build_kinematics(config))
+        else:
+            self._loop = self._bands = build_loop(config, compensate)
 
     def __repr__(self) -> str:
+        slack = display_text(self.delta_plus - self.delta_minus, self._config.dofs)
         return (
-            f"<HysteresisReduction: profile {self._config.profile}, {self.updates} image updates, "
-            f"reaction {self.supervision.reaction}, "
-            f"slack {display_text(self.delta_plus - self.delta_minus)}>"
+            f"<HysteresisReduction: profile {self._config.profile}, {self.updates} updates, "
+            f"reaction {self.supervision.reaction}, slack {slack}>"
         )
 
     def step(
@@ -159,20 +197,20 @@ class HysteresisReduction:
         """One control tick: the command for a reference, Eqs. (2)-(3).
 
         Args:
-            reference: u (3,) [m, rad, rad].
+            reference: u (n,) [m or rad].
             time: The rig's clock [s]; if not given, ticks of `control.period` from 0 on.
             made_at: When the reference was made [s, the same clock], if known. A reference older
                 than ``safety.reference_age`` causes no motion.
 
         Returns:
-            c (3,) [m, rad, rad]. The first reference is passed through. While motion is held, the
+            c (n,) [m or rad]. The first reference is passed through. While motion is held, the
             last command.
 
         Raises:
-            SignalError: The reference is not three finite numbers, or a time is not finite;
-                the loop is unchanged.
+            SignalError: The reference is not n finite numbers, or a time is not finite; the
+                loop is unchanged.
         """
-        values = check_signal("reference", reference, (3,))
+        values = check_signal("reference", reference, (self._dofs,))
         if time is None:
             time = self._ticks * self._config.control.period
         time = check_time("time", time)
@@ -230,6 +268,124 @@ class HysteresisReduction:
         values = None if features is None else check_features(features)
         return self._update(values, None, check_time("captured_at", captured_at))
 
+    def on_tip(
+        self,
+        values: ArrayLike,
+        captured_at: float,
+        covariance: ArrayLike | None = None,
+        *,
+        sensor: int = 0,
+    ) -> Report:
+        """Update with the tip measured degree by degree.
+
+        Args:
+            values: (n,) [m or rad]; NaN for a degree of freedom that was not measured.
+            captured_at: When it was measured [s, the clock of `step`].
+            covariance: (n, n); without it `measurement.tip_deviation`.
+            sensor: Which of 4 sensors, each with its own rate and delay.
+
+        Raises:
+            SignalError: A shape is wrong, a number infinite, all values NaN, or the covariance not
+                positive definite; the configuration has no [[dof]].
+        """
+        reading = self._axes_sensors("on_tip").tip(values, covariance)
+        return self._update_by(reading, captured_at, sensor)
+
+    def on_pose(
+        self,
+        position: ArrayLike,
+        captured_at: float,
+        orientation: ArrayLike | None = None,
+        covariance: ArrayLike | None = None,
+        *,
+        sensor: int = 0,
+    ) -> Report:
+        """Update with a pose of the tip: an EM tracker, a board of markers, motion capture.
+
+        Args:
+            position: (3,) [m] in the frame of the kinematics; NaN for what was not measured.
+            captured_at: When it was measured [s, the clock of `step`].
+            orientation: Rotation matrix (3, 3), or quaternion (4,) x, y, z, w.
+            covariance: (3, 3), or (6, 6) with an orientation: position [m], then rotation about the
+                sensor's axes [rad]; without it `measurement.position_deviation` and
+                `measurement.orientation_deviation`.
+            sensor: Which of 4 sensors, each with its own rate and delay.
+
+        Raises:
+            SignalError: As `on_tip`; the orientation is no rotation; no kinematics is configured.
+        """
+        sensors = self._axes_sensors("on_pose")
+        reading = sensors.pose(position, orientation, covariance)
+        return self._update_by(reading, captured_at, sensor)
+
+    def on_points(
+        self,
+        pixels: ArrayLike,
+        captured_at: float,
+        covariance: ArrayLike | None = None,
+        *,
+        sensor: int = 0,
+    ) -> Report:
+        """Update with the pixels of the points of the kinematics.
+
+        Args:
+            pixels: (k, 2) [px], k at most 8; NaN for a point that was not found.
+            captured_at: When the image was captured [s, the clock of `step`].
+            covariance: (2 k, 2 k) [px^2]; without it `measurement.point_deviation`.
+            sensor: Which of 4 sensors, each with its own rate and delay.
+
+        Raises:
+            SignalError: As `on_tip`; the kinematics has no method ``points``.
+        """
+        reading = self._axes_sensors("on_points").points(pixels, covariance)
+        return self._update_by(reading, captured_at, sensor)
+
+    def on_measurement(
+        self,
+        values: ArrayLike,
+        captured_at: float,
+        covariance: ArrayLike,
+        predict: Predict,
+        *,
+        jacobian: Predict | None = None,
+        sensor: int = 0,
+    ) -> Report:
+        """Update with anything that depends on the state.
+
+        Args:
+            values: z (m,), m at most 16; NaN for what was not measured.
+            captured_at: When it was measured [s, the clock of `step`].
+            covariance: (m, m).
+            predict: q (n,) to the values z (m,) that would be measured.
+            jacobian: q (n,) to dz/dq (m, n); without it by differences.
+            sensor: Which of 4 sensors, each with its own rate and delay.
+
+        Raises:
+            SignalError: As `on_tip`; a result of `predict` or `jacobian` has another shape.
+        """
+        sensors = self._axes_sensors("on_measurement")
+        count = len(np.atleast_1d(values)) if np.ndim(values) == 1 else 0
+        if not 1 <= count <= MOST_VALUES:
+            raise SignalError("values", f"an array {np.shape(values)}", "1 to 16 numbers or NaN")
+        found = check_numbers("values", values, (count,), "numbers or NaN")
+        known = check_covariance("covariance", covariance, count)
+        reading = sensors.own(found, known, predict, jacobian)
+        return self._update_by(reading, captured_at, sensor)
+
+    def on_sample(self, measurement: Measurement) -> Report:
+        """Update with a measurement of a rig: `on_tip`, `on_pose` or `on_points`."""
+        at, covariance, sensor = (
+            measurement.captured_at,
+            measurement.covariance,
+            measurement.sensor,
+        )
+        if isinstance(measurement, Tip):
+            return self.on_tip(measurement.values, at, covariance, sensor=sensor)
+        if isinstance(measurement, Pose):
+            orientation = measurement.orientation
+            return self.on_pose(measurement.position, at, orientation, covariance, sensor=sensor)
+        return self.on_points(measurement.pixels, at, covariance, sensor=sensor)
+
     @property
     def supervision(self) -> Supervision:
         """Reaction and flags in force now."""
@@ -277,7 +433,7 @@ class HysteresisReduction:
 
         `MarkerDetector.detect` searches around it. None if the history does not reach that time.
         """
-        prediction = self._loop.predict_state(captured_at)
+        prediction = self._band_loop("predict_state").predict_state(captured_at)
         return None if prediction is None else StatePrediction(*prediction)
 
     def predicted_features(self, captured_at: float) -> NDArray[np.float64] | None:
@@ -285,27 +441,29 @@ class HysteresisReduction:
 
         None if the history does not reach that time, or a marker is behind the camera.
         """
-        return self._loop.predicted_features(captured_at)
+        return self._band_loop("predicted_features").predicted_features(captured_at)
 
     @property
     def predicted_state(self) -> NDArray[np.float64]:
-        """The model's tip state q (3,) [m, rad, rad] now; NaN before the first tick."""
+        """The model's tip state q (n,) [m or rad] now; NaN before the first tick."""
         return self._loop.predicted_state
 
     @property
     def delta_minus(self) -> NDArray[np.float64]:
-        """The estimated negative contact offsets (3,) [m, rad, rad], input minus output."""
+        """The estimated negative contact offsets (n,) [m or rad], input minus output."""
         return self._loop.delta_minus
 
     @property
     def delta_plus(self) -> NDArray[np.float64]:
-        """The estimated positive contact offsets (3,) [m, rad, rad], input minus output."""
+        """The estimated positive contact offsets (n,) [m or rad], input minus output."""
         return self._loop.delta_plus
 
     @property
     def hysteresis(self) -> HysteresisEstimate | None:
         """The estimated hysteresis; None in profile ``paper``."""
-        found = self._loop.hysteresis
+        if self._axes is not None:
+            return HysteresisEstimate(*self._axes.hysteresis)
+        found = self._band_loop("hysteresis").hysteresis
         return None if found is None else HysteresisEstimate(*found)
 
     @cached_property
@@ -316,8 +474,38 @@ class HysteresisReduction:
         return MarkerDetector(self._config)
 
     def _detection(self, frame: Frame) -> Callable[[], Detection]:
+        self._band_loop("on_frame")
         prediction = self.predict_state(check_time("captured_at", frame.captured_at))
         return partial(self._detector.detect, frame.image, None, prediction)
+
+    def _band_loop(self, call: str) -> _core.Reduction:
+        if self._bands is None:
+            allowed = "a configuration without [[dof]]; on_tip, on_pose, on_points with it"
+            raise SignalError(call, "[[dof]]", allowed)
+        return self._bands
+
+    def _axes_sensors(self, call: str) -> Sensors:
+        if self._axes is None:
+            raise SignalError(call, "no [[dof]]", "a configuration with [[dof]]; tautscope.axes")
+        return self._sensors
+
+    def _update_by(self, reading: Reading, captured_at: float, sensor: int) -> Report:
+        captured_at = check_time("captured_at", captured_at)
+        if sensor not in range(SENSORS):
+            raise SignalError("sensor", sensor, f"0 to {SENSORS - 1}")
+        assert self._axes is not None
+        result = self._axes.on_reading(
+            reading.values,
+            reading.covariance,
+            captured_at,
+            reading.model,
+            reading.point,
+            sensor,
+        )
+        self.updates += 1
+        now = self.supervision
+        warnings = (*self._disabled, *now.flags)
+        return Report(None, captured_at, Status(result[0]), *result[1:], now.reaction, warnings)
 
     def _notify(self, what: str) -> None:
         if self.on_event is not None:
@@ -331,7 +519,8 @@ class HysteresisReduction:
         detection: Detection | None = None,
         image_checksum: int | None = None,
     ) -> Report:
-        result = self._loop.on_features(features, captured_at, covariance, image_checksum)
+        loop = self._band_loop("on_features")
+        result = loop.on_features(features, captured_at, covariance, image_checksum)
         self.updates += 1
         now = self.supervision
         warnings = (*self._disabled, *now.flags)

@@ -39,7 +39,7 @@ class Segment:
 
 
 class Reference(Protocol):
-    """A desired motion of the tip."""
+    """A desired motion of the tip; (n,) for n degrees of freedom."""
 
     @property
     def duration(self) -> float:
@@ -111,6 +111,8 @@ APPROACH_SPEED = 0.5
 """Largest speed of the approach to a recorded motion [of `safety.reference_speed`]."""
 TREMOR, TREMOR_FREQUENCY = (0.1e-3, 0.01, 0.01), 8.0
 """Amplitude [m, rad, rad], and frequency [Hz]."""
+TREMOR_SHARE = 1 / 150
+"""Amplitude for another robot [in that of the motion]."""
 FLICKS, PAUSES = 0.2, 0.1
 """Share of the moves that are flicks, and of the rests that are pauses."""
 
@@ -130,13 +132,14 @@ class OperatorMotion:
     rest a pause of 5 s.
 
     Attributes:
-        experiment: Centre and amplitude per DOF.
+        experiment: Centre and amplitude per DOF: a section, or of another robot a `Sine` each, with
+            a tremor of a 150th of its amplitude.
         seed: Of all that is random.
         duration: [s].
         is_disturbed: Whether tremor, flicks and pauses are added.
     """
 
-    experiment: ExperimentConfig
+    experiment: ExperimentConfig | Sequence[Sine]
     seed: int
     duration: float = 120.0
     is_disturbed: bool = False
@@ -145,7 +148,20 @@ class OperatorMotion:
     @cached_property
     def _moves(self) -> list[NDArray[np.float64]]:
         rng = np.random.default_rng(self.seed)
-        return [self._draw_moves(self.experiment[dof], rng) for dof in Dof]
+        return [self._draw_moves(sine, rng) for sine in self._sines]
+
+    @property
+    def _sines(self) -> Sequence[Sine]:
+        experiment = self.experiment
+        if isinstance(experiment, ExperimentConfig):
+            return [experiment[dof] for dof in Dof]
+        return experiment
+
+    @property
+    def _tremor(self) -> NDArray[np.float64]:
+        if isinstance(self.experiment, ExperimentConfig):
+            return np.array(TREMOR)
+        return np.array([TREMOR_SHARE * sine.amplitude for sine in self._sines])
 
     def _draw_moves(self, sine: Sine, rng: np.random.Generator) -> NDArray[np.float64]:
         """Moves (n, 4): start [s], D [s], a, b."""
@@ -165,14 +181,14 @@ class OperatorMotion:
         return np.array(moves)
 
     def __call__(self, time: float) -> NDArray[np.float64]:
-        """(3,) [m, rad, rad] at `time` [s from the start of the reference]."""
-        position = np.empty(3)
+        """(n,) [m or rad] at `time` [s from the start of the reference]."""
+        position = np.empty(len(self._moves))
         for dof, moves in enumerate(self._moves):
             index = max(int(np.searchsorted(moves[:, 0], time, side="right")) - 1, 0)
             start, lasts, a, b = moves[index]
             position[dof] = _minimum_jerk(a, b, (time - start) / lasts)
         if self.is_disturbed:
-            position += np.array(TREMOR) * np.sin(2 * np.pi * TREMOR_FREQUENCY * time)
+            position += self._tremor * np.sin(2 * np.pi * TREMOR_FREQUENCY * time)
         return position
 
 

@@ -11,7 +11,10 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tautscope.dof import display_text
+from tautscope.config import Config
+from tautscope.errors import SignalError
+from tautscope.loop.measurement import Measurement, Points, Pose, Tip
+from tautscope.loop.signal_checks import check_time
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,24 +48,28 @@ class Sample:
 
     Attributes:
         time: [s, the rig's clock].
-        applied: (3,) [m, rad, rad] what the drives report.
+        applied: (n,) [m or rad] what the drives report.
         frame: The newest image that arrived in this period, if any.
-        true_state: (3,) [m, rad, rad] of the tip; twin only, the loop never reads it.
+        true_state: (n,) [m or rad] of the tip; simulations only, the loop never reads it.
+        measurements: What sensors other than the camera measured and delivered in this period:
+            `Tip`, `Pose` or `Points`.
     """
 
     time: float
     applied: NDArray[np.float64]
     frame: Frame | None = None
     true_state: NDArray[np.float64] | None = None
+    measurements: tuple[Measurement, ...] = ()
 
     def __repr__(self) -> str:
         frame = "no frame" if self.frame is None else f"frame {self.frame.sequence}"
-        return f"<Sample at {self.time:.3f} s: applied {display_text(self.applied)}, {frame}>"
+        applied = ", ".join(f"{value:.3g}" for value in self.applied)
+        return f"<Sample at {self.time:.3f} s: applied {applied} [m or rad], {frame}>"
 
 
 @runtime_checkable
 class Rig(Protocol):
-    """An instrument with drives and a camera."""
+    """An instrument with drives, and a camera or another sensor of its tip."""
 
     @property
     def control_period(self) -> float:
@@ -74,9 +81,34 @@ class Rig(Protocol):
         ...
 
     def step(self, command: ArrayLike) -> Sample:
-        """Send a command (3,) [m, rad, rad] and let one control period pass."""
+        """Send a command (n,) [m or rad] and let one control period pass."""
         ...
 
     def close(self) -> None:
         """Stop the motors and release all resources; a second call does nothing."""
         ...
+
+
+def check_sample(sample: Sample, config: Config) -> Sample:
+    """The sample, where its parts are as `Sample` says.
+
+    Raises:
+        SignalError: The rig returned something else, a time that is not finite, or an array of
+            another length; the error names the part.
+    """
+    if not isinstance(sample, Sample):
+        raise SignalError("sample", type(sample).__name__, "a tautscope.Sample from the rig")
+    count = len(config.dofs)
+    check_time("sample.time", sample.time)
+    for name in ("applied", "true_state"):
+        value = getattr(sample, name)
+        if value is not None and np.shape(value) != (count,):
+            allowed = f"an array ({count},), one per degree of freedom"
+            raise SignalError(f"sample.{name}", f"an array {np.shape(value)}", allowed)
+    if not isinstance(sample.measurements, tuple):
+        found = type(sample.measurements).__name__
+        raise SignalError("sample.measurements", found, "a tuple of Tip, Pose or Points")
+    for one in sample.measurements:
+        if not isinstance(one, Tip | Pose | Points):
+            raise SignalError("sample.measurements", type(one).__name__, "Tip, Pose or Points")
+    return sample

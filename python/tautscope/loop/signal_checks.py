@@ -49,3 +49,49 @@ def check_time(field: str, value: float) -> float:
     if not isinstance(value, float | int | np.floating) or not math.isfinite(value):
         raise SignalError(field, value, "a finite number of seconds")
     return float(value)
+
+
+def check_numbers(
+    field: str, values: ArrayLike, shape: tuple[int, ...], allowed: str
+) -> NDArray[np.float64]:
+    """Numbers of this shape as an array, none infinite and not all NaN; the error names `field`.
+
+    Raises:
+        SignalError: They are anything else.
+    """
+    allowed = f"an array {shape} of {allowed}"
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise SignalError(field, values, allowed) from None
+    if array.shape != shape or np.isinf(array).any() or np.isnan(array).all():
+        raise SignalError(field, array.tolist(), allowed)
+    return array
+
+
+def check_covariance(field: str, values: ArrayLike, count: int) -> NDArray[np.float64]:
+    """A covariance (count, count): symmetric and positive definite; the error names `field`.
+
+    Raises:
+        SignalError: It is not.
+    """
+    array = check_signal_shape(field, values, (count, count))
+    is_symmetric = np.allclose(array, array.T, rtol=1e-6, atol=0)
+    if not is_symmetric or (np.linalg.eigvalsh(array) <= 0).any():
+        allowed = f"a covariance {(count, count)}: symmetric and positive definite"
+        raise SignalError(field, array.tolist(), allowed)
+    return array
+
+
+def check_signal_shape(
+    field: str, values: ArrayLike, shape: tuple[int, ...]
+) -> NDArray[np.float64]:
+    """Finite numbers as an array of this shape; the error names `field`.
+
+    Raises:
+        SignalError: The shape is different, or a number is not finite.
+    """
+    array = check_numbers(field, values, shape, "finite numbers")
+    if np.isnan(array).any():
+        raise SignalError(field, array.tolist(), f"an array {shape} of finite numbers")
+    return array

@@ -11,13 +11,14 @@ import numpy as np
 
 from tautscope.config import Config
 from tautscope.errors import MotionHeldError, SignalError
+from tautscope.loop.measurement import Measurement
 from tautscope.loop.reduction import HysteresisReduction, Report
 from tautscope.loop.references import DatedReference, Reference
-from tautscope.loop.rig import Frame, Rig, Sample
+from tautscope.loop.rig import Frame, Rig, Sample, check_sample
 from tautscope.loop.safety import Reaction, Supervision, disabled_monitors
 from tautscope.runs.flag_summary import FlagSummary
 from tautscope.runs.recording import Floats, Recording, Snapshot
-from tautscope.runs.run_recorder import RunRecorder, frame_row
+from tautscope.runs.run_recorder import RunRecorder, frame_row, measurement_row
 
 if TYPE_CHECKING:
     from tautscope.loop.vision import Detection
@@ -62,16 +63,16 @@ def run_experiment(
     watch: Callable[[Supervision], None] | None = None,
     engage: Callable[[Supervision], bool] | None = None,
 ) -> Recording:
-    """Run a reference on a rig, with the camera as the only feedback.
+    """Run a reference on a rig, with the camera, or other sensors of the tip, as the only feedback.
 
     In every control period the loop turns the reference into a command for the rig. Every image
-    that arrives updates the state estimate and the hysteresis estimators. The rig's true state, if
-    it has one, is recorded; the loop never reads it.
+    or measurement that arrives updates the state estimate and the hysteresis estimators. The rig's
+    true state, if it has one, is recorded; the loop never reads it.
 
     Args:
         rig: Any object with the methods of `tautscope.rig.Rig`. It is reset first; the caller
             closes it.
-        reference: (time [s]) -> (3,) [m, rad, rad], with `duration` and `segments`; optionally with
+        reference: (time [s]) -> (n,) [m or rad], with `duration` and `segments`; optionally with
             `made_at` (`tautscope.references.DatedReference`), then an old one causes no motion.
         config: Settings of the loop.
         compensate: If false, the command is the reference; the estimators still run.
@@ -91,7 +92,8 @@ def run_experiment(
     Raises:
         MotionHeldError: Motion was held, and nobody could re-engage it. The error has the recording
             up to this time.
-        SignalError: The reference is not three finite numbers, or the rig's clock does not advance.
+        SignalError: The reference is not n finite numbers, a sample is not as `Sample` says, or the
+            rig's clock does not advance.
         FrameError: An image is not what the configured camera gives.
     """
     reduction = HysteresisReduction(config, compensate=compensate)
@@ -112,7 +114,7 @@ def run_experiment(
         return Recording(trace, frames, config, compensate, segments, recorder.snapshot, warnings)
 
     dated = reference if isinstance(reference, DatedReference) else None
-    sample = rig.reset()
+    sample = check_sample(rig.reset(), config)
     start = sample.time
     while (elapsed := sample.time - start) < reference.duration:
         desired = reference(elapsed)
@@ -129,12 +131,15 @@ def run_experiment(
             if log is not None and events is not None:
                 events.write(sample.time, reduction.updates)
                 log.frame(sample.time, frame, report)
+        for measurement in sample.measurements:
+            report = reduction.on_sample(measurement)
+            recorder.add_measurement(sample.time, measurement, report, elapsed)
         if watch is not None:
             watch(reduction.supervision)
         if (error := stop.update(sample.time)) is not None:
             error.recording = recording()
             raise error
-        before, sample = sample, rig.step(command)
+        before, sample = sample, check_sample(rig.step(command), config)
         if not sample.time > before.time:
             raise SignalError("sample.time", sample.time, f"later than the last, {before.time}")
         if progress is not None and int(sample.time - start) > int(elapsed):
@@ -232,6 +237,15 @@ class _ExperimentRecorder(RunRecorder):
         self.flags = FlagSummary()
         self._snapshot_after = snapshot_after
         self._is_late = False
+        self._measurements = 0
+
+    def add_measurement(
+        self, now: float, measurement: Measurement, report: Report, elapsed: float
+    ) -> None:
+        self._measurements += 1
+        row = measurement_row(now, self._measurements, measurement, report)
+        self.add_frame(row, report.delta_minus, report.delta_plus)
+        self.flags.add(elapsed, report.warnings, report.reaction)
 
     def add_report(self, now: float, frame: Frame, report: Report, elapsed: float) -> None:
         self.add_frame(frame_row(now, frame, report), report.delta_minus, report.delta_plus)

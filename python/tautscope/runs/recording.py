@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.config import Config, dump_config, load_config
-from tautscope.dof import Dof
+from tautscope.dof import Dof, NamedDof
 from tautscope.errors import MissingPathError, RecordError
 from tautscope.loop.references import Segment
 from tautscope.runs.csv_files import read_csv, write_csv
@@ -28,30 +29,30 @@ def _names(groups: list[str], members: list[str]) -> list[str]:
     return [f"{group}_{member}" for group in groups for member in members]
 
 
-_DOFS = [dof.label for dof in Dof]
-TRACE_COLUMNS = np.dtype(
-    [("time", "f8")]
-    + [
-        (name, "f8")
-        for name in _names(
-            ["reference", "command", "applied", "estimate", "true", "delta_minus", "delta_plus"],
-            _DOFS,
-        )
-    ]
-    + [("status", "U16")]
-)
-FRAME_COLUMNS = np.dtype(
-    [("captured_at", "f8"), ("arrived_at", "f8"), ("sequence", "i8")]
-    + [("status", "U16"), ("valid", "?")]
-    + [(name, "f8") for name in _names(["estimate", "predicted", "true"], _DOFS)]
-    + [(name, "?") for name in _names(["observable"], _DOFS)]
-    + [
-        (name, "f8")
-        for name in _names(
-            ["features", "predicted_features", "innovation", "true_features"], list(FEATURES)
-        )
-    ]
-)
+def trace_columns(dofs: Iterable[NamedDof]) -> np.dtype[np.void]:
+    """Columns of a trace with these degrees of freedom."""
+    groups = ["reference", "command", "applied", "estimate", "true", "delta_minus", "delta_plus"]
+    names = _names(groups, [dof.label for dof in dofs])
+    return np.dtype([("time", "f8"), *((name, "f8") for name in names), ("status", "U16")])
+
+
+def frame_columns(
+    dofs: Iterable[NamedDof], features: Sequence[str] = FEATURES
+) -> np.dtype[np.void]:
+    """Columns of the updates of a run with these degrees of freedom and features."""
+    labels = [dof.label for dof in dofs]
+    groups = ["features", "predicted_features", "innovation", "true_features"]
+    return np.dtype(
+        [("captured_at", "f8"), ("arrived_at", "f8"), ("sequence", "i8")]
+        + [("status", "U16"), ("valid", "?")]
+        + [(name, "f8") for name in _names(["estimate", "predicted", "true"], labels)]
+        + [(name, "?") for name in _names(["observable"], labels)]
+        + [(name, "f8") for name in _names(groups, list(features))]
+    )
+
+
+TRACE_COLUMNS = trace_columns(Dof)
+FRAME_COLUMNS = frame_columns(Dof)
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,13 +82,14 @@ class Recording:
 
     Attributes:
         trace: Structured array, one row per control tick: `time` [s, the rig's clock]; per DOF
-            [m, rad, rad] `reference_*`, `command_*` (given at this time), `applied_*` and
+            [m or rad] `reference_*`, `command_*` (given at this time), `applied_*` and
             `true_*` (at this time; truth is NaN if the rig has none), `estimate_*`,
             `delta_minus_*`, `delta_plus_*` (of the newest frame); `status` of that frame.
         frames: Structured array, one row per image: `captured_at`, `arrived_at` [s], `sequence`,
             `status`, `valid`; per DOF `estimate_*`, `predicted_*`, `true_*` (at the capture time,
             interpolated), `observable_*`; per feature [px] `features_*`, `predicted_features_*`,
-            `innovation_*`, `true_features_*`.
+            `innovation_*`, `true_features_*`. Of a robot with [[dof]] a row per measurement,
+            without features.
         config: The configuration of the run.
         compensated: Whether compensation was on.
         segments: Which DOF moved when.
@@ -109,9 +111,22 @@ class Recording:
         seconds = time[-1] - time[0] if len(time) else 0.0
         compensated = "with" if self.compensated else "without"
         return (
-            f"<Recording: {len(time)} ticks in {seconds:g} s, {len(self.frames)} images, "
+            f"<Recording: {len(time)} ticks in {seconds:g} s, {len(self.frames)} updates, "
             f"profile {self.config.profile}, {compensated} compensation>"
         )
+
+    def tracking_rms(self, after: float = 20.0) -> Floats:
+        """RMS of the tip less the reference (n,) [m or rad] from `after` [s] on.
+
+        The tip is the true one, or the estimate where the rig does not know it; NaN before the
+        first measurement.
+        """
+        trace, dofs = self.trace, self.config.dofs
+        rows = trace["time"] >= trace["time"][0] + after
+        true, estimate = (per_dof(trace, group, dofs)[rows] for group in ("true", "estimate"))
+        error = np.where(np.isnan(true), estimate, true) - per_dof(trace, "reference", dofs)[rows]
+        rms: Floats = np.sqrt(np.mean(error**2, axis=0))
+        return rms
 
     def during(self, segment: Segment, first: float, last: float) -> NDArray[np.bool_]:
         """(ticks,) rows of the trace in periods `first` to `last` of a segment."""
@@ -174,18 +189,20 @@ class Recording:
         except (tomllib.TOMLDecodeError, KeyError, TypeError, AttributeError) as error:
             allowed = f"compensated and segments ({error})"
             raise RecordError("recording", str(facts_file), allowed) from None
+        config = load_config(place / "config.toml")
+        features = () if config.dof else FEATURES
         return cls(
-            trace=read_csv(place / f"trace{suffix}.csv", TRACE_COLUMNS),
-            frames=read_csv(place / f"frames{suffix}.csv", FRAME_COLUMNS),
-            config=load_config(place / "config.toml"),
+            trace=read_csv(place / f"trace{suffix}.csv", trace_columns(config.dofs)),
+            frames=read_csv(place / f"frames{suffix}.csv", frame_columns(config.dofs, features)),
+            config=config,
             compensated=compensated,
             segments=segments,
         )
 
 
-def per_dof(table: Table, group: str) -> Floats:
-    """(n, 3) columns ``<group>_insertion``, ``_rotation``, ``_bending`` of a table."""
-    return np.stack([table[f"{group}_{dof.label}"] for dof in Dof], axis=1)
+def per_dof(table: Table, group: str, dofs: Iterable[NamedDof] = Dof) -> Floats:
+    """(rows, n) columns ``<group>_insertion``, ... of a table, one per degree of freedom."""
+    return np.stack([table[f"{group}_{dof.label}"] for dof in dofs], axis=1)
 
 
 def per_feature(table: Table, group: str) -> Floats:

@@ -8,7 +8,8 @@ import numpy as np
 
 from tautscope.config import Config
 from tautscope.dof import Dof
-from tautscope.runs.recording import FRAME_COLUMNS, TRACE_COLUMNS, Floats, Table, per_dof
+from tautscope.loop.measurement import Measurement
+from tautscope.runs.recording import FEATURES, Floats, Table, frame_columns, per_dof, trace_columns
 
 if TYPE_CHECKING:
     from tautscope.loop.reduction import Report
@@ -50,6 +51,21 @@ def frame_row(now: float, frame: Frame, report: Report) -> Row:
     )
 
 
+def measurement_row(now: float, count: int, measurement: Measurement, report: Report) -> Row:
+    """Result of an update by a measurement in the order of `frame_columns` without features."""
+    return (
+        measurement.captured_at,
+        now,
+        count,
+        str(report.status),
+        report.status in ("ok", "held", "partial"),
+        *report.state_estimate,
+        *report.predicted_state,
+        *(np.nan for _ in report.state_estimate),
+        *report.observable,
+    )
+
+
 class _RowBuffer:
     """Rows, converted to arrays in small blocks: one large conversion would block all threads."""
 
@@ -85,18 +101,19 @@ class RunRecorder:
     """
 
     def __init__(self, config: Config) -> None:
-        self._trace = _RowBuffer(TRACE_COLUMNS)
-        self._frames = _RowBuffer(FRAME_COLUMNS)
-        self._estimate: Row = _UNKNOWN
-        self._deltas: Row = (
-            *(config[dof].delta_minus for dof in Dof),
-            *(config[dof].delta_plus for dof in Dof),
-        )
+        self._dofs = config.dofs
+        self._columns = frame_columns(config.dofs, () if config.dof else FEATURES)
+        self._trace = _RowBuffer(trace_columns(config.dofs))
+        self._frames = _RowBuffer(self._columns)
+        self._unknown = (np.nan,) * len(config.dofs)
+        self._estimate: Row = self._unknown
+        own = config.dof or [config[dof] for dof in Dof]
+        self._deltas: Row = (*(dof.delta_minus for dof in own), *(dof.delta_plus for dof in own))
         self._status = "none"
 
     def add_tick(self, sample: Sample, reference: Floats, command: Floats) -> None:
         """Add a control tick: the rig's sample, the reference and the command given then."""
-        truth = _UNKNOWN if sample.true_state is None else sample.true_state
+        truth = self._unknown if sample.true_state is None else sample.true_state
         self._trace.append(
             (
                 sample.time,
@@ -112,8 +129,8 @@ class RunRecorder:
 
     def add_frame(self, row: Row, delta_minus: Floats, delta_plus: Floats) -> None:
         """Add an image update: its `frame_row`, and the contact offsets (3,) after it."""
-        fields = dict(zip(FRAME_COLUMNS.names or (), row, strict=True))
-        self._estimate = tuple(fields[f"estimate_{dof.label}"] for dof in Dof)
+        fields = dict(zip(self._columns.names or (), row, strict=True))
+        self._estimate = tuple(fields[f"estimate_{dof.label}"] for dof in self._dofs)
         self._deltas = (*delta_minus, *delta_plus)
         self._status = str(fields["status"])
         self._frames.append(row)
@@ -122,7 +139,8 @@ class RunRecorder:
         """Trace and frames; the frames with the true state at their capture times."""
         trace, frames = self._trace.table(), self._frames.table()
         if len(trace):
-            for dof, truth in zip(Dof, per_dof(trace, "true").T, strict=True):
+            truths = per_dof(trace, "true", self._dofs)
+            for dof, truth in zip(self._dofs, truths.T, strict=True):
                 frames[f"true_{dof.label}"] = np.interp(
                     frames["captured_at"], trace["time"], truth, left=np.nan, right=np.nan
                 )

@@ -3,10 +3,11 @@
 use crate::article::estimator::Triggers;
 use crate::article::state::{StateEstimate, found};
 use crate::estimation::history::Entry;
-use crate::r#loop::measurement::{Measurement, Sight, is_reversed, is_usable};
+use crate::r#loop::measurement::{Measurement, is_reversed, is_usable};
 use crate::r#loop::profile::{BandBlocks, BandProfile, BandsView, Image, Profile, Seen, Updated};
 use crate::r#loop::reduction::HysteresisReduction;
 use crate::r#loop::report::{Report, Status};
+use crate::r#loop::sight::Sight;
 use crate::model::features::FeatureModel;
 use crate::supervision::flags::{Flag, Flags};
 use crate::supervision::frame_gate::{FrameArrival, ImageIdentity};

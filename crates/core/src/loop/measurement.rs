@@ -2,8 +2,6 @@
 
 use crate::article::state::found;
 use crate::dof::{all_finite, zip_with};
-use crate::estimation::history::Entry;
-use crate::r#loop::profile::ProfileBlocks;
 
 /// A measurement of the state, with what the update of a profile needs of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,32 +25,6 @@ impl<const N: usize, E> Measurement<N, E> {
     pub(crate) fn observed_state(&self) -> [f64; N] {
         let observed = |value, is_observable| if is_observable { value } else { f64::NAN };
         zip_with(self.state, self.observable, observed)
-    }
-}
-
-/// What a sensor saw at one time, before a profile has looked at it.
-pub(crate) trait Sight<P: ProfileBlocks<N>, const N: usize> {
-    /// What a report says of it.
-    type View: Copy;
-
-    /// Whether anything was seen.
-    fn is_usable(&self) -> bool;
-
-    /// The measurement; None where the model of the sensor sees nothing.
-    fn measure(
-        &self,
-        profile: &P,
-        past: &Entry<N>,
-    ) -> Option<(Measurement<N, P::Evidence>, Self::View)>;
-
-    /// Whether its two markers look exchanged.
-    fn is_exchanged(&self, _: &Self::View) -> bool {
-        false
-    }
-
-    /// Whether it `fits` with its two markers exchanged, by its distance.
-    fn fits_exchanged(&self, _: &P, _: &Entry<N>, _: impl Fn(f64) -> bool) -> bool {
-        false
     }
 }
 

@@ -1,5 +1,6 @@
 //! The whole loop, Fig. 6.
 
+pub(crate) mod axes;
 pub(crate) mod bands;
 pub(crate) mod best;
 pub(crate) mod image_update;
@@ -9,3 +10,4 @@ pub(crate) mod profile;
 pub(crate) mod reduction;
 pub(crate) mod report;
 pub(crate) mod settings;
+pub(crate) mod sight;

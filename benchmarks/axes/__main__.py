@@ -1,0 +1,90 @@
+"""Tracking of an operator's motion by loops of 1 to 8 degrees of freedom, and their computing time.
+
+The plants are plays of this folder, independent of the package; the tip is measured as it is, 40
+times per second, 50 ms late. `--write` updates docs/robots.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from axes.tracking import PLANTS, Job, simulate, times
+from common.doc_pages import insert
+from common.paths import ROOT
+from common.processes import add_arguments, run_parallel
+
+FIRST_SEED, SEEDS = 400, 5
+COUNTS = (1, 2, 5, 8)
+GOAL = 0.85
+"""Least reduction of the tracking error of a degree of freedom."""
+
+
+def to_rows(found: dict[Job, list[float]]) -> list[dict[str, Any]]:
+    """A row per number of degrees of freedom and plant: reductions over all and seeds, times."""
+    rows = []
+    for count in dict.fromkeys(count for count, _, _ in found):
+        spent = times(count)
+        for plant in PLANTS:
+            own = [found[job] for job in found if job[:2] == (count, plant)]
+            each = np.concatenate(own)
+            rows.append(
+                {
+                    "dofs": count,
+                    "plant": plant,
+                    "median": float(np.median(each)),
+                    "worst": float(each.min()),
+                    "share_below_goal": float(np.mean(each < GOAL)),
+                    "tick": spent[0],
+                    "update": spent[1],
+                    "seeds": len(own),
+                }
+            )
+    return rows
+
+
+def table(rows: Sequence[dict[str, Any]]) -> str:
+    """A Markdown table of the rows."""
+    lines = [
+        "| degrees of freedom | plays | reduction | worst | below 85 % | tick | update |",
+        "|--:|---|--:|--:|--:|--:|--:|",
+    ]
+    lines += [
+        f"| {row['dofs']} | {row['plant']} | {row['median']:.0%} | {row['worst']:.0%} "
+        f"| {row['share_below_goal']:.0%} | {1e6 * row['tick']:.0f} us "
+        f"| {1e6 * row['update']:.0f} us |"
+        for row in rows
+    ]
+    return "\n".join(lines)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="axes", description=__doc__.splitlines()[0])
+    parser.add_argument("--seeds", type=int, default=SEEDS, help="number of seeds [5]")
+    parser.add_argument("--first-seed", type=int, default=FIRST_SEED, help=f"[{FIRST_SEED}]")
+    parser.add_argument("--dofs", type=int, choices=COUNTS, help="only this number [all]")
+    add_arguments(parser)
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument("--write", action="store_true", help="update docs/robots.md")
+    options = parser.parse_args()
+    seeds = range(options.first_seed, options.first_seed + options.seeds)
+    counts = [options.dofs] if options.dofs else COUNTS
+    jobs = [(count, plant, seed) for count in counts for plant in PLANTS for seed in seeds]
+    done = dict(run_parallel(simulate, jobs, options.workers, options.scheduler))
+    rows = to_rows({job: done[job] for job in jobs})
+    if options.write:
+        head = f"Seeds {seeds[0]} to {seeds[-1]}; median and worst of all degrees of freedom.\n\n"
+        insert(ROOT / "docs" / "robots.md", "axes", head + table(rows))
+    print(json.dumps({"rows": rows}) if options.json else table(rows))
+
+
+if __name__ == "__main__":
+    main()

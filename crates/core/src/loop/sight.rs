@@ -1,0 +1,31 @@
+//! What a sensor saw, for a profile.
+
+use crate::estimation::history::Entry;
+use crate::r#loop::measurement::Measurement;
+use crate::r#loop::profile::ProfileBlocks;
+
+/// What a sensor saw at one time, before a profile has looked at it.
+pub(crate) trait Sight<P: ProfileBlocks<N>, const N: usize> {
+    /// What a report says of it.
+    type View: Copy;
+
+    /// Whether anything was seen.
+    fn is_usable(&self) -> bool;
+
+    /// The measurement; None where the model of the sensor sees nothing.
+    fn measure(
+        &self,
+        profile: &P,
+        past: &Entry<N>,
+    ) -> Option<(Measurement<N, P::Evidence>, Self::View)>;
+
+    /// Whether its two markers look exchanged.
+    fn is_exchanged(&self, _: &Self::View) -> bool {
+        false
+    }
+
+    /// Whether it `fits` with its two markers exchanged, by its distance.
+    fn fits_exchanged(&self, _: &P, _: &Entry<N>, _: impl Fn(f64) -> bool) -> bool {
+        false
+    }
+}

@@ -1,0 +1,52 @@
+"""A catheter of your own: two bending planes, and a tip that an EM tracker sees.
+
+Run it with ``uv run python examples/own_catheter.py``.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+from tautscope import Config, Pose, Sample, run_experiment
+from tautscope.config import DofEntry, KinematicsConfig, Sine
+from tautscope.loop.kinematics import TwoPlanes
+from tautscope.references import OperatorMotion
+
+CONFIG = Config(
+    dof=(DofEntry(name="bend_x", width_limit=1.0), DofEntry(name="bend_y", width_limit=1.0)),
+    kinematics=KinematicsConfig(kind="two_planes", length=0.06, tip_length=0.01),
+)
+
+
+class Catheter:
+    """Your motors and your tracker in place of these plays and this noise."""
+
+    control_period = 0.005
+
+    def reset(self) -> Sample:
+        """Straight, at rest."""
+        self.ticks, self.tip, self.rng = 0, np.zeros(2), np.random.default_rng(1)
+        return self.step(np.zeros(2))
+
+    def step(self, command: ArrayLike) -> Sample:
+        """Move; a pose of the tip 40 times per second."""
+        motors = np.asarray(command)
+        self.tip, self.ticks = np.clip(self.tip, motors - 0.3, motors + 0.3), self.ticks + 1
+        time = self.ticks * self.control_period
+        position, rotation = TwoPlanes(CONFIG).tip(self.tip)
+        pose = Pose(position + self.rng.normal(0, 0.3e-3, 3), time, rotation)
+        seen = (pose,) if self.ticks % 5 == 0 else ()
+        return Sample(time, motors, true_state=self.tip.copy(), measurements=seen)
+
+    def close(self) -> None:
+        """Stop your motors."""
+
+
+def main() -> None:
+    motion = OperatorMotion([Sine(centre=0.0, amplitude=1.2)] * 2, seed=3, duration=60.0)
+    without, with_it = (run_experiment(Catheter(), motion, CONFIG, on) for on in (False, True))
+    rms = zip(CONFIG.dofs, without.tracking_rms(), with_it.tracking_rms(), strict=True)
+    for dof, before, after in rms:
+        print(f"{dof.label}: tip off by {before:.3f} rad, with tautscope by {after:.3f} rad")
+
+
+if __name__ == "__main__":
+    main()

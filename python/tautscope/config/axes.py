@@ -1,0 +1,94 @@
+"""The degrees of freedom of any robot, its kinematics, and the noise of its sensors."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from tautscope.config.fields import Gain, Positive
+from tautscope.config.section import Section
+
+Name = Annotated[str, Meta(min_length=1, max_length=32, pattern=r"^[a-z][a-z0-9_]*$")]
+
+EXPECTED_WIDTH = 2 / 3
+"""Of `DofEntry.width_limit`, as the article's instrument has it."""
+START_DEVIATION = 0.3
+SPEED = 2.0
+RANGE = 50.0
+
+
+class DofEntry(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """One of 1 to 8 degrees of freedom of a robot that is not the article's instrument.
+
+    In the order of every array. With them, insertion, rotation, bending and the values per degree
+    of freedom in [safety] are not used.
+    """
+
+    name: Name
+    """Its name in traces, tables and messages: small letters, digits and underscores."""
+    width_limit: Positive
+    """Largest width of the slack that is compensated, and the unit of its other lengths [m or
+    rad]."""
+    unit: Literal["m", "rad"] = "rad"
+    """Its unit in every array."""
+    range: tuple[float, float] | None = None
+    """Least and largest command [m or rad]; without it 50 width_limit to both sides of 0."""
+    speed: Positive | None = None
+    """Largest speed of the reference that is followed [m or rad per s]; without it 2 width_limit
+    per s."""
+    friction: str = ""
+    """Degrees of freedom of one name share one friction, as a shaft that slides and turns in a
+    channel; without a name it has its own."""
+    lever: Positive = 1.0
+    """Of one that shares a friction: motion of the surface that rubs, over its own [m/rad], 1 for
+    a translation."""
+    expected_width: Positive | None = None
+    """Width of the slack that is expected [m or rad]; without it two thirds of width_limit."""
+    gain_limit: Gain = 5.0
+    """K_b: command over reference while the slack is crossed, and the bound of every gain."""
+    delta_minus: float = 0.0
+    """Initial offset at the negative contact [m or rad]."""
+    delta_plus: float = 0.0
+    """Initial offset at the positive contact [m or rad], not below delta_minus."""
+
+    @property
+    def label(self) -> str:
+        """The name in columns and tables."""
+        return self.name
+
+    @property
+    def display_unit(self) -> str:
+        """The unit in tables and figures: mm for a length. Arrays are in m and rad."""
+        return "mm" if self.unit == "m" else "rad"
+
+    @property
+    def display_scale(self) -> float:
+        """Factor from m or rad to `display_unit`."""
+        return 1e3 if self.unit == "m" else 1.0
+
+
+class KinematicsConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Where the tip is in a state of the degrees of freedom of [[dof]]."""
+
+    kind: str = "joints"
+    """"joints": the tip is measured degree by degree; "two_planes": a section of constant curvature
+    with the degrees of freedom bend_x, bend_y and, if there is one, insertion and rotation by their
+    names; or your class as "module:Class"."""
+    length: Positive = 0.08
+    """Of the bending section of "two_planes" [m]."""
+    tip_length: Positive = 0.015
+    """From its end to the sensor [m]."""
+
+
+class MeasurementConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Standard deviations of measurements that come without a covariance."""
+
+    tip_deviation: Positive = 0.01
+    """Of a tip that is measured degree by degree [in width_limit]."""
+    position_deviation: Positive = 0.5e-3
+    """Of a position [m]."""
+    orientation_deviation: Positive = 0.01
+    """Of an orientation about each axis [rad]."""
+    point_deviation: Positive = 0.5
+    """Of a point of an image [px]."""

@@ -1,0 +1,143 @@
+"""Where the tip is in a state of the degrees of freedom."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tautscope.config import Config
+from tautscope.errors import ConfigError
+
+Floats = NDArray[np.float64]
+Predict = Callable[[Floats], Floats]
+
+STEP = 1e-5
+"""Step of a difference, over the width limit of the degree of freedom."""
+_SMALL = 1e-4
+"""Angle below which the series of a sine is as exact [rad]."""
+
+
+@runtime_checkable
+class Kinematics(Protocol):
+    """Position and orientation of the tip in a state.
+
+    A class may also have ``points(q)``: (k, 2) pixels of named points, for `on_points`.
+    """
+
+    def tip(self, q: Floats) -> tuple[Floats, Floats]:
+        """Position (3,) [m] and rotation matrix (3, 3) of the tip in a state q (n,)."""
+        ...
+
+
+class TwoPlanes:
+    """A section of constant curvature that bends in two planes.
+
+    With the bending vector b = (bend_x, bend_y), theta = |b|, insertion s along z, rotation r about
+    z, length l of the section and t of the rigid tip:
+
+        p = Rz(r) ((0, 0, s) + l (b_x, b_y) (1 - cos theta) / theta^2, l sin(theta) / theta in z
+            + R(b) (0, 0, t)),      orientation Rz(r) R(b)
+
+    where R(b) turns by theta about (-b_y, b_x, 0) / theta. Smooth in every state, also where the
+    section is straight. Webster and Jones, Int. J. Robotics Research 29, 2010.
+
+    Wrong for a section that does not bend evenly.
+
+    Raises:
+        ConfigError: bend_x or bend_y is missing, or there is another degree of freedom.
+    """
+
+    NAMES = ("bend_x", "bend_y", "insertion", "rotation")
+
+    def __init__(self, config: Config) -> None:
+        names = [dof.label for dof in config.dofs]
+        for name in names:
+            if name not in self.NAMES:
+                raise ConfigError("dof.name", name, "one of " + ", ".join(self.NAMES))
+        for name in self.NAMES[:2]:
+            if name not in names:
+                raise ConfigError("dof", names, f'a degree of freedom "{name}"')
+        self._place = [names.index(name) if name in names else None for name in self.NAMES]
+        self._length, self._tip = config.kinematics.length, config.kinematics.tip_length
+
+    def tip(self, q: Floats) -> tuple[Floats, Floats]:
+        """Position (3,) [m] and rotation matrix (3, 3) of the tip in a state q (n,)."""
+        bend_x, bend_y, insertion, rotation = (
+            0.0 if place is None else float(q[place]) for place in self._place
+        )
+        turned = rotation_matrix(np.array([-bend_y, bend_x, 0.0]))
+        angle = np.hypot(bend_x, bend_y)
+        if angle < _SMALL:
+            along, aside = 1.0 - angle**2 / 6, 0.5
+        else:
+            along, aside = np.sin(angle) / angle, (1.0 - np.cos(angle)) / angle**2
+        arc = self._length * np.array([bend_x * aside, bend_y * aside, along])
+        about = rotation_matrix(np.array([0.0, 0.0, rotation]))
+        position = about @ (arc + turned[:, 2] * self._tip + np.array([0.0, 0.0, insertion]))
+        return position, about @ turned
+
+
+def build_kinematics(config: Config) -> Kinematics | None:
+    """The kinematics of a configuration; None where the tip is measured degree by degree.
+
+    A class of yours is called without arguments.
+
+    Raises:
+        ConfigError: There is no such module or class, it needs arguments, or has no method ``tip``.
+    """
+    kind = config.kinematics.kind
+    if kind == "joints":
+        return None
+    if kind == "two_planes":
+        return TwoPlanes(config)
+    field, allowed = "kinematics.kind", '"joints", "two_planes" or "module:Class"'
+    module, _, name = kind.partition(":")
+    if not module or not name:
+        raise ConfigError(field, kind, allowed)
+    try:
+        made = getattr(import_module(module), name)()
+    except (ImportError, AttributeError, TypeError) as error:
+        raise ConfigError(field, kind, f"{allowed} ({error})") from None
+    if not isinstance(made, Kinematics):
+        raise ConfigError(field, kind, "a class with the method tip(q)")
+    return made
+
+
+def jacobian_by_differences(predict: Predict, q: Floats, steps: Floats) -> Floats:
+    """dz/dq (m, n) by central differences with steps (n,)."""
+    columns = []
+    for index, step in enumerate(steps):
+        ahead, behind = q.copy(), q.copy()
+        ahead[index] += step
+        behind[index] -= step
+        columns.append((predict(ahead) - predict(behind)) / (2 * step))
+    return np.stack(columns, axis=1)
+
+
+def rotation_matrix(vector: Floats) -> Floats:
+    """Rotation matrix (3, 3) of a rotation vector (3,) [rad], by Rodrigues' formula."""
+    angle = float(np.sqrt(vector @ vector))
+    x, y, z = vector
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    if angle < _SMALL:
+        first, second = 1.0 - angle**2 / 6, 0.5 - angle**2 / 24
+    else:
+        first, second = np.sin(angle) / angle, (1.0 - np.cos(angle)) / angle**2
+    turned: Floats = np.eye(3) + first * cross + second * (cross @ cross)
+    return turned
+
+
+def rotation_vector(matrix: Floats) -> Floats:
+    """Rotation vector (3,) [rad] of a rotation matrix (3, 3); not near half a turn."""
+    skew = np.array(
+        [matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]]
+    )
+    sine = float(np.sqrt(skew @ skew)) / 2
+    cosine = (float(np.trace(matrix)) - 1) / 2
+    angle = np.arctan2(sine, cosine)
+    vector: Floats = skew / 2 * (1.0 + angle**2 / 6 if sine < _SMALL else angle / sine)
+    return vector

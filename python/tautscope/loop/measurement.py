@@ -1,0 +1,209 @@
+"""What a sensor measures of the tip, as values, covariance and a model of the sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tautscope.config import Config
+from tautscope.errors import SignalError
+from tautscope.loop.kinematics import (
+    STEP,
+    Floats,
+    Kinematics,
+    Predict,
+    jacobian_by_differences,
+    rotation_vector,
+)
+from tautscope.loop.signal_checks import check_covariance, check_numbers
+
+MOST_VALUES = 16
+SENSORS = 4
+Model = Callable[[Floats], tuple[Floats, Floats] | None]
+"""State (n,) to the values (m,) that would be measured and their derivatives (m, n)."""
+_UNIT_LENGTH = 1e-3
+"""How far a quaternion or a rotation matrix may be from one by rounding."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tip:
+    """The tip measured degree by degree: values (n,) [m or rad], NaN for what was not measured."""
+
+    values: ArrayLike
+    captured_at: float
+    covariance: ArrayLike | None = None
+    sensor: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Position (3,) [m] and, if measured, orientation of the tip, by an EM tracker for example.
+
+    `orientation` is a rotation matrix (3, 3) or a quaternion (4,) x, y, z, w; the covariance is
+    (3, 3) or (6, 6), position first, then the rotation about the sensor's axes.
+    """
+
+    position: ArrayLike
+    captured_at: float
+    orientation: ArrayLike | None = None
+    covariance: ArrayLike | None = None
+    sensor: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Points:
+    """Pixels (k, 2) of the points of the kinematics; NaN for one that was not found."""
+
+    pixels: ArrayLike
+    captured_at: float
+    covariance: ArrayLike | None = None
+    sensor: int = 0
+
+
+Measurement = Tip | Pose | Points
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reading:
+    """Values (m,), their covariance (m, m), the model of the sensor, and how many are one point."""
+
+    values: Floats
+    covariance: Floats
+    model: Model
+    point: int = 1
+
+
+class Sensors:
+    """Turns measurements into readings for a configuration."""
+
+    def __init__(self, config: Config, kinematics: Kinematics | None) -> None:
+        self._config, self._kinematics = config, kinematics
+        self._count = len(config.dof)
+        self._widths = np.array([dof.width_limit for dof in config.dof])
+
+    def tip(self, values: ArrayLike, covariance: ArrayLike | None) -> Reading:
+        """Reading of the tip degree by degree.
+
+        Raises:
+            SignalError: The values are not n numbers or NaN, or the covariance is none.
+        """
+        found = check_numbers("values", values, (self._count,), "numbers or NaN")
+        std = self._config.measurement.tip_deviation * self._widths
+        identity = np.eye(self._count)
+        model = lambda q: (q, identity)  # noqa: E731
+        return Reading(found, _covariance(covariance, std), model)
+
+    def pose(
+        self, position: ArrayLike, orientation: ArrayLike | None, covariance: ArrayLike | None
+    ) -> Reading:
+        """Reading of a pose: position, and the rotation from the measured orientation.
+
+        Raises:
+            SignalError: A shape is wrong, the orientation is no rotation, or the kinematics has no
+                tip.
+        """
+        kinematics = self._with("tip", "on_pose")
+        place = check_numbers("position", position, (3,), "numbers or NaN")
+        settings = self._config.measurement
+        std = np.full(3, settings.position_deviation)
+        if orientation is None:
+            return self.own(place, _covariance(covariance, std), lambda q: kinematics.tip(q)[0])
+        turned = check_rotation(orientation)
+
+        def predict(q: Floats) -> Floats:
+            position, rotation = kinematics.tip(q)
+            return np.concatenate([position, rotation_vector(turned.T @ rotation)])
+
+        values = np.concatenate([place, np.zeros(3)])
+        std = np.concatenate([std, np.full(3, settings.orientation_deviation)])
+        return self.own(values, _covariance(covariance, std), predict)
+
+    def points(self, pixels: ArrayLike, covariance: ArrayLike | None) -> Reading:
+        """Reading of points of an image.
+
+        Raises:
+            SignalError: The pixels are not (k, 2) numbers or NaN, or the kinematics has no points.
+        """
+        kinematics = self._with("points", "on_points")
+        shape = np.shape(pixels)
+        count = shape[0] if len(shape) == 2 and 1 <= shape[0] <= MOST_VALUES // 2 else 1
+        found = check_numbers("pixels", pixels, (count, 2), "numbers or NaN").ravel()
+        std = np.full(found.size, self._config.measurement.point_deviation)
+        predict = lambda q: np.ravel(kinematics.points(q))  # type: ignore[attr-defined]  # noqa: E731
+        return self.own(found, _covariance(covariance, std), predict, point=2)
+
+    def own(
+        self,
+        values: Floats,
+        covariance: Floats,
+        predict: Predict,
+        jacobian: Predict | None = None,
+        point: int = 1,
+    ) -> Reading:
+        """Reading of values (m,) by a model of the user's, with its Jacobian or by differences."""
+        derive = jacobian or partial(
+            jacobian_by_differences, partial(_predicted, predict, values), steps=STEP * self._widths
+        )
+
+        def model(q: Floats) -> tuple[Floats, Floats]:
+            rows = np.asarray(derive(q), dtype=np.float64)
+            if rows.shape != (len(values), len(q)):
+                shape = f"an array {(len(values), len(q))}"
+                raise SignalError("jacobian(q)", f"an array {rows.shape}", shape)
+            return _predicted(predict, values, q), rows
+
+        return Reading(values, covariance, model, point)
+
+    def _with(self, method: str, call: str) -> Kinematics:
+        kinematics = self._kinematics
+        if kinematics is None or not hasattr(kinematics, method):
+            kind = self._config.kinematics.kind
+            raise SignalError(call, kind, f"a kinematics.kind with the method {method}(q)")
+        return kinematics
+
+
+def check_rotation(orientation: ArrayLike) -> Floats:
+    """A rotation matrix (3, 3) of itself or of a quaternion (4,) x, y, z, w.
+
+    Raises:
+        SignalError: It is neither.
+    """
+    allowed = "a rotation matrix (3, 3) or a quaternion (4,) x, y, z, w of length 1"
+    try:
+        found = np.asarray(orientation, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise SignalError("orientation", orientation, allowed) from None
+    if found.shape == (4,) and abs(float(found @ found) - 1) < 2 * _UNIT_LENGTH:
+        x, y, z, w = found / np.sqrt(found @ found)
+        return np.array(
+            [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+            ]
+        )
+    if (
+        found.shape == (3, 3)
+        and np.allclose(found @ found.T, np.eye(3), atol=_UNIT_LENGTH)
+        and np.linalg.det(found) > 0
+    ):
+        return found
+    raise SignalError("orientation", found.tolist(), allowed)
+
+
+def _predicted(predict: Predict, values: Floats, q: Floats) -> Floats:
+    found = np.asarray(predict(q), dtype=np.float64)
+    if found.shape != values.shape:
+        shape = f"an array {values.shape}"
+        raise SignalError("predict(q)", f"an array {found.shape}", shape)
+    return found
+
+
+def _covariance(covariance: ArrayLike | None, std: NDArray[np.float64]) -> Floats:
+    if covariance is None:
+        return np.diag(std**2)
+    return check_covariance("covariance", covariance, len(std))

@@ -1,0 +1,370 @@
+"""Loops of 1 to 8 degrees of freedom with any sensor of the tip."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import ArrayLike, NDArray
+from tautscope import Config, HysteresisReduction, Report, axes
+from tautscope.config import DofEntry, KinematicsConfig, Sine, from_document
+from tautscope.errors import ConfigError, SignalError
+from tautscope.loop.kinematics import TwoPlanes
+from tautscope.loop.references import OperatorMotion
+
+Floats = NDArray[np.float64]
+PERIOD = 0.005
+TWO = Config(
+    dof=(DofEntry(name="bend_x", width_limit=1.0), DofEntry(name="bend_y", width_limit=1.0)),
+    kinematics=KinematicsConfig(kind="two_planes", length=0.06, tip_length=0.01),
+)
+
+
+class Plays:
+    """Tip of n motors: the mean of plays of some radii each."""
+
+    def __init__(self, widths: ArrayLike, shares: ArrayLike = (1.0,)) -> None:
+        self._half = np.outer(np.asarray(widths) / 2, shares)
+        self._plays = np.zeros(self._half.shape)
+
+    def __call__(self, command: Floats) -> Floats:
+        motor = command[:, None]
+        self._plays = np.clip(self._plays, motor - self._half, motor + self._half)
+        tip: Floats = self._plays.mean(axis=1)
+        return tip
+
+
+Look = Callable[[HysteresisReduction, Floats, float], Report | None]
+
+
+def operate(
+    loop: HysteresisReduction,
+    plant: Plays,
+    look: Look,
+    *,
+    seconds: float = 50.0,
+    delay: float = 0.04,
+    amplitude: float = 1.0,
+) -> Floats:
+    """RMS (n,) of tip less reference after 20 s of an operator's motion, looks at 40 Hz."""
+    count = len(loop.delta_minus)
+    motion = OperatorMotion([Sine(centre=0.0, amplitude=amplitude)] * count, 7, seconds)
+    late: list[tuple[float, Floats]] = []
+    errors = []
+    for tick in range(round(seconds / PERIOD)):
+        time = tick * PERIOD
+        reference = motion(time)
+        tip = plant(loop.step(reference, time))
+        if tick % 5 == 0:
+            late.append((time, tip))
+        if late and late[0][0] <= time - delay:
+            look(loop, late[0][1], late[0][0])
+            late.pop(0)
+        if time > 20:
+            errors.append(tip - reference)
+    rms: Floats = np.sqrt(np.mean(np.square(errors), axis=0))
+    return rms
+
+
+def on_tip(std: float, seed: int = 0) -> Look:
+    rng = np.random.default_rng(seed)
+    return lambda loop, tip, at: loop.on_tip(
+        tip + rng.normal(0, std, len(tip)), at, np.eye(len(tip)) * std**2
+    )
+
+
+@pytest.mark.parametrize("count", [1, 2, 5, 8])
+@pytest.mark.parametrize("shares", [(1.0,), (0.5, 0.75, 1.0, 1.25, 1.5)], ids=["ideal", "rounded"])
+def test_axes_measured_as_they_are_are_compensated(count: int, shares: tuple[float, ...]) -> None:
+    widths = np.random.default_rng(count).uniform(0.45, 0.8, count)
+    config = axes(count, width_limit=1.2)
+    looks = on_tip(0.005)
+    off = operate(HysteresisReduction(config, compensate=False), Plays(widths, shares), looks)
+    loop = HysteresisReduction(config)
+    left = operate(loop, Plays(widths, shares), looks)
+    assert (1 - left / off).mean() > 0.82, 1 - left / off
+    assert (1 - left / off).min() > 0.7, 1 - left / off
+    assert loop.supervision.latched == ()
+    # The rounded loop of these plays is as wide as their mean.
+    found = loop.hysteresis
+    assert found is not None
+    np.testing.assert_allclose(2 * found.half_width, widths, rtol=0.25)
+
+
+def test_axes_that_share_a_friction_release_each_other() -> None:
+    shared = {"friction": "shaft", "lever": [1.0, 2e-3]}
+    config = axes(2, width_limit=[12e-3, 2.6], unit=["m", "rad"], **shared)
+    loop, alone = HysteresisReduction(config), axes(2, width_limit=[12e-3, 2.6], unit=["m", "rad"])
+    assert HysteresisReduction(alone).hysteresis is not None
+    commands = [loop.step([0.004 * np.sin(t), 0.0], t) for t in np.arange(0, 3, PERIOD)]
+    assert np.isfinite(commands).all()
+
+
+def test_a_pose_determines_both_planes() -> None:
+    kinematics = TwoPlanes(TWO)
+    rng = np.random.default_rng(3)
+
+    def look(loop: HysteresisReduction, tip: Floats, at: float) -> Report:
+        position, rotation = kinematics.tip(tip)
+        return loop.on_pose(position + rng.normal(0, 0.3e-3, 3), at, rotation)
+
+    off = operate(HysteresisReduction(TWO, compensate=False), Plays([0.6, 0.5]), look)
+    left = operate(HysteresisReduction(TWO), Plays([0.6, 0.5]), look)
+    assert (1 - left / off).min() > 0.8, 1 - left / off
+
+
+def test_a_position_alone_is_enough_where_it_determines_the_state() -> None:
+    kinematics = TwoPlanes(TWO)
+
+    def look(loop: HysteresisReduction, tip: Floats, at: float) -> Report:
+        return loop.on_pose(kinematics.tip(tip)[0], at)
+
+    left = operate(HysteresisReduction(TWO), Plays([0.6, 0.5]), look)
+    assert left.max() < 0.08
+
+
+class Camera:
+    """Two points of a tip that bends in one plane, as a pinhole sees them from aside."""
+
+    def tip(self, q: Floats) -> tuple[Floats, Floats]:
+        raise AssertionError("points need no tip")
+
+    def points(self, q: Floats) -> Floats:
+        angle, insertion = q
+        ends = np.array([[0.3, 0.01], [0.6, 0.02]]) * np.array([angle, 1.0])
+        return 400 * np.stack([insertion + ends[:, 1] * np.cos(ends[:, 0]), ends[:, 0]], axis=1)
+
+
+POINTS = from_document(
+    {
+        "dof": [
+            {"name": "bend", "width_limit": 1.2},
+            {"name": "insertion", "unit": "m", "width_limit": 12e-3},
+        ],
+        "kinematics": {"kind": "test_axes:Camera"},
+    }
+)
+
+
+def test_points_of_your_own_kinematics() -> None:
+    camera, loop = Camera(), HysteresisReduction(POINTS)
+    plant = Plays([0.6, 6e-3])
+    for tick in range(6000):
+        time = tick * PERIOD
+        tip = plant(loop.step([0.8 * np.sin(time), 0.012 * np.sin(0.7 * time)], time))
+        if tick % 8 == 0:
+            seen, at_once = camera.points(tip), tip
+            if tick % 3 == 0:
+                seen[1] = np.nan  # not found
+            if tick % 5 == 0:
+                seen[0] += [40.0, 30.0]  # something else
+            report = loop.on_points(seen, time)
+    scale = np.array([1.2, 12e-3])
+    np.testing.assert_allclose(report.state_estimate / scale, at_once / scale, atol=0.02)
+    np.testing.assert_allclose(loop.predicted_state / scale, tip / scale, atol=0.05)
+
+
+def test_a_measurement_of_your_own_needs_no_jacobian() -> None:
+    """Two sums of three DOFs and one value twice, against the same with exact derivatives."""
+    rows = np.array([[1.0, 1.0, 0.0], [0.0, 1.0, 1.0], [1.0, 0.0, 1.0]])
+    config = axes(3, width_limit=1.0)
+    loops = [HysteresisReduction(config) for _ in range(2)]
+    plants = [Plays([0.5, 0.4, 0.6]) for _ in range(2)]
+    for tick in range(3000):
+        time = tick * PERIOD
+        reference = np.sin(time * np.array([1.0, 0.7, 1.3]))
+        for index, (loop, plant) in enumerate(zip(loops, plants, strict=True)):
+            tip = plant(loop.step(reference, time))
+            if tick % 8 == 0:
+                z = rows @ tip**3
+                derive = None if index == 0 else lambda q: rows * (3 * q**2)
+                loop.on_measurement(
+                    z, time, np.eye(3) * 1e-4, lambda q: rows @ q**3, jacobian=derive
+                )
+    np.testing.assert_allclose(loops[0].delta_plus, loops[1].delta_plus, rtol=1e-4)
+
+
+def test_two_equal_values_say_as_much_as_one_of_half_the_variance() -> None:
+    config = axes(2, width_limit=1.0)
+    once, twice = HysteresisReduction(config), HysteresisReduction(config)
+    plant = Plays([0.5, 0.4])
+    stack = np.vstack([np.eye(2), np.eye(2)])
+    for tick in range(2000):
+        time = tick * PERIOD
+        reference = np.sin(time * np.array([1.0, 0.7]))
+        tip = plant(once.step(reference, time))
+        twice.step(reference, time)
+        if tick % 8 == 0:
+            first = once.on_tip(tip, time, np.eye(2) * 1e-4)
+            second = twice.on_measurement(
+                stack @ tip, time, np.eye(4) * 2e-4, lambda q: stack @ q, jacobian=lambda _: stack
+            )
+            np.testing.assert_allclose(first.state_estimate, second.state_estimate, atol=1e-4)
+    np.testing.assert_allclose(once.delta_plus, twice.delta_plus, rtol=1e-3)
+
+
+def test_what_was_not_measured_is_held() -> None:
+    loop = HysteresisReduction(axes(2, width_limit=1.0))
+    for tick in range(400):
+        loop.step([0.001 * tick, 0.001 * tick], tick * PERIOD)
+    report = loop.on_tip([0.2, np.nan], 399 * PERIOD)
+    assert report.status == "partial"
+    np.testing.assert_array_equal(report.observable, [True, False])
+    assert np.isnan(report.innovation).tolist() == [False, True]
+
+
+def test_repeated_late_and_future_measurements() -> None:
+    loop = HysteresisReduction(axes(1, width_limit=1.0))
+    for tick in range(400):
+        loop.step([0.001 * tick], tick * PERIOD)
+    now = 399 * PERIOD
+    assert loop.on_tip([0.3], now - 0.1).status == "ok"
+    assert loop.on_tip([0.31], now - 0.1).status == "duplicate"
+    assert loop.on_tip([0.29], now - 0.15).status == "duplicate"
+    assert loop.on_tip([0.29], now - 0.15, sensor=1).status == "ok"
+    assert loop.on_tip([0.3], now - 0.5, sensor=2).status == "refused"
+    assert "late" in loop.supervision.latched
+    assert loop.on_tip([0.3], now + 1.0).status == "stale"
+    assert "clock" in loop.supervision.latched
+
+
+def test_a_late_sensor_counts_at_the_time_of_its_measurement() -> None:
+    """A fast encoder of the first DOF, and a slow tracker of both, 200 ms late."""
+    loop, plant = HysteresisReduction(axes(2, width_limit=1.0)), Plays([0.5, 0.5])
+    tips: list[Floats] = []
+    errors = []
+    for tick in range(8000):
+        time = tick * PERIOD
+        tips.append(plant(loop.step(np.sin(time * np.array([1.0, 0.8])), time)))
+        loop.on_tip([tips[-1][0], np.nan], time, np.eye(2) * 1e-6)
+        if tick % 8 == 0 and tick >= 40:
+            report = loop.on_tip(tips[-41], time - 40 * PERIOD, np.eye(2) * 1e-6, sensor=1)
+            errors.append(report.state_estimate - tips[-41])
+            assert report.status in ("ok", "refused"), report
+    assert np.abs(errors[-200:]).max() < 0.02
+    reference = np.sin(time * np.array([1.0, 0.8]))
+    assert np.abs(tips[-1] - reference).max() < 0.12
+
+
+def test_a_tracker_that_repeats_its_value_is_frozen() -> None:
+    loop, plant = HysteresisReduction(axes(1, width_limit=1.0)), Plays([0.5])
+    for tick in range(6000):
+        time = tick * PERIOD
+        tip = plant(loop.step([2.0 * np.sin(time)], time))
+        loop.on_tip(tip if tick < 3000 else [0.123], time)
+    assert "frozen" in loop.supervision.latched
+
+
+def _with(**keys: Any) -> dict[str, Any]:
+    return {"dof": [{"name": "a", "width_limit": 1.0} | keys]}
+
+
+@pytest.mark.parametrize(
+    ("document", "field"),
+    [
+        (_with(name="A b"), "dof[0].name"),
+        (_with(name=""), "dof[0].name"),
+        (_with(width_limit=0.0), "dof[0].width_limit"),
+        (_with(width_limit=float("nan")), "dof[0].width_limit"),
+        (_with(unit="deg"), "dof[0].unit"),
+        (_with(range=[1.0, -1.0]), "dof[0].range"),
+        (_with(range=[-180.0, 180.0]), "dof[0].range"),
+        (_with(range=[1.0]), "dof[0].range"),
+        (_with(speed=-1.0), "dof[0].speed"),
+        (_with(lever=0.0), "dof[0].lever"),
+        (_with(gain_limit=0.5), "dof[0].gain_limit"),
+        (_with(expected_width=2.0), "dof[0].expected_width"),
+        (_with(delta_minus=0.2, delta_plus=0.1), "dof[0].delta_minus"),
+        (_with(widht=1.0), "dof[0].widht"),
+        ({"dof": [{"name": "a"}]}, "dof[0].width_limit"),
+        ({"dof": _with()["dof"] * 2}, "dof[1].name"),
+        ({"dof": [{"name": f"a{k}", "width_limit": 1.0} for k in range(9)]}, "dof"),
+        (_with() | {"profile": "paper"}, "profile"),
+        (_with() | {"safety": {"width_limit": [1.0, 1.0, 1.0]}}, "safety.width_limit"),
+    ],
+)
+def test_a_wrong_configuration_is_refused(document: dict[str, Any], field: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        from_document(document)
+    assert caught.value.field == field
+
+
+@pytest.mark.parametrize(
+    ("kind", "field"),
+    [
+        ("joint", "kinematics.kind"),
+        ("no_such_module:Robot", "kinematics.kind"),
+        ("test_axes:Nothing", "kinematics.kind"),
+        ("test_axes:Plays", "kinematics.kind"),
+        ("two_planes", "dof.name"),
+    ],
+)
+def test_a_wrong_kinematics_is_refused(kind: str, field: str) -> None:
+    config = from_document(_with() | {"kinematics": {"kind": kind}})
+    with pytest.raises(ConfigError) as caught:
+        HysteresisReduction(config)
+    assert caught.value.field == field
+
+
+EYE = np.eye(3)
+
+
+@pytest.mark.parametrize(
+    ("call", "field"),
+    [
+        (lambda loop: loop.step([0.0, 0.0, 0.0]), "reference"),
+        (lambda loop: loop.step([0.0, np.nan]), "reference"),
+        (lambda loop: loop.on_tip([0.0], 0.0), "values"),
+        (lambda loop: loop.on_tip([np.nan, np.nan], 0.0), "values"),
+        (lambda loop: loop.on_tip([np.inf, 0.0], 0.0), "values"),
+        (lambda loop: loop.on_tip("ab", 0.0), "values"),
+        (lambda loop: loop.on_tip([0.0, 0.0], np.nan), "captured_at"),
+        (lambda loop: loop.on_tip([0.0, 0.0], 0.0, np.eye(3)), "covariance"),
+        (lambda loop: loop.on_tip([0.0, 0.0], 0.0, [[1, 2], [0, 1]]), "covariance"),
+        (lambda loop: loop.on_tip([0.0, 0.0], 0.0, np.zeros((2, 2))), "covariance"),
+        (lambda loop: loop.on_tip([0.0, 0.0], 0.0, sensor=4), "sensor"),
+        (lambda loop: loop.on_pose([0.0, 0.0], 0.0), "position"),
+        (lambda loop: loop.on_pose([0.0, 0.0, 0.0], 0.0, [0, 0, 0, 2.0]), "orientation"),
+        (lambda loop: loop.on_pose([0.0, 0.0, 0.0], 0.0, -EYE), "orientation"),
+        (lambda loop: loop.on_pose([0.0, 0.0, 0.0], 0.0, [0.0, 0.0, 0.0]), "orientation"),
+        (lambda loop: loop.on_pose([0.0, 0.0, 0.0], 0.0, EYE, EYE), "covariance"),
+        (lambda loop: loop.on_points([[0.0, 0.0]], 0.0), "on_points"),
+        (lambda loop: loop.on_measurement([], 0.0, EYE, lambda q: q), "values"),
+        (lambda loop: loop.on_measurement(np.ones(17), 0.0, EYE, lambda q: q), "values"),
+        (lambda loop: loop.on_measurement([1.0], 0.0, [[1.0]], lambda q: q), "predict(q)"),
+        (
+            lambda loop: loop.on_measurement(
+                [1.0], 0.0, [[1.0]], lambda q: q[:1], jacobian=lambda q: q
+            ),
+            "jacobian(q)",
+        ),
+        (lambda loop: loop.on_features(np.ones(4), 0.0), "on_features"),
+        (lambda loop: loop.predict_state(0.0), "predict_state"),
+    ],
+)
+def test_a_wrong_signal_names_its_field(
+    call: Callable[[HysteresisReduction], object], field: str
+) -> None:
+    loop = HysteresisReduction(TWO)
+    loop.step([0.0, 0.0], 0.0)
+    with pytest.raises(SignalError) as caught:
+        call(loop)
+    assert caught.value.field == field
+
+
+@pytest.mark.parametrize("call", ["on_tip", "on_pose", "on_points"])
+def test_the_articles_instrument_says_what_it_needs(call: str) -> None:
+    with pytest.raises(SignalError, match="dof"):
+        getattr(HysteresisReduction(Config()), call)([0.0, 0.0, 0.0], 0.0)
+
+
+def test_an_error_of_your_model_is_raised_and_the_loop_goes_on() -> None:
+    loop = HysteresisReduction(axes(1, width_limit=1.0))
+    loop.step([0.0], 0.0)
+
+    def fail(_: Floats) -> Floats:
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        loop.on_measurement([0.0], 0.0, [[1.0]], fail)
+    assert np.isfinite(loop.step([0.01], PERIOD)).all()

@@ -1,0 +1,58 @@
+"""Kinematics of two bending planes against an integrated curve, rotations against SciPy."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+from tautscope.config import from_document
+from tautscope.loop.kinematics import TwoPlanes, rotation_matrix, rotation_vector
+from tautscope.loop.measurement import check_rotation
+
+CONFIG = from_document(
+    {
+        "dof": [
+            {"name": "insertion", "unit": "m", "width_limit": 0.01},
+            {"name": "bend_x", "width_limit": 1.0},
+            {"name": "bend_y", "width_limit": 1.0},
+            {"name": "rotation", "width_limit": 1.0},
+        ],
+        "kinematics": {"kind": "two_planes", "length": 0.05, "tip_length": 0.02},
+    }
+)
+
+
+@pytest.mark.parametrize(
+    "q",
+    [
+        (0.03, 0.0, 0.0, 0.0),
+        (0.0, 1e-6, -2e-6, 0.4),
+        (0.01, 9e-5, 4e-5, 1.0),
+        (0.02, 0.7, -1.1, -0.6),
+        (0.0, -2.0, 1.5, 2.0),
+    ],
+)
+def test_two_planes_is_the_integral_of_a_constant_curvature(q: tuple[float, ...]) -> None:
+    insertion, bend_x, bend_y, rotation = q
+    turn = np.array([-bend_y, bend_x, 0.0]) / 0.05
+
+    def slope(_: float, y: np.ndarray) -> np.ndarray:
+        frame = y[3:].reshape(3, 3)
+        cross = np.cross(np.eye(3), turn)
+        return np.concatenate([frame[:, 2], (frame @ cross).ravel()])
+
+    start = np.concatenate([np.zeros(3), np.eye(3).ravel()])
+    end = solve_ivp(slope, (0, 0.05), start, rtol=1e-11, atol=1e-13).y[:, -1]
+    frame, about = end[3:].reshape(3, 3), Rotation.from_rotvec([0, 0, rotation]).as_matrix()
+    place = about @ (end[:3] + frame[:, 2] * 0.02 + [0, 0, insertion])
+    position, orientation = TwoPlanes(CONFIG).tip(np.array(q))
+    np.testing.assert_allclose(position, place, atol=1e-9)
+    np.testing.assert_allclose(orientation, about @ frame, atol=1e-8)
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-7, 1e-4, 0.3, 2.0, 3.0])
+def test_rotations_are_those_of_scipy(size: float) -> None:
+    vector = size * np.array([2.0, -1.0, 2.0]) / 3
+    oracle = Rotation.from_rotvec(vector)
+    np.testing.assert_allclose(rotation_matrix(vector), oracle.as_matrix(), atol=1e-12)
+    np.testing.assert_allclose(rotation_vector(oracle.as_matrix()), vector, atol=1e-9)
+    np.testing.assert_allclose(check_rotation(oracle.as_quat()), oracle.as_matrix(), atol=1e-12)
