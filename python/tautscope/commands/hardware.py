@@ -7,11 +7,12 @@ import math
 import sys
 from typing import TYPE_CHECKING
 
-from tautscope.commands import arguments
+from tautscope.commands import arguments, robot
 from tautscope.commands.article_config import article_config
 from tautscope.commands.held_run import recording_saved
 from tautscope.commands.positions import add_reference, read_reference
 from tautscope.commands.printing import announce, print_json
+from tautscope.config import load_config
 from tautscope.config.placeholders import refuse_placeholders
 from tautscope.dof import Dof
 from tautscope.errors import FieldError
@@ -51,6 +52,13 @@ def add_parser(verbs: arguments.Verbs) -> None:
         help="periods of the reference per DOF [experiment.periods of the configuration]",
     )
     add_reference(run, "the article's experiment")
+    run.add_argument(
+        "--rig",
+        metavar="MODULE:CLASS",
+        help="run an operator's motion, without and then with compensation, on a rig of your own "
+        "in place of [drives] and [camera]: docs/robots.md",
+    )
+    robot.add_seconds(run, "a rig")
     arguments.add_out(run, "run")
     arguments.add_json(run)
     run.set_defaults(run=_run)
@@ -63,6 +71,17 @@ def _run(options: argparse.Namespace) -> int:
     from tautscope.hardware.run_results import write_run_folder  # noqa: PLC0415
     from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
 
+    if options.rig is not None:
+        from tautscope.runs.rigs import rig_maker  # noqa: PLC0415
+
+        if options.reference is not None or options.periods is not None or options.compare:
+            what = "neither --reference nor --periods nor --compare"
+            raise FieldError("--rig", options.rig, what)
+        config = load_config(options.config, options.profile)
+        robot.run(options, config, rig_maker(options.rig), "run", seed=0)
+        return 0
+    if options.seconds is not None:
+        raise FieldError("--seconds", options.seconds, "--rig")
     config = article_config(options.config, options.profile)
     refuse_placeholders(options.config)
     if options.periods is not None:

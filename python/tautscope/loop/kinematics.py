@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib import import_module
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from tautscope.config import Config
 from tautscope.errors import ConfigError
+from tautscope.loop.named_class import named_class
 
 Floats = NDArray[np.float64]
 Predict = Callable[[Floats], Floats]
@@ -95,13 +95,11 @@ def build_kinematics(config: Config) -> Kinematics | None:
     if kind == "two_planes":
         return TwoPlanes(config)
     field, allowed = "kinematics.kind", '"joints", "two_planes" or "module:Class"'
-    module, _, name = kind.partition(":")
-    if not module or not name:
-        raise ConfigError(field, kind, allowed)
+    make = named_class(field, kind, allowed)
     try:
-        made = getattr(import_module(module), name)()
-    except (ImportError, AttributeError, TypeError) as error:
-        raise ConfigError(field, kind, f"{allowed} ({error})") from None
+        made = make()
+    except TypeError as error:
+        raise ConfigError(field, kind, f"a class without arguments ({error})") from None
     if not isinstance(made, Kinematics):
         raise ConfigError(field, kind, "a class with the method tip(q)")
     return made

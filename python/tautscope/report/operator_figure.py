@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from string import ascii_lowercase
 from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from tautscope.dof import Dof
+from tautscope.dof import NamedDof
 from tautscope.figure_style import BLACK, BLUE, GREY, ORANGE, PAGE, style
 from tautscope.report.operator_motion import evaluated_after, tip_and_reference
 from tautscope.runs.recording import Recording
@@ -25,8 +26,8 @@ WINDOW = 20.0
 def draw_operator_motion(uncompensated: Recording | None, main: Recording) -> Figure:
     """The operator motion of a run, and of one without compensation: one row per DOF.
 
-    (a)-(c): reference, command and tip over 20 s, the tip also without compensation.
-    (d)-(f): tracking error of the tip over the whole run, without and with compensation.
+    Left: reference, command and tip over 20 s, the tip also without compensation.
+    Right: tracking error of the tip over the whole run, without and with compensation.
     The tip is the true one where it is known, else that of the images.
     """
     runs = [(uncompensated, GREY)] if uncompensated is not None else []
@@ -34,9 +35,11 @@ def draw_operator_motion(uncompensated: Recording | None, main: Recording) -> Fi
     begin = evaluated_after(main)
     end = float(main.trace["time"][-1] - main.trace["time"][0])
     with style():
-        figure = Figure(figsize=(PAGE, 6.0), layout="constrained")
-        panels = figure.subplots(len(Dof), 2, sharex="col", width_ratios=(1.25, 1))
-        for dof, (signals, errors), letters in zip(Dof, panels, ("ad", "be", "cf"), strict=True):
+        dofs = main.config.dofs
+        figure = Figure(figsize=(PAGE, 2.0 * len(dofs) + 0.2), layout="constrained")
+        panels = figure.subplots(len(dofs), 2, sharex="col", squeeze=False, width_ratios=(1.25, 1))
+        letters_of = zip(ascii_lowercase, ascii_lowercase[len(dofs) :], strict=False)
+        for dof, (signals, errors), letters in zip(dofs, panels, letters_of, strict=False):
             _draw_signals(signals, runs, dof)
             signals.set_xlim(begin, min(begin + WINDOW, end))
             _draw_errors(errors, runs, dof)
@@ -60,7 +63,7 @@ def draw_operator_motion(uncompensated: Recording | None, main: Recording) -> Fi
     return figure
 
 
-def _draw_signals(axes: Axes, runs: Runs, dof: Dof) -> None:
+def _draw_signals(axes: Axes, runs: Runs, dof: NamedDof) -> None:
     trace = runs[-1][0].trace
     time = trace["time"] - trace["time"][0]
     for recording, colour in runs:
@@ -89,7 +92,7 @@ def _draw_signals(axes: Axes, runs: Runs, dof: Dof) -> None:
     axes.xaxis.set_major_locator(MaxNLocator("auto", integer=True, steps=[1, 2, 5, 10]))
 
 
-def _draw_errors(axes: Axes, runs: Runs, dof: Dof) -> None:
+def _draw_errors(axes: Axes, runs: Runs, dof: NamedDof) -> None:
     for recording, colour in runs:
         time, tip, reference = tip_and_reference(recording, dof)
         axes.plot(

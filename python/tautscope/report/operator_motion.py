@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.config import Config
-from tautscope.dof import Dof
+from tautscope.dof import Dof, NamedDof
 from tautscope.loop.references import OperatorMotion
 from tautscope.report import metrics
 from tautscope.report.tracking_bound import tracking_bound
@@ -65,7 +65,7 @@ def evaluated_after(recording: Recording) -> float:
     return min(EVALUATED_AFTER, float(time[-1] - time[0]) / 2)
 
 
-def tip_and_reference(recording: Recording, dof: Dof) -> tuple[Floats, Floats, Floats]:
+def tip_and_reference(recording: Recording, dof: NamedDof) -> tuple[Floats, Floats, Floats]:
     """Times [s, the rig's clock], the tip, true or by camera, and the reference, each (n,)."""
     trace, frames = recording.trace, recording.frames
     truth, reference = trace[f"true_{dof.label}"], trace[f"reference_{dof.label}"]

@@ -121,12 +121,17 @@ class Recording:
         The tip is the true one, or the estimate where the rig does not know it; NaN before the
         first measurement.
         """
+        rms: Floats = np.sqrt(np.mean(self.tracking_error(after) ** 2, axis=0))
+        return rms
+
+    def tracking_error(self, after: float = 20.0) -> Floats:
+        """Tip less reference (ticks, n) [m or rad] from `after` [s] on; see `tracking_rms`."""
         trace, dofs = self.trace, self.config.dofs
         rows = trace["time"] >= trace["time"][0] + after
         true, estimate = (per_dof(trace, group, dofs)[rows] for group in ("true", "estimate"))
-        error = np.where(np.isnan(true), estimate, true) - per_dof(trace, "reference", dofs)[rows]
-        rms: Floats = np.sqrt(np.mean(error**2, axis=0))
-        return rms
+        tip = np.where(np.isnan(true), estimate, true)
+        error: Floats = tip - per_dof(trace, "reference", dofs)[rows]
+        return error
 
     def during(self, segment: Segment, first: float, last: float) -> NDArray[np.bool_]:
         """(ticks,) rows of the trace in periods `first` to `last` of a segment."""
