@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tautscope.commands import arguments
+from tautscope.commands import arguments, robot, sensor_latency
 from tautscope.commands.align import NO_ANSWER, print_delay
 from tautscope.commands.article_config import article_config
 from tautscope.commands.calibration_output import add_options, check_options, finish
@@ -18,9 +18,10 @@ from tautscope.commands.calibration_rig import (
     simulated_experiment,
 )
 from tautscope.commands.printing import print_json
+from tautscope.commands.robot import DURATION
 from tautscope.config import Config
 from tautscope.dof import Dof
-from tautscope.errors import CalibrationError, ConfigError
+from tautscope.errors import CalibrationError, ConfigError, FieldError
 
 if TYPE_CHECKING:
     from tautscope.calibration.delay import DelayEstimate
@@ -55,6 +56,13 @@ def add_parser(kinds: arguments.Verbs) -> None:
         metavar="DIR",
         help="folder of the log of a motion on a rig, new or empty [runs/<date-time>-latency]",
     )
+    latency.add_argument(
+        "--rig",
+        metavar="MODULE:CLASS",
+        help="delay of the sensors of a rig of your own with [[dof]], as measurement.delays: a "
+        "motion of all degrees of freedom within 80 %% of their ranges; docs/robots.md",
+    )
+    robot.add_seconds(latency, "a rig", DURATION / 2)
     add_rig_options(latency)
     add_options(latency)
     latency.set_defaults(run=_run)
@@ -64,6 +72,10 @@ def _run(options: argparse.Namespace) -> int:
     from tautscope.log.alignment import align_recording  # noqa: PLC0415
 
     check_options(options)
+    if options.rig is not None:
+        if options.file is not None or options.twin:
+            raise FieldError("--rig", options.rig, "neither a file nor --twin")
+        return sensor_latency.run(options)
     recording, serial_numbers = _recording(options)
     found = align_recording(recording)
     if not found.is_known:

@@ -20,13 +20,13 @@ DURATION = 120.0
 BYTES_PER_SECOND = 60e3
 
 
-def add_seconds(parser: argparse.ArgumentParser, of: str) -> None:
+def add_seconds(parser: argparse.ArgumentParser, of: str, default: float = DURATION) -> None:
     """``--seconds``."""
     parser.add_argument(
         "--seconds",
         type=arguments.above_zero,
         metavar="T",
-        help=f"duration of each of the two runs of {of} [{DURATION:g}]",
+        help=f"duration of a motion of {of} [{default:g} s]",
     )
 
 

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from tautscope.config.fields import Gain, Positive
+from tautscope.config.fields import Gain, NonNegative, Positive
 from tautscope.config.section import Section
 
 Name = Annotated[str, Meta(min_length=1, max_length=32, pattern=r"^[a-z][a-z0-9_]*$")]
@@ -82,7 +82,11 @@ class KinematicsConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only
 
 
 class MeasurementConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Standard deviations of measurements that come without a covariance."""
+    """Sensors of a robot with [[dof]]; deviations are of measurements without a covariance."""
+
+    delays: Annotated[tuple[NonNegative, ...], Meta(max_length=4)] = ()
+    """How much earlier than its time stamps say each sensor measures [s];
+    `tautscope calibrate latency --rig` finds it."""
 
     tip_deviation: Positive = 0.01
     """Of a tip that is measured degree by degree [in width_limit]."""

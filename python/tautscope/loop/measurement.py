@@ -85,6 +85,19 @@ class Sensors:
         self._count = len(config.dof)
         self._widths = np.array([dof.width_limit for dof in config.dof])
 
+    def reading(self, measurement: Measurement) -> Reading:
+        """Reading of a measurement of a rig.
+
+        Raises:
+            SignalError: As `tip`, `pose` and `points`.
+        """
+        covariance = measurement.covariance
+        if isinstance(measurement, Tip):
+            return self.tip(measurement.values, covariance)
+        if isinstance(measurement, Pose):
+            return self.pose(measurement.position, measurement.orientation, covariance)
+        return self.points(measurement.pixels, covariance)
+
     def tip(self, values: ArrayLike, covariance: ArrayLike | None) -> Reading:
         """Reading of the tip degree by degree.
 

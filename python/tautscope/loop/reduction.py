@@ -20,10 +20,8 @@ from tautscope.loop.measurement import (
     MOST_VALUES,
     SENSORS,
     Measurement,
-    Pose,
     Reading,
     Sensors,
-    Tip,
 )
 from tautscope.loop.rig import Frame
 from tautscope.loop.safety import Reaction, Supervision, checksum, disabled_monitors
@@ -374,17 +372,8 @@ class HysteresisReduction:
 
     def on_sample(self, measurement: Measurement) -> Report:
         """Update with a measurement of a rig: `on_tip`, `on_pose` or `on_points`."""
-        at, covariance, sensor = (
-            measurement.captured_at,
-            measurement.covariance,
-            measurement.sensor,
-        )
-        if isinstance(measurement, Tip):
-            return self.on_tip(measurement.values, at, covariance, sensor=sensor)
-        if isinstance(measurement, Pose):
-            orientation = measurement.orientation
-            return self.on_pose(measurement.position, at, orientation, covariance, sensor=sensor)
-        return self.on_points(measurement.pixels, at, covariance, sensor=sensor)
+        reading = self._axes_sensors("on_sample").reading(measurement)
+        return self._update_by(reading, measurement.captured_at, measurement.sensor)
 
     @property
     def supervision(self) -> Supervision:
@@ -493,6 +482,8 @@ class HysteresisReduction:
         captured_at = check_time("captured_at", captured_at)
         if sensor not in range(SENSORS):
             raise SignalError("sensor", sensor, f"0 to {SENSORS - 1}")
+        delays = self._config.measurement.delays
+        captured_at -= delays[sensor] if sensor < len(delays) else 0.0
         assert self._axes is not None
         result = self._axes.on_reading(
             reading.values,
