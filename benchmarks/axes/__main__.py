@@ -17,6 +17,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from axes import colonoscope
 from axes.tracking import PLANTS, Job, simulate, times
 from common.doc_pages import insert
 from common.paths import ROOT
@@ -51,6 +52,21 @@ def to_rows(found: dict[Job, list[float]]) -> list[dict[str, Any]]:
     return rows
 
 
+def colonoscope_table(found: dict[colonoscope.Job, list[float]]) -> str:
+    """A Markdown table: a line per instrument."""
+    lines = [
+        "| instrument | bend_x | bend_y | insertion | delay of 0.1 s found as |",
+        "|--:|--:|--:|--:|--:|",
+    ]
+    for seed in dict.fromkeys(seed for _, seed in found):
+        less = " | ".join(f"{each:.0%}" for each in found["motion", seed])
+        lines.append(f"| {seed} | {less} | {found['delay', seed][0]:.3f} s |")
+    every = [found[job] for job in found if job[0] == "motion"]
+    medians = " | ".join(f"{each:.0%}" for each in np.median(every, axis=0))
+    lines.append(f"| median | {medians} | |")
+    return "\n".join(lines)
+
+
 def table(rows: Sequence[dict[str, Any]]) -> str:
     """A Markdown table of the rows."""
     lines = [
@@ -74,8 +90,19 @@ def main() -> None:
     add_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--write", action="store_true", help="update docs/robots.md")
+    parser.add_argument(
+        "--colonoscope", action="store_true", help="the simulated colonoscope in place of plays"
+    )
     options = parser.parse_args()
     seeds = range(options.first_seed, options.first_seed + options.seeds)
+    if options.colonoscope:
+        both = [(what, seed) for seed in seeds for what in ("motion", "delay")]
+        ran = dict(run_parallel(colonoscope.simulate, both, options.workers, options.scheduler))
+        text = colonoscope_table({job: ran[job] for job in both})
+        if options.write:
+            insert(ROOT / "docs" / "robots.md", "colonoscope", text)
+        print(text)
+        return
     counts = [options.dofs] if options.dofs else COUNTS
     jobs = [(count, plant, seed) for count in counts for plant in PLANTS for seed in seeds]
     done = dict(run_parallel(simulate, jobs, options.workers, options.scheduler))

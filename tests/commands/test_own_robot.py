@@ -120,3 +120,50 @@ def test_what_a_rig_returns_is_checked(
     (folder / f"{name}.py").write_text(RIG.replace(change, field), encoding="utf-8")
     assert run("--rig", f"{name}:Catheter", "--seconds", "2") == 2
     assert "error: sample" in capsys.readouterr().err
+
+
+def test_the_simulated_colonoscope_is_a_demo(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    options = ["demo", "--robot", "colonoscope", "--seconds", "30", "--out", str(out)]
+    assert main(options) == 0
+    text = capsys.readouterr().out
+    assert all(name in text for name in ("bend_x [rad]", "bend_y [rad]", "insertion [mm]"))
+    found = json.loads((out / "results.json").read_text(encoding="utf-8"))["dofs"]
+    assert [dof["unit"] for dof in found] == ["rad", "rad", "mm"]
+    assert all(dof["reduction"] > 0.4 for dof in found[:2]), found
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--robot", "colonoscope", "--seeds", "2"], "--seeds: got 2"),
+        (["--robot", "colonoscope", "--disturb", "smoke"], "--disturb: got 'smoke'"),
+        (["--seconds", "3"], "--seconds: got 3.0"),
+    ],
+)
+def test_options_of_the_other_demo_are_refused(
+    options: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["demo", *options]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_the_delay_of_a_rig_is_written_into_its_configuration(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ["--config", "robot.toml", "--rig", "catheter_of_a_newcomer:Catheter"]
+    assert main(["calibrate", "latency", *options, "--seconds", "25", "--yes", "--write"]) == 0
+    assert "[measurement]" in capsys.readouterr().out
+    (delay,) = load_config(folder / "robot.toml").measurement.delays
+    assert delay == pytest.approx(0.005, abs=0.02)
+
+
+def test_nothing_moves_without_an_answer(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("builtins.input", lambda _: "n")
+    options = ["--config", str(folder / "robot.toml"), "--rig", "catheter_of_a_newcomer:Catheter"]
+    assert main(["calibrate", "latency", *options]) == 2
+    assert "nothing moved" in capsys.readouterr().err

@@ -265,8 +265,8 @@ def test_tracker_rate_and_noise() -> None:
     about = np.stack([errors[:, 2, 1], errors[:, 0, 2], errors[:, 1, 0]])
     np.testing.assert_allclose(about.std(axis=1), ORIENTATION_STD, rtol=0.15)
     assert np.abs(about.mean(axis=1)).max() < 4 * ORIENTATION_STD / np.sqrt(len(poses))
-    covariance = np.diag(np.repeat([POSITION_STD**2, ORIENTATION_STD**2], 3))
-    np.testing.assert_array_equal(np.asarray(poses[0][1].covariance), covariance)
+    # Noise is the smaller part of what the loop must expect: its kinematics err by more.
+    assert poses[0][1].covariance is None
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.05, 0.083])

@@ -60,7 +60,7 @@ def add_parser(kinds: arguments.Verbs) -> None:
         "--rig",
         metavar="MODULE:CLASS",
         help="delay of the sensors of a rig of your own with [[dof]], as measurement.delays: a "
-        "motion of all degrees of freedom within 80 %% of their ranges; docs/robots.md",
+        "motion of all degrees of freedom within 60 %% of their ranges; docs/robots.md",
     )
     robot.add_seconds(latency, "a rig", DURATION / 2)
     add_rig_options(latency)

@@ -7,12 +7,12 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tautscope.commands import arguments
+from tautscope.commands import arguments, robot
 from tautscope.commands.article_config import article_config
 from tautscope.commands.held_run import recording_saved
 from tautscope.commands.printing import announce, console, print_json
-from tautscope.config import DISTURBANCES, Config
-from tautscope.errors import MissingPathError
+from tautscope.config import DISTURBANCES, Config, load_config
+from tautscope.errors import FieldError, MissingPathError
 from tautscope.loop.references import SineSequence
 
 if TYPE_CHECKING:
@@ -67,6 +67,13 @@ def add_parser(verbs: arguments.Verbs) -> None:
         metavar="NAME[,NAME]",
         help=f"image disturbances: {', '.join(DISTURBANCES)} [twin.disturb of the configuration]",
     )
+    demo.add_argument(
+        "--robot",
+        choices=["colonoscope"],
+        help="another simulated robot in place of the article's instrument: the steerable tip of a "
+        "colonoscope with an EM tracker; an operator's motion without and with compensation",
+    )
+    robot.add_seconds(demo, "--robot")
     arguments.add_out(demo, "demo")
     arguments.add_config(demo)
     arguments.add_json(demo)
@@ -78,6 +85,11 @@ def _run(options: argparse.Namespace) -> None:
     from tautscope.report import demo, tables  # noqa: PLC0415
     from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
 
+    if options.robot is not None:
+        _run_robot(options)
+        return
+    if options.seconds is not None:
+        raise FieldError("--seconds", options.seconds, "--robot")
     config = _load(options)
     folder = check_free(options.out or default_folder("demo"))
     first = config.twin.seed
@@ -110,6 +122,19 @@ def _run(options: argparse.Namespace) -> None:
         _print_table1(found)
         _print_operator_motion(found)
         _print_facts(found, folder)
+
+
+def _run_robot(options: argparse.Namespace) -> None:
+    from tautscope.twin.colonoscope import ColonoscopeTwin  # noqa: PLC0415
+
+    for name in ("background", "disturb"):
+        if getattr(options, name) is not None:
+            raise FieldError(f"--{name}", getattr(options, name), "no --robot, which has no camera")
+    if options.seeds != 1:
+        raise FieldError("--seeds", options.seeds, "1 with --robot")
+    config = load_config(options.config or options.robot, options.profile)
+    seed = options.seed or 0
+    robot.run(options, config, lambda _: ColonoscopeTwin(seed), "demo", seed=seed)
 
 
 def _duration(trial: Trial) -> float:

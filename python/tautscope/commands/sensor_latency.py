@@ -10,7 +10,7 @@ from tautscope.config import load_config
 from tautscope.errors import FieldError
 
 QUESTION = (
-    "THE MOTORS WILL MOVE, over 80 % of each range. Keep tissue and hands away, the emergency stop "
+    "THE MOTORS WILL MOVE, over 60 % of each range. Keep tissue and hands away, the emergency stop "
     "within reach. Type y to start: "
 )
 

@@ -19,7 +19,7 @@ from tautscope.runs.experiment import run_experiment
 from tautscope.runs.output_folder import new_folder
 from tautscope.runs.recording import Recording, per_dof
 
-AMPLITUDE = 0.4
+AMPLITUDE = 0.3
 """Amplitude of the motion about the middle of a range [share of the range]."""
 
 

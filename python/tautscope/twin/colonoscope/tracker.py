@@ -51,7 +51,7 @@ class EmTracker:
         self._drift_rate = 2 * np.pi / generator.uniform(*_DRIFT_PERIODS, 3)
         self._drift_phase = generator.uniform(0, 2 * np.pi, 3)
         std = np.repeat([POSITION_STD, ORIENTATION_STD], 3)
-        self._std, self._covariance = std, np.diag(std**2)
+        self._std = std
         self._in_transit: deque[tuple[float, Pose]] = deque()
         self._count = 0
 
@@ -68,7 +68,6 @@ class EmTracker:
             position + drift + noise[:3],
             time + self._stamp_error,
             without_roll(direction) @ _rotation(noise[3:]),
-            self._covariance,
         )
         self._in_transit.append((time + self._delay, pose))
         self._count += 1

@@ -1,0 +1,31 @@
+"""An operator's motion on the simulated colonoscope, and the delay of its tracker."""
+
+from __future__ import annotations
+
+from tautscope.calibration.sensor_delay import find_delay, move
+from tautscope.config import load_config
+from tautscope.report.robot_run import motion_of, run_robot
+from tautscope.twin.colonoscope import ColonoscopeTwin
+
+DELAY, UNTOLD = 0.05, 0.1
+"""Delay of the tracker, which it tells, and one that it does not tell [s]."""
+Job = tuple[str, int]
+"""What is measured, "motion" or "delay", and the seed of instrument and motion."""
+
+
+def simulate(job: Job) -> list[float]:
+    """Reduction of the RMS tracking error of each degree of freedom, or the delay found [s]."""
+    what, seed = job
+    config = load_config("colonoscope")
+    if what == "motion":
+        motion = motion_of(config, seed, 120.0)
+        found = run_robot(lambda _: ColonoscopeTwin(seed, delay=DELAY), config, motion, _ignore)
+        return [result.reduction for result in found.results]
+    rig = ColonoscopeTwin(seed, delay=UNTOLD, told_delay=0.0)
+    passage = move(rig, motion_of(config, seed, 60.0), config)
+    rig.close()
+    return [find_delay(passage, config).delay]
+
+
+def _ignore(_: float) -> None:
+    pass
