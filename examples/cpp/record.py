@@ -8,6 +8,12 @@ with rows of float64:
 - ``NAME.images``: tick, captured_at, features (4,); status, reaction, flags, state estimate (3,),
   delta_minus (3,), delta_plus (3,); features found without a prediction (4,), checksum.
 
+``axes`` is of a robot with [[dof]], whose measurements are in ``axes.measurements``: tick,
+captured_at, kind, values (3,); status, reaction, flags, state estimate (3,), innovation (3,),
+delta_minus (3,), delta_plus (3,), half widths (3,). Each kind is a sensor: 0 is the tip degree by
+degree, 1 that of `_own` by differences, 2 with its Jacobian. ``axes-short.toml`` has only the keys
+that are not defaults.
+
 ``frames.pixels`` has the images themselves, ``frames.workspace`` the states (3,) that the detection
 starts from without a prediction: starts, their standard deviations, postures. Units are m, rad, s,
 px; NaN is not known.
@@ -22,7 +28,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from tautscope import Config, Frame, HysteresisReduction, Report
-from tautscope.config import ControlConfig, Profile, dump_config
+from tautscope.config import ControlConfig, Profile, dump_config, load_config
 from tautscope.loop.construction import build_feature_model
 from tautscope.loop.reduction import Status
 from tautscope.loop.safety import DETECTORS, checksum
@@ -174,13 +180,91 @@ def record_frames(folder: Path) -> Record:
     return record
 
 
+ROBOT = """\
+[control]
+history = 1
+[[dof]]
+name = "insertion"
+unit = "m"
+width_limit = 12e-3
+range = [-0.1, 0.3]
+friction = "shaft"
+[[dof]]
+name = "rotation"
+width_limit = 2.6
+speed = 6
+friction = "shaft"
+lever = 1.75e-3
+[[dof]]
+name = "bend"
+width_limit = 1.5
+expected_width = 0.8
+gain_limit = 4
+"""
+
+
+def _own(q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Without functions that C rounds differently."""
+    return np.array([20 * q[0] + 0.5 * q[1], q[1] + 0.25 * q[2] * q[2], q[2] - 0.5 * q[1]])
+
+
+def _jacobian(q: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.array([[20.0, 0.5, 0.0], [0.0, 1.0, 0.5 * q[2]], [0.0, -0.5, 1.0]])
+
+
+def record_axes(folder: Path) -> None:
+    """60 s at 200 Hz of three plays and three sensors, and every kind of event."""
+    (folder / "axes-short.toml").write_text(ROBOT, encoding="utf-8")
+    record = Record(load_config(folder / "axes-short.toml"))
+    random = np.random.default_rng(SEED)
+    rows = []
+    tip, covariance = CENTRES.copy(), np.diag([1e-3, 1e-3, 1e-3])
+    covariance[0, 1] = covariance[1, 0] = 2e-4
+    late: list[tuple[float, NDArray[np.float64]]] = []
+    for tick in range(12000):
+        time = tick * 0.005
+        reference = CENTRES + AMPLITUDES * np.sin(2 * np.pi * time / PERIODS)
+        if time >= JUMP[0]:
+            reference += JUMP[1]
+        age = 1.0 if time == OLD_REFERENCE else np.nan
+        command = record.step(time, reference, EVENTS.get(time, 0), age)
+        tip = np.clip(tip, command - WIDTHS / 2, command + WIDTHS / 2)
+        if tick % 5:
+            continue
+        late.append((time, tip.copy()))
+        if len(late) < 3:
+            continue
+        at, seen = late.pop(0)
+        kind = tick // 5 % 3
+        noise = random.normal(0, 0.01, 3)
+        if kind == 0:
+            values = seen + noise * [12e-3, 2.6, 1.5]
+            values[tick // 15 % 5 :][:1] = np.nan
+            report = record.loop.on_tip(values, at)
+        else:
+            values = _own(seen) + noise
+            report = record.loop.on_measurement(
+                values, at, covariance, _own, jacobian=_jacobian if kind == 2 else None, sensor=kind
+            )
+        now, found = record.loop.supervision, record.loop.hysteresis
+        assert found is not None
+        flags = sum(1 << DETECTORS.index(name) for name in now.flags)
+        row = [tick, at, kind, *values]
+        row += [list(Status).index(report.status), now.reaction.rank, flags]
+        row += [*report.state_estimate, *report.innovation, *report.delta_minus]
+        rows.append([*row, *report.delta_plus, *found.half_width])
+    record.write(folder, "axes")
+    np.array(rows).astype("<f8").tofile(folder / "axes.measurements")
+
+
 def main() -> None:
     folder = Path(sys.argv[1])
     folder.mkdir(parents=True, exist_ok=True)
     for profile in ("paper", "best"):
         record_features(profile).write(folder, profile)
+    record_axes(folder)
     record_frames(folder).write(folder, "frames")
-    print(f"{folder}: 60 s of profiles paper and best, 2 s of images")
+    print(f"{folder}: 60 s of profiles paper and best and of a robot with [[dof]], 2 s of images")
 
 
 if __name__ == "__main__":

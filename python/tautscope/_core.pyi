@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 __all__ = [
     "DETECTORS",
     "MEANINGS",
+    "MOST_RANGE",
     "Camera",
     "Compensator",
     "Estimator",
@@ -28,6 +29,7 @@ __all__ = [
 __version__: str
 DETECTORS: tuple[str, ...]
 MEANINGS: tuple[str, ...]
+MOST_RANGE: float
 
 # Models, estimation, compensation, supervision: crates/core.
 
@@ -213,7 +215,7 @@ class Reduction:
 
 @final
 class AxesReduction:
-    def __new__(cls, settings: Mapping[str, Any], dofs: int) -> AxesReduction: ...
+    def __new__(cls, settings: Mapping[str, Any], compensate: bool) -> AxesReduction: ...
     def step(self, reference: ArrayLike, time: float, stamp: float | None = None) -> _Floats: ...
     def on_reading(
         self,

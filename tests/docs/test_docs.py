@@ -19,7 +19,7 @@ REFERENCE = re.compile(r"`([\w./-]+\.(?:py|rs))::(\w+)`")
 """`file::name`, the file from the repository's root."""
 FOLDERS = ("benchmarks", "configs", "crates", "docs", "examples", "python", "ros", "tests")
 TREE_PATH = re.compile(rf"`((?:{'|'.join(FOLDERS)})/[\w./-]+)(?:::\w+)?`")
-LINK = re.compile(r"\]\(([^)#\s]+)")
+LINK = re.compile(r"\]\(([^)#\s]+)(?:#[^)\s]*)?\)")
 
 pages = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
 

@@ -21,9 +21,10 @@ def blocks(page: str, language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)
 
 
-@pytest.mark.parametrize(("language", "file"), [("c", "first_steps.c"), ("cpp", "first_steps.cpp")])
-def test_the_code_of_the_page_is_that_of_the_example(language: str, file: str) -> None:
-    assert blocks("cpp.md", language) == [(EXAMPLES / "cpp" / file).read_text(encoding="utf-8")]
+@pytest.mark.parametrize("language", ["c", "cpp"])
+def test_the_code_of_the_page_is_that_of_the_examples(language: str) -> None:
+    files = [EXAMPLES / "cpp" / f"{name}.{language}" for name in ("first_steps", "robot")]
+    assert blocks("cpp.md", language) == [file.read_text(encoding="utf-8") for file in files]
 
 
 @pytest.fixture

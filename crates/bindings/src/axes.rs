@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use numpy::{PyArray1, PyArrayLike1, PyArrayLike2};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
-use serde::Deserialize;
+use tautscope_axes::{AxesSettings, BoxedAxes};
 use tautscope_core as core;
 
 use crate::arrays::{Table, Vector};
@@ -41,56 +41,19 @@ type Hysteresis<'py> = (
     Floats<'py>,
 );
 
-/// Settings of a loop with N DOFs by the names of `tautscope.loop.construction.axes_settings`.
-#[derive(Deserialize)]
-#[serde(bound(
-    deserialize = "[core::DofSettings; N]: Deserialize<'de>, [usize; N]: Deserialize<'de>, [f64; N]: Deserialize<'de>, \
-                   [(f64, f64); N]: Deserialize<'de>"
-))]
-struct Settings<const N: usize> {
-    dof: [core::DofSettings; N],
-    group: [usize; N],
-    lever: [f64; N],
-    control: core::ControlSettings,
-    safety: core::SafetySettings<N>,
-    law: core::LawSettings,
-    estimation: core::EstimateSettings,
-}
-
-impl<const N: usize> Settings<N> {
-    fn of_loop(self) -> Result<core::LoopSettings<N>, core::ConfigError> {
-        Ok(core::LoopSettings {
-            dofs: self.dof,
-            friction: core::Friction::new(self.group, self.lever)?,
-            control: self.control,
-            safety: self.safety,
-            law: self.law,
-            estimation: self.estimation,
-        })
-    }
-}
-
 /// The loop of Fig. 6 for 1 to 8 DOFs and any sensor. Raises `ConfigError`.
 #[pyclass(name = "AxesReduction", module = "tautscope._core")]
-pub struct AxesReduction(Box<dyn core::Axes + Send + Sync>);
+pub struct AxesReduction(BoxedAxes);
 
 #[pymethods]
 impl AxesReduction {
-    /// From the settings of a loop with `dofs` DOFs.
+    /// From the configuration of a robot with [[dof]]; without compensation every gain is 1.
     #[new]
-    fn new(settings: Bound<'_, PyAny>, dofs: usize) -> PyResult<Self> {
-        macro_rules! of {
-            ($($count:literal)*) => {
-                match dofs {
-                    $($count => build::<$count, { $count * core::COEFFICIENTS }>(settings),)*
-                    _ => {
-                        let found = dofs.to_string();
-                        Err(errors::choice(settings.py(), "dof", &found, "1 to 8 degrees of freedom"))
-                    }
-                }
-            };
-        }
-        of!(1 2 3 4 5 6 7 8).map(Self)
+    fn new(settings: Bound<'_, PyAny>, compensate: bool) -> PyResult<Self> {
+        let py = settings.py();
+        let settings: AxesSettings = from_mapping("config", settings)?;
+        let made = settings.build(compensate);
+        Ok(Self(made.map_err(errors::config(py))?))
     }
 
     /// One control tick at `time` in s: command (n,) for a reference (n,), which was generated at `stamp` in s.
@@ -253,21 +216,6 @@ impl AxesReduction {
         let allowed = format!("{dofs} values, one per degree of freedom");
         Err(errors::length(py, field, found, &allowed))
     }
-}
-
-fn build<const N: usize, const D: usize>(
-    settings: Bound<'_, PyAny>,
-) -> PyResult<Box<dyn core::Axes + Send + Sync>>
-where
-    for<'de> Settings<N>: Deserialize<'de>,
-{
-    let py = settings.py();
-    let settings: Settings<N> = from_mapping("config", settings)?;
-    let settings = settings.of_loop().map_err(errors::config(py))?;
-    let entries = core::history_entries(settings.control.history, settings.control.period);
-    let storage = vec![core::Entry::<N>::BLANK; entries];
-    let made = core::AxesReduction::<N, D, Vec<core::Entry<N>>>::of_axes(&settings, storage);
-    Ok(Box::new(made.map_err(errors::config(py))?))
 }
 
 /// The model of a sensor in Python, and its first error.

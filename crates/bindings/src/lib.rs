@@ -71,6 +71,7 @@ mod _core {
             "MEANINGS",
             PyTuple::new(module.py(), super::flags::meanings())?,
         )?;
+        module.add("MOST_RANGE", tautscope_axes::MOST_RANGE)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

@@ -253,6 +253,9 @@ typedef uint32_t TautscopeRejection;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
+// The loop of a robot with `[[dof]]`: reference in, command out; measurements of the tip update the estimate of the hysteresis.
+typedef struct TautscopeAxes TautscopeAxes;
+
 // Finds the two marker bands in images. No result depends on earlier images.
 typedef struct TautscopeDetector TautscopeDetector;
 
@@ -352,6 +355,80 @@ typedef struct TautscopeSupervision {
     // Share of the compensation in use, 0 to 1.
     double share;
 } TautscopeSupervision;
+
+// Estimated hysteresis of n degrees of freedom, in the first n entries [m or rad].
+typedef struct TautscopeAxesHysteresis {
+    // Half widths of the slack of each DOF that moves alone.
+    double half_width[8];
+    // Standard deviations of the half widths.
+    double width_std[8];
+    // Centres of the contact offsets, input minus output.
+    double centre[8];
+    // Travel of the tip over that of the command in contact.
+    double gain[8];
+    // Standard deviations of the gains.
+    double gain_std[8];
+} TautscopeAxesHysteresis;
+
+// A measurement of the tip. Set what you do not know to 0.
+typedef struct TautscopeMeasurement {
+    // Values (m,); NaN for one that was not measured.
+    const double *values;
+    // m, 1 to 16.
+    size_t count;
+    // Covariance (m, m) row by row, or null, where the function allows it.
+    const double *covariance;
+    // When it was measured, on the clock of `tautscope_axes_step` (s).
+    double captured_at;
+    // Which of 4 sensors with rates and delays of their own, 0 to 3.
+    uint32_t sensor;
+    // Values in a row that are right or wrong together: 2 for u, v of points of an image; 0 is 1.
+    uint32_t point;
+} TautscopeMeasurement;
+
+// Result of an update by a measurement; values that are not known are NaN.
+//
+// Of n degrees of freedom and m values the first n and m entries are used. Set `size` to `sizeof(TautscopeAxesReport)` first.
+typedef struct TautscopeAxesReport {
+    // Bytes of the structure as the caller knows it.
+    uint32_t size;
+    // Result of the update.
+    TautscopeStatus status;
+    // The reaction in force after this measurement.
+    TautscopeReaction reaction;
+    // The active flags, a bit `1 << TautscopeFlag` each.
+    uint32_t flags;
+    // When it was measured (s).
+    double captured_at;
+    // The most probable state [m or rad].
+    double state_estimate[8];
+    // Its standard deviations [m or rad].
+    double state_deviation[8];
+    // Predicted state q at the time of the measurement [m or rad].
+    double predicted_state[8];
+    // Values expected in the predicted state.
+    double predicted_values[16];
+    // Measured minus expected values.
+    double innovation[16];
+    // Negative contact offsets after this measurement [m or rad], input minus output.
+    double delta_minus[8];
+    // Positive contact offsets after this measurement [m or rad], input minus output.
+    double delta_plus[8];
+    // Per DOF, why `delta_minus` was updated.
+    TautscopeTrigger triggers_minus[8];
+    // Per DOF, why `delta_plus` was updated.
+    TautscopeTrigger triggers_plus[8];
+    // Per DOF, 1 if the measurement determined it.
+    uint32_t is_observable[8];
+} TautscopeAxesReport;
+
+// What a sensor would measure in a state: its values and their derivatives.
+//
+// `state` is (n,) [m or rad], `values` the place for the measurement's count m of values, `jacobian` that for dz/dq (m, n) row by
+// row. If it leaves NaN in `jacobian`, as it was, central differences are used; they call it twice per degree of freedom.
+//
+// It returns 0 where the sensor sees nothing. It must not call functions with the same handle.
+typedef int (*TautscopePredict)(void *context, const double *state, double *values, double *jacobian);
 
 #ifdef __cplusplus
 extern "C" {
@@ -516,6 +593,114 @@ TautscopeResult tautscope_detector_detect(struct TautscopeDetector *handle,
                                           const struct TautscopeImage *image,
                                           const struct TautscopeStatePrediction *prediction,
                                           struct TautscopeDetection *detection);
+
+// Creates a loop at rest.
+//
+// `toml` is a configuration with `[[dof]]`, of which each needs a `name` and a `width_limit`; `length` is its bytes. Keys that it
+// does not have have their defaults, so that it may also be what `tautscope config` prints. `*created` is the loop; destroy it
+// with `tautscope_axes_destroy`.
+//
+// # Safety
+// `toml` points to `length` readable bytes; `created` is writable.
+TautscopeResult tautscope_axes_create(const uint8_t *toml,
+                                      size_t length,
+                                      struct TautscopeAxes **created);
+
+// Destroys a loop; null is ignored.
+//
+// # Safety
+// The loop came from `tautscope_axes_create` and is not used again.
+void tautscope_axes_destroy(struct TautscopeAxes *handle);
+
+// The number n of degrees of freedom, and the control period of the configuration (s). Either place may be null.
+//
+// # Safety
+// The handle is valid and used by this thread only; `dofs` and `period` are null or writable.
+TautscopeResult tautscope_axes_size(struct TautscopeAxes *handle, size_t *dofs, double *period);
+
+// One control tick: the command for a reference. It does not allocate, block or read a clock.
+//
+// `reference` and `command` are (n,) [m or rad]; `dofs` is n. `time` is the caller's clock (s). `made_at` is when the reference was
+// made on that clock (s), NaN if not known.
+//
+// With any result but OK, and while motion is held, `command` is the last one, NaN before the first; with
+// `TAUTSCOPE_RESULT_SIZE` nothing is written.
+//
+// # Safety
+// The handle is valid and used by this thread only; `reference` points to `dofs` numbers, `command` to place for as many.
+TautscopeResult tautscope_axes_step(struct TautscopeAxes *handle,
+                                    size_t dofs,
+                                    const double *reference,
+                                    double made_at,
+                                    double time,
+                                    double *command);
+
+// The state of the tip (n,) [m or rad] that the estimated slack predicts now; NaN before the first tick. `dofs` is n.
+//
+// # Safety
+// The handle is valid and used by this thread only; `state` points to place for `dofs` numbers.
+TautscopeResult tautscope_axes_predicted_state(struct TautscopeAxes *handle, size_t dofs, double *state);
+
+// The hysteresis estimated so far.
+//
+// # Safety
+// The handle is valid and used by this thread only; `hysteresis` is writable.
+TautscopeResult tautscope_axes_hysteresis(struct TautscopeAxes *handle, struct TautscopeAxesHysteresis *hysteresis);
+
+// State of the supervision now.
+//
+// # Safety
+// The handle is valid and used by this thread only; `supervision` is writable.
+TautscopeResult tautscope_axes_supervision(struct TautscopeAxes *handle, struct TautscopeSupervision *supervision);
+
+// Re-engages: resumes held motion, without a jump of the command.
+//
+// # Safety
+// The handle is valid and used by this thread only.
+TautscopeResult tautscope_axes_engage(struct TautscopeAxes *handle);
+
+// Acknowledges the warnings: empties `latched`; nothing else changes.
+//
+// # Safety
+// The handle is valid and used by this thread only.
+TautscopeResult tautscope_axes_acknowledge(struct TautscopeAxes *handle);
+
+// Uses a share of the compensation: all with 1, none with 0. The command moves only with the reference.
+//
+// # Safety
+// The handle is valid and used by this thread only.
+TautscopeResult tautscope_axes_set_compensation(struct TautscopeAxes *handle, double share);
+
+// Raises a `TautscopeFlag` that only the rig can detect, as `tautscope_loop_raise_flag`.
+//
+// # Safety
+// The handle is valid and used by this thread only.
+TautscopeResult tautscope_axes_raise_flag(struct TautscopeAxes *handle, uint32_t flag);
+
+// Update with the tip measured degree by degree. It does not allocate.
+//
+// `measurement` has n values [m or rad]; without a covariance `measurement.tip_deviation` of the configuration is used. `report`
+// may be null.
+//
+// # Safety
+// The handle is valid and used by this thread only; `measurement` and what it points to are readable; `report` is null or points to
+// as many writable bytes as its member `size` states.
+TautscopeResult tautscope_axes_on_tip(struct TautscopeAxes *handle,
+                                      const struct TautscopeMeasurement *measurement,
+                                      struct TautscopeAxesReport *report);
+
+// Update with any measurement of the tip: `predict` is what the sensor would measure in a state. It does not allocate.
+//
+// `measurement` has up to 16 values and a covariance. `predict` is called several times, with `context`, before this returns.
+// `report` may be null.
+//
+// # Safety
+// As `tautscope_axes_on_tip`; `predict` keeps to `TautscopePredict` and throws no exception.
+TautscopeResult tautscope_axes_on_measurement(struct TautscopeAxes *handle,
+                                              const struct TautscopeMeasurement *measurement,
+                                              TautscopePredict predict,
+                                              void *context,
+                                              struct TautscopeAxesReport *report);
 
 #ifdef __cplusplus
 }  // extern "C"

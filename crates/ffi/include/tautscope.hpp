@@ -6,6 +6,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <exception>
 #include <fstream>
 #include <initializer_list>
 #include <iterator>
@@ -76,6 +77,48 @@ private:
     const double *data_;
 };
 
+/// Numbers in the caller's memory, for the call they are an argument of: as `View`, of any count.
+class Numbers {
+public:
+    Numbers() noexcept = default;
+
+    template <std::size_t N> Numbers(const double (&values)[N]) noexcept : data_(values), size_(N) {}
+
+    Numbers(std::initializer_list<double> values) noexcept : Numbers(values.begin(), values.size()) {}
+
+    template <class Container,
+              class = std::enable_if_t<
+                  std::is_convertible_v<decltype(std::declval<const Container &>().data()), const double *>>>
+    Numbers(const Container &values) : Numbers(values.data(), static_cast<std::size_t>(values.size())) {}
+
+    const double *data() const noexcept { return data_; }
+
+    std::size_t size() const noexcept { return size_; }
+
+private:
+    Numbers(const double *data, std::size_t size) noexcept : data_(data), size_(size) {}
+
+    const double *data_ = nullptr;
+    std::size_t size_ = 0;
+};
+
+/// A number per degree of freedom, up to 8, without allocation.
+class Values {
+public:
+    explicit Values(std::size_t size = 0) noexcept : size_(size) {}
+
+    double *data() noexcept { return values_.data(); }
+    const double *data() const noexcept { return values_.data(); }
+    std::size_t size() const noexcept { return size_; }
+    double operator[](std::size_t index) const noexcept { return values_[index]; }
+    const double *begin() const noexcept { return data(); }
+    const double *end() const noexcept { return data() + size_; }
+
+private:
+    std::array<double, 8> values_{};
+    std::size_t size_;
+};
+
 #ifdef TAUTSCOPE_WITH_OPENCV
 /// An 8-bit cv::Mat as an image, without a copy; regions of interest too. Of NV12 and I420 the matrix has 3/2 of the rows.
 inline TautscopeImage view(const cv::Mat &mat, TautscopePixelFormat format) {
@@ -116,6 +159,7 @@ namespace detail {
 struct Destroy {
     void operator()(TautscopeLoop *loop) const noexcept { tautscope_loop_destroy(loop); }
     void operator()(TautscopeDetector *detector) const noexcept { tautscope_detector_destroy(detector); }
+    void operator()(TautscopeAxes *axes) const noexcept { tautscope_axes_destroy(axes); }
 };
 
 template <class Handle>
@@ -249,6 +293,155 @@ private:
     }
 
     std::unique_ptr<TautscopeLoop, detail::Destroy> handle_;
+};
+
+/// The loop of 1 to 8 degrees of freedom whose tip any sensor measures; one thread at a time.
+class Axes {
+public:
+    /// From a configuration with `[[dof]]`; keys that it does not have have their defaults.
+    explicit Axes(std::string_view toml) : handle_(detail::create(&tautscope_axes_create, toml)) {
+        check(tautscope_axes_size(handle_.get(), &dofs_, &period_));
+    }
+
+    /// The number n of degrees of freedom.
+    std::size_t dofs() const noexcept { return dofs_; }
+
+    /// The control period [s].
+    double period() const noexcept { return period_; }
+
+    /// One control tick at `time` [s]: the command (n,) for a reference (n,), made at `made_at` [s] if that is known.
+    Values step(Numbers reference, double time, double made_at = unknown) {
+        Values command(dofs_);
+        check(try_step(reference, time, command, made_at));
+        return command;
+    }
+
+    /// As `step`, without exceptions: with any result but OK, `command` is the last one.
+    TautscopeResult try_step(Numbers reference, double time, Values &command, double made_at = unknown) noexcept {
+        command = Values(dofs_);
+        return tautscope_axes_step(handle_.get(), reference.size(), reference.data(), made_at, time, command.data());
+    }
+
+    /// Update with the tip measured degree by degree (n,); NaN for what was not measured. Without a covariance (n, n), row by
+    /// row, `measurement.tip_deviation` is used.
+    TautscopeAxesReport on_tip(Numbers values, double captured_at, Numbers covariance = {}, std::uint32_t sensor = 0) {
+        const TautscopeMeasurement measurement = measured(values, captured_at, covariance, sensor, 0);
+        TautscopeAxesReport report = empty_report();
+        check(tautscope_axes_on_tip(handle_.get(), &measurement, &report));
+        return report;
+    }
+
+    /// Update with up to 16 values (m,) and their covariance (m, m), row by row.
+    ///
+    /// `predict(const double *state, double *values)` writes what the sensor would measure in a state; with a third argument
+    /// `double *jacobian` also dz/dq (m, n) row by row, else central differences are used. It may return false where the sensor
+    /// sees nothing. `point` is 2 for u, v of points of an image, which are right or wrong together.
+    template <class Predict>
+    TautscopeAxesReport on_measurement(Numbers values, double captured_at, Numbers covariance, Predict &&predict,
+                                       std::uint32_t sensor = 0, std::uint32_t point = 1) {
+        struct Call {
+            std::remove_reference_t<Predict> *predict;
+            std::exception_ptr error;
+        } call{&predict, nullptr};
+        // No exception may pass the library.
+        const auto forward = [](void *context, const double *state, double *z, double *jacobian) -> int {
+            Call &own = *static_cast<Call *>(context);
+            if (own.error) {
+                return 0;
+            }
+            try {
+                return seen(*own.predict, state, z, jacobian);
+            } catch (...) {
+                own.error = std::current_exception();
+                return 0;
+            }
+        };
+        const TautscopeMeasurement measurement = measured(values, captured_at, covariance, sensor, point);
+        TautscopeAxesReport report = empty_report();
+        const TautscopeResult result =
+            tautscope_axes_on_measurement(handle_.get(), &measurement, forward, &call, &report);
+        if (call.error) {
+            std::rethrow_exception(call.error);
+        }
+        check(result);
+        return report;
+    }
+
+    /// The state of the tip (n,) that the estimated slack predicts now.
+    Values predicted_state() {
+        Values state(dofs_);
+        check(tautscope_axes_predicted_state(handle_.get(), dofs_, state.data()));
+        return state;
+    }
+
+    /// The hysteresis estimated so far, in the first n entries.
+    TautscopeAxesHysteresis hysteresis() {
+        TautscopeAxesHysteresis hysteresis;
+        check(tautscope_axes_hysteresis(handle_.get(), &hysteresis));
+        return hysteresis;
+    }
+
+    /// Reaction and flags in force.
+    TautscopeSupervision supervision() {
+        TautscopeSupervision supervision;
+        check(tautscope_axes_supervision(handle_.get(), &supervision));
+        return supervision;
+    }
+
+    /// Resumes held motion, without a jump of the command.
+    void engage() { check(tautscope_axes_engage(handle_.get())); }
+
+    /// Acknowledges the warnings.
+    void acknowledge() { check(tautscope_axes_acknowledge(handle_.get())); }
+
+    /// Uses a share of the compensation, 0 to 1.
+    void set_compensation(double share) { check(tautscope_axes_set_compensation(handle_.get(), share)); }
+
+    /// Raises a flag that only the rig can detect.
+    void raise_flag(TautscopeFlag flag) {
+        check(tautscope_axes_raise_flag(handle_.get(), static_cast<std::uint32_t>(flag)));
+    }
+
+    TautscopeAxes *handle() noexcept { return handle_.get(); }
+
+private:
+    static constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+
+    static TautscopeAxesReport empty_report() noexcept {
+        TautscopeAxesReport report{};
+        report.size = sizeof report;
+        return report;
+    }
+
+    static TautscopeMeasurement measured(Numbers values, double captured_at, Numbers covariance, std::uint32_t sensor,
+                                         std::uint32_t point) {
+        const std::size_t count = values.size();
+        if (covariance.data() != nullptr && covariance.size() != count * count) {
+            throw Error(TAUTSCOPE_RESULT_SIZE, "covariance: got " + std::to_string(covariance.size()) +
+                                                   " numbers, expected " + std::to_string(count * count));
+        }
+        return {values.data(), count, covariance.data(), captured_at, sensor, point};
+    }
+
+    template <class Predict> static int seen(Predict &predict, const double *state, double *z, double *jacobian) {
+        const auto call = [&] {
+            if constexpr (std::is_invocable_v<Predict &, const double *, double *, double *>) {
+                return predict(state, z, jacobian);
+            } else {
+                return predict(state, z);
+            }
+        };
+        if constexpr (std::is_void_v<decltype(call())>) {
+            call();
+            return 1;
+        } else {
+            return call() ? 1 : 0;
+        }
+    }
+
+    std::unique_ptr<TautscopeAxes, detail::Destroy> handle_;
+    std::size_t dofs_ = 0;
+    double period_ = 0.0;
 };
 
 } // namespace tautscope

@@ -4,8 +4,8 @@ use tautscope_core as core;
 use tautscope_vision as vision;
 
 use crate::types::{
-    TautscopeReaction, TautscopeRejection, TautscopeReport, TautscopeStatus, TautscopeSupervision,
-    TautscopeTrigger,
+    TautscopeAxesHysteresis, TautscopeAxesReport, TautscopeReaction, TautscopeRejection,
+    TautscopeReport, TautscopeStatus, TautscopeSupervision, TautscopeTrigger,
 };
 
 /// The bits of a set of flags.
@@ -107,6 +107,42 @@ impl TautscopeReport {
             triggers_plus: report.triggers.map(|triggers| triggers.plus.into()),
             is_observable: report.estimate.observable.map(u32::from),
             reserved: 0,
+        }
+    }
+}
+
+impl TautscopeAxesReport {
+    /// The report of a measurement at a time in s.
+    pub fn new(report: &core::AxesReport, axes: &dyn core::Axes, captured_at: f64) -> Self {
+        let (now, play) = (axes.supervision(), axes.play());
+        Self {
+            size: 0,
+            status: report.status.into(),
+            reaction: now.reaction.into(),
+            flags: bits(now.flags),
+            captured_at,
+            state_estimate: report.state,
+            state_deviation: report.state_deviation,
+            predicted_state: report.predicted_state,
+            predicted_values: report.predicted,
+            innovation: report.innovation,
+            delta_minus: play.map(|play| play.delta_minus()),
+            delta_plus: play.map(|play| play.delta_plus()),
+            triggers_minus: report.triggers.map(|triggers| triggers.minus.into()),
+            triggers_plus: report.triggers.map(|triggers| triggers.plus.into()),
+            is_observable: report.observable.map(u32::from),
+        }
+    }
+}
+
+impl From<core::AxesHysteresis> for TautscopeAxesHysteresis {
+    fn from(found: core::AxesHysteresis) -> Self {
+        Self {
+            half_width: found.half_width,
+            width_std: found.width_std,
+            centre: found.centre,
+            gain: found.gain,
+            gain_std: found.gain_std,
         }
     }
 }

@@ -1,9 +1,11 @@
-//! The configuration: TOML with every key, as `tautscope config` prints it.
+//! The configuration: TOML with every key, as `tautscope config` prints it; with `[[dof]]`, missing keys have their defaults.
 
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
+use tautscope_axes::AxesSettings;
 use tautscope_core as core;
 use tautscope_vision::PixelFormat;
+use toml::{Table, Value};
 
 use crate::result::{TautscopeResult, failed};
 
@@ -67,7 +69,7 @@ pub fn loop_settings(text: &[u8]) -> Result<(core::Settings, Profile), Tautscope
     let ProfileDocument { profile, dof } = parsed(text)?;
     if !dof.is_empty() {
         return Err(config(format_args!(
-            "dof: got {} degrees of freedom, expected none: the article's instrument",
+            "dof: got {} degrees of freedom, expected none: they are for `tautscope_axes_create`",
             dof.len()
         )));
     }
@@ -105,19 +107,141 @@ pub fn detector_settings(
     Ok((document, model, format))
 }
 
+/// A configuration of one degree of freedom with every default, written by `tests/config/test_axes_defaults.py`.
+const DEFAULTS: &str = include_str!("defaults.toml");
+/// Keys of `[[dof]]` without a default.
+const OPTIONAL: [&str; 5] = ["name", "width_limit", "range", "speed", "expected_width"];
+
+/// Settings of a loop with `[[dof]]`.
+#[derive(Debug)]
+pub struct AxesDocument {
+    /// What the loop reads.
+    pub axes: AxesSettings,
+    /// `[measurement]`.
+    pub measurement: Measurement,
+}
+
+/// What the sensors of a loop with `[[dof]]` need, `[measurement]`.
+#[derive(Debug, Deserialize)]
+pub struct Measurement {
+    /// Standard deviation of a tip that is measured degree by degree, in `width_limit`.
+    pub tip_deviation: f64,
+    /// How much earlier than its time stamps say each sensor measures, in s.
+    #[serde(default)]
+    pub delays: Vec<f64>,
+}
+
+/// Settings of a loop with `[[dof]]`; keys that are not in the text have their defaults.
+///
+/// # Errors
+/// The text is not TOML in UTF-8, or a key is missing, unknown, of another instrument, or of the wrong kind.
+pub fn axes_document(text: &[u8]) -> Result<AxesDocument, TautscopeResult> {
+    let wrong = |error: toml::de::Error| config(format_args!("configuration: {error}"));
+    let given: Table = toml::from_str(utf8(text)?).map_err(wrong)?;
+    let mut table: Table = toml::from_str(DEFAULTS).map_err(wrong)?;
+    let entry = table
+        .remove("dof")
+        .and_then(|entries| entries.get(0).cloned());
+    let mut entry = entry
+        .and_then(|entry| entry.try_into::<Table>().ok())
+        .unwrap_or_default();
+    for key in ["name", "width_limit"] {
+        entry.remove(key);
+    }
+    let (mut dofs, mut names) = (Vec::new(), Vec::new());
+    for (name, value) in given {
+        match (name.as_str(), value) {
+            ("dof", Value::Array(entries)) => {
+                for own in entries {
+                    let mut dof = entry.clone();
+                    merge(&mut dof, own, "dof", &OPTIONAL)?;
+                    let name = dof.get("name").and_then(Value::as_str).unwrap_or_default();
+                    if name.is_empty() || names.iter().any(|other| other == name) {
+                        return Err(config(format_args!(
+                            "dof.name: got {name:?}, expected a name used once"
+                        )));
+                    }
+                    names.push(name.to_owned());
+                    dofs.push(Value::Table(dof));
+                }
+            }
+            ("profile", value) if value.as_str() != Some("best") => {
+                return Err(config(format_args!(
+                    "profile: got {:?}, expected \"best\"",
+                    value.as_str().unwrap_or_default()
+                )));
+            }
+            // Not used with `[[dof]]`, but for defaults.
+            ("profile" | "drives" | "insertion" | "rotation" | "bending", _) => {}
+            (name, own) => match table.get_mut(name) {
+                Some(Value::Table(section)) if SECTIONS.contains(&name) => {
+                    merge(section, own, name, &[])?;
+                }
+                Some(_) => {}
+                None => return Err(unknown(name)),
+            },
+        }
+    }
+    table.insert("dof".into(), Value::Array(dofs));
+    Ok(AxesDocument {
+        measurement: table["measurement"].clone().try_into().map_err(wrong)?,
+        axes: table.try_into().map_err(wrong)?,
+    })
+}
+
+/// Sections that a loop with `[[dof]]` reads.
+const SECTIONS: [&str; 5] = ["control", "safety", "law", "estimation", "measurement"];
+
+/// Takes the values of a section.
+fn merge(
+    section: &mut Table,
+    own: Value,
+    name: &str,
+    optional: &[&str],
+) -> Result<(), TautscopeResult> {
+    let Value::Table(own) = own else {
+        return Err(config(format_args!(
+            "{name}: got a {}, expected a table",
+            own.type_str()
+        )));
+    };
+    for (key, value) in own {
+        let default = section.get(&key);
+        if default.is_none() && !optional.contains(&key.as_str()) {
+            return Err(unknown(&format!("{name}.{key}")));
+        }
+        let is_per_dof = default
+            .and_then(Value::as_array)
+            .is_some_and(|all| all.len() == 3);
+        if is_per_dof && default != Some(&value) {
+            return Err(config(format_args!(
+                "{name}.{key}: not used with [[dof]], which has its own"
+            )));
+        }
+        section.insert(key, value);
+    }
+    Ok(())
+}
+
+fn unknown(name: &str) -> TautscopeResult {
+    config(format_args!("{name}: unknown key"))
+}
+
 /// The error of a configuration.
 pub fn config(message: std::fmt::Arguments<'_>) -> TautscopeResult {
     failed(TautscopeResult::Config, message)
 }
 
 fn parsed<T: DeserializeOwned>(text: &[u8]) -> Result<T, TautscopeResult> {
-    let text = str::from_utf8(text)
-        .map_err(|error| config(format_args!("configuration: not UTF-8: {error}")))?;
-    toml::from_str(text).map_err(|error| {
+    toml::from_str(utf8(text)?).map_err(|error| {
         config(format_args!(
             "configuration: {error}every key is needed, as `tautscope config` prints them"
         ))
     })
+}
+
+fn utf8(text: &[u8]) -> Result<&str, TautscopeResult> {
+    str::from_utf8(text).map_err(|error| config(format_args!("configuration: not UTF-8: {error}")))
 }
 
 impl Experiment {

@@ -1,10 +1,8 @@
 //! Image updates of `TautscopeLoop`: by features, by a detection, or by an image.
 #![allow(unsafe_code)]
 
-use std::mem::offset_of;
-
 use crate::detector::{TautscopeDetector, detect};
-use crate::pointers::{read, write};
+use crate::pointers::{check_report, read, write, write_report};
 use crate::reduction::{TautscopeLoop, check_finite, on_loop};
 use crate::result::{TautscopeResult, failed, with_handle};
 use crate::types::{
@@ -195,41 +193,4 @@ fn check_bands(features: &[f64; 4], is_found: [bool; 2]) -> Result<(), Tautscope
         }
     }
     Ok(())
-}
-
-/// Checks the size of the caller's report.
-///
-/// # Safety
-/// It is null, or `size` is readable.
-unsafe fn check_report(report: *const TautscopeReport) -> Result<(), TautscopeResult> {
-    if report.is_null() {
-        return Ok(());
-    }
-    // SAFETY: the caller's contract.
-    let size = unsafe { (&raw const (*report).size).read() } as usize;
-    let needed = size_of::<TautscopeReport>();
-    if size < needed {
-        return Err(failed(
-            TautscopeResult::Size,
-            format_args!("report.size: got {size}, expected at least {needed}"),
-        ));
-    }
-    Ok(())
-}
-
-/// Writes a report, all but its size.
-///
-/// # Safety
-/// [`check_report`] accepted it.
-unsafe fn write_report(report: *mut TautscopeReport, done: &TautscopeReport) {
-    if report.is_null() {
-        return;
-    }
-    let start = offset_of!(TautscopeReport, status);
-    // SAFETY: both have this size, of which none is padding, and do not overlap.
-    unsafe {
-        let from = std::ptr::from_ref(done).cast::<u8>().add(start);
-        let count = size_of::<TautscopeReport>() - start;
-        from.copy_to_nonoverlapping(report.cast::<u8>().add(start), count);
-    }
 }

@@ -14,6 +14,8 @@
 #[cfg(test)]
 mod tests;
 
+mod axes;
+mod axes_update;
 mod conversions;
 mod detector;
 mod document;

@@ -52,6 +52,86 @@ pub unsafe fn bytes<'a>(
     Ok(unsafe { std::slice::from_raw_parts(pointer, length) })
 }
 
+/// Numbers at a pointer.
+///
+/// # Errors
+/// It is null.
+///
+/// # Safety
+/// If not null, it is aligned, `count` numbers from it are readable and nobody changes them during the call.
+pub unsafe fn numbers<'a>(
+    name: &str,
+    pointer: *const f64,
+    count: usize,
+) -> Result<&'a [f64], TautscopeResult> {
+    if pointer.is_null() {
+        return Err(null(name));
+    }
+    // SAFETY: not null; the rest is the caller's contract.
+    Ok(unsafe { std::slice::from_raw_parts(pointer, count) })
+}
+
+/// Place for numbers at a pointer.
+///
+/// # Errors
+/// It is null.
+///
+/// # Safety
+/// If not null, it is aligned, and nobody else uses the `count` numbers from it during the call.
+pub unsafe fn numbers_mut<'a>(
+    name: &str,
+    pointer: *mut f64,
+    count: usize,
+) -> Result<&'a mut [f64], TautscopeResult> {
+    if pointer.is_null() {
+        return Err(null(name));
+    }
+    // SAFETY: not null; the rest is the caller's contract.
+    Ok(unsafe { std::slice::from_raw_parts_mut(pointer, count) })
+}
+
+/// A structure without padding whose first member is its size in bytes, as the caller knows it (u32).
+///
+/// # Safety
+/// It is.
+pub unsafe trait Sized32 {}
+
+/// Checks the size of the caller's report.
+///
+/// # Safety
+/// It is null, or `size` is readable.
+pub unsafe fn check_report<T: Sized32>(report: *const T) -> Result<(), TautscopeResult> {
+    if report.is_null() {
+        return Ok(());
+    }
+    // SAFETY: the caller's contract.
+    let size = unsafe { report.cast::<u32>().read() } as usize;
+    let needed = size_of::<T>();
+    if size < needed {
+        return Err(failed(
+            TautscopeResult::Size,
+            format_args!("report.size: got {size}, expected at least {needed}"),
+        ));
+    }
+    Ok(())
+}
+
+/// Writes a report, all but its size.
+///
+/// # Safety
+/// [`check_report`] accepted it.
+pub unsafe fn write_report<T: Sized32>(report: *mut T, done: &T) {
+    if report.is_null() {
+        return;
+    }
+    let start = size_of::<u32>();
+    // SAFETY: both have this size, of which none is padding, and do not overlap.
+    unsafe {
+        let from = std::ptr::from_ref(done).cast::<u8>().add(start);
+        from.copy_to_nonoverlapping(report.cast::<u8>().add(start), size_of::<T>() - start);
+    }
+}
+
 /// Moves a value to the heap and gives it to the caller.
 ///
 /// # Safety

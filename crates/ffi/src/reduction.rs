@@ -142,10 +142,7 @@ pub unsafe extern "C" fn tautscope_loop_step(
             check_finite("reference", *value)?;
         }
         check_finite("time", time)?;
-        if made_at.is_infinite() {
-            return Err(not_finite("made_at", made_at));
-        }
-        let made_at = (!made_at.is_nan()).then_some(made_at);
+        let made_at = check_made_at(made_at)?;
         handle.command = on_loop!(handle, inner => inner.step(*reference, made_at, time));
         *command = handle.command;
         Ok(())
@@ -158,6 +155,14 @@ pub fn check_finite(name: &str, value: f64) -> Result<(), TautscopeResult> {
     } else {
         Err(not_finite(name, value))
     }
+}
+
+/// When a reference was made, if that is known.
+pub fn check_made_at(made_at: f64) -> Result<Option<f64>, TautscopeResult> {
+    if made_at.is_infinite() {
+        return Err(not_finite("made_at", made_at));
+    }
+    Ok((!made_at.is_nan()).then_some(made_at))
 }
 
 fn not_finite(name: &str, value: f64) -> TautscopeResult {

@@ -63,8 +63,7 @@ pub unsafe extern "C" fn tautscope_loop_set_compensation(
 ) -> TautscopeResult {
     // SAFETY: the caller's contract.
     with_handle(unsafe { handle.as_mut() }, |handle| {
-        on_loop!(handle, inner => inner.set_compensation(share))
-            .map_err(|error| failed(TautscopeResult::Signal, format_args!("{error}")))
+        on_loop!(handle, inner => inner.set_compensation(share)).map_err(share_error)
     })
 }
 
@@ -80,14 +79,24 @@ pub unsafe extern "C" fn tautscope_loop_raise_flag(
 ) -> TautscopeResult {
     // SAFETY: the caller's contract.
     with_handle(unsafe { handle.as_mut() }, |handle| {
-        let known = core::Flag::ALL.get(flag as usize);
-        let known = known.ok_or_else(|| {
-            failed(
-                TautscopeResult::Signal,
-                format_args!("flag: got {flag}, expected a TautscopeFlag"),
-            )
-        })?;
-        on_loop!(handle, inner => inner.raise(*known));
+        let known = known_flag(flag)?;
+        on_loop!(handle, inner => inner.raise(known));
         Ok(())
     })
+}
+
+/// The flag of a number.
+pub fn known_flag(flag: u32) -> Result<core::Flag, TautscopeResult> {
+    let known = core::Flag::ALL.get(flag as usize).copied();
+    known.ok_or_else(|| {
+        failed(
+            TautscopeResult::Signal,
+            format_args!("flag: got {flag}, expected a TautscopeFlag"),
+        )
+    })
+}
+
+/// The error of a share of the compensation.
+pub fn share_error(error: core::ConfigError) -> TautscopeResult {
+    failed(TautscopeResult::Signal, format_args!("{error}"))
 }

@@ -192,6 +192,85 @@ pub struct TautscopeReport {
     pub reserved: u32,
 }
 
+/// A measurement of the tip. Set what you do not know to 0.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct TautscopeMeasurement {
+    /// Values (m,); NaN for one that was not measured.
+    pub values: *const f64,
+    /// m, 1 to 16.
+    pub count: usize,
+    /// Covariance (m, m) row by row, or null, where the function allows it.
+    pub covariance: *const f64,
+    /// When it was measured, on the clock of `tautscope_axes_step` (s).
+    pub captured_at: f64,
+    /// Which of 4 sensors with rates and delays of their own, 0 to 3.
+    pub sensor: u32,
+    /// Values in a row that are right or wrong together: 2 for u, v of points of an image; 0 is 1.
+    pub point: u32,
+}
+
+/// Result of an update by a measurement; values that are not known are NaN.
+///
+/// Of n degrees of freedom and m values the first n and m entries are used. Set `size` to `sizeof(TautscopeAxesReport)` first.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TautscopeAxesReport {
+    /// Bytes of the structure as the caller knows it.
+    pub size: u32,
+    /// Result of the update.
+    pub status: TautscopeStatus,
+    /// The reaction in force after this measurement.
+    pub reaction: TautscopeReaction,
+    /// The active flags, a bit `1 << TautscopeFlag` each.
+    pub flags: u32,
+    /// When it was measured (s).
+    pub captured_at: f64,
+    /// The most probable state [m or rad].
+    pub state_estimate: [f64; 8],
+    /// Its standard deviations [m or rad].
+    pub state_deviation: [f64; 8],
+    /// Predicted state q at the time of the measurement [m or rad].
+    pub predicted_state: [f64; 8],
+    /// Values expected in the predicted state.
+    pub predicted_values: [f64; 16],
+    /// Measured minus expected values.
+    pub innovation: [f64; 16],
+    /// Negative contact offsets after this measurement [m or rad], input minus output.
+    pub delta_minus: [f64; 8],
+    /// Positive contact offsets after this measurement [m or rad], input minus output.
+    pub delta_plus: [f64; 8],
+    /// Per DOF, why `delta_minus` was updated.
+    pub triggers_minus: [TautscopeTrigger; 8],
+    /// Per DOF, why `delta_plus` was updated.
+    pub triggers_plus: [TautscopeTrigger; 8],
+    /// Per DOF, 1 if the measurement determined it.
+    pub is_observable: [u32; 8],
+}
+
+/// Estimated hysteresis of n degrees of freedom, in the first n entries [m or rad].
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TautscopeAxesHysteresis {
+    /// Half widths of the slack of each DOF that moves alone.
+    pub half_width: [f64; 8],
+    /// Standard deviations of the half widths.
+    pub width_std: [f64; 8],
+    /// Centres of the contact offsets, input minus output.
+    pub centre: [f64; 8],
+    /// Travel of the tip over that of the command in contact.
+    pub gain: [f64; 8],
+    /// Standard deviations of the gains.
+    pub gain_std: [f64; 8],
+}
+
+// SAFETY: the first member is `size`, and the members leave no gap; a test compares the sizes.
+#[allow(unsafe_code)]
+unsafe impl crate::pointers::Sized32 for TautscopeReport {}
+// SAFETY: likewise.
+#[allow(unsafe_code)]
+unsafe impl crate::pointers::Sized32 for TautscopeAxesReport {}
+
 /// State of the supervision.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -11,12 +11,6 @@ from tautscope.config.section import Section
 
 Name = Annotated[str, Meta(min_length=1, max_length=32, pattern=r"^[a-z][a-z0-9_]*$")]
 
-EXPECTED_WIDTH = 2 / 3
-"""Of `DofEntry.width_limit`, as the article's instrument has it."""
-START_DEVIATION = 0.3
-SPEED = 2.0
-RANGE = 50.0
-
 
 class DofEntry(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """One of 1 to 8 degrees of freedom of a robot that is not the article's instrument.

@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from tautscope._core import DETECTORS
-from tautscope.config.axes import RANGE, DofEntry
+from tautscope._core import DETECTORS, MOST_RANGE
+from tautscope.config.axes import DofEntry
 from tautscope.config.control import ControlConfig
 from tautscope.config.dof import DofConfig
 from tautscope.config.drives import DrivesConfig
@@ -100,7 +100,7 @@ def _check_dof_entry(dof: DofEntry) -> None:
     if dof.range is not None:
         low, high = dof.range
         _require(low < high, "range", dof.range, _RANGE)
-        most = 2 * RANGE * dof.width_limit
+        most = MOST_RANGE * dof.width_limit
         degrees = "; in m and rad, not mm and degrees" if high - low > most else ""
         _require(not degrees, "range", dof.range, f"at most {most:.3g} wide{degrees}")
     if dof.expected_width is not None:

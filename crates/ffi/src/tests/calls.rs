@@ -18,7 +18,7 @@ use crate::result::{
     Handle, TautscopeResult, failed, guarded, tautscope_error_message, with_handle,
 };
 use crate::supervision::tautscope_loop_engage;
-use crate::types::{TautscopeFlag, TautscopePixelFormat, TautscopeReport};
+use crate::types::{TautscopeAxesReport, TautscopeFlag, TautscopePixelFormat, TautscopeReport};
 
 fn text(pointer: *const std::ffi::c_char) -> &'static str {
     // SAFETY: a text of the library, which ends with a zero.
@@ -177,6 +177,14 @@ fn numbers_and_names_are_those_of_the_core() {
 #[test]
 fn the_report_has_no_padding() {
     assert_eq!(size_of::<TautscopeReport>(), 4 * 4 + 8 * 27 + 4 * 10);
+}
+
+#[test]
+fn the_report_of_axes_has_no_padding() {
+    assert_eq!(
+        size_of::<TautscopeAxesReport>(),
+        4 * 4 + 8 * (1 + 5 * 8 + 2 * 16) + 4 * 24
+    );
 }
 
 #[test]

@@ -18,6 +18,8 @@ fn header_is_generated_from_these_sources() {
         "image_update",
         "supervision",
         "detector",
+        "axes",
+        "axes_update",
     ] {
         builder = builder.with_src(folder.join(format!("src/{file}.rs")));
     }

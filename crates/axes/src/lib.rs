@@ -1,0 +1,201 @@
+//! A loop of 1 to 8 degrees of freedom from a configuration with `[[dof]]`, for Python and for C.
+//!
+//! The only place with the ratios by which the settings of a degree of freedom follow from its `width_limit`.
+
+use serde::Deserialize;
+use tautscope_core as core;
+
+/// A loop whose number of DOFs is known at run time.
+pub type BoxedAxes = Box<dyn core::Axes + Send + Sync>;
+
+// The article's instrument has about these ratios of its lengths to safety.width_limit.
+const OFFSET_LIMIT: f64 = 2.0 / 3.0;
+const EXPECTED_WIDTH: f64 = 2.0 / 3.0;
+const START_DEVIATION: f64 = 0.3;
+const UPDATES: f64 = 50.0;
+const COUNTS: f64 = 250.0;
+/// `speed` without a value, in `width_limit` per s.
+const SPEED: f64 = 2.0;
+/// Speed of the command over that of the reference while the slack is crossed at `gain_limit`.
+const COMMAND_SPEED: f64 = 2.0;
+/// Widest `range`, in `width_limit`, and without a value that about 0.
+pub const MOST_RANGE: f64 = 100.0;
+
+const STACK: usize = 16 << 20;
+
+/// An entry of `[[dof]]`: names, units and meaning are those of `python/tautscope/config/axes.py`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[expect(missing_docs, reason = "in Python")]
+pub struct AxisSettings {
+    pub width_limit: f64,
+    pub range: Option<(f64, f64)>,
+    pub speed: Option<f64>,
+    pub friction: String,
+    pub lever: f64,
+    pub expected_width: Option<f64>,
+    pub gain_limit: f64,
+    pub delta_minus: f64,
+    pub delta_plus: f64,
+}
+
+/// The sections of a configuration that such a loop reads.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct AxesSettings {
+    /// The degrees of freedom in the order of every array.
+    pub dof: Vec<AxisSettings>,
+    /// The loop's clock.
+    pub control: core::ControlSettings,
+    /// Supervision; its values per degree of freedom are not used.
+    pub safety: core::SafetySettings,
+    /// Compensation.
+    pub law: core::LawSettings,
+    /// Estimation.
+    pub estimation: core::EstimateSettings,
+    /// Defaults of a degree of freedom that are no lengths.
+    pub insertion: core::DofSettings,
+}
+
+impl AxesSettings {
+    /// A loop at rest; without compensation every gain is 1.
+    ///
+    /// # Errors
+    /// There are not 1 to 8 degrees of freedom, or a setting is out of range.
+    pub fn build(&self, compensate: bool) -> Result<BoxedAxes, core::ConfigError> {
+        // The constructors copy a loop of eight, 0.4 MB, several times: more than the stack of many threads.
+        std::thread::scope(|scope| {
+            let roomy = std::thread::Builder::new().stack_size(STACK);
+            match roomy.spawn_scoped(scope, || self.build_here(compensate)) {
+                Ok(thread) => thread
+                    .join()
+                    .unwrap_or_else(|cause| std::panic::resume_unwind(cause)),
+                Err(_) => self.build_here(compensate),
+            }
+        })
+    }
+
+    fn build_here(&self, compensate: bool) -> Result<BoxedAxes, core::ConfigError> {
+        macro_rules! of {
+            ($($count:literal)*) => {
+                match self.dof.len() {
+                    $($count => self.build_of::<$count, { $count * core::COEFFICIENTS }>(compensate),)*
+                    #[expect(clippy::cast_precision_loss, reason = "for the message")]
+                    count => Err(error("dof", count as f64, "1 to 8 degrees of freedom")),
+                }
+            };
+        }
+        of!(1 2 3 4 5 6 7 8)
+    }
+
+    fn build_of<const N: usize, const D: usize>(
+        &self,
+        compensate: bool,
+    ) -> Result<BoxedAxes, core::ConfigError> {
+        let period = self.control.period;
+        if !(period.is_finite() && period > 0.0) {
+            return Err(error("period", period, "a finite number above 0"));
+        }
+        let settings = self.of_loop::<N>(compensate)?;
+        let entries = core::history_entries(self.control.history, period);
+        let storage = vec![core::Entry::<N>::BLANK; entries];
+        let made = core::AxesReduction::<N, D, Vec<core::Entry<N>>>::of_axes(&settings, storage);
+        Ok(Box::new(made?))
+    }
+
+    fn of_loop<const N: usize>(
+        &self,
+        compensate: bool,
+    ) -> Result<core::LoopSettings<N>, core::ConfigError> {
+        let dofs: [&AxisSettings; N] = std::array::from_fn(|index| &self.dof[index]);
+        for dof in dofs {
+            dof.check()?;
+        }
+        let group = std::array::from_fn(|index| {
+            let same = |other: &&AxisSettings| other.friction == dofs[index].friction;
+            let first = dofs.iter().position(same).unwrap_or(index);
+            if dofs[index].friction.is_empty() {
+                index
+            } else {
+                first
+            }
+        });
+        Ok(core::LoopSettings {
+            dofs: dofs.map(|dof| dof.settings(&self.insertion, compensate)),
+            friction: core::Friction::new(group, dofs.map(|dof| dof.lever))?,
+            control: self.control,
+            safety: self.safety_of(dofs),
+            law: self.law,
+            estimation: self.estimation,
+        })
+    }
+
+    fn safety_of<const N: usize>(&self, dofs: [&AxisSettings; N]) -> core::SafetySettings<N> {
+        macro_rules! with {
+            ($($own:ident: $value:expr,)* $(; $kept:ident)*) => {
+                core::SafetySettings { $($own: $value,)* $($kept: self.safety.$kept,)* }
+            };
+        }
+        with! {
+            width_limit: dofs.map(|dof| dof.width_limit),
+            offset_limit: dofs.map(|dof| OFFSET_LIMIT * dof.width_limit),
+            reference_speed: dofs.map(AxisSettings::speed),
+            command_speed: dofs.map(|dof| COMMAND_SPEED * dof.gain_limit * dof.speed()),
+            command_travel: dofs.map(|dof| {
+                let far = MOST_RANGE / 2.0 * dof.width_limit;
+                dof.range.unwrap_or((-far, far))
+            }),
+            reference_count: dofs.map(|dof| dof.width_limit / COUNTS),
+            // An encoder repeats its value bit for bit while the slack is crossed.
+            frozen_travel: 2.0 * UPDATES,
+            ; off; reference_time; reference_age; late_tick; stall; frame_age; frame_gap; clock_jump; innovation_limit
+            ; tremor_swing; tremor_rate; ahead_limit; ahead_ratio; offset_decrease; cycle_swings; cycle_growth; cycle_time
+            ; hold_time; hold_travel; fade_travel; restore_travel; good_frames; good_ticks
+        }
+    }
+}
+
+impl AxisSettings {
+    /// What the blocks of the core do not check.
+    fn check(&self) -> Result<(), core::ConfigError> {
+        let width = self.width_limit;
+        for (name, value) in [("width_limit", width), ("speed", self.speed())] {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(error(name, value, "a finite number above 0"));
+            }
+        }
+        let span = self.range.map_or(width, |(low, high)| high - low);
+        if !(span > 0.0 && span <= MOST_RANGE * width) {
+            let allowed = "from least to largest, above 0 and at most 100 width_limit; in m and rad, not mm and degrees";
+            return Err(error("range", span, allowed));
+        }
+        if self.expected_width.is_some_and(|own| own > width) {
+            return Err(error("expected_width", width, "a width_limit not below it"));
+        }
+        Ok(())
+    }
+
+    fn speed(&self) -> f64 {
+        self.speed.unwrap_or(SPEED * self.width_limit)
+    }
+
+    fn settings(&self, article: &core::DofSettings, compensate: bool) -> core::DofSettings {
+        let width = self.width_limit;
+        core::DofSettings {
+            update_distance: width / UPDATES,
+            expected_width: self.expected_width.unwrap_or(EXPECTED_WIDTH * width),
+            start_deviation: START_DEVIATION * width,
+            free_gain: if compensate { self.gain_limit } else { 1.0 },
+            gain_limit: self.gain_limit,
+            delta_minus: self.delta_minus,
+            delta_plus: self.delta_plus,
+            ..*article
+        }
+    }
+}
+
+const fn error(field: &'static str, value: f64, allowed: &'static str) -> core::ConfigError {
+    core::ConfigError {
+        field,
+        value,
+        allowed,
+    }
+}

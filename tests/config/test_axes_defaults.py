@@ -1,0 +1,17 @@
+"""The defaults of the C interface with [[dof]] are those of Python."""
+
+import os
+
+from common.paths import ROOT
+from tautscope import axes
+from tautscope.config import dump_config
+
+DEFAULTS = ROOT / "crates" / "ffi" / "src" / "defaults.toml"
+
+
+def test_the_defaults_in_c_are_these() -> None:
+    text = dump_config(axes(1, width_limit=1.0))
+    if "TAUTSCOPE_WRITE_DEFAULTS" in os.environ:
+        DEFAULTS.write_text(text, encoding="utf-8")
+    found = DEFAULTS.read_text(encoding="utf-8")
+    assert found == text, f"write it: TAUTSCOPE_WRITE_DEFAULTS=1 uv run pytest {__file__}"
