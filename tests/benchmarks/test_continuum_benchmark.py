@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from continuum.__main__ import out_and_back, rms, split, static_model, to_rows
+from continuum.__main__ import out_and_back, rms, split, static_model, table, to_rows
 from continuum.prediction import MODELS, predict, products, recursive_least_squares
 from continuum.robot import (
     FILE,
@@ -99,6 +99,18 @@ def test_rows_are_errors_of_the_last_third_alone() -> None:
     tip[20:, 0] += 2e-3
     (row,) = to_rows(record, robot, {("last tip", 1): replace(perfect, tip=tip)})
     assert row["rms_mm"][1] == pytest.approx(2.0) and row["refused"] == 0
+
+
+def test_the_table_says_by_how_much_plays_change_the_error() -> None:
+    errors = {"filter without plays": (2.0, 4.0, 10.0), "filter": (2.0, 5.0, 9.0)}
+    rows = [
+        {"model": model, "rms_mm": dict(zip((1, 5, 20), each, strict=True))}
+        for model, each in errors.items()
+    ]
+    known = dict.fromkeys(("static_fitted", "static_last_third", "out_and_back", "pairs"), 7.0)
+    shown = table(rows, known)
+    assert "| filter | 2.0 | 5.0 | 9.0 |" in shown
+    assert "Plays change the error by +0%, +25%, -10% (filter)." in shown
 
 
 def test_pairs_are_equal_pulls_on_the_way_out_and_back() -> None:
