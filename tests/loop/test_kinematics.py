@@ -1,11 +1,12 @@
-"""Kinematics of two bending planes against an integrated curve, rotations against SciPy."""
+"""Kinematics of bending sections against an integrated curve, rotations against SciPy."""
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
-from tautscope.config import from_document
-from tautscope.loop.kinematics import TwoPlanes, rotation_matrix, rotation_vector
+from tautscope.config import Config, from_document
+from tautscope.errors import ConfigError
+from tautscope.loop.kinematics import TwoPlanes, build_kinematics, rotation_matrix, rotation_vector
 from tautscope.loop.measurement import check_rotation
 
 CONFIG = from_document(
@@ -33,6 +34,18 @@ CONFIG = from_document(
 )
 def test_two_planes_is_the_integral_of_a_constant_curvature(q: tuple[float, ...]) -> None:
     insertion, bend_x, bend_y, rotation = q
+    end, frame = integrated(np.zeros(3), np.eye(3), bend_x, bend_y)
+    about = Rotation.from_rotvec([0, 0, rotation]).as_matrix()
+    place = about @ (end + frame[:, 2] * 0.02 + [0, 0, insertion])
+    position, orientation = TwoPlanes(CONFIG).tip(np.array(q))
+    np.testing.assert_allclose(position, place, atol=1e-9)
+    np.testing.assert_allclose(orientation, about @ frame, atol=1e-8)
+
+
+def integrated(
+    start: np.ndarray, turned: np.ndarray, bend_x: float, bend_y: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """End and frame of a section of 0.05 m that begins at a frame."""
     turn = np.array([-bend_y, bend_x, 0.0]) / 0.05
 
     def slope(_: float, y: np.ndarray) -> np.ndarray:
@@ -40,13 +53,33 @@ def test_two_planes_is_the_integral_of_a_constant_curvature(q: tuple[float, ...]
         cross = np.cross(np.eye(3), turn)
         return np.concatenate([frame[:, 2], (frame @ cross).ravel()])
 
-    start = np.concatenate([np.zeros(3), np.eye(3).ravel()])
-    end = solve_ivp(slope, (0, 0.05), start, rtol=1e-11, atol=1e-13).y[:, -1]
-    frame, about = end[3:].reshape(3, 3), Rotation.from_rotvec([0, 0, rotation]).as_matrix()
-    place = about @ (end[:3] + frame[:, 2] * 0.02 + [0, 0, insertion])
-    position, orientation = TwoPlanes(CONFIG).tip(np.array(q))
-    np.testing.assert_allclose(position, place, atol=1e-9)
-    np.testing.assert_allclose(orientation, about @ frame, atol=1e-8)
+    begin = np.concatenate([start, turned.ravel()])
+    end = solve_ivp(slope, (0, 0.05), begin, rtol=1e-11, atol=1e-13).y[:, -1]
+    return end[:3], end[3:].reshape(3, 3)
+
+
+@pytest.mark.parametrize(
+    "q", [(0.0, 0.0), (0.7, -1.1, 0.0, 0.0, -2.0, 1.5), (0.4, 0.2, 9e-5, 4e-5, 0.3, -0.8, 1.0, 0.1)]
+)
+def test_segments_are_the_integral_of_constant_curvatures(q: tuple[float, ...]) -> None:
+    config = segments(len(q))
+    end, frame = np.zeros(3), np.eye(3)
+    for bend_x, bend_y in np.reshape(q, (-1, 2)):
+        end, frame = integrated(end, frame, bend_x, bend_y)
+    position, orientation = build_kinematics(config).tip(np.array(q))
+    np.testing.assert_allclose(position, end + frame[:, 2] * 0.02, atol=1e-8)
+    np.testing.assert_allclose(orientation, frame, atol=1e-8)
+
+
+def test_segments_have_two_degrees_of_freedom_each() -> None:
+    with pytest.raises(ConfigError, match="two degrees of freedom per segment"):
+        build_kinematics(segments(3))
+
+
+def segments(count: int) -> Config:
+    dofs = [{"name": f"bend_{index}", "width_limit": 1.0} for index in range(count)]
+    kinematics = {"kind": "segments", "length": 0.05, "tip_length": 0.02}
+    return from_document({"dof": dofs, "kinematics": kinematics})
 
 
 @pytest.mark.parametrize("size", [0.0, 1e-7, 1e-4, 0.3, 2.0, 3.0])

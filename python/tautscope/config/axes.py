@@ -68,9 +68,10 @@ class KinematicsConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only
     kind: str = "joints"
     """"joints": the tip is measured degree by degree; "two_planes": a section of constant curvature
     with the degrees of freedom bend_x, bend_y and, if there is one, insertion and rotation by their
-    names; or your class as "module:Class"."""
+    names; "segments": sections of constant curvature in a row, two degrees of freedom each; or your
+    class as "module:Class"."""
     length: Positive = 0.08
-    """Of the bending section of "two_planes" [m]."""
+    """Of the bending section of "two_planes", or of each of "segments" [m]."""
     tip_length: Positive = 0.015
     """From its end to the sensor [m]."""
 

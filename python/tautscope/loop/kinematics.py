@@ -69,16 +69,50 @@ class TwoPlanes:
         bend_x, bend_y, insertion, rotation = (
             0.0 if place is None else float(q[place]) for place in self._place
         )
-        turned = rotation_matrix(np.array([-bend_y, bend_x, 0.0]))
-        angle = np.hypot(bend_x, bend_y)
-        if angle < _SMALL:
-            along, aside = 1.0 - angle**2 / 6, 0.5
-        else:
-            along, aside = np.sin(angle) / angle, (1.0 - np.cos(angle)) / angle**2
-        arc = self._length * np.array([bend_x * aside, bend_y * aside, along])
+        arc, turned = _arc(bend_x, bend_y, self._length)
         about = rotation_matrix(np.array([0.0, 0.0, rotation]))
         position = about @ (arc + turned[:, 2] * self._tip + np.array([0.0, 0.0, insertion]))
         return position, about @ turned
+
+
+class Segments:
+    """Sections of constant curvature in a row, of one length, each bending in two planes.
+
+    The degrees of freedom are bend_x and bend_y of each section in turn, from the base on, as those
+    of `TwoPlanes`; with p_k and R_k of a section by itself and t of the rigid tip:
+
+        p = p_1 + R_1 (p_2 + R_2 (... + R_n (0, 0, t))),      orientation R_1 R_2 ... R_n
+
+    Wrong for sections of different lengths, and for one that does not bend evenly.
+
+    Raises:
+        ConfigError: The number of degrees of freedom is odd.
+    """
+
+    def __init__(self, config: Config) -> None:
+        if len(config.dofs) % 2:
+            raise ConfigError("dof", len(config.dofs), "two degrees of freedom per segment")
+        self._length, self._tip = config.kinematics.length, config.kinematics.tip_length
+
+    def tip(self, q: Floats) -> tuple[Floats, Floats]:
+        """Position (3,) [m] and rotation matrix (3, 3) of the tip in a state q (n,)."""
+        position, turned = np.zeros(3), np.eye(3)
+        for bend_x, bend_y in np.reshape(q, (-1, 2)).tolist():
+            arc, about = _arc(bend_x, bend_y, self._length)
+            position = position + turned @ arc
+            turned = turned @ about
+        return position + turned[:, 2] * self._tip, turned
+
+
+def _arc(bend_x: float, bend_y: float, length: float) -> tuple[Floats, Floats]:
+    """End (3,) and rotation matrix (3, 3) of an arc that begins at 0 along z."""
+    angle = np.hypot(bend_x, bend_y)
+    if angle < _SMALL:
+        along, aside = 1.0 - angle**2 / 6, 0.5
+    else:
+        along, aside = np.sin(angle) / angle, (1.0 - np.cos(angle)) / angle**2
+    turned = rotation_matrix(np.array([-bend_y, bend_x, 0.0]))
+    return length * np.array([bend_x * aside, bend_y * aside, along]), turned
 
 
 def build_kinematics(config: Config) -> Kinematics | None:
@@ -94,7 +128,9 @@ def build_kinematics(config: Config) -> Kinematics | None:
         return None
     if kind == "two_planes":
         return TwoPlanes(config)
-    field, allowed = "kinematics.kind", '"joints", "two_planes" or "module:Class"'
+    if kind == "segments":
+        return Segments(config)
+    field, allowed = "kinematics.kind", '"joints", "two_planes", "segments" or "module:Class"'
     make = named_class(field, kind, allowed)
     try:
         made = make()
