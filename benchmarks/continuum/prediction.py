@@ -16,13 +16,14 @@ from continuum.robot import (
 )
 from tautscope import Config, HysteresisReduction
 from tautscope.config import DofEntry, EstimationConfig, SafetyConfig
-from tautscope.config.axes import EXPECTED_WIDTH
 from tautscope.loop.safety import Reaction
 
 TICKS = 4
 """Control ticks per row. The record is quasi-static, so the loop runs on a clock of its own."""
 WIDTH_LIMIT = 0.1
 """Largest slack of a bending angle [rad]."""
+EXPECTED = 2 / 3
+"""Of it, the width that is expected without another setting."""
 WITHOUT = 0.02
 """Share of it that is left of the slack in a filter without plays."""
 POSITION_DEVIATION = 1e-3
@@ -110,7 +111,7 @@ def settings(share: float) -> Config:
         DofEntry(
             name=f"bend_{axis}_{segment}",
             width_limit=WIDTH_LIMIT,
-            expected_width=share * EXPECTED_WIDTH * WIDTH_LIMIT,
+            expected_width=share * EXPECTED * WIDTH_LIMIT,
             range=(-5.0, 5.0),
             speed=200.0,
         )
