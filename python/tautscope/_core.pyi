@@ -8,6 +8,7 @@ __all__ = [
     "DETECTORS",
     "MEANINGS",
     "MOST_RANGE",
+    "AxesReduction",
     "Camera",
     "Compensator",
     "Estimator",
