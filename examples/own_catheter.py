@@ -34,7 +34,7 @@ class Catheter:
         position, rotation = TwoPlanes(CONFIG).tip(self.tip)
         pose = Pose(position + self.rng.normal(0, 0.3e-3, 3), time, rotation)
         seen = (pose,) if self.ticks % 5 == 0 else ()
-        return Sample(time, motors, true_state=self.tip.copy(), measurements=seen)
+        return Sample(time, motors, true_state=self.tip.copy(), measurement=seen)
 
     def close(self) -> None:
         """Stop your motors."""

@@ -45,7 +45,7 @@ class PlayRig:
             self._waiting.append(Tip(tip + self._rng.normal(0, NOISE, len(tip)), now))
         arrived = tuple(each for each in self._waiting if each.captured_at <= now - DELAY)
         self._waiting = self._waiting[len(arrived) :]
-        return Sample(now, motors[:, 0], true_state=tip, measurements=arrived)
+        return Sample(now, motors[:, 0], true_state=tip, measurement=arrived)
 
     def close(self) -> None:
         """Nothing to stop."""

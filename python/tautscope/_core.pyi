@@ -7,7 +7,10 @@ from numpy.typing import ArrayLike, NDArray
 __all__ = [
     "DETECTORS",
     "MEANINGS",
+    "MOST_DOFS",
     "MOST_RANGE",
+    "MOST_SENSORS",
+    "MOST_VALUES",
     "AxesReduction",
     "Camera",
     "Compensator",
@@ -30,6 +33,9 @@ __all__ = [
 __version__: str
 DETECTORS: tuple[str, ...]
 MEANINGS: tuple[str, ...]
+MOST_DOFS: int
+MOST_SENSORS: int
+MOST_VALUES: int
 MOST_RANGE: float
 
 # Models, estimation, compensation, supervision: crates/core.
@@ -245,7 +251,6 @@ class AxesReduction:
     def acknowledge(self) -> None: ...
     def set_compensation(self, share: float) -> None: ...
     def raise_flag(self, name: str) -> None: ...
-    def state_at(self, captured_at: float) -> _Floats | None: ...
     @property
     def hysteresis(self) -> tuple[_Floats, _Floats, _Floats, _Floats, _Floats]: ...
     @property

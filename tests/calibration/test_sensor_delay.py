@@ -36,8 +36,8 @@ class LateRig:
         now = self._ticks * PERIOD
         # The tip of this tick follows the command of the last one: one period is of the rig.
         seen = Tip([self._tips[-1 - self._delay] + self._rng.normal(0, 0.005)], now)
-        measurements = (seen,) if self._ticks % 4 == 0 else ()
-        return Sample(now, np.array([motor]), measurements=measurements)
+        measurement = (seen,) if self._ticks % 4 == 0 else ()
+        return Sample(now, np.array([motor]), measurement=measurement)
 
     def close(self) -> None:
         pass

@@ -165,12 +165,6 @@ impl AxesReduction {
         Ok(())
     }
 
-    /// Predicted state (n,) at a time; None beyond the history.
-    fn state_at<'py>(&self, py: Python<'py>, captured_at: f64) -> Option<Floats<'py>> {
-        let state = self.0.predict_state(captured_at)?;
-        Some(self.floats(py, &state))
-    }
-
     /// The predicted state (n,) now.
     #[getter]
     fn predicted_state<'py>(&self, py: Python<'py>) -> Floats<'py> {

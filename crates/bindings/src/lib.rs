@@ -71,6 +71,9 @@ mod _core {
             "MEANINGS",
             PyTuple::new(module.py(), super::flags::meanings())?,
         )?;
+        module.add("MOST_DOFS", tautscope_core::DOFS)?;
+        module.add("MOST_SENSORS", tautscope_core::SENSORS)?;
+        module.add("MOST_VALUES", tautscope_core::VALUES)?;
         module.add("MOST_RANGE", tautscope_axes::MOST_RANGE)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }

@@ -4,7 +4,7 @@
 use std::ffi::{c_int, c_void};
 
 use tautscope_core as core;
-use tautscope_core::{DOFS, VALUES};
+use tautscope_core::{DOFS, SENSORS, VALUES};
 
 use crate::axes::TautscopeAxes;
 use crate::pointers::{check_report, numbers, read, write_report};
@@ -13,7 +13,6 @@ use crate::result::{TautscopeResult, failed, null, with_handle};
 use crate::types::{TautscopeAxesReport, TautscopeMeasurement};
 
 /// Sensors with rates and delays of their own.
-const SENSORS: u32 = 4;
 /// Step of a central difference, in `width_limit`.
 const STEP: f64 = 1e-5;
 
@@ -76,7 +75,7 @@ impl<'a> Checked<'a> {
                 "{name}: expected a symmetric and positive definite matrix of {count} rows"
             )));
         }
-        if given.sensor >= SENSORS {
+        if given.sensor as usize >= SENSORS {
             let found = given.sensor;
             return Err(signal(format_args!(
                 "measurement.sensor: got {found}, expected 0 to 3"

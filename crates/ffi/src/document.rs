@@ -210,10 +210,11 @@ fn merge(
         if default.is_none() && !optional.contains(&key.as_str()) {
             return Err(unknown(&format!("{name}.{key}")));
         }
-        let is_per_dof = default
-            .and_then(Value::as_array)
-            .is_some_and(|all| all.len() == 3);
-        if is_per_dof && default != Some(&value) {
+        let is_of_article = key == "frozen_travel"
+            || default
+                .and_then(Value::as_array)
+                .is_some_and(|all| all.len() == 3);
+        if is_of_article && default != Some(&value) {
             return Err(config(format_args!(
                 "{name}.{key}: not used with [[dof]], which has its own"
             )));

@@ -7,7 +7,7 @@ import argparse
 from tautscope.commands.calibration_output import finish
 from tautscope.commands.robot import DURATION
 from tautscope.config import load_config
-from tautscope.errors import FieldError
+from tautscope.errors import ConfigError, FieldError
 
 QUESTION = (
     "THE MOTORS WILL MOVE, over 60 % of each range. Keep tissue and hands away, the emergency stop "
@@ -29,6 +29,8 @@ def run(options: argparse.Namespace) -> int:
     from tautscope.runs.rigs import rig_maker  # noqa: PLC0415
 
     config = load_config(options.config)
+    if not config.dof:
+        raise ConfigError("dof", "none", "degrees of freedom: [[dof]]; without --rig the camera's")
     _confirm(options)
     motion = motion_of(config, options.seed or 0, options.seconds or DURATION / 2)
     rig = rig_maker(options.rig)(config)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from tautscope._core import DETECTORS, MOST_RANGE
+from tautscope._core import DETECTORS, MOST_DOFS, MOST_RANGE
 from tautscope.config.axes import DofEntry
 from tautscope.config.control import ControlConfig
 from tautscope.config.dof import DofConfig
@@ -21,7 +21,6 @@ from tautscope.config.twin import DISTURBANCES, TwinConfig
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError
 
-MOST_DOFS = 8
 _RANGE = "the lower limit, then the upper"
 
 
@@ -108,7 +107,7 @@ def _check_dof_entry(dof: DofEntry) -> None:
     _require_at_most("", dof, "delta_minus", "delta_plus")
 
 
-_PER_DOF = (
+_OF_THE_ARTICLE = (
     "width_limit",
     "offset_limit",
     "reference_speed",
@@ -116,19 +115,21 @@ _PER_DOF = (
     "command_travel",
     "reference_count",
     "state_noise",
+    "frozen_travel",
 )
+"""Keys of [safety] that a robot with [[dof]] does not use."""
 
 
 def check_axes(dofs: Sequence[DofEntry], profile: str, safety: SafetyConfig) -> None:
     """Check the entries of [[dof]] with each other; keys from the root."""
     if not dofs:
         return
-    _require(len(dofs) <= MOST_DOFS, "dof", f"{len(dofs)} degrees of freedom", "1 to 8")
+    _require(len(dofs) <= MOST_DOFS, "dof", f"{len(dofs)} entries", f"1 to {MOST_DOFS}")
     _require(profile == "best", "profile", profile, '"best" with [[dof]]')
     for index, dof in enumerate(dofs):
         names = [other.name for other in dofs[:index]]
         _require(dof.name not in names, f"dof[{index}].name", dof.name, "a name used once")
-    for name in _PER_DOF:
+    for name in _OF_THE_ARTICLE:
         value = getattr(safety, name)
         default = getattr(SafetyConfig(), name)
         _require(value == default, f"safety.{name}", value, "its default: [[dof]] has its own")

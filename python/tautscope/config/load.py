@@ -9,7 +9,9 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from tautscope._core import MOST_DOFS
 from tautscope.config.root import Config, Profile, from_document, to_document
+from tautscope.config.section import without_numpy
 from tautscope.errors import ConfigError, MissingPathError
 
 _LOG = logging.getLogger(__name__)
@@ -86,18 +88,18 @@ def axes(
     Raises:
         ConfigError: A value is out of range, or a list has another length.
     """
+    if count not in range(1, MOST_DOFS + 1):
+        raise ConfigError("count", count, f"1 to {MOST_DOFS}")
     default = [f"axis_{index + 1}" for index in range(count)]
     given = {"name": list(names or default), "width_limit": width_limit, "unit": unit, **keys}
     entries: list[dict[str, Any]] = [{} for _ in range(count)]
-    for key, value in given.items():
+    for key, value in without_numpy(given).items():
         each = value if isinstance(value, Sequence) and not isinstance(value, str) else None
-        if key == "range" and each is not None and not isinstance(each[0], Sequence):
-            each = None
+        if key == "range" and each and not isinstance(each[0], Sequence):
+            each = None  # one range for all
         each = [value] * count if each is None else each
         if len(each) != count:
             raise ConfigError(key, value, f"one value, or {count}")
         for entry, one in zip(entries, each, strict=True):
             entry[key] = one
-    if not entries:
-        raise ConfigError("count", count, "1 to 8")
     return from_document({"dof": entries})

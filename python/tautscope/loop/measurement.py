@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tautscope._core import MOST_VALUES
 from tautscope.config import Config
 from tautscope.errors import SignalError
 from tautscope.loop.kinematics import (
@@ -21,8 +22,6 @@ from tautscope.loop.kinematics import (
 )
 from tautscope.loop.signal_checks import check_covariance, check_numbers
 
-MOST_VALUES = 16
-SENSORS = 4
 Model = Callable[[Floats], tuple[Floats, Floats] | None]
 """State (n,) to the values (m,) that would be measured and their derivatives (m, n)."""
 _UNIT_LENGTH = 1e-3
@@ -107,8 +106,7 @@ class Sensors:
         found = check_numbers("values", values, (self._count,), "numbers or NaN")
         std = self._config.measurement.tip_deviation * self._widths
         identity = np.eye(self._count)
-        model = lambda q: (q, identity)  # noqa: E731
-        return Reading(found, _covariance(covariance, std), model)
+        return Reading(found, _covariance(covariance, std), lambda q: (q, identity))
 
     def pose(
         self, position: ArrayLike, orientation: ArrayLike | None, covariance: ArrayLike | None
@@ -146,7 +144,10 @@ class Sensors:
         count = shape[0] if len(shape) == 2 and 1 <= shape[0] <= MOST_VALUES // 2 else 1
         found = check_numbers("pixels", pixels, (count, 2), "numbers or NaN").ravel()
         std = np.full(found.size, self._config.measurement.point_deviation)
-        predict = lambda q: np.ravel(kinematics.points(q))  # type: ignore[attr-defined]  # noqa: E731
+
+        def predict(q: Floats) -> Floats:
+            return np.ravel(kinematics.points(q))  # type: ignore[attr-defined]
+
         return self.own(found, _covariance(covariance, std), predict, point=2)
 
     def own(

@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tautscope._core import MOST_SENSORS, MOST_VALUES
 from tautscope.config import Config
 from tautscope.dof import display_text
 from tautscope.errors import SignalError
 from tautscope.loop.construction import build_axes, build_loop
 from tautscope.loop.kinematics import Predict, build_kinematics
 from tautscope.loop.measurement import (
-    MOST_VALUES,
-    SENSORS,
     Measurement,
     Reading,
     Sensors,
@@ -364,7 +363,9 @@ class HysteresisReduction:
         sensors = self._axes_sensors("on_measurement")
         count = len(np.atleast_1d(values)) if np.ndim(values) == 1 else 0
         if not 1 <= count <= MOST_VALUES:
-            raise SignalError("values", f"an array {np.shape(values)}", "1 to 16 numbers or NaN")
+            raise SignalError(
+                "values", f"an array {np.shape(values)}", f"1 to {MOST_VALUES} numbers or NaN"
+            )
         found = check_numbers("values", values, (count,), "numbers or NaN")
         known = check_covariance("covariance", covariance, count)
         reading = sensors.own(found, known, predict, jacobian)
@@ -480,8 +481,8 @@ class HysteresisReduction:
 
     def _update_by(self, reading: Reading, captured_at: float, sensor: int) -> Report:
         captured_at = check_time("captured_at", captured_at)
-        if sensor not in range(SENSORS):
-            raise SignalError("sensor", sensor, f"0 to {SENSORS - 1}")
+        if sensor not in range(MOST_SENSORS):
+            raise SignalError("sensor", sensor, f"0 to {MOST_SENSORS - 1}")
         delays = self._config.measurement.delays
         captured_at -= delays[sensor] if sensor < len(delays) else 0.0
         assert self._axes is not None

@@ -51,15 +51,20 @@ class Sample:
         applied: (n,) [m or rad] what the drives report.
         frame: The newest image that arrived in this period, if any.
         true_state: (n,) [m or rad] of the tip; simulations only, the loop never reads it.
-        measurements: What sensors other than the camera measured and delivered in this period:
-            `Tip`, `Pose` or `Points`.
+        measurement: What sensors other than the camera delivered in this period: a `Tip`, `Pose` or
+            `Points`, or several in a tuple.
     """
 
     time: float
     applied: NDArray[np.float64]
     frame: Frame | None = None
     true_state: NDArray[np.float64] | None = None
-    measurements: tuple[Measurement, ...] = ()
+    measurement: Measurement | tuple[Measurement, ...] = ()
+
+    @property
+    def measurements(self) -> tuple[Measurement, ...]:
+        """All of `measurement`."""
+        return self.measurement if isinstance(self.measurement, tuple) else (self.measurement,)
 
     def __repr__(self) -> str:
         frame = "no frame" if self.frame is None else f"frame {self.frame.sequence}"
@@ -105,10 +110,8 @@ def check_sample(sample: Sample, config: Config) -> Sample:
         if value is not None and np.shape(value) != (count,):
             allowed = f"an array ({count},), one per degree of freedom"
             raise SignalError(f"sample.{name}", f"an array {np.shape(value)}", allowed)
-    if not isinstance(sample.measurements, tuple):
-        found = type(sample.measurements).__name__
-        raise SignalError("sample.measurements", found, "a tuple of Tip, Pose or Points")
     for one in sample.measurements:
         if not isinstance(one, Tip | Pose | Points):
-            raise SignalError("sample.measurements", type(one).__name__, "Tip, Pose or Points")
+            allowed = "a Tip, Pose or Points, or several in a tuple"
+            raise SignalError("sample.measurement", type(one).__name__, allowed)
     return sample

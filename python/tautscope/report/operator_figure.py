@@ -56,6 +56,7 @@ def draw_operator_motion(uncompensated: Recording | None, main: Recording) -> Fi
             va="top",
             color=GREY,
             fontsize=7,
+            bbox={"facecolor": "#eeeeee", "edgecolor": "none", "pad": 1},
         )
         figure.align_ylabels(panels)
         lines, labels = panels[0, 0].get_legend_handles_labels()

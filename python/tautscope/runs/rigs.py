@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Callable
 from importlib.metadata import entry_points
 
@@ -36,6 +37,10 @@ def rig_maker(name: str) -> Callable[[Config], Rig]:
         missing = [part for part in _PARTS if not hasattr(rig, part)]
         if missing:
             raise ConfigError(field, name, f"a rig with {', '.join(missing)}: tautscope.Rig")
+        period = config.control.period
+        if not math.isclose(rig.control_period, period, rel_tol=1e-6):
+            allowed = f"that of the rig, {rig.control_period:g} s"
+            raise ConfigError("control.period", period, allowed)
         return rig  # type: ignore[no-any-return]
 
     return make

@@ -107,9 +107,6 @@ pub trait Axes {
     /// Update by a measurement.
     fn on_reading(&mut self, reading: &Reading<'_>) -> AxesReport;
 
-    /// The predicted state at `captured_at` in s; None beyond the history.
-    fn predict_state(&self, captured_at: f64) -> Option<[f64; DOFS]>;
-
     /// The predicted state now.
     fn predicted_state(&self) -> [f64; DOFS];
 
@@ -192,11 +189,6 @@ impl<const N: usize, const D: usize, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>> A
             innovation: view.innovation,
             triggers: padded(triggers, Triggers::default()),
         }
-    }
-
-    fn predict_state(&self, captured_at: f64) -> Option<[f64; DOFS]> {
-        let past = self.history.at(captured_at)?;
-        Some(padded(past.predicted_state, f64::NAN))
     }
 
     fn predicted_state(&self) -> [f64; DOFS] {

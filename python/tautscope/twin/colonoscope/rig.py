@@ -28,7 +28,7 @@ class ColonoscopeTwin:
     that of a section of constant curvature (Webster and Jones, Int. J. Robotics Research 29, 2010)
     with `ColonoscopeParameters.length`, then `tip_length` straight on, from (0, 0, insertion).
 
-    `Sample.measurements` has the `Pose` of the tip that arrived in a control period, if any.
+    `Sample.measurement` has the `Pose` of the tip that arrived in a control period, if any.
 
     Args:
         seed: Decides the parameters, unless they are given, and the tracker's noise.
