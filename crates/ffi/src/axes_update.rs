@@ -12,7 +12,6 @@ use crate::reduction::check_finite;
 use crate::result::{TautscopeResult, failed, null, with_handle};
 use crate::types::{TautscopeAxesReport, TautscopeMeasurement};
 
-/// Sensors with rates and delays of their own.
 /// Step of a central difference, in `width_limit`.
 const STEP: f64 = 1e-5;
 

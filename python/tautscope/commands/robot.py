@@ -6,6 +6,8 @@ import argparse
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from tautscope.commands import arguments
 from tautscope.commands.held_run import recording_saved
 from tautscope.commands.printing import announce, console, print_json
@@ -79,3 +81,5 @@ def _print(found: RobotRun) -> None:
         less = f"{result.reduction:.0%}"
         table.add_row(f"{result.name} [{result.unit}]", *shown, less, *rest)
     console().print(table)
+    if np.isnan(found.compensated.trace[f"true_{found.results[0].name}"]).all():
+        print("The tip is the one measured: this rig does not know its true tip.")
