@@ -46,10 +46,21 @@ pub struct Workspace {
     pub std: [f64; 3],
 }
 
+/// What the loop predicts for an image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Prior {
+    /// State (3,) [m, rad, rad].
+    pub state: [f64; 3],
+    /// Its standard deviations (3,).
+    pub std: [f64; 3],
+    /// Unevenness of the section, shift (2,) of the image in px: `FeatureModel::with_geometry`.
+    pub geometry: [f64; 3],
+}
+
 /// Predicts the marker bands of an image by the core's feature model, for [`tautscope_vision::Detector::recognise`].
 #[derive(Debug, Clone, Copy)]
 pub struct ModelPredictor<'a> {
-    model: &'a core::FeatureModel,
+    model: core::FeatureModel,
     model_deviation: f64,
     workspace: &'a Workspace,
     geometry: core::GeometryDeviation,
@@ -58,14 +69,20 @@ pub struct ModelPredictor<'a> {
 }
 
 impl<'a> ModelPredictor<'a> {
-    /// From the predicted state (3,) of an image with its standard deviations (3,) [m, rad, rad]; None if it may be anywhere
-    /// in the workspace. `model_deviation` is the standard deviation of a band from where the model has it (px).
+    /// From what is predicted for an image; None if the state may be anywhere in the workspace. `model_deviation` is the standard deviation of a band from where the model has it (px).
     pub const fn new(
-        model: &'a core::FeatureModel,
+        model: &core::FeatureModel,
         model_deviation: f64,
         workspace: &'a Workspace,
-        prior: Option<([f64; 3], [f64; 3])>,
+        prior: Option<Prior>,
     ) -> Self {
+        let (model, prior) = match prior {
+            Some(known) => (
+                model.with_geometry(known.geometry),
+                Some((known.state, known.std)),
+            ),
+            None => (*model, None),
+        };
         Self {
             model,
             model_deviation,

@@ -108,8 +108,9 @@ impl FeatureModel {
             state: fixed("state", &state)?,
             deviation: fixed("state_std", &state_std)?,
         };
-        let observed = core::Observation::new(fixed("features", &features)?, fixed("std", &std)?);
-        let found = self.0.nearest_state(&prior, &observed);
+        let found =
+            self.0
+                .nearest_state(&prior, fixed("features", &features)?, fixed("std", &std)?);
         Ok(found.map(|(state, misfit)| (PyArray1::from_slice(py, &state), misfit)))
     }
 

@@ -186,15 +186,21 @@ impl Reduction {
         Some(PyArray1::from_slice(py, &features))
     }
 
-    /// Predicted state (3,) and standard deviations (3,) [m, rad, rad] at a capture time; None if not known.
+    /// Predicted state (3,) and standard deviations (3,) [m, rad, rad] at a capture time, and the geometry (3,) that images have
+    /// found; None if not known.
     fn predict_state<'py>(
         &self,
         py: Python<'py>,
         captured_at: f64,
-    ) -> Option<(Floats<'py>, Floats<'py>)> {
+    ) -> Option<(Floats<'py>, Floats<'py>, Floats<'py>)> {
         let prior = on_loop!(&self.0, inner => inner.predict_state(captured_at))?;
+        let geometry = on_loop!(&self.0, inner => inner.geometry());
         let array = |values| PyArray1::from_slice(py, values);
-        Some((array(&prior.state), array(&prior.deviation)))
+        Some((
+            array(&prior.state),
+            array(&prior.deviation),
+            array(&geometry),
+        ))
     }
 
     /// The predicted state (3,) now.

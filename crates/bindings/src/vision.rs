@@ -11,7 +11,7 @@ use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2, PyReadonlyArrayDyn};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use tautscope_band_prediction::{ModelPredictor, Workspace, outlines};
+use tautscope_band_prediction::{ModelPredictor, Prior, Workspace, outlines};
 use tautscope_core as core;
 use tautscope_vision::{
     ColorDiscriminant, Detector, Error, Frame, Labeller, MAX_SIDE, PixelFormat, Segmenter,
@@ -78,14 +78,19 @@ impl MarkerDetector {
 
     /// Features (4,), covariance (4, 4), scores (2, 10), a reason per marker, regions, index of the discriminant.
     ///
-    /// `prior`: predicted state (3,) and its standard deviations (3,); None: anywhere in the workspace.
+    /// `prior`: predicted state (3,), its standard deviations (3,) and the geometry (3,); None: anywhere in the workspace.
     fn detect<'py>(
         &self,
         py: Python<'py>,
         image: PyReadonlyArrayDyn<'py, u8>,
-        prior: Option<([f64; 3], [f64; 3])>,
+        prior: Option<([f64; 3], [f64; 3], [f64; 3])>,
     ) -> PyResult<Detected<'py>> {
         let frame = ArrayFrame::new(&image, self.format)?;
+        let prior = prior.map(|(state, std, geometry)| Prior {
+            state,
+            std,
+            geometry,
+        });
         let predictor =
             ModelPredictor::new(&self.model, self.model_deviation, &self.workspace, prior);
         let (found, regions) = py.detach(|| {

@@ -71,9 +71,8 @@ pub use dof::Friction;
 pub use error::ConfigError;
 pub use estimation::axis_filter::AxisFilter;
 pub use estimation::estimate_settings::EstimateSettings;
-pub use estimation::expectation::{Beliefs, Expected};
+pub use estimation::expectation::{Belief, Beliefs, Expected};
 pub use estimation::history::{Entry, history_entries};
-pub use estimation::posture::{Belief, Observation};
 pub use law::settings::LawSettings;
 pub use r#loop::axes::{
     Axes, AxesHysteresis, AxesReduction, AxesReport, DOFS, Predict, Reading, VALUES,

@@ -1,7 +1,7 @@
 //! `TautscopeDetector`: the marker bands in an image, Eq. (12) and Fig. 5.
 #![allow(unsafe_code)]
 
-use tautscope_band_prediction::{ModelPredictor, Workspace, outlines};
+use tautscope_band_prediction::{ModelPredictor, Prior, Workspace, outlines};
 use tautscope_core as core;
 use tautscope_vision::{Detector, Frame, Image, PixelFormat};
 
@@ -148,7 +148,8 @@ pub unsafe fn detect(
         .map_err(|error| failed(TautscopeResult::Image, format_args!("image.{error}")))?;
     let prediction = prediction.filter(|prediction| prediction.is_known != 0);
     if prediction.is_some_and(|prediction| {
-        let mut numbers = prediction.state.iter().chain(&prediction.std);
+        let known = prediction.state.iter().chain(&prediction.std);
+        let mut numbers = known.chain(&prediction.geometry);
         !numbers.all(|number| number.is_finite())
     }) {
         return Err(failed(
@@ -156,7 +157,11 @@ pub unsafe fn detect(
             format_args!("prediction: got {prediction:?}, expected finite numbers"),
         ));
     }
-    let prior = prediction.map(|known| (known.state, known.std));
+    let prior = prediction.map(|known| Prior {
+        state: known.state,
+        std: known.std,
+        geometry: known.geometry,
+    });
     let TautscopeDetector {
         detector,
         model,

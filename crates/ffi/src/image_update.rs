@@ -46,6 +46,7 @@ impl TautscopeLoop {
         TautscopeStatePrediction {
             state: known.map_or([f64::NAN; 3], |known| known.state),
             std: known.map_or([f64::NAN; 3], |known| known.deviation),
+            geometry: on_loop!(self, inner => inner.geometry()),
             is_known: known.is_some().into(),
         }
     }

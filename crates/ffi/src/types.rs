@@ -130,6 +130,8 @@ pub struct TautscopeStatePrediction {
     pub state: [f64; 3],
     /// Their standard deviations [m, rad, rad].
     pub std: [f64; 3],
+    /// What images have found of the geometry: unevenness of the section, shift u, v of the image (px).
+    pub geometry: [f64; 3],
     /// 1, or 0 beyond the history: then the detection searches the whole workspace.
     pub is_known: u32,
 }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,10 @@ class StatePrediction:
     Attributes:
         state: (3,) [m, rad, rad].
         std: (3,) standard deviation of each DOF by itself [m, rad, rad].
+        geometry: (3,) what images have found of the geometry: unevenness of the section, shift u, v
+            of the image [px].
     """
 
     state: NDArray[np.float64]
     std: NDArray[np.float64]
+    geometry: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))

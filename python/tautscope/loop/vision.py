@@ -218,10 +218,11 @@ class MarkerDetector:
 
     def _prior(
         self, predicted: NDArray[np.float64] | None, expectation: StatePrediction | None
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-        """State (3,) and standard deviations (3,); None if it may be anywhere."""
+    ) -> tuple[NDArray[np.float64], ...] | None:
+        """State (3,), standard deviations (3,) and geometry (3,); None if it may be anywhere."""
         if expectation is not None:
-            return np.asarray(expectation.state), np.asarray(expectation.std)
+            known = (expectation.state, expectation.std, expectation.geometry)
+            return tuple(map(np.asarray, known))
         if predicted is None or not np.isfinite(predicted).all():
             return None
         starts, broad = self._starts
@@ -233,7 +234,7 @@ class MarkerDetector:
         if not fits:
             return None
         state, _ = min(fits, key=lambda fit: fit[1])
-        return state, self._start_deviation / 2
+        return state, self._start_deviation / 2, np.zeros(3)
 
     def regions_in(
         self, image: NDArray[np.uint8], windows: Sequence[tuple[int, int, int, int]]

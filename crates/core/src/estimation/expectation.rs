@@ -1,15 +1,76 @@
 //! Where the bands should be and how they look, before an image is looked at and while it is.
 
+use nalgebra::{SMatrix, SVector};
+
 use crate::dof::PerDof;
-use crate::estimation::posture::{Belief, Observation};
+use crate::estimation::measurement::{Observed, Prior, Sensor};
 use crate::math::linear::square;
-use crate::math::whitening::{add_matrix, diagonal};
 use crate::model::features::FeatureModel;
-use crate::model::geometry_error::GeometryDeviation;
+use crate::model::geometry_error::{ERRORS, GeometryDeviation};
 use crate::model::outline::BandImage;
 
 /// States from which the best is sought.
 const STARTS: usize = 3;
+
+/// What is believed of the state before an image is looked at: normal, each DOF by itself.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Belief {
+    /// Most probable state (3,) [m, rad, rad].
+    pub state: PerDof<f64>,
+    /// Standard deviations (3,) [m, rad, rad].
+    pub deviation: PerDof<f64>,
+}
+
+/// The feature model with errors (8,) of its geometry, in their standard deviations.
+struct Displaced<'a> {
+    model: &'a FeatureModel,
+    deviation: GeometryDeviation,
+}
+
+impl Sensor<3, 4, ERRORS> for Displaced<'_> {
+    fn point(&self) -> usize {
+        2
+    }
+
+    fn features(
+        &self,
+        state: &[f64; 3],
+        errors: &[f64; ERRORS],
+    ) -> Option<([f64; 4], [[f64; 4]; 3])> {
+        let model = self.model.displaced(&self.deviation, *errors);
+        let predicted = model.predict(*state)?;
+        Some((predicted.features, predicted.columns))
+    }
+
+    fn by_geometry(&self, state: &[f64; 3], _: &[f64; ERRORS]) -> Option<[[f64; 4]; ERRORS]> {
+        self.model.by_displacement(*state, &self.deviation)
+    }
+}
+
+impl Belief {
+    fn prior(&self) -> Prior<3, ERRORS> {
+        Prior {
+            state: self.state.into(),
+            covariance: SMatrix::from_diagonal(&self.deviation.map(square).into()),
+            geometry: SVector::zeros(),
+            slope: SMatrix::zeros(),
+            geometry_covariance: SMatrix::identity(),
+        }
+    }
+}
+
+/// Features (4,) in px with independent errors of standard deviations (4,) in px; one of infinite deviation, or that is not
+/// finite, says nothing.
+fn observed(features: [f64; 4], deviation: [f64; 4]) -> Observed<4> {
+    let is_seen = |(feature, deviation): (f64, f64)| (feature + deviation).is_finite();
+    let [a, b, c, d] = features;
+    let [da, db, dc, dd] = deviation;
+    Observed {
+        features: features.into(),
+        covariance: SMatrix::from_diagonal(&deviation.map(square).into()),
+        seen: [(a, da), (b, db), (c, dc), (d, dd)].map(is_seen),
+    }
+}
 
 /// What is believed of the instrument's state: one of several, equally likely.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,6 +101,25 @@ pub struct Expected {
 }
 
 impl FeatureModel {
+    /// The most probable state (3,), and its squared Mahalanobis distance from belief and features, for features (4,) with
+    /// standard deviations (4,) in px: [`Observed::most_probable`].
+    ///
+    /// A feature of infinite deviation, or that is not finite, says nothing. None where the model sees no band. Wrong in another
+    /// valley than the belief's.
+    #[must_use]
+    pub fn nearest_state(
+        &self,
+        belief: &Belief,
+        features: [f64; 4],
+        deviation: [f64; 4],
+    ) -> Option<(PerDof<f64>, f64)> {
+        let exact = Displaced {
+            model: self,
+            deviation: GeometryDeviation::EXACT,
+        };
+        nearest(&exact, belief, &observed(features, deviation))
+    }
+
     /// What to expect of an image in which features (4,) in px were seen with standard deviations (4,) in px:
     ///
     /// ```text
@@ -58,62 +138,64 @@ impl FeatureModel {
         seen: [f64; 4],
         deviation: [f64; 4],
     ) -> Option<Expected> {
-        let (believed, posture) = self.likeliest(beliefs, seen, deviation)?;
-        let prediction = self.predict(posture)?;
-        let bands = self.bands(posture)?;
-        let [[ua, va], [ub, vb]] = bands.map(|band| band.centroid);
-        let mut features = [ua, va, ub, vb];
-        let (mut covariance, model, bands) = if beliefs.geometry == GeometryDeviation::EXACT {
-            ([[0.0; 4]; 4], *self, bands)
-        } else {
-            let errors = self.geometry_errors(posture, &beliefs.geometry)?;
-            let observed = Observation::and_error(seen, deviation, errors.covariance())?;
-            let innovation = observed.innovation(&prediction);
-            let model = errors.explain(self, observed.whitener(), innovation);
-            (errors.covariance(), model, model.bands(posture)?)
+        let sensor = Displaced {
+            model: self,
+            deviation: beliefs.geometry,
         };
-        let own = diagonal([square(beliefs.model_deviation); 4]);
-        add_matrix(&mut covariance, &own);
-        let dofs = believed.iter().zip(posture).zip(beliefs.deviation);
-        for (column, ((believed, here), spread)) in prediction.columns.iter().zip(dofs) {
-            for ((feature, row), by) in features.iter_mut().zip(&mut covariance).zip(column) {
-                *feature += by * (believed - here);
-                for (entry, other) in row.iter_mut().zip(column) {
-                    *entry += by * other * square(spread);
-                }
-            }
-        }
-        Some(Expected {
-            features,
-            covariance,
+        let seen = observed(seen, deviation);
+        let (believed, posture) = sensor.likeliest(beliefs, &seen)?;
+        let there = Belief {
             state: posture,
-            bands,
+            deviation: beliefs.deviation,
+        }
+        .prior();
+        let errors = seen.geometry(&sensor, &there)?;
+        let model = self.displaced(&beliefs.geometry, errors);
+        let columns = SMatrix::<f64, 4, 3>::from(self.predict(posture)?.columns);
+        let by_geometry =
+            SMatrix::<f64, 4, ERRORS>::from(self.by_displacement(posture, &beliefs.geometry)?);
+        let own = SMatrix::<f64, 4, 4>::from_diagonal_element(square(beliefs.model_deviation));
+        let covariance = columns * there.covariance * columns.transpose()
+            + by_geometry * by_geometry.transpose()
+            + own;
+        let [[ua, va], [ub, vb]] = self.bands(posture)?.map(|band| band.centroid);
+        let features =
+            SVector::from([ua, va, ub, vb]) + columns * (SVector::from(believed) - there.state);
+        Some(Expected {
+            features: features.into(),
+            covariance: covariance.into(),
+            state: posture,
+            bands: model.bands(posture)?,
             model,
         })
     }
+}
 
+/// The most probable state and its squared distance.
+fn nearest(
+    sensor: &Displaced<'_>,
+    belief: &Belief,
+    seen: &Observed<4>,
+) -> Option<(PerDof<f64>, f64)> {
+    let found = seen.most_probable(sensor, &belief.prior(), core::iter::empty(), f64::INFINITY)?;
+    Some((found.state, found.distance_squared))
+}
+
+impl Displaced<'_> {
     /// A believed state, and the posture to which it leads.
     fn likeliest(
         &self,
         beliefs: &Beliefs<'_>,
-        seen: [f64; 4],
-        deviation: [f64; 4],
+        seen: &Observed<4>,
     ) -> Option<(PerDof<f64>, PerDof<f64>)> {
         let belief = |state| Belief {
             state,
             deviation: beliefs.deviation,
         };
-        let observed = |state| {
-            if beliefs.geometry == GeometryDeviation::EXACT {
-                return Some(Observation::new(seen, deviation));
-            }
-            let errors = self.geometry_errors(state, &beliefs.geometry)?;
-            Observation::and_error(seen, deviation, errors.covariance())
-        };
         // The states that explain the features best as they are; one of them leads to the best of all.
         let mut starts: [Option<(f64, PerDof<f64>)>; STARTS] = [None; STARTS];
         let mut consider = |state: PerDof<f64>| {
-            let misfit = observed(state).and_then(|seen| self.misfit(&belief(state), state, &seen));
+            let misfit = seen.distance_squared(self, &belief(state).prior());
             let mut moved = misfit.map(|misfit| (misfit, state));
             for place in &mut starts {
                 if let Some((misfit, _)) = moved
@@ -125,7 +207,7 @@ impl FeatureModel {
         };
         beliefs.states.iter().copied().for_each(&mut consider);
         if let [[q1, q2, q3]] = *beliefs.states
-            && self.predict([q1, q2, q3]).is_none()
+            && self.model.predict([q1, q2, q3]).is_none()
         {
             // No band can be seen from there; but it need not be exactly there.
             let [d1, d2, d3] = beliefs.deviation;
@@ -136,11 +218,60 @@ impl FeatureModel {
             }
         }
         let found = starts.iter().flatten().filter_map(|(_, state)| {
-            let (nearest, misfit) = self.nearest_state(&belief(*state), &observed(*state)?)?;
-            Some((*state, nearest, misfit))
+            let (posture, misfit) = nearest(self, &belief(*state), seen)?;
+            Some((*state, posture, misfit))
         });
         let (believed, posture, _) = found.min_by(|a, b| a.2.total_cmp(&b.2))?;
         let anywhere = beliefs.states.len() > 1;
         Some((if anywhere { posture } else { believed }, posture))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::camera::{Camera, Pose};
+    use crate::model::instrument::Instrument;
+
+    fn model(translation: [f64; 3], rotation: [f64; 3], bands: [f64; 2]) -> FeatureModel {
+        let [a, b] = bands;
+        FeatureModel::new(
+            Instrument::new(18.5e-3, a, b, 1.75e-3, 4e-3).unwrap(),
+            Camera::new([520.0, 540.0], [360.0, 288.0], [0.0; 8]).unwrap(),
+            Pose::new(translation, rotation).unwrap(),
+        )
+    }
+
+    /// Two models whose geometry differs: the one explains what the other predicts, and better than without.
+    #[test]
+    fn errors_explain_the_features_of_another_geometry() {
+        let told = model([5e-3, 4e-3, 12e-3], [0.1, -0.05, 0.3], [5e-3, 15e-3]);
+        let actual = model([6e-3, 3e-3, 13e-3], [0.12, -0.03, 0.3], [5.2e-3, 14.8e-3]);
+        let sensor = Displaced {
+            model: &told,
+            deviation: GeometryDeviation {
+                shift: 1e-3,
+                turn: 0.02,
+                band: 0.3e-3,
+            },
+        };
+        for state in [[20e-3, 0.4, 1.2], [30e-3, -1.9, 0.4], [15e-3, 2.0, -0.8]] {
+            let seen = actual.predict(state).unwrap().features;
+            let belief = Belief {
+                state,
+                deviation: [1e-3; 3],
+            };
+            let found = observed(seen, [0.3; 4]).geometry(&sensor, &belief.prior());
+            let explained = told.displaced(&sensor.deviation, found.unwrap());
+            let away = |model: &FeatureModel| {
+                let found = model.predict(state).unwrap().features;
+                let squares = found.iter().zip(seen).map(|(a, b)| (a - b).powi(2));
+                squares.sum::<f64>().sqrt()
+            };
+            assert!(
+                away(&told) > 20.0 && away(&explained) < 0.1 * away(&told),
+                "{state:?}"
+            );
+        }
     }
 }

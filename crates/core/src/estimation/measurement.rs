@@ -5,8 +5,9 @@ use nalgebra::{Cholesky, Const, SMatrix, SVector};
 /// Gauss-Newton steps at most, and halvings of each.
 const STEPS: usize = 12;
 const HALVINGS: usize = 6;
-/// Step in standard deviations at which the iteration ends.
-const SMALL: f64 = 1e-4;
+/// Gain of a step, and its share of what is left, at which the iteration ends: along what is hardly determined, further steps
+/// move the state far for nothing.
+const ENOUGH: f64 = 1e-3;
 
 /// A sensor: what it measures of a state of N DOFs, M features, of which G errors of its geometry are estimated.
 pub trait Sensor<const N: usize, const M: usize, const G: usize> {
@@ -96,14 +97,13 @@ impl<const M: usize> Observed<M> {
         starts: impl Iterator<Item = SVector<f64, N>>,
         price: f64,
     ) -> Option<MostProbable<N, M>> {
-        let geometry = prior.geometry.into();
-        let by_geometry = SMatrix::from(sensor.by_geometry(&prior.state.into(), &geometry)?);
-        let problem = |used| Problem::new(self, sensor, prior, by_geometry, used);
+        let all = Problem::about(self, sensor, prior)?;
+        let problem = |used| Problem::new(self, sensor, prior, all.by_geometry, used);
         let price = price * price;
-        let mut best = problem(self.seen)?.minimum(SVector::zeros())?;
+        let mut best = all.minimum(SVector::zeros())?;
         if best.distance_squared > price {
             for start in starts {
-                if let Some(other) = problem(self.seen)?.minimum(start)
+                if let Some(other) = all.minimum(start)
                     && other.distance_squared < best.distance_squared
                 {
                     best = other;
@@ -129,6 +129,34 @@ impl<const M: usize> Observed<M> {
             }
         }
         Some(best)
+    }
+
+    /// Squared Mahalanobis distance of the innovation in the prior's state.
+    pub fn distance_squared<const N: usize, const G: usize, S: Sensor<N, M, G>>(
+        &self,
+        sensor: &S,
+        prior: &Prior<N, G>,
+    ) -> Option<f64> {
+        let here = SVector::zeros();
+        let problem = Problem::about(self, sensor, prior)?;
+        problem.cost(&here, &problem.at(&here)?.0)
+    }
+
+    /// The most probable errors (G,) of the geometry in the prior's state, to first order:
+    ///
+    /// ```text
+    /// g = g0 + G H_g' (R + H_g G H_g')^-1 (s - h(q0, g0))
+    /// ```
+    pub fn geometry<const N: usize, const G: usize, S: Sensor<N, M, G>>(
+        &self,
+        sensor: &S,
+        prior: &Prior<N, G>,
+    ) -> Option<[f64; G]> {
+        let here = SVector::zeros();
+        let problem = Problem::about(self, sensor, prior)?;
+        let misfit = problem.misfit(&here, &problem.at(&here)?.0)?;
+        let by_geometry = problem.whitener.apply(problem.by_geometry)?;
+        Some((prior.geometry + prior.geometry_covariance * by_geometry.tr_mul(&misfit)).into())
     }
 
     /// The measurement of the features that are `used` about the prior's state, of a state that deviates by `std` (N,) from
@@ -200,6 +228,8 @@ struct Problem<'a, const N: usize, const M: usize, const G: usize, S> {
     sensor: &'a S,
     prior: &'a Prior<N, G>,
     factor: SMatrix<f64, N, N>,
+    /// `H_g`
+    by_geometry: SMatrix<f64, M, G>,
     /// `H_g A`: change of the features by the geometry that changes with the state.
     by_slope: SMatrix<f64, M, N>,
     used: [bool; M],
@@ -212,6 +242,13 @@ type Features<const N: usize, const M: usize> = ([f64; M], [[f64; M]; N]);
 impl<'a, const N: usize, const M: usize, const G: usize, S: Sensor<N, M, G>>
     Problem<'a, N, M, G, S>
 {
+    /// With all features that are seen.
+    fn about(observed: &'a Observed<M>, sensor: &'a S, prior: &'a Prior<N, G>) -> Option<Self> {
+        let (state, geometry) = (prior.state.into(), prior.geometry.into());
+        let by_geometry = SMatrix::from(sensor.by_geometry(&state, &geometry)?);
+        Self::new(observed, sensor, prior, by_geometry, observed.seen)
+    }
+
     fn new(
         observed: &'a Observed<M>,
         sensor: &'a S,
@@ -226,6 +263,7 @@ impl<'a, const N: usize, const M: usize, const G: usize, S: Sensor<N, M, G>>
             sensor,
             prior,
             factor: Cholesky::new(prior.covariance)?.l(),
+            by_geometry,
             by_slope: by_geometry * prior.slope,
             used,
             whitener: Whitener::new(covariance, used)?,
@@ -264,10 +302,13 @@ impl<'a, const N: usize, const M: usize, const G: usize, S: Sensor<N, M, G>>
                 let less = self.cost(&trial, &there.0)?;
                 (less <= cost).then_some((trial, there, less))
             });
-            let Some(found) = better else { break };
-            (x, here, cost) = found;
+            let Some((there, seen, less)) = better else {
+                break;
+            };
+            let is_enough = cost - less < ENOUGH.max(ENOUGH * less);
+            (x, here, cost) = (there, seen, less);
             normal = self.normal(&x, &here)?;
-            if step.norm_squared() < SMALL * SMALL {
+            if is_enough {
                 break;
             }
         }

@@ -7,5 +7,4 @@ pub(crate) mod expectation;
 pub(crate) mod history;
 pub(crate) mod kalman;
 pub(crate) mod measurement;
-pub(crate) mod posture;
 pub(crate) mod state_prediction;

@@ -1,10 +1,12 @@
 //! State prediction of profile `paper` for the marker detection.
 
+use core::f64::consts::{FRAC_PI_2, PI};
+
 use crate::article::state::StateEstimate;
 use crate::dof::PerDof;
 use crate::error::{ConfigError, require_positive};
+use crate::estimation::expectation::Belief;
 use crate::estimation::history::Entry;
-use crate::estimation::posture::{Belief, half_turn, turn};
 use crate::math::linear::{add, square};
 
 /// Error of one linear step, as a share of the step.
@@ -131,6 +133,49 @@ impl StatePrediction {
                     travel,
                 };
             }
+        }
+    }
+}
+
+/// By how much to [`turn`] a state, in rad, for the name of its posture that is nearer to an expected one; 0: not.
+///
+/// Wrong where the rotation is expected a quarter of a turn off.
+fn half_turn(expected: PerDof<f64>, state: PerDof<f64>) -> f64 {
+    let ([_, expected, _], [_, rotation, _]) = (expected, state);
+    let away = rotation - expected;
+    if away.abs() > FRAC_PI_2 {
+        -PI.copysign(away)
+    } else {
+        0.0
+    }
+}
+
+/// The same posture by another name, `half_turn` being pi, -pi or 0; images never tell them apart:
+///
+/// ```text
+/// (q1, q2, q3) = (q1, q2 + pi, -q3) = (q1, q2 - pi, -q3)
+/// ```
+fn turn([insertion, rotation, bending]: PerDof<f64>, half_turn: f64) -> PerDof<f64> {
+    let side = if half_turn.abs() > 0.0 { -1.0 } else { 1.0 };
+    [insertion, rotation + half_turn, side * bending]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_posture_goes_by_the_name_nearer_to_what_is_expected() {
+        for turns in -8_i32..=8 {
+            let rotation = 0.1 + 0.35 * f64::from(turns);
+            let state = [0.03, rotation, 0.9];
+            let expected = [0.0, 0.2, 1.0];
+            let [insertion, named, bending] = turn(state, half_turn(expected, state));
+            assert!((named - 0.2).abs() <= FRAC_PI_2 + 1e-12, "{rotation}");
+            let turns = (named - rotation) / PI;
+            assert!((turns - turns.round()).abs() < 1e-12 && turns.abs() < 1.5);
+            let side = if turns.abs() > 0.5 { -0.9 } else { 0.9 };
+            assert!((insertion - 0.03).abs() + (bending - side).abs() < 1e-12);
         }
     }
 }

@@ -7,9 +7,9 @@ use crate::article::state::{StateEstimate, found};
 use crate::dof::PerDof;
 use crate::error::ConfigError;
 use crate::estimation::estimate::GeometryPrior;
+use crate::estimation::expectation::Belief;
 use crate::estimation::history::{Entry, History};
 use crate::estimation::measurement::{Observed, Sensor};
-use crate::estimation::posture::{Belief, Observation};
 use crate::r#loop::best::{Best, ERRORS};
 use crate::r#loop::image_update::completeness;
 use crate::r#loop::measurement::Measurement;
@@ -18,14 +18,12 @@ use crate::r#loop::profile::{BandBlocks, BandsView, Image, Seen};
 use crate::r#loop::reduction::HysteresisReduction;
 use crate::r#loop::report::HysteresisEstimate;
 use crate::r#loop::settings::Settings;
-use crate::model::features::{FeatureModel, FeaturePrediction};
+use crate::model::features::{FeatureModel, FeaturePrediction, GEOMETRY};
 
 /// Limits of the low-passed error of the predicted tip, in units.
 const SLACK_CHANGED: PerDof<f64> = [0.13, 0.3, 0.13];
 /// Angle in rad by which the image seems shifted from which on the geometry counts as wrong.
 const GEOMETRY_OFF: f64 = 0.02;
-/// Standard deviation in px of the bands in an apparent state.
-const APPARENT: f64 = 0.1;
 
 /// Features (4,) of the bands with errors of the geometry: unevenness of the section, shift of the image (2,) in px, and what
 /// else the feature model errs (4,) in px.
@@ -152,22 +150,9 @@ impl BandBlocks for Best {
         Some((measurement, view))
     }
 
-    fn feature_model(&self, configured: &FeatureModel) -> FeatureModel {
+    fn geometry(&self) -> [f64; GEOMETRY] {
         let ([unevenness, u, v, ..], _) = self.estimate.geometry();
-        configured.with_geometry([unevenness, u, v])
-    }
-
-    fn apparent(&self, configured: &FeatureModel, belief: Belief) -> Belief {
-        let anywhere = Belief {
-            deviation: self.dofs.map(|dof| dof.start_deviation),
-            ..belief
-        };
-        let corrected = self.feature_model(configured);
-        let nearest = corrected.predict(belief.state).and_then(|expected| {
-            let observed = Observation::new(expected.features, [APPARENT; 4]);
-            configured.nearest_state(&anywhere, &observed)
-        });
-        nearest.map_or(belief, |(state, _)| Belief { state, ..belief })
+        [unevenness, u, v]
     }
 }
 

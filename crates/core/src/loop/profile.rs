@@ -6,11 +6,11 @@ use crate::article::play_limit::PlayLimit;
 use crate::article::state::StateEstimate;
 use crate::dof::PerDof;
 use crate::error::ConfigError;
+use crate::estimation::expectation::Belief;
 use crate::estimation::history::{Entry, History};
-use crate::estimation::posture::Belief;
 use crate::r#loop::measurement::Measurement;
 use crate::r#loop::settings::Settings;
-use crate::model::features::FeatureModel;
+use crate::model::features::{FeatureModel, GEOMETRY};
 use crate::supervision::flags::Flags;
 use crate::supervision::monitors::Law;
 
@@ -151,15 +151,13 @@ pub(crate) trait BandBlocks: ProfileBlocks<3> {
         image: Image<'_>,
     ) -> Option<Seen<Self::Evidence>>;
 
-    /// The feature model as far as images have corrected the configured one.
-    fn feature_model(&self, configured: &FeatureModel) -> FeatureModel {
-        *configured
+    /// What images have found of the geometry, as [`FeatureModel::with_geometry`] has it.
+    fn geometry(&self) -> [f64; GEOMETRY] {
+        [0.0; GEOMETRY]
     }
 
-    /// The state in which the configured feature model has the bands where the corrected one has them in the state of a
-    /// belief; where that finds none, the belief.
-    fn apparent(&self, configured: &FeatureModel, belief: Belief) -> Belief {
-        let _ = configured;
-        belief
+    /// The feature model as far as images have corrected the configured one.
+    fn feature_model(&self, configured: &FeatureModel) -> FeatureModel {
+        configured.with_geometry(self.geometry())
     }
 }

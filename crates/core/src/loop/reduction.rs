@@ -4,11 +4,11 @@ use crate::article::play::Play;
 use crate::article::play_limit::PlayLimit;
 use crate::dof::{Friction, zip_with};
 use crate::error::{ConfigError, require};
+use crate::estimation::expectation::Belief;
 use crate::estimation::history::{Entry, History};
-use crate::estimation::posture::Belief;
 use crate::r#loop::profile::{BandProfile, Profile};
 use crate::r#loop::settings::{LoopSettings, Settings};
-use crate::model::features::FeatureModel;
+use crate::model::features::{FeatureModel, GEOMETRY};
 use crate::supervision::flags::Flag;
 use crate::supervision::monitors::{Monitors, SENSORS, Supervision};
 
@@ -41,14 +41,16 @@ impl<P: BandProfile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, 
     /// The predicted state (3,) [m, rad, rad] at `captured_at` in s with its standard deviation: the prior of the marker
     /// detection, corrected by the last images.
     ///
-    /// It is the state in which the configured geometry has the bands where they are expected; where images have corrected
-    /// the geometry, the tip is elsewhere.
-    ///
     /// None beyond the history.
     pub fn predict_state(&self, captured_at: f64) -> Option<Belief> {
         let past = self.history.at(captured_at)?;
-        let belief = self.profile.predict(&self.history, &past);
-        Some(self.profile.apparent(&self.view, belief))
+        Some(self.profile.predict(&self.history, &past))
+    }
+
+    /// What images have found of the geometry: unevenness of the section, shift (2,) of the image in px;
+    /// [`FeatureModel::with_geometry`].
+    pub fn geometry(&self) -> [f64; GEOMETRY] {
+        self.profile.geometry()
     }
 
     /// Predicted features (4,) in px of a frame captured at `captured_at` in s.

@@ -48,21 +48,3 @@ pub fn cross([ax, ay, az]: Vector, [bx, by, bz]: Vector) -> Vector {
 pub fn square(x: f64) -> f64 {
     x * x
 }
-
-/// x in A x = b for a symmetric, positive definite A; None for any other matrix.
-pub fn solve_symmetric(
-    [[a, b, c], [_, d, e], [_, _, f]]: Matrix,
-    [x, y, z]: Vector,
-) -> Option<Vector> {
-    // A = M diag(p) M' with M lower triangular, ones on its diagonal.
-    let (m10, m20) = (b / a, c / a);
-    let p1 = d - m10 * b;
-    let m21 = (e - m10 * c) / p1;
-    let p2 = f - m20 * c - m21 * m21 * p1;
-    let y = y - m10 * x;
-    let z = z - m20 * x - m21 * y;
-    let z = z / p2;
-    let y = y / p1 - m21 * z;
-    let x = x / a - m10 * y - m20 * z;
-    (a > 0.0 && p1 > 0.0 && p2 > 0.0).then_some([x, y, z])
-}

@@ -1,4 +1,3 @@
 //! Vectors and small linear systems.
 
 pub(crate) mod linear;
-pub(crate) mod whitening;

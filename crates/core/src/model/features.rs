@@ -10,7 +10,7 @@ use crate::model::instrument::{Instrument, Marker};
 use crate::model::settings::{CameraSettings, InstrumentSettings};
 
 /// Number of values in which the geometry may differ from the configured one.
-pub(crate) const GEOMETRY: usize = 3;
+pub const GEOMETRY: usize = 3;
 
 /// h = g after f, Eqs. (9)-(11): from the state to the centroids of the two marker bands.
 ///
@@ -114,7 +114,8 @@ impl FeatureModel {
 
     /// The model of an instrument whose section bends unevenly, [`Instrument::with_unevenness`], in an image that is
     /// shifted by (u, v) px.
-    pub(crate) const fn with_geometry(&self, [unevenness, u, v]: [f64; GEOMETRY]) -> Self {
+    #[must_use]
+    pub const fn with_geometry(&self, [unevenness, u, v]: [f64; GEOMETRY]) -> Self {
         Self {
             instrument: self.instrument.with_unevenness(unevenness),
             camera: self.camera.with_shift([u, v]),

@@ -1,7 +1,7 @@
-//! Vectors, and linear systems against plain Gaussian elimination.
+//! Vectors and matrices.
 
 use crate::math::linear::{
-    Matrix, Vector, add, cross, dot, rotate, scale, sinc, sinc_slope, solve_symmetric, square,
+    Matrix, Vector, add, cross, dot, rotate, scale, sinc, sinc_slope, square,
 };
 use proptest::prelude::*;
 
@@ -14,16 +14,6 @@ fn vectors() -> impl Strategy<Value = Vector> {
 fn symmetric() -> impl Strategy<Value = Matrix> {
     prop::array::uniform6(-3.0..3.0_f64)
         .prop_map(|[a, b, c, d, e, f]| [[a, b, c], [b, d, e], [c, e, f]])
-}
-
-/// B B' + 0.1, which is positive definite.
-fn positive(rows: Matrix) -> Matrix {
-    [0, 1, 2].map(|i| {
-        [0, 1, 2].map(|j| {
-            let product: f64 = (0..3).map(|k| rows[i][k] * rows[j][k]).sum();
-            product + if i == j { 0.1 } else { 0.0 }
-        })
-    })
 }
 
 /// Gaussian elimination with partial pivoting.
@@ -44,16 +34,6 @@ pub fn eliminate(mut rows: Matrix, mut right: Vector) -> Vector {
         }
     }
     [0, 1, 2].map(|row| right[row] / rows[row][row])
-}
-
-/// Determinants of the leading 1 x 1, 2 x 2 and 3 x 3 parts (Sylvester's criterion).
-fn leading_minors(rows: &Matrix) -> Vector {
-    let [[a, b, c], [d, e, f], [g, h, i]] = *rows;
-    [
-        a,
-        a * e - b * d,
-        a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g),
-    ]
 }
 
 /// The integral of `f` from 0 to 1 by Simpson's rule.
@@ -102,27 +82,6 @@ proptest! {
         prop_assert!((sinc(x) - integrate(|t| (x * t).cos())).abs() <= 1e-10);
         prop_assert!((sinc_slope(x) + integrate(|t| t * (x * t).sin())).abs() <= 1e-10);
     }
-
-    #[test]
-    fn solutions_agree_with_gaussian_elimination(
-        rows in prop::array::uniform3(vectors()), right in vectors()
-    ) {
-        let matrix = positive(rows);
-        let expected = eliminate(matrix, right);
-        let size = expected.iter().fold(1.0, |most: f64, value| most.max(value.abs()));
-        let solution = solve_symmetric(matrix, right).unwrap();
-        for (found, expected) in solution.iter().zip(expected) {
-            prop_assert!((found - expected).abs() <= 1e-9 * size, "{} {}", found, expected);
-        }
-    }
-
-    #[test]
-    fn only_positive_definite_matrices_have_a_solution(rows in symmetric()) {
-        let minors = leading_minors(&rows);
-        prop_assume!(minors.iter().all(|minor| minor.abs() > 1e-6));
-        let definite = minors.iter().all(|minor| *minor > 0.0);
-        prop_assert_eq!(solve_symmetric(rows, [1.0, 2.0, 3.0]).is_some(), definite);
-    }
 }
 
 #[test]
@@ -130,16 +89,5 @@ fn sinc_is_exact_and_smooth_at_zero() {
     assert_eq!((sinc(0.0), sinc_slope(0.0)), (1.0, 0.0));
     for x in [1e-12, -1e-9, 1e-6] {
         assert!((sinc_slope(x) / (-x / 3.0) - 1.0).abs() <= 1e-12, "{x}");
-    }
-}
-
-#[test]
-fn a_matrix_with_one_axis_that_is_not_positive_has_no_solution() {
-    for axis in 0..3 {
-        for value in [0.0, -1.0] {
-            let mut rows = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-            rows[axis][axis] = value;
-            assert_eq!(solve_symmetric(rows, [1.0; 3]), None, "{rows:?}");
-        }
     }
 }
