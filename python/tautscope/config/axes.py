@@ -76,6 +76,19 @@ class KinematicsConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only
     """From its end to the sensor [m]."""
 
 
+class TopicConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A topic of ROS 2 with which a sensor of the tip measures."""
+
+    name: str
+    """Name of the topic, relative to the node's namespace without a slash at its beginning."""
+    type: Literal["JointState", "PointStamped", "PoseStamped", "PoseWithCovarianceStamped"]
+    """Type of its messages: "JointState" measures degrees of freedom by their names, the others the
+    position of the tip and, but for "PointStamped", its orientation."""
+    frame: str = ""
+    """frame_id that its messages must have, in which the kinematics gives the tip; empty: that of
+    the first message."""
+
+
 class MeasurementConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Sensors of a robot with [[dof]]; deviations are of measurements without a covariance."""
 
@@ -91,3 +104,5 @@ class MeasurementConfig(Section, frozen=True, forbid_unknown_fields=True, kw_onl
     """Of an orientation about each axis [rad]."""
     point_deviation: Positive = 0.5
     """Of a point of an image [px]."""
+    topics: Annotated[tuple[TopicConfig, ...], Meta(max_length=4)] = ()
+    """Sensors in ROS 2, in the order of delays."""
