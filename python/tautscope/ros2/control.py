@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import logging
 import time
 from collections.abc import Callable
@@ -24,6 +25,7 @@ from tautscope.ros2.lifecycle import ACTIVATE, CONFIGURE, DEACTIVATE, Lifecycle,
 from tautscope.ros2.opening import reset_rig
 from tautscope.ros2.parameters import Parameter, Parameters
 from tautscope.ros2.references import Pausable, Source
+from tautscope.ros2.sensors import Sensors
 from tautscope.ros2.session import Node
 from tautscope.ros2.telemetry import Telemetry, Topics
 from tautscope.ros2.wire import Qos
@@ -44,6 +46,7 @@ class NodeControl:
         topics: Names of the topics.
         telemetry: Publishes.
         source: The operator's reference.
+        sensors: Of the tip, in ROS.
         make_rig: Makes the rig; called by the transition ``configure``.
         folder: For logs.
         executor: Runs the marker detection.
@@ -62,14 +65,15 @@ class NodeControl:
         telemetry: Telemetry,
         *,
         source: Source,
-        make_rig: Callable[[], LiveRig],
+        sensors: Sensors,
+        make_rig: Callable[[Config], LiveRig],
         folder: Path,
         executor: Executor,
         clock: Clock,
     ) -> None:
         self._config, self._folder, self._executor = config, folder, executor
         self._telemetry, self._make_rig = telemetry, make_rig
-        self._source = Pausable(source)
+        self._source, self._sensors = Pausable(source), sensors
         self._rig: LiveRig | None = None
         self.run: ControlRun | None = None
         self.fault = ""
@@ -104,6 +108,8 @@ class NodeControl:
         try:
             for frame, report, _ in run.tick():
                 self._telemetry.update(run, frame, report)
+            for measurement in run.sample.measurements:
+                self._telemetry.update(run, None, run.loop.on_sample(measurement))
             self._telemetry.tick(run)
             supervision = run.loop.supervision
             if supervision.reaction.rank >= Reaction.QUICK_STOP.rank:
@@ -111,6 +117,7 @@ class NodeControl:
                 self._fail(f"{supervision.reaction}: {', '.join(supervision.flags)}")
                 return
             run.step()
+            self._add_measurements(run)
         except TautscopeError as error:
             self._fail(str(error))
 
@@ -180,7 +187,7 @@ class NodeControl:
         """Carry out a transition of the lifecycle."""
         try:
             if transition is CONFIGURE:
-                self._rig = self._make_rig()
+                self._rig = self._make_rig(self._config)
             elif transition is ACTIVATE:
                 self._start_run()
             else:
@@ -207,6 +214,7 @@ class NodeControl:
         self._telemetry.state("DISABLED", is_busy=True)
         sample = reset_rig(rig, lambda: self._take_command() in ("disable", "pause"))
         self._source.reset(sample.applied)
+        self._sensors.reset()
         self._runs += 1
         is_hardware = isinstance(rig, HardwareRig)
         # Threads of the log inherit the priority.
@@ -220,13 +228,21 @@ class NodeControl:
                 executor=self._executor,
                 monitor=PlausibilityMonitor(self._config, sample.applied) if is_hardware else None,
             )
-        # The detector is made and used now, because its first use is slow.
-        blank = np.zeros(FrameLayout(self._config.camera).shape, np.uint8)
-        run.loop.prepare_detection(Frame(blank, sample.time, 0))()
+        if not self._config.dof:
+            # The detector is made and used now, because its first use is slow.
+            blank = np.zeros(FrameLayout(self._config.camera).shape, np.uint8)
+            run.loop.prepare_detection(Frame(blank, sample.time, 0))()
         share = float(self.parameters["compensation"])
         if share != 1:
             run.loop.set_compensation(share)
         self.run = run
+
+    def _add_measurements(self, run: ControlRun) -> None:
+        """Add what sensors in ROS have measured to the sample for the next tick."""
+        sample = run.sample
+        if found := self._sensors.take(sample.time):
+            measured = (*sample.measurements, *found)
+            run.sample = dataclasses.replace(sample, measurement=measured)
 
     def _end_run(self) -> None:
         """Stop the drives, then close the log."""

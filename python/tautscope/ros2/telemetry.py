@@ -58,6 +58,7 @@ class Telemetry:
         self._config, self._clock, self._has_rig = config, clock, has_rig
         self._node = node
         self._name = node.identity.path.lstrip("/")
+        self._joints = [dof.label for dof in config.dofs]
         joints, text = "sensor_msgs/msg/JointState", "std_msgs/msg/String"
 
         def publisher(name: str, kind: str) -> Publisher:
@@ -71,10 +72,12 @@ class Telemetry:
         self._state = publisher("operating_state", "crtk_msgs/msg/OperatingState")
         self._warning = publisher("warning", text)
         self._diagnostics = node.publisher("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
-        self._camera_info = node.publisher(topics.camera_info, "sensor_msgs/msg/CameraInfo")
+        if not config.dof:
+            self._camera_info = node.publisher(topics.camera_info, "sensor_msgs/msg/CameraInfo")
         if has_rig:
             self._command = publisher("actuators/setpoint_js", joints)
             self._applied = publisher("actuators/measured_js", joints)
+        if has_rig and not config.dof:
             self._image = node.publisher(topics.image, "sensor_msgs/msg/Image", SENSOR_DATA)
         # The transport may wait for a slow receiver; a tick may not.
         self._images = realtime_executor("images", OTHERS)
@@ -88,25 +91,27 @@ class Telemetry:
 
     def tick(self, run: ControlRun) -> None:
         """Publish set-points, and the positions of the drives."""
-        now = self._clock.wall()
-        self._setpoint.publish(messages.joint_state(now, run.reference))
+        now, joints = self._clock.wall(), self._joints
+        self._setpoint.publish(messages.joint_state(now, joints, run.reference))
         if self._has_rig:
-            self._command.publish(messages.joint_state(now, run.command))
-            self._applied.publish(messages.joint_state(now, run.sample.applied))
+            self._command.publish(messages.joint_state(now, joints, run.command))
+            self._applied.publish(messages.joint_state(now, joints, run.sample.applied))
         flags = run.loop.supervision.flags
         for flag in sorted(set(flags) - set(self._flags)):
             self.warn(f"{flag}: {run.loop.supervision.reaction}")
         self._flags = flags
 
-    def update(self, run: ControlRun, frame: Frame, report: Report) -> None:
-        """Publish an image update, and the image if anybody receives it."""
+    def update(self, run: ControlRun, frame: Frame | None, report: Report) -> None:
+        """Publish an update; of an image also the camera, and the image if anybody receives it."""
         age = round((run.sample.time - report.captured_at) * 1e9)
         captured = self._clock.wall() - age
-        self._tip.publish(messages.tip_state(captured, report))
-        self._offsets.publish(messages.offsets(report))
+        self._tip.publish(messages.tip_state(captured, self._joints, report))
+        self._offsets.publish(messages.offsets(self._joints, report))
         supervision = run.loop.supervision
         self._mode.publish(messages.text(str(supervision.reaction)))
         self._compensation.publish(messages.number(supervision.lead))
+        if frame is None:
+            return
         self._camera_info.publish(messages.camera_info(captured, self._config.camera))
         if self._has_rig and self._sending.done() and self._image.has_subscribers:
             self._sending = self._images.submit(self._send_image, captured, frame)
