@@ -118,6 +118,7 @@ def modules() -> dict[str, ModuleType]:
     messages = {
         "crtk_msgs": ("OperatingState", "StringStamped"),
         "diagnostic_msgs": ("DiagnosticArray", "DiagnosticStatus", "KeyValue"),
+        "geometry_msgs": ("PointStamped", "PoseStamped", "PoseWithCovarianceStamped"),
         "rcl_interfaces": ("SetParametersResult",),
         "sensor_msgs": ("CameraInfo", "Image", "JointState"),
         "std_msgs": ("Float64MultiArray", "MultiArrayDimension", "String"),
