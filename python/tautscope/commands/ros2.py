@@ -80,6 +80,12 @@ def add_parser(verbs: arguments.Verbs) -> None:
     ros2.add_argument(
         "--domain", type=arguments.natural, default=0, metavar="N", help="ROS_DOMAIN_ID [0]"
     )
+    ros2.add_argument(
+        "--distribution",
+        choices=["humble", "jazzy"],
+        default="jazzy",
+        help="of the other nodes; jazzy also for later ones [%(default)s]",
+    )
     arguments.add_out(ros2, "ros2")
     arguments.add_json(ros2)
     ros2.set_defaults(run=_ros2)
@@ -104,7 +110,13 @@ def _ros2(options: argparse.Namespace) -> int:
     if options.listen is not None:
         endpoints = {"connect": "", "listen": options.listen}
     with realtime(OTHERS):  # Zenoh's threads inherit the priority
-        opened = Node(NAME, options.namespace, domain=options.domain, **endpoints)
+        opened = Node(
+            NAME,
+            options.namespace,
+            domain=options.domain,
+            distribution=options.distribution,
+            **endpoints,
+        )
     with opened as node:
         folder.mkdir(parents=True, exist_ok=True)
         return start_node(
