@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -97,6 +98,7 @@ def test_two_sensors_measure_a_joint_each(tmp_path: Path) -> None:
     with peers(config, tmp_path) as both:
         publishers = [both.other.publisher(name, JOINTS) for name in ("/left", "/right")]
         tips = both.other.subscription("/instrument/measured_js", JOINTS, Qos(depth=2000))
+        results = both.other.subscription("/instrument/hysteresis/result", "std_msgs/msg/String")
 
         def measure(tick: int, seen: list[np.ndarray], start: int) -> Calls:
             calls: Calls = []
@@ -128,6 +130,13 @@ def test_two_sensors_measure_a_joint_each(tmp_path: Path) -> None:
         assert len(stamps) >= len(found.statuses) - 7
         assert abs(stamps.count(0) - len(lost)) <= 2
         assert len(lost) > 15
+        both.request("disable")
+        result = both.received(results, "result").data
+        assert re.fullmatch(
+            rf"Tip less reference, RMS: {names[0]} \S+ rad, slack found 0\.\d+ rad; "
+            rf"{names[1]} \S+ rad, slack found 0\.\d+ rad",
+            result,
+        ), result
         error = np.array(found.tips[1:])[300:] - np.array(found.references)[300:]
         assert (np.sqrt((error**2).mean(axis=0)) < 0.5 * HALF_WIDTH).all()
 

@@ -127,6 +127,7 @@ def _ros2(options: argparse.Namespace) -> int:
             make_rig=make_rig,
             device=options.device,
             layout=JoyAxes(tuple(options.axes), options.button),
+            on_result=lambda text: _print(options, "result", text),
         )
 
 
@@ -155,10 +156,15 @@ def _rig(options: argparse.Namespace, config: Config) -> MakeRig | None:
 
 
 def _announce(options: argparse.Namespace, name: str) -> None:
+    what = f"REAL MOTORS of {options.rig or options.config}"
+    what = "the twin" if options.twin else "a driver in ROS" if options.driver else what
+    text = f"The node {name} commands {what}, once it is enabled. Ctrl-C ends."
+    _print(options, "node", name, text)
+
+
+def _print(options: argparse.Namespace, key: str, value: str, text: str = "") -> None:
     if options.json:
-        print_json({"node": name})
+        print_json({key: value})
     else:
-        what = f"REAL MOTORS of {options.rig or options.config}"
-        what = "the twin" if options.twin else "a driver in ROS" if options.driver else what
-        print(f"The node {name} commands {what}, once it is enabled. Ctrl-C ends.")
+        print(text or value)
     sys.stdout.flush()

@@ -18,8 +18,11 @@ from tautscope.hardware.plausibility import PlausibilityMonitor
 from tautscope.hardware.realtime import OTHERS, realtime
 from tautscope.hardware.rig import HardwareRig
 from tautscope.loop.frame_layout import FrameLayout
+from tautscope.loop.measurement import Measurement
+from tautscope.loop.reduction import Report
 from tautscope.loop.rig import Frame
 from tautscope.loop.safety import Reaction
+from tautscope.report.achieved import Achieved, achieved_text
 from tautscope.ros2.clock import Clock
 from tautscope.ros2.lifecycle import ACTIVATE, CONFIGURE, DEACTIVATE, Lifecycle, State, Transition
 from tautscope.ros2.opening import reset_rig
@@ -51,6 +54,7 @@ class NodeControl:
         folder: For logs.
         executor: Runs the marker detection.
         clock: The clocks.
+        on_result: Called at the end of a run with a line about what the compensation achieved.
 
     Attributes:
         run: The present run; None if the node is not active.
@@ -70,10 +74,12 @@ class NodeControl:
         folder: Path,
         executor: Executor,
         clock: Clock,
+        on_result: Callable[[str], None] = lambda _: None,
     ) -> None:
         self._config, self._folder, self._executor = config, folder, executor
         self._telemetry, self._make_rig = telemetry, make_rig
         self._source, self._sensors = Pausable(source), sensors
+        self._on_result, self._achieved = on_result, Achieved(config)
         self._rig: LiveRig | None = None
         self.run: ControlRun | None = None
         self.fault = ""
@@ -107,11 +113,13 @@ class NodeControl:
         """A tick of the loop; a fault ends the run, with the drives stopped."""
         try:
             for frame, report, _ in run.tick():
-                self._telemetry.update(run, frame, report)
+                self._update(run, frame, report)
             for measurement in run.sample.measurements:
-                self._telemetry.update(run, None, run.loop.on_sample(measurement))
+                self._update(run, measurement, run.loop.on_sample(measurement))
             self._telemetry.tick(run)
             supervision = run.loop.supervision
+            share = supervision.lead * float(self.parameters["compensation"])
+            self._achieved.add_tick(run.sample, run.reference, run.command, share)
             if supervision.reaction.rank >= Reaction.QUICK_STOP.rank:
                 self._is_disabling = supervision.reaction is Reaction.DISABLE
                 self._fail(f"{supervision.reaction}: {', '.join(supervision.flags)}")
@@ -216,6 +224,7 @@ class NodeControl:
         self._source.reset(sample.applied)
         self._sensors.reset()
         self._runs += 1
+        self._achieved = Achieved(self._config)
         is_hardware = isinstance(rig, HardwareRig)
         # Threads of the log inherit the priority.
         with realtime(OTHERS):
@@ -244,6 +253,10 @@ class NodeControl:
             measured = (*sample.measurements, *found)
             run.sample = dataclasses.replace(sample, measurement=measured)
 
+    def _update(self, run: ControlRun, source: Frame | Measurement, report: Report) -> None:
+        self._achieved.add_update(run.sample.time, source, report)
+        self._telemetry.update(run, source, report)
+
     def _end_run(self) -> None:
         """Stop the drives, then close the log."""
         run, self.run = self.run, None
@@ -254,7 +267,18 @@ class NodeControl:
                 self._rig.disable() if self._is_disabling else self._rig.close()
         finally:
             self._publish_state()
-            run.log.close()
+            try:
+                self._tell_result(run)
+            finally:
+                run.log.close()
+
+    def _tell_result(self, run: ControlRun) -> None:
+        """Publish, log and print what the compensation achieved."""
+        if results := self._achieved.results():
+            text = achieved_text(results, self._config)
+            run.note(text)
+            self._telemetry.result(text)
+            self._on_result(text)
 
     def _fail(self, fault: str) -> None:
         """End the run because of a fault."""

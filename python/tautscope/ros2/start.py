@@ -45,6 +45,7 @@ def start_node(
     make_rig: MakeRig | None,
     device: str,
     layout: JoyAxes,
+    on_result: Callable[[str], None],
 ) -> int:
     """Run the node until it is finalized, or a signal; the exit status.
 
@@ -58,6 +59,7 @@ def start_node(
         make_rig: Makes the rig; None for a driver in ROS.
         device: `tautscope.ros2.references.SERVO` or `JOY`.
         layout: Axes and button of a gamepad.
+        on_result: As of `tautscope.ros2.control.NodeControl`.
 
     Raises:
         ConfigError: The configuration does not describe a rig; as `build_control`.
@@ -70,7 +72,15 @@ def start_node(
         realtime_executor("vision", VISION) as executor,
     ):
         control = build_control(
-            config, node, folder, executor, Clock(), make_rig=make_rig, device=device, layout=layout
+            config,
+            node,
+            folder,
+            executor,
+            Clock(),
+            make_rig=make_rig,
+            device=device,
+            layout=layout,
+            on_result=on_result,
         )
         with (
             short_switch_interval(),
@@ -99,6 +109,7 @@ def build_control(
     make_rig: MakeRig | None,
     device: str,
     layout: JoyAxes,
+    on_result: Callable[[str], None] = lambda _: None,
 ) -> NodeControl:
     """The control of a node, unconfigured.
 
@@ -138,4 +149,5 @@ def build_control(
         folder=folder,
         executor=executor,
         clock=clock,
+        on_result=on_result,
     )

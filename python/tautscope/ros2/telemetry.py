@@ -9,6 +9,7 @@ from tautscope.config import Config
 from tautscope.console.control_run import ControlRun
 from tautscope.errors import MessageError
 from tautscope.hardware.realtime import OTHERS, realtime_executor
+from tautscope.loop.measurement import Measurement
 from tautscope.loop.reduction import Report
 from tautscope.loop.rig import Frame
 from tautscope.ros2 import messages
@@ -69,6 +70,7 @@ class Telemetry:
         self._offsets = publisher("hysteresis/delta", "std_msgs/msg/Float64MultiArray")
         self._mode = publisher("hysteresis/mode", text)
         self._compensation = publisher("hysteresis/compensation", "std_msgs/msg/Float64")
+        self._result = publisher("hysteresis/result", text)
         self._state = publisher("operating_state", "crtk_msgs/msg/OperatingState")
         self._warning = publisher("warning", text)
         self._diagnostics = node.publisher("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
@@ -101,7 +103,7 @@ class Telemetry:
             self.warn(f"{flag}: {run.loop.supervision.reaction}")
         self._flags = flags
 
-    def update(self, run: ControlRun, frame: Frame | None, report: Report) -> None:
+    def update(self, run: ControlRun, source: Frame | Measurement, report: Report) -> None:
         """Publish an update; of an image also the camera, and the image if anybody receives it."""
         age = round((run.sample.time - report.captured_at) * 1e9)
         captured = self._clock.wall() - age
@@ -110,11 +112,11 @@ class Telemetry:
         supervision = run.loop.supervision
         self._mode.publish(messages.text(str(supervision.reaction)))
         self._compensation.publish(messages.number(supervision.lead))
-        if frame is None:
+        if not isinstance(source, Frame):
             return
         self._camera_info.publish(messages.camera_info(captured, self._config.camera))
         if self._has_rig and self._sending.done() and self._image.has_subscribers:
-            self._sending = self._images.submit(self._send_image, captured, frame)
+            self._sending = self._images.submit(self._send_image, captured, source)
 
     def _send_image(self, captured: int, frame: Frame) -> None:
         image = messages.image(captured, frame, self._config.camera)
@@ -143,6 +145,10 @@ class Telemetry:
         if now - self._warned.get(error.field, -DIAGNOSTICS_PERIOD) >= DIAGNOSTICS_PERIOD:
             self._warned[error.field] = now
             self.warn(f"refused: {error}")
+
+    def result(self, text: str) -> None:
+        """Publish what the compensation achieved."""
+        self._result.publish(messages.text(text))
 
     def warn(self, text: str) -> None:
         """Publish a warning."""
