@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import runpy
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,11 +11,14 @@ from typing import Any
 
 import numpy as np
 import tautscope
+from common.paths import ROOT
 from ros2.peers import JOINTS, Peers, peers
 from tautscope.config import load_config
 from tautscope.loop.kinematics import build_kinematics
+from tautscope.loop.measurement import Pose
 from tautscope.loop.reduction import HysteresisReduction
 from tautscope.ros2 import messages
+from tautscope.ros2.measurements import MeasurementReader
 from tautscope.ros2.messages import LOST
 from tautscope.ros2.wire import Qos
 from test_measurements import Rotation, message
@@ -83,6 +87,18 @@ def follow(
 
 def stamp(both: Peers, start: int, tick: int) -> int:
     return both.clock.wall() - both.clock.now + start + round(tick * PERIOD * 1e9)
+
+
+def test_the_example_publishes_the_pose_of_its_tip() -> None:
+    example = runpy.run_path(str(ROOT / "examples" / "ros2" / "catheter.py"))
+    bend = np.array([0.4, -0.9])
+    position, rotation = example["TwoPlanes"](example["CONFIG"]).tip(bend)
+    found = MeasurementReader(example["CONFIG"], 0, "/tracker/pose").read(
+        example["pose"](1, position, bend), 0.5
+    )
+    assert isinstance(found, Pose)
+    np.testing.assert_allclose(found.position, position)
+    np.testing.assert_allclose(found.orientation, rotation, atol=1e-12)
 
 
 def test_two_sensors_measure_a_joint_each(tmp_path: Path) -> None:
