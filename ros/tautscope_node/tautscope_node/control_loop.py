@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tautscope import Config, Frame, HysteresisReduction
 from tautscope.loop.reduction import Report
 from tautscope.loop.safety import Reaction, Supervision
-from tautscope.runs.experiment import BackgroundUpdater
+from tautscope.runs.control_loop import BackgroundUpdater
 
 Floats = NDArray[np.float64]
 START_TOLERANCE = np.array([1e-3, 0.05, 0.05])
