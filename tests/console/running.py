@@ -20,6 +20,7 @@ from console import pages
 from console.pages import PERIOD
 from tautscope.config import Config, load_config
 from tautscope.console import lease, operator_input
+from tautscope.console.control_run import LiveRig
 from tautscope.console.live_twin import LiveTwin
 from tautscope.console.rig_control import RigControl
 from tautscope.console.session import Session
@@ -66,7 +67,7 @@ class Page(pages.Page):
         """Send that nothing is held, until the control process knows it."""
 
         def release() -> bool:
-            self.servo(is_holding=False)
+            self.servo((0.0,) * len(self.layout["dofs"]), is_holding=False)
             return not self.state["must_release"]
 
         self.wait(release, PERIOD)
@@ -81,23 +82,26 @@ class Page(pages.Page):
 
 
 @contextmanager
-def running_console(folder: Path, config: Config | None = None) -> Iterator[RunningConsole]:
-    """A console of the twin during the block."""
+def running_console(
+    folder: Path, config: Config | None = None, rig: LiveRig | None = None
+) -> Iterator[RunningConsole]:
+    """A console of the twin, or of another rig, during the block."""
     config = small_config() if config is None else config
     ending = threading.Event()
     with (
         pytest.MonkeyPatch.context() as patch,
-        web_server(config.camera, 0) as (server, channels, url),
+        web_server(config, 0) as (server, channels, url),
         ThreadPoolExecutor(1) as executor,
     ):
         patch.setattr(lease, "COMMAND_AGE", AGE)
         patch.setattr(operator_input, "COMMAND_TIMEOUT", TIMEOUT)
-        control = RigControl(config, LiveTwin(config), folder, executor)
+        control = RigControl(config, rig or LiveTwin(config), folder, executor)
         session = Session(control, channels, ending.is_set)
         thread = threading.Thread(target=session.main, name="control")
         thread.start()
         try:
-            while control.run is None or control.images.newest < 3:
+            # Motors wait for the operator.
+            while control.images.newest < 3 or not (control.run or control.is_hardware):
                 assert thread.is_alive()
                 time.sleep(0.01)
             yield RunningConsole(url, control, server)

@@ -54,7 +54,8 @@ class ControlLoop:
         sample: The rig's newest sample; without it the rig is reset.
         compensate: If false, the command is the reference; the estimators still run.
         look: The image update.
-        executor: Runs the marker detection in the background, in place of `look`.
+        executor: Runs the marker detection in the background, in place of `look`; a robot with
+            [[dof]] has none, and does not use its images.
 
     Attributes:
         loop: The loop.
@@ -79,6 +80,7 @@ class ControlLoop:
         self._config, self._rig = config, rig
         self._log: Log | None = None
         self._updater = _InlineUpdater(look) if executor is None else BackgroundUpdater(executor)
+        self._uses_images = executor is None or not config.dof
         self._events: list[tuple[int, str]] = []
         self.sample = check_sample(rig.reset() if sample is None else sample, config)
         self.command = np.array(self.sample.applied, np.float64)
@@ -99,8 +101,8 @@ class ControlLoop:
 
     def updates(self) -> Iterator[tuple[Frame | Measurement, Report]]:
         """The updates that have ended, after the command, which never waits for an image."""
-        now = self.sample.time
-        for frame, report in self._updater.update(self.loop, self.sample.frame):
+        now, image = self.sample.time, self.sample.frame if self._uses_images else None
+        for frame, report in self._updater.update(self.loop, image):
             if self._log is not None:
                 self.write_events(self.loop.updates)
                 self._log.frame(now, frame, report)
