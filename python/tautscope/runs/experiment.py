@@ -18,7 +18,7 @@ from tautscope.loop.rig import Frame, Rig, Sample, check_sample
 from tautscope.loop.safety import Reaction, Supervision, disabled_monitors
 from tautscope.runs.flag_summary import FlagSummary
 from tautscope.runs.recording import Floats, Recording, Snapshot
-from tautscope.runs.run_recorder import RunRecorder, frame_row, measurement_row
+from tautscope.runs.run_recorder import RunRecorder, update_row
 
 if TYPE_CHECKING:
     from tautscope.loop.vision import Detection
@@ -43,6 +43,10 @@ class Log(Protocol):
 
     def frame(self, now: float, frame: Frame, report: Report) -> None:
         """An image update at time `now` [s, the rig's clock]."""
+        ...
+
+    def measurement(self, now: float, measurement: Measurement, report: Report) -> None:
+        """An update by another sensor at time `now` [s, the rig's clock]."""
         ...
 
     def event(self, now: float, what: str) -> None:
@@ -134,6 +138,9 @@ def run_experiment(
         for measurement in sample.measurements:
             report = reduction.on_sample(measurement)
             recorder.add_measurement(sample.time, measurement, report, elapsed)
+            if log is not None and events is not None:
+                events.write(sample.time, reduction.updates)
+                log.measurement(sample.time, measurement, report)
         if watch is not None:
             watch(reduction.supervision)
         if (error := stop.update(sample.time)) is not None:
@@ -243,12 +250,13 @@ class _ExperimentRecorder(RunRecorder):
         self, now: float, measurement: Measurement, report: Report, elapsed: float
     ) -> None:
         self._measurements += 1
-        row = measurement_row(now, self._measurements, measurement, report)
+        row = update_row(now, measurement, report, self._measurements)
         self.add_frame(row, report.delta_minus, report.delta_plus)
         self.flags.add(elapsed, report.warnings, report.reaction)
 
     def add_report(self, now: float, frame: Frame, report: Report, elapsed: float) -> None:
-        self.add_frame(frame_row(now, frame, report), report.delta_minus, report.delta_plus)
+        row = update_row(now, frame, report, frame.sequence)
+        self.add_frame(row, report.delta_minus, report.delta_plus)
         self.flags.add(elapsed, report.warnings, report.reaction)
         detection = report.detection
         is_late = elapsed >= self._snapshot_after
