@@ -19,14 +19,12 @@ from tautscope.log.reader import Log, Request, Tick, read_log
 from tautscope.log.reader import Update as LoggedUpdate
 from tautscope.loop.kinematics import build_kinematics
 from tautscope.loop.rig import Frame
-from tautscope.runs.recording import FRAME_COLUMNS
 
 Floats = NDArray[np.float64]
 STATE_PERIOD = 0.02
 """Time between two states for the page [s]."""
 _END_PERIOD = 0.2
 """The same after the end of the log."""
-_NAMES = FRAME_COLUMNS.names or ()
 
 
 def play(path: str | PathLike[str], port: int, announce: Callable[[str], None]) -> int:
@@ -120,7 +118,7 @@ class LogPlayer:
             show_truth(state, tick.sample.true_state, self._kinematics)
 
     def _add_update(self, index: int, update: LoggedUpdate) -> None:
-        row = dict(zip(_NAMES, update.row, strict=True))
+        row = dict(zip(self._log.update_names, update.row, strict=True))
         state, dofs = self._state, self._log.config.dofs
         estimate = np.array([row[f"estimate_{dof.label}"] for dof in dofs], np.float64)
         predicted = np.array([row[f"predicted_{dof.label}"] for dof in dofs], np.float64)

@@ -38,6 +38,10 @@ class Log(Protocol):
         """An image update at time `now` [s, the rig's clock]."""
         ...
 
+    def measurement(self, now: float, measurement: Measurement, report: Report) -> None:
+        """An update by another sensor at time `now` [s, the rig's clock]."""
+        ...
+
     def event(self, now: float, what: str) -> None:
         """A call of the operator or the rig, as `HysteresisReduction.on_event`, at time `now`."""
         ...
@@ -108,7 +112,11 @@ class ControlLoop:
                 self._log.frame(now, frame, report)
             yield frame, report
         for measurement in self.sample.measurements:
-            yield measurement, self.loop.on_sample(measurement)
+            report = self.loop.on_sample(measurement)
+            if self._log is not None:
+                self.write_events(self.loop.updates)
+                self._log.measurement(now, measurement, report)
+            yield measurement, report
         self.write_events()
 
     def step(self) -> None:

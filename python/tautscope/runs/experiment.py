@@ -17,7 +17,7 @@ from tautscope.loop.safety import Reaction, Supervision, disabled_monitors
 from tautscope.runs.control_loop import ControlLoop, ImageUpdate, Log
 from tautscope.runs.flag_summary import FlagSummary
 from tautscope.runs.recording import Recording, Snapshot
-from tautscope.runs.run_recorder import RunRecorder, frame_row, measurement_row
+from tautscope.runs.run_recorder import RunRecorder, update_row
 
 Progress = Callable[[float, float], None]
 """Called about once per second of the rig's clock with (elapsed, duration) [s]."""
@@ -154,11 +154,8 @@ class _ExperimentRecorder(RunRecorder):
     def add_report(
         self, now: float, source: Frame | Measurement, report: Report, elapsed: float
     ) -> None:
-        if isinstance(source, Frame):
-            row = frame_row(now, source, report)
-        else:
-            self._measurements += 1
-            row = measurement_row(now, self._measurements, source, report)
+        self._measurements += not isinstance(source, Frame)
+        row = update_row(now, source, report, self._measurements)
         self.add_frame(row, report.delta_minus, report.delta_plus)
         self.flags.add(elapsed, report.warnings, report.reaction)
         detection = report.detection
