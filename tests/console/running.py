@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 from console import pages
 from console.pages import PERIOD
+from numpy.typing import ArrayLike
 from tautscope.config import Config, load_config
 from tautscope.console import lease, operator_input
 from tautscope.console.control_run import LiveRig
@@ -25,6 +26,8 @@ from tautscope.console.live_twin import LiveTwin
 from tautscope.console.rig_control import RigControl
 from tautscope.console.session import Session
 from tautscope.console.start import web_server
+from tautscope.loop.measurement import Tip
+from tautscope.loop.rig import Sample
 
 TIMEOUT, AGE = 1.5, 4.0
 """In place of `COMMAND_TIMEOUT` and `COMMAND_AGE` [s]."""
@@ -33,6 +36,26 @@ TIMEOUT, AGE = 1.5, 4.0
 def small_config(**changes: Any) -> Config:
     """The default configuration with small JPEG images, which are drawn and encoded quickly."""
     return pages.sized("180x144").replace(**changes)
+
+
+class Arm:
+    """Axes without slack, whose drives are where they are told to be."""
+
+    control_period = 0.005
+
+    def __init__(self, count: int) -> None:
+        self._start, self._ticks = np.zeros(count), 0
+
+    def reset(self) -> Sample:
+        return self.step(self._start)
+
+    def step(self, command: ArrayLike) -> Sample:
+        self._ticks += 1
+        now = self._ticks * self.control_period
+        seen = () if self._ticks % 5 else (Tip(np.array(command), now),)
+        return Sample(now, np.array(command), measurement=seen)
+
+    def close(self) -> None: ...
 
 
 class RunningConsole(pages.Address):
