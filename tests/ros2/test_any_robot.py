@@ -14,6 +14,8 @@ import tautscope
 from common.paths import ROOT
 from ros2.peers import JOINTS, Peers, peers
 from tautscope.config import load_config
+from tautscope.log.reader import read_log
+from tautscope.log.replay import replay_same
 from tautscope.loop.kinematics import build_kinematics
 from tautscope.loop.measurement import Pose
 from tautscope.loop.reduction import HysteresisReduction
@@ -153,6 +155,8 @@ def test_two_sensors_measure_a_joint_each(tmp_path: Path) -> None:
             rf"{names[1]} \S+ rad, slack found 0\.\d+ rad",
             result,
         ), result
+        same, _ = replay_same(read_log(run.path))
+        assert same.is_identical
         error = np.array(found.tips[1:])[300:] - np.array(found.references)[300:]
         assert (np.sqrt((error**2).mean(axis=0)) < 0.5 * HALF_WIDTH).all()
 

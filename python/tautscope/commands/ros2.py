@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
 from tautscope.commands.printing import print_json
 from tautscope.config import Config, load_config
 from tautscope.config.placeholders import refuse_placeholders
-from tautscope.errors import ConfigError
+from tautscope.errors import ConfigError, FieldError
 from tautscope.extras import require_extras
 
 if TYPE_CHECKING:
+    from tautscope.loop.rig import Rig
     from tautscope.ros2.start import MakeRig
 
 
@@ -43,6 +45,11 @@ def add_parser(verbs: arguments.Verbs) -> None:
         "--rig",
         metavar="MODULE:CLASS",
         help="move a rig of yours in real time: a class, or an entry point of tautscope.rigs",
+    )
+    ros2.add_argument(
+        "--robot",
+        choices=["colonoscope"],
+        help="with --twin, another simulated robot in place of the article's instrument",
     )
     ros2.add_argument(
         "--device",
@@ -100,7 +107,9 @@ def _ros2(options: argparse.Namespace) -> int:
     from tautscope.ros2.start import NAME, start_node  # noqa: PLC0415
     from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
 
-    config = load_config(options.config, options.profile)
+    if options.robot is not None and not options.twin:
+        raise FieldError("--robot", options.robot, "--twin beside it")
+    config = load_config(options.config or options.robot, options.profile)
     make_rig = _rig(options, config)
     if options.device == "joy" and len(options.axes) != len(config.dofs):
         allowed = f"{len(config.dofs)} axes, one per degree of freedom"
@@ -133,16 +142,25 @@ def _ros2(options: argparse.Namespace) -> int:
 
 def _rig(options: argparse.Namespace, config: Config) -> MakeRig | None:
     """What makes the rig; None for a driver in ROS."""
+    from tautscope.console.paced_rig import PacedRig  # noqa: PLC0415
     from tautscope.hardware.rig import HardwareRig  # noqa: PLC0415
     from tautscope.runs.rigs import rig_maker  # noqa: PLC0415
 
     if options.driver:
         return None
+    make: Callable[[Config], Rig] | None = None
     if options.rig:
-        return rig_maker(options.rig)
+        make = rig_maker(options.rig)
+    elif options.robot:
+        from tautscope.twin.colonoscope import ColonoscopeTwin  # noqa: PLC0415
+
+        make = lambda _: ColonoscopeTwin()  # noqa: E731
+    if make is not None:
+        period = config.control.period
+        return lambda config: PacedRig(lambda: make(config), period, is_simulated=options.twin)
     if config.dof:
         found = ", ".join(dof.name for dof in config.dof)
-        allowed = "the option --driver or --rig; twin and [drives] are the article's instrument"
+        allowed = "the option --driver, --rig or --robot: drives are the article's instrument"
         raise ConfigError("dof", found, allowed)
     if options.twin:
         from tautscope.console.live_twin import LiveTwin  # noqa: PLC0415  MuJoCo

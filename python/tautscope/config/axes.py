@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
+from tautscope._core import MOST_RANGE, SPEED
 from tautscope.config.fields import Gain, NonNegative, Positive
 from tautscope.config.section import Section
 
@@ -45,6 +46,17 @@ class DofEntry(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Initial offset at the negative contact [m or rad]."""
     delta_plus: float = 0.0
     """Initial offset at the positive contact [m or rad], not below delta_minus."""
+
+    @property
+    def travel(self) -> tuple[float, float]:
+        """Least and largest command [m or rad]: `range`, or the widest one about 0."""
+        far = MOST_RANGE / 2 * self.width_limit
+        return (-far, far) if self.range is None else self.range
+
+    @property
+    def largest_speed(self) -> float:
+        """Largest speed of the reference that is followed [m or rad per s]."""
+        return SPEED * self.width_limit if self.speed is None else self.speed
 
     @property
     def label(self) -> str:

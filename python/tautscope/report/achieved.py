@@ -12,7 +12,7 @@ from tautscope.loop.reduction import Report
 from tautscope.loop.rig import Frame, Sample
 from tautscope.report.robot_run import RobotResult, RobotRun
 from tautscope.runs.recording import Floats, Recording
-from tautscope.runs.run_recorder import RunRecorder, frame_row, measurement_row
+from tautscope.runs.run_recorder import RunRecorder, update_row
 
 WINDOW = 120.0
 """Duration of the ticks that are kept, with and without compensation each [s]."""
@@ -39,11 +39,7 @@ class Achieved:
     def add_update(self, now: float, source: Frame | Measurement, report: Report) -> None:
         """Add an update by an image or a measurement that arrived at `now` [s]."""
         self._updates += 1
-        row = (
-            frame_row(now, source, report)
-            if isinstance(source, Frame)
-            else measurement_row(now, self._updates, source, report)
-        )
+        row = update_row(now, source, report, self._updates)
         for recorder in (self._without, self._with):
             recorder.add_frame(row, report.delta_minus, report.delta_plus)
 

@@ -13,13 +13,12 @@ import numpy as np
 
 from tautscope.config import Config
 from tautscope.console.control_run import ControlRun, LiveRig
+from tautscope.console.paced_rig import PacedRig
 from tautscope.errors import MessageError, TautscopeError
 from tautscope.hardware.plausibility import PlausibilityMonitor
 from tautscope.hardware.realtime import OTHERS, realtime
 from tautscope.hardware.rig import HardwareRig
 from tautscope.loop.frame_layout import FrameLayout
-from tautscope.loop.measurement import Measurement
-from tautscope.loop.reduction import Report
 from tautscope.loop.rig import Frame
 from tautscope.loop.safety import Reaction
 from tautscope.report.achieved import Achieved, achieved_text
@@ -112,10 +111,9 @@ class NodeControl:
     def tick(self, run: ControlRun) -> None:
         """A tick of the loop; a fault ends the run, with the drives stopped."""
         try:
-            for frame, report, _ in run.tick():
-                self._update(run, frame, report)
-            for measurement in run.sample.measurements:
-                self._update(run, measurement, run.loop.on_sample(measurement))
+            for source, report, _ in run.tick():
+                self._achieved.add_update(run.sample.time, source, report)
+                self._telemetry.update(run, source, report)
             self._telemetry.tick(run)
             supervision = run.loop.supervision
             share = supervision.lead * float(self.parameters["compensation"])
@@ -208,7 +206,7 @@ class NodeControl:
             self.fault = str(error)
             _LOG.warning("%s", error)
             self._telemetry.warn(str(error))
-            if transition is ACTIVATE and isinstance(self._rig, HardwareRig):
+            if transition is ACTIVATE and isinstance(self._rig, HardwareRig | PacedRig):
                 self._rig.close()
             # A rig that cannot be stopped orderly is left in any case.
             return transition not in (CONFIGURE, ACTIVATE)
@@ -253,18 +251,17 @@ class NodeControl:
             measured = (*sample.measurements, *found)
             run.sample = dataclasses.replace(sample, measurement=measured)
 
-    def _update(self, run: ControlRun, source: Frame | Measurement, report: Report) -> None:
-        self._achieved.add_update(run.sample.time, source, report)
-        self._telemetry.update(run, source, report)
-
     def _end_run(self) -> None:
         """Stop the drives, then close the log."""
         run, self.run = self.run, None
         if run is None:
             return
         try:
-            if isinstance(self._rig, HardwareRig):
-                self._rig.disable() if self._is_disabling else self._rig.close()
+            rig = self._rig
+            if isinstance(rig, HardwareRig) and self._is_disabling:
+                rig.disable()
+            elif isinstance(rig, HardwareRig | PacedRig):
+                rig.close()
         finally:
             self._publish_state()
             try:

@@ -14,7 +14,7 @@ from tautscope import Config, Frame, HysteresisReduction
 from tautscope.loop.measurement import Measurement
 from tautscope.loop.reduction import Report
 from tautscope.loop.safety import Reaction, Supervision
-from tautscope.runs.experiment import BackgroundUpdater
+from tautscope.runs.control_loop import BackgroundUpdater
 
 Floats = NDArray[np.float64]
 START_TOLERANCE = {"mm": 1e-3, "rad": 0.05}
