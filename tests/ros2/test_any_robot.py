@@ -19,7 +19,7 @@ from tautscope.log.replay import replay_same
 from tautscope.loop.kinematics import build_kinematics
 from tautscope.loop.measurement import Pose
 from tautscope.loop.reduction import HysteresisReduction
-from tautscope.ros2 import messages
+from tautscope.ros2 import messages, types
 from tautscope.ros2.measurements import MeasurementReader
 from tautscope.ros2.messages import LOST
 from tautscope.ros2.wire import Qos
@@ -180,7 +180,7 @@ def test_the_tip_of_a_colonoscope_is_measured_by_its_pose(tmp_path: Path) -> Non
             quaternion = Rotation.from_matrix(rotation).as_quat()
             for frame in ("base", "tool") if tick == 200 else ("base",):
                 sent = message("PoseStamped", position.tolist(), quaternion, frame=frame)
-                sent.header.stamp = messages.types.stamp(stamp(both, start, at))
+                sent.header.stamp = types.stamp(stamp(both, start, at))
                 poses.publish(sent)
             return [lambda loop: loop.on_pose(position, at * PERIOD, rotation)]
 
@@ -195,3 +195,30 @@ def test_the_tip_of_a_colonoscope_is_measured_by_its_pose(tmp_path: Path) -> Non
         np.testing.assert_allclose(last.position, found.tips[round(at / PERIOD / 1e9)], atol=0.02)
         warned = [each.data for each in both.drain(both.warnings)]
         assert any(each.startswith("refused: /tracker/pose header.frame_id") for each in warned)
+
+
+def test_a_gamepad_moves_another_robot(tmp_path: Path) -> None:
+    changes = {"measurement.topics": [{"name": "/tracker/pose", "type": "PoseStamped"}]}
+    config = load_config("colonoscope").replace(**changes)
+    kind = "sensor_msgs/msg/Joy"
+    with peers(config, tmp_path, device="joy") as both:
+        joy = both.other.publisher("/joy", kind)
+        both.delivered(resend=True)
+        both.enable(np.zeros(3))
+        pressed = [0, 0, *[1] * 40]
+
+        def send() -> None:
+            both.send_position(np.zeros(3))
+            axes = np.array([0.5, 0, 0, 0, 0], np.float32)
+            buttons = np.array([0, 0, 0, 0, pressed.pop(0)], np.int32)
+            header = types.header(both.clock.wall(), "")
+            joy.publish(types.make(kind, header=header, axes=axes, buttons=buttons))
+            both.delivered()
+
+        both.clock.before_tick = send
+        while pressed:
+            both.tick()
+        assert both.control.run is not None
+        moved = both.control.run.reference
+        assert moved[1] > 0  # axis 0 is the second degree of freedom
+        assert moved[0] == moved[2] == 0

@@ -75,7 +75,7 @@ class Node:
         def log(text: str, **_: Any) -> None:
             self.logged.append(text)
 
-        return SimpleNamespace(error=log, warning=log)
+        return SimpleNamespace(error=log, warning=log, info=log)
 
     def get_clock(self) -> SimpleNamespace:
         return SimpleNamespace(now=lambda: Time(nanoseconds=self.now))

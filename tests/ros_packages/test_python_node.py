@@ -240,7 +240,8 @@ class TestAnotherRobot:
         node.callbacks["state_command"](doubles.Message(string="enable"))
         for number in range(40):
             self.tick(node, [2e-3 * number, 0.0])
-        captured = node.now - 20_000_000
+            node.callbacks["/left"](stamped(node.now - 10_000_000, name=["bend_x"], position=[0]))
+        captured = node.now - 9_000_000
         seen = stamped(captured, name=["bend_x"], position=[0.01])
         node.callbacks["/left"](seen)
         node.callbacks["/left"](seen)  # repeated
@@ -250,6 +251,8 @@ class TestAnotherRobot:
         assert first.name == list(self.JOINTS)
         assert first.position[0] == pytest.approx(0.01, abs=0.02)
         assert second.header.stamp.sec == 0
+        node.on_deactivate(None)
+        assert node.logged[-1].startswith("Tip less reference, RMS: bend_x ")
         (label, _) = node.published["hysteresis/delta"][-1].layout.dim
         assert (label.label, label.size, label.stride) == ("bend_x,bend_y", 2, 4)
 

@@ -129,7 +129,7 @@ class ControlLoop:
 
     def exchange(
         self, frame: Frame | None, measurements: Sequence[Measurement] = ()
-    ) -> list[Report]:
+    ) -> list[tuple[Frame | Measurement, Report]]:
         """After the command of a tick was sent: the updates, and the next detection.
 
         Args:
@@ -138,8 +138,9 @@ class ControlLoop:
         """
         if self.state is OperatingState.DISABLED:
             return []
-        reports = [report for _, report in self._updater.update(self.loop, frame)]
-        reports += map(self.loop.on_sample, measurements)
+        reports: list[tuple[Frame | Measurement, Report]] = []
+        reports += self._updater.update(self.loop, frame)
+        reports += [(each, self.loop.on_sample(each)) for each in measurements]
         if reports:
             self._update_state()
         return reports

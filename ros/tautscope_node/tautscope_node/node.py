@@ -23,10 +23,11 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.time import Time
 from sensor_msgs.msg import CameraInfo, Image, JointState
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
-from tautscope import Frame, load_config
+from tautscope import Frame, Sample, load_config
 from tautscope.errors import ConfigError, MessageError
 from tautscope.loop.measurement import Measurement
 from tautscope.loop.safety import Reaction
+from tautscope.report.achieved import Achieved, achieved_text
 from tautscope.ros2.inputs import ImageReader, checked_stamp
 from tautscope.ros2.measurements import MeasurementReader
 
@@ -112,6 +113,7 @@ class InstrumentNode(LifecycleNode):
         """Start the ticks; the state command `enable` starts the motion."""
         assert self._control is not None
         self._last_state = OperatingState.DISABLED
+        self._achieved = Achieved(self._config)
         self._session_timers = [
             self.create_timer(self._control.period, self._tick),
             self.create_timer(REPORT_PERIOD, self._report),
@@ -147,6 +149,8 @@ class InstrumentNode(LifecycleNode):
             self._control.disable()
             self._last_state = OperatingState.DISABLED
             self._status_publisher.publish_state(self._control)
+            if results := self._achieved.results():
+                self.get_logger().info(achieved_text(results, self._config))
 
     def _create_topics(self) -> None:
         publish, subscribe = self._publisher, self._subscribe
@@ -262,8 +266,12 @@ class InstrumentNode(LifecycleNode):
         control = self._control
         if control is None:
             return
-        tick = control.step(self._now())
+        now = self._now()
+        tick = control.step(now)
         if tick.is_sent:
+            share = control.supervision.lead * self.get_parameter("compensation").value
+            sample = Sample(now, tick.command)
+            self._achieved.add_tick(sample, control.reference, tick.command, share)
             stamp = self.get_clock().now().to_msg()
             self._actuators.publish(self._joint_state(tick.command, stamp))
             self._setpoint.publish(self._joint_state(control.reference, stamp))
@@ -273,7 +281,8 @@ class InstrumentNode(LifecycleNode):
         # After the command, which never waits for an image.
         frame, self._newest = self._newest, None
         measurements, self._measurements = self._measurements, []
-        for report in control.exchange(frame, measurements):
+        for seen, report in control.exchange(frame, measurements):
+            self._achieved.add_update(now, seen, report)
             self._used += 1
             stamp = Time().to_msg()
             if is_measured(report):
