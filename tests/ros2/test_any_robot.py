@@ -138,7 +138,7 @@ def test_two_sensors_measure_a_joint_each(tmp_path: Path) -> None:
                     )
             return calls
 
-        found = follow(both, 450, np.ones(2), measure)
+        found = follow(both, 340, np.ones(2), measure)
         assert found.difference < 1e-9
         run = both.control.run
         assert run is not None
@@ -147,7 +147,7 @@ def test_two_sensors_measure_a_joint_each(tmp_path: Path) -> None:
         lost = [status for status in found.statuses if status in LOST]
         assert len(stamps) >= len(found.statuses) - 7
         assert abs(stamps.count(0) - len(lost)) <= 2
-        assert len(lost) > 15
+        assert len(lost) > 10
         both.request("disable")
         result = both.received(results, "result").data
         assert re.fullmatch(
@@ -157,7 +157,7 @@ def test_two_sensors_measure_a_joint_each(tmp_path: Path) -> None:
         ), result
         same, _ = replay_same(read_log(run.path))
         assert same.is_identical
-        error = np.array(found.tips[1:])[300:] - np.array(found.references)[300:]
+        error = np.array(found.tips[1:])[240:] - np.array(found.references)[240:]
         assert (np.sqrt((error**2).mean(axis=0)) < 0.5 * HALF_WIDTH).all()
 
 
@@ -184,7 +184,7 @@ def test_the_tip_of_a_colonoscope_is_measured_by_its_pose(tmp_path: Path) -> Non
                 poses.publish(sent)
             return [lambda loop: loop.on_pose(position, at * PERIOD, rotation)]
 
-        found = follow(both, 450, np.array([1.0, 1.0, 0.01]), measure)
+        found = follow(both, 300, np.array([1.0, 1.0, 0.01]), measure)
         assert found.difference < 1e-6
         run = both.control.run
         assert run is not None
