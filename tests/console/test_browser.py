@@ -319,9 +319,11 @@ def test_any_number_of_axes_is_drawn_and_steered_without_an_image(
         wait(lambda: not moves(console))
         moved = console.control.operator.reference - before
         assert list((moved < 0).nonzero()[0]) == [count - 1]
-        arm.picture = np.full((config.camera.height, config.camera.width, 3), 128, np.uint8)
-        expect(page.locator("#image")).to_be_visible()
-        arm.picture = arm.picture[1:]
-        expect(page.locator("#message")).to_contain_text("image: got uint8 array (575, 720, 3)")
+        if count == 1:
+            arm.picture = np.full((config.camera.height, config.camera.width, 3), 128, np.uint8)
+            expect(page.locator("#image")).to_be_visible(timeout=TIMEOUT)
+            arm.picture = arm.picture[1:]
+            text = "image: got 'uint8 array (575, 720, 3)'"
+            expect(page.locator("#message")).to_contain_text(text, timeout=TIMEOUT)
         assert problems == []
     context.close()
