@@ -27,7 +27,7 @@ from tautscope.console.rig_control import RigControl
 from tautscope.console.session import Session
 from tautscope.console.start import web_server
 from tautscope.loop.measurement import Tip
-from tautscope.loop.rig import Sample
+from tautscope.loop.rig import Frame, Sample
 
 TIMEOUT, AGE = 1.5, 4.0
 """In place of `COMMAND_TIMEOUT` and `COMMAND_AGE` [s]."""
@@ -45,6 +45,7 @@ class Arm:
 
     def __init__(self, count: int) -> None:
         self._start, self._ticks = np.zeros(count), 0
+        self.picture: np.ndarray | None = None
 
     def reset(self) -> Sample:
         return self.step(self._start)
@@ -53,7 +54,8 @@ class Arm:
         self._ticks += 1
         now = self._ticks * self.control_period
         seen = () if self._ticks % 5 else (Tip(np.array(command), now),)
-        return Sample(now, np.array(command), measurement=seen)
+        frame = None if self.picture is None else Frame(self.picture, now, self._ticks)
+        return Sample(now, np.array(command), frame, measurement=seen)
 
     def close(self) -> None: ...
 

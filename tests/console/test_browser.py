@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import tautscope
 from common.paths import ROOT
@@ -280,7 +281,8 @@ def test_any_number_of_axes_is_drawn_and_steered_without_an_image(
     browser: Browser, tmp_path: Path, count: int
 ) -> None:
     config = tautscope.axes(count, width_limit=1.0, unit="rad")
-    rig, config = make_rig(config, is_twin=True, make=lambda _: Arm(count))
+    arm = Arm(count)
+    rig, config = make_rig(config, is_twin=True, make=lambda _: arm)
     context = browser.new_context(viewport={"width": 1280, "height": 800})
     context.set_default_timeout(TIMEOUT)
     with running_console(tmp_path, config, rig) as console:
@@ -317,5 +319,11 @@ def test_any_number_of_axes_is_drawn_and_steered_without_an_image(
         wait(lambda: not moves(console))
         moved = console.control.operator.reference - before
         assert list((moved < 0).nonzero()[0]) == [count - 1]
+        if count == 1:
+            arm.picture = np.full((config.camera.height, config.camera.width, 3), 128, np.uint8)
+            expect(page.locator("#image")).to_be_visible(timeout=TIMEOUT)
+            arm.picture = arm.picture[1:]
+            text = "image: got 'uint8 array (575, 720, 3)'"
+            expect(page.locator("#message")).to_contain_text(text, timeout=TIMEOUT)
         assert problems == []
     context.close()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import multiprocessing
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,14 +14,16 @@ import own_catheter
 import pytest
 from running import Arm, Page, RunningConsole, rests, running_console
 from tautscope.config import Config, DofEntry, load_config
-from tautscope.console import paced_rig
+from tautscope.console import log_player, paced_rig
 from tautscope.console.lease import ImageTimes, Lease
-from tautscope.console.messages import Received, Servo
+from tautscope.console.messages import Received, Servo, decode_state
 from tautscope.console.operator_input import OperatorInput
 from tautscope.console.paced_rig import PacedRig
+from tautscope.console.shared import Channels, SharedMemory
 from tautscope.console.start import make_rig
-from tautscope.log.reader import read_log
+from tautscope.log.reader import Log, Tick, read_log
 from tautscope.log.replay import replay_same
+from tautscope.loop.kinematics import TwoPlanes
 from tautscope.loop.rig import Rig, Sample
 from tautscope.runs.rigs import rig_maker
 from tautscope.twin.colonoscope import ColonoscopeTwin
@@ -82,6 +86,35 @@ def test_a_newcomers_catheter_follows_stops_replays_and_fails(
     assert comparison.ended == ""
     assert comparison.same_ticks == comparison.ticks > 100
     assert comparison.same_updates == comparison.updates > 20
+    is_shown_by_the_player(log, monkeypatch)
+
+
+def is_shown_by_the_player(log: Log, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The page of a log has its commands, and positions by its kinematics."""
+    monkeypatch.setattr(log_player, "STATE_PERIOD", 0.0)
+    monkeypatch.setattr(time, "sleep", lambda pause: None)  # at once
+    memory = SharedMemory(multiprocessing.get_context("spawn"), log.config)
+    shown, states = Channels(memory), []
+    player = log_player.LogPlayer(log, Channels(memory))
+
+    def look() -> bool:
+        if (found := shown.state.newest()) is not None:
+            states.append(decode_state(found[1]))
+        return True
+
+    try:
+        player.run(look)
+    finally:
+        player.close()
+    ticks = [event for event in log.events.values() if isinstance(event, Tick)]
+    by_time = {tick.sample.time: tick for tick in ticks}
+    compared = [state for state in states if state["time"] in by_time]
+    assert len(compared) > 100
+    kinematics = TwoPlanes(log.config)
+    for state in compared:
+        tick = by_time[state["time"]]
+        assert np.allclose(state["command"], tick.command)
+        assert np.allclose(state["positions"]["true"], kinematics.tip(tick.sample.true_state)[0])
 
 
 def broken(*_: object) -> Sample:

@@ -124,6 +124,7 @@ class ControlRun(ControlLoop):
             self._last_frame = source.sequence
             arrived_at = dict(self._arrivals).get(source.sequence, began)
             updates.append((source, report, arrived_at))
+        self.write_events()
         return updates
 
     def note(self, text: str) -> None:

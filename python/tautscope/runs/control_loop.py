@@ -117,7 +117,6 @@ class ControlLoop:
                 self.write_events(self.loop.updates)
                 self._log.measurement(now, measurement, report)
             yield measurement, report
-        self.write_events()
 
     def step(self) -> None:
         """Send the command and wait for the next sample."""
