@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
+from functools import partial
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 ImageUpdate = Callable[[HysteresisReduction, Frame], Report]
 """Updates the loop with a frame."""
+ImageReports = Iterator[tuple[Frame, Report]]
 
 
 class Log(Protocol):
@@ -83,7 +85,8 @@ class ControlLoop:
         self.loop = HysteresisReduction(config, compensate=compensate)
         self._config, self._rig = config, rig
         self._log: Log | None = None
-        self._updater = _InlineUpdater(look) if executor is None else BackgroundUpdater(executor)
+        at_once = partial(_at_once, look)
+        self._update = at_once if executor is None else BackgroundUpdater(executor).update
         self._uses_images = executor is None or not config.dof
         self._events: list[tuple[int, str]] = []
         self.sample = check_sample(rig.reset() if sample is None else sample, config)
@@ -106,7 +109,7 @@ class ControlLoop:
     def updates(self) -> Iterator[tuple[Frame | Measurement, Report]]:
         """The updates that have ended, after the command, which never waits for an image."""
         now, image = self.sample.time, self.sample.frame if self._uses_images else None
-        for frame, report in self._updater.update(self.loop, image):
+        for frame, report in self._update(self.loop, image):
             if self._log is not None:
                 self.write_events(self.loop.updates)
                 self._log.frame(now, frame, report)
@@ -136,17 +139,9 @@ class ControlLoop:
         return self.loop.supervision.reaction.rank >= Reaction.HOLD_MOTION.rank
 
 
-class _InlineUpdater:
-    """Updates the loop with each frame at once."""
-
-    def __init__(self, image_update: ImageUpdate) -> None:
-        self._image_update = image_update
-
-    def update(
-        self, reduction: HysteresisReduction, frame: Frame | None
-    ) -> Iterator[tuple[Frame, Report]]:
-        if frame is not None:
-            yield frame, self._image_update(reduction, frame)
+def _at_once(look: ImageUpdate, loop: HysteresisReduction, frame: Frame | None) -> ImageReports:
+    if frame is not None:
+        yield frame, look(loop, frame)
 
 
 class BackgroundUpdater:
@@ -157,9 +152,7 @@ class BackgroundUpdater:
         self._next: Frame | None = None
         self._running: tuple[Frame, Future[Detection]] | None = None
 
-    def update(
-        self, reduction: HysteresisReduction, frame: Frame | None
-    ) -> Iterator[tuple[Frame, Report]]:
+    def update(self, reduction: HysteresisReduction, frame: Frame | None) -> ImageReports:
         """Updates that have ended since the last call; `frame` is the next one, if it arrived."""
         if self._running is not None and self._running[1].done():
             (detected, result), self._running = self._running, None

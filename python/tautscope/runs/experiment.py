@@ -21,6 +21,8 @@ from tautscope.runs.run_recorder import RunRecorder, update_row
 
 Progress = Callable[[float, float], None]
 """Called about once per second of the rig's clock with (elapsed, duration) [s]."""
+Engage = Callable[[Supervision], bool]
+"""Whether held motion is to be re-engaged."""
 HELD_TIME = 1.0
 """How long motion is held before a run ends in which nobody can re-engage it [s]."""
 
@@ -36,7 +38,7 @@ def run_experiment(
     log: Log | None = None,
     executor: Executor | None = None,
     watch: Callable[[Supervision], None] | None = None,
-    engage: Callable[[Supervision], bool] | None = None,
+    engage: Engage | None = None,
 ) -> Recording:
     """Run a reference on a rig, with the camera, or other sensors of the tip, as the only feedback.
 
@@ -81,11 +83,8 @@ def run_experiment(
     def recording() -> Recording:
         ticks.write_events()
         trace, frames = recorder.tables()
-        warnings = (
-            *disabled_monitors(config),
-            *recorder.flags.lines(ticks.loop.supervision.latched),
-        )
-        segments = tuple(reference.segments)
+        flags = recorder.flags.lines(ticks.loop.supervision.latched)
+        warnings, segments = (*disabled_monitors(config), *flags), tuple(reference.segments)
         return Recording(trace, frames, config, compensate, segments, recorder.snapshot, warnings)
 
     start = ticks.sample.time
@@ -110,12 +109,7 @@ def run_experiment(
 class _MotionStop:
     """Re-engages held motion as `run_experiment` describes, or ends the run."""
 
-    def __init__(
-        self,
-        loop: HysteresisReduction,
-        engage: Callable[[Supervision], bool] | None,
-        period: float,
-    ) -> None:
+    def __init__(self, loop: HysteresisReduction, engage: Engage | None, period: float) -> None:
         self._loop, self._engage = loop, engage
         self._limit = round(HELD_TIME / period)
         self._ticks = 0
@@ -158,14 +152,10 @@ class _ExperimentRecorder(RunRecorder):
         row = update_row(now, source, report, self._measurements)
         self.add_frame(row, report.delta_minus, report.delta_plus)
         self.flags.add(elapsed, report.warnings, report.reaction)
-        detection = report.detection
-        is_late = elapsed >= self._snapshot_after
-        if (
-            isinstance(source, Frame)
-            and detection is not None
-            and detection.valid
-            and (self.snapshot is None or (is_late and not self._is_late))
-        ):
+        detection, is_late = report.detection, elapsed >= self._snapshot_after
+        if not isinstance(source, Frame) or detection is None or not detection.valid:
+            return
+        if self.snapshot is None or (is_late and not self._is_late):
             self._is_late = is_late
             self.snapshot = Snapshot(
                 source.image.copy(),

@@ -2,6 +2,7 @@
 
 const SAMPLE = 0.04; // s
 const LENGTH = 600; // samples
+const FRAME = 100; // ms
 const LEAST = 0.02; // m, shown across at least
 const COLOURS = { reference: "#9aa3ad", true: "#5dff7a", tip: "#58b9ff" };
 const SIDES = [["x", 0], ["y", 1]]; // over z
@@ -10,32 +11,37 @@ export class PathView {
   constructor(canvas) {
     this.canvas = canvas;
     this.context = canvas.getContext("2d");
-    this.path = [];
+    this.#clear();
     this.time = -Infinity;
-    new ResizeObserver(() => this.#draw()).observe(canvas);
+    setInterval(() => this.#draw(), FRAME);
+  }
+
+  #clear() {
+    this.path = [];
+    this.ends = [[0, 0], [0, 0], [0, 0]]; // of all points since, with the guide's end
   }
 
   add(state) {
-    if (state.time < this.time) this.path = [];
+    if (state.time < this.time) this.#clear();
     else if (state.time - this.time < SAMPLE * 0.9) return;
     this.time = state.time;
     this.path.push(state.positions);
     if (this.path.length > LENGTH) this.path.shift();
-    this.#draw();
+    for (const point of Object.values(state.positions)) {
+      point?.forEach((value, axis) => {
+        const [low, high] = this.ends[axis];
+        this.ends[axis] = [Math.min(low, value), Math.max(high, value)];
+      });
+    }
   }
 
   #draw() {
-    const { canvas, context } = this;
+    const { canvas, context, ends } = this;
     const [width, height] = [canvas.clientWidth, canvas.clientHeight];
-    if (!width || !height || !this.path.length) return;
+    if (!width || !height || !this.path.length || document.hidden) return;
     [canvas.width, canvas.height] = [width * devicePixelRatio, height * devicePixelRatio];
     context.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
     context.font = "13px system-ui";
-    const points = this.path.flatMap((each) => Object.values(each)).filter(Boolean);
-    const ends = [0, 1, 2].map((axis) => {
-      const values = points.map((point) => point[axis]).filter(Number.isFinite);
-      return [Math.min(0, ...values), Math.max(0, ...values)];
-    });
     const size = (axis) => Math.max(ends[axis][1] - ends[axis][0], LEAST);
     const isWide = width > 1.6 * height;
     const [across, down] = isWide ? [width / 2, height] : [width, height / 2];
