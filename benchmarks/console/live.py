@@ -77,7 +77,7 @@ def live_console(folder: Path, config: Config) -> Iterator[LiveConsole]:
     """A console of the twin; the control loop is a thread with real-time priority."""
     ending = threading.Event()
     with (
-        web_server(config.camera, 0) as (_, channels, url),
+        web_server(config, 0) as (_, channels, url),
         realtime_executor("vision", VISION) as executor,
         limited_garbage_collection(),
         locked_memory(),

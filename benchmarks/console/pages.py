@@ -78,6 +78,7 @@ class Page:
 
     Attributes:
         client: The page's number; 0 before the console has accepted it.
+        layout: What the console told it of the instrument.
         state: The newest state that was received.
         replies: To requests, in their order.
         is_closed: Set when the connection has ended.
@@ -91,7 +92,7 @@ class Page:
         options["open_timeout"] = PATIENCE
         uri = f"ws://{address.host}{path}"
         self.socket = self._resources.enter_context(connect(uri, **options))
-        self.client, self.state = 0, dict[str, Any]()
+        self.client, self.state, self.layout = 0, dict[str, Any](), dict[str, Any]()
         self.replies = list[dict[str, Any]]()
         self.on_state: Callable[[dict[str, Any]], None] = lambda state: None
         self.on_latency: Callable[[Any], None] = lambda latency: None
@@ -169,7 +170,7 @@ class Page:
             while True:
                 message = json.loads(self.socket.recv())
                 if message["type"] == "welcome":
-                    self.client = message["client"]
+                    self.client, self.layout = message["client"], message["layout"]
                 elif message["type"] == "reply":
                     self.replies.append(message["reply"])
                 else:

@@ -23,7 +23,7 @@ from tautscope.ros2.endpoints import IMAGE, Subscription
 from tautscope.ros2.inputs import JoyAxes
 from tautscope.ros2.references import SERVO
 from tautscope.ros2.session import SENSOR_DATA, Node
-from tautscope.ros2.start import Drives, build_control
+from tautscope.ros2.start import MakeRig, build_control
 from tautscope.ros2.wire import Qos
 
 Floats = NDArray[np.float64]
@@ -109,17 +109,17 @@ class Peers:
     """
 
     def __init__(
-        self, config: Config, folder: Path, *, drives: Drives = "ros", device: str = SERVO
+        self, config: Config, folder: Path, *, make_rig: MakeRig | None = None, device: str = SERVO
     ) -> None:
         self.endpoint = free_endpoint()
         self.clock = SteppedClock()
-        self.config = config
+        self.config, self.joints = config, [dof.label for dof in config.dofs]
         # A busy computer must not drop what is compared.
         self.node = Node("tautscope", connect="", listen=self.endpoint, is_blocking=True)
         self.other = Node("other", connect=self.endpoint, is_blocking=True)
         self.control: NodeControl = build_control(
             config, self.node, folder, InlineExecutor(), self.clock,
-            drives=drives, device=device, layout=JoyAxes(),
+            make_rig=make_rig, device=device, layout=JoyAxes(),
         )  # fmt: skip
         # One per priority, because order is kept within each.
         self._barriers_to_node = [Barrier(self.other, self.node, n) for n in range(2)]
@@ -169,15 +169,15 @@ class Peers:
         self.control.serve()
 
     def send_position(self, values: Floats) -> None:
-        """Send the drives' positions (3,) [m, rad, rad]."""
-        self.positions.publish(messages.joint_state(self.clock.wall(), values))
+        """Send the drives' positions (n,) [m or rad]."""
+        self.positions.publish(messages.joint_state(self.clock.wall(), self.joints, values))
 
     def send_reference(self, values: Floats) -> None:
-        """Send a reference (3,) [m, rad, rad]."""
-        self.servo.publish(messages.joint_state(self.clock.wall(), values))
+        """Send a reference (n,) [m or rad]."""
+        self.servo.publish(messages.joint_state(self.clock.wall(), self.joints, values))
 
     def enable(self, at: Floats) -> None:
-        """Enable the loop with the drives at a position (3,)."""
+        """Enable the loop with the drives at a position (n,)."""
         self.send_position(at)
         self.delivered()
         self.request("enable")

@@ -20,6 +20,7 @@ from tautscope.ros2.session import ROUTER, Node
 WATCHDOG = 0.1
 """Longest time without a set-point while the motors move [s]."""
 PERIOD = 0.005
+NAMES = ["insertion", "rotation", "bending"]
 START = [0.025, 0.0, 0.9]
 JOINTS = "sensor_msgs/msg/JointState"
 
@@ -49,12 +50,12 @@ def main(endpoint: str = ROUTER) -> None:
             message = setpoints.take()
             now = time.monotonic()
             if message is not None:
-                motors.move(joint_positions(setpoints.topic, message))
+                motors.move(joint_positions(setpoints.topic, message, NAMES))
                 moved_at = now
             elif not motors.is_stopped and now - moved_at > WATCHDOG:
                 motors.stop()
                 print(json.dumps({"event": "quick stop", "silence": now - moved_at}), flush=True)
-            positions.publish(messages.joint_state(time.time_ns(), motors.position))
+            positions.publish(messages.joint_state(time.time_ns(), NAMES, motors.position))
             time.sleep(PERIOD)
 
 

@@ -18,7 +18,8 @@ from tautscope.ros2.endpoints import Subscription
 from tautscope.ros2.session import ROUTER, Node
 
 JOINTS, STATE = "sensor_msgs/msg/JointState", "crtk_msgs/msg/OperatingState"
-AMPLITUDE = np.array([0.005, 0.5, 0.3])  # m, rad, rad
+AMPLITUDES = {"insertion": 0.005, "rotation": 0.5, "bending": 0.3}  # m or rad
+OTHER = 0.3  # of any other degree of freedom
 PERIOD, RATE = 10.0, 200.0
 
 
@@ -43,14 +44,16 @@ def main(endpoint: str = ROUTER, duration: str = "10") -> None:
         )
         requests.publish(enable)
         wait(states, lambda state: state.state == "ENABLED")
-        start = wait(setpoints).position  # a stream that begins here is followed as it is
+        first = wait(setpoints)  # a stream that begins here is followed as it is
+        amplitude = np.array([AMPLITUDES.get(name, OTHER) for name in first.name])
         begin = time.monotonic()
         while (elapsed := time.monotonic() - begin) < float(duration):
-            wave = AMPLITUDE * math.sin(math.tau * elapsed / PERIOD)
-            references.publish(messages.joint_state(time.time_ns(), start + wave))
+            moved = first.position + amplitude * math.sin(math.tau * elapsed / PERIOD)
+            references.publish(messages.joint_state(time.time_ns(), first.name, moved))
             time.sleep(1 / RATE)
-        tip = wait(tips).position
-    print("tip at", ", ".join(f"{value:.4f}" for value in tip), "m, rad, rad")
+        tip = wait(tips)
+    at = zip(tip.name, tip.position, strict=True)
+    print("tip at", ", ".join(f"{name} {value:.4f}" for name, value in at), "[m or rad]")
 
 
 if __name__ == "__main__":

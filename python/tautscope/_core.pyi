@@ -11,6 +11,7 @@ __all__ = [
     "MOST_RANGE",
     "MOST_SENSORS",
     "MOST_VALUES",
+    "SPEED",
     "AxesReduction",
     "Camera",
     "Compensator",
@@ -37,6 +38,7 @@ MOST_DOFS: int
 MOST_SENSORS: int
 MOST_VALUES: int
 MOST_RANGE: float
+SPEED: float
 
 # Models, estimation, compensation, supervision: crates/core.
 

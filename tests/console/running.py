@@ -18,12 +18,16 @@ import numpy as np
 import pytest
 from console import pages
 from console.pages import PERIOD
+from numpy.typing import ArrayLike
 from tautscope.config import Config, load_config
 from tautscope.console import lease, operator_input
+from tautscope.console.control_run import LiveRig
 from tautscope.console.live_twin import LiveTwin
 from tautscope.console.rig_control import RigControl
 from tautscope.console.session import Session
 from tautscope.console.start import web_server
+from tautscope.loop.measurement import Tip
+from tautscope.loop.rig import Frame, Sample
 
 TIMEOUT, AGE = 1.5, 4.0
 """In place of `COMMAND_TIMEOUT` and `COMMAND_AGE` [s]."""
@@ -32,6 +36,28 @@ TIMEOUT, AGE = 1.5, 4.0
 def small_config(**changes: Any) -> Config:
     """The default configuration with small JPEG images, which are drawn and encoded quickly."""
     return pages.sized("180x144").replace(**changes)
+
+
+class Arm:
+    """Axes without slack, whose drives are where they are told to be."""
+
+    control_period = 0.005
+
+    def __init__(self, count: int) -> None:
+        self._start, self._ticks = np.zeros(count), 0
+        self.picture: np.ndarray | None = None
+
+    def reset(self) -> Sample:
+        return self.step(self._start)
+
+    def step(self, command: ArrayLike) -> Sample:
+        self._ticks += 1
+        now = self._ticks * self.control_period
+        seen = () if self._ticks % 5 else (Tip(np.array(command), now),)
+        frame = None if self.picture is None else Frame(self.picture, now, self._ticks)
+        return Sample(now, np.array(command), frame, measurement=seen)
+
+    def close(self) -> None: ...
 
 
 class RunningConsole(pages.Address):
@@ -66,7 +92,7 @@ class Page(pages.Page):
         """Send that nothing is held, until the control process knows it."""
 
         def release() -> bool:
-            self.servo(is_holding=False)
+            self.servo((0.0,) * len(self.layout["dofs"]), is_holding=False)
             return not self.state["must_release"]
 
         self.wait(release, PERIOD)
@@ -81,23 +107,26 @@ class Page(pages.Page):
 
 
 @contextmanager
-def running_console(folder: Path, config: Config | None = None) -> Iterator[RunningConsole]:
-    """A console of the twin during the block."""
+def running_console(
+    folder: Path, config: Config | None = None, rig: LiveRig | None = None
+) -> Iterator[RunningConsole]:
+    """A console of the twin, or of another rig, during the block."""
     config = small_config() if config is None else config
     ending = threading.Event()
     with (
         pytest.MonkeyPatch.context() as patch,
-        web_server(config.camera, 0) as (server, channels, url),
+        web_server(config, 0) as (server, channels, url),
         ThreadPoolExecutor(1) as executor,
     ):
         patch.setattr(lease, "COMMAND_AGE", AGE)
         patch.setattr(operator_input, "COMMAND_TIMEOUT", TIMEOUT)
-        control = RigControl(config, LiveTwin(config), folder, executor)
+        control = RigControl(config, rig or LiveTwin(config), folder, executor)
         session = Session(control, channels, ending.is_set)
         thread = threading.Thread(target=session.main, name="control")
         thread.start()
         try:
-            while control.run is None or control.images.newest < 3:
+            # Motors wait for the operator.
+            while control.images.newest < 3 or not (control.run or control.is_hardware):
                 assert thread.is_alive()
                 time.sleep(0.01)
             yield RunningConsole(url, control, server)

@@ -10,10 +10,13 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+import tautscope
 from common.paths import ROOT
 from playwright.sync_api import Browser, Page, expect, sync_playwright
-from running import AGE, RunningConsole, rests
+from running import AGE, Arm, RunningConsole, rests, running_console
+from tautscope.console.start import make_rig
 
 CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
 AXE = ROOT / "target" / "axe-core" / "package" / "axe.min.js"
@@ -82,6 +85,18 @@ def take(page: Page) -> None:
     if page.get_attribute("body", "data-motion") == "stopped":
         page.click("#enable")
     expect(page.locator("#hint")).to_contain_text("Hold a key", timeout=TIMEOUT)
+
+
+def overflow(page: Page, *sides: str) -> list[str]:
+    """Elements that end outside of the window, at sides or both right and bottom."""
+    return page.evaluate(  # type: ignore[no-any-return]
+        "sides => [...document.querySelectorAll('body > *, fieldset, button')].filter(each => {"
+        " const box = each.getBoundingClientRect();"
+        " const end = {right: innerWidth, bottom: innerHeight};"
+        " return box.width && sides.some(side => box[side] > end[side] + 1)})"
+        ".map(each => each.id || each.textContent)",
+        sides or ("right", "bottom"),
+    )
 
 
 def moves(console: RunningConsole) -> bool:
@@ -253,15 +268,62 @@ def test_nothing_is_cut_off_and_axe_finds_no_serious_fault(
     page.emulate_media(color_scheme=scheme)
     page.set_viewport_size({"width": size[0], "height": size[1]})
     take(page)
-    cut = page.evaluate(
-        "[...document.querySelectorAll('body > *, fieldset, button')].filter(each => {"
-        " const box = each.getBoundingClientRect();"
-        " return box.width && (box.right > innerWidth + 1 || box.bottom > innerHeight + 1)})"
-        ".map(each => each.id || each.textContent)"
-    )
-    assert cut == []
+    assert overflow(page) == []
     if not AXE.exists():
         pytest.skip(f"no {AXE}: `npm pack axe-core`, unpacked there, as .ci/run does")
     page.evaluate(AXE.read_text(encoding="utf-8"))
     found = page.evaluate("axe.run(document)")["violations"]
     assert [each["id"] for each in found if each["impact"] in ("serious", "critical")] == []
+
+
+@pytest.mark.parametrize("count", [1, 8])
+def test_any_number_of_axes_is_drawn_and_steered_without_an_image(
+    browser: Browser, tmp_path: Path, count: int
+) -> None:
+    config = tautscope.axes(count, width_limit=1.0, unit="rad")
+    arm = Arm(count)
+    rig, config = make_rig(config, is_twin=True, make=lambda _: arm)
+    context = browser.new_context(viewport={"width": 1280, "height": 800})
+    context.set_default_timeout(TIMEOUT)
+    with running_console(tmp_path, config, rig) as console:
+        page = context.new_page()
+        problems: list[str] = []
+        page.on("pageerror", lambda error: problems.append(str(error)))
+        page.goto(console.url)
+        take(page)
+        expect(page.locator(".dof canvas")).to_have_count(3 * count)
+        expect(page.locator("#view")).to_be_hidden()  # no image is no error
+        expect(page.locator("[data-action=experiment]")).to_be_hidden()
+        assert overflow(page) == []
+        keys = [("ArrowUp", 0), ("Digit8", 7), ("KeyW", 7)] if count == 8 else [("ArrowUp", 0)]
+        for key, axis in keys:
+            before = console.control.operator.reference
+            page.keyboard.down(key)
+            if not key.startswith("Digit"):
+                wait(lambda: moves(console))
+                page.keyboard.up(key)
+                wait(lambda: not moves(console))
+                moved = console.control.operator.reference - before
+                assert list(moved.nonzero()[0]) == [axis]
+        page.set_viewport_size({"width": 400, "height": 800})
+        expect(page.locator("#stop")).to_be_in_viewport()
+        assert page.evaluate("document.documentElement.scrollWidth") == 400
+        assert overflow(page, "right") == []
+        button = page.get_by_label(f"axis_{count} backwards")
+        before = console.control.operator.reference
+        button.hover()
+        page.mouse.down()
+        wait(lambda: moves(console))
+        expect(page.locator("#stop")).to_be_in_viewport()
+        page.mouse.up()
+        wait(lambda: not moves(console))
+        moved = console.control.operator.reference - before
+        assert list((moved < 0).nonzero()[0]) == [count - 1]
+        if count == 1:
+            arm.picture = np.full((config.camera.height, config.camera.width, 3), 128, np.uint8)
+            expect(page.locator("#image")).to_be_visible(timeout=TIMEOUT)
+            arm.picture = arm.picture[1:]
+            text = "image: got 'uint8 array (575, 720, 3)'"
+            expect(page.locator("#message")).to_contain_text(text, timeout=TIMEOUT)
+        assert problems == []
+    context.close()

@@ -24,6 +24,10 @@ def test_drives_need_a_configuration_and_the_twin_has_none(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert "drives: got None" in failed(capsys, "console")
+    assert "--robot: got 'colonoscope'" in failed(capsys, "console", "--robot", "colonoscope")
+    assert "rig: got 'nothing:Here'" in failed(capsys, "console", "--rig", "nothing:Here")
+    colonoscope = ("console", "--twin", "--config", "colonoscope")
+    assert "this command is for the article's instrument" in failed(capsys, *colonoscope)
     err = failed(capsys, "console", "--config", "article_rig")
     assert "placeholders of" in err
     config = load_config("bench")
@@ -54,8 +58,11 @@ def test_a_taken_port_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: P
     assert "port: got 70000" in failed(capsys, "console", "--twin", "--port", "70000")
 
 
-def test_it_prints_its_address_and_ends_with_ctrl_c(tmp_path: Path) -> None:
-    command = [*COMMAND, "--twin", "--json", "--out", str(tmp_path / "out")]
+@pytest.mark.parametrize("options", [(), ("--robot", "colonoscope")], ids=["article", "robot"])
+def test_it_prints_its_address_and_ends_with_ctrl_c(
+    tmp_path: Path, options: tuple[str, ...]
+) -> None:
+    command = [*COMMAND, "--twin", *options, "--json", "--out", str(tmp_path / "out")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         assert process.stdout is not None
         assert process.stderr is not None

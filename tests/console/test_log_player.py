@@ -19,7 +19,7 @@ def test_the_player_shows_the_recorded_states_and_images(tmp_path: Path, monkeyp
     path = tmp_path / "run.mcap"
     record(path, config, 0.6)
     log = read_log(path)
-    memory = SharedMemory(multiprocessing.get_context("spawn"), config.camera)
+    memory = SharedMemory(multiprocessing.get_context("spawn"), config)
     shown, seen = Channels(memory), []
     player = LogPlayer(log, Channels(memory))
     monkeypatch.setattr("tautscope.console.log_player.STATE_PERIOD", 0.0)

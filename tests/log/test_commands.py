@@ -77,8 +77,7 @@ def test_replay_counts_identical_outputs(
     ticks, frames = len(recording.trace), len(recording.frames)
     assert main(["replay", str(path)]) == 0
     assert capsys.readouterr().out == (
-        f"{ticks} of {ticks} commands and {frames} of {frames} image updates identical, "
-        "bit for bit.\n"
+        f"{ticks} of {ticks} commands and {frames} of {frames} updates identical, bit for bit.\n"
     )
     assert main(["replay", str(truncated), "--json", "--out", str(tmp_path / "out")]) == 0
     found = json.loads(capsys.readouterr().out)

@@ -94,9 +94,7 @@ def test_a_gap_ends_the_comparison(recorded: Recorded) -> None:
     found, _ = replay_same(log)
     assert found.is_identical
     assert found.ticks + found.updates == 99
-    assert (
-        found.ended == f"tick, image update or request 100 of {max(log.events)} is not in the log"
-    )
+    assert found.ended == f"tick, update or request 100 of {max(log.events)} is not in the log"
 
 
 def test_jpeg_is_not_identical_but_close(tmp_path: Path, config: Config) -> None:

@@ -22,6 +22,7 @@ from tautscope.ros2.inputs import (
 CAMERA = load_config().camera
 NOW = 10**18
 TOPIC = "/topic"
+JOINTS = ["insertion", "rotation", "bending"]
 
 
 def image(**changes: object):
@@ -38,7 +39,7 @@ def image(**changes: object):
 
 
 def joints(**changes: object):
-    message = messages.joint_state(NOW, [1.0, 2.0, 3.0])
+    message = messages.joint_state(NOW, JOINTS, [1.0, 2.0, 3.0])
     for name, value in changes.items():
         setattr(message, name, value)
     return message
@@ -55,7 +56,7 @@ def joy(axes: list[float], buttons: list[int]):
 
 def test_joints_are_found_by_their_names() -> None:
     message = joints(name=["bending", "insertion", "rotation"])
-    assert joint_positions(TOPIC, message).tolist() == [2.0, 3.0, 1.0]
+    assert joint_positions(TOPIC, message, JOINTS).tolist() == [2.0, 3.0, 1.0]
 
 
 @pytest.mark.parametrize(
@@ -72,7 +73,7 @@ def test_joints_are_found_by_their_names() -> None:
 )
 def test_wrong_joints_are_named(changes: dict[str, object], field: str) -> None:
     with pytest.raises(MessageError) as found:
-        joint_positions(TOPIC, joints(**changes))
+        joint_positions(TOPIC, joints(**changes), JOINTS)
     assert found.value.field == f"{TOPIC} {field}"
 
 
@@ -171,7 +172,7 @@ def test_wrong_gamepads_are_named(axes: list[float], buttons: list[int], field: 
 )
 def test_any_joints_are_read_or_refused(names: list[str], position: np.ndarray) -> None:
     try:
-        found = joint_positions(TOPIC, joints(name=names, position=position))
+        found = joint_positions(TOPIC, joints(name=names, position=position), JOINTS)
     except MessageError:
         return
     assert np.isfinite(found).all()

@@ -26,6 +26,7 @@ from tautscope.ros2 import messages, types
 from tautscope.ros2.session import Node
 
 PAGE = (ROOT / "docs" / "interfaces" / "ros2.md").read_text(encoding="utf-8")
+NAMES = ["insertion", "rotation", "bending"]
 START = np.array([0.025, 0.0, 0.9])
 TIMEOUT = 60.0
 PYTHON = [sys.executable, "-W", "error"]
@@ -83,7 +84,7 @@ class Operator:
         begin = time.monotonic()
         while (elapsed := time.monotonic() - begin) < duration:
             wave = np.array([0.003, 0.3, 0.2]) * np.sin(2 * np.pi * elapsed / 4)
-            self._servo.publish(messages.joint_state(time.time_ns(), START + wave))
+            self._servo.publish(messages.joint_state(time.time_ns(), NAMES, START + wave))
             time.sleep(0.005)
 
 

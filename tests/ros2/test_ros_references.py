@@ -76,7 +76,7 @@ def test_a_second_publisher_is_refused_until_it_takes_over(both: Peers) -> None:
     def send() -> None:
         position[0] += 1e-5
         both.send_position(START)
-        second.publish(messages.joint_state(both.clock.wall(), position))
+        second.publish(messages.joint_state(both.clock.wall(), both.joints, position))
         both.delivered()
 
     both.clock.before_tick = send
@@ -102,7 +102,8 @@ def test_late_references_move_nothing(both: Peers) -> None:
     def send() -> None:
         both.send_position(START)
         late = both.clock.wall() - 60_000_000
-        both.servo.publish(messages.joint_state(late, START + np.array([0.001, 0, 0])))
+        position = START + np.array([0.001, 0, 0])
+        both.servo.publish(messages.joint_state(late, both.joints, position))
         both.delivered()
 
     commands(both)
@@ -129,7 +130,7 @@ def test_a_malformed_reference_changes_nothing(
 
     def send() -> None:
         both.send_position(START)
-        message = messages.joint_state(both.clock.wall(), START + 0.5)
+        message = messages.joint_state(both.clock.wall(), both.joints, START + 0.5)
         for name, value in changes.items():
             setattr(message, name, value)
         both.servo.publish(message)

@@ -73,8 +73,8 @@ def test_any_bytes_to_a_topic_or_service_are_answered_or_refused(
     names = types.make("rcl_interfaces/srv/GetParameters_Request", names=["compensation", "a"])
     good = [
         (both.requests, types.make(STRING, header=types.header(1, ""), string="reset")),
-        (both.servo, messages.joint_state(1, START)),
-        (both.positions, messages.joint_state(1, START)),
+        (both.servo, messages.joint_state(1, both.joints, START)),
+        (both.positions, messages.joint_state(1, both.joints, START)),
         (both.images, types.make(IMAGE, **IMAGE_FIELDS)),
     ]
     replies = []

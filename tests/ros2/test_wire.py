@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import pytest
+import zenoh
 from hypothesis import given
 from hypothesis import strategies as st
+from ros2.peers import free_endpoint
 from tautscope.errors import ConfigError, MessageError
 from tautscope.ros2 import types, wire
 from tautscope.ros2.session import Node, check_loopback
@@ -29,6 +31,24 @@ def test_tokens_are_those_of_the_design_document() -> None:
     inside = Identity(0, "z", "/lab/left", "tautscope")
     assert inside.path == "/lab/left/tautscope"
     assert inside.node_token().endswith("/NN/%/%lab%left/tautscope")
+
+
+@pytest.mark.parametrize("distribution", wire.DISTRIBUTIONS)
+def test_keys_of_humble_have_no_type_hashes(distribution: str) -> None:
+    kind = "std_msgs/msg/String"
+    name = "TypeHashNotSupported" if distribution == "humble" else types.type_hash(kind)
+    endpoint = free_endpoint()
+    settings = zenoh.Config()
+    settings.insert_json5("connect/endpoints", f'["{endpoint}"]')
+    settings.insert_json5("scouting/multicast/enabled", "false")
+    with Node("talker", distribution=distribution, connect="", listen=endpoint) as node:
+        talker = node.publisher("/chatter", kind)
+        with zenoh.open(settings) as session:
+            tokens = session.liveliness().get("@ros2_lv/0/*/0/*/MP/**", timeout=5.0)
+            found = [str(reply.ok.key_expr) for reply in tokens if reply.ok]
+    assert talker is not None
+    assert [each.split("/")[-2] for each in found] == [name]
+    assert node._key("/chatter", kind) == f"0/chatter/std_msgs::msg::dds_::String_/{name}"
 
 
 def test_quality_of_sensor_data() -> None:

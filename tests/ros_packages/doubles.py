@@ -75,7 +75,7 @@ class Node:
         def log(text: str, **_: Any) -> None:
             self.logged.append(text)
 
-        return SimpleNamespace(error=log, warning=log)
+        return SimpleNamespace(error=log, warning=log, info=log)
 
     def get_clock(self) -> SimpleNamespace:
         return SimpleNamespace(now=lambda: Time(nanoseconds=self.now))
@@ -118,6 +118,7 @@ def modules() -> dict[str, ModuleType]:
     messages = {
         "crtk_msgs": ("OperatingState", "StringStamped"),
         "diagnostic_msgs": ("DiagnosticArray", "DiagnosticStatus", "KeyValue"),
+        "geometry_msgs": ("PointStamped", "PoseStamped", "PoseWithCovarianceStamped"),
         "rcl_interfaces": ("SetParametersResult",),
         "sensor_msgs": ("CameraInfo", "Image", "JointState"),
         "std_msgs": ("Float64MultiArray", "MultiArrayDimension", "String"),

@@ -142,7 +142,7 @@ def test_the_joints_are_the_same_everywhere():
     names = ", ".join(f'"{joint}"' for joint in JOINTS)
     for path in (CONTROL / "src/controller.cpp", CONTROL / "src/node.cpp"):
         assert f"{{{names}}}" in path.read_text("utf-8")
-    assert f"[{names}]" in (ROS / "tautscope_node/tautscope_node/node.py").read_text("utf-8")
+    assert f"[{names}]" in (ROS / "tautscope_node/tautscope_node/messages.py").read_text("utf-8")
 
 
 def test_pixi_brings_every_dependency():

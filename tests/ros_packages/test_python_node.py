@@ -185,7 +185,7 @@ def test_bad_messages_are_reported_and_change_nothing(laboratory):
     ("overrides", "text"),
     [
         ({"config": "missing.toml"}, "missing.toml"),
-        ({"joints": ["a", "a", "b"]}, "three different names"),
+        ({"joints": ["a", "a", "b"]}, "3 different names"),
         ({"compensation": 2.0}, "compensation"),
     ],
 )
@@ -204,3 +204,71 @@ def test_the_share_of_the_compensation_is_checked(laboratory):
     refused = laboratory.node.set_parameter("compensation", 1.5)
     assert not refused.successful
     assert "compensation" in refused.reason
+
+
+class TestAnotherRobot:
+    """Two joints, each measured by a topic of its own; and a tracker."""
+
+    JOINTS = ("left", "right")
+
+    @pytest.fixture
+    def node(self, tmp_path, monkeypatch):
+        topics = [
+            {"name": "/left", "type": "JointState"},
+            {"name": "/pose", "type": "PoseStamped", "frame": "base"},
+        ]
+        dof = [{"name": "bend_x", "width_limit": 1.2}, {"name": "bend_y", "width_limit": 1.2}]
+        changes = {"dof": dof, "kinematics.kind": "two_planes", "measurement.topics": topics}
+        path = tmp_path / "rig.toml"
+        path.write_text(dump_config(Config().replace(**changes)))
+        overrides = {"config": str(path), "joints": list(self.JOINTS)}
+        monkeypatch.setattr(doubles.Node, "overrides", overrides)
+        node = InstrumentNode()
+        assert node.on_configure(None) == "success"
+        assert node.on_activate(None) == "success"
+        return node
+
+    def tick(self, node, reference=None):
+        if reference is not None:
+            message = stamped(node.now, name=list(self.JOINTS), position=list(reference))
+            node.callbacks["servo_jp"](message)
+        node.timers[0][1]()
+        node.now += 5_000_000
+
+    def test_its_joints_are_measured_with_the_stamps_of_the_messages(self, node):
+        assert "/endoscope/image_raw" not in node.callbacks
+        node.callbacks["state_command"](doubles.Message(string="enable"))
+        for number in range(40):
+            self.tick(node, [2e-3 * number, 0.0])
+            node.callbacks["/left"](stamped(node.now - 10_000_000, name=["bend_x"], position=[0]))
+        captured = node.now - 9_000_000
+        seen = stamped(captured, name=["bend_x"], position=[0.01])
+        node.callbacks["/left"](seen)
+        node.callbacks["/left"](seen)  # repeated
+        self.tick(node, [0.08, 0.0])
+        first, second = node.published["measured_js"][-2:]
+        assert first.header.stamp.sec * 10**9 + first.header.stamp.nanosec == captured
+        assert first.name == list(self.JOINTS)
+        assert first.position[0] == pytest.approx(0.01, abs=0.02)
+        assert second.header.stamp.sec == 0
+        node.on_deactivate(None)
+        assert node.logged[-1].startswith("Tip less reference, RMS: bend_x ")
+        (label, _) = node.published["hysteresis/delta"][-1].layout.dim
+        assert (label.label, label.size, label.stride) == ("bend_x,bend_y", 2, 4)
+
+    def test_a_wrong_frame_name_or_time_is_named_and_not_used(self, node):
+        node.callbacks["state_command"](doubles.Message(string="enable"))
+        self.tick(node, [0.0, 0.0])
+        wrong = stamped(node.now)
+        wrong.header.frame_id = "tool"
+        node.callbacks["/pose"](wrong)
+        node.callbacks["/left"](stamped(node.now, name=["left"], position=[0.0]))
+        node.callbacks["/left"](stamped(node.now + 10**9, name=["bend_x"], position=[0.0]))
+        self.tick(node, [0.0, 0.0])
+        assert node.published["measured_js"] == []
+        for text, field in zip(
+            node.logged[-3:],
+            ("/pose header.frame_id", "/left name", "/left header.stamp"),
+            strict=True,
+        ):
+            assert text.startswith(f"{field}: got ")

@@ -3,7 +3,7 @@
 from types import SimpleNamespace as Message
 
 import pytest
-from tautscope.config import CameraConfig
+from tautscope.config import CameraConfig, Config, load_config
 from tautscope_node import messages
 
 JOINTS = ["insertion", "rotation", "bending"]
@@ -35,9 +35,17 @@ def test_a_message_without_all_joints_has_no_positions(message):
 
 
 @pytest.mark.parametrize("joints", [[], JOINTS[:2], ["a", "a", "b"]])
-def test_joints_are_three_different_names(joints):
-    with pytest.raises(ValueError, match="expected three different names"):
-        messages.check_joints(joints)
+def test_joints_are_different_names_one_per_degree_of_freedom(joints):
+    with pytest.raises(ValueError, match="expected 3 different names"):
+        messages.joints_of(joints, Config())
+
+
+def test_joints_of_another_robot_are_its_degrees_of_freedom_or_named():
+    config = load_config("colonoscope")
+    assert messages.joints_of(JOINTS, config) == ["bend_x", "bend_y", "insertion"]
+    assert messages.joints_of(["a", "b", "c"], config) == ["a", "b", "c"]
+    with pytest.raises(ValueError, match="of bend_x, bend_y, insertion, got a, b"):
+        messages.joints_of(["a", "b"], config)
 
 
 def test_another_calibration_is_named():

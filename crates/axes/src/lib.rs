@@ -15,7 +15,7 @@ const START_DEVIATION: f64 = 0.3;
 const UPDATES: f64 = 50.0;
 const COUNTS: f64 = 250.0;
 /// `speed` without a value, in `width_limit` per s.
-const SPEED: f64 = 2.0;
+pub const SPEED: f64 = 2.0;
 /// Speed of the command over that of the reference while the slack is crossed at `gain_limit`.
 const COMMAND_SPEED: f64 = 2.0;
 /// Widest `range`, in `width_limit`, and without a value that about 0.

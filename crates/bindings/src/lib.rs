@@ -75,6 +75,7 @@ mod _core {
         module.add("MOST_SENSORS", tautscope_core::SENSORS)?;
         module.add("MOST_VALUES", tautscope_core::VALUES)?;
         module.add("MOST_RANGE", tautscope_axes::MOST_RANGE)?;
+        module.add("SPEED", tautscope_axes::SPEED)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

@@ -18,7 +18,7 @@ from tautscope.loop.references import SineSequence
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from tautscope.dof import Dof
+    from tautscope.dof import NamedDof
     from tautscope.report.demo import Demo
     from tautscope.report.rows import Row
     from tautscope.runs.trials import Trial
@@ -170,7 +170,12 @@ def _table(title: str, seeds: int) -> Table:
 
 
 def _cell(
-    row: Row, dof: Dof, median: dict[Dof, Any], worst: dict[Dof, Any], *, several: bool
+    row: Row,
+    dof: NamedDof,
+    median: dict[NamedDof, Any],
+    worst: dict[NamedDof, Any],
+    *,
+    several: bool,
 ) -> str:
     """A figure of a DOF, with the worst one in brackets if there are several seeds."""
     from tautscope.report import tables  # noqa: PLC0415

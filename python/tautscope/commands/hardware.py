@@ -14,7 +14,7 @@ from tautscope.commands.positions import add_reference, read_reference
 from tautscope.commands.printing import announce, print_json
 from tautscope.config import load_config
 from tautscope.config.placeholders import refuse_placeholders
-from tautscope.dof import Dof
+from tautscope.dof import NamedDof
 from tautscope.errors import FieldError
 from tautscope.loop.references import SineSequence
 
@@ -135,7 +135,7 @@ def result_lines(run: RecordedRun) -> list[str]:
     ]
 
 
-def summary_line(dof: Dof, result: DofResult) -> str:
+def summary_line(dof: NamedDof, result: DofResult) -> str:
     """One line of results of a DOF from its state estimates; a dash for unknown values."""
     line = f"{dof.label}: remaining slack {_shown(dof, result.compensated_estimate)}"
     if not math.isnan(result.uncompensated_estimate):
@@ -145,7 +145,7 @@ def summary_line(dof: Dof, result: DofResult) -> str:
     return f"{line}; tracking error {_shown(dof, result.tracking_estimate)} RMS; by camera"
 
 
-def tracking_line(dof: Dof, result: OperatorResult, tip: str = "by camera") -> str:
+def tracking_line(dof: NamedDof, result: OperatorResult, tip: str = "by camera") -> str:
     """One line of the tracking of a recorded motion; a dash for unknown values."""
     line = f"{dof.label}: tracking error {_shown(dof, result.compensated_rms)} RMS"
     if not math.isnan(result.reduction):
@@ -154,5 +154,5 @@ def tracking_line(dof: Dof, result: OperatorResult, tip: str = "by camera") -> s
     return f"{line}; largest {_shown(dof, result.largest)}; {tip}"
 
 
-def _shown(dof: Dof, value: float) -> str:
+def _shown(dof: NamedDof, value: float) -> str:
     return "-" if math.isnan(value) else f"{dof.display_scale * value:.3g} {dof.display_unit}"

@@ -173,7 +173,7 @@ def _replay_same(options: argparse.Namespace, log: Log) -> int:
     else:
         print(
             f"{comparison.same_ticks} of {comparison.ticks} commands and "
-            f"{comparison.same_updates} of {comparison.updates} image updates identical, "
+            f"{comparison.same_updates} of {comparison.updates} updates identical, "
             "bit for bit."
         )
         if comparison.first_difference:

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
-from tautscope.commands.article_config import article_config
 from tautscope.commands.printing import print_json
+from tautscope.config import Config, load_config
 from tautscope.config.placeholders import refuse_placeholders
-from tautscope.errors import ConfigError
+from tautscope.errors import ConfigError, FieldError
 from tautscope.extras import require_extras
+
+if TYPE_CHECKING:
+    from tautscope.loop.rig import Rig
+    from tautscope.ros2.start import MakeRig
 
 
 def add_parser(verbs: arguments.Verbs) -> None:
@@ -21,8 +27,9 @@ def add_parser(verbs: arguments.Verbs) -> None:
         help="run the loop as a node of ROS 2, without a ROS installation",
         description="Run the loop as a node of ROS 2: messages of rmw_zenoh over Zenoh. References "
         "come from ROS; docs/interfaces/ros2.md lists the topics. Without --twin or --driver THE "
-        "MOTORS of the configuration MOVE, once a node enables them. Who can connect can move "
-        "them: the node listens on this computer only. Research software, not a medical device.",
+        "MOTORS of the configuration or the rig MOVE, once a node enables them. Who can connect "
+        "can move them: the node listens on this computer only. Research software, not a medical "
+        "device.",
         extras=["ros2"],
     )
     arguments.add_config(ros2)
@@ -32,7 +39,17 @@ def add_parser(verbs: arguments.Verbs) -> None:
     kind.add_argument(
         "--driver",
         action="store_true",
-        help="send set-points to a driver in ROS, and take images from ROS",
+        help="send set-points to a driver in ROS, and take images or measurements from ROS",
+    )
+    kind.add_argument(
+        "--rig",
+        metavar="MODULE:CLASS",
+        help="move a rig of yours in real time: a class, or an entry point of tautscope.rigs",
+    )
+    ros2.add_argument(
+        "--robot",
+        choices=["colonoscope"],
+        help="with --twin, another simulated robot in place of the article's instrument",
     )
     ros2.add_argument(
         "--device",
@@ -42,11 +59,11 @@ def add_parser(verbs: arguments.Verbs) -> None:
     )
     ros2.add_argument(
         "--axes",
-        nargs=3,
+        nargs="+",
         type=arguments.natural,
         default=(1, 0, 4),
         metavar="N",
-        help="of joy: axes of insertion, rotation, bending [1 0 4]",
+        help="of joy: the axis of each degree of freedom [1 0 4]",
     )
     ros2.add_argument(
         "--button",
@@ -70,13 +87,19 @@ def add_parser(verbs: arguments.Verbs) -> None:
     ros2.add_argument(
         "--domain", type=arguments.natural, default=0, metavar="N", help="ROS_DOMAIN_ID [0]"
     )
+    ros2.add_argument(
+        "--distribution",
+        choices=["humble", "jazzy"],
+        default="jazzy",
+        help="of the other nodes; jazzy also for later ones [%(default)s]",
+    )
     arguments.add_out(ros2, "ros2")
     arguments.add_json(ros2)
     ros2.set_defaults(run=_ros2)
 
 
 def _ros2(options: argparse.Namespace) -> int:
-    if not options.driver:
+    if not (options.driver or options.rig):
         require_extras("tautscope ros2", ["twin" if options.twin else "hardware"])
     from tautscope.hardware.realtime import OTHERS, realtime  # noqa: PLC0415
     from tautscope.ros2.inputs import JoyAxes  # noqa: PLC0415
@@ -84,18 +107,25 @@ def _ros2(options: argparse.Namespace) -> int:
     from tautscope.ros2.start import NAME, start_node  # noqa: PLC0415
     from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
 
-    config = article_config(options.config, options.profile)
-    if not (options.twin or options.driver):
-        refuse_placeholders(options.config)
-        if config.drives is None:
-            allowed = "a section [drives], or the option --twin or --driver"
-            raise ConfigError("drives", None, allowed)
+    if options.robot is not None and not options.twin:
+        raise FieldError("--robot", options.robot, "--twin beside it")
+    config = load_config(options.config or options.robot, options.profile)
+    make_rig = _rig(options, config)
+    if options.device == "joy" and len(options.axes) != len(config.dofs):
+        allowed = f"{len(config.dofs)} axes, one per degree of freedom"
+        raise ConfigError("--axes", list(options.axes), allowed)
     folder = check_free(options.out or default_folder("ros2"))
     endpoints = {"connect": options.connect}
     if options.listen is not None:
         endpoints = {"connect": "", "listen": options.listen}
     with realtime(OTHERS):  # Zenoh's threads inherit the priority
-        opened = Node(NAME, options.namespace, domain=options.domain, **endpoints)
+        opened = Node(
+            NAME,
+            options.namespace,
+            domain=options.domain,
+            distribution=options.distribution,
+            **endpoints,
+        )
     with opened as node:
         folder.mkdir(parents=True, exist_ok=True)
         return start_node(
@@ -103,17 +133,56 @@ def _ros2(options: argparse.Namespace) -> int:
             node,
             folder,
             lambda name: _announce(options, name),
-            drives="twin" if options.twin else "ros" if options.driver else "rig",
+            make_rig=make_rig,
             device=options.device,
             layout=JoyAxes(tuple(options.axes), options.button),
+            on_result=lambda text: _print(options, "result", text),
         )
 
 
+def _rig(options: argparse.Namespace, config: Config) -> MakeRig | None:
+    """What makes the rig; None for a driver in ROS."""
+    from tautscope.console.paced_rig import PacedRig  # noqa: PLC0415
+    from tautscope.hardware.rig import HardwareRig  # noqa: PLC0415
+    from tautscope.runs.rigs import rig_maker  # noqa: PLC0415
+
+    if options.driver:
+        return None
+    make: Callable[[Config], Rig] | None = None
+    if options.rig:
+        make = rig_maker(options.rig)
+    elif options.robot:
+        from tautscope.twin.colonoscope import ColonoscopeTwin  # noqa: PLC0415
+
+        make = lambda _: ColonoscopeTwin()  # noqa: E731
+    if make is not None:
+        period = config.control.period
+        return lambda config: PacedRig(lambda: make(config), period, is_simulated=options.twin)
+    if config.dof:
+        found = ", ".join(dof.name for dof in config.dof)
+        allowed = "the option --driver, --rig or --robot: drives are the article's instrument"
+        raise ConfigError("dof", found, allowed)
+    if options.twin:
+        from tautscope.console.live_twin import LiveTwin  # noqa: PLC0415  MuJoCo
+
+        return LiveTwin
+    refuse_placeholders(options.config)
+    if config.drives is None:
+        allowed = "a section [drives], or the option --twin, --driver or --rig"
+        raise ConfigError("drives", None, allowed)
+    return HardwareRig
+
+
 def _announce(options: argparse.Namespace, name: str) -> None:
+    what = f"REAL MOTORS of {options.rig or options.config}"
+    what = "the twin" if options.twin else "a driver in ROS" if options.driver else what
+    text = f"The node {name} commands {what}, once it is enabled. Ctrl-C ends."
+    _print(options, "node", name, text)
+
+
+def _print(options: argparse.Namespace, key: str, value: str, text: str = "") -> None:
     if options.json:
-        print_json({"node": name})
+        print_json({key: value})
     else:
-        what = f"REAL MOTORS of {options.config}"
-        what = "the twin" if options.twin else "a driver in ROS" if options.driver else what
-        print(f"The node {name} commands {what}, once it is enabled. Ctrl-C ends.")
+        print(text or value)
     sys.stdout.flush()

@@ -5,7 +5,7 @@ default: [paper] is Reilink et al. 2013, [ours] is chosen here, [geometry] is a 
 that no publication describes. Missing keys have their defaults.
 """
 
-from tautscope.config.axes import DofEntry, KinematicsConfig, MeasurementConfig
+from tautscope.config.axes import DofEntry, KinematicsConfig, MeasurementConfig, TopicConfig
 from tautscope.config.calibration import CalibrationConfig, CalibrationRecord
 from tautscope.config.camera import (
     CameraClock,
@@ -83,6 +83,7 @@ __all__ = [
     "ShaftConfig",
     "Sine",
     "SourceConfig",
+    "TopicConfig",
     "TransmissionConfig",
     "TwinConfig",
     "Vector3",

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
+from tautscope._core import MOST_RANGE, SPEED
 from tautscope.config.fields import Gain, NonNegative, Positive
 from tautscope.config.section import Section
 
@@ -47,6 +48,17 @@ class DofEntry(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Initial offset at the positive contact [m or rad], not below delta_minus."""
 
     @property
+    def travel(self) -> tuple[float, float]:
+        """Least and largest command [m or rad]: `range`, or the widest one about 0."""
+        far = MOST_RANGE / 2 * self.width_limit
+        return (-far, far) if self.range is None else self.range
+
+    @property
+    def largest_speed(self) -> float:
+        """Largest speed of the reference that is followed [m or rad per s]."""
+        return SPEED * self.width_limit if self.speed is None else self.speed
+
+    @property
     def label(self) -> str:
         """The name in columns and tables."""
         return self.name
@@ -76,6 +88,19 @@ class KinematicsConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only
     """From its end to the sensor [m]."""
 
 
+class TopicConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A topic of ROS 2 with which a sensor of the tip measures."""
+
+    name: str
+    """Name of the topic, relative to the node's namespace without a slash at its beginning."""
+    type: Literal["JointState", "PointStamped", "PoseStamped", "PoseWithCovarianceStamped"]
+    """Type of its messages: "JointState" measures degrees of freedom by their names, the others the
+    position of the tip and, but for "PointStamped", its orientation."""
+    frame: str = ""
+    """frame_id that its messages must have, in which the kinematics gives the tip; empty: that of
+    the first message."""
+
+
 class MeasurementConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Sensors of a robot with [[dof]]; deviations are of measurements without a covariance."""
 
@@ -91,3 +116,5 @@ class MeasurementConfig(Section, frozen=True, forbid_unknown_fields=True, kw_onl
     """Of an orientation about each axis [rad]."""
     point_deviation: Positive = 0.5
     """Of a point of an image [px]."""
+    topics: Annotated[tuple[TopicConfig, ...], Meta(max_length=4)] = ()
+    """Sensors in ROS 2, in the order of delays."""

@@ -6,10 +6,11 @@ Each check raises `ConfigError` with the key, relative to its section.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 
 from tautscope._core import DETECTORS, MOST_DOFS, MOST_RANGE
-from tautscope.config.axes import DofEntry
+from tautscope.config.axes import DofEntry, KinematicsConfig, MeasurementConfig
 from tautscope.config.control import ControlConfig
 from tautscope.config.dof import DofConfig
 from tautscope.config.drives import DrivesConfig
@@ -133,6 +134,25 @@ def check_axes(dofs: Sequence[DofEntry], profile: str, safety: SafetyConfig) -> 
         value = getattr(safety, name)
         default = getattr(SafetyConfig(), name)
         _require(value == default, f"safety.{name}", value, "its default: [[dof]] has its own")
+
+
+_TOPIC = re.compile(r"(~?/)?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
+
+
+def check_topics(
+    dofs: Sequence[DofEntry], kinematics: KinematicsConfig, measurement: MeasurementConfig
+) -> None:
+    """Check measurement.topics; keys from the root."""
+    for index, topic in enumerate(measurement.topics):
+        path = f"measurement.topics[{index}]"
+        names = [other.name for other in measurement.topics[:index]]
+        _require(bool(dofs), path, topic.name, "none without [[dof]]")
+        _require(topic.name not in names, f"{path}.name", topic.name, "a topic named once")
+        allowed = "a topic as /tracker/pose: letters, digits and underscores between slashes"
+        _require(bool(_TOPIC.fullmatch(topic.name)), f"{path}.name", topic.name, allowed)
+        if topic.type != "JointState":
+            allowed = f'a kinematics that gives the tip, as "two_planes", for {topic.name}'
+            _require(kinematics.kind != "joints", "kinematics.kind", kinematics.kind, allowed)
 
 
 @relation(DrivesConfig)

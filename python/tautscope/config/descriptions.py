@@ -103,8 +103,8 @@ def all_sections(
     yield path, section
     for key in keys(section):
         if key.section is not None:
-            name = f"[{key.name}]" if key.is_list else key.name
-            yield from all_sections(key.section, f"{path}.{name}".lstrip("."))
+            place = f"{path}.{key.name}".lstrip(".")
+            yield from all_sections(key.section, f"[{place}]" if key.is_list else place)
 
 
 @cache

@@ -11,7 +11,7 @@ from msgspec import field
 from tautscope.config.axes import DofEntry, KinematicsConfig, MeasurementConfig
 from tautscope.config.calibration import CalibrationConfig
 from tautscope.config.camera import CameraConfig
-from tautscope.config.checks import check_axes, check_references
+from tautscope.config.checks import check_axes, check_references, check_topics
 from tautscope.config.control import ControlConfig
 from tautscope.config.dof import DofConfig
 from tautscope.config.drives import DrivesConfig
@@ -82,6 +82,7 @@ class Config(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
         Section.__post_init__(self)
         check_references(self.safety, self.experiment, {dof: self[dof] for dof in Dof})
         check_axes(self.dof, self.profile, self.safety)
+        check_topics(self.dof, self.kinematics, self.measurement)
 
     @property
     def dofs(self) -> tuple[NamedDof, ...]:

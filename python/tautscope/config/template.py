@@ -46,7 +46,7 @@ def _section(
         place = f"{path}.{key.name}".lstrip(".")
         if key.is_list and key.section is not None:
             for entry in value or (None,):
-                yield from _section(entry, key.section, f"[{key.name}]", marked, described)
+                yield from _section(entry, key.section, f"[{place}]", marked, described)
             continue
         if key.section is not None:
             yield from _section(value, key.section, place, marked, described)

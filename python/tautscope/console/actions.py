@@ -6,14 +6,11 @@ import time
 from collections.abc import Callable
 
 from tautscope.console import messages as msg
-from tautscope.console import programs
+from tautscope.console.programs import PROGRAMS, programs_of
 from tautscope.console.rig_control import RigControl
 from tautscope.console.stills import Image, write_still
-from tautscope.dof import Dof
+from tautscope.errors import ConfigError
 from tautscope.loop.safety import Reaction
-
-MOVING = {"home": programs.home, "experiment": programs.experiment, "sweep": programs.sweep}
-"""Actions that move the instrument."""
 
 
 class Actions:
@@ -47,7 +44,7 @@ class Actions:
             return None
         what = message.name if isinstance(message, msg.Action | msg.Setting) else "profile"
         reason = control.lease.refusal(
-            client, message, time.monotonic(), needs_image=what in MOVING
+            client, message, time.monotonic(), needs_image=what in PROGRAMS
         )
         if reason:
             control.operator.refused[reason] += 1
@@ -63,7 +60,7 @@ class Actions:
             return self._set(message)
         if isinstance(message, msg.SetProfile):
             return self._set_profile(message)
-        if message.name in MOVING:
+        if message.name in PROGRAMS:
             return self._start_program(message.name)
         reason: str = getattr(self, f"_{message.name}")(message)
         return reason
@@ -75,12 +72,15 @@ class Actions:
             if self._control.run is not None:
                 self._control.run.loop.set_compensation(setting.value)
             return ""
+        names = [dof.label for dof in self._control.config.dofs]
+        if setting.dof not in names:
+            return f"no degree of freedom {setting.dof!r}"
         operator.interrupt()
-        dof = Dof[setting.dof.upper()]
+        index = names.index(setting.dof)
         if setting.name == "scale":
-            operator.scale[dof] = setting.value
+            operator.scale[index] = setting.value
         else:
-            operator.is_coupled[dof] = setting.value > 0
+            operator.is_coupled[index] = setting.value > 0
         return ""
 
     def _set_profile(self, message: msg.SetProfile) -> str:
@@ -88,18 +88,24 @@ class Actions:
         if control.operator.is_moving:
             return "the instrument moves"
         if message.profile != control.config.profile:
-            control.restart(control.config.replace(profile=message.profile))
+            try:
+                config = control.config.replace(profile=message.profile)
+            except ConfigError as error:
+                return str(error)
+            control.restart(config)
         return ""
 
     def _start_program(self, name: str) -> str:
         control = self._control
         operator, run = control.operator, control.run
+        if name not in programs_of(control.config):
+            return "only the article's instrument has this program"
         if run is None or operator.stopped_by or run.is_held:
             return "motion is stopped"
         if not operator.is_present(time.monotonic()):
             return "no command for 0.1 s"
         operator.interrupt()
-        operator.program = MOVING[name](control.config, operator.reference)
+        operator.program = PROGRAMS[name](control.config, operator.reference)
         return ""
 
     def _end_program(self, _: msg.Action) -> str:

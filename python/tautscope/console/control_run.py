@@ -9,42 +9,23 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from tautscope.config import Config
 from tautscope.hardware.plausibility import PlausibilityMonitor
 from tautscope.log.writer import LogWriter
-from tautscope.loop.reduction import HysteresisReduction, Report
-from tautscope.loop.rig import Frame, Sample
-from tautscope.loop.safety import Reaction
-from tautscope.runs.experiment import BackgroundUpdater
+from tautscope.loop.measurement import Measurement
+from tautscope.loop.reduction import Report
+from tautscope.loop.rig import Frame, Rig, Sample
+from tautscope.runs.control_loop import ControlLoop
 
 Floats = NDArray[np.float64]
 LATE = 2.0
 """A tick that begins so many control periods after the last one is late."""
 _TIMES = 200_000
 """Number of ticks whose times are kept."""
-
-
-class LiveRig(Protocol):
-    """A rig in real time."""
-
-    @property
-    def control_period(self) -> float:
-        """Time from one command to the next [s]."""
-        ...
-
-    def reset(self) -> Sample:
-        """Go to the start."""
-        ...
-
-    def step(self, command: ArrayLike) -> Sample:
-        """Send a command and wait for the end of the control period."""
-        ...
-
-    def close(self) -> None:
-        """Stop the motors and release all resources."""
-        ...
+LiveRig = Rig
+"""A rig whose `step` waits for the end of the control period."""
 
 
 class ReferenceSource(Protocol):
@@ -52,7 +33,7 @@ class ReferenceSource(Protocol):
 
     @property
     def reference(self) -> Floats:
-        """Reference u (3,) [m, rad, rad] of the last tick."""
+        """Reference u (n,) [m or rad] of the last tick."""
         ...
 
     @property
@@ -65,7 +46,7 @@ class ReferenceSource(Protocol):
         ...
 
 
-class ControlRun:
+class ControlRun(ControlLoop):
     """Ticks of the control loop with the operator's reference, all of them in a log.
 
     Args:
@@ -78,13 +59,10 @@ class ControlRun:
         monitor: Compares drives and images with the configuration; for a rig.
 
     Attributes:
-        loop: The loop.
         log: Its log.
         path: The file of the log.
-        sample: The newest sample.
-        reference: u (3,) [m, rad, rad] of the last tick.
-        command: c (3,) [m, rad, rad] of the last tick.
-        report: The newest image update.
+        reference: u (n,) [m or rad] of the last tick.
+        report: The newest update.
         ticks: Number of ticks.
         late: Number of ticks that were late.
         unused: Number of images that the loop did not use.
@@ -102,13 +80,11 @@ class ControlRun:
         executor: Executor,
         monitor: PlausibilityMonitor | None = None,
     ) -> None:
-        self.sample = sample
-        self.loop = HysteresisReduction(config)
+        super().__init__(config, rig, sample, executor=executor)
         self.path = path
         self.log = LogWriter(path, config)
-        self.loop.on_event = lambda what: self.log.event(self.sample.time, what)
-        self._rig, self._operator, self._monitor = rig, operator, monitor
-        self._updater = BackgroundUpdater(executor)
+        self.write_to(self.log)
+        self._operator, self._monitor = operator, monitor
         self._arrivals: deque[tuple[int, float]] = deque(maxlen=16)
         self._last_frame: int | None = None
         self._began = 0.0
@@ -117,51 +93,41 @@ class ControlRun:
         self.ticks = self.late = self.unused = 0
         self.times: deque[float] = deque(maxlen=_TIMES)
 
-    def tick(self) -> list[tuple[Frame, Report, float]]:
-        """Compute the command; the image updates that have ended, with the frames' arrivals.
+    def tick(self) -> list[tuple[Frame | Measurement, Report, float]]:
+        """Compute the command; the updates that have ended, with the arrivals of what caused them.
 
         Raises:
             ConfigError: The rig differs from its configuration; see `PlausibilityMonitor`.
         """
-        began = time.monotonic()
-        sample = self.sample
-        self.late += self.ticks > 0 and began - self._began > LATE * self._rig.control_period
+        began, sample, period = time.monotonic(), self.sample, self._rig.control_period
+        self.late += self.ticks > 0 and began - self._began > LATE * period
         self._began = began
-        self.reference = self._operator.update(
-            began, self._rig.control_period, self.command, is_held=self.is_held
-        )
+        self.reference = self._operator.update(began, period, self.command, is_held=self.is_held)
         age = self._operator.age
-        made_at = None if age is None else sample.time - age
-        self.command = self.loop.step(self.reference, sample.time, made_at)
+        self.control(self.reference, None if age is None else sample.time - age)
         self.ticks += 1
         self.times.append(time.monotonic() - began)
-        self.log.tick(sample, self.reference, self.command, made_at)
         if self._monitor is not None:
             self._monitor.add_sample(sample.time, sample.applied)
         if sample.frame is not None:
             self._arrivals.append((sample.frame.sequence, began))
-        updates = []
-        for frame, report in self._updater.update(self.loop, sample.frame):
-            self.log.frame(sample.time, frame, report)
+        updates: list[tuple[Frame | Measurement, Report, float]] = []
+        for source, report in self.updates():
             self.report = report
+            if not isinstance(source, Frame):
+                updates.append((source, report, began))
+                continue
             if self._monitor is not None:
-                self._monitor.check_frame(frame.captured_at, report)
+                self._monitor.check_frame(source.captured_at, report)
             if self._last_frame is not None:
-                self.unused += max(frame.sequence - self._last_frame - 1, 0)
-            self._last_frame = frame.sequence
-            arrived_at = dict(self._arrivals).get(frame.sequence, began)
-            updates.append((frame, report, arrived_at))
+                self.unused += max(source.sequence - self._last_frame - 1, 0)
+            self._last_frame = source.sequence
+            arrived_at = dict(self._arrivals).get(source.sequence, began)
+            updates.append((source, report, arrived_at))
+        self.write_events()
         return updates
-
-    def step(self) -> None:
-        """Send the command and wait for the next sample."""
-        self.sample = self._rig.step(self.command)
-
-    @property
-    def is_held(self) -> bool:
-        """Whether the supervisor holds motion."""
-        return self.loop.supervision.reaction.rank >= Reaction.HOLD_MOTION.rank
 
     def note(self, text: str) -> None:
         """Write a note into the log."""
+        self.write_events()
         self.log.event(self.sample.time, f"note {text}")

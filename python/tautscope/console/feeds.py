@@ -16,6 +16,7 @@ from websockets.exceptions import ConnectionClosed
 from tautscope.config import PixelFormat
 from tautscope.console import messages as msg
 from tautscope.console.shared import Channels, ImageChannel
+from tautscope.console.state import Layout
 from tautscope.console.stills import encode_jpeg
 
 POLL_PERIOD = 0.004
@@ -29,6 +30,7 @@ class StateFeed:
 
     Args:
         channels: Views of the shared memory.
+        layout: Sent to each page once.
         latency: Returns median and 95th percentile of the time from an image's arrival until it
             was drawn [s], if they are known.
 
@@ -37,8 +39,12 @@ class StateFeed:
     """
 
     def __init__(
-        self, channels: Channels, latency: Callable[[], tuple[float, float] | None]
+        self,
+        channels: Channels,
+        layout: Layout,
+        latency: Callable[[], tuple[float, float] | None],
     ) -> None:
+        self._layout = layout
         self._channels = channels
         self._latency = latency
         self._newest = b""
@@ -72,7 +78,8 @@ class StateFeed:
         replies = self._replies[client] = deque(maxlen=32)
         number = 0
         try:
-            await connection.send(msg.encode({"type": "welcome", "client": client}).decode())
+            welcome = {"type": "welcome", "client": client, "layout": self._layout}
+            await connection.send(msg.encode(welcome).decode())
             while True:
                 async with self._has_news:
                     await self._has_news.wait_for(

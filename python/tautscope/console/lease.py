@@ -13,7 +13,7 @@ _IMAGES = 256
 
 
 class ImageTimes:
-    """When images were published."""
+    """When images were published, or without images states."""
 
     def __init__(self) -> None:
         self._times: deque[float] = deque(maxlen=_IMAGES)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
-import time
 from concurrent.futures import Future
 
 from numpy.typing import ArrayLike
 
 from tautscope.config import Config
+from tautscope.console.paced_rig import Pace
 from tautscope.hardware.realtime import OTHERS, realtime_executor
 from tautscope.loop.rig import Frame, Sample
 from tautscope.twin.camera import RenderedImage, TwinCamera
@@ -30,21 +29,18 @@ class LiveTwin(Twin):
         super().__init__(config)
         self._renderer = realtime_executor("rendering", OTHERS)
         self._rendering: tuple[Future[RenderedImage], int, float, float] | None = None
-        self._due = 0.0
+        self._pace = Pace(self.control_period)
         self.dropped_images = 0
 
     def reset(self) -> Sample:
         """As `Twin.reset`; its clock starts."""
         sample = super().reset()
-        self._due = time.monotonic()
+        self._pace = Pace(self.control_period)
         return sample
 
     def step(self, command: ArrayLike) -> Sample:
         """As `Twin.step`, and wait for the end of the control period."""
-        self._due += self.control_period
-        late = math.floor((time.monotonic() - self._due) / self.control_period)
-        self._due += max(late, 0) * self.control_period
-        time.sleep(max(0.0, self._due - time.monotonic()))
+        self._pace.wait()
         return super().step(command)
 
     def close(self) -> None:

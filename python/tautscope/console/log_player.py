@@ -10,23 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.console import messages as msg
-from tautscope.console.publisher import Publisher, Update
+from tautscope.console.publisher import Bands, Publisher, Update
 from tautscope.console.shared import Channels
 from tautscope.console.start import web_server
-from tautscope.console.state import ImageState, LogState, State, Three
-from tautscope.dof import Dof
+from tautscope.console.state import ImageState, LogState, blank_state, show_truth, values
 from tautscope.hardware.signals import exit_on_signals
 from tautscope.log.reader import Log, Request, Tick, read_log
 from tautscope.log.reader import Update as LoggedUpdate
+from tautscope.loop.kinematics import build_kinematics
 from tautscope.loop.rig import Frame
-from tautscope.runs.recording import FRAME_COLUMNS
 
 Floats = NDArray[np.float64]
 STATE_PERIOD = 0.02
 """Time between two states for the page [s]."""
 _END_PERIOD = 0.2
 """The same after the end of the log."""
-_NAMES = FRAME_COLUMNS.names or ()
 
 
 def play(path: str | PathLike[str], port: int, announce: Callable[[str], None]) -> int:
@@ -38,7 +36,7 @@ def play(path: str | PathLike[str], port: int, announce: Callable[[str], None]) 
         ConfigError: The port is taken.
     """
     log = read_log(path)
-    with exit_on_signals(), web_server(log.config.camera, port) as (server, channels, url):
+    with exit_on_signals(), web_server(log.config, port) as (server, channels, url):
         announce(url)
         player = LogPlayer(log, channels)
         try:
@@ -66,7 +64,9 @@ class LogPlayer:
         self._publisher = Publisher(log.config, channels.images)
         config = log.config
         message = f"Recording {log.path.name}. Nothing is steered."
-        self._state = State("replay", config.profile, motion="replay", message=message)
+        self._kinematics = build_kinematics(config) if config.dof else None
+        self._state = blank_state("replay", config)
+        self._state.motion, self._state.message = "replay", message
         self._state.must_release = False
         self._state.drives = "recorded"
         self._state.log = LogState(str(log.path), log.path.stat().st_size)
@@ -112,40 +112,30 @@ class LogPlayer:
     def _add_tick(self, tick: Tick) -> None:
         state = self._state
         state.time = tick.sample.time
-        state.reference = _three(tick.reference)
-        state.command = _three(tick.command)
-        state.applied = _three(tick.sample.applied)
+        state.reference, state.command = values(tick.reference), values(tick.command)
+        state.applied = values(tick.sample.applied)
+        if self._log.config.dof:
+            show_truth(state, tick.sample.true_state, self._kinematics)
 
     def _add_update(self, index: int, update: LoggedUpdate) -> None:
-        row = dict(zip(_NAMES, update.row, strict=True))
-        state = self._state
-        estimate = np.array([row[f"estimate_{dof.label}"] for dof in Dof], np.float64)
-        predicted = np.array([row[f"predicted_{dof.label}"] for dof in Dof], np.float64)
+        row = dict(zip(self._log.update_names, update.row, strict=True))
+        state, dofs = self._state, self._log.config.dofs
+        estimate = np.array([row[f"estimate_{dof.label}"] for dof in dofs], np.float64)
+        predicted = np.array([row[f"predicted_{dof.label}"] for dof in dofs], np.float64)
         tip = np.where(np.isfinite(estimate), estimate, predicted)
-        state.tip = _three(tip)
-        state.delta_minus, state.delta_plus = _three(update.delta_minus), _three(update.delta_plus)
+        state.tip = values(tip)
+        state.delta_minus, state.delta_plus = values(update.delta_minus), values(update.delta_plus)
         self._images += 1
         captured_at, arrived_at = float(row["captured_at"]), float(row["arrived_at"])  # type: ignore[arg-type]
-        state.image = ImageState(self._images, str(row["status"]), arrived_at - captured_at)
+        age, status = arrived_at - captured_at, str(row["status"])
+        state.image = ImageState(self._images, status, age, updates=self._images)
+        state.image.deviation = (None,) * len(dofs)
         if self._log.has_image(index):
             frame = Frame(self._log.image(index), captured_at, int(row["sequence"]))  # type: ignore[call-overload]
             found = tuple(np.isfinite(row[f"features_{band}_x"]) for band in "ab")  # type: ignore[call-overload]
-            self._publisher.submit(
-                Update(
-                    self._images,
-                    frame,
-                    estimate,
-                    predicted,
-                    (bool(found[0]), bool(found[1])),
-                    np.array(state.reference),
-                    time.monotonic(),
-                )
-            )
+            reference = np.array(state.reference)
+            bands = Bands(estimate, predicted, reference, (bool(found[0]), bool(found[1])))
+            self._publisher.submit(Update(self._images, frame, time.monotonic(), bands))
 
     def _add_request(self, request: Request) -> None:
         self._state.message = f"Recording {self._log.path.name}: {request.text}"
-
-
-def _three(values: Floats) -> Three:
-    a, b, c = (float(value) for value in values)
-    return a, b, c

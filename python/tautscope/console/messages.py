@@ -10,12 +10,15 @@ from typing import Annotated, Any, Literal, TypeAlias
 import msgspec
 from msgspec import Meta, Struct
 
+from tautscope._core import MOST_DOFS
+
 Count = Annotated[int, Meta(ge=0, lt=2**53)]
 """An integer that JavaScript represents exactly."""
 Axis = Annotated[float, Meta(ge=-1, le=1)]
 Share = Annotated[float, Meta(ge=0, le=1)]
 Text = Annotated[str, Meta(max_length=200)]
-DofName = Literal["insertion", "rotation", "bending"]
+Axes = Annotated[tuple[Axis, ...], Meta(min_length=1, max_length=MOST_DOFS)]
+DofName = Annotated[str, Meta(max_length=32)]
 ActionName = Literal[
     "acknowledge",
     "enable",
@@ -66,11 +69,11 @@ class Servo(Command, frozen=True, tag="servo"):
     """The deflection of the input device, sent periodically.
 
     Attributes:
-        axes: Speeds of insertion, rotation, bending [of the largest speed times scale].
+        axes: (n,) speeds [of the largest speed times scale].
         is_holding: Whether the operator holds the device's enabling button.
     """
 
-    axes: tuple[Axis, Axis, Axis]
+    axes: Axes
     is_holding: bool
 
 
@@ -93,12 +96,12 @@ class Setting(Command, frozen=True, tag="setting"):
         name: ``compensation``, a share from 0 to 1; ``scale``, of a DOF; ``clutch``, 1 couples
             a DOF to the input device and 0 does not.
         value: The new value.
-        dof: The DOF of ``scale`` and ``clutch``.
+        dof: Name of the DOF of ``scale`` and ``clutch``.
     """
 
     name: Literal["compensation", "scale", "clutch"]
     value: Share
-    dof: DofName = "insertion"
+    dof: DofName = ""
 
 
 class SetProfile(Command, frozen=True, tag="profile"):

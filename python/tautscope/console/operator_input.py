@@ -15,20 +15,16 @@ from numpy.typing import NDArray
 from tautscope.config import Config
 from tautscope.console.lease import Lease
 from tautscope.console.messages import Received, Servo
+from tautscope.console.motion_limits import motion_limits
 from tautscope.console.programs import Program
-from tautscope.dof import Dof
 
 Floats = NDArray[np.float64]
 COMMAND_TIMEOUT = 0.1
 """Time without an accepted command after which motion stops [s]."""
 LARGEST_SPEED = 0.75
-"""Speed at full deflection and scale 1 [of `safety.reference_speed`]."""
+"""Speed at full deflection and scale 1 [of the largest speed that the loop follows]."""
 RAMP_TIME = 0.15
 """Time from rest to the largest speed [s]; deceleration is immediate."""
-TRAVEL_MARGIN = 0.25
-"""Distance of reference and command from the drives' travel [in `safety.width_limit`]."""
-TWIN_TRAVEL = 4 / 3
-"""Travel of the reference in the twin about the start position [in amplitudes]."""
 
 
 class OperatorInput:
@@ -46,9 +42,9 @@ class OperatorInput:
         lease: The lease.
 
     Attributes:
-        reference: u (3,) [m, rad, rad].
-        scale: (3,) share of the largest speed at full deflection.
-        is_coupled: (3,) whether the input device moves each DOF (clutch).
+        reference: u (n,) [m or rad].
+        scale: (n,) share of the largest speed at full deflection.
+        is_coupled: (n,) whether the input device moves each DOF (clutch).
         program: The motion that runs by itself, if there is one.
         age: None, because the reference is made in the tick.
         rested_by: Why the last motion ended, if the operator did not end it.
@@ -60,16 +56,18 @@ class OperatorInput:
 
     def __init__(self, config: Config, lease: Lease) -> None:
         self._lease = lease
-        self._speed: Final = LARGEST_SPEED * np.array(config.safety.reference_speed)
-        self._limits: Final = _travel(config)
-        self.reference = np.array([config.experiment[dof].centre for dof in Dof])
-        self.scale = np.full(3, 0.4)
-        self.is_coupled = np.ones(3, bool)
+        limits: Final = motion_limits(config)
+        self._speed: Final = LARGEST_SPEED * limits.speed
+        self._limits: Final = limits.least, limits.most
+        self.reference = limits.start
+        count = len(self.reference)
+        self.scale = np.full(count, 0.4)
+        self.is_coupled = np.ones(count, bool)
         self.program: Program | None = None
         self.stopped_by = self.rested_by = ""
         self.refused: Counter[str] = Counter()
-        self._axes = np.zeros(3)
-        self._velocity = np.zeros(3)
+        self._axes = np.zeros(count)
+        self._velocity = np.zeros(count)
         self._accepted_at = -float("inf")
         self._must_release = True
 
@@ -94,6 +92,8 @@ class OperatorInput:
         # While a rig opens there are no images yet; then only the page's presence counts.
         moves = servo.is_holding or self.program is not None
         reason = self._lease.refusal(received.client, servo, now, needs_image=moves)
+        if len(servo.axes) != len(self._axes):
+            reason = "not one deflection per degree of freedom"
         if reason:
             self.refused[reason] += 1
             return
@@ -108,7 +108,7 @@ class OperatorInput:
             self._axes[:] = servo.axes
 
     def reset(self, reference: Floats) -> None:
-        """Continue from another reference (3,) [m, rad, rad], at the start of a new run."""
+        """Continue from another reference (n,) [m or rad], at the start of a new run."""
         self.interrupt()
         self.reference = reference.copy()
 
@@ -132,12 +132,12 @@ class OperatorInput:
         self.program = None
 
     def update(self, now: float, period: float, command: Floats, *, is_held: bool) -> Floats:
-        """The reference (3,) [m, rad, rad] of a control tick.
+        """The reference (n,) [m or rad] of a control tick.
 
         Args:
             now: Time [s, monotonic clock].
             period: Control period [s].
-            command: The last command of the loop (3,) [m, rad, rad].
+            command: The last command of the loop (n,) [m or rad].
             is_held: Whether the supervisor holds motion.
         """
         if is_held or self.stopped_by:
@@ -163,14 +163,3 @@ class OperatorInput:
         ramped[ramped * self._velocity < 0] = 0
         self._velocity = ramped
         self.reference = self.reference + ramped * period
-
-
-def _travel(config: Config) -> tuple[Floats, Floats]:
-    """Least and largest reference (3,) [m, rad, rad]."""
-    if config.drives is None:
-        centre = np.array([config.experiment[dof].centre for dof in Dof])
-        reach = TWIN_TRAVEL * np.array([config.experiment[dof].amplitude for dof in Dof])
-        return centre - reach, centre + reach
-    travel = np.array([config.drives[dof].travel for dof in Dof])
-    margin = TRAVEL_MARGIN * np.array(config.safety.width_limit)
-    return travel[:, 0] + margin, travel[:, 1] - margin

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.config import Config
-from tautscope.dof import Dof
+from tautscope.console.motion_limits import motion_limits
 from tautscope.loop.references import MINIMUM_JERK_PEAK, SineSequence
 
 Floats = NDArray[np.float64]
 MOVE_SPEED = 0.25
-"""Peak speed of a move to the start [of `safety.reference_speed`]."""
+"""Peak speed of a move to the start [of the largest speed that the loop follows]."""
 
 
 class Motion(Protocol):
@@ -26,14 +26,14 @@ class Motion(Protocol):
         ...
 
     def __call__(self, time: float) -> Floats:
-        """(3,) [m, rad, rad] at `time` [s from its start]."""
+        """(n,) [m or rad] at `time` [s from its start]."""
         ...
 
 
 class Move:
-    """A minimum-jerk move of all DOFs between two positions (3,) [m, rad, rad].
+    """A minimum-jerk move of all DOFs between two positions (n,) [m or rad].
 
-    u = a + (b - a) (10 x^3 - 15 x^4 + 6 x^5), x = time / duration, as fast as `speed` (3,) allows.
+    u = a + (b - a) (10 x^3 - 15 x^4 + 6 x^5), x = time / duration, as fast as `speed` (n,) allows.
     """
 
     def __init__(self, start: Floats, end: Floats, speed: Floats) -> None:
@@ -41,7 +41,7 @@ class Move:
         self.duration = float(max(MINIMUM_JERK_PEAK * np.max(np.abs(self._travel) / speed), 0.1))
 
     def __call__(self, time: float) -> Floats:
-        """(3,) [m, rad, rad] at `time` [s from its start]."""
+        """(n,) [m or rad] at `time` [s from its start]."""
         x = min(max(time / self.duration, 0.0), 1.0)
         return self._start + self._travel * x**3 * (10 - 15 * x + 6 * x**2)
 
@@ -67,7 +67,7 @@ class Program:
         return self.elapsed >= self.duration
 
     def advance(self, period: float) -> Floats:
-        """The reference (3,) [m, rad, rad] after a further period [s]."""
+        """The reference (n,) [m or rad] after a further period [s]."""
         self.elapsed += period
         time = self.elapsed
         for motion in self._motions[:-1]:
@@ -78,7 +78,7 @@ class Program:
 
 
 def home(config: Config, reference: Floats) -> Program:
-    """A slow move to the start position of the experiment."""
+    """A slow move to the start position of the experiment, or the middle of the ranges."""
     return Program("homing", [_move_to_start(config, reference)])
 
 
@@ -110,5 +110,18 @@ class _FirstPeriods:
 
 
 def _move_to_start(config: Config, reference: Floats) -> Move:
-    centre = np.array([config.experiment[dof].centre for dof in Dof])
-    return Move(reference, centre, MOVE_SPEED * np.array(config.safety.reference_speed))
+    limits = motion_limits(config)
+    return Move(reference, limits.start, MOVE_SPEED * limits.speed)
+
+
+PROGRAMS: dict[str, Callable[[Config, Floats], Program]] = {
+    "home": home,
+    "sweep": sweep,
+    "experiment": experiment,
+}
+"""By the names of the actions that start them."""
+
+
+def programs_of(config: Config) -> tuple[str, ...]:
+    """Names of the programs of an instrument; the experiment is the article's."""
+    return ("home",) if config.dof else tuple(PROGRAMS)

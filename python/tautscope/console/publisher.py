@@ -24,26 +24,37 @@ _LOG_PERIOD = 1.0
 
 
 @dataclass(frozen=True)
+class Bands:
+    """States of an image of the bands, each (3,) [m, rad, rad].
+
+    Attributes:
+        estimate: State estimate.
+        predicted: Predicted state.
+        reference: Reference.
+        found: Which bands were found.
+    """
+
+    estimate: Floats
+    predicted: Floats
+    reference: Floats
+    found: tuple[bool, bool]
+
+
+@dataclass(frozen=True)
 class Update:
     """An image update to be shown.
 
     Attributes:
         sequence: Of the image, as in `tautscope.console.lease.ImageTimes`.
         frame: The frame.
-        estimate: State estimate (3,) [m, rad, rad].
-        predicted: Predicted state (3,) [m, rad, rad].
-        found: Which bands were found.
-        reference: (3,) [m, rad, rad].
         arrived_at: When the control loop got the frame [s, monotonic clock].
+        bands: What is drawn over it; None where nothing is.
     """
 
     sequence: int
     frame: Frame
-    estimate: Floats
-    predicted: Floats
-    found: tuple[bool, bool]
-    reference: Floats
     arrived_at: float
+    bands: Bands | None = None
 
 
 class Publisher:
@@ -99,11 +110,12 @@ class Publisher:
 
     def _overlay(self, update: Update) -> Overlay:
         overlay = Overlay(update.sequence, update.arrived_at, *self._size)
-        measured = zip(self._outlines(update.estimate), update.found, strict=False)
-        overlay.measured = [outline for outline, is_found in measured if is_found]
-        overlay.predicted = self._outlines(update.predicted)
-        overlay.tip = self._tip(update.estimate)
-        overlay.target = self._tip(update.reference)
+        if (bands := update.bands) is not None:
+            measured = zip(self._outlines(bands.estimate), bands.found, strict=False)
+            overlay.measured = [outline for outline, is_found in measured if is_found]
+            overlay.predicted = self._outlines(bands.predicted)
+            overlay.tip = self._tip(bands.estimate)
+            overlay.target = self._tip(bands.reference)
         return overlay
 
     def _outlines(self, state: Floats) -> list[list[tuple[float, float]]]:

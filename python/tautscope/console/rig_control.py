@@ -9,15 +9,19 @@ from collections.abc import Callable
 from concurrent.futures import Executor
 from pathlib import Path
 
+import numpy as np
+
 from tautscope.config import Config
 from tautscope.console.control_run import ControlRun, LiveRig
 from tautscope.console.lease import ImageTimes, Lease
 from tautscope.console.operator_input import OperatorInput
+from tautscope.console.paced_rig import PacedRig
 from tautscope.errors import TautscopeError
 from tautscope.hardware.plausibility import PlausibilityMonitor
 from tautscope.hardware.realtime import OTHERS, realtime
 from tautscope.hardware.rig import HardwareRig
-from tautscope.loop.rig import Sample
+from tautscope.loop.kinematics import build_kinematics
+from tautscope.loop.rig import Sample, check_sample
 
 _LOG = logging.getLogger(__name__)
 INTERRUPTED = "STOP, or the page was away, while they were being enabled"
@@ -30,12 +34,13 @@ class RigControl:
 
     Args:
         config: Settings of the loop.
-        rig: `tautscope.console.live_twin.LiveTwin` or `tautscope.hardware.rig.HardwareRig`.
+        rig: In real time: a `LiveTwin`, `HardwareRig`, or a rig of the user's as a `PacedRig`.
         folder: For logs and stills.
         executor: Runs the marker detection.
 
     Attributes:
-        images: When images were published.
+        images: When images were published, or without images states.
+        kinematics: Of an instrument with [[dof]], if it has positions.
         lease: Who may command.
         operator: The source of the reference.
         run: The present run; None while the rig is off.
@@ -60,6 +65,7 @@ class RigControl:
         self.stopped_at: float | None = None
         self.compensation = 1.0
         self.while_opening: Callable[[], None] = lambda: None
+        self.kinematics = build_kinematics(config) if config.dof else None
         self._rig, self._executor = rig, executor
         if isinstance(rig, HardwareRig):
             rig.warn = self._warn
@@ -70,7 +76,8 @@ class RigControl:
     @property
     def is_hardware(self) -> bool:
         """Whether real motors move."""
-        return isinstance(self._rig, HardwareRig)
+        rig = self._rig
+        return isinstance(rig, HardwareRig) or (isinstance(rig, PacedRig) and not rig.is_simulated)
 
     def open(self) -> None:
         """Enable the rig and start a run; a STOP, or a page that is gone, interrupts it."""
@@ -78,14 +85,18 @@ class RigControl:
         watching = threading.Thread(target=self._watch_opening, name="opening")
         watching.start()
         try:
-            sample = self._rig.reset()
+            sample = check_sample(self._rig.reset(), self.config)
         except TautscopeError as error:
-            self.fault = INTERRUPTED if self._was_interrupted else str(error)
-            return
+            self.fault = str(error)
         finally:
             self.is_opening = False
             watching.join()
-        self.operator.reset(sample.applied)
+        if self._was_interrupted:
+            self.fault = INTERRUPTED
+        if self.fault:
+            self._stop_motors(self.fault)
+            return
+        self.operator.reset(np.array(sample.applied, np.float64))
         self._start_run(sample)
 
     def close(self, fault: str = "", *, disable: bool = False) -> None:
@@ -95,13 +106,7 @@ class RigControl:
         self.fault = fault
         if run is None:
             return
-        try:
-            if isinstance(self._rig, HardwareRig) and disable:
-                self._rig.disable()
-            elif self.is_hardware:
-                self._rig.close()
-        except TautscopeError as error:
-            self.fault = f"{fault}; {error}" if fault else str(error)
+        self._stop_motors(fault, disable=disable)
         if self.fault:
             run.note(f"rig off: {self.fault}")
         self._end(run)
@@ -135,10 +140,21 @@ class RigControl:
         for thread in self._endings:
             thread.join()
 
+    def _stop_motors(self, fault: str, *, disable: bool = False) -> None:
+        self.fault = fault
+        try:
+            if isinstance(self._rig, HardwareRig) and disable:
+                self._rig.disable()
+            elif self.is_hardware:
+                self._rig.close()
+        except TautscopeError as error:
+            self.fault = f"{fault}; {error}" if fault else str(error)
+
     def _start_run(self, sample: Sample) -> None:
         self._runs += 1
         path = self.folder / f"console-{self._runs}.mcap"
-        monitor = PlausibilityMonitor(self.config, sample.applied) if self.is_hardware else None
+        is_article = isinstance(self._rig, HardwareRig)
+        monitor = PlausibilityMonitor(self.config, sample.applied) if is_article else None
         # Threads of the log inherit the priority.
         with realtime(OTHERS):
             self.run = ControlRun(
@@ -170,7 +186,8 @@ class RigControl:
             self.while_opening()
             operator = self.operator
             is_wanted = not operator.stopped_by and operator.is_present(time.monotonic())
-            if isinstance(self._rig, HardwareRig) and not is_wanted:
+            if self.is_hardware and not is_wanted:
                 self._was_interrupted = True
-                self._rig.interrupt()
+                if isinstance(self._rig, HardwareRig):
+                    self._rig.interrupt()
             time.sleep(_IDLE_PERIOD)

@@ -21,7 +21,6 @@ from websockets.asyncio.server import ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
-from tautscope.config import PixelFormat
 from tautscope.console import messages as msg
 from tautscope.console.access import (
     LARGEST_CONNECTIONS,
@@ -41,7 +40,7 @@ POLICY_VIOLATION = 1008
 def run_server(memory: SharedMemory, token: str, sockets: list[Any]) -> None:
     """Serve until the control process ends; the target of the server's process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the control process, then this one
-    server = Server(Channels(memory), memory.pixel_format, token, sockets[0].getsockname()[1])
+    server = Server(Channels(memory), memory, token, sockets[0].getsockname()[1])
     asyncio.run(server.run(sockets[0]))
 
 
@@ -50,19 +49,17 @@ class Server:
 
     Args:
         channels: This process's views of the shared memory.
-        pixel_format: Of the images.
+        memory: What the processes share, with the layout of the page.
         token: What a page has to know.
         port: The port.
     """
 
-    def __init__(
-        self, channels: Channels, pixel_format: PixelFormat, token: str, port: int
-    ) -> None:
+    def __init__(self, channels: Channels, memory: SharedMemory, token: str, port: int) -> None:
         self._channels = channels
         self._access = Access(token, port)
         self._pages = Pages(self._access.hosts)
-        self._images = ImageFeed(channels.images, pixel_format)
-        self._states = StateFeed(channels, lambda: self._images.latency)
+        self._images = ImageFeed(channels.images, memory.pixel_format)
+        self._states = StateFeed(channels, memory.layout, lambda: self._images.latency)
         self._connections = self._clients = 0
 
     async def run(self, listener: Any) -> None:

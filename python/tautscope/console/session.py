@@ -12,11 +12,13 @@ from collections.abc import Callable
 from tautscope.console import messages as msg
 from tautscope.console.actions import Actions
 from tautscope.console.control_run import ControlRun
-from tautscope.console.publisher import Publisher, Update
+from tautscope.console.publisher import Bands, Publisher, Update
 from tautscope.console.rig_control import RigControl
 from tautscope.console.session_state import session_state
 from tautscope.console.shared import Channels
 from tautscope.errors import TautscopeError
+from tautscope.loop.frame_layout import FrameLayout
+from tautscope.loop.measurement import Measurement
 from tautscope.loop.reduction import Report
 from tautscope.loop.rig import Frame
 from tautscope.loop.safety import Reaction
@@ -48,6 +50,8 @@ class Session:
         self._must_end = must_end
         self._publisher = Publisher(control.config, channels.images)
         self._actions = Actions(control, lambda: self._publisher.image)
+        self._layout = FrameLayout(control.config.camera)
+        self._pictures = 0
         self._published_at = 0.0
         control.while_opening = self._idle_opening
 
@@ -84,14 +88,22 @@ class Session:
             _LOG.warning("%s", error)
             control.close(str(error))
 
-    def _show(self, run: ControlRun, updates: list[tuple[Frame, Report, float]]) -> None:
+    def _show(
+        self, run: ControlRun, updates: list[tuple[Frame | Measurement, Report, float]]
+    ) -> None:
+        """Show what images of the bands told, or a picture that tells the loop nothing."""
         for frame, report, arrived_at in updates:
+            if not isinstance(frame, Frame):
+                continue
             sequence = self._control.images.add(arrived_at)
             detection = report.detection
             found = (False, False) if detection is None else detection.found
-            states = report.state_estimate, report.predicted_state
-            update = Update(sequence, frame, *states, found, run.reference, arrived_at)
-            self._publisher.submit(update)
+            bands = Bands(report.state_estimate, report.predicted_state, run.reference, found)
+            self._publisher.submit(Update(sequence, frame, arrived_at, bands))
+        if self._control.config.dof and (picture := run.sample.frame) is not None:
+            self._layout.checked(picture.image)
+            self._pictures += 1
+            self._publisher.submit(Update(self._pictures, picture, time.monotonic()))
 
     def _idle_opening(self) -> None:
         self._receive_motion()
@@ -116,5 +128,7 @@ class Session:
         if now - self._published_at < STATE_PERIOD * 0.9:
             return
         self._published_at = now
+        if self._control.config.dof:
+            self._control.images.add(now)
         state = session_state(self._control, self._publisher.log, now)
         self._channels.state.write(msg.encode(state))

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
-
 from tautscope.console.control_run import ControlRun
 from tautscope.console.rig_control import RigControl
-from tautscope.console.state import ImageState, LogState, State
+from tautscope.console.state import (
+    ImageState,
+    LogState,
+    State,
+    blank_state,
+    known,
+    show_truth,
+    values,
+)
 from tautscope.loop.safety import MEANINGS, Reaction
 
 _EFFECTS = {
@@ -26,26 +29,22 @@ def session_state(control: RigControl, log: LogState, now: float) -> State:
     """The state of the session, with that of its log, at a time [s, monotonic clock]."""
     operator, lease, run = control.operator, control.lease, control.run
     program = operator.program
-    state = State(
-        "hardware" if control.is_hardware else "twin",
-        control.config.profile,
-        now=now,
-        reference=_three(operator.reference),
-        scale=_three(operator.scale),
-        clutch=tuple(operator.is_coupled.tolist()),
-        compensation=control.compensation,
-        rested_by=operator.rested_by,
-        must_release=operator.must_release,
-        lease=lease.number,
-        holder=lease.holder,
-        program=program.name if program else "",
-        progress=program.elapsed / program.duration if program else 0.0,
-        is_recording=control.is_recording,
-        refused=dict(operator.refused),
-        stopped_at=control.stopped_at,
-    )
+    state = blank_state("hardware" if control.is_hardware else "twin", control.config)
+    state.now = now
+    state.reference, state.scale = values(operator.reference), values(operator.scale)
+    state.clutch = tuple(operator.is_coupled.tolist())
+    state.compensation = control.compensation
+    state.rested_by, state.must_release = operator.rested_by, operator.must_release
+    state.lease, state.holder = lease.number, lease.holder
+    if program is not None:
+        state.program, state.progress = program.name, program.elapsed / program.duration
+    state.is_recording = control.is_recording
+    state.refused = dict(operator.refused)
+    state.stopped_at = control.stopped_at
     if run is not None:
         _add_run(state, run)
+        if control.config.dof:
+            show_truth(state, run.sample.true_state, control.kinematics)
         dropped = run.log.dropped
         state.log = LogState(log.path, log.size, log.remaining, dropped, run.log.failure)
     state.image.sequence = control.images.newest
@@ -57,12 +56,12 @@ def session_state(control: RigControl, log: LogState, now: float) -> State:
 def _add_run(state: State, run: ControlRun) -> None:
     loop, sample, report = run.loop, run.sample, run.report
     state.time = sample.time
-    state.command = _three(run.command)
-    state.applied = _three(sample.applied)
-    state.tip = _three(loop.predicted_state)
-    state.delta_minus, state.delta_plus = _three(loop.delta_minus), _three(loop.delta_plus)
+    state.command = values(run.command)
+    state.applied = values(sample.applied)
+    state.tip = values(loop.predicted_state)
+    state.delta_minus, state.delta_plus = values(loop.delta_minus), values(loop.delta_plus)
     if (hysteresis := loop.hysteresis) is not None:
-        state.width_std = _known(2 * hysteresis.width_std)
+        state.width_std = known(2 * hysteresis.width_std)
     supervision = loop.supervision
     state.reaction, state.flags = str(supervision.reaction), supervision.flags
     state.latched = tuple((name, MEANINGS[name]) for name in supervision.latched)
@@ -70,8 +69,9 @@ def _add_run(state: State, run: ControlRun) -> None:
     state.late = run.late, run.ticks
     if report is not None:
         age = sample.time - report.captured_at
-        deviation = _known(report.state_deviation)
-        state.image = ImageState(0, str(report.status), age, run.unused, deviation)
+        deviation = known(report.state_deviation)
+        status, updates = str(report.status), loop.updates
+        state.image = ImageState(0, status, age, run.unused, updates, deviation)
 
 
 def _motion(control: RigControl) -> tuple[str, str]:
@@ -112,13 +112,3 @@ def _drives(control: RigControl) -> str:
     if not control.is_hardware:
         return "simulated"
     return "operation enabled" if control.run is not None else "quick stop, or off"
-
-
-def _three(values: NDArray[Any]) -> tuple[float, float, float]:
-    a, b, c = values.tolist()
-    return a, b, c
-
-
-def _known(values: NDArray[np.float64]) -> tuple[float | None, float | None, float | None]:
-    a, b, c = (value if np.isfinite(value) else None for value in values.tolist())
-    return a, b, c

@@ -11,8 +11,9 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope.config import CameraConfig
+from tautscope.config import Config
 from tautscope.console.slots import Slots
+from tautscope.console.state import layout_of
 from tautscope.loop.frame_layout import FrameLayout
 
 Image = NDArray[np.uint8]
@@ -52,12 +53,13 @@ class SharedMemory:
     ``state``, ``replies``, ``images`` by the control process.
     """
 
-    def __init__(self, context: SpawnContext, camera: CameraConfig) -> None:
+    def __init__(self, context: SpawnContext, config: Config) -> None:
         def memory(size: int) -> Any:
             return context.RawArray(ctypes.c_uint8, size)
 
-        self.shape = FrameLayout(camera).shape
-        self.pixel_format = camera.pixel_format
+        self.layout = layout_of(config)
+        self.shape = FrameLayout(config.camera).shape
+        self.pixel_format = config.camera.pixel_format
         self.servo = memory(Slots.size(_SMALL, _QUEUE))
         self.stop = memory(Slots.size(_SMALL, 2))
         self.inbound = memory(Slots.size(_SMALL, _QUEUE))

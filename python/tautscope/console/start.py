@@ -9,9 +9,10 @@ from contextlib import contextmanager
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
-from tautscope.config import CameraConfig, Config
+from tautscope.config import Config
 from tautscope.console.access import ADDRESS, new_token
 from tautscope.console.control_run import LiveRig
+from tautscope.console.paced_rig import PacedRig
 from tautscope.console.rig_control import RigControl
 from tautscope.console.server import run_server
 from tautscope.console.session import Session
@@ -20,37 +21,33 @@ from tautscope.errors import STOPPED, ConfigError, StateError
 from tautscope.hardware.realtime import LOOP, OTHERS, VISION, realtime_executor, realtime_process
 from tautscope.hardware.rig import HardwareRig
 from tautscope.hardware.signals import exit_on_signals
+from tautscope.loop.rig import Rig
 
 
 def start_console(
-    config: Config,
-    folder: Path,
-    port: int,
-    announce: Callable[[str], None],
-    *,
-    is_twin: bool,
+    rig: LiveRig, config: Config, folder: Path, port: int, announce: Callable[[str], None]
 ) -> int:
-    """Serve the console of the twin or of a rig until Ctrl-C; the exit status.
+    """Serve the console of a rig until Ctrl-C; the exit status.
 
     Args:
+        rig: In real time, as for `RigControl`.
         config: Settings.
         folder: New; for logs and stills.
         port: Port on 127.0.0.1; 0 is a free one.
         announce: Called with the page's address.
-        is_twin: Whether the simulated instrument is steered, not the drives of the configuration.
 
     Raises:
-        ConfigError: The port is taken, or the configuration does not describe a rig.
+        ConfigError: The port is taken, or there is no kinematics of this name.
         StateError: The web server ended.
     """
-    rig, config = make_rig(config, is_twin=is_twin)
-    with exit_on_signals(), web_server(config.camera, port) as (server, channels, url):
+    with (
+        realtime_executor("vision", VISION) as executor,
+        exit_on_signals(),
+        web_server(config, port) as (server, channels, url),
+    ):
+        control = RigControl(config, rig, folder, executor)
         announce(url)
-        with (
-            realtime_executor("vision", VISION) as executor,
-            realtime_process(LOOP if is_twin else OTHERS),
-        ):
-            control = RigControl(config, rig, folder, executor)
+        with realtime_process(OTHERS if isinstance(rig, HardwareRig) else LOOP):
             try:
                 Session(control, channels, lambda: not server.is_alive()).main()
             except KeyboardInterrupt:
@@ -60,12 +57,19 @@ def start_console(
     raise error
 
 
-def make_rig(config: Config, *, is_twin: bool) -> tuple[LiveRig, Config]:
+def make_rig(
+    config: Config, *, is_twin: bool, make: Callable[[Config], Rig] | None = None
+) -> tuple[LiveRig, Config]:
     """The simulated instrument, or the drives and camera of a configuration; with its settings.
+
+    With `make` what that makes of the configuration, a simulation or not.
 
     Raises:
         ConfigError: The configuration does not describe a rig.
     """
+    if make is not None:
+        period = config.control.period
+        return PacedRig(lambda: make(config), period, is_simulated=is_twin), config
     if not is_twin:
         return HardwareRig(config), config
     from tautscope.console.live_twin import LiveTwin  # noqa: PLC0415  MuJoCo
@@ -75,14 +79,14 @@ def make_rig(config: Config, *, is_twin: bool) -> tuple[LiveRig, Config]:
 
 
 @contextmanager
-def web_server(camera: CameraConfig, port: int) -> Iterator[tuple[BaseProcess, Channels, str]]:
+def web_server(config: Config, port: int) -> Iterator[tuple[BaseProcess, Channels, str]]:
     """A web server in a process of its own, this process's channels, and the page's address.
 
     Raises:
         ConfigError: The port is taken.
     """
     context = multiprocessing.get_context("spawn")
-    memory, token = SharedMemory(context, camera), new_token()
+    memory, token = SharedMemory(context, config), new_token()
     with socket.socket() as listener:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:

@@ -2,30 +2,87 @@
 
 from __future__ import annotations
 
+import math
+from itertools import zip_longest
 from typing import Literal
 
+import numpy as np
 from msgspec import Struct, field
+from numpy.typing import ArrayLike
+
+from tautscope.config import Config
+from tautscope.console.programs import programs_of
+from tautscope.loop.kinematics import Kinematics
 
 Mode = Literal["twin", "hardware", "replay"]
-Three = tuple[float, float, float]
+Values = tuple[float, ...]
+"""(n,) [m or rad]."""
+Known = tuple[float | None, ...]
+"""(n,) [m or rad]; None where it is not known."""
+
+
+class DofLayout(Struct, frozen=True):
+    """A degree of freedom on the page.
+
+    Attributes:
+        name: Its name.
+        unit: ``mm`` or ``rad``.
+        range: Least and largest command [m or rad]; None where the configuration has none.
+    """
+
+    name: str
+    unit: str
+    range: tuple[float, float] | None
+
+
+class Layout(Struct, frozen=True):
+    """What a page has to know of an instrument, once.
+
+    Attributes:
+        dofs: In the order of every (n,).
+        sees_bands: Whether images of the bands are the measurement; they are shown, and commands
+            name the image displayed. Without them commands name the state displayed.
+        profiles: That can be chosen.
+        programs: Motions that run by themselves.
+    """
+
+    dofs: tuple[DofLayout, ...]
+    sees_bands: bool
+    profiles: tuple[str, ...]
+    programs: tuple[str, ...]
+
+
+def layout_of(config: Config) -> Layout:
+    """The layout of the page for a configuration."""
+    ranges = [dof.range for dof in config.dof]
+    dofs = zip_longest(config.dofs, ranges)
+    return Layout(
+        tuple(DofLayout(dof.label, dof.display_unit, ends) for dof, ends in dofs),
+        not config.dof,
+        ("best",) if config.dof else ("best", "paper"),
+        programs_of(config),
+    )
 
 
 class ImageState(Struct):
-    """What became of the newest images.
+    """What became of the newest images or measurements.
 
     Attributes:
-        sequence: Of the newest image, as in `ImageTimes`.
-        status: Result of its update.
+        sequence: What a command has to name, as in `ImageTimes`: the newest image, or without
+            images this state.
+        status: Result of the newest update.
         age: Time from capture to the result [s].
         dropped: Number of images of the camera that the loop did not use.
-        deviation: (3,) standard deviation of the state estimate; None where it is not known.
+        updates: Number of updates of the loop.
+        deviation: (n,) standard deviation of the state estimate.
     """
 
     sequence: int = 0
     status: str = "no_image"
     age: float = 0.0
     dropped: int = 0
-    deviation: tuple[float | None, float | None, float | None] = (None, None, None)
+    updates: int = 0
+    deviation: Known = ()
 
 
 class LogState(Struct):
@@ -46,8 +103,22 @@ class LogState(Struct):
     failure: str = ""
 
 
+class Positions(Struct):
+    """Where the tip is, for instruments without an image; each (3,) [m] in the frame of the guide.
+
+    Attributes:
+        reference: Where the reference is.
+        tip: The model's tip.
+        true: The true tip, in simulations.
+    """
+
+    reference: Values
+    tip: Values
+    true: Values | None
+
+
 class State(Struct):
-    """All that a page shows beside the image. Every (3,) is [m, rad, rad].
+    """All that a page shows beside the image. Every (n,) is [m or rad].
 
     Attributes:
         mode: What is commanded.
@@ -55,16 +126,18 @@ class State(Struct):
         time: The rig's clock [s].
         motion: ``off``, ``stopped``, ``held``, ``moving``, ``ready``.
         message: What is in force and why, in one line.
-        reference, command, applied, tip, delta_minus, delta_plus: (3,).
-        width_std: (3,) standard deviations of the slack's width; None where not known.
+        reference, command, applied, tip, delta_minus, delta_plus: (n,).
+        true: (n,) true tip, in simulations without an image of it.
+        positions: For the side view, where a kinematics has positions.
+        width_std: (n,) standard deviations of the slack's width.
         reaction: The supervisor's reaction in force.
         flags: The active flags.
         latched: The flags since the last acknowledgement, with their meanings.
         lead: Share of the compensation that the supervisor allows.
         compensation: Share that the operator has chosen.
         profile: The profile of compensation.
-        scale: (3,) of the input device.
-        clutch: (3,) whether it moves each DOF.
+        scale: (n,) of the input device.
+        clutch: (n,) whether it moves each DOF.
         rested_by: Why the last motion ended, if the operator did not end it.
         must_release: Whether the operator has to let go of the input device first.
         lease: Number of the lease.
@@ -86,20 +159,22 @@ class State(Struct):
     time: float = 0.0
     motion: str = "off"
     message: str = ""
-    reference: Three = (0.0, 0.0, 0.0)
-    command: Three = (0.0, 0.0, 0.0)
-    applied: Three = (0.0, 0.0, 0.0)
-    tip: Three = (0.0, 0.0, 0.0)
-    delta_minus: Three = (0.0, 0.0, 0.0)
-    delta_plus: Three = (0.0, 0.0, 0.0)
-    width_std: tuple[float | None, float | None, float | None] = (None, None, None)
+    reference: Values = ()
+    command: Values = ()
+    applied: Values = ()
+    tip: Values = ()
+    delta_minus: Values = ()
+    delta_plus: Values = ()
+    true: Values | None = None
+    positions: Positions | None = None
+    width_std: Known = ()
     reaction: str = "none"
     flags: tuple[str, ...] = ()
     latched: tuple[tuple[str, str], ...] = ()
     lead: float = 1.0
     compensation: float = 1.0
-    scale: Three = (0.4, 0.4, 0.4)
-    clutch: tuple[bool, bool, bool] = (True, True, True)
+    scale: Values = ()
+    clutch: tuple[bool, ...] = ()
     rested_by: str = ""
     must_release: bool = True
     lease: int = 0
@@ -113,3 +188,37 @@ class State(Struct):
     late: tuple[int, int] = (0, 0)
     stopped_at: float | None = None
     drives: str = ""
+
+
+def blank_state(mode: Mode, config: Config) -> State:
+    """The state of an instrument that is off."""
+    count = len(config.dofs)
+    state = State(mode, config.profile)
+    state.reference = state.command = state.applied = state.tip = (0.0,) * count
+    state.delta_minus = state.delta_plus = (0.0,) * count
+    state.width_std = state.image.deviation = (None,) * count
+    state.scale, state.clutch = (0.4,) * count, (True,) * count
+    return state
+
+
+def show_truth(state: State, true: ArrayLike | None, kinematics: Kinematics | None) -> None:
+    """Add what an image would show: the true tip (n,), and positions by the kinematics."""
+
+    def position(of: Values) -> Values:
+        assert kinematics is not None
+        return values(kinematics.tip(np.array(of))[0])
+
+    state.true = None if true is None else values(true)
+    if kinematics is not None:
+        truth = None if state.true is None else position(state.true)
+        state.positions = Positions(position(state.reference), position(state.tip), truth)
+
+
+def values(of: ArrayLike) -> Values:
+    """(n,) as a message has it."""
+    return tuple(np.asarray(of, np.float64).tolist())
+
+
+def known(of: ArrayLike) -> Known:
+    """The same, None where a number is not finite."""
+    return tuple(value if math.isfinite(value) else None for value in values(of))

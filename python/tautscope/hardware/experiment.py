@@ -15,6 +15,7 @@ from tautscope.hardware.rig import HardwareRig
 from tautscope.hardware.run_results import HardwareRun, ProtocolRun
 from tautscope.hardware.signals import exit_on_signals
 from tautscope.log.writer import LogWriter
+from tautscope.loop.measurement import Measurement
 from tautscope.loop.reduction import Report
 from tautscope.loop.references import Reference, SineSequence
 from tautscope.loop.rig import Frame, Sample
@@ -168,6 +169,9 @@ class _MonitoredLog:
         self._log.frame(now, frame, report)
         if self._monitor is not None:
             self._monitor.check_frame(frame.captured_at, report)
+
+    def measurement(self, now: float, measurement: Measurement, report: Report) -> None:
+        self._log.measurement(now, measurement, report)
 
     def event(self, now: float, what: str) -> None:
         self._log.event(now, what)

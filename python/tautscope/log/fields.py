@@ -7,10 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tautscope.dof import Dof
 from tautscope.log.cdr import Message
-
-_NAMES = [dof.label for dof in Dof]
 
 
 def header_of(nanoseconds: int, frame: str) -> dict[str, Any]:
@@ -23,10 +20,10 @@ def stamp_of(nanoseconds: int) -> dict[str, int]:
     return {"sec": nanoseconds // 10**9, "nanosec": nanoseconds % 10**9}
 
 
-def joint_state(header: Message, values: Iterable[float]) -> dict[str, Any]:
-    """sensor_msgs/msg/JointState: positions (3,) [m, rad, rad]."""
+def joint_state(header: Message, names: list[str], values: Iterable[float]) -> dict[str, Any]:
+    """sensor_msgs/msg/JointState: positions (n,) [m or rad] of the degrees of freedom."""
     position = [float(value) for value in values]
-    return {"header": header, "name": _NAMES, "position": position, "velocity": (), "effort": ()}
+    return {"header": header, "name": names, "position": position, "velocity": (), "effort": ()}
 
 
 def multi_array(axes: Mapping[str, int], data: Iterable[Any]) -> dict[str, Any]:

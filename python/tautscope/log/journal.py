@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from tautscope.errors import OutputError
 from tautscope.log import messages as msg
 from tautscope.log import topics
+from tautscope.log.header import RunInfo, header_messages
 from tautscope.log.images import ImageCodec
 from tautscope.log.mcap_file import McapFile
 from tautscope.loop.rig import Sample
@@ -37,7 +38,7 @@ class Journal:
         on_warning: Called by a thread, once per kind of problem.
 
     Attributes:
-        events: Index, time [s] and the arguments of `tick_messages`, `update_messages` or
+        events: Index, time [s] and the arguments of `Codec.tick`, `Codec.update` or
             `request_messages`.
         images: Index, time [s], capture time [s], pixels.
         warnings: Time [s] or None, and text.
@@ -51,7 +52,7 @@ class Journal:
         OutputError: The file exists already, or cannot be created or written.
     """
 
-    def __init__(self, path: Path, info: msg.RunInfo, on_warning: Callable[[str], None]) -> None:
+    def __init__(self, path: Path, info: RunInfo, on_warning: Callable[[str], None]) -> None:
         self.path = path
         self.events: deque[tuple[int, float, tuple[Any, ...]]] = deque()
         self.images: deque[tuple[int, float, float, NDArray[np.uint8]]] = deque()
@@ -62,6 +63,7 @@ class Journal:
         self.failure = ""
         self._on_warning = on_warning
         self._settings = info.config.recording
+        self._messages = msg.Codec(info.config)
         self._codec = ImageCodec(info.config.camera, self._settings)
         self._is_closing, self._is_encoded, self._is_done = Event(), Event(), Event()
         self._file = _open(path)
@@ -157,8 +159,14 @@ class Journal:
             index, now, arguments = self.events.popleft()
             clock = self.clock
             assert clock is not None
-            for topic, data in _encode_event(clock, arguments).items():
+            for topic, data in self._encoded(clock, arguments).items():
                 file.add(topic, data, index, clock.nanoseconds(now))
+
+    def _encoded(self, clock: msg.Clock, arguments: tuple[Any, ...]) -> msg.Messages:
+        if isinstance(arguments[0], str):
+            return msg.request_messages(*arguments)
+        is_tick = isinstance(arguments[0], Sample)
+        return (self._messages.tick if is_tick else self._messages.update)(clock, *arguments)
 
     def _write_images(self, file: McapFile) -> None:
         """Write the images, and after each one the events, which are quicker to write."""
@@ -193,13 +201,6 @@ class Journal:
         self._is_encoded.set()
 
 
-def _encode_event(clock: msg.Clock, arguments: tuple[Any, ...]) -> msg.Messages:
-    if isinstance(arguments[0], str):
-        return msg.request_messages(*arguments)
-    encode = msg.tick_messages if isinstance(arguments[0], Sample) else msg.update_messages
-    return encode(clock, *arguments)
-
-
 def _open(path: Path) -> IO[bytes]:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -210,12 +211,12 @@ def _open(path: Path) -> IO[bytes]:
         raise OutputError("log", str(path), f"a place that can be written ({error})") from None
 
 
-def _begin(path: Path, file: IO[bytes], info: msg.RunInfo) -> McapFile:
+def _begin(path: Path, file: IO[bytes], info: RunInfo) -> McapFile:
     """Write the header; the file is removed if it cannot be written."""
     stamp = time.time_ns()
     try:
         log = McapFile(file)
-        for topic, data in msg.header_messages(info, stamp).items():
+        for topic, data in header_messages(info, stamp).items():
             log.add(topic, data, 0, stamp)
         log.flush()
     except OSError as error:

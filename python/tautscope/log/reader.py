@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from dataclasses import dataclass, field
+from functools import cached_property
 from os import PathLike
 from pathlib import Path
 
@@ -15,11 +16,13 @@ from tautscope.config import Config
 from tautscope.errors import RecordError
 from tautscope.log import messages as msg
 from tautscope.log import topics
+from tautscope.log.header import read_header
 from tautscope.log.images import ImageCodec
 from tautscope.log.mcap_records import Damage, read_messages, read_records
+from tautscope.loop.measurement import Measurement
 from tautscope.loop.references import Segment
 from tautscope.loop.rig import Sample
-from tautscope.runs.recording import Recording
+from tautscope.runs.recording import Recording, update_columns
 from tautscope.runs.run_recorder import Row, RunRecorder
 
 
@@ -36,11 +39,12 @@ class Tick:
 
 @dataclass(frozen=True, slots=True)
 class Update:
-    """A recorded image update: its `frame_row`, and the offsets after it."""
+    """A recorded update: its `update_row`, the offsets after it, and its measurement if any."""
 
     row: Row
     delta_minus: msg.Floats
     delta_plus: msg.Floats
+    measurement: Measurement | None
     raw: msg.Messages
 
 
@@ -62,7 +66,7 @@ class Log:
         compensated: Whether the loop compensated.
         segments: Which DOF moved when.
         versions: Versions of the software that wrote it.
-        events: Index -> tick, image update or request, in the loop's order. Indices start at 1; a
+        events: Index -> tick, update or request, in the loop's order. Indices start at 1; a
             missing index was dropped during recording or is damaged.
         warnings: Warnings in the log.
         damage: The parts that could not be read.
@@ -78,6 +82,18 @@ class Log:
     damage: Damage
     _images: dict[int, tuple[int, int]] = field(repr=False)
     """Index -> offset of the chunk in the file, and channel of the images."""
+
+    @cached_property
+    def update_names(self) -> tuple[str, ...]:
+        """Names of the numbers of `Update.row`."""
+        return update_columns(self.config).names or ()
+
+    def has_input(self, index: int) -> bool:
+        """Whether the image or the measurement of an update is in the log."""
+        event = self.events.get(index)
+        return isinstance(event, Update) and (
+            event.measurement is not None or self.has_image(index)
+        )
 
     @property
     def missing(self) -> int:
@@ -125,7 +141,8 @@ def read_log(path: str | PathLike[str]) -> Log:
 
     Raises:
         MissingPathError: There is no such file.
-        RecordError: The file is not MCAP, or not a log of tautscope.
+        RecordError: The file is not MCAP, not a log of tautscope, or has other degrees of freedom
+            than its configuration.
         ConfigError: This version does not know its configuration.
     """
     file = Path(path)
@@ -140,13 +157,14 @@ def read_log(path: str | PathLike[str]) -> Log:
             warnings.append(topics.decode(topic, record.data)["msg"])
         elif topic in topics.TYPES:
             groups[record.sequence][topic] = record.data
-    info, versions = msg.read_header(groups.pop(0, {}))
+    info, versions = read_header(groups.pop(0, {}))
+    codec = msg.Codec(info.config)
     events: dict[int, Tick | Update | Request] = {}
     for index, messages in sorted(groups.items()):
         if messages.keys() >= topics.TICK_TOPICS:
-            events[index] = Tick(*msg.read_tick(messages), messages)
-        elif messages.keys() >= topics.UPDATE_TOPICS:
-            events[index] = Update(*msg.read_update(messages), messages)
+            events[index] = Tick(*codec.read_tick(messages), messages)
+        elif codec.is_update(messages):
+            events[index] = Update(*codec.read_update(messages), messages)
         elif topics.EVENT in messages:
             text = topics.decode(topics.EVENT, messages[topics.EVENT])["data"]
             events[index] = Request(text, messages)

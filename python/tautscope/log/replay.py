@@ -9,22 +9,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.calibration.delay import DelayEstimate
 from tautscope.config import Config
-from tautscope.errors import RecordError
+from tautscope.errors import ConfigError, RecordError
 from tautscope.log import messages as msg
 from tautscope.log import topics
 from tautscope.log.reader import Log, Request, Tick, Update
-from tautscope.loop.reduction import HysteresisReduction
+from tautscope.loop.measurement import Measurement
+from tautscope.loop.reduction import HysteresisReduction, Report
 from tautscope.loop.rig import Frame, Sample
 from tautscope.loop.safety import DETECTORS
-from tautscope.runs.recording import FEATURES, FRAME_COLUMNS, Recording
-from tautscope.runs.run_recorder import RunRecorder, frame_row
+from tautscope.runs.recording import FEATURES, Recording
+from tautscope.runs.run_recorder import RunRecorder, update_row
 
 if TYPE_CHECKING:
     from tautscope.loop.vision import Detection
@@ -32,8 +34,10 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 PREPARE = "prepare_detection "
 """Begin of the request to prepare the detection of a frame, before its sequence number."""
-Inputs = Iterator[Tick | tuple[float, Frame]]
-"""Ticks, and frames with their arrival time [s], in the order of the run."""
+Seen = tuple[float, Frame | Measurement, int]
+"""Arrival time [s] of what an update saw, this, and its sequence number."""
+Inputs = Iterator[Tick | Seen]
+"""Ticks, and frames or measurements, in the order of the run."""
 
 
 @dataclass(slots=True)
@@ -43,8 +47,8 @@ class Comparison:
     Attributes:
         ticks: Number of compared commands.
         same_ticks: Number of identical commands.
-        updates: Number of compared image updates (estimate, offsets, features, status, ...).
-        same_updates: Number of identical image updates.
+        updates: Number of compared updates (estimate, offsets, features, status, ...).
+        same_updates: Number of identical updates.
         first_difference: Where the first difference is; empty if there is none.
         ended: Why the rest of the log was not compared; empty if all was.
     """
@@ -63,9 +67,10 @@ class Comparison:
 
 
 def replay_same(log: Log) -> tuple[Comparison, Recording]:
-    """Run the recorded references, images and requests through the loop, in the recorded order.
+    """Run the recorded references, measurements and requests through the loop, in their order.
 
-    The replay ends at the first missing tick, image or request, because later outputs depend on it.
+    The replay ends at the first missing tick, measurement or request, because later outputs depend
+    on it.
 
     Returns:
         The comparison, and the replayed run.
@@ -75,38 +80,40 @@ def replay_same(log: Log) -> tuple[Comparison, Recording]:
     """
     loop = HysteresisReduction(log.config, log.compensated)
     comparison, recorder = Comparison(), RunRecorder(log.config)
-    clock = _clock(log)
-    detections: dict[int, tuple[float, Frame, Callable[[], Detection]]] = {}
+    clock, codec = _clock(log), msg.Codec(log.config)
+    prepared: dict[int, tuple[Seen, Callable[[], Report]]] = {}
     for index in range(1, max(log.events, default=0) + 1):
         event = log.events.get(index)
         if isinstance(event, Tick):
             sample, reference = event.sample, event.reference
             command = loop.step(reference, sample.time, event.made_at)
             recorder.add_tick(sample, reference, command)
-            replayed = msg.tick_messages(clock, sample, reference, command, event.made_at)
+            replayed = codec.tick(clock, sample, reference, command, event.made_at)
             comparison.ticks += 1
             where = f"tick at {sample.time:g} s"
             comparison.same_ticks += _is_same(comparison, event, replayed, where)
         elif isinstance(event, Request) and event.text.startswith(PREPARE):
             if (found := _prepared_frame(log, index, event.text)) is not None:
                 update, now, frame = found
-                detections[update] = now, frame, loop.prepare_detection(frame)
+                finish = partial(_finish, loop, frame, loop.prepare_detection(frame))
+                prepared[update] = (now, frame, frame.sequence), finish
         elif isinstance(event, Request):
             _send_request(loop, event.text)
-        elif event is not None and log.has_image(index):
-            if index in detections:
-                now, frame, detect = detections.pop(index)
-                report = loop.on_detection(frame, detect())
+        elif event is not None and log.has_input(index):
+            if index in prepared:
+                (now, seen, count), end = prepared.pop(index)
+                report = end()
             else:
-                now, frame = _frame(log, index, event)
-                report = loop.on_frame(frame)
-            recorder.add_frame(frame_row(now, frame, report), report.delta_minus, report.delta_plus)
-            replayed = msg.update_messages(clock, now, frame, report)
+                now, seen, count = _seen(log, index, event)
+                report = _update(loop, seen)
+            row = update_row(now, seen, report, count)
+            recorder.add_frame(row, report.delta_minus, report.delta_plus)
+            replayed = codec.update(clock, now, seen, report, count)
             comparison.updates += 1
-            where = f"image {frame.sequence}"
+            where = f"{'image' if isinstance(seen, Frame) else 'measurement'} {count}"
             comparison.same_updates += _is_same(comparison, event, replayed, where)
         else:
-            missing = "image" if event is not None else "tick, image update or request"
+            missing = "image" if event is not None else "tick, update or request"
             comparison.ended = f"{missing} {index} of {max(log.events)} is not in the log"
             break
     return comparison, Recording(*recorder.tables(), log.config, log.compensated, log.segments)
@@ -122,8 +129,10 @@ def _prepared_frame(log: Log, after: int, request: str) -> tuple[int, float, Fra
         if isinstance(event, Update):
             if not log.has_image(index):
                 return None
-            now, frame = _frame(log, index, event)
-            return (index, now, frame) if request == f"{PREPARE}{frame.sequence}" else None
+            now, frame, count = _seen(log, index, event)
+            if isinstance(frame, Frame) and request == f"{PREPARE}{count}":
+                return index, now, frame
+            return None
     return None
 
 
@@ -164,32 +173,43 @@ def _clock(log: Log) -> msg.Clock:
     return msg.Clock(ticks[0].sample.time, stamp["sec"] * 10**9 + stamp["nanosec"])
 
 
-def _frame(log: Log, index: int, update: Update) -> tuple[float, Frame]:
-    """Arrival time [s] and frame of a recorded update, as the loop got them."""
-    row = dict(zip(FRAME_COLUMNS.names or (), update.row, strict=True))
+def _seen(log: Log, index: int, update: Update) -> Seen:
+    """Frame or measurement of a recorded update, as the loop got it."""
+    row: dict[str, Any] = dict(zip(log.update_names, update.row, strict=True))
+    now, count = float(row["arrived_at"]), int(row["sequence"])
+    if update.measurement is not None:
+        return now, update.measurement, count
     truth = np.array([row[f"true_features_{name}"] for name in FEATURES], np.float64)
-    frame = Frame(
-        log.image(index),
-        float(row["captured_at"]),  # type: ignore[arg-type]
-        int(row["sequence"]),  # type: ignore[call-overload]
-        None if np.isnan(truth).all() else truth,
-    )
-    return float(row["arrived_at"]), frame  # type: ignore[arg-type]
+    known = None if np.isnan(truth).all() else truth
+    return now, Frame(log.image(index), float(row["captured_at"]), count, known), count
+
+
+def _finish(loop: HysteresisReduction, frame: Frame, detect: Callable[[], Detection]) -> Report:
+    return loop.on_detection(frame, detect())
+
+
+def _update(loop: HysteresisReduction, seen: Frame | Measurement) -> Report:
+    return loop.on_frame(seen) if isinstance(seen, Frame) else loop.on_sample(seen)
 
 
 def estimate_from_log(log: Log, config: Config) -> tuple[Recording, int]:
     """Estimate the states and offsets of a recorded run with another configuration.
 
     Returns:
-        The recorded references and commands with the new estimates, and the number of image updates
-        that were skipped because their image is not in the log.
+        The recorded references and commands with the new estimates, and the number of updates that
+        were skipped because their image is not in the log.
 
     Raises:
+        ConfigError: The configuration has other degrees of freedom than the log.
         FrameError: The configured camera is not the recorded one.
     """
+    recorded, given = ([dof.label for dof in each.dofs] for each in (log.config, config))
+    if recorded != given:
+        allowed = f"those of the log: {', '.join(recorded)}"
+        raise ConfigError("dof", ", ".join(given), allowed)
     run = _estimate(_log_inputs(log), config, log.compensated)
     skipped = sum(
-        isinstance(event, Update) and not log.has_image(index)
+        isinstance(event, Update) and not log.has_input(index)
         for index, event in log.events.items()
     )
     return Recording(run.trace, run.frames, config, log.compensated, log.segments), skipped
@@ -235,8 +255,8 @@ def _log_inputs(log: Log) -> Inputs:
         if isinstance(event, Tick):
             yield event
         # Requests are left out: their effect on the motors is in the recorded commands.
-        elif isinstance(event, Update) and log.has_image(index):
-            yield _frame(log, index, event)
+        elif isinstance(event, Update) and log.has_input(index):
+            yield _seen(log, index, event)
 
 
 def _video_inputs(
@@ -257,7 +277,7 @@ def _video_inputs(
         if at == len(ticks):
             return  # the motor positions after the end of the table are unknown
         if at:
-            yield frame.captured_at, frame
+            yield frame.captured_at, frame, frame.sequence
         if progress is not None:
             progress(at / len(ticks))
     yield from ticks[at:]
@@ -282,8 +302,8 @@ def _estimate(inputs: Inputs, config: Config, compensated: bool) -> Recording:
             loop.step(each.command, each.sample.time)
             recorder.add_tick(each.sample, each.reference, each.command)
         else:
-            arrived_at, frame = each
-            report = loop.on_frame(frame)
-            row = frame_row(arrived_at, frame, report)
+            arrived_at, seen, count = each
+            report = _update(loop, seen)
+            row = update_row(arrived_at, seen, report, count)
             recorder.add_frame(row, report.delta_minus, report.delta_plus)
     return Recording(*recorder.tables(), config, compensated, ())

@@ -3,6 +3,7 @@
 Names follow CRTK.
 """
 
+from collections.abc import Mapping
 from typing import Any
 
 from tautscope.log import cdr
@@ -21,6 +22,9 @@ IMAGE = "/endoscope/image_raw/compressed"
 ESTIMATE = "/instrument/measured_js"
 DELTA = "/instrument/hysteresis/delta"
 MARKERS = "/endoscope/markers"
+MEASUREMENT = "/tautscope/measurement"
+COVARIANCE = "/tautscope/measurement/covariance"
+POSE = "/tip/measured_cp"
 STATUS = "/tautscope/status"
 UPDATE = "/tautscope/image_update"
 EVENT = "/tautscope/event"
@@ -45,18 +49,26 @@ TYPES = {
     UPDATE: "std_msgs/msg/Float64MultiArray",
     EVENT: "std_msgs/msg/String",
     WARNING: "rcl_interfaces/msg/Log",
+    MEASUREMENT: "std_msgs/msg/Float64MultiArray",
+    COVARIANCE: "std_msgs/msg/Float64MultiArray",
+    POSE: "geometry_msgs/msg/PoseStamped",
 }
 """Topic -> ROS 2 message type."""
 
 TICK_TOPICS = {REFERENCE, COMMAND, APPLIED, TICK}
 """Topics that every control tick has."""
-UPDATE_TOPICS = {ESTIMATE, DELTA, MARKERS, STATUS, UPDATE}
-"""Topics that every image update has."""
+UPDATE_TOPICS = {ESTIMATE, DELTA, STATUS, UPDATE}
+"""Topics that every update has, beside `MARKERS` of an image or `MEASUREMENT`."""
 
 
 def encode(topic: str, message: cdr.Message) -> bytes:
     """A message of a topic as CDR."""
     return cdr.encode(TYPES[topic], message)
+
+
+def encode_all(messages: Mapping[str, cdr.Message]) -> dict[str, bytes]:
+    """Messages by topic as CDR."""
+    return {topic: encode(topic, message) for topic, message in messages.items()}
 
 
 def decode(topic: str, data: bytes) -> dict[str, Any]:

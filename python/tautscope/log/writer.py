@@ -10,6 +10,7 @@ import logging
 import time
 from collections import deque
 from collections.abc import Callable, Iterable
+from copy import deepcopy
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -19,7 +20,9 @@ import numpy as np
 
 from tautscope.config import Config
 from tautscope.log import messages as msg
+from tautscope.log.header import RunInfo
 from tautscope.log.journal import POLL_PERIOD, Journal
+from tautscope.loop.measurement import Measurement
 from tautscope.loop.reduction import Report
 from tautscope.loop.references import Segment
 from tautscope.loop.rig import Frame, Sample
@@ -35,7 +38,7 @@ class LogSummary:
         path: The file.
         messages: Topic -> number of written messages.
         ticks: Number of control ticks given to the log.
-        updates: Number of image updates given to the log.
+        updates: Number of updates given to the log.
         dropped: Number of dropped ticks, updates and requests.
         dropped_images: Number of other updates whose image was dropped.
         failure: Why recording stopped early; empty if it did not.
@@ -58,8 +61,8 @@ class LogSummary:
 class LogWriter:
     """Writes the log of a run as an MCAP file; a context manager.
 
-    Call `tick`, `frame` and `event` in the order of the loop's own calls. The messages' sequence
-    number is the position in this order, from 1 on.
+    Call `tick`, `frame`, `measurement` and `event` in the order of the loop's own calls. The
+    messages' sequence number is the position in this order, from 1 on.
 
     Args:
         path: New file.
@@ -87,7 +90,7 @@ class LogWriter:
         self._settings = config.recording
         self._wait = wait
         self._ticks = self._updates = self._index = 0
-        info = msg.RunInfo(config, compensate, tuple(segments))
+        info = RunInfo(config, compensate, tuple(segments))
         self._journal = Journal(Path(path), info, on_warning)
 
     def tick(
@@ -97,7 +100,7 @@ class LogWriter:
         command: Iterable[float],
         made_at: float | None = None,
     ) -> None:
-        """Record a control tick: the sample before it, reference u (3,) and command c (3,).
+        """Record a control tick: the sample before it, reference u (n,) and command c (n,).
 
         `made_at` is the rig time of the reference [s], if the loop got it.
         """
@@ -121,13 +124,25 @@ class LogWriter:
         frame_info = Frame(
             np.empty(0, np.uint8), frame.captured_at, frame.sequence, frame.true_features
         )
-        if not self._enqueue(now, (now, frame_info, report)):
+        if not self._enqueue(now, (now, frame_info, report, self._updates)):
             return
         journal = self._journal
         if not self._has_room(journal.images, self._settings.queue_images):
             journal.dropped_images += 1
             return
         journal.images.append((self._index, now, frame.captured_at, frame.image.copy()))
+
+    def measurement(self, now: float, measurement: Measurement, report: Report) -> None:
+        """Record an update by another sensor, after the tick whose sample has the measurement.
+
+        Args:
+            now: Time of that sample [s].
+            measurement: The measurement; it is copied.
+            report: Result of the update.
+        """
+        self._start_clock(now)
+        self._updates += 1
+        self._enqueue(now, (now, deepcopy(measurement), report, self._updates))
 
     def event(self, now: float, request: str) -> None:
         """Record a request of the operator or the rig to the loop, at a rig time [s].

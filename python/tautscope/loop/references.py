@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tautscope.config import Config, ExperimentConfig, Sine
-from tautscope.dof import Dof
+from tautscope.dof import Dof, NamedDof
 
 Value = TypeVar("Value", float, NDArray[np.float64])
 
@@ -21,13 +21,13 @@ class Segment:
     """A part of a reference in which one DOF repeats a motion.
 
     Attributes:
-        dof: The DOF that moves.
+        dof: The DOF that moves, one of `Config.dofs`.
         start: When it begins [s from the start of the reference].
         period: Period of the motion [s].
         periods: Number of periods.
     """
 
-    dof: Dof
+    dof: NamedDof
     start: float
     period: float
     periods: int
@@ -98,10 +98,10 @@ class SineSequence:
     def __call__(self, time: float) -> NDArray[np.float64]:
         """(3,) [m, rad, rad] at `time` [s from the start of the reference]."""
         position = self._centre.copy()
-        for segment, sine in zip(self.segments, self._sines, strict=True):
+        for dof, (segment, sine) in enumerate(zip(self.segments, self._sines, strict=True)):
             if segment.start <= time < segment.end:
                 phase = 2 * np.pi * (time - segment.start) / sine.period
-                position[segment.dof] += sine.amplitude * np.sin(phase)
+                position[dof] += sine.amplitude * np.sin(phase)
         return position
 
 

@@ -50,7 +50,7 @@ class OperatorResult:
     bound: float
 
 
-OperatorResults = dict[Dof, OperatorResult]
+OperatorResults = dict[NamedDof, OperatorResult]
 
 
 def operator_motion(config: Config, *, is_disturbed: bool = False) -> OperatorMotion:
@@ -111,7 +111,7 @@ def evaluate_uncompensated_motion(recording: Recording) -> OperatorResults:
     return {dof: replace(result, **unknown) for dof, result in found.items()}
 
 
-def _tracking_errors(recording: Recording, dof: Dof) -> Floats:
+def _tracking_errors(recording: Recording, dof: NamedDof) -> Floats:
     time, tip, reference = tip_and_reference(recording, dof)
     counts = time >= recording.trace["time"][0] + evaluated_after(recording)
     errors: Floats = tip[counts] - reference[counts]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from tautscope._core import __version__
 from tautscope.config import Config, dump_config
-from tautscope.dof import Dof
+from tautscope.dof import NamedDof
 from tautscope.report import tables
 from tautscope.report.operator_motion import OperatorResults
 from tautscope.report.results import Figures, Results
@@ -191,14 +191,14 @@ def results_table(columns: Mapping[str, Sequence[Results]], by_camera: bool = Fa
     )
 
 
-def row_explanations(rows: Sequence[Row], results: Sequence[dict[Dof, Figures]] = ()) -> str:
+def row_explanations(rows: Sequence[Row], results: Sequence[dict[NamedDof, Figures]] = ()) -> str:
     """A table of what each row means, its goal, and for which DOFs results of ``best`` meet it.
 
     Args:
         rows: Rows of the table above it.
         results: Results per seed, of which the median counts; none for another profile or rig.
     """
-    middle: dict[Dof, Figures] = tables.median(results) if results else {}
+    middle: dict[NamedDof, Figures] = tables.median(results) if results else {}
     lines = []
     for row in rows:
         values = {dof: getattr(each, row.name) for dof, each in middle.items()}
@@ -221,7 +221,7 @@ def row_explanations(rows: Sequence[Row], results: Sequence[dict[Dof, Figures]] 
     )
 
 
-def measured_rows(results: Sequence[dict[Dof, Figures]], rows: Sequence[Row]) -> list[Row]:
+def measured_rows(results: Sequence[dict[NamedDof, Figures]], rows: Sequence[Row]) -> list[Row]:
     """The rows with a value for a DOF."""
     dofs = tables.median(results).values()
     return [row for row in rows if not all(math.isnan(getattr(each, row.name)) for each in dofs)]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope.dof import Dof
+from tautscope.dof import NamedDof
 from tautscope.loop.references import Segment
 from tautscope.report import metrics
 from tautscope.runs.recording import Recording, Table, per_feature
@@ -73,7 +73,7 @@ class DofResult:
     actuator_gain: float
 
 
-Results = dict[Dof, DofResult]
+Results = dict[NamedDof, DofResult]
 
 
 def evaluate(uncompensated: Recording | None, compensated: Recording) -> Results:
@@ -98,7 +98,9 @@ def evaluate_uncompensated(recording: Recording) -> Results:
     return {dof: replace(result, **unknown) for dof, result in found.items()}
 
 
-def combine(results: Sequence[dict[Dof, Figures]], how: dict[str, str] | str) -> dict[Dof, Figures]:
+def combine(
+    results: Sequence[dict[NamedDof, Figures]], how: dict[str, str] | str
+) -> dict[NamedDof, Figures]:
     """Combine seeds: ``"median"``, or per name of a figure ``"min"``, ``"max"`` or ``"median"``.
 
     Seeds with an unknown figure are skipped.

@@ -48,17 +48,23 @@ class RobotResult:
 
 @dataclass(frozen=True)
 class RobotRun:
-    """Recordings without and with compensation, of one motion."""
+    """Recordings without, where there is one, and with compensation."""
 
-    uncompensated: Recording
+    uncompensated: Recording | None
     compensated: Recording
 
     @property
     def results(self) -> list[RobotResult]:
         """The figures of each degree of freedom."""
         after, dofs = evaluated_after(self.compensated), self.compensated.config.dofs
-        before, rms = (run.tracking_rms(after) for run in (self.uncompensated, self.compensated))
-        largest = np.nanmax(np.abs(self.compensated.tracking_error(after)), axis=0)
+        rms = self.compensated.tracking_rms(after)
+        first = self.uncompensated
+        before = (
+            np.full(len(dofs), np.nan)
+            if first is None
+            else first.tracking_rms(min(after, evaluated_after(first)))
+        )
+        largest = np.fmax.reduce(np.abs(self.compensated.tracking_error(after)), axis=0)
         trace = self.compensated.trace
         slack = (per_dof(trace, "delta_plus", dofs) - per_dof(trace, "delta_minus", dofs))[-1]
         return [
@@ -135,7 +141,8 @@ def write_robot_folder(run: RobotRun, folder: Path) -> None:
     from tautscope.report.operator_figure import draw_operator_motion  # noqa: PLC0415
 
     with new_folder(folder) as place:
-        run.uncompensated.write(place, "_uncompensated")
+        if run.uncompensated is not None:
+            run.uncompensated.write(place, "_uncompensated")
         run.compensated.write(place)
         text = json.dumps(run.to_json(), indent=1, allow_nan=False)
         (place / "results.json").write_text(text + "\n", encoding="utf-8")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from tautscope.dof import Dof
+from tautscope.dof import Dof, NamedDof
 
 Worst = Literal["min", "max"]
 
@@ -35,11 +35,13 @@ class Row:
     goal: float | tuple[float, float, float] | None = None
     in_summary: bool = False
 
-    def limit(self, dof: Dof) -> float | None:
-        """The goal of one DOF."""
+    def limit(self, dof: NamedDof) -> float | None:
+        """The goal of one DOF; another robot has none."""
+        if not isinstance(dof, Dof):
+            return None
         return self.goal[dof] if isinstance(self.goal, tuple) else self.goal
 
-    def holds(self, dof: Dof, value: float) -> bool | None:
+    def holds(self, dof: NamedDof, value: float) -> bool | None:
         """Whether a value meets the goal; None without one. An unknown value does not."""
         limit = self.limit(dof)
         if limit is None:
@@ -224,7 +226,7 @@ OPERATOR_ROWS = (
     ),
 )
 
-ARTICLE: dict[str, dict[Dof, float]] = {
+ARTICLE: dict[str, dict[NamedDof, float]] = {
     "uncompensated": {Dof.INSERTION: 10e-3, Dof.ROTATION: 1.8, Dof.BENDING: 1.1},
     "compensated": {Dof.INSERTION: 2.5e-3, Dof.ROTATION: 0.4, Dof.BENDING: 0.3},
     "reduction": {Dof.INSERTION: 0.75, Dof.ROTATION: 0.78, Dof.BENDING: 0.73},

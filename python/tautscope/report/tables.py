@@ -9,32 +9,34 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from tautscope.dof import Dof
+from tautscope.dof import Dof, NamedDof
 from tautscope.report.results import DofResult, Figures, Results, combine
 from tautscope.report.rows import ARTICLE, OPERATOR_ROWS, ROWS, Row
 
 
-def median(results: Sequence[dict[Dof, Figures]]) -> dict[Dof, Figures]:
+def median(results: Sequence[dict[NamedDof, Figures]]) -> dict[NamedDof, Figures]:
     """Median of every figure over the seeds."""
     return combine(results, "median")
 
 
-def worst(results: Sequence[dict[Dof, Figures]], rows: Sequence[Row] = ROWS) -> dict[Dof, Figures]:
+def worst(
+    results: Sequence[dict[NamedDof, Figures]], rows: Sequence[Row] = ROWS
+) -> dict[NamedDof, Figures]:
     """Worst value of every figure over the seeds."""
     return combine(results, {row.name: row.worst for row in rows})
 
 
-def in_display_unit(row: Row, dof: Dof, value: float) -> float:
+def in_display_unit(row: Row, dof: NamedDof, value: float) -> float:
     """A figure [m or rad] in the display unit."""
     return value * dof.display_scale if row.kind == "length" else value
 
 
-def heading(dof: Dof) -> str:
+def heading(dof: NamedDof) -> str:
     """The title of a DOF's columns, with the unit of its lengths."""
     return f"{dof.label} [{dof.display_unit}]"
 
 
-def cell(row: Row, dof: Dof, value: float) -> str:
+def cell(row: Row, dof: NamedDof, value: float) -> str:
     """A figure as text in its display unit; a dash if it is not known."""
     if math.isnan(value):
         return "-"
@@ -46,7 +48,7 @@ def cell(row: Row, dof: Dof, value: float) -> str:
     return f"{shown:.3g}" if abs(shown) >= 1 else f"{shown:.2g}"
 
 
-def exact_cell(row: Row, dof: Dof, value: float) -> str:
+def exact_cell(row: Row, dof: NamedDof, value: float) -> str:
     """A figure with a digit more than `cell` and its unit, to compare it with a goal."""
     if math.isnan(value):
         return "not known"
@@ -68,7 +70,7 @@ def goal_text(row: Row) -> str:
     return f"at {'least' if row.worst == 'min' else 'most'} {joined}"
 
 
-def article_cell(row: Row, dof: Dof, by_camera: bool = False) -> str:
+def article_cell(row: Row, dof: NamedDof, by_camera: bool = False) -> str:
     """The figure as the article's Table 1 prints it, or nothing.
 
     The article measured by camera: with `by_camera` its figures stand in the rows "by camera".
@@ -101,7 +103,7 @@ def write_csv(
 
 
 def write_operator_csv(
-    path: Path, profile: str, seeds: Sequence[int], results: Sequence[dict[Dof, Figures]]
+    path: Path, profile: str, seeds: Sequence[int], results: Sequence[dict[NamedDof, Figures]]
 ) -> None:
     """Write operator_motion.csv in display units: per DOF seeds, median, worst."""
     sources = _sources(seeds, results, OPERATOR_ROWS)
@@ -115,8 +117,8 @@ def write_operator_csv(
 
 
 def _sources(
-    seeds: Sequence[int], results: Sequence[dict[Dof, Figures]], rows: Sequence[Row]
-) -> list[tuple[str, dict[Dof, Figures]]]:
+    seeds: Sequence[int], results: Sequence[dict[NamedDof, Figures]], rows: Sequence[Row]
+) -> list[tuple[str, dict[NamedDof, Figures]]]:
     """The figures of every seed, their median and the worst, each with its name."""
     return [
         *((f"seed {seed}", result) for seed, result in zip(seeds, results, strict=True)),
@@ -125,7 +127,7 @@ def _sources(
     ]
 
 
-def _numbers(result: dict[Dof, Figures], dof: Dof, rows: Sequence[Row]) -> list[str]:
+def _numbers(result: dict[NamedDof, Figures], dof: NamedDof, rows: Sequence[Row]) -> list[str]:
     return [_number(row, dof, getattr(result[dof], row.name)) for row in rows]
 
 
@@ -133,7 +135,7 @@ def to_json(
     profile: str,
     seeds: Sequence[int],
     results: Sequence[Results],
-    operator_results: Sequence[dict[Dof, Figures]],
+    operator_results: Sequence[dict[NamedDof, Figures]],
     *,
     sim_seconds: float,
     wall_seconds: float,
@@ -156,7 +158,7 @@ def to_json(
     }
 
 
-def operator_to_json(results: Mapping[Dof, Figures]) -> dict[str, dict[str, float | None]]:
+def operator_to_json(results: Mapping[NamedDof, Figures]) -> dict[str, dict[str, float | None]]:
     """Figures of an operator motion by DOF [m or rad]; an unknown figure is None."""
     return {
         dof.label: {name: finite_or_none(value) for name, value in asdict(figures).items()}
@@ -176,7 +178,7 @@ def _by_dof(results: Sequence[Results]) -> dict[str, Any]:
     }
 
 
-def _summary(dof: Dof, result: DofResult) -> dict[str, float | None]:
+def _summary(dof: NamedDof, result: DofResult) -> dict[str, float | None]:
     values = asdict(result)
     return {
         row.name: finite_or_none(in_display_unit(row, dof, values[row.name]))
@@ -190,7 +192,7 @@ def finite_or_none(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _number(row: Row, dof: Dof, value: float | None) -> str:
+def _number(row: Row, dof: NamedDof, value: float | None) -> str:
     if value is None or math.isnan(value):
         return ""
     return f"{in_display_unit(row, dof, value):.6g}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import logging
 import time
 from collections.abc import Callable
@@ -12,6 +13,7 @@ import numpy as np
 
 from tautscope.config import Config
 from tautscope.console.control_run import ControlRun, LiveRig
+from tautscope.console.paced_rig import PacedRig
 from tautscope.errors import MessageError, TautscopeError
 from tautscope.hardware.plausibility import PlausibilityMonitor
 from tautscope.hardware.realtime import OTHERS, realtime
@@ -19,11 +21,13 @@ from tautscope.hardware.rig import HardwareRig
 from tautscope.loop.frame_layout import FrameLayout
 from tautscope.loop.rig import Frame
 from tautscope.loop.safety import Reaction
+from tautscope.report.achieved import Achieved, achieved_text
 from tautscope.ros2.clock import Clock
 from tautscope.ros2.lifecycle import ACTIVATE, CONFIGURE, DEACTIVATE, Lifecycle, State, Transition
 from tautscope.ros2.opening import reset_rig
 from tautscope.ros2.parameters import Parameter, Parameters
 from tautscope.ros2.references import Pausable, Source
+from tautscope.ros2.sensors import Sensors
 from tautscope.ros2.session import Node
 from tautscope.ros2.telemetry import Telemetry, Topics
 from tautscope.ros2.wire import Qos
@@ -44,10 +48,12 @@ class NodeControl:
         topics: Names of the topics.
         telemetry: Publishes.
         source: The operator's reference.
+        sensors: Of the tip, in ROS.
         make_rig: Makes the rig; called by the transition ``configure``.
         folder: For logs.
         executor: Runs the marker detection.
         clock: The clocks.
+        on_result: Called at the end of a run with a line about what the compensation achieved.
 
     Attributes:
         run: The present run; None if the node is not active.
@@ -62,14 +68,17 @@ class NodeControl:
         telemetry: Telemetry,
         *,
         source: Source,
-        make_rig: Callable[[], LiveRig],
+        sensors: Sensors,
+        make_rig: Callable[[Config], LiveRig],
         folder: Path,
         executor: Executor,
         clock: Clock,
+        on_result: Callable[[str], None] = lambda _: None,
     ) -> None:
         self._config, self._folder, self._executor = config, folder, executor
         self._telemetry, self._make_rig = telemetry, make_rig
-        self._source = Pausable(source)
+        self._source, self._sensors = Pausable(source), sensors
+        self._on_result, self._achieved = on_result, Achieved(config)
         self._rig: LiveRig | None = None
         self.run: ControlRun | None = None
         self.fault = ""
@@ -102,15 +111,19 @@ class NodeControl:
     def tick(self, run: ControlRun) -> None:
         """A tick of the loop; a fault ends the run, with the drives stopped."""
         try:
-            for frame, report, _ in run.tick():
-                self._telemetry.update(run, frame, report)
+            for source, report, _ in run.tick():
+                self._achieved.add_update(run.sample.time, source, report)
+                self._telemetry.update(run, source, report)
             self._telemetry.tick(run)
             supervision = run.loop.supervision
+            share = supervision.lead * float(self.parameters["compensation"])
+            self._achieved.add_tick(run.sample, run.reference, run.command, share)
             if supervision.reaction.rank >= Reaction.QUICK_STOP.rank:
                 self._is_disabling = supervision.reaction is Reaction.DISABLE
                 self._fail(f"{supervision.reaction}: {', '.join(supervision.flags)}")
                 return
             run.step()
+            self._add_measurements(run)
         except TautscopeError as error:
             self._fail(str(error))
 
@@ -180,7 +193,7 @@ class NodeControl:
         """Carry out a transition of the lifecycle."""
         try:
             if transition is CONFIGURE:
-                self._rig = self._make_rig()
+                self._rig = self._make_rig(self._config)
             elif transition is ACTIVATE:
                 self._start_run()
             else:
@@ -193,7 +206,7 @@ class NodeControl:
             self.fault = str(error)
             _LOG.warning("%s", error)
             self._telemetry.warn(str(error))
-            if transition is ACTIVATE and isinstance(self._rig, HardwareRig):
+            if transition is ACTIVATE and isinstance(self._rig, HardwareRig | PacedRig):
                 self._rig.close()
             # A rig that cannot be stopped orderly is left in any case.
             return transition not in (CONFIGURE, ACTIVATE)
@@ -207,7 +220,9 @@ class NodeControl:
         self._telemetry.state("DISABLED", is_busy=True)
         sample = reset_rig(rig, lambda: self._take_command() in ("disable", "pause"))
         self._source.reset(sample.applied)
+        self._sensors.reset()
         self._runs += 1
+        self._achieved = Achieved(self._config)
         is_hardware = isinstance(rig, HardwareRig)
         # Threads of the log inherit the priority.
         with realtime(OTHERS):
@@ -220,13 +235,21 @@ class NodeControl:
                 executor=self._executor,
                 monitor=PlausibilityMonitor(self._config, sample.applied) if is_hardware else None,
             )
-        # The detector is made and used now, because its first use is slow.
-        blank = np.zeros(FrameLayout(self._config.camera).shape, np.uint8)
-        run.loop.prepare_detection(Frame(blank, sample.time, 0))()
+        if not self._config.dof:
+            # The detector is made and used now, because its first use is slow.
+            blank = np.zeros(FrameLayout(self._config.camera).shape, np.uint8)
+            run.loop.prepare_detection(Frame(blank, sample.time, 0))()
         share = float(self.parameters["compensation"])
         if share != 1:
             run.loop.set_compensation(share)
         self.run = run
+
+    def _add_measurements(self, run: ControlRun) -> None:
+        """Add what sensors in ROS have measured to the sample for the next tick."""
+        sample = run.sample
+        if found := self._sensors.take(sample.time):
+            measured = (*sample.measurements, *found)
+            run.sample = dataclasses.replace(sample, measurement=measured)
 
     def _end_run(self) -> None:
         """Stop the drives, then close the log."""
@@ -234,11 +257,25 @@ class NodeControl:
         if run is None:
             return
         try:
-            if isinstance(self._rig, HardwareRig):
-                self._rig.disable() if self._is_disabling else self._rig.close()
+            rig = self._rig
+            if isinstance(rig, HardwareRig) and self._is_disabling:
+                rig.disable()
+            elif isinstance(rig, HardwareRig | PacedRig):
+                rig.close()
         finally:
             self._publish_state()
-            run.log.close()
+            try:
+                self._tell_result(run)
+            finally:
+                run.log.close()
+
+    def _tell_result(self, run: ControlRun) -> None:
+        """Publish, log and print what the compensation achieved."""
+        if results := self._achieved.results():
+            text = achieved_text(results, self._config)
+            run.note(text)
+            self._telemetry.result(text)
+            self._on_result(text)
 
     def _fail(self, fault: str) -> None:
         """End the run because of a fault."""

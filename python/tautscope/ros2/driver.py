@@ -1,4 +1,4 @@
-"""A rig whose drives and camera are nodes of ROS."""
+"""A rig whose drives, and the camera if it has one, are nodes of ROS."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tautscope.loop.rig import Frame, Sample
 from tautscope.loop.signal_checks import check_signal
 from tautscope.ros2 import messages
 from tautscope.ros2.clock import Clock
-from tautscope.ros2.endpoints import IMAGE
+from tautscope.ros2.endpoints import IMAGE, Subscription
 from tautscope.ros2.inputs import ImageReader, Stamps, joint_positions
 from tautscope.ros2.references import Refuse
 from tautscope.ros2.session import SENSOR_DATA, Node
@@ -24,14 +24,16 @@ _POLL = 1_000_000
 
 
 class DriverRig:
-    """Drives behind ``actuators/setpoint_js`` and ``actuators/measured_js``, and a camera.
+    """Drives behind ``actuators/setpoint_js`` and ``actuators/measured_js``.
+
+    The article's instrument also has a camera; other sensors are `tautscope.ros2.sensors.Sensors`.
 
     Implements `tautscope.loop.rig.Rig`. Its clock is the monotonic one, from `reset` on; a stamp is
     converted by its age. The first command should be the applied position of the first sample.
     After `close`, and if this process ends, no set-point is sent, by which the driver has to stop.
 
     Args:
-        config: With the camera's size and format.
+        config: With the degrees of freedom; without [[dof]] with the camera's size and format.
         node: Publishes and subscribes.
         instrument: Namespace of the topics of the drives.
         image: Topic of the images.
@@ -52,10 +54,13 @@ class DriverRig:
         kind = "sensor_msgs/msg/JointState"
         self._setpoints = node.publisher(f"{instrument}/actuators/setpoint_js", kind)
         self._positions = node.subscription(f"{instrument}/actuators/measured_js", kind)
-        self._images = node.subscription(image, IMAGE, SENSOR_DATA)
         self._position_stamps = Stamps(self._positions.topic)
-        self._image_stamps = Stamps(self._images.topic)
-        self._reader = ImageReader(self._images.topic, config.camera)
+        self._images: Subscription | None = None
+        if not config.dof:
+            self._images = node.subscription(image, IMAGE, SENSOR_DATA)
+            self._image_stamps = Stamps(self._images.topic)
+            self._reader = ImageReader(self._images.topic, config.camera)
+        self._joints = [dof.label for dof in config.dofs]
         self._clock, self._refuse = clock, refuse
         self._period = round(config.control.period * 1e9)
         self._applied: NDArray[np.float64] | None = None
@@ -74,7 +79,8 @@ class DriverRig:
         """
         self._applied = None
         self._position_stamps.reset()
-        self._image_stamps.reset()
+        if self._images is not None:
+            self._image_stamps.reset()
         give_up = self._clock.monotonic() + round(START_TIMEOUT * 1e9)
         while self._newest_position() is None:
             if self._clock.monotonic() > give_up:
@@ -85,17 +91,17 @@ class DriverRig:
         return self._sample()
 
     def step(self, command: ArrayLike) -> Sample:
-        """Publish command (3,) [m, rad, rad]; return at the end of the control period.
+        """Publish command (n,) [m or rad]; return at the end of the control period.
 
         A tick that wakes late does not catch up.
 
         Raises:
-            SignalError: The command is not three finite numbers.
+            SignalError: The command is not n finite numbers.
             DriveError: The driver is silent for `DRIVER_TIMEOUT`.
         """
-        positions = check_signal("command", command, (3,))
+        positions = check_signal("command", command, (len(self._joints),))
         stamp = self._clock.wall()
-        self._setpoints.publish(messages.joint_state(stamp, positions))
+        self._setpoints.publish(messages.joint_state(stamp, self._joints, positions))
         self._due += self._period
         self._due = max(self._due, self._clock.monotonic())
         self._clock.sleep_until(self._due)
@@ -116,7 +122,7 @@ class DriverRig:
         try:
             message = self._positions.take()
             if message is not None:
-                applied = joint_positions(self._positions.topic, message)
+                applied = joint_positions(self._positions.topic, message, self._joints)
                 wall, source = self._clock.wall(), self._positions.source
                 self._position_stamps.check(message.header, wall, source)
                 self._applied, self._moved_at = applied, self._clock.monotonic()
@@ -126,7 +132,7 @@ class DriverRig:
 
     def _newest_frame(self) -> Frame | None:
         try:
-            message = self._images.take()
+            message = None if self._images is None else self._images.take()
             if message is None:
                 return None
             wall = self._clock.wall()

@@ -6,6 +6,7 @@ An error names the topic and the field; the message then changes nothing.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.config import CameraConfig
-from tautscope.dof import Dof
 from tautscope.errors import ConfigError, MessageError
 from tautscope.loop.frame_layout import FrameLayout
 from tautscope.loop.rig import Frame
@@ -21,7 +21,6 @@ from tautscope.loop.rig import Frame
 Floats = NDArray[np.float64]
 FUTURE = 5_000_000
 """How much later than this computer's clock a stamp may be [ns]."""
-JOINTS = [dof.label for dof in Dof]
 ENCODINGS = {
     "bgr": ("bgr8",),
     "rgb": ("rgb8",),
@@ -64,38 +63,65 @@ class Stamps:
         if self._source not in (None, source):
             allowed = "the publisher that was the first after `enable` or `resume`"
             raise MessageError(f"{self._topic} publisher", source.hex(), allowed)
-        sec, nanosec = header.stamp.sec, header.stamp.nanosec
-        stamp = int(sec * 10**9 + nanosec)
-        given = f"{sec}.{nanosec:09d} s"
-        if sec < 0 or nanosec >= 10**9 or stamp == 0:
-            self._refuse(given, "a time above 0 with less than 10^9 ns; 0 marks invalid data")
-        if stamp > wall + FUTURE:
-            ahead = (stamp - wall) / 1e9
-            self._refuse(given, f"no time in the future (by {ahead:.3f} s): synchronise the clocks")
+        stamp = checked_stamp(self._topic, header, wall)
         if stamp <= self._last:
-            self._refuse(given, "a later time than that of the last message")
+            allowed = "a later time than that of the last message"
+            raise MessageError(f"{self._topic} header.stamp", f"{stamp / 1e9:.9f} s", allowed)
         self._last, self._source = stamp, source
         return stamp
 
-    def _refuse(self, given: str, allowed: str) -> None:
-        raise MessageError(f"{self._topic} header.stamp", given, allowed)
+
+def checked_stamp(topic: str, header: Any, wall: int) -> int:
+    """The stamp [ns since 1970] of a header that arrived at a wall clock time [ns].
+
+    Raises:
+        MessageError: It is 0 (CRTK: invalid data), no time, or in the future.
+    """
+    sec, nanosec = header.stamp.sec, header.stamp.nanosec
+    stamp = int(sec * 10**9 + nanosec)
+    allowed = ""
+    if sec < 0 or nanosec >= 10**9 or stamp == 0:
+        allowed = "a time above 0 with less than 10^9 ns; 0 marks invalid data"
+    elif stamp > wall + FUTURE:
+        ahead = (stamp - wall) / 1e9
+        allowed = f"no time in the future (by {ahead:.3f} s): synchronise the clocks"
+    if allowed:
+        raise MessageError(f"{topic} header.stamp", f"{sec}.{nanosec:09d} s", allowed)
+    return stamp
 
 
-def joint_positions(topic: str, message: Any) -> Floats:
-    """Positions (3,) [m, rad, rad] of insertion, rotation and bending in a JointState.
+def joint_positions(topic: str, message: Any, joints: Sequence[str]) -> Floats:
+    """Positions (n,) [m or rad] of the joints in a JointState, in their order.
 
     Raises:
         MessageError: A joint is missing, doubled or unknown, or a position is not finite.
     """
+    if sorted(message.name) != sorted(joints):
+        allowed = f"{', '.join(joints)}, in any order"
+        raise MessageError(f"{topic} name", list(message.name)[:9], allowed)
+    found = known_positions(topic, message, joints)
+    for name, position in zip(joints, found, strict=True):
+        if np.isnan(position):
+            raise MessageError(f"{topic} position of {name}", position, "a finite number")
+    return found
+
+
+def known_positions(topic: str, message: Any, joints: Sequence[str]) -> Floats:
+    """Positions (n,) [m or rad] of the joints in a JointState; NaN for one that is missing.
+
+    Raises:
+        MessageError: A joint is doubled or unknown, or a position is infinite.
+    """
     names, positions = list(message.name), message.position
-    if sorted(names) != sorted(JOINTS):
-        raise MessageError(f"{topic} name", names[:9], f"{', '.join(JOINTS)}, in any order")
+    if not names or len(set(names)) < len(names) or not set(names) <= set(joints):
+        raise MessageError(f"{topic} name", names[:9], f"of {', '.join(joints)}, each once")
     if len(positions) != len(names):
         raise MessageError(f"{topic} position", len(positions), f"{len(names)} numbers, one a name")
     for name, position in zip(names, positions, strict=True):
-        if not np.isfinite(position):
+        if np.isinf(position):
             raise MessageError(f"{topic} position of {name}", float(position), "a finite number")
-    return np.array([positions[names.index(joint)] for joint in JOINTS], np.float64)
+    found = dict(zip(names, positions, strict=True))
+    return np.array([found.get(joint, np.nan) for joint in joints], np.float64)
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,16 +129,16 @@ class JoyAxes:
     """Which axes and which button of a gamepad are used.
 
     Attributes:
-        axes: Index in ``axes`` for insertion, rotation, bending.
+        axes: Index in ``axes`` for each degree of freedom.
         button: Index in ``buttons`` of the dead man's button.
     """
 
-    axes: tuple[int, int, int] = (1, 0, 4)
+    axes: tuple[int, ...] = (1, 0, 4)
     button: int = 4
 
 
 def joy_deflection(topic: str, message: Any, layout: JoyAxes) -> tuple[Floats, bool]:
-    """Deflections (3,) from -1 to 1, and whether the dead man's button is held.
+    """Deflections (n,) from -1 to 1, and whether the dead man's button is held.
 
     Raises:
         MessageError: An axis or the button is missing, or a deflection is not from -1 to 1.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,36 +11,38 @@ from tautscope.config import CameraConfig
 from tautscope.loop.reduction import Report, Status
 from tautscope.loop.rig import Frame
 from tautscope.ros2 import types
-from tautscope.ros2.inputs import ENCODINGS, JOINTS
+from tautscope.ros2.inputs import ENCODINGS
 
 OK, WARN, ERROR = 0, 1, 2
 """Levels of diagnostic_msgs/msg/DiagnosticStatus."""
 _NOTHING = np.empty(0)
 LOST = (Status.NO_MARKERS, Status.STALE, Status.DUPLICATE, Status.REFUSED)
-"""Image updates that measured nothing."""
+"""Updates that measured nothing."""
 
 
-def joint_state(stamp: int, values: Iterable[float], frame: str = "guide") -> Any:
-    """sensor_msgs/msg/JointState: positions (3,) [m, rad, rad] at a wall clock time [ns]."""
+def joint_state(
+    stamp: int, joints: Sequence[str], values: Iterable[float], frame: str = "guide"
+) -> Any:
+    """sensor_msgs/msg/JointState: positions (n,) [m or rad] at a wall clock time [ns]."""
     return types.make(
         "sensor_msgs/msg/JointState",
         header=types.header(stamp, frame),
-        name=JOINTS,
+        name=list(joints),
         position=np.asarray(values, np.float64),
         velocity=_NOTHING,
         effort=_NOTHING,
     )
 
 
-def tip_state(stamp: int, report: Report) -> Any:
-    """sensor_msgs/msg/JointState: q_hat of an image update; stamp 0 if markers are lost (CRTK)."""
-    return joint_state(0 if report.status in LOST else stamp, report.state_estimate)
+def tip_state(stamp: int, joints: Sequence[str], report: Report) -> Any:
+    """sensor_msgs/msg/JointState: q_hat of an update; stamp 0 if nothing was measured (CRTK)."""
+    return joint_state(0 if report.status in LOST else stamp, joints, report.state_estimate)
 
 
-def offsets(report: Report) -> Any:
-    """std_msgs/msg/Float64MultiArray (3, 2): delta_minus and delta_plus of each DOF."""
+def offsets(joints: Sequence[str], report: Report) -> Any:
+    """std_msgs/msg/Float64MultiArray (n, 2): delta_minus and delta_plus of each DOF."""
     values = np.stack([report.delta_minus, report.delta_plus], axis=1).ravel()
-    axes = (("insertion,rotation,bending", 3, 6), ("minus,plus", 2, 2))
+    axes = ((",".join(joints), len(joints), 2 * len(joints)), ("minus,plus", 2, 2))
     dim = [
         types.make("std_msgs/msg/MultiArrayDimension", label=label, size=size, stride=stride)
         for label, size, stride in axes

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -37,7 +37,7 @@ class Source(Protocol):
         ...
 
     def reset(self, reference: Floats) -> None:
-        """Start at a reference (3,) [m, rad, rad]."""
+        """Start at a reference (n,) [m or rad]."""
         ...
 
     def engage(self) -> None:
@@ -66,7 +66,7 @@ class Pausable:
 
     @property
     def reference(self) -> Floats:
-        """Reference u (3,) [m, rad, rad] of the last tick."""
+        """Reference u (n,) [m or rad] of the last tick."""
         return self._source.reference
 
     @property
@@ -94,21 +94,24 @@ class ServoReference:
     Args:
         node: Subscribes.
         topic: Of sensor_msgs/msg/JointState.
+        joints: Names of the degrees of freedom.
         clock: Clock of the stamps.
         refuse: Called for refused messages.
     """
 
-    def __init__(self, node: Node, topic: str, clock: Clock, refuse: Refuse) -> None:
+    def __init__(
+        self, node: Node, topic: str, joints: Sequence[str], clock: Clock, refuse: Refuse
+    ) -> None:
         self._messages = node.subscription(topic, "sensor_msgs/msg/JointState", Qos(depth=QUEUE))
-        self._clock, self._refuse = clock, refuse
+        self._joints, self._clock, self._refuse = joints, clock, refuse
         self._stamps = Stamps(self._messages.topic)
-        self.reference = self._before = np.full(3, np.nan)
+        self.reference = self._before = np.full(len(joints), np.nan)
         self._offset: Floats | None = None
         self._made_at: int | None = None
         self.age: float | None = None
 
     def reset(self, reference: Floats) -> None:
-        """Start at a reference (3,) [m, rad, rad]; what arrived before is discarded."""
+        """Start at a reference (n,) [m or rad]; what arrived before is discarded."""
         self.reference = self._before = reference.copy()
         self._take()
         self._stamps.reset()
@@ -120,7 +123,7 @@ class ServoReference:
         self._stamps.release()
 
     def update(self, now: float, period: float, command: Floats, *, is_held: bool) -> Floats:
-        """The newest reference (3,) [m, rad, rad]; sets `age`."""
+        """The newest reference (n,) [m or rad]; sets `age`."""
         found = self._take()
         if is_held:
             # The increment with which motion was stopped has not been followed.
@@ -147,7 +150,7 @@ class ServoReference:
                 message = self._messages.take()
                 if message is None:
                     break
-                position = joint_positions(self._messages.topic, message)
+                position = joint_positions(self._messages.topic, message, self._joints)
                 source = self._messages.source
                 stamp = self._stamps.check(message.header, self._clock.wall(), source)
                 found.append((position, stamp))
@@ -190,7 +193,7 @@ class JoyReference:
 
     @property
     def reference(self) -> Floats:
-        """Reference u (3,) [m, rad, rad] of the last tick."""
+        """Reference u (n,) [m or rad] of the last tick."""
         return self._operator.reference
 
     @reference.setter
@@ -198,7 +201,7 @@ class JoyReference:
         self._operator.reference = reference
 
     def reset(self, reference: Floats) -> None:
-        """Start at a reference (3,) [m, rad, rad], after the button was released once."""
+        """Start at a reference (n,) [m or rad], after the button was released once."""
         self._stamps.reset()
         self._operator.reset(reference)
 
@@ -208,7 +211,7 @@ class JoyReference:
         self._operator.interrupt()
 
     def update(self, now: float, period: float, command: Floats, *, is_held: bool) -> Floats:
-        """The reference (3,) [m, rad, rad] of a tick at a time of the monotonic clock [s]."""
+        """The reference (n,) [m or rad] of a tick at a time of the monotonic clock [s]."""
         try:
             message = self._messages.take()
             if message is not None:

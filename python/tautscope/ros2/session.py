@@ -13,7 +13,7 @@ import zenoh
 from tautscope.errors import ConfigError
 from tautscope.ros2 import types, wire
 from tautscope.ros2.endpoints import Publisher, Service, Subscription
-from tautscope.ros2.wire import Entity, Qos
+from tautscope.ros2.wire import HUMBLE, JAZZY, NO_HASH, Entity, Qos
 
 ROUTER = "tcp/127.0.0.1:7447"
 """Where the router of rmw_zenoh, `ros2 run rmw_zenoh_cpp rmw_zenohd`, listens."""
@@ -39,6 +39,7 @@ class Node:
         name: Name of the node.
         namespace: Empty, or ``/name``.
         domain: ROS_DOMAIN_ID.
+        distribution: Of the nodes that it talks with, one of `wire.DISTRIBUTIONS`.
         connect: Endpoint of a router or another node; tried again until it answers. Empty: none.
         listen: Own endpoint, on the loopback interface.
         is_blocking: Whether a publisher waits while the transport is busy, and drops no message;
@@ -58,6 +59,7 @@ class Node:
         namespace: str = "",
         *,
         domain: int = 0,
+        distribution: str = JAZZY,
         connect: str = ROUTER,
         listen: str = _LOOPBACK,
         is_blocking: bool = False,
@@ -92,6 +94,7 @@ class Node:
         self._congestion = (
             zenoh.CongestionControl.BLOCK if is_blocking else zenoh.CongestionControl.DROP
         )
+        self._has_hashes = distribution != HUMBLE
         self._entities = 0
         self.subscriptions: list[Subscription] = []
 
@@ -141,7 +144,10 @@ class Node:
         self.close()
 
     def _key(self, topic: str, kind: str) -> str:
-        return wire.key(self.identity.domain, self.resolve(topic), kind, types.type_hash(kind))
+        return wire.key(self.identity.domain, self.resolve(topic), kind, self._hash(kind))
+
+    def _hash(self, kind: str) -> str:
+        return types.type_hash(kind) if self._has_hashes else NO_HASH
 
     def _announce(self, entity: Entity, topic: str, kind: str, qos: Qos) -> tuple[Any, str]:
         self._entities += 1
@@ -150,7 +156,7 @@ class Node:
             entity,
             self.resolve(topic),
             kind=kind,
-            rihs=types.type_hash(kind),
+            rihs=self._hash(kind),
             qos=qos,
         )
         return self._declare(name), name

@@ -6,10 +6,10 @@ import logging
 from collections.abc import Callable
 from concurrent.futures import Executor
 from pathlib import Path
-from typing import Literal
 
 from tautscope.config import Config
 from tautscope.console.control_run import LiveRig
+from tautscope.errors import ConfigError
 from tautscope.hardware.realtime import (
     LOOP,
     OTHERS,
@@ -25,11 +25,12 @@ from tautscope.ros2.control import NodeControl
 from tautscope.ros2.driver import DriverRig
 from tautscope.ros2.inputs import JoyAxes
 from tautscope.ros2.references import JOY, JoyReference, ServoReference, Source
+from tautscope.ros2.sensors import Sensors
 from tautscope.ros2.session import Node
 from tautscope.ros2.telemetry import Telemetry, Topics
 
-Drives = Literal["twin", "rig", "ros"]
-"""What the loop commands: the twin, the drives of the configuration, or a driver in ROS."""
+MakeRig = Callable[[Config], LiveRig]
+"""Makes the rig that the loop commands."""
 _LOG = logging.getLogger(__name__)
 NAME = "tautscope"
 """Name of the node."""
@@ -41,9 +42,10 @@ def start_node(
     folder: Path,
     announce: Callable[[str], None],
     *,
-    drives: Drives,
+    make_rig: MakeRig | None,
     device: str,
     layout: JoyAxes,
+    on_result: Callable[[str], None],
 ) -> int:
     """Run the node until it is finalized, or a signal; the exit status.
 
@@ -54,25 +56,35 @@ def start_node(
         node: The node; the caller closes it.
         folder: New; for logs.
         announce: Called with the name of the node when it is ready.
-        drives: What the loop commands.
+        make_rig: Makes the rig; None for a driver in ROS.
         device: `tautscope.ros2.references.SERVO` or `JOY`.
         layout: Axes and button of a gamepad.
+        on_result: As of `tautscope.ros2.control.NodeControl`.
 
     Raises:
-        ConfigError: The configuration does not describe a rig.
+        ConfigError: The configuration does not describe a rig; as `build_control`.
     """
-    if drives != "rig":
+    has_drives = make_rig is HardwareRig
+    if not has_drives:
         config = config.replace(drives=None)
     with (
         exit_on_signals(),
         realtime_executor("vision", VISION) as executor,
     ):
         control = build_control(
-            config, node, folder, executor, Clock(), drives=drives, device=device, layout=layout
+            config,
+            node,
+            folder,
+            executor,
+            Clock(),
+            make_rig=make_rig,
+            device=device,
+            layout=layout,
+            on_result=on_result,
         )
         with (
             short_switch_interval(),
-            realtime_process(OTHERS if drives == "rig" else LOOP) as refusal,
+            realtime_process(OTHERS if has_drives else LOOP) as refusal,
         ):
             if refusal:
                 _LOG.warning("%s", refusal)
@@ -94,21 +106,29 @@ def build_control(
     executor: Executor,
     clock: Clock,
     *,
-    drives: Drives,
+    make_rig: MakeRig | None,
     device: str,
     layout: JoyAxes,
+    on_result: Callable[[str], None] = lambda _: None,
 ) -> NodeControl:
-    """The control of a node, unconfigured."""
+    """The control of a node, unconfigured.
+
+    Raises:
+        ConfigError: Without a rig of its own nothing would measure the tip, or the axes are not
+            one per degree of freedom.
+    """
     topics = Topics(node.identity.namespace)
-    telemetry = Telemetry(config, node, topics, clock, has_rig=drives != "ros")
+    telemetry = Telemetry(config, node, topics, clock, has_rig=make_rig is not None)
     refuse = telemetry.refuse
+    joints = [dof.label for dof in config.dofs]
+    if config.dof and make_rig is None and not config.measurement.topics:
+        raise ConfigError("measurement.topics", None, "a topic that measures the tip")
     source: Source = (
         JoyReference(config, node, topics.joy, clock=clock, refuse=refuse, layout=layout)
         if device == JOY
-        else ServoReference(node, topics.servo, clock, refuse)
+        else ServoReference(node, topics.servo, joints, clock, refuse)
     )
-    make_rig: Callable[[], LiveRig]
-    if drives == "ros":
+    if make_rig is None:
         driver = DriverRig(
             config,
             node,
@@ -117,21 +137,17 @@ def build_control(
             clock=clock,
             refuse=refuse,
         )
-        make_rig = lambda: driver  # noqa: E731
-    elif drives == "twin":
-        from tautscope.console.live_twin import LiveTwin  # noqa: PLC0415  MuJoCo
-
-        make_rig = lambda: LiveTwin(config)  # noqa: E731
-    else:
-        make_rig = lambda: HardwareRig(config)  # noqa: E731
+        make_rig = lambda _: driver  # noqa: E731
     return NodeControl(
         config,
         node,
         topics,
         telemetry,
         source=source,
+        sensors=Sensors(config, node, clock, refuse),
         make_rig=make_rig,
         folder=folder,
         executor=executor,
         clock=clock,
+        on_result=on_result,
     )

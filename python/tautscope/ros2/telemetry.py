@@ -9,6 +9,7 @@ from tautscope.config import Config
 from tautscope.console.control_run import ControlRun
 from tautscope.errors import MessageError
 from tautscope.hardware.realtime import OTHERS, realtime_executor
+from tautscope.loop.measurement import Measurement
 from tautscope.loop.reduction import Report
 from tautscope.loop.rig import Frame
 from tautscope.ros2 import messages
@@ -58,6 +59,7 @@ class Telemetry:
         self._config, self._clock, self._has_rig = config, clock, has_rig
         self._node = node
         self._name = node.identity.path.lstrip("/")
+        self._joints = [dof.label for dof in config.dofs]
         joints, text = "sensor_msgs/msg/JointState", "std_msgs/msg/String"
 
         def publisher(name: str, kind: str) -> Publisher:
@@ -68,13 +70,16 @@ class Telemetry:
         self._offsets = publisher("hysteresis/delta", "std_msgs/msg/Float64MultiArray")
         self._mode = publisher("hysteresis/mode", text)
         self._compensation = publisher("hysteresis/compensation", "std_msgs/msg/Float64")
+        self._result = publisher("hysteresis/result", text)
         self._state = publisher("operating_state", "crtk_msgs/msg/OperatingState")
         self._warning = publisher("warning", text)
         self._diagnostics = node.publisher("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
-        self._camera_info = node.publisher(topics.camera_info, "sensor_msgs/msg/CameraInfo")
+        if not config.dof:
+            self._camera_info = node.publisher(topics.camera_info, "sensor_msgs/msg/CameraInfo")
         if has_rig:
             self._command = publisher("actuators/setpoint_js", joints)
             self._applied = publisher("actuators/measured_js", joints)
+        if has_rig and not config.dof:
             self._image = node.publisher(topics.image, "sensor_msgs/msg/Image", SENSOR_DATA)
         # The transport may wait for a slow receiver; a tick may not.
         self._images = realtime_executor("images", OTHERS)
@@ -88,28 +93,30 @@ class Telemetry:
 
     def tick(self, run: ControlRun) -> None:
         """Publish set-points, and the positions of the drives."""
-        now = self._clock.wall()
-        self._setpoint.publish(messages.joint_state(now, run.reference))
+        now, joints = self._clock.wall(), self._joints
+        self._setpoint.publish(messages.joint_state(now, joints, run.reference))
         if self._has_rig:
-            self._command.publish(messages.joint_state(now, run.command))
-            self._applied.publish(messages.joint_state(now, run.sample.applied))
+            self._command.publish(messages.joint_state(now, joints, run.command))
+            self._applied.publish(messages.joint_state(now, joints, run.sample.applied))
         flags = run.loop.supervision.flags
         for flag in sorted(set(flags) - set(self._flags)):
             self.warn(f"{flag}: {run.loop.supervision.reaction}")
         self._flags = flags
 
-    def update(self, run: ControlRun, frame: Frame, report: Report) -> None:
-        """Publish an image update, and the image if anybody receives it."""
+    def update(self, run: ControlRun, source: Frame | Measurement, report: Report) -> None:
+        """Publish an update; of an image also the camera, and the image if anybody receives it."""
         age = round((run.sample.time - report.captured_at) * 1e9)
         captured = self._clock.wall() - age
-        self._tip.publish(messages.tip_state(captured, report))
-        self._offsets.publish(messages.offsets(report))
+        self._tip.publish(messages.tip_state(captured, self._joints, report))
+        self._offsets.publish(messages.offsets(self._joints, report))
         supervision = run.loop.supervision
         self._mode.publish(messages.text(str(supervision.reaction)))
         self._compensation.publish(messages.number(supervision.lead))
+        if not isinstance(source, Frame):
+            return
         self._camera_info.publish(messages.camera_info(captured, self._config.camera))
         if self._has_rig and self._sending.done() and self._image.has_subscribers:
-            self._sending = self._images.submit(self._send_image, captured, frame)
+            self._sending = self._images.submit(self._send_image, captured, source)
 
     def _send_image(self, captured: int, frame: Frame) -> None:
         image = messages.image(captured, frame, self._config.camera)
@@ -138,6 +145,10 @@ class Telemetry:
         if now - self._warned.get(error.field, -DIAGNOSTICS_PERIOD) >= DIAGNOSTICS_PERIOD:
             self._warned[error.field] = now
             self.warn(f"refused: {error}")
+
+    def result(self, text: str) -> None:
+        """Publish what the compensation achieved."""
+        self._result.publish(messages.text(text))
 
     def warn(self, text: str) -> None:
         """Publish a warning."""

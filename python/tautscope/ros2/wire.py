@@ -14,6 +14,10 @@ from enum import StrEnum
 
 from tautscope.errors import MessageError
 
+HUMBLE, JAZZY = DISTRIBUTIONS = ("humble", "jazzy")
+"""Distributions of ROS whose keys differ: those of Jazzy and later ones have type hashes."""
+NO_HASH = "TypeHashNotSupported"
+"""What the keys of Humble have in place of a type hash."""
 _GID_SIZE = 16
 _ATTACHMENT = struct.Struct(f"<qqB{_GID_SIZE}s")
 

@@ -1,53 +1,30 @@
-"""Runs of a reference on a rig: the only place with a loop and a clock."""
+"""Runs of a reference on a rig."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Callable
+from concurrent.futures import Executor
 
 import numpy as np
 
 from tautscope.config import Config
-from tautscope.errors import MotionHeldError, SignalError
+from tautscope.errors import MotionHeldError
 from tautscope.loop.measurement import Measurement
 from tautscope.loop.reduction import HysteresisReduction, Report
 from tautscope.loop.references import DatedReference, Reference
-from tautscope.loop.rig import Frame, Rig, Sample, check_sample
+from tautscope.loop.rig import Frame, Rig
 from tautscope.loop.safety import Reaction, Supervision, disabled_monitors
+from tautscope.runs.control_loop import ControlLoop, ImageUpdate, Log
 from tautscope.runs.flag_summary import FlagSummary
-from tautscope.runs.recording import Floats, Recording, Snapshot
-from tautscope.runs.run_recorder import RunRecorder, frame_row, measurement_row
-
-if TYPE_CHECKING:
-    from tautscope.loop.vision import Detection
+from tautscope.runs.recording import Recording, Snapshot
+from tautscope.runs.run_recorder import RunRecorder, update_row
 
 Progress = Callable[[float, float], None]
 """Called about once per second of the rig's clock with (elapsed, duration) [s]."""
-ImageUpdate = Callable[[HysteresisReduction, Frame], Report]
-"""Updates the loop with a frame."""
+Engage = Callable[[Supervision], bool]
+"""Whether held motion is to be re-engaged."""
 HELD_TIME = 1.0
 """How long motion is held before a run ends in which nobody can re-engage it [s]."""
-Reports = Iterator[tuple[Frame, Report]]
-
-
-class Log(Protocol):
-    """Receives every event of a run as it happens, e.g. `tautscope.log.writer.LogWriter`."""
-
-    def tick(
-        self, sample: Sample, reference: Floats, command: Floats, made_at: float | None = None
-    ) -> None:
-        """A control tick; `made_at` is when its reference was made [s, the rig's clock]."""
-        ...
-
-    def frame(self, now: float, frame: Frame, report: Report) -> None:
-        """An image update at time `now` [s, the rig's clock]."""
-        ...
-
-    def event(self, now: float, what: str) -> None:
-        """A call of the operator or the rig, as `HysteresisReduction.on_event`, at time `now`."""
-        ...
 
 
 def run_experiment(
@@ -61,7 +38,7 @@ def run_experiment(
     log: Log | None = None,
     executor: Executor | None = None,
     watch: Callable[[Supervision], None] | None = None,
-    engage: Callable[[Supervision], bool] | None = None,
+    engage: Engage | None = None,
 ) -> Recording:
     """Run a reference on a rig, with the camera, or other sensors of the tip, as the only feedback.
 
@@ -96,66 +73,43 @@ def run_experiment(
             rig's clock does not advance.
         FrameError: An image is not what the configured camera gives.
     """
-    reduction = HysteresisReduction(config, compensate=compensate)
+    dated = reference if isinstance(reference, DatedReference) else None
+    ticks = ControlLoop(config, rig, compensate=compensate, look=look, executor=executor)
+    if log is not None:
+        ticks.write_to(log)
     recorder = _ExperimentRecorder(config, reference.duration / 2)
-    updater = _InlineUpdater(look) if executor is None else BackgroundUpdater(executor)
-    events = None if log is None else _EventLog(reduction, log)
-    stop = _MotionStop(reduction, engage, rig.control_period)
+    stop = _MotionStop(ticks.loop, engage, rig.control_period)
 
     def recording() -> Recording:
-        if events is not None:
-            events.write(sample.time)
+        ticks.write_events()
         trace, frames = recorder.tables()
-        warnings = (
-            *disabled_monitors(config),
-            *recorder.flags.lines(reduction.supervision.latched),
-        )
-        segments = tuple(reference.segments)
+        flags = recorder.flags.lines(ticks.loop.supervision.latched)
+        warnings, segments = (*disabled_monitors(config), *flags), tuple(reference.segments)
         return Recording(trace, frames, config, compensate, segments, recorder.snapshot, warnings)
 
-    dated = reference if isinstance(reference, DatedReference) else None
-    sample = check_sample(rig.reset(), config)
-    start = sample.time
-    while (elapsed := sample.time - start) < reference.duration:
+    start = ticks.sample.time
+    while (elapsed := ticks.sample.time - start) < reference.duration:
         desired = reference(elapsed)
-        made_at = None if dated is None else start + dated.made_at
-        if events is not None:
-            events.write(sample.time)
-        command = reduction.step(desired, time=sample.time, made_at=made_at)
-        recorder.add_tick(sample, desired, command)
-        if log is not None:
-            log.tick(sample, desired, command, made_at)
-        # After the command, which never waits for an image.
-        for frame, report in updater.update(reduction, sample.frame):
-            recorder.add_report(sample.time, frame, report, elapsed)
-            if log is not None and events is not None:
-                events.write(sample.time, reduction.updates)
-                log.frame(sample.time, frame, report)
-        for measurement in sample.measurements:
-            report = reduction.on_sample(measurement)
-            recorder.add_measurement(sample.time, measurement, report, elapsed)
+        command = ticks.control(desired, None if dated is None else start + dated.made_at)
+        recorder.add_tick(ticks.sample, desired, command)
+        for source, report in ticks.updates():
+            recorder.add_report(ticks.sample.time, source, report, elapsed)
         if watch is not None:
-            watch(reduction.supervision)
-        if (error := stop.update(sample.time)) is not None:
+            watch(ticks.loop.supervision)
+        if (error := stop.update(ticks.sample.time)) is not None:
             error.recording = recording()
             raise error
-        before, sample = sample, check_sample(rig.step(command), config)
-        if not sample.time > before.time:
-            raise SignalError("sample.time", sample.time, f"later than the last, {before.time}")
-        if progress is not None and int(sample.time - start) > int(elapsed):
-            progress(sample.time - start, reference.duration)
+        ticks.step()
+        now = ticks.sample.time - start
+        if progress is not None and int(now) > int(elapsed):
+            progress(now, reference.duration)
     return recording()
 
 
 class _MotionStop:
     """Re-engages held motion as `run_experiment` describes, or ends the run."""
 
-    def __init__(
-        self,
-        loop: HysteresisReduction,
-        engage: Callable[[Supervision], bool] | None,
-        period: float,
-    ) -> None:
+    def __init__(self, loop: HysteresisReduction, engage: Engage | None, period: float) -> None:
         self._loop, self._engage = loop, engage
         self._limit = round(HELD_TIME / period)
         self._ticks = 0
@@ -180,54 +134,6 @@ class _MotionStop:
         return None
 
 
-class _InlineUpdater:
-    """Updates the loop with each frame at once."""
-
-    def __init__(self, image_update: ImageUpdate) -> None:
-        self._image_update = image_update
-
-    def update(self, reduction: HysteresisReduction, frame: Frame | None) -> Reports:
-        if frame is not None:
-            yield frame, self._image_update(reduction, frame)
-
-
-class BackgroundUpdater:
-    """Detects the markers of one frame at a time in a background thread."""
-
-    def __init__(self, executor: Executor) -> None:
-        self._executor = executor
-        self._next: Frame | None = None
-        self._running: tuple[Frame, Future[Detection]] | None = None
-
-    def update(self, reduction: HysteresisReduction, frame: Frame | None) -> Reports:
-        """Updates that have ended since the last call; `frame` is the next one, if it arrived."""
-        if self._running is not None and self._running[1].done():
-            (detected, result), self._running = self._running, None
-            yield detected, reduction.on_detection(detected, result.result())
-        self._next = frame or self._next
-        if self._next is not None and self._running is None:
-            detect = reduction.prepare_detection(self._next)
-            self._running, self._next = (self._next, self._executor.submit(detect)), None
-
-
-class _EventLog:
-    """Writes the events of `HysteresisReduction.on_event` to the log, in their order."""
-
-    def __init__(self, loop: HysteresisReduction, log: Log) -> None:
-        self._loop, self._log = loop, log
-        self._pending: list[tuple[int, str]] = []
-        loop.on_event = self._add
-
-    def write(self, now: float, update: float = math.inf) -> None:
-        """Write the events before an image update, or all."""
-        while self._pending and self._pending[0][0] < update:
-            self._log.event(now, self._pending.pop(0)[1])
-
-    def _add(self, what: str) -> None:
-        # `look` may cause events before and after its update; each is written with its report.
-        self._pending.append((self._loop.updates, what))
-
-
 class _ExperimentRecorder(RunRecorder):
     """A run recorder with the flag summary and one valid frame from about the middle."""
 
@@ -239,28 +145,21 @@ class _ExperimentRecorder(RunRecorder):
         self._is_late = False
         self._measurements = 0
 
-    def add_measurement(
-        self, now: float, measurement: Measurement, report: Report, elapsed: float
+    def add_report(
+        self, now: float, source: Frame | Measurement, report: Report, elapsed: float
     ) -> None:
-        self._measurements += 1
-        row = measurement_row(now, self._measurements, measurement, report)
+        self._measurements += not isinstance(source, Frame)
+        row = update_row(now, source, report, self._measurements)
         self.add_frame(row, report.delta_minus, report.delta_plus)
         self.flags.add(elapsed, report.warnings, report.reaction)
-
-    def add_report(self, now: float, frame: Frame, report: Report, elapsed: float) -> None:
-        self.add_frame(frame_row(now, frame, report), report.delta_minus, report.delta_plus)
-        self.flags.add(elapsed, report.warnings, report.reaction)
-        detection = report.detection
-        is_late = elapsed >= self._snapshot_after
-        if (
-            detection is not None
-            and detection.valid
-            and (self.snapshot is None or (is_late and not self._is_late))
-        ):
+        detection, is_late = report.detection, elapsed >= self._snapshot_after
+        if not isinstance(source, Frame) or detection is None or not detection.valid:
+            return
+        if self.snapshot is None or (is_late and not self._is_late):
             self._is_late = is_late
             self.snapshot = Snapshot(
-                frame.image.copy(),
-                frame.captured_at,
+                source.image.copy(),
+                source.captured_at,
                 np.array(detection.features),
                 np.array(report.predicted_features),
             )

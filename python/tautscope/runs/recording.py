@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +50,11 @@ def frame_columns(
         + [(name, "?") for name in _names(["observable"], labels)]
         + [(name, "f8") for name in _names(groups, list(features))]
     )
+
+
+def update_columns(config: Config) -> np.dtype[np.void]:
+    """Columns of the updates of a run: of a robot with [[dof]] without features."""
+    return frame_columns(config.dofs, () if config.dof else FEATURES)
 
 
 TRACE_COLUMNS = trace_columns(Dof)
@@ -159,16 +165,7 @@ class Recording:
 
         write_csv(folder / f"trace{suffix}.csv", self.trace)
         write_csv(folder / f"frames{suffix}.csv", self.frames)
-        segments = [
-            {
-                "dof": segment.dof.label,
-                "start": segment.start,
-                "period": segment.period,
-                "periods": segment.periods,
-            }
-            for segment in self.segments
-        ]
-        facts = tomlkit.dumps({"compensated": self.compensated, "segments": segments})
+        facts = tomlkit.dumps(run_facts(self.compensated, self.segments))
         (folder / f"recording{suffix}.toml").write_text(facts, encoding="utf-8")
         (folder / "config.toml").write_text(dump_config(self.config), encoding="utf-8")
 
@@ -185,24 +182,43 @@ class Recording:
         if not facts_file.is_file():
             raise MissingPathError("recording", str(facts_file), "a file of a saved recording")
         try:
-            facts = tomllib.loads(facts_file.read_text(encoding="utf-8"))
-            segments = tuple(
-                Segment(Dof[item["dof"].upper()], item["start"], item["period"], item["periods"])
-                for item in facts["segments"]
-            )
-            compensated = bool(facts["compensated"])
-        except (tomllib.TOMLDecodeError, KeyError, TypeError, AttributeError) as error:
+            facts = facts_file.read_text(encoding="utf-8")
+            config = load_config(place / "config.toml")
+            compensated, segments = read_run_facts(facts, config)
+        except (tomllib.TOMLDecodeError, KeyError, TypeError) as error:
             allowed = f"compensated and segments ({error})"
             raise RecordError("recording", str(facts_file), allowed) from None
-        config = load_config(place / "config.toml")
-        features = () if config.dof else FEATURES
         return cls(
             trace=read_csv(place / f"trace{suffix}.csv", trace_columns(config.dofs)),
-            frames=read_csv(place / f"frames{suffix}.csv", frame_columns(config.dofs, features)),
+            frames=read_csv(place / f"frames{suffix}.csv", update_columns(config)),
             config=config,
             compensated=compensated,
             segments=segments,
         )
+
+
+def run_facts(compensated: bool, segments: Iterable[Segment]) -> dict[str, Any]:
+    """What configuration and tables do not say of a run, as a TOML document."""
+    items = [
+        {"dof": each.dof.label, "start": each.start, "period": each.period, "periods": each.periods}
+        for each in segments
+    ]
+    return {"compensated": compensated, "segments": items}
+
+
+def read_run_facts(text: str, config: Config) -> tuple[bool, tuple[Segment, ...]]:
+    """Whether a run was compensated, and its segments, from the text of `run_facts`.
+
+    Raises:
+        TOMLDecodeError, KeyError, TypeError: The text is none of `run_facts` for these degrees of
+            freedom.
+    """
+    facts, dofs = tomllib.loads(text), {dof.label: dof for dof in config.dofs}
+    segments = tuple(
+        Segment(dofs[item["dof"]], item["start"], item["period"], item["periods"])
+        for item in facts["segments"]
+    )
+    return bool(facts["compensated"]), segments
 
 
 def per_dof(table: Table, group: str, dofs: Iterable[NamedDof] = Dof) -> Floats:

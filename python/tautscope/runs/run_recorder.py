@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,69 +10,58 @@ import numpy as np
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.loop.measurement import Measurement
-from tautscope.runs.recording import FEATURES, Floats, Table, frame_columns, per_dof, trace_columns
+from tautscope.runs.recording import Floats, Table, per_dof, trace_columns, update_columns
 
 if TYPE_CHECKING:
     from tautscope.loop.reduction import Report
     from tautscope.loop.rig import Frame, Sample
 
 Row = tuple[object, ...]
-_UNKNOWN = (np.nan, np.nan, np.nan)
-_BLOCK = 500
-"""Rows converted to an array at a time, which takes a millisecond."""
+_USED = ("ok", "held", "partial")
+"""Status of a measurement that was used."""
+_BLOCK = 100
+"""Rows converted to an array at a time, which takes a fifth of a millisecond."""
 _NO_FEATURES = (np.nan, np.nan, np.nan, np.nan)
 
 
-def frame_row(now: float, frame: Frame, report: Report) -> Row:
-    """Result of an image update in the order of `FRAME_COLUMNS`; the true state comes later.
+def update_row(now: float, seen: Frame | Measurement, report: Report, count: int) -> Row:
+    """Result of an update in the order of `update_columns`; the true state comes later.
 
     Args:
-        now: Time of the frame's arrival [s, the rig's clock].
-        frame: The frame.
-        report: Its image update.
+        now: Time of arrival [s, the rig's clock].
+        seen: The frame or measurement.
+        report: Its update.
+        count: Number of the measurement in the run; a frame has its own.
     """
-    detection = report.detection
-    valid = detection is not None and bool(detection.valid)
-    features = detection.features if detection is not None and valid else _NO_FEATURES
-    truth = _NO_FEATURES if frame.true_features is None else frame.true_features
+    features: Row = ()
+    if isinstance(seen, Measurement):
+        is_valid = report.status in _USED
+    else:
+        count, detection = seen.sequence, report.detection
+        is_valid = detection is not None and bool(detection.valid)
+        found = detection.features if detection is not None and is_valid else _NO_FEATURES
+        truth = _NO_FEATURES if seen.true_features is None else seen.true_features
+        features = (*found, *report.predicted_features, *report.innovation, *truth)
     return (
-        frame.captured_at,
-        now,
-        frame.sequence,
-        str(report.status),
-        valid,
-        *report.state_estimate,
-        *report.predicted_state,
-        *_UNKNOWN,
-        *report.observable,
-        *features,
-        *report.predicted_features,
-        *report.innovation,
-        *truth,
-    )
-
-
-def measurement_row(now: float, count: int, measurement: Measurement, report: Report) -> Row:
-    """Result of an update by a measurement in the order of `frame_columns` without features."""
-    return (
-        measurement.captured_at,
+        seen.captured_at,
         now,
         count,
         str(report.status),
-        report.status in ("ok", "held", "partial"),
+        is_valid,
         *report.state_estimate,
         *report.predicted_state,
         *(np.nan for _ in report.state_estimate),
         *report.observable,
+        *features,
     )
 
 
 class _RowBuffer:
     """Rows, converted to arrays in small blocks: one large conversion would block all threads."""
 
-    def __init__(self, columns: np.dtype[np.void]) -> None:
+    def __init__(self, columns: np.dtype[np.void], most: int | None) -> None:
         self._columns = columns
-        self._packed: list[Table] = []
+        self._packed: deque[Table] = deque(maxlen=None if most is None else most // _BLOCK)
         self._rows: list[Row] = []
 
     def append(self, row: Row) -> None:
@@ -98,13 +88,14 @@ class RunRecorder:
 
     Args:
         config: Its contact offsets are recorded until the first frame.
+        most: About how many rows of each table are kept, the newest ones; without it all.
     """
 
-    def __init__(self, config: Config) -> None:
+    def __init__(self, config: Config, most: int | None = None) -> None:
         self._dofs = config.dofs
-        self._columns = frame_columns(config.dofs, () if config.dof else FEATURES)
-        self._trace = _RowBuffer(trace_columns(config.dofs))
-        self._frames = _RowBuffer(self._columns)
+        self._columns = update_columns(config)
+        self._trace = _RowBuffer(trace_columns(config.dofs), most)
+        self._frames = _RowBuffer(self._columns, most)
         self._unknown = (np.nan,) * len(config.dofs)
         self._estimate: Row = self._unknown
         own = config.dof or [config[dof] for dof in Dof]
@@ -128,7 +119,7 @@ class RunRecorder:
         )
 
     def add_frame(self, row: Row, delta_minus: Floats, delta_plus: Floats) -> None:
-        """Add an image update: its `frame_row`, and the contact offsets (3,) after it."""
+        """Add an update: its `update_row`, and the contact offsets (n,) after it."""
         fields = dict(zip(self._columns.names or (), row, strict=True))
         self._estimate = tuple(fields[f"estimate_{dof.label}"] for dof in self._dofs)
         self._deltas = (*delta_minus, *delta_plus)

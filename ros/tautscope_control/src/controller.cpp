@@ -1,17 +1,16 @@
 /* ros2_control controller: references of insertion, rotation and bending in, position commands of the joints out. */
 
 #include <array>
-#include <cmath>
 #include <limits>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include <controller_interface/chainable_controller_interface.hpp>
 #include <hardware_interface/types/hardware_interface_type_values.hpp>
 #include <pluginlib/class_list_macros.hpp>
 #include <realtime_tools/realtime_buffer.hpp>
 
+#include "tautscope_control/chainable_controller.hpp"
 #include "tautscope_control/messages.hpp"
 #include "tautscope_control/session.hpp"
 
@@ -25,7 +24,7 @@ using controller_interface::return_type;
 ///
 /// `update` neither allocates nor waits. It returns an error, so that the controller manager deactivates the controller, when the
 /// drives have to stop.
-class HysteresisController : public controller_interface::ChainableControllerInterface {
+class HysteresisController : public ChainableController {
 public:
     CallbackReturn on_init() override {
         try {
@@ -56,7 +55,7 @@ public:
                 throw std::invalid_argument("Parameter compensation: expected a number from 0 to 1.");
             }
             const double rate = 1.0 / session_->control().period();
-            if (std::abs(rate - get_update_rate()) > 0.01 * rate) {
+            if (!is_updated_at(rate)) {
                 throw std::invalid_argument("Parameter update_rate: expected " + std::to_string(rate) +
                                             " Hz, as control.period of the configuration, got " +
                                             std::to_string(get_update_rate()));
@@ -82,7 +81,7 @@ public:
     CallbackReturn on_activate(const rclcpp_lifecycle::State &) override {
         Vector measured{};
         for (std::size_t i = 0; i < measured.size(); ++i) {
-            measured[i] = state_interfaces_[i].get_optional().value_or(unknown);
+            measured[i] = read(state_interfaces_[i]).value_or(unknown);
             reference_interfaces_[i] = unknown;
         }
         used_message_ = received_.readFromRT()->number;
@@ -116,7 +115,7 @@ protected:
         return interfaces;
     }
 
-    return_type update_reference_from_subscribers(const rclcpp::Time &, const rclcpp::Duration &) override {
+    return_type read_references() override {
         const Received *received = received_.readFromRT();
         const bool is_new = received->number != used_message_;
         used_message_ = received->number;
@@ -135,8 +134,7 @@ protected:
         // Of the clock of the images; the time given is that of the controller manager.
         const Tick tick = control.step(session_->now());
         for (std::size_t i = 0; i < tick.command.size() && tick.is_sent; ++i) {
-            // One that is being read at this moment gets the next command.
-            static_cast<void>(command_interfaces_[i].set_value(tick.command[i]));
+            write(command_interfaces_[i], tick.command[i]);
         }
         control.exchange();
         return tick.state == OperatingState::fault ? return_type::ERROR : return_type::OK;

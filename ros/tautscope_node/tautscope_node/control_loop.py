@@ -11,13 +11,14 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 from tautscope import Config, Frame, HysteresisReduction
+from tautscope.loop.measurement import Measurement
 from tautscope.loop.reduction import Report
 from tautscope.loop.safety import Reaction, Supervision
-from tautscope.runs.experiment import BackgroundUpdater
+from tautscope.runs.control_loop import BackgroundUpdater
 
 Floats = NDArray[np.float64]
-START_TOLERANCE = np.array([1e-3, 0.05, 0.05])
-"""Largest distance of the drives from the last command when enabled again [m, rad, rad]."""
+START_TOLERANCE = {"mm": 1e-3, "rad": 0.05}
+"""Largest distance of the drives from the last command when enabled again [m or rad]."""
 
 
 class OperatingState(StrEnum):
@@ -38,7 +39,7 @@ class Tick:
     """Result of a control tick.
 
     Attributes:
-        command: (3,) [m, rad, rad]; NaN before the first reference.
+        command: (n,) [m or rad]; NaN before the first reference.
         is_sent: Whether the command is to be sent to the drives.
         state: The operating state.
     """
@@ -60,21 +61,23 @@ class ControlLoop:
 
     Attributes:
         loop: The loop itself.
-        reference: The newest reference that went into the loop (3,) [m, rad, rad]; NaN before.
+        reference: The newest reference that went into the loop (n,) [m or rad]; NaN before.
         state: The operating state.
         is_misplaced: Whether enabling was refused: the drives were not where the last command was.
     """
 
     def __init__(self, config: Config, executor: Executor) -> None:
         self.loop = HysteresisReduction(config)
-        # It creates the detector, which takes 0.1 s, now and not in a tick.
-        self.loop.prepare_detection(Frame(np.empty(0, np.uint8), 0.0, 0))
+        if not config.dof:
+            # It creates the detector, which takes 0.1 s, now and not in a tick.
+            self.loop.prepare_detection(Frame(np.empty(0, np.uint8), 0.0, 0))
         self.period = config.control.period
-        self.reference = np.full(3, np.nan)
+        self._start_tolerance = [START_TOLERANCE[dof.display_unit] for dof in config.dofs]
+        self.reference = np.full(len(config.dofs), np.nan)
         self.state = OperatingState.DISABLED
         self.is_misplaced = False
         self._updater = BackgroundUpdater(executor)
-        self._command = np.full(3, np.nan)
+        self._command = self.reference.copy()
         self._measured: Floats | None = None
         self._next: tuple[Floats, float | None] | None = None
         self._made_at: float | None = None
@@ -84,14 +87,14 @@ class ControlLoop:
         self._engaged_at = -math.inf
 
     def set_measured(self, position: Sequence[float] | Floats) -> None:
-        """Position of the drives (3,) [m, rad, rad]; values that are not finite are ignored."""
+        """Position of the drives (n,) [m or rad]; values that are not finite are ignored."""
         if np.isfinite(position).all():
             self._measured = np.array(position, np.float64)
 
     def set_reference(
         self, position: Sequence[float] | Floats, made_at: float | None = None
     ) -> None:
-        """The newest reference (3,) [m, rad, rad], made at a time [s]; none if it is not finite."""
+        """The newest reference (n,) [m or rad], made at a time [s]; none if it is not finite."""
         if np.isfinite(position).all():
             self._next = np.array(position, np.float64), made_at
 
@@ -124,14 +127,20 @@ class ControlLoop:
         is_sent = self.state is not OperatingState.FAULT and bool(np.isfinite(self._command).all())
         return Tick(self._command, is_sent, self.state)
 
-    def exchange(self, frame: Frame | None) -> list[tuple[Frame, Report]]:
-        """After the command of a tick was sent: the updates by images, and the next detection.
+    def exchange(
+        self, frame: Frame | None, measurements: Sequence[Measurement] = ()
+    ) -> list[tuple[Frame | Measurement, Report]]:
+        """After the command of a tick was sent: the updates, and the next detection.
 
-        `frame` is the newest image, if one arrived since the last tick.
+        Args:
+            frame: The newest image, if one arrived since the last tick.
+            measurements: What other sensors measured.
         """
         if self.state is OperatingState.DISABLED:
             return []
-        reports = list(self._updater.update(self.loop, frame))
+        reports: list[tuple[Frame | Measurement, Report]] = []
+        reports += self._updater.update(self.loop, frame)
+        reports += [(each, self.loop.on_sample(each)) for each in measurements]
         if reports:
             self._update_state()
         return reports
@@ -157,7 +166,7 @@ class ControlLoop:
         has_command = bool(np.isfinite(self._command).all())
         if has_command and self._measured is not None:
             distance = np.abs(self._measured - self._command)
-            self.is_misplaced = bool((distance > START_TOLERANCE).any())
+            self.is_misplaced = bool((distance > self._start_tolerance).any())
             if self.is_misplaced:
                 self.state = OperatingState.FAULT
                 return

@@ -7,26 +7,30 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from tautscope.config import CameraConfig
+from tautscope.config import CameraConfig, Config
 from tautscope.loop.reduction import Report, Status
 
+DEFAULT_JOINTS = ["insertion", "rotation", "bending"]
 CALIBRATION_TOLERANCE = 0.01
 """Largest difference of focal length or principal point from the configuration, of the width."""
 MEASURED = (Status.OK, Status.HELD, Status.PARTIAL)
 """Image updates that measured the tip."""
 
 
-def check_joints(joints: Sequence[str]) -> None:
-    """Check the parameter of the joints' names.
+def joints_of(names: Sequence[str], config: Config) -> list[str]:
+    """The joints' names by the parameter; of a robot with [[dof]] by default those of its entries.
 
     Raises:
-        ValueError: They are not three different names.
+        ValueError: They are not different names, one per degree of freedom.
     """
-    if len(joints) != 3 or len(set(joints)) != 3:
+    labels = [dof.label for dof in config.dofs]
+    joints = labels if config.dof and list(names) == DEFAULT_JOINTS else list(names)
+    if len(joints) != len(labels) or len(set(joints)) != len(labels):
         raise ValueError(
-            f"Parameter joints: expected three different names, of insertion, rotation and "
-            f"bending, got {', '.join(joints)}"
+            f"Parameter joints: expected {len(labels)} different names, of {', '.join(labels)}, "
+            f"got {', '.join(names)}"
         )
+    return joints
 
 
 def nanoseconds(stamp: Any) -> int:
@@ -35,7 +39,7 @@ def nanoseconds(stamp: Any) -> int:
 
 
 def positions(message: Any, joints: Sequence[str]) -> NDArray[np.float64] | None:
-    """Positions (3,) of the joints in a JointState: by name, by order where it has no names.
+    """Positions (n,) of the joints in a JointState: by name, by order where it has no names.
 
     None if one is missing.
     """
@@ -70,6 +74,6 @@ def is_measured(report: Report) -> bool:
 
 
 def offsets(report: Report) -> list[float]:
-    """delta_minus and delta_plus of each DOF, one after the other (6,)."""
+    """delta_minus and delta_plus of each DOF, one after the other (2 n,)."""
     values = np.stack([report.delta_minus, report.delta_plus], axis=1)
     return [float(value) for value in values.ravel()]

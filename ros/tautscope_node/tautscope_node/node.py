@@ -5,12 +5,14 @@ from __future__ import annotations
 import signal
 import threading
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import rclpy
 from crtk_msgs.msg import OperatingState as OperatingStateMessage
 from crtk_msgs.msg import StringStamped
+from geometry_msgs.msg import PointStamped, PoseStamped, PoseWithCovarianceStamped
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.executors import MultiThreadedExecutor
@@ -21,16 +23,20 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.time import Time
 from sensor_msgs.msg import CameraInfo, Image, JointState
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
-from tautscope import Frame, load_config
+from tautscope import Frame, Sample, load_config
 from tautscope.errors import ConfigError, MessageError
+from tautscope.loop.measurement import Measurement
 from tautscope.loop.safety import Reaction
-from tautscope.ros2.inputs import ImageReader
+from tautscope.report.achieved import Achieved, achieved_text
+from tautscope.ros2.inputs import ImageReader, checked_stamp
+from tautscope.ros2.measurements import MeasurementReader
 
 from tautscope_node.control_loop import ControlLoop, OperatingState
 from tautscope_node.messages import (
+    DEFAULT_JOINTS,
     calibration_problem,
-    check_joints,
     is_measured,
+    joints_of,
     nanoseconds,
     offsets,
     positions,
@@ -38,12 +44,20 @@ from tautscope_node.messages import (
 from tautscope_node.status import REPORT_PERIOD, StatusPublisher
 
 MEASURED_TIMEOUT = 0.2
-"""Without a used image for this long, `measured_js` is invalid [s]."""
+"""Without a used measurement for this long, `measured_js` is invalid [s]."""
 LATEST = QoSProfile(depth=1)
 COMMANDS = QoSProfile(depth=10)
-SENSOR = QoSProfile(
-    depth=1, history=HistoryPolicy.KEEP_LAST, reliability=ReliabilityPolicy.BEST_EFFORT
+IMAGES, MEASUREMENTS = (
+    QoSProfile(
+        depth=depth, history=HistoryPolicy.KEEP_LAST, reliability=ReliabilityPolicy.BEST_EFFORT
+    )
+    for depth in (1, 10)
 )
+SENSORS = {
+    kind.__name__: kind
+    for kind in (JointState, PointStamped, PoseStamped, PoseWithCovarianceStamped)
+}
+"""`measurement.topics[].type` -> type of the messages."""
 
 
 class InstrumentNode(LifecycleNode):
@@ -56,7 +70,7 @@ class InstrumentNode(LifecycleNode):
     def __init__(self, **options: Any) -> None:
         super().__init__("tautscope", **options)
         self.declare_parameter("config", "")
-        self.declare_parameter("joints", ["insertion", "rotation", "bending"])
+        self.declare_parameter("joints", DEFAULT_JOINTS)
         self.declare_parameter("image_topic", "/endoscope/image_raw")
         self.declare_parameter("camera_info_topic", "/endoscope/camera_info")
         self.declare_parameter("frame_id", "guide")
@@ -72,10 +86,9 @@ class InstrumentNode(LifecycleNode):
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Read the configuration, and create the loop, publishers and subscriptions."""
         try:
-            self._joints = list(self.get_parameter("joints").value)
-            check_joints(self._joints)
             path = Path(self.get_parameter("config").value)
             self._config = load_config(path)
+            self._joints = joints_of(self.get_parameter("joints").value, self._config)
             self._image_topic = self.get_parameter("image_topic").value
             self._reader = ImageReader(self._image_topic, self._config.camera)
             self._detection = ThreadPoolExecutor(1, "detection")
@@ -88,6 +101,7 @@ class InstrumentNode(LifecycleNode):
         self._origin = self.get_clock().now().nanoseconds
         self._frame_id = self.get_parameter("frame_id").value
         self._newest: Frame | None = None
+        self._measurements: list[Measurement] = []
         self._sequence = 0
         self._arrived = self._replaced = self._used = 0
         self._measured_at = -1.0
@@ -99,6 +113,7 @@ class InstrumentNode(LifecycleNode):
         """Start the ticks; the state command `enable` starts the motion."""
         assert self._control is not None
         self._last_state = OperatingState.DISABLED
+        self._achieved = Achieved(self._config)
         self._session_timers = [
             self.create_timer(self._control.period, self._tick),
             self.create_timer(REPORT_PERIOD, self._report),
@@ -134,6 +149,8 @@ class InstrumentNode(LifecycleNode):
             self._control.disable()
             self._last_state = OperatingState.DISABLED
             self._status_publisher.publish_state(self._control)
+            if results := self._achieved.results():
+                self.get_logger().info(achieved_text(results, self._config))
 
     def _create_topics(self) -> None:
         publish, subscribe = self._publisher, self._subscribe
@@ -147,12 +164,21 @@ class InstrumentNode(LifecycleNode):
         subscribe(StringStamped, "state_command", self._on_state_command, COMMANDS)
         subscribe(JointState, "actuators/measured_js", self._on_measured, LATEST)
         subscribe(OperatingStateMessage, "actuators/operating_state", self._on_actuators, LATEST)
-        camera_info = self.get_parameter("camera_info_topic").value
-        subscribe(CameraInfo, camera_info, self._on_camera_info, LATEST)
-        group = MutuallyExclusiveCallbackGroup()
-        subscribe(Image, self._image_topic, self._on_image, SENSOR, callback_group=group)
+        if self._config.dof:
+            self._subscribe_sensors()
+        else:
+            camera_info = self.get_parameter("camera_info_topic").value
+            subscribe(CameraInfo, camera_info, self._on_camera_info, LATEST)
+            group = MutuallyExclusiveCallbackGroup()
+            subscribe(Image, self._image_topic, self._on_image, IMAGES, callback_group=group)
         assert self._control is not None
         self._status_publisher.publish_state(self._control)
+
+    def _subscribe_sensors(self) -> None:
+        for sensor, topic in enumerate(self._config.measurement.topics):
+            reader = MeasurementReader(self._config, sensor, topic.name)
+            callback = partial(self._on_measurement, reader, topic.name)
+            self._subscribe(SENSORS[topic.type], topic.name, callback, MEASUREMENTS)
 
     def _publisher(self, kind: Any, topic: str, qos: QoSProfile) -> Any:
         # Not those of the lifecycle: the state is published also while the node is not active.
@@ -213,6 +239,17 @@ class InstrumentNode(LifecycleNode):
         if self._problem:
             self.get_logger().error(self._problem, throttle_duration_sec=10.0)
 
+    def _on_measurement(self, reader: MeasurementReader, topic: str, message: Any) -> None:
+        self._arrived += 1
+        try:
+            stamp = checked_stamp(topic, message.header, self.get_clock().now().nanoseconds)
+            found = reader.read(message, 1e-9 * (stamp - self._origin))
+        except MessageError as error:
+            self.get_logger().error(str(error), throttle_duration_sec=1.0)
+            return
+        if found is not None:
+            self._measurements.append(found)
+
     def _on_image(self, message: Image) -> None:
         captured_at = 1e-9 * (nanoseconds(message.header.stamp) - self._origin)
         try:
@@ -229,8 +266,12 @@ class InstrumentNode(LifecycleNode):
         control = self._control
         if control is None:
             return
-        tick = control.step(self._now())
+        now = self._now()
+        tick = control.step(now)
         if tick.is_sent:
+            share = control.supervision.lead * self.get_parameter("compensation").value
+            sample = Sample(now, tick.command)
+            self._achieved.add_tick(sample, control.reference, tick.command, share)
             stamp = self.get_clock().now().to_msg()
             self._actuators.publish(self._joint_state(tick.command, stamp))
             self._setpoint.publish(self._joint_state(control.reference, stamp))
@@ -239,17 +280,22 @@ class InstrumentNode(LifecycleNode):
         self._last_state = tick.state
         # After the command, which never waits for an image.
         frame, self._newest = self._newest, None
-        for used, report in control.exchange(frame):
+        measurements, self._measurements = self._measurements, []
+        for seen, report in control.exchange(frame, measurements):
+            self._achieved.add_update(now, seen, report)
             self._used += 1
             stamp = Time().to_msg()
             if is_measured(report):
-                captured = self._origin + round(1e9 * used.captured_at)
+                captured = self._origin + round(1e9 * report.captured_at)
                 stamp = Time(nanoseconds=captured).to_msg()
                 self._measured_at = self._now()
             self._measured.publish(self._joint_state(report.state_estimate, stamp))
+            labels = [dof.label for dof in self._config.dofs]
             delta = Float64MultiArray()
             delta.layout.dim = [
-                MultiArrayDimension(label="insertion,rotation,bending", size=3, stride=6),
+                MultiArrayDimension(
+                    label=",".join(labels), size=len(labels), stride=2 * len(labels)
+                ),
                 MultiArrayDimension(label="minus,plus", size=2, stride=2),
             ]
             delta.data = offsets(report)
@@ -276,14 +322,15 @@ class InstrumentNode(LifecycleNode):
         if control.state is OperatingState.FAULT:
             # A message may be lost, and a drive may begin to listen later.
             self._stop_drives()
+        what = "measurements" if self._config.dof else "images"
         counts = {
-            "images arrived": self._arrived,
-            "images replaced by newer ones": self._replaced,
-            "images used": self._used,
+            f"{what} arrived": self._arrived,
+            f"{what} replaced by newer ones": self._replaced,
+            f"{what} used": self._used,
         }
         self._status_publisher.update(control, self._problem, counts)
         if self._now() - self._measured_at > MEASURED_TIMEOUT:
-            self._measured.publish(self._joint_state([0.0] * 3, Time().to_msg()))
+            self._measured.publish(self._joint_state([0.0] * len(self._joints), Time().to_msg()))
 
     def _on_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
         for parameter in parameters:

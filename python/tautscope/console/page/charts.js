@@ -1,11 +1,7 @@
 // Per degree of freedom: reference and tip over time, the loop, the offsets; with uPlot.
 
 const DEGREES = 180 / Math.PI;
-export const DOFS = [
-  { name: "insertion", scale: 1000, unit: "mm" },
-  { name: "rotation", scale: DEGREES, unit: "°" },
-  { name: "bending", scale: DEGREES, unit: "°" },
-];
+const SHOWN = { mm: { scale: 1000, unit: "mm" }, rad: { scale: DEGREES, unit: "°" } };
 const LENGTH = 600; // samples
 const SAMPLE = 0.04; // s
 const FRAME = 40; // ms; one degree of freedom is drawn in each
@@ -33,13 +29,15 @@ class DofCharts {
     this.dof = dof;
     const card = document.createElement("article");
     card.className = "dof";
-    card.innerHTML = `<h2><b>${dof.name}</b> error <b class="error"></b><span class="offsets"></span></h2>`;
+    const { unit, scale, range } = dof;
+    const ends = range?.map((end) => `${Math.round(scale * end)}`.replace("-", "−")).join(" to ");
+    card.innerHTML = `<h2><b>${dof.name}</b>${ends ? `<span class="range">${ends} ${unit}</span>` : ""}
+      error <b class="error"></b><span class="offsets"></span></h2>`;
     this.error = card.querySelector(".error");
     this.offsets = card.querySelector(".offsets");
-    const { unit } = dof;
     this.boxes = [
       ["over time: reference, command and tip",
-        `<span class="reference">reference</span> <span class="command">command</span> <span class="tip">tip</span> [${unit}]`],
+        `<span class="reference">reference</span> <span class="command">command</span> <span class="tip">tip</span> <span class="true" hidden>true tip</span> [${unit}]`],
       ["loop of tip over reference", `<span class="tip">tip</span> over reference [${unit}]`],
       ["contact offsets over time", `<span class="offset">contact offsets</span> [${unit}]`],
     ].map(([what, caption]) => {
@@ -80,8 +78,8 @@ class DofCharts {
     this.plots = [
       new uPlot({
         ...common(timeBox), scales: { x: time, y: { range: least(size) } }, axes: [axis(), vertical()],
-        series: [{}, line("reference"), line("command", 1), line("tip", 2)],
-      }, [[], [], [], []], timeBox),
+        series: [{}, line("reference"), line("command", 1), line("tip", 2), line("true", 1)],
+      }, [[], [], [], [], []], timeBox),
       new uPlot({
         ...common(loopBox), mode: 2, scales: { x: { time: false, range: least(size) }, y: { range: least(size) } },
         axes: [axis(), vertical()], series: [null, { ...line("tip", 1.5), paths: xyPath }],
@@ -95,9 +93,9 @@ class DofCharts {
   }
 
   draw(times, rows) {
-    const { reference, command, tip, minus, plus } = rows;
+    const { reference, command, tip, true: truth, minus, plus } = rows;
     const [time, loop, offsets] = this.plots;
-    time.setData([times, reference, command, tip]);
+    time.setData([times, reference, command, tip, truth]);
     loop.setData([null, [reference, tip]]);
     offsets.setData([times, minus, plus]);
   }
@@ -105,10 +103,12 @@ class DofCharts {
 
 /** All charts; `add` samples the states, which are drawn one degree of freedom at a time. */
 export class Charts {
-  constructor(parent) {
-    this.cards = DOFS.map((dof) => new DofCharts(dof, parent));
+  constructor(parent, dofs) {
+    this.dofs = dofs.map((dof) => ({ ...dof, ...SHOWN[dof.unit] }));
+    this.parent = parent;
+    this.cards = this.dofs.map((dof) => new DofCharts(dof, parent));
     this.times = [];
-    this.rows = DOFS.map(() => ({ reference: [], command: [], tip: [], minus: [], plus: [] }));
+    this.rows = dofs.map(() => ({ reference: [], command: [], tip: [], true: [], minus: [], plus: [] }));
     this.next = 0;
     const rebuild = () => this.cards.forEach((card) => card.rebuild());
     rebuild(); // the observer first calls when the page is rendered, which a hidden one is not
@@ -122,11 +122,13 @@ export class Charts {
     if (state.time < last) this.#clear();
     else if (state.time - last < SAMPLE * 0.9) return;
     this.times.push(state.time);
-    DOFS.forEach(({ scale }, k) => {
+    if (state.true) this.parent.querySelectorAll(".true").forEach((element) => (element.hidden = false));
+    this.dofs.forEach(({ scale }, k) => {
       const row = this.rows[k];
       row.reference.push(scale * state.reference[k]);
       row.command.push(scale * state.command[k]);
       row.tip.push(state.tip[k] === null ? null : scale * state.tip[k]);
+      row.true.push(state.true ? scale * state.true[k] : null);
       row.minus.push(scale * state.delta_minus[k]);
       row.plus.push(scale * state.delta_plus[k]);
     });
@@ -135,7 +137,7 @@ export class Charts {
 
   /** Numbers beside the charts. */
   describe(state) {
-    DOFS.forEach(({ scale, unit }, k) => {
+    this.dofs.forEach(({ scale, unit }, k) => {
       const number = (value) => (value === null ? "–" : `${(scale * value).toFixed(unit === "mm" ? 2 : 1)} ${unit}`);
       const card = this.cards[k];
       card.error.textContent = state.tip[k] === null ? "–" : number(state.reference[k] - state.tip[k]);
@@ -151,7 +153,7 @@ export class Charts {
   }
 
   #draw() {
-    this.next = (this.next + 1) % DOFS.length;
+    this.next = (this.next + 1) % this.dofs.length;
     if (this.times.length > 1 && !document.hidden) this.cards[this.next].draw(this.times, this.rows[this.next]);
   }
 }

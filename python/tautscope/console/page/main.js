@@ -1,8 +1,9 @@
 // The operator's console: connects the two links with what is shown and with the controls.
 
-import { Charts, DOFS } from "./charts.js";
+import { Charts } from "./charts.js";
 import { ImageView } from "./image.js";
 import { Link, readToken } from "./link.js";
+import { PathView } from "./path.js";
 import { Sound } from "./sound.js";
 import { Steering } from "./steer.js";
 
@@ -12,11 +13,12 @@ const WORDS = {
   ready: "READY", moving: "MOVING", held: "HELD", stopped: "STOPPED", off: "OFF", opening: "ENABLING", lost: "NO DATA",
   replay: "REPLAY",
 };
-const KEY_NAMES = ["↑ ↓", "← →", "W S"];
 
 const $ = (id) => document.getElementById(id);
 document.body.classList.toggle("viewing", new URLSearchParams(location.search).has("view"));
 
+let layout = null;
+let charts, steering, rows;
 let state = null;
 let client = null;
 let receivedAt = -Infinity;
@@ -32,7 +34,8 @@ const hasLease = () => state !== null && client !== null && state.holder === cli
 function command(kind) {
   if (!hasLease()) return null;
   sequences[kind] += 1;
-  return { lease: state.lease, sequence: sequences[kind], image: view.sequence };
+  const image = layout.sees_bands ? view.sequence : state.image.sequence;
+  return { lease: state.lease, sequence: sequences[kind], image };
 }
 
 function request(fields) {
@@ -51,14 +54,19 @@ const stop = () => control.send({ type: "stop" });
 const control = new Link("/control", token, {
   onMessage(data) {
     const message = JSON.parse(data);
-    if (message.type === "welcome") client = message.client;
-    else if (message.type === "reply") {
+    if (message.type === "welcome") {
+      client = message.client;
+      if (!layout) build(message.layout);
+    } else if (message.type === "reply") {
       const { what, is_accepted: isAccepted, reason } = message.reply;
       reply(isAccepted ? `${what}: done` : `${what}: refused, ${reason}`, !isAccepted);
     } else {
       state = { ...message.state, latency: message.latency };
       receivedAt = performance.now();
       charts.add(state);
+      if (state.positions) path.add(state);
+      updates.push([state.time, state.image.updates]);
+      if (updates.length > 100) updates.shift();
     }
   },
   onClose() {
@@ -67,8 +75,8 @@ const control = new Link("/control", token, {
 });
 const video = new Link("/video", token, { onMessage: (data) => view.receive(data) });
 const view = new ImageView($("image"), (image, width) => video.send({ type: "drawn", image, width }));
-const charts = new Charts($("charts"));
-const steering = new Steering({ getCommand: () => command("servo"), send: (message) => control.send(message), onStop: stop });
+const path = new PathView($("path"));
+const updates = []; // time and number of updates, of the newest states
 
 // Controls
 
@@ -85,17 +93,35 @@ $("compensate").addEventListener("change", setCompensation);
 $("gain").addEventListener("change", setCompensation);
 $("profile").addEventListener("change", () => request({ type: "profile", profile: $("profile").value }));
 
-const rows = DOFS.map(({ name }, k) => {
-  $("dofs").insertAdjacentHTML("beforeend", `<span>${name}</span><kbd>${KEY_NAMES[k]}</kbd>
+/** The page of an instrument. */
+function build(found) {
+  layout = found;
+  const { dofs, programs, profiles, sees_bands: seesBands } = layout;
+  if (seesBands) document.body.dataset.view = "image";
+  document.body.dataset.dofs = dofs.length > 3 ? "many" : "few";
+  document.body.style.setProperty("--dofs", dofs.length);
+  for (const button of document.querySelectorAll("[data-program]")) button.hidden = !programs.includes(button.dataset.action);
+  $("profile").parentElement.hidden = profiles.length < 2;
+  $("legend").hidden = !seesBands;
+  charts = new Charts($("charts"), dofs);
+  const send = (message) => control.send(message);
+  steering = new Steering({ count: dofs.length, getCommand: () => command("servo"), send, onStop: stop });
+  rows = dofs.map(controlsOf);
+}
+
+function controlsOf({ name }, k) {
+  $("dofs").insertAdjacentHTML("beforeend", `<span>${name}</span><span><kbd></kbd><span class="touch">
+    <button aria-label="${name} backwards">−</button> <button aria-label="${name} forwards">+</button></span></span>
     <input type="range" min="0.05" max="1" step="0.05" aria-label="scale of ${name}"><output></output>
     <label><input type="checkbox" checked> clutch</label>`);
-  const [clutch, scale] = ["checkbox", "range"].map((type) => [...$("dofs").querySelectorAll(`[type=${type}]`)].at(-1));
-  const output = [...$("dofs").querySelectorAll("output")].at(-1);
+  const last = (selector) => [...$("dofs").querySelectorAll(selector)].at(-1);
+  const [clutch, scale, output, keys] = ["[type=checkbox]", "[type=range]", "output", "kbd"].map(last);
+  [...last(".touch").children].forEach((button, side) => steering.bind(button, k, 2 * side - 1));
   scale.addEventListener("change", () => request({ type: "setting", name: "scale", value: Number(scale.value), dof: name }));
   clutch.addEventListener("change", () =>
     request({ type: "setting", name: "clutch", value: clutch.checked ? 1 : 0, dof: name }));
-  return { scale, clutch, output };
-});
+  return { scale, clutch, output, keys };
+}
 
 // What is shown, ten times a second
 
@@ -115,12 +141,18 @@ function duration(seconds) {
 function facts() {
   const { image, log, late } = state;
   const refused = Object.values(state.refused).reduce((a, b) => a + b, 0);
-  const list = {
-    profile: state.profile,
-    images: `${view.rate.toFixed(1)}/s, ${image.status}`,
-    "capture to estimate": `${(1000 * image.age).toFixed(0)} ms`,
+  const ofImages = layout.sees_bands && {
     "image to screen": state.latency ? `${state.latency.map((time) => (1000 * time).toFixed(0)).join(" ms, 95 %: ")} ms` : "–",
     "images dropped": image.dropped,
+  };
+  const [since, before] = updates[0];
+  const measured = state.time > since ? (image.updates - before) / (state.time - since) : 0;
+  const list = {
+    profile: state.profile,
+    [layout.sees_bands ? "images" : "measurements"]:
+      `${(layout.sees_bands ? view.rate : measured).toFixed(1)}/s, ${layout.sees_bands || image.updates ? image.status : "none"}`,
+    "capture to estimate": `${(1000 * image.age).toFixed(0)} ms`,
+    ...ofImages,
     drives: state.drives,
     "late ticks": late[1] ? `${late[0]} of ${late[1]}` : "–",
     "commands refused": refused,
@@ -166,7 +198,8 @@ function showControls() {
   if (share > 0) show($("gain"), share);
   $("gain_value").textContent = `${Math.round(100 * share)} %`;
   show($("profile"), state.profile);
-  rows.forEach(({ scale, clutch, output }, k) => {
+  rows.forEach(({ scale, clutch, output, keys }, k) => {
+    keys.textContent = steering.keyName(k);
     show(scale, state.scale[k]);
     output.textContent = `${Math.round(100 * state.scale[k])} %`;
     if (document.activeElement !== clutch) clutch.checked = state.clutch[k];
@@ -185,7 +218,9 @@ function hint() {
   if (["stopped", "held", "off"].includes(state.motion)) return "Press Enable; then hold a key to move.";
   if (state.rested_by) return `Motion ended: ${state.rested_by}. Let go, then hold again.`;
   if (state.must_release) return "Let go of all keys and buttons, then hold one to move.";
-  return "Hold a key, or a shoulder button of the gamepad and its sticks, to move. Escape stops.";
+  const pick = rows.length > 3 ? ` Keys 3 to ${rows.length}, or the pad's cross, pick what W S and the right stick move.` : "";
+  const touch = matchMedia("(any-pointer: coarse), (max-width: 700px)").matches ? "Hold − or +, or hold" : "Hold";
+  return `${touch} a key, or a shoulder button of the gamepad and its sticks, to move. Escape stops.${pick}`;
 }
 
 function update() {
@@ -197,8 +232,10 @@ function update() {
     motion = document.body.dataset.motion = now;
     $("motion").textContent = WORDS[now];
   }
+  if (!layout) return;
+  const hasImage = layout.sees_bands || view.sequence > 0;
   const isOld = performance.now() - view.drawnAt > LOST;
-  $("stale").hidden = !isOld;
+  $("stale").hidden = !isOld || !hasImage;
   if (isLost) {
     $("message").textContent = "No data from the control process. Motion has stopped; use the emergency stop if not.";
     return;
@@ -206,6 +243,8 @@ function update() {
   $("message").textContent = state.message;
   $("mode").textContent = MODES[state.mode];
   $("mode").dataset.mode = state.mode;
+  document.body.dataset.view = hasImage ? "image" : state.positions ? "path" : "none";
+  for (const element of document.querySelectorAll(".picture")) element.hidden = !hasImage;
   charts.describe(state);
   showWarnings();
   showLease();

@@ -1,0 +1,85 @@
+"""Any rig in real time, opened as often as the operator enables it."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from typing import TypeVar
+
+from numpy.typing import ArrayLike
+
+from tautscope.errors import DriveError, TautscopeError
+from tautscope.loop.rig import Rig, Sample
+
+T = TypeVar("T")
+
+
+class Pace:
+    """Waits for the ends of control periods; who comes late does not catch up.
+
+    Args:
+        period: The control period [s].
+    """
+
+    def __init__(self, period: float) -> None:
+        self._period = period
+        self._due = time.monotonic()
+
+    def wait(self) -> None:
+        """Wait for the end of the period that follows the last one."""
+        self._due += self._period
+        late = math.floor((time.monotonic() - self._due) / self._period)
+        self._due += max(late, 0) * self._period
+        time.sleep(max(0.0, self._due - time.monotonic()))
+
+
+class PacedRig:
+    """A rig that is made anew at each `reset`, in real time also where its `step` does not wait.
+
+    Args:
+        make: Makes the rig.
+        control_period: Its control period [s].
+        is_simulated: Whether no motors move.
+
+    Raises:
+        DriveError: In place of any error of the rig that is none of this package.
+    """
+
+    def __init__(
+        self, make: Callable[[], Rig], control_period: float, *, is_simulated: bool
+    ) -> None:
+        self._make, self.control_period, self.is_simulated = make, control_period, is_simulated
+        self._rig: Rig | None = None
+        self._pace = Pace(control_period)
+
+    def reset(self) -> Sample:
+        """Make a rig, and go to its start."""
+        self.close()
+        self._rig = self._checked(self._make)
+        sample = self._checked(self._rig.reset)
+        self._pace = Pace(self.control_period)
+        return sample
+
+    def step(self, command: ArrayLike) -> Sample:
+        """Send a command (n,) [m or rad], and wait for the end of the control period."""
+        rig = self._rig
+        assert rig is not None
+        sample = self._checked(lambda: rig.step(command))
+        self._pace.wait()
+        return sample
+
+    def close(self) -> None:
+        """Stop the motors; the next `reset` makes another rig."""
+        rig, self._rig = self._rig, None
+        if rig is not None:
+            self._checked(rig.close)
+
+    @staticmethod
+    def _checked(call: Callable[[], T]) -> T:
+        try:
+            return call()
+        except TautscopeError:
+            raise
+        except Exception as error:
+            raise DriveError("rig", f"{type(error).__name__}: {error}", "See to the rig") from error

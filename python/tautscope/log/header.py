@@ -1,0 +1,91 @@
+"""The messages at the start of a log: configuration, run, versions and camera."""
+
+from __future__ import annotations
+
+import json
+import platform
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.metadata import version
+from typing import Any
+
+import tomlkit
+
+from tautscope._core import __version__
+from tautscope.config import CameraConfig, Config, dump_config, from_document
+from tautscope.errors import ConfigError, RecordError
+from tautscope.log import topics
+from tautscope.log.fields import header_of
+from tautscope.loop.references import Segment
+from tautscope.runs.recording import read_run_facts, run_facts
+
+
+@dataclass(frozen=True, slots=True)
+class RunInfo:
+    """The data of a run that are known before it starts."""
+
+    config: Config
+    compensated: bool
+    segments: tuple[Segment, ...]
+
+
+def header_messages(info: RunInfo, stamp: int) -> dict[str, bytes]:
+    """The messages at the start of a log: configuration, run, versions, and a camera if used."""
+    config = info.config
+    versions = {
+        "tautscope": __version__,
+        "python": platform.python_version(),
+        "machine": f"{platform.system()} {platform.machine()}",
+        **{name: version(name) for name in ("numpy", "opencv-python-headless", "mcap")},
+    }
+    messages = {
+        topics.CONFIG: {"data": dump_config(config)},
+        topics.RUN: {"data": tomlkit.dumps(run_facts(info.compensated, info.segments))},
+        topics.VERSIONS: {"data": json.dumps(versions)},
+    }
+    if not config.dof:
+        messages[topics.CAMERA_INFO] = _camera_info(config.camera, stamp)
+    return topics.encode_all(messages)
+
+
+def read_header(messages: Mapping[str, bytes]) -> tuple[RunInfo, dict[str, str]]:
+    """Read run data and versions from the messages of `header_messages`.
+
+    Raises:
+        RecordError: A message is missing or invalid.
+        ConfigError: The configuration has a key that this version does not know.
+    """
+    try:
+        texts = {
+            topic: topics.decode(topic, messages[topic])["data"]
+            for topic in (topics.CONFIG, topics.RUN, topics.VERSIONS)
+        }
+        config = from_document(tomllib.loads(texts[topics.CONFIG]))
+        compensated, segments = read_run_facts(texts[topics.RUN], config)
+        versions = json.loads(texts[topics.VERSIONS])
+    except ConfigError:
+        raise
+    except (KeyError, TypeError, ValueError) as error:
+        allowed = f"a log of tautscope, with {topics.CONFIG}, {topics.RUN} and {topics.VERSIONS}"
+        raise RecordError("log", f"{type(error).__name__}: {error}", allowed) from None
+    return RunInfo(config, compensated, segments), versions
+
+
+def _camera_info(camera: CameraConfig, stamp: int) -> dict[str, Any]:
+    """sensor_msgs/msg/CameraInfo."""
+    intrinsics = (camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0)
+    window = {"x_offset": 0, "y_offset": 0, "height": 0, "width": 0, "do_rectify": False}
+    return {
+        "header": header_of(stamp, "endoscope"),
+        "height": camera.height,
+        "width": camera.width,
+        "distortion_model": "rational_polynomial",
+        "d": camera.distortion,
+        "k": intrinsics,
+        "r": (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
+        "p": (camera.fx, 0.0, camera.cx, 0.0, 0.0, camera.fy, camera.cy, *[0.0] * 3, 1.0, 0.0),
+        "binning_x": 0,
+        "binning_y": 0,
+        "roi": window,
+    }

@@ -1,0 +1,73 @@
+"""What the compensation of a run without an end achieved in the last minutes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from tautscope.config import Config
+from tautscope.loop.measurement import Measurement
+from tautscope.loop.reduction import Report
+from tautscope.loop.rig import Frame, Sample
+from tautscope.report.robot_run import RobotResult, RobotRun
+from tautscope.runs.recording import Floats, Recording
+from tautscope.runs.run_recorder import RunRecorder, update_row
+
+WINDOW = 120.0
+"""Duration of the ticks that are kept, with and without compensation each [s]."""
+
+
+class Achieved:
+    """Records the last `WINDOW` of ticks with all compensation, and of those without any.
+
+    Args:
+        config: Of the loop.
+    """
+
+    def __init__(self, config: Config) -> None:
+        self._config, self._updates = config, 0
+        most = round(WINDOW / config.control.period)
+        self._without, self._with = (RunRecorder(config, most) for _ in range(2))
+
+    def add_tick(self, sample: Sample, reference: Floats, command: Floats, share: float) -> None:
+        """Add a tick with a share of the compensation, 0 to 1."""
+        if share in (0.0, 1.0):
+            recorder = self._with if share else self._without
+            recorder.add_tick(sample, reference, command)
+
+    def add_update(self, now: float, source: Frame | Measurement, report: Report) -> None:
+        """Add an update by an image or a measurement that arrived at `now` [s]."""
+        self._updates += 1
+        row = update_row(now, source, report, self._updates)
+        for recorder in (self._without, self._with):
+            recorder.add_frame(row, report.delta_minus, report.delta_plus)
+
+    def results(self) -> list[RobotResult]:
+        """Of each degree of freedom; none where the tip was not measured with compensation."""
+        without, with_it = (
+            Recording(*recorder.tables(), self._config, is_on, ())
+            for is_on, recorder in ((False, self._without), (True, self._with))
+        )
+        if not _is_measured(with_it):
+            return []
+        return RobotRun(without if _is_measured(without) else None, with_it).results
+
+
+def achieved_text(results: Iterable[RobotResult], config: Config) -> str:
+    """One line with the figures of each degree of freedom."""
+    parts = []
+    for result, dof in zip(results, config.dofs, strict=True):
+        scale, unit = dof.display_scale, result.unit
+        before = result.uncompensated_rms
+        known = "" if np.isnan(before) else f", {scale * before:.3g} without compensation"
+        parts.append(
+            f"{result.name} {scale * result.compensated_rms:.3g} {unit}{known}, "
+            f"slack found {scale * result.slack:.3g} {unit}"
+        )
+    return "Tip less reference, RMS: " + "; ".join(parts)
+
+
+def _is_measured(recording: Recording) -> bool:
+    """Whether the tip is known in the part of a recording that is evaluated."""
+    return len(recording.trace) > 1 and bool(np.isfinite(recording.tracking_error(0.0)[-1]).all())

@@ -1,0 +1,216 @@
+"""The console of robots with [[dof]]: a rig of one's own, the colonoscope, any number of axes."""
+
+from __future__ import annotations
+
+import multiprocessing
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import own_catheter
+import pytest
+from running import Arm, Page, RunningConsole, rests, running_console
+from tautscope.config import Config, DofEntry, load_config
+from tautscope.console import log_player, paced_rig
+from tautscope.console.lease import ImageTimes, Lease
+from tautscope.console.messages import Received, Servo, decode_state
+from tautscope.console.operator_input import OperatorInput
+from tautscope.console.paced_rig import PacedRig
+from tautscope.console.shared import Channels, SharedMemory
+from tautscope.console.start import make_rig
+from tautscope.log.reader import Log, Tick, read_log
+from tautscope.log.replay import replay_same
+from tautscope.loop.kinematics import TwoPlanes
+from tautscope.loop.rig import Rig, Sample
+from tautscope.runs.rigs import rig_maker
+from tautscope.twin.colonoscope import ColonoscopeTwin
+
+SLACK = 0.3
+"""Of the catheter to each side [rad]."""
+
+
+@contextmanager
+def console_of(
+    folder: Path, config: Config, make: Callable[[Config], Rig], *, is_twin: bool
+) -> Iterator[RunningConsole]:
+    rig, config = make_rig(config, is_twin=is_twin, make=make)
+    with running_console(folder, config, rig) as console:
+        yield console
+
+
+def test_a_newcomers_catheter_follows_stops_replays_and_fails(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    closed: list[Rig] = []
+
+    def close(rig: Rig) -> None:
+        closed.append(rig)
+
+    monkeypatch.setattr(own_catheter.Catheter, "close", close)
+    make = rig_maker("own_catheter:Catheter")
+    with console_of(tmp_path, own_catheter.CONFIG, make, is_twin=False) as console:
+        page, watcher = console.page(), console.page()
+        page.take()
+        assert page.state["mode"] == "hardware"
+        assert page.state["motion"] == "off"  # motors wait for the operator
+        page.servo((0.0, 0.0), is_holding=False)
+        assert page.request(type="action", name="enable")["is_accepted"]
+        assert page.request(type="setting", name="scale", value=1.0, dof="bend_x")["is_accepted"]
+        bend(page, 1, lambda: page.state["reference"][0] > 0.9)
+        bend(page, -1, lambda: page.state["reference"][0] < 0.1)
+        true, reference = (np.array(page.state[name]) for name in ("true", "reference"))
+        assert reference[1] == 0
+        assert abs(true - reference).max() < SLACK / 2  # by itself it lags by its slack
+        assert page.state["image"]["updates"] > 20
+        tip, target = (page.state["positions"][name] for name in ("true", "reference"))
+        assert np.hypot(*np.subtract(tip, target)[:2]) < 0.06 * SLACK / 2  # of a length of 6 cm
+        page.servo((1.0, 0.0))
+        watcher.send({"type": "stop"})
+        page.wait(lambda: page.state["motion"] == "stopped")
+        assert console.control.run is None
+        assert len(closed) == 1
+        # Enabled again it is a new one, and what fails in it is shown.
+        page.servo((0.0, 0.0), is_holding=False)
+        assert page.request(type="action", name="enable")["is_accepted"]
+        page.wait(lambda: page.state["motion"] == "ready")
+        monkeypatch.setattr(own_catheter.Catheter, "step", broken)
+        page.wait(lambda: page.state["motion"] == "off")
+        assert "rig: OSError: cable pulled" in page.state["message"]
+        assert len(closed) == 2
+        assert closed[0] is not closed[1]
+    log = read_log(tmp_path / "console-1.mcap")
+    comparison, _ = replay_same(log)
+    assert comparison.ended == ""
+    assert comparison.same_ticks == comparison.ticks > 100
+    assert comparison.same_updates == comparison.updates > 20
+    is_shown_by_the_player(log, monkeypatch)
+
+
+def is_shown_by_the_player(log: Log, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The page of a log has its commands, and positions by its kinematics."""
+    monkeypatch.setattr(log_player, "STATE_PERIOD", 0.0)
+    monkeypatch.setattr(time, "sleep", lambda pause: None)  # at once
+    memory = SharedMemory(multiprocessing.get_context("spawn"), log.config)
+    shown, states = Channels(memory), []
+    player = log_player.LogPlayer(log, Channels(memory))
+
+    def look() -> bool:
+        if (found := shown.state.newest()) is not None:
+            states.append(decode_state(found[1]))
+        return True
+
+    try:
+        player.run(look)
+    finally:
+        player.close()
+    ticks = [event for event in log.events.values() if isinstance(event, Tick)]
+    by_time = {tick.sample.time: tick for tick in ticks}
+    compared = [state for state in states if state["time"] in by_time]
+    assert len(compared) > 100
+    kinematics = TwoPlanes(log.config)
+    for state in compared:
+        tick = by_time[state["time"]]
+        assert np.allclose(state["command"], tick.command)
+        assert np.allclose(state["positions"]["true"], kinematics.tip(tick.sample.true_state)[0])
+
+
+def broken(*_: object) -> Sample:
+    raise OSError("cable pulled")
+
+
+def bend(page: Page, sign: int, is_done: Callable[[], bool]) -> None:
+    """Bend the first plane until a condition holds, then let go."""
+    deflection = (float(sign), 0.0)
+
+    def hold() -> bool:
+        page.servo(deflection, is_holding=not page.state["must_release"])
+        return is_done()
+
+    page.wait(hold, 0.02)
+    page.servo((0.0, 0.0), is_holding=False)
+    page.wait(lambda: page.state["motion"] == "ready")
+
+
+@pytest.fixture(scope="module")
+def colonoscope(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningConsole]:
+    folder = tmp_path_factory.mktemp("colonoscope")
+    make: Callable[[Config], Rig] = lambda _: ColonoscopeTwin()  # noqa: E731
+    with console_of(folder, load_config("colonoscope"), make, is_twin=True) as console:
+        yield console
+
+
+def test_each_degree_of_freedom_of_the_colonoscope_moves_alone(colonoscope: RunningConsole) -> None:
+    page = colonoscope.page()
+    assert [dof["name"] for dof in page.layout["dofs"]] == ["bend_x", "bend_y", "insertion"]
+    assert [dof["unit"] for dof in page.layout["dofs"]] == ["rad", "rad", "mm"]
+    assert page.layout["dofs"][2]["range"] == [-0.05, 0.05]
+    page.take()
+    for index in range(3):
+        before = np.array(page.state["reference"])
+        page.move(tuple(float(k == index) for k in range(3)))
+        page.servo((0.0, 0.0, 0.0), is_holding=False)
+        page.wait(lambda: page.state["motion"] == "ready")
+        moved = np.array(page.state["reference"]) - before
+        assert list(np.flatnonzero(moved)) == [index]
+    assert rests(colonoscope)
+    page.close()
+
+
+def test_what_is_the_articles_is_refused(colonoscope: RunningConsole) -> None:
+    page = colonoscope.page()
+    page.take()
+    assert page.layout["programs"] == ["home"]
+    page.let_go()
+    for name in ("sweep", "experiment"):
+        reply = page.request(type="action", name=name)
+        assert reply["reason"] == "only the article's instrument has this program"
+    assert '"best" with [[dof]]' in page.request(type="profile", profile="paper")["reason"]
+    reply = page.request(type="setting", name="clutch", value=0, dof="rotation")
+    assert reply["reason"] == "no degree of freedom 'rotation'"
+    refused = colonoscope.control.operator.refused
+    page.servo((1.0, 0.0))
+    page.wait(lambda: refused["not one deflection per degree of freedom"] > 0)
+    assert rests(colonoscope, 0.1)
+    page.close()
+
+
+def test_any_range_can_be_steered_and_is_not_left() -> None:
+    wide, narrow = (-2.0, 3.0), (0.0, 0.2)
+    dofs = [DofEntry(name=f"a{k}", width_limit=1.0, range=r) for k, r in enumerate((wide, narrow))]
+    images = ImageTimes()
+    lease = Lease(images)
+    operator = OperatorInput(Config(dof=tuple(dofs)), lease)
+    operator.scale[:] = 1
+    lease.take(1)
+    now, sequence = 0.0, 0
+    for sign, ends in ((1, (2.75, 0.15)), (-1, (-1.75, 0.05))):
+        for is_holding in (False, *[True] * 1000):
+            now, sequence = now + 0.005, sequence + 1
+            servo = Servo(lease.number, sequence, images.add(now), (sign, sign), is_holding)
+            operator.receive(Received(1, now, servo), now)
+            operator.update(now, 0.005, operator.reference, is_held=False)
+        # A quarter of the width within the range, or of a range that is narrower.
+        assert np.allclose(operator.reference, ends, atol=2 * 0.75 * 0.005)
+
+
+def test_a_rig_that_does_not_wait_is_paced_and_one_that_is_late_does_not_catch_up(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    clock = SimpleNamespace(now=100.0, monotonic=lambda: clock.now)
+    clock.sleep = lambda pause: setattr(clock, "now", clock.now + pause)
+    monkeypatch.setattr(paced_rig, "time", clock)
+    arm = Arm(1)
+    rig = PacedRig(lambda: arm, arm.control_period, is_simulated=True)
+    rig.reset()
+    for _ in range(10):
+        rig.step([0.0])
+    assert clock.now == pytest.approx(100.0 + 10 * 0.005)
+    clock.now += 0.063
+    rig.step([0.0])
+    before = clock.now
+    for _ in range(10):
+        rig.step([0.0])
+    assert 0.045 <= clock.now - before <= 0.05
