@@ -11,11 +11,11 @@ const STEPS: usize = 8;
 
 /// What is believed of the state before an image is looked at: normal, each DOF by itself.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Belief {
-    /// Most probable state (3,) [m, rad, rad].
-    pub state: PerDof<f64>,
-    /// Standard deviations (3,) [m, rad, rad].
-    pub deviation: PerDof<f64>,
+pub struct Belief<const N: usize = 3> {
+    /// Most probable state (N,) [m or rad].
+    pub state: [f64; N],
+    /// Standard deviations (N,) [m or rad].
+    pub deviation: [f64; N],
 }
 
 /// By how much to [`turn`] a state, in rad, for the name of its posture that is nearer to an expected one; 0: not.

@@ -1,11 +1,10 @@
 //! State prediction of profile `paper` for the marker detection.
 
-use crate::article::state::StateEstimate;
-use crate::dof::PerDof;
+use crate::dof::zip_with;
 use crate::error::{ConfigError, require_positive};
 use crate::estimation::history::Entry;
-use crate::estimation::posture::{Belief, half_turn, turn};
-use crate::math::linear::{add, square};
+use crate::estimation::posture::Belief;
+use crate::math::linear::square;
 
 /// Error of one linear step, as a share of the step.
 const STEP_ERROR: f64 = 0.25;
@@ -25,9 +24,9 @@ const MISSED: f64 = 0.15;
 /// and, of the linear step of Eq. (16), a quarter of the correction. Every image without markers makes it half as large
 /// again, up to a part of `start_deviation`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StatePrediction {
-    start_deviation: PerDof<f64>,
-    last: PerDof<Last>,
+pub struct StatePrediction<const N: usize> {
+    start_deviation: [f64; N],
+    last: [Last; N],
 }
 
 /// One DOF at the last image that determined it.
@@ -40,7 +39,11 @@ struct Last {
 }
 
 /// Standard deviation of an estimate by one linear step from the predicted state to `state`, from that of the markers.
-pub fn step_deviation(past: &Entry, state: PerDof<f64>, deviation: PerDof<f64>) -> PerDof<f64> {
+pub fn step_deviation<const N: usize>(
+    past: &Entry<N>,
+    state: [f64; N],
+    deviation: [f64; N],
+) -> [f64; N] {
     let mut own = deviation;
     let seen = state.into_iter().zip(past.predicted_state);
     for (own, (state, predicted)) in own.iter_mut().zip(seen) {
@@ -49,12 +52,12 @@ pub fn step_deviation(past: &Entry, state: PerDof<f64>, deviation: PerDof<f64>) 
     own
 }
 
-impl StatePrediction {
+impl<const N: usize> StatePrediction<N> {
     /// Before the first image: at the prediction.
     ///
     /// # Errors
     /// A start deviation is not a finite number above 0.
-    pub fn new(start_deviation: PerDof<f64>) -> Result<Self, ConfigError> {
+    pub fn new(start_deviation: [f64; N]) -> Result<Self, ConfigError> {
         for start in start_deviation {
             require_positive("start_deviation", start)?;
         }
@@ -70,9 +73,9 @@ impl StatePrediction {
     }
 
     /// The prediction at a moment of the history.
-    pub(crate) fn at(&self, past: &Entry) -> Belief {
+    pub(crate) fn at(&self, past: &Entry<N>) -> Belief<N> {
         let mut belief = Belief {
-            state: add(past.predicted_state, -1.0, past.corrected),
+            state: zip_with(past.predicted_state, past.corrected, |q, moved| q - moved),
             deviation: self.start_deviation,
         };
         let now = belief.state.iter_mut().zip(&mut belief.deviation);
@@ -82,44 +85,34 @@ impl StatePrediction {
             let variance = square(last.deviation) + square(moved);
             *deviation = deviation.min(libm::sqrt(variance));
         }
-        belief.state = turn(belief.state, half_turn(past.predicted_state, belief.state));
         belief
     }
 
-    /// Updates the prediction with an estimate by one linear step, with its standard deviation by [`step_deviation`].
-    pub(crate) fn update(
-        &mut self,
-        past: &Entry,
-        estimate: &StateEstimate,
-        deviation: PerDof<f64>,
-    ) {
-        self.set(past, estimate.state, deviation, estimate.observable);
-    }
-
-    /// Makes the prediction less certain after an image without markers.
-    pub(crate) fn miss(&mut self, past: &Entry) {
-        let Belief { state, deviation } = self.at(past);
-        let mut wider = deviation;
+    /// Makes the prediction `prior` less certain after an image without markers.
+    pub(crate) fn miss(&mut self, past: &Entry<N>, prior: &Belief<N>) {
+        let mut wider = prior.deviation;
         for (deviation, start) in wider.iter_mut().zip(self.start_deviation) {
             *deviation = deviation.max((MISS * *deviation).min(MISSED * start));
         }
-        self.set(past, state, wider, [true; 3]);
+        self.set(past, prior.state, wider, [true; N]);
     }
 
-    /// Makes the prediction as uncertain as at the start.
-    pub(crate) fn reset(&mut self, past: &Entry) {
-        let state = self.at(past).state;
-        self.set(past, state, self.start_deviation, [true; 3]);
+    /// Makes the prediction `prior` as uncertain as at the start.
+    pub(crate) fn reset(&mut self, past: &Entry<N>, prior: &Belief<N>) {
+        self.set(past, prior.state, self.start_deviation, [true; N]);
     }
 
-    fn set(
+    /// Sets the prediction of the DOFs that are `known` to an estimate by one linear step, with its standard deviation by
+    /// [`step_deviation`].
+    pub(crate) fn set(
         &mut self,
-        past: &Entry,
-        state: PerDof<f64>,
-        deviation: PerDof<f64>,
-        known: PerDof<bool>,
+        past: &Entry<N>,
+        state: [f64; N],
+        deviation: [f64; N],
+        known: [bool; N],
     ) {
-        let correction = add(add(state, -1.0, past.predicted_state), 1.0, past.corrected);
+        let apart = zip_with(state, past.predicted_state, |state, q| state - q);
+        let correction = zip_with(apart, past.corrected, |apart, moved| apart + moved);
         let new = correction.iter().zip(deviation).zip(past.travel);
         for ((last, known), ((correction, deviation), travel)) in
             self.last.iter_mut().zip(known).zip(new)

@@ -15,8 +15,7 @@ use crate::r#loop::image_update::completeness;
 use crate::r#loop::measurement::Measurement;
 use crate::r#loop::paper::state_estimator;
 use crate::r#loop::profile::{BandBlocks, BandsView, Image, Seen};
-use crate::r#loop::reduction::HysteresisReduction;
-use crate::r#loop::report::HysteresisEstimate;
+use crate::r#loop::report::GeometryEstimate;
 use crate::r#loop::settings::Settings;
 use crate::model::features::{FeatureModel, FeaturePrediction};
 
@@ -152,6 +151,16 @@ impl BandBlocks for Best {
         Some((measurement, view))
     }
 
+    fn geometry(&self) -> Option<GeometryEstimate> {
+        let ([unevenness, u, v, ..], [_, u_std, v_std, ..]) = self.estimate.geometry();
+        Some(GeometryEstimate {
+            shared: self.estimate.shared(),
+            unevenness,
+            image_shift: [u, v],
+            image_shift_std: [u_std, v_std],
+        })
+    }
+
     fn feature_model(&self, configured: &FeatureModel) -> FeatureModel {
         let ([unevenness, u, v, ..], _) = self.estimate.geometry();
         configured.with_geometry([unevenness, u, v])
@@ -168,26 +177,6 @@ impl BandBlocks for Best {
             configured.nearest_state(&anywhere, &observed)
         });
         nearest.map_or(belief, |(state, _)| Belief { state, ..belief })
-    }
-}
-
-impl<S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<Best, S> {
-    /// The estimated hysteresis.
-    pub fn hysteresis(&self) -> HysteresisEstimate {
-        let slack = &self.profile.slack;
-        let deviation = self.profile.estimate.slack_deviation();
-        let ([unevenness, u, v, ..], [_, u_std, v_std, ..]) = self.profile.estimate.geometry();
-        HysteresisEstimate {
-            half_width: slack.map(|slack| slack.half_width),
-            width_std: deviation.map(|own| own.half_width),
-            centre: slack.map(|slack| slack.centre),
-            shared: self.profile.estimate.shared(),
-            gain: slack.map(|slack| slack.gain),
-            gain_std: deviation.map(|own| own.gain),
-            unevenness,
-            image_shift: [u, v],
-            image_shift_std: [u_std, v_std],
-        }
     }
 }
 
