@@ -42,8 +42,12 @@ static inline int block_create(LoopBlock *block, const char *file, char *message
     }
     if (!toml || fread(toml, 1, (size_t)size, stream) != (size_t)size) {
         snprintf(message, length, "File cannot be read: %s", file);
-    } else if (tautscope_loop_create((const uint8_t *)toml, (size_t)size, &block->loop) != TAUTSCOPE_RESULT_OK) {
+    } else if (tautscope_loop_create((const uint8_t *)toml, (size_t)size, &block->loop) != TAUTSCOPE_RESULT_OK ||
+               tautscope_loop_predict_state(block->loop, 0.0, &(TautscopeStatePrediction){.is_known = 0}) != TAUTSCOPE_RESULT_OK) {
+        /* The second refuses a robot with [[dof]]: the signals are those of the article's instrument. */
         snprintf(message, length, "%s: %s", file, tautscope_error_message());
+        tautscope_loop_destroy(block->loop);
+        block->loop = NULL;
     }
     free(toml);
     if (stream) {
@@ -71,7 +75,7 @@ static inline TautscopeResult block_tick(LoopBlock *block, const double *referen
         block->share = share;
     }
     if (result == TAUTSCOPE_RESULT_OK) {
-        result = tautscope_loop_step(block->loop, reference, time - age, time, block->command);
+        result = tautscope_loop_step(block->loop, 3, reference, time - age, time, block->command);
     }
     return result == TAUTSCOPE_RESULT_OK ? tautscope_loop_supervision(block->loop, &block->supervision) : result;
 }

@@ -85,7 +85,7 @@ static void mdlInitializeSampleTimes(SimStruct *S) {
     double period = 0.0;
     LoopBlock *block = create(S);
     if (block) {
-        check(S, tautscope_loop_period(block->loop, &period));
+        check(S, tautscope_loop_size(block->loop, NULL, &period));
         tautscope_loop_destroy(block->loop);
         free(block);
         ssSetSampleTime(S, 0, period);

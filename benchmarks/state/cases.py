@@ -147,7 +147,7 @@ def first_estimate(
 
     Its prior is the first reference, with the configured `start_deviation`.
     """
-    loop = _core.Reduction(settings, "best")
+    loop = _core.Reduction(settings | {"profile": "best"})
     loop.step(prior, 0.0)
     report = loop.on_features(measured, 0.0, covariance)
     return report[1], report[7], report[5]

@@ -2,39 +2,40 @@
 #include <stdio.h>
 #include <tautscope.h>
 
-static int is_ok(TautscopeResult result) {
+static const char robot[] = "[[dof]]\n"
+                            "name = \"bend\"\n"
+                            "width_limit = 1.2\n"; /* the largest slack that is compensated [rad] */
+
+/* In use: your motor and what it moves; here a slack of 1 rad. */
+static double moved(double tip, double command) { return fmin(fmax(tip, command - 0.5), command + 0.5); }
+
+int main(void) {
+    TautscopeLoop *loop = NULL;
+    TautscopeResult result = tautscope_loop_create((const uint8_t *)robot, sizeof robot - 1, &loop);
+    double command = 0.0, tip = 0.0, alone = 0.0, error = 0.0, error_alone = 0.0;
+    for (int tick = 0; tick < 4000 && result == TAUTSCOPE_RESULT_OK; ++tick) { /* in use: every control period */
+        const double time = tick * 0.005;
+        const double reference = sin(1.57 * time); /* in use: from the operator [rad] */
+        result = tautscope_loop_step(loop, 1, &reference, NAN, time, &command);
+        tip = moved(tip, command);
+        alone = moved(alone, reference);
+        error += fabs(tip - reference) / 400;
+        error_alone += fabs(alone - reference) / 400;
+        if (result == TAUTSCOPE_RESULT_OK && tick >= 1400 && tick % 8 == 0) { /* in use: for every measurement of the tip */
+            const TautscopeMeasurement measurement = {.values = &tip, .count = 1, .captured_at = time};
+            result = tautscope_loop_on_tip(loop, &measurement, NULL);
+        }
+        if (result == TAUTSCOPE_RESULT_OK && tick % 400 == 399) {
+            TautscopeHysteresis found;
+            result = tautscope_loop_hysteresis(loop, &found);
+            printf("%2.0f s: slack of %.2f rad, tip off by %.2f rad, without tautscope by %.2f rad\n", time,
+                   2 * found.half_width[0], error, error_alone);
+            error = error_alone = 0.0;
+        }
+    }
     if (result != TAUTSCOPE_RESULT_OK) {
         fprintf(stderr, "%s\n", tautscope_error_message());
     }
-    return result == TAUTSCOPE_RESULT_OK;
-}
-
-int main(int count, char **arguments) {
-    static uint8_t toml[65536];
-    FILE *file = fopen(count == 2 ? arguments[1] : "config.toml", "rb");
-    const size_t length = file ? fread(toml, 1, sizeof toml, file) : 0;
-    TautscopeLoop *loop = NULL;
-    double period = 0.0;
-    if (!is_ok(tautscope_loop_create(toml, length, &loop)) || !is_ok(tautscope_loop_period(loop, &period))) {
-        return 1;
-    }
-    for (int tick = 0; tick < 400; ++tick) { /* in use: every control period */
-        const double time = tick * period;
-        const double reference[3] = {0.025 + 0.01 * time, 0.0, 0.9}; /* m, rad, rad */
-        double command[3];
-        if (!is_ok(tautscope_loop_step(loop, reference, NAN, time, command))) {
-            return 1; /* `command` is the last one */
-        }
-        if (tick % 40 == 0) { /* in use: for every image */
-            const double features[4] = {350.0, 260.0, 345.0, 190.0}; /* u, v of band A, of band B in px */
-            TautscopeReport report = {.size = sizeof report};
-            if (!is_ok(tautscope_loop_on_features(loop, features, time, &report))) {
-                return 1;
-            }
-            printf("%.2f s: %s, %s\n", time, tautscope_status_name(report.status),
-                   tautscope_reaction_name(report.reaction));
-        }
-    }
     tautscope_loop_destroy(loop);
-    return 0;
+    return result != TAUTSCOPE_RESULT_OK;
 }

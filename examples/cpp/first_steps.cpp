@@ -1,32 +1,36 @@
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <exception>
-#include <vector>
 
 #include <tautscope.hpp>
 
-int main(int count, char **arguments) try {
-    const std::string toml = tautscope::read_file(count == 2 ? arguments[1] : "config.toml");
-    tautscope::Loop loop(toml);
-    tautscope::Detector detector(toml);
+const char robot[] = R"(
+[[dof]]
+name = "bend"
+width_limit = 1.2  # the largest slack that is compensated [rad]
+)";
 
-    const std::vector<std::uint8_t> pixels(720 * 576 * 3, 90); // in use: the camera's memory
-    TautscopeImage image{};
-    image.data = pixels.data();
-    image.length = pixels.size();
-    image.stride = 720 * 3;
-    image.width = 720;
-    image.height = 576;
-    image.format = TAUTSCOPE_PIXEL_FORMAT_BGR;
+/// In use: your motor and what it moves; here a slack of 1 rad.
+double moved(double tip, double command) { return std::clamp(tip, command - 0.5, command + 0.5); }
 
-    for (int tick = 0; tick < 400; ++tick) { // in use: every control period
+int main() try {
+    tautscope::Axes loop(robot);
+    double tip = 0.0, alone = 0.0, error = 0.0, error_alone = 0.0;
+    for (int tick = 0; tick < 4000; ++tick) { // in use: every control period
         const double time = tick * loop.period();
-        const tautscope::Vector command = loop.step({0.025 + 0.01 * time, 0.0, 0.9}, time); // m, rad, rad
-        if (tick % 40 == 0) {                                                                // in use: for every image
-            const TautscopeReport report = loop.on_frame(detector, image, time);
-            std::printf("%.2f s: insertion %.4f m, %s\n", time, command[0], tautscope_status_name(report.status));
-            if (report.reaction >= TAUTSCOPE_REACTION_QUICK_STOP) {
-                return 1; // in use: stop the drives
-            }
+        const double reference = std::sin(1.57 * time); // in use: from the operator [rad]
+        tip = moved(tip, loop.step({reference}, time)[0]);
+        alone = moved(alone, reference);
+        error += std::abs(tip - reference) / 400;
+        error_alone += std::abs(alone - reference) / 400;
+        if (tick >= 1400 && tick % 8 == 0) { // in use: for every measurement of the tip
+            loop.on_tip({tip}, time);
+        }
+        if (tick % 400 == 399) {
+            std::printf("%2.0f s: slack of %.2f rad, tip off by %.2f rad, without tautscope by %.2f rad\n", time,
+                        2 * loop.hysteresis().half_width[0], error, error_alone);
+            error = error_alone = 0.0;
         }
     }
 } catch (const std::exception &error) {

@@ -8,11 +8,11 @@ with rows of float64:
 - ``NAME.images``: tick, captured_at, features (4,); status, reaction, flags, state estimate (3,),
   delta_minus (3,), delta_plus (3,); features found without a prediction (4,), checksum.
 
-``axes`` is of a robot with [[dof]], whose measurements are in ``axes.measurements``: tick,
-captured_at, kind, values (3,); status, reaction, flags, state estimate (3,), innovation (3,),
-delta_minus (3,), delta_plus (3,), half widths (3,). Each kind is a sensor: 0 is the tip degree by
-degree, 1 that of `_own` by differences, 2 with its Jacobian. ``axes-short.toml`` has only the keys
-that are not defaults.
+``axes_paper`` and ``axes_best`` are of a robot with [[dof]], whose measurements are in
+``NAME.measurements``: tick, captured_at, kind, values (3,); status, reaction, flags, state estimate
+(3,), innovation (3,), delta_minus (3,), delta_plus (3,), half widths (3,). Each kind is a sensor: 0
+is the tip degree by degree, 1 that of `_own` by differences, 2 with its Jacobian.
+``NAME-short.toml`` has only the keys that are not defaults.
 
 ``frames.pixels`` has the images themselves, ``frames.workspace`` the states (3,) that the detection
 starts from without a prediction: starts, their standard deviations, postures. Units are m, rad, s,
@@ -212,10 +212,12 @@ def _jacobian(q: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.array([[20.0, 0.5, 0.0], [0.0, 1.0, 0.5 * q[2]], [0.0, -0.5, 1.0]])
 
 
-def record_axes(folder: Path) -> None:
+def record_axes(folder: Path, profile: Profile) -> None:
     """60 s at 200 Hz of three plays and three sensors, and every kind of event."""
-    (folder / "axes-short.toml").write_text(ROBOT, encoding="utf-8")
-    record = Record(load_config(folder / "axes-short.toml"))
+    name = f"axes_{profile}"
+    short = folder / f"{name}-short.toml"
+    short.write_text(f'profile = "{profile}"\n{ROBOT}', encoding="utf-8")
+    record = Record(load_config(short))
     random = np.random.default_rng(SEED)
     rows = []
     tip, covariance = CENTRES.copy(), np.diag([1e-3, 1e-3, 1e-3])
@@ -247,14 +249,14 @@ def record_axes(folder: Path) -> None:
                 values, at, covariance, _own, jacobian=_jacobian if kind == 2 else None, sensor=kind
             )
         now, found = record.loop.supervision, record.loop.hysteresis
-        assert found is not None
+        half = found.half_width if found else (report.delta_plus - report.delta_minus) / 2
         flags = sum(1 << DETECTORS.index(name) for name in now.flags)
         row = [tick, at, kind, *values]
         row += [list(Status).index(report.status), now.reaction.rank, flags]
         row += [*report.state_estimate, *report.innovation, *report.delta_minus]
-        rows.append([*row, *report.delta_plus, *found.half_width])
-    record.write(folder, "axes")
-    np.array(rows).astype("<f8").tofile(folder / "axes.measurements")
+        rows.append([*row, *report.delta_plus, *half])
+    record.write(folder, name)
+    np.array(rows).astype("<f8").tofile(folder / f"{name}.measurements")
 
 
 def main() -> None:
@@ -262,7 +264,7 @@ def main() -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for profile in ("paper", "best"):
         record_features(profile).write(folder, profile)
-    record_axes(folder)
+        record_axes(folder, profile)
     record_frames(folder).write(folder, "frames")
     print(f"{folder}: 60 s of profiles paper and best and of a robot with [[dof]], 2 s of images")
 

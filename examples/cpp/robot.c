@@ -21,13 +21,13 @@ static int predict(void *context, const double *q, double *z, double *jacobian) 
 int main(void) {
     const double covariance[4] = {0.1, 0.0, 0.0, 0.1}; /* mm^2 */
     double tip[2] = {0.0, 0.0};
-    TautscopeAxes *axes = NULL;
-    TautscopeResult result = tautscope_axes_create((const uint8_t *)robot, sizeof robot - 1, &axes);
+    TautscopeLoop *loop = NULL;
+    TautscopeResult result = tautscope_loop_create((const uint8_t *)robot, sizeof robot - 1, &loop);
     for (int tick = 0; tick < 12000 && result == TAUTSCOPE_RESULT_OK; ++tick) { /* in use: every control period */
         const double time = tick * 0.005;
         const double reference[2] = {0.8 * sin(1.1 * time), 0.8 * sin(0.7 * time)};
         double command[2];
-        result = tautscope_axes_step(axes, 2, reference, NAN, time, command);
+        result = tautscope_loop_step(loop, 2, reference, NAN, time, command);
         for (int dof = 0; dof < 2; ++dof) { /* in use: your motors; here a slack of 0.6 rad */
             tip[dof] = fmin(fmax(tip[dof], command[dof] - 0.3), command[dof] + 0.3);
         }
@@ -36,15 +36,15 @@ int main(void) {
             predict(NULL, tip, values, NULL);
             const TautscopeMeasurement measurement = {
                 .values = values, .count = 2, .covariance = covariance, .captured_at = time};
-            result = tautscope_axes_on_measurement(axes, &measurement, predict, NULL, NULL);
+            result = tautscope_loop_on_measurement(loop, &measurement, predict, NULL, NULL);
         }
     }
-    TautscopeAxesHysteresis found;
-    if (result != TAUTSCOPE_RESULT_OK || tautscope_axes_hysteresis(axes, &found) != TAUTSCOPE_RESULT_OK) {
+    TautscopeHysteresis found;
+    if (result != TAUTSCOPE_RESULT_OK || tautscope_loop_hysteresis(loop, &found) != TAUTSCOPE_RESULT_OK) {
         fprintf(stderr, "%s\n", tautscope_error_message());
         return 1;
     }
     printf("slack of %.2f and %.2f rad found\n", 2 * found.half_width[0], 2 * found.half_width[1]);
-    tautscope_axes_destroy(axes);
+    tautscope_loop_destroy(loop);
     return 0;
 }

@@ -39,7 +39,7 @@ int main() try {
             axes.on_measurement(measured, time, {0.1, 0.0, 0.0, 0.1}, predict); // covariance in mm^2
         }
         if (tick % 2400 == 2399) {
-            const TautscopeAxesHysteresis found = axes.hysteresis();
+            const TautscopeHysteresis found = axes.hysteresis();
             std::printf("%2.0f s: slack of %.2f and %.2f rad found\n", time, 2 * found.half_width[0],
                         2 * found.half_width[1]);
         }

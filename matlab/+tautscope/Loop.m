@@ -1,13 +1,15 @@
 classdef Loop < handle
-    % Loop  Image-based hysteresis compensation: references in, commands out, images update the estimate.
+    % Loop  Hysteresis compensation: references in, commands out, measurements of the tip update the estimate.
     %
-    %   loop = tautscope.Loop('config.toml');
-    %   command = loop.step(reference, time);               % in every control period
-    %   report = loop.on_features(features, captured_at);   % for every image
+    %   loop = tautscope.Loop(sprintf('[[dof]]\nname = "bend"\nwidth_limit = 1.2'));
+    %   command = loop.step(reference, time);            % in every control period
+    %   report = loop.on_tip(values, captured_at);       % whenever a sensor has measured the tip
     %
-    % The file has every key of the configuration, as `tautscope config` prints it; its key `profile` selects the profile.
-    % References and commands are [insertion, rotation, bending] in m, rad, rad. Times are s on one clock of yours. Pixels count
-    % from 0 at the centre of the first one: subtract 1 from positions that MATLAB gives.
+    % The configuration is the name of a file, or text of several lines. With [[dof]] it has 1 to 8 degrees of freedom, and missing
+    % keys have their defaults. Without, it is of the article's instrument and has every key, as `tautscope config` prints it:
+    % on_features and on_frame take its images, and references and commands are [insertion, rotation, bending] in m, rad, rad.
+    % Its key `profile` selects the profile. Times are s on one clock of yours. Pixels count from 0 at the centre of the first one:
+    % subtract 1 from positions that MATLAB gives.
     %
     % Errors have the identifiers tautscope:Config, tautscope:Signal and tautscope:Image, and leave the loop unchanged.
 
@@ -18,16 +20,21 @@ classdef Loop < handle
     properties (Access = private)
         toml
         serial = 0
+        problem = []  % the error of a model of the user's
     end
 
     methods
-        function self = Loop(file)
-            [id, problem] = fopen(file, 'r');
-            if id < 0
-                error('tautscope:Config', 'File cannot be read: %s: %s', file, problem);
+        function self = Loop(configuration)
+            if any(configuration == sprintf('\n'))
+                self.toml = unicode2native(configuration, 'UTF-8');
+            else
+                [id, problem] = fopen(configuration, 'r');
+                if id < 0
+                    error('tautscope:Config', 'File cannot be read: %s: %s', configuration, problem);
+                end
+                self.toml = fread(id, Inf, '*uint8');
+                fclose(id);
             end
-            self.toml = fread(id, Inf, '*uint8');
-            fclose(id);
             self.serial = tautscope_mex('create', self.toml);
             self.period = tautscope_mex('period', self.serial);
         end
@@ -37,7 +44,7 @@ classdef Loop < handle
         end
 
         function command = step(self, reference, time, made_at)
-            % One control tick: the command (1x3) for a reference (3 numbers), Eqs. (2)-(3).
+            % One control tick: the command (1xn) for a reference (n numbers).
             %
             % made_at is when the reference was made [s], if known: a reference that is too old stops the motion.
             if nargin < 4
@@ -59,6 +66,49 @@ classdef Loop < handle
             %
             % It takes some ms, in which the loop cannot step.
             report = tautscope_mex('on_frame', self.serial, self.toml, image, captured_at);
+        end
+
+        function report = on_tip(self, values, captured_at, covariance, sensor)
+            % Update with the tip measured degree by degree (n numbers); NaN for what was not measured.
+            %
+            % captured_at is the time of the measurement [s]. Without a covariance (nxn) measurement.tip_deviation is used. sensor is
+            % 0 to 3: sensors with rates and delays of their own. The report has status, state_estimate, delta_minus, ...
+            if nargin < 4
+                covariance = [];
+            end
+            if nargin < 5
+                sensor = 0;
+            end
+            report = tautscope_mex('on_measurement', self.serial, values, captured_at, covariance, sensor);
+        end
+
+        function report = on_measurement(self, values, captured_at, covariance, predict, sensor, point)
+            % Update with up to 16 numbers (m) of the covariance (mxm): predict is a function handle from a state (1xn) to the m
+            % numbers that the sensor would measure, [] where it sees nothing.
+            %
+            % point is 2 for u, v of points of an image, which are right or wrong together.
+            if nargin < 6
+                sensor = 0;
+            end
+            if nargin < 7
+                point = 1;
+            end
+            self.problem = [];
+            guarded = @(state) self.predicted(predict, state);
+            report = tautscope_mex('on_measurement', self.serial, values, captured_at, covariance, sensor, guarded, point);
+            if ~isempty(self.problem)
+                rethrow(self.problem);
+            end
+        end
+
+        function state = predicted_state(self)
+            % The state of the tip (1xn) that the estimated slack predicts now.
+            state = tautscope_mex('predicted_state', self.serial);
+        end
+
+        function found = hysteresis(self)
+            % The hysteresis found so far: half_width, width_std, centre, gain, gain_std (1xn each).
+            found = tautscope_mex('hysteresis', self.serial);
         end
 
         function state = supervision(self)
@@ -86,6 +136,19 @@ classdef Loop < handle
         function raise_flag(self, flag)
             % Report a condition that only the rig can detect: 'drive_fault' stops the motion until engage.
             tautscope_mex('raise_flag', self.serial, flag);
+        end
+    end
+
+    methods (Hidden)
+        function values = predicted(self, predict, state)
+            values = [];
+            if isempty(self.problem)
+                try
+                    values = predict(state);
+                catch problem
+                    self.problem = problem;  % no error may jump over the library
+                end
+            end
         end
     end
 end

@@ -1,14 +1,20 @@
-loop = tautscope.Loop('config.toml');
-for tick = 0:399                                     % in use: every control period
+loop = tautscope.Loop(sprintf('[[dof]]\nname = "bend"\nwidth_limit = 1.2'));  % the largest slack that is compensated [rad]
+moved = @(tip, command) min(max(tip, command - 0.5), command + 0.5);  % in use: your motor; here a slack of 1 rad
+[tip, alone] = deal(0);
+off = [0 0];
+for tick = 0:3999                                    % in use: every control period
     time = tick * loop.period;
-    reference = [0.025 + 0.01 * time, 0, 0.9];       % m, rad, rad
-    command = loop.step(reference, time);            % in use: to the drives
-    if mod(tick, 40) == 0                            % in use: for every image
-        features = [350 260 345 190];                % u, v of band A, of band B in px
-        report = loop.on_features(features, time);   % or loop.on_frame(image, captured_at)
-        fprintf('%.2f s: insertion %.4f m, %s, %s\n', time, command(1), report.status, report.reaction);
-        if any(strcmp(report.reaction, {'quick_stop', 'disable'}))
-            break                                    % in use: stop the drives
-        end
+    reference = sin(1.57 * time);                    % in use: from the operator [rad]
+    command = loop.step(reference, time);
+    tip = moved(tip, command);
+    alone = moved(alone, reference);
+    off = off + abs([tip alone] - reference) / 400;
+    if tick >= 1400 && mod(tick, 8) == 0             % in use: for every measurement of the tip
+        report = loop.on_tip(tip, time);
+    end
+    if mod(tick, 400) == 399
+        slack = 2 * loop.hysteresis().half_width;
+        fprintf('%2.0f s: slack of %.2f rad, tip off by %.2f rad, without tautscope by %.2f rad\n', time, slack, off);
+        off = [0 0];
     end
 end

@@ -27,4 +27,7 @@ end
 fprintf('%d ticks, %d images, last status %s\n', tick, image - 1, report.status);
 fprintf('largest difference of a command: %g m, %g rad, %g rad\n', max(abs(commands - recorded)));
 fprintf('width of the slack: %.4f m, %.3f rad, %.3f rad\n', report.delta_plus - report.delta_minus);
+if nargout == 0
+    clear commands recorded  % or each of them would be printed
+end
 end

@@ -5,7 +5,7 @@ addpath(here, fullfile(here, '..'), fullfile(here, '..', 'examples'));
 if exist('OCTAVE_VERSION', 'builtin')
     warning('off', 'Octave:gnuplot-graphics');
 end
-tests = {@() test_same_as_python(recordings), @() test_errors(recordings), @() test_examples(run), @() test_first_steps(recordings)};
+tests = {@() test_same_as_python(recordings), @() test_errors(recordings), @() test_examples(run), @() test_axes(), @() test_first_steps()};
 for i = 1:numel(tests)
     fprintf('== %s\n', func2str(tests{i}));
     tests{i}();

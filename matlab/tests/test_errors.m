@@ -44,14 +44,3 @@ for i = 1:200  % more loops than can exist at once: each is destroyed
     delete(passing);
 end
 end
-
-function expect(identifier, words, action)
-try
-    action();
-catch problem
-    assert(strcmp(problem.identifier, identifier), '%s: %s', problem.identifier, problem.message);
-    assert(~isempty(strfind(problem.message, words)), problem.message); %#ok<STREMP>
-    return
-end
-error('no error, expected %s: %s', identifier, words);
-end

@@ -1,10 +1,5 @@
-function test_first_steps(recordings)
-% The code of docs/interfaces/matlab.md runs in a folder that has a configuration.
-folder = tempname;
-mkdir(folder);
-copyfile(fullfile(recordings, 'best.toml'), fullfile(folder, 'config.toml'));
-previous = cd(folder);
-restore = onCleanup(@() cd(previous));
+function test_first_steps()
+% The code of docs/interfaces/matlab.md finds the slack of 1 rad.
 first_steps;
-assert(tick == 399 && all(isfinite(command)));
+assert(abs(slack - 1) < 0.1 && all(isfinite(command)));
 end

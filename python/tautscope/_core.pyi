@@ -1,5 +1,5 @@
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Self, final
+from typing import Any, Self, final, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,7 +12,6 @@ __all__ = [
     "MOST_SENSORS",
     "MOST_VALUES",
     "SPEED",
-    "AxesReduction",
     "Camera",
     "Compensator",
     "Estimator",
@@ -64,50 +63,56 @@ class Play:
     @property
     def width(self) -> float: ...
 
+# A number for one axis, or an array (n,) where a setting is one.
+_PerAxis = Any
+
 @final
 class Compensator:
     def __new__(
         cls,
         *,
-        free_gain: float,
-        gain_limit: float,
-        delta_minus: float,
-        delta_plus: float,
-        recovery: float = 0.0,
+        free_gain: ArrayLike,
+        gain_limit: ArrayLike,
+        delta_minus: ArrayLike,
+        delta_plus: ArrayLike,
+        recovery: ArrayLike = 0.0,
     ) -> Compensator: ...
-    def step(self, reference: float) -> float: ...
+    def step(self, reference: ArrayLike) -> _PerAxis: ...
     def run(self, references: ArrayLike) -> _Floats: ...
-    def set_offsets(self, delta_minus: float, delta_plus: float) -> None: ...
+    def set_offsets(self, delta_minus: ArrayLike, delta_plus: ArrayLike) -> None: ...
     def set_gain(self, free_gain: float, gain_limit: float) -> None: ...
     @property
-    def command(self) -> float: ...
+    def command(self) -> _PerAxis: ...
     @property
-    def position(self) -> float: ...
+    def position(self) -> _PerAxis: ...
     @property
-    def predicted_state(self) -> float: ...
+    def predicted_state(self) -> _PerAxis: ...
     @property
-    def delta_minus(self) -> float: ...
+    def delta_minus(self) -> _PerAxis: ...
     @property
-    def delta_plus(self) -> float: ...
+    def delta_plus(self) -> _PerAxis: ...
 
 @final
 class Estimator:
     def __new__(
         cls,
         *,
-        update_distance: float,
-        contact_tolerance: float,
-        smoothing_factor: float,
-        delta_minus: float,
-        delta_plus: float,
+        update_distance: ArrayLike,
+        contact_tolerance: ArrayLike,
+        smoothing_factor: ArrayLike,
+        delta_minus: ArrayLike,
+        delta_plus: ArrayLike,
     ) -> Estimator: ...
+    @overload
     def update(self, command: float, measured: float) -> _Triggers: ...
-    def predict(self, command: float) -> float: ...
+    @overload
+    def update(self, command: ArrayLike, measured: ArrayLike) -> tuple[_Triggers, ...]: ...
+    def predict(self, command: ArrayLike) -> _PerAxis: ...
     def run(self, commands: ArrayLike, measured: ArrayLike) -> tuple[_Floats, _Floats, _Floats]: ...
     @property
-    def delta_minus(self) -> float: ...
+    def delta_minus(self) -> _PerAxis: ...
     @property
-    def delta_plus(self) -> float: ...
+    def delta_plus(self) -> _PerAxis: ...
 
 @final
 class Instrument:
@@ -177,9 +182,23 @@ class TipFilter:
     @property
     def gain(self) -> float: ...
 
+_Update = tuple[
+    str,
+    _Floats,
+    _Floats,
+    _Floats,
+    _Floats,
+    _Flags,
+    _Floats,
+    _Floats,
+    tuple[_Triggers, ...],
+    _Floats,
+    _Floats,
+]
+
 @final
 class Reduction:
-    def __new__(cls, settings: Mapping[str, Any], profile: str) -> Reduction: ...
+    def __new__(cls, settings: Mapping[str, Any], compensate: bool = True) -> Reduction: ...
     def step(self, reference: ArrayLike, time: float, stamp: float | None = None) -> _Floats: ...
     def run(self, references: ArrayLike, times: ArrayLike) -> _Floats: ...
     def on_features(
@@ -188,19 +207,16 @@ class Reduction:
         captured_at: float,
         covariance: ArrayLike | None = None,
         checksum: int | None = None,
-    ) -> tuple[
-        str,
-        _Floats,
-        _Floats,
-        _Floats,
-        _Floats,
-        _Flags,
-        _Floats,
-        _Floats,
-        tuple[_Triggers, _Triggers, _Triggers],
-        _Floats,
-        _Floats,
-    ]: ...
+    ) -> _Update: ...
+    def on_reading(
+        self,
+        values: ArrayLike,
+        covariance: ArrayLike,
+        captured_at: float,
+        predict: Callable[[_Floats], tuple[_Floats, _Floats] | None],
+        point: int,
+        sensor: int = 0,
+    ) -> _Update: ...
     @property
     def supervision(self) -> tuple[str, list[str], list[str], float]: ...
     def engage(self) -> None: ...
@@ -210,51 +226,7 @@ class Reduction:
     def predicted_features(self, captured_at: float) -> _Floats | None: ...
     def predict_state(self, captured_at: float) -> tuple[_Floats, _Floats, _Floats] | None: ...
     @property
-    def hysteresis(
-        self,
-    ) -> (
-        tuple[_Floats, _Floats, _Floats, _Floats, _Floats, float, float, _Floats, _Floats] | None
-    ): ...
-    @property
-    def predicted_state(self) -> _Floats: ...
-    @property
-    def delta_minus(self) -> _Floats: ...
-    @property
-    def delta_plus(self) -> _Floats: ...
-
-@final
-class AxesReduction:
-    def __new__(cls, settings: Mapping[str, Any], compensate: bool) -> AxesReduction: ...
-    def step(self, reference: ArrayLike, time: float, stamp: float | None = None) -> _Floats: ...
-    def on_reading(
-        self,
-        values: ArrayLike,
-        covariance: ArrayLike,
-        captured_at: float,
-        predict: Callable[[_Floats], tuple[_Floats, _Floats] | None],
-        point: int,
-        sensor: int = 0,
-    ) -> tuple[
-        str,
-        _Floats,
-        _Floats,
-        _Floats,
-        _Floats,
-        _Flags,
-        _Floats,
-        _Floats,
-        tuple[_Triggers, ...],
-        _Floats,
-        _Floats,
-    ]: ...
-    @property
-    def supervision(self) -> tuple[str, list[str], list[str], float]: ...
-    def engage(self) -> None: ...
-    def acknowledge(self) -> None: ...
-    def set_compensation(self, share: float) -> None: ...
-    def raise_flag(self, name: str) -> None: ...
-    @property
-    def hysteresis(self) -> tuple[_Floats, _Floats, _Floats, _Floats, _Floats]: ...
+    def hysteresis(self) -> tuple[Any, ...]: ...
     @property
     def predicted_state(self) -> _Floats: ...
     @property

@@ -307,7 +307,6 @@ def _with(**keys: Any) -> dict[str, Any]:
         ({"dof": [{"name": "a"}]}, "dof[0].width_limit"),
         ({"dof": _with()["dof"] * 2}, "dof[1].name"),
         ({"dof": [{"name": f"a{k}", "width_limit": 1.0} for k in range(9)]}, "dof"),
-        (_with() | {"profile": "paper"}, "profile"),
         (_with() | {"safety": {"width_limit": [1.0, 1.0, 1.0]}}, "safety.width_limit"),
     ],
 )

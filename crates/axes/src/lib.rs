@@ -1,12 +1,81 @@
-//! A loop of 1 to 8 degrees of freedom from a configuration with `[[dof]]`, for Python and for C.
+//! The loop of a configuration, for Python and for C: of the article's instrument, or of 1 to 8 degrees of freedom of `[[dof]]`.
 //!
 //! The only place with the ratios by which the settings of a degree of freedom follow from its `width_limit`.
 
+use std::ops::{Deref, DerefMut};
+
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 use tautscope_core as core;
 
-/// A loop whose number of DOFs is known at run time.
-pub type BoxedAxes = Box<dyn core::Axes + Send + Sync>;
+/// The loop of a robot.
+pub enum AnyLoop {
+    /// Of the article's instrument.
+    Bands(Box<dyn core::BandLoop + Send + Sync>),
+    /// Of the degrees of freedom of `[[dof]]`.
+    Axes(Box<dyn core::Axes + Send + Sync>),
+}
+
+/// What selects the loop of a configuration.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Selection {
+    #[serde(default)]
+    profile: Profile,
+    #[serde(default)]
+    dof: Vec<IgnoredAny>,
+}
+
+/// The profiles of the loop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Profile {
+    /// The article's blocks.
+    Paper,
+    /// The vector law on one linear filter of fixed plays.
+    #[default]
+    Best,
+}
+
+impl Selection {
+    /// Whether the configuration has `[[dof]]`.
+    pub const fn has_axes(&self) -> bool {
+        !self.dof.is_empty()
+    }
+
+    /// The loop of the article's instrument at rest.
+    ///
+    /// # Errors
+    /// A setting is out of range.
+    pub fn build_bands(&self, settings: &core::Settings) -> Result<AnyLoop, core::ConfigError> {
+        let storage = vec![core::Entry::BLANK; settings.history_entries()];
+        Ok(AnyLoop::Bands(match self.profile {
+            Profile::Paper => Box::new(Bands::<core::Paper>::new(settings, storage)?),
+            Profile::Best => Box::new(Bands::<core::Best>::new(settings, storage)?),
+        }))
+    }
+}
+
+type Bands<P> = core::HysteresisReduction<P, Vec<core::Entry>>;
+
+impl Deref for AnyLoop {
+    type Target = dyn core::Loop;
+
+    fn deref(&self) -> &Self::Target {
+        match self {
+            Self::Bands(inner) => inner.as_ref(),
+            Self::Axes(inner) => inner.as_ref(),
+        }
+    }
+}
+
+impl DerefMut for AnyLoop {
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        match self {
+            Self::Bands(inner) => inner.as_mut(),
+            Self::Axes(inner) => inner.as_mut(),
+        }
+    }
+}
 
 // The article's instrument has about these ratios of its lengths to safety.width_limit.
 const OFFSET_LIMIT: f64 = 2.0 / 3.0;
@@ -51,16 +120,22 @@ pub struct AxesSettings {
     pub law: core::LawSettings,
     /// Estimation.
     pub estimation: core::EstimateSettings,
+    /// The scheme of compensation and estimation.
+    pub profile: Profile,
     /// Defaults of a degree of freedom that are no lengths.
     pub insertion: core::DofSettings,
 }
+
+type Axes<P, const N: usize> = core::HysteresisReduction<P, Vec<core::Entry<N>>, (), N>;
+type PaperOf<const N: usize> = core::Paper<N, core::StateFromSensor<N>>;
+type BestOf<const N: usize, const D: usize> = core::Best<N, N, 0, D>;
 
 impl AxesSettings {
     /// A loop at rest; without compensation every gain is 1.
     ///
     /// # Errors
     /// There are not 1 to 8 degrees of freedom, or a setting is out of range.
-    pub fn build(&self, compensate: bool) -> Result<BoxedAxes, core::ConfigError> {
+    pub fn build(&self, compensate: bool) -> Result<AnyLoop, core::ConfigError> {
         // The constructors copy a loop of eight, 0.4 MB, several times: more than the stack of many threads.
         std::thread::scope(|scope| {
             let roomy = std::thread::Builder::new().stack_size(STACK);
@@ -73,7 +148,7 @@ impl AxesSettings {
         })
     }
 
-    fn build_here(&self, compensate: bool) -> Result<BoxedAxes, core::ConfigError> {
+    fn build_here(&self, compensate: bool) -> Result<AnyLoop, core::ConfigError> {
         macro_rules! of {
             ($($count:literal)*) => {
                 match self.dof.len() {
@@ -89,7 +164,7 @@ impl AxesSettings {
     fn build_of<const N: usize, const D: usize>(
         &self,
         compensate: bool,
-    ) -> Result<BoxedAxes, core::ConfigError> {
+    ) -> Result<AnyLoop, core::ConfigError> {
         let period = self.control.period;
         if !(period.is_finite() && period > 0.0) {
             return Err(error("period", period, "a finite number above 0"));
@@ -97,8 +172,10 @@ impl AxesSettings {
         let settings = self.of_loop::<N>(compensate)?;
         let entries = core::history_entries(self.control.history, period);
         let storage = vec![core::Entry::<N>::BLANK; entries];
-        let made = core::AxesReduction::<N, D, Vec<core::Entry<N>>>::of_axes(&settings, storage);
-        Ok(Box::new(made?))
+        Ok(AnyLoop::Axes(match self.profile {
+            Profile::Paper => Box::new(Axes::<PaperOf<N>, N>::of_axes(&settings, storage)?),
+            Profile::Best => Box::new(Axes::<BestOf<N, D>, N>::of_axes(&settings, storage)?),
+        }))
     }
 
     fn of_loop<const N: usize>(

@@ -1,112 +1,145 @@
 //! `Compensator`.
 
-use numpy::PyArray1;
 use pyo3::prelude::*;
 use tautscope_core as core;
 
-use crate::arrays::Vector;
 use crate::description::{described, described_with};
 use crate::errors;
+use crate::per_axis::{Axes, PerAxis, Samples, shaped};
 
-/// The limited-gain inverse of one DOF's play, Eqs. (2)-(3), Fig. 2.
+/// The limited-gain inverse of the plays of 1 to 8 axes, each by itself, Eqs. (2)-(3), Fig. 2.
 ///
 /// Gain 1 in contact, `free_gain` (at least 1, at most `gain_limit`) while the slack is crossed. A
 /// slack of width w leaves w / `free_gain`; an over-estimated width overshoots beyond a margin of
 /// 1 / (`free_gain` - 1). With `recovery` above 0 the command returns to the reference after changed
-/// offsets, by that share of the further travel. Signals are in the unit of the DOF. Raises `ConfigError`.
+/// offsets, by that share of the further travel. Signals are in the unit of the axis. Settings are floats, or arrays (n,) for n
+/// axes; signals likewise. Raises `ConfigError`, and `SignalError` for another number of axes.
 #[pyclass(name = "Compensator", module = "tautscope._core")]
-pub struct Compensator {
-    pub inner: core::Compensator,
-    state: core::CompensatorState,
-}
+pub struct Compensator(Axes<(core::Compensator, core::CompensatorState)>);
 
 #[pymethods]
 impl Compensator {
     #[new]
-    #[pyo3(signature = (*, free_gain, gain_limit, delta_minus, delta_plus, recovery=0.0))]
+    #[pyo3(
+        signature = (*, free_gain, gain_limit, delta_minus, delta_plus, recovery=PerAxis::One(0.0)),
+        text_signature = "(*, free_gain, gain_limit, delta_minus, delta_plus, recovery=0.0)"
+    )]
     fn new(
         py: Python<'_>,
-        free_gain: f64,
-        gain_limit: f64,
-        delta_minus: f64,
-        delta_plus: f64,
-        recovery: f64,
+        free_gain: PerAxis,
+        gain_limit: PerAxis,
+        delta_minus: PerAxis,
+        delta_plus: PerAxis,
+        recovery: PerAxis,
     ) -> PyResult<Self> {
-        let inner = core::Compensator::new(free_gain, gain_limit)
-            .and_then(|compensator| compensator.with_recovery(recovery))
-            .map_err(errors::config(py))?;
-        let play = core::Play::new(delta_minus, delta_plus).map_err(errors::config(py))?;
-        let state = core::CompensatorState::new(play);
-        Ok(Self { inner, state })
+        let settings = [
+            ("free_gain", free_gain),
+            ("gain_limit", gain_limit),
+            ("delta_minus", delta_minus),
+            ("delta_plus", delta_plus),
+            ("recovery", recovery),
+        ];
+        let axes = Axes::new(py, settings, |[free_gain, limit, minus, plus, recovery]| {
+            let inner = core::Compensator::new(free_gain, limit)?.with_recovery(recovery)?;
+            let play = core::Play::new(minus, plus)?;
+            Ok((inner, core::CompensatorState::new(play)))
+        });
+        axes.map(Self)
     }
 
     /// The command c for the next reference u. The first command is the reference; a reference that is
     /// unchanged or not finite repeats the last command.
-    fn step(&mut self, reference: f64) -> f64 {
-        self.inner.step(&mut self.state, reference)
+    fn step(&mut self, py: Python<'_>, reference: PerAxis) -> PyResult<PerAxis> {
+        let references = self.0.values(py, "reference", reference)?;
+        let axes = self.0.all.iter_mut().zip(references);
+        let commands = axes.map(|((inner, state), reference)| inner.step(state, reference));
+        let commands = commands.collect();
+        Ok(self.0.pack(commands))
     }
 
-    /// `step` for references (n,): commands (n,).
-    fn run<'py>(&mut self, py: Python<'py>, references: Vector<'py>) -> Bound<'py, PyArray1<f64>> {
+    /// `step` for references (m,), of n axes (m, n): commands likewise.
+    fn run<'py>(
+        &mut self,
+        py: Python<'py>,
+        references: Samples<'py>,
+    ) -> PyResult<Bound<'py, PyAny>> {
         let references = references.as_array();
-        let commands = references.iter().map(|reference| self.step(*reference));
-        PyArray1::from_iter(py, commands)
+        self.0.check_rows(py, "references", &references)?;
+        let count = self.0.all.len();
+        let step = |(index, reference): (usize, &f64)| {
+            let (inner, state) = &mut self.0.all[index % count];
+            inner.step(state, *reference)
+        };
+        let commands = references.iter().enumerate().map(step).collect();
+        shaped(py, commands, &references)
     }
 
     /// Changes the contact offsets (input minus output); the command does not move.
-    fn set_offsets(&mut self, py: Python<'_>, delta_minus: f64, delta_plus: f64) -> PyResult<()> {
-        let play = core::Play::new(delta_minus, delta_plus).map_err(errors::config(py))?;
-        self.inner.retune(&mut self.state, play);
+    fn set_offsets(
+        &mut self,
+        py: Python<'_>,
+        delta_minus: PerAxis,
+        delta_plus: PerAxis,
+    ) -> PyResult<()> {
+        let minus = self.0.values(py, "delta_minus", delta_minus)?;
+        let plus = self.0.values(py, "delta_plus", delta_plus)?;
+        let plays = minus.into_iter().zip(plus);
+        let plays: Result<Vec<_>, _> = plays
+            .map(|(minus, plus)| core::Play::new(minus, plus))
+            .collect();
+        let plays = plays.map_err(errors::config(py))?;
+        for ((inner, state), play) in self.0.all.iter_mut().zip(plays) {
+            inner.retune(state, play);
+        }
         Ok(())
     }
 
-    /// Changes the gain, 1 for no compensation; the command does not move.
+    /// Changes the gain of every axis, 1 for no compensation; the command does not move.
     fn set_gain(&mut self, py: Python<'_>, free_gain: f64, gain_limit: f64) -> PyResult<()> {
-        self.inner = self
-            .inner
-            .with_gain(free_gain, gain_limit)
-            .map_err(errors::config(py))?;
-        let play = self.state.play();
-        self.inner.retune(&mut self.state, play);
+        for (inner, state) in &mut self.0.all {
+            let changed = inner.with_gain(free_gain, gain_limit);
+            *inner = changed.map_err(errors::config(py))?;
+            let play = state.play();
+            inner.retune(state, play);
+        }
         Ok(())
     }
 
     /// The command c; NaN before the first reference.
     #[getter]
-    fn command(&self) -> f64 {
-        self.state.command()
+    fn command(&self) -> PerAxis {
+        self.0.map(|(_, state)| state.command())
     }
 
     /// p = c - q, the position between the contacts; NaN before the first reference.
     #[getter]
-    fn position(&self) -> f64 {
-        self.state.position()
+    fn position(&self) -> PerAxis {
+        self.0.map(|(_, state)| state.position())
     }
 
     /// The predicted state q: the play model driven by c; NaN before the first reference.
     #[getter]
-    fn predicted_state(&self) -> f64 {
-        self.state.predicted_state()
+    fn predicted_state(&self) -> PerAxis {
+        self.0.map(|(_, state)| state.predicted_state())
     }
 
     /// Offset at the negative contact, input minus output.
     #[getter]
-    fn delta_minus(&self) -> f64 {
-        self.state.play().delta_minus()
+    fn delta_minus(&self) -> PerAxis {
+        self.0.map(|(_, state)| state.play().delta_minus())
     }
 
     /// Offset at the positive contact, input minus output.
     #[getter]
-    fn delta_plus(&self) -> f64 {
-        self.state.play().delta_plus()
+    fn delta_plus(&self) -> PerAxis {
+        self.0.map(|(_, state)| state.play().delta_plus())
     }
 
     fn __repr__(&self) -> String {
-        let (text, command) = (
-            described_with(&self.inner, &self.state.play()),
-            self.command(),
-        );
-        let command = described(&command);
-        format!("{}, command={command})", text.trim_end_matches(')'))
+        self.0.described(|(inner, state)| {
+            let text = described_with(inner, &state.play());
+            let command = described(&state.command());
+            format!("{}, command={command})", text.trim_end_matches(')'))
+        })
     }
 }

@@ -1,25 +1,36 @@
 //! `Estimator`.
 
-use numpy::PyArray1;
+use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 use tautscope_core as core;
 
-use crate::arrays::{Vector, same_length};
+use crate::arrays::same_length;
 use crate::description::described_with;
-use crate::errors;
+use crate::per_axis::{Axes, PerAxis, Samples, shaped};
 
-type Series<'py> = Bound<'py, PyArray1<f64>>;
-
-/// On-line estimation of one DOF's contact offsets from command and output, Eqs. (4)-(6), Fig. 3.
+/// On-line estimation of the contact offsets of 1 to 8 axes from command and output, each by itself, Eqs. (4)-(6), Fig. 3.
 ///
-/// `update_distance` (tau) is in the unit of the DOF; `contact_tolerance` (epsilon) and
+/// `update_distance` (tau) is in the unit of the axis; `contact_tolerance` (epsilon) and
 /// `smoothing_factor` (alpha, per `update_distance` travelled) are between 0 and 1. Command and output
-/// must be of the same instant: a delay reads as width. Raises `ConfigError`.
+/// must be of the same instant: a delay reads as width. Settings are floats, or arrays (n,) for n axes; signals likewise.
+/// Raises `ConfigError`, and `SignalError` for another number of axes.
 #[pyclass(name = "Estimator", module = "tautscope._core")]
-pub struct Estimator {
-    pub inner: core::Estimator,
-    pub state: core::EstimatorState,
+pub struct Estimator(Axes<Axis>);
+
+struct Axis {
+    inner: core::Estimator,
+    state: core::EstimatorState,
     output: core::PlayState,
+}
+
+impl Axis {
+    fn predict(&mut self, command: f64) -> f64 {
+        if self.output.output.is_nan() {
+            self.output.output = command;
+        }
+        self.state.play().step(&mut self.output, command)
+    }
 }
 
 #[pymethods]
@@ -30,81 +41,111 @@ impl Estimator {
     ))]
     fn new(
         py: Python<'_>,
-        update_distance: f64,
-        contact_tolerance: f64,
-        smoothing_factor: f64,
-        delta_minus: f64,
-        delta_plus: f64,
+        update_distance: PerAxis,
+        contact_tolerance: PerAxis,
+        smoothing_factor: PerAxis,
+        delta_minus: PerAxis,
+        delta_plus: PerAxis,
     ) -> PyResult<Self> {
-        let inner = core::Estimator::new(update_distance, contact_tolerance, smoothing_factor)
-            .map_err(errors::config(py))?;
-        let play = core::Play::new(delta_minus, delta_plus).map_err(errors::config(py))?;
-        Ok(Self {
-            inner,
-            state: core::EstimatorState::new(play),
-            output: core::PlayState { output: f64::NAN },
-        })
+        let settings = [
+            ("update_distance", update_distance),
+            ("contact_tolerance", contact_tolerance),
+            ("smoothing_factor", smoothing_factor),
+            ("delta_minus", delta_minus),
+            ("delta_plus", delta_plus),
+        ];
+        let axes = Axes::new(
+            py,
+            settings,
+            |[distance, tolerance, factor, minus, plus]| {
+                Ok(Axis {
+                    inner: core::Estimator::new(distance, tolerance, factor)?,
+                    state: core::EstimatorState::new(core::Play::new(minus, plus)?),
+                    output: core::PlayState { output: f64::NAN },
+                })
+            },
+        );
+        axes.map(Self)
     }
 
     /// Updates the offsets from a command and the output measured at the same instant.
     ///
     /// Returns the triggers of (`delta_minus`, `delta_plus`): "contact", Eq. (4), "violation", Eq. (5),
-    /// or None. A pair that is not finite is ignored.
-    fn update(&mut self, command: f64, measured: f64) -> TriggerNames {
-        let triggers = self.inner.update(&mut self.state, command, measured);
-        trigger_names(triggers)
+    /// or None; of n axes a tuple of n of them. A pair that is not finite is ignored.
+    fn update<'py>(
+        &mut self,
+        py: Python<'py>,
+        command: PerAxis,
+        measured: PerAxis,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let is_one = matches!(command, PerAxis::One(_));
+        let commands = self.0.values(py, "command", command)?;
+        let measured = self.0.values(py, "measured", measured)?;
+        let pairs = commands.into_iter().zip(measured);
+        let axes = self.0.all.iter_mut().zip(pairs);
+        let triggers = axes.map(|(axis, (command, measured))| {
+            trigger_names(axis.inner.update(&mut axis.state, command, measured))
+        });
+        let triggers: Vec<_> = triggers.collect();
+        if let ([one], true) = (triggers.as_slice(), is_one) {
+            return one.into_bound_py_any(py);
+        }
+        PyTuple::new(py, triggers).map(Bound::into_any)
     }
 
     /// The output of the play with the offsets estimated so far, for the next command.
-    fn predict(&mut self, command: f64) -> f64 {
-        if self.output.output.is_nan() {
-            self.output.output = command;
-        }
-        self.state.play().step(&mut self.output, command)
+    fn predict(&mut self, py: Python<'_>, command: PerAxis) -> PyResult<PerAxis> {
+        let commands = self.0.values(py, "command", command)?;
+        let axes = self.0.all.iter_mut().zip(commands);
+        let outputs = axes.map(|(axis, command)| axis.predict(command)).collect();
+        Ok(self.0.pack(outputs))
     }
 
-    /// `predict`, then `update`, for commands (n,) and measured (n,).
+    /// `predict`, then `update`, for commands (m,) and measured (m,), of n axes (m, n).
     ///
-    /// Returns predicted, `delta_minus` and `delta_plus`, each (n,): `predicted[k]` uses `measured[:k]` only,
+    /// Returns predicted, `delta_minus` and `delta_plus` of this shape: `predicted[k]` uses `measured[:k]` only,
     /// the offsets are those after sample k. Raises `SignalError` for unequal lengths.
     fn run<'py>(
         &mut self,
         py: Python<'py>,
-        commands: Vector<'py>,
-        measured: Vector<'py>,
-    ) -> PyResult<(Series<'py>, Series<'py>, Series<'py>)> {
+        commands: Samples<'py>,
+        measured: Samples<'py>,
+    ) -> PyResult<[Bound<'py, PyAny>; 3]> {
         let (commands, measured) = (commands.as_array(), measured.as_array());
+        self.0.check_rows(py, "commands", &commands)?;
+        self.0.check_rows(py, "measured", &measured)?;
         same_length(py, "measured", measured.len(), commands.len())?;
-        let mut predicted = Vec::with_capacity(commands.len());
-        let mut minus = Vec::with_capacity(commands.len());
-        let mut plus = Vec::with_capacity(commands.len());
-        for (command, measured) in commands.iter().zip(measured) {
-            predicted.push(self.predict(*command));
-            self.inner.update(&mut self.state, *command, *measured);
-            minus.push(self.delta_minus());
-            plus.push(self.delta_plus());
+        let (mut predicted, mut minus, mut plus) = (Vec::new(), Vec::new(), Vec::new());
+        let axes = self.0.all.len();
+        for (index, (command, measured)) in commands.iter().zip(&measured).enumerate() {
+            let axis = &mut self.0.all[index % axes];
+            predicted.push(axis.predict(*command));
+            axis.inner.update(&mut axis.state, *command, *measured);
+            minus.push(axis.state.play().delta_minus());
+            plus.push(axis.state.play().delta_plus());
         }
-        Ok((
-            PyArray1::from_vec(py, predicted),
-            PyArray1::from_vec(py, minus),
-            PyArray1::from_vec(py, plus),
-        ))
+        Ok([
+            shaped(py, predicted, &commands)?,
+            shaped(py, minus, &commands)?,
+            shaped(py, plus, &commands)?,
+        ])
     }
 
     /// Estimated offset at the negative contact, input minus output.
     #[getter]
-    fn delta_minus(&self) -> f64 {
-        self.state.play().delta_minus()
+    fn delta_minus(&self) -> PerAxis {
+        self.0.map(|axis| axis.state.play().delta_minus())
     }
 
     /// Estimated offset at the positive contact, input minus output.
     #[getter]
-    fn delta_plus(&self) -> f64 {
-        self.state.play().delta_plus()
+    fn delta_plus(&self) -> PerAxis {
+        self.0.map(|axis| axis.state.play().delta_plus())
     }
 
     fn __repr__(&self) -> String {
-        described_with(&self.inner, &self.state.play())
+        self.0
+            .described(|axis| described_with(&axis.inner, &axis.state.play()))
     }
 }
 

@@ -5,7 +5,6 @@
 
 mod analysis;
 mod arrays;
-mod axes;
 mod camera;
 mod compensator;
 mod description;
@@ -16,7 +15,9 @@ mod flags;
 mod frame;
 mod hysteresis;
 mod instrument;
+mod per_axis;
 mod play;
+mod predict;
 mod reduction;
 mod region;
 mod render;
@@ -34,8 +35,6 @@ mod _core {
 
     #[pymodule_export]
     use super::analysis::{move_along_curve, track_coefficients};
-    #[pymodule_export]
-    use super::axes::AxesReduction;
     #[pymodule_export]
     use super::camera::Camera;
     #[pymodule_export]

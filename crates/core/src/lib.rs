@@ -74,14 +74,15 @@ pub use estimation::estimate_settings::EstimateSettings;
 pub use estimation::expectation::{Belief, Beliefs, Expected};
 pub use estimation::history::{Entry, history_entries};
 pub use law::settings::LawSettings;
+pub use r#loop::any_loop::{BandLoop, DOFS, Loop};
 pub use r#loop::axes::{
-    Axes, AxesHysteresis, AxesReduction, AxesReport, DOFS, Predict, Reading, VALUES,
+    Axes, AxesReport, Predict, Reading, SensorProfile, StateFromSensor, VALUES,
 };
 pub use r#loop::best::Best;
 pub use r#loop::paper::Paper;
 pub use r#loop::profile::{BandProfile, Profile};
 pub use r#loop::reduction::HysteresisReduction;
-pub use r#loop::report::{HysteresisEstimate, Report, Status};
+pub use r#loop::report::{GeometryEstimate, Report, SlackEstimate, Status};
 pub use r#loop::settings::{LoopSettings, Settings};
 pub use model::camera::{Camera, Pose};
 pub use model::features::{FeatureModel, FeaturePrediction};

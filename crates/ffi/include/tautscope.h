@@ -253,14 +253,31 @@ typedef uint32_t TautscopeRejection;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// The loop of a robot with `[[dof]]`: reference in, command out; measurements of the tip update the estimate of the hysteresis.
-typedef struct TautscopeAxes TautscopeAxes;
+// Inverse of the play of 1 to 8 degrees of freedom, Eqs. (2)-(3).
+typedef struct TautscopeCompensator TautscopeCompensator;
 
 // Finds the two marker bands in images. No result depends on earlier images.
 typedef struct TautscopeDetector TautscopeDetector;
 
-// The loop: reference in, command out; images update the estimate of the hysteresis.
+// Estimation of the contact offsets of 1 to 8 degrees of freedom, Eqs. (4)-(6).
+typedef struct TautscopeEstimator TautscopeEstimator;
+
+// The loop: reference in, command out; images or other measurements update the estimate of the hysteresis.
 typedef struct TautscopeLoop TautscopeLoop;
+
+// Estimated hysteresis of n degrees of freedom, in the first n entries [m or rad].
+typedef struct TautscopeHysteresis {
+    // Half widths of the slack of each DOF that moves alone.
+    double half_width[8];
+    // Standard deviations of the half widths; NaN in profile `paper`.
+    double width_std[8];
+    // Centres of the contact offsets, input minus output.
+    double centre[8];
+    // Travel of the tip over that of the command in contact; 1 in profile `paper`.
+    double gain[8];
+    // Standard deviations of the gains; NaN in profile `paper`.
+    double gain_std[8];
+} TautscopeHysteresis;
 
 // Result of an image update; values that are not known are NaN.
 //
@@ -342,34 +359,6 @@ typedef struct TautscopeImage {
     uint32_t format;
 } TautscopeImage;
 
-// State of the supervision.
-typedef struct TautscopeSupervision {
-    // The reaction in force.
-    TautscopeReaction reaction;
-    // The active flags, a bit `1 << TautscopeFlag` each.
-    uint32_t flags;
-    // The flags raised since the last acknowledgement.
-    uint32_t latched;
-    // 0.
-    uint32_t reserved;
-    // Share of the compensation in use, 0 to 1.
-    double share;
-} TautscopeSupervision;
-
-// Estimated hysteresis of n degrees of freedom, in the first n entries [m or rad].
-typedef struct TautscopeAxesHysteresis {
-    // Half widths of the slack of each DOF that moves alone.
-    double half_width[8];
-    // Standard deviations of the half widths.
-    double width_std[8];
-    // Centres of the contact offsets, input minus output.
-    double centre[8];
-    // Travel of the tip over that of the command in contact.
-    double gain[8];
-    // Standard deviations of the gains.
-    double gain_std[8];
-} TautscopeAxesHysteresis;
-
 // A measurement of the tip. Set what you do not know to 0.
 typedef struct TautscopeMeasurement {
     // Values (m,); NaN for one that was not measured.
@@ -378,7 +367,7 @@ typedef struct TautscopeMeasurement {
     size_t count;
     // Covariance (m, m) row by row, or null, where the function allows it.
     const double *covariance;
-    // When it was measured, on the clock of `tautscope_axes_step` (s).
+    // When it was measured, on the clock of `tautscope_loop_step` (s).
     double captured_at;
     // Which of 4 sensors with rates and delays of their own, 0 to 3.
     uint32_t sensor;
@@ -388,8 +377,8 @@ typedef struct TautscopeMeasurement {
 
 // Result of an update by a measurement; values that are not known are NaN.
 //
-// Of n degrees of freedom and m values the first n and m entries are used. Set `size` to `sizeof(TautscopeAxesReport)` first.
-typedef struct TautscopeAxesReport {
+// Of n degrees of freedom and m values the first n and m entries are used. Set `size` to `sizeof(TautscopeTipReport)` first.
+typedef struct TautscopeTipReport {
     // Bytes of the structure as the caller knows it.
     uint32_t size;
     // Result of the update.
@@ -420,7 +409,7 @@ typedef struct TautscopeAxesReport {
     TautscopeTrigger triggers_plus[8];
     // Per DOF, 1 if the measurement determined it.
     uint32_t is_observable[8];
-} TautscopeAxesReport;
+} TautscopeTipReport;
 
 // What a sensor would measure in a state: its values and their derivatives.
 //
@@ -429,6 +418,48 @@ typedef struct TautscopeAxesReport {
 //
 // It returns 0 where the sensor sees nothing. It must not call functions with the same handle.
 typedef int (*TautscopePredict)(void *context, const double *state, double *values, double *jacobian);
+
+// State of the supervision.
+typedef struct TautscopeSupervision {
+    // The reaction in force.
+    TautscopeReaction reaction;
+    // The active flags, a bit `1 << TautscopeFlag` each.
+    uint32_t flags;
+    // The flags raised since the last acknowledgement.
+    uint32_t latched;
+    // 0.
+    uint32_t reserved;
+    // Share of the compensation in use, 0 to 1.
+    double share;
+} TautscopeSupervision;
+
+// Settings of the compensator of a degree of freedom, in its unit.
+typedef struct TautscopeCompensatorSettings {
+    // Gain while the slack is crossed, `K_b` of the article: from 1, which compensates nothing, to `gain_limit`.
+    double free_gain;
+    // Upper bound of every gain.
+    double gain_limit;
+    // Share of the reference's travel by which the command returns to the reference after changed offsets; 0: it does not.
+    double recovery;
+    // Negative contact offset, input minus output.
+    double delta_minus;
+    // Positive contact offset, input minus output.
+    double delta_plus;
+} TautscopeCompensatorSettings;
+
+// Settings of the estimator of a degree of freedom, in its unit.
+typedef struct TautscopeEstimatorSettings {
+    // Travel of the command between two updates, tau.
+    double update_distance;
+    // Contact tolerance, epsilon, between 0 and 1.
+    double contact_tolerance;
+    // Smoothing factor, alpha, per `update_distance` travelled, between 0 and 1.
+    double smoothing_factor;
+    // First negative contact offset, input minus output.
+    double delta_minus;
+    // First positive contact offset, input minus output.
+    double delta_plus;
+} TautscopeEstimatorSettings;
 
 #ifdef __cplusplus
 extern "C" {
@@ -455,8 +486,9 @@ const char *tautscope_error_message(void);
 
 // Creates a loop at rest.
 //
-// `toml` is the configuration with every key, as `tautscope config` prints it, `length` its bytes. Its key `profile` selects
-// the profile. `*created` is the loop; destroy it with `tautscope_loop_destroy`.
+// `toml` is the configuration, `length` its bytes; its key `profile` selects the profile. With `[[dof]]`, of which each needs a
+// `name` and a `width_limit`, keys that it does not have have their defaults; without, it has every key, as `tautscope config`
+// prints it. `*created` is the loop; destroy it with `tautscope_loop_destroy`.
 //
 // # Safety
 // `toml` points to `length` readable bytes; `created` is writable.
@@ -470,26 +502,40 @@ TautscopeResult tautscope_loop_create(const uint8_t *toml,
 // The loop came from `tautscope_loop_create` and is not used again.
 void tautscope_loop_destroy(struct TautscopeLoop *handle);
 
-// The control period of the configuration (s).
+// The number n of degrees of freedom, and the control period of the configuration (s). Either place may be null.
 //
 // # Safety
-// The handle is valid and used by this thread only; `period` is writable.
-TautscopeResult tautscope_loop_period(struct TautscopeLoop *handle, double *period);
+// The handle is valid and used by this thread only; `dofs` and `period` are null or writable.
+TautscopeResult tautscope_loop_size(struct TautscopeLoop *handle, size_t *dofs, double *period);
 
-// One control tick: the command for a reference, Eqs. (2)-(3). It does not allocate, block or read a clock.
+// One control tick: the command for a reference. It does not allocate, block or read a clock.
 //
-// `reference` and `command` are insertion, rotation, bending [m, rad, rad]. `time` is the caller's clock (s). `made_at` is when
-// the reference was made on that clock (s), NaN if not known.
+// `reference` and `command` are (n,) [m or rad], without `[[dof]]` insertion, rotation, bending [m, rad, rad]; `dofs` is n.
+// `time` is the caller's clock (s). `made_at` is when the reference was made on that clock (s), NaN if not known.
 //
-// With any result but OK, and while motion is held, `command` is the last one, NaN before the first.
+// With any result but OK, and while motion is held, `command` is the last one, NaN before the first; with
+// `TAUTSCOPE_RESULT_SIZE` nothing is written.
 //
 // # Safety
-// The handle is valid and used by this thread only; `reference` points to three numbers, `command` to place for three.
+// The handle is valid and used by this thread only; `reference` points to `dofs` numbers, `command` to place for as many.
 TautscopeResult tautscope_loop_step(struct TautscopeLoop *handle,
+                                    size_t dofs,
                                     const double *reference,
                                     double made_at,
                                     double time,
                                     double *command);
+
+// The state of the tip (n,) [m or rad] that the estimated slack predicts now; NaN before the first tick. `dofs` is n.
+//
+// # Safety
+// The handle is valid and used by this thread only; `state` points to place for `dofs` numbers.
+TautscopeResult tautscope_loop_predicted_state(struct TautscopeLoop *handle, size_t dofs, double *state);
+
+// The hysteresis estimated so far.
+//
+// # Safety
+// The handle is valid and used by this thread only; `hysteresis` is writable.
+TautscopeResult tautscope_loop_hysteresis(struct TautscopeLoop *handle, struct TautscopeHysteresis *hysteresis);
 
 // Image update with the centroids of the bands from the caller's own detector. It does not allocate.
 //
@@ -534,6 +580,32 @@ TautscopeResult tautscope_loop_on_frame(struct TautscopeLoop *handle,
                                         const struct TautscopeImage *image,
                                         double captured_at,
                                         struct TautscopeReport *report);
+
+// Update of a loop with `[[dof]]` by the tip measured degree by degree. It does not allocate.
+//
+// `measurement` has n values [m or rad]; without a covariance `measurement.tip_deviation` of the configuration is used. `report`
+// may be null.
+//
+// # Safety
+// The handle is valid and used by this thread only; `measurement` and what it points to are readable; `report` is null or points to
+// as many writable bytes as its member `size` states.
+TautscopeResult tautscope_loop_on_tip(struct TautscopeLoop *handle,
+                                      const struct TautscopeMeasurement *measurement,
+                                      struct TautscopeTipReport *report);
+
+// Update of a loop with `[[dof]]` by any measurement of the tip: `predict` is what the sensor would measure in a state. It does
+// not allocate.
+//
+// `measurement` has up to 16 values and a covariance. `predict` is called several times, with `context`, before this returns.
+// `report` may be null.
+//
+// # Safety
+// As `tautscope_loop_on_tip`; `predict` keeps to `TautscopePredict` and throws no exception.
+TautscopeResult tautscope_loop_on_measurement(struct TautscopeLoop *handle,
+                                              const struct TautscopeMeasurement *measurement,
+                                              TautscopePredict predict,
+                                              void *context,
+                                              struct TautscopeTipReport *report);
 
 // State of the supervision now.
 //
@@ -594,113 +666,65 @@ TautscopeResult tautscope_detector_detect(struct TautscopeDetector *handle,
                                           const struct TautscopeStatePrediction *prediction,
                                           struct TautscopeDetection *detection);
 
-// Creates a loop at rest.
-//
-// `toml` is a configuration with `[[dof]]`, of which each needs a `name` and a `width_limit`; `length` is its bytes. Keys that it
-// does not have have their defaults, so that it may also be what `tautscope config` prints. `*created` is the loop; destroy it
-// with `tautscope_axes_destroy`.
+// Creates a compensator at rest from the settings of each of its 1 to 8 degrees of freedom.
 //
 // # Safety
-// `toml` points to `length` readable bytes; `created` is writable.
-TautscopeResult tautscope_axes_create(const uint8_t *toml,
-                                      size_t length,
-                                      struct TautscopeAxes **created);
+// `settings` points to `dofs` structures; `created` is writable.
+TautscopeResult tautscope_compensator_create(const struct TautscopeCompensatorSettings *settings,
+                                             size_t dofs,
+                                             struct TautscopeCompensator **created);
 
-// Destroys a loop; null is ignored.
+// Destroys a compensator; null is ignored.
 //
 // # Safety
-// The loop came from `tautscope_axes_create` and is not used again.
-void tautscope_axes_destroy(struct TautscopeAxes *handle);
+// It came from `tautscope_compensator_create` and is not used again.
+void tautscope_compensator_destroy(struct TautscopeCompensator *handle);
 
-// The number n of degrees of freedom, and the control period of the configuration (s). Either place may be null.
-//
-// # Safety
-// The handle is valid and used by this thread only; `dofs` and `period` are null or writable.
-TautscopeResult tautscope_axes_size(struct TautscopeAxes *handle, size_t *dofs, double *period);
-
-// One control tick: the command for a reference. It does not allocate, block or read a clock.
-//
-// `reference` and `command` are (n,) [m or rad]; `dofs` is n. `time` is the caller's clock (s). `made_at` is when the reference was
-// made on that clock (s), NaN if not known.
-//
-// With any result but OK, and while motion is held, `command` is the last one, NaN before the first; with
-// `TAUTSCOPE_RESULT_SIZE` nothing is written.
+// The command (n,) for the next reference (n,). The first one is the reference; a reference that has not changed, or is not
+// finite, repeats the last command of its degree of freedom.
 //
 // # Safety
 // The handle is valid and used by this thread only; `reference` points to `dofs` numbers, `command` to place for as many.
-TautscopeResult tautscope_axes_step(struct TautscopeAxes *handle,
-                                    size_t dofs,
-                                    const double *reference,
-                                    double made_at,
-                                    double time,
-                                    double *command);
+TautscopeResult tautscope_compensator_step(struct TautscopeCompensator *handle,
+                                           size_t dofs,
+                                           const double *reference,
+                                           double *command);
 
-// The state of the tip (n,) [m or rad] that the estimated slack predicts now; NaN before the first tick. `dofs` is n.
+// Changes the contact offsets (n,), input minus output; the command does not move.
 //
 // # Safety
-// The handle is valid and used by this thread only; `state` points to place for `dofs` numbers.
-TautscopeResult tautscope_axes_predicted_state(struct TautscopeAxes *handle, size_t dofs, double *state);
+// The handle is valid and used by this thread only; `delta_minus` and `delta_plus` point to `dofs` numbers.
+TautscopeResult tautscope_compensator_set_offsets(struct TautscopeCompensator *handle,
+                                                  size_t dofs,
+                                                  const double *delta_minus,
+                                                  const double *delta_plus);
 
-// The hysteresis estimated so far.
+// Creates an estimator from the settings of each of its 1 to 8 degrees of freedom.
 //
 // # Safety
-// The handle is valid and used by this thread only; `hysteresis` is writable.
-TautscopeResult tautscope_axes_hysteresis(struct TautscopeAxes *handle, struct TautscopeAxesHysteresis *hysteresis);
+// `settings` points to `dofs` structures; `created` is writable.
+TautscopeResult tautscope_estimator_create(const struct TautscopeEstimatorSettings *settings,
+                                           size_t dofs,
+                                           struct TautscopeEstimator **created);
 
-// State of the supervision now.
+// Destroys an estimator; null is ignored.
 //
 // # Safety
-// The handle is valid and used by this thread only; `supervision` is writable.
-TautscopeResult tautscope_axes_supervision(struct TautscopeAxes *handle, struct TautscopeSupervision *supervision);
+// It came from `tautscope_estimator_create` and is not used again.
+void tautscope_estimator_destroy(struct TautscopeEstimator *handle);
 
-// Re-engages: resumes held motion, without a jump of the command.
+// Updates the offsets from a command (n,) and the output (n,) measured at the same instant, NaN where it was not measured.
+// `delta_minus` and `delta_plus` are then the estimated offsets (n,), input minus output.
 //
 // # Safety
-// The handle is valid and used by this thread only.
-TautscopeResult tautscope_axes_engage(struct TautscopeAxes *handle);
-
-// Acknowledges the warnings: empties `latched`; nothing else changes.
-//
-// # Safety
-// The handle is valid and used by this thread only.
-TautscopeResult tautscope_axes_acknowledge(struct TautscopeAxes *handle);
-
-// Uses a share of the compensation: all with 1, none with 0. The command moves only with the reference.
-//
-// # Safety
-// The handle is valid and used by this thread only.
-TautscopeResult tautscope_axes_set_compensation(struct TautscopeAxes *handle, double share);
-
-// Raises a `TautscopeFlag` that only the rig can detect, as `tautscope_loop_raise_flag`.
-//
-// # Safety
-// The handle is valid and used by this thread only.
-TautscopeResult tautscope_axes_raise_flag(struct TautscopeAxes *handle, uint32_t flag);
-
-// Update with the tip measured degree by degree. It does not allocate.
-//
-// `measurement` has n values [m or rad]; without a covariance `measurement.tip_deviation` of the configuration is used. `report`
-// may be null.
-//
-// # Safety
-// The handle is valid and used by this thread only; `measurement` and what it points to are readable; `report` is null or points to
-// as many writable bytes as its member `size` states.
-TautscopeResult tautscope_axes_on_tip(struct TautscopeAxes *handle,
-                                      const struct TautscopeMeasurement *measurement,
-                                      struct TautscopeAxesReport *report);
-
-// Update with any measurement of the tip: `predict` is what the sensor would measure in a state. It does not allocate.
-//
-// `measurement` has up to 16 values and a covariance. `predict` is called several times, with `context`, before this returns.
-// `report` may be null.
-//
-// # Safety
-// As `tautscope_axes_on_tip`; `predict` keeps to `TautscopePredict` and throws no exception.
-TautscopeResult tautscope_axes_on_measurement(struct TautscopeAxes *handle,
-                                              const struct TautscopeMeasurement *measurement,
-                                              TautscopePredict predict,
-                                              void *context,
-                                              struct TautscopeAxesReport *report);
+// The handle is valid and used by this thread only; `command` and `measured` point to `dofs` numbers, `delta_minus` and
+// `delta_plus` to place for as many.
+TautscopeResult tautscope_estimator_update(struct TautscopeEstimator *handle,
+                                           size_t dofs,
+                                           const double *command,
+                                           const double *measured,
+                                           double *delta_minus,
+                                           double *delta_plus);
 
 #ifdef __cplusplus
 }  // extern "C"

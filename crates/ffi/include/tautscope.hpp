@@ -18,6 +18,7 @@
 #include <string_view>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "tautscope.h"
 
@@ -159,17 +160,22 @@ namespace detail {
 struct Destroy {
     void operator()(TautscopeLoop *loop) const noexcept { tautscope_loop_destroy(loop); }
     void operator()(TautscopeDetector *detector) const noexcept { tautscope_detector_destroy(detector); }
-    void operator()(TautscopeAxes *axes) const noexcept { tautscope_axes_destroy(axes); }
+    void operator()(TautscopeCompensator *compensator) const noexcept { tautscope_compensator_destroy(compensator); }
+    void operator()(TautscopeEstimator *estimator) const noexcept { tautscope_estimator_destroy(estimator); }
 };
 
-template <class Handle>
-std::unique_ptr<Handle, Destroy> create(TautscopeResult (*function)(const std::uint8_t *, std::size_t, Handle **),
-                                        std::string_view toml) {
+inline void check_version() {
     if (tautscope_abi_version() != TAUTSCOPE_ABI_VERSION) {
         throw Error(TAUTSCOPE_RESULT_INTERNAL,
                     "the library has version " + std::to_string(tautscope_abi_version()) +
                         " of the interface, the header " + std::to_string(TAUTSCOPE_ABI_VERSION));
     }
+}
+
+template <class Handle>
+std::unique_ptr<Handle, Destroy> create(TautscopeResult (*function)(const std::uint8_t *, std::size_t, Handle **),
+                                        std::string_view toml) {
+    check_version();
     // An empty view has a null pointer.
     static const char nothing = 0;
     const char *text = toml.empty() ? &nothing : toml.data();
@@ -178,86 +184,37 @@ std::unique_ptr<Handle, Destroy> create(TautscopeResult (*function)(const std::u
     return std::unique_ptr<Handle, Destroy>(handle);
 }
 
-} // namespace detail
+/// As `create`, of an object of the settings of each degree of freedom.
+template <class Handle, class Settings>
+std::unique_ptr<Handle, Destroy> create_each(TautscopeResult (*function)(const Settings *, std::size_t, Handle **),
+                                             const std::vector<Settings> &settings) {
+    check_version();
+    Handle *handle = nullptr;
+    check(function(settings.data(), settings.size(), &handle));
+    return std::unique_ptr<Handle, Destroy>(handle);
+}
 
-/// Finds the two marker bands in images; one thread at a time.
-class Detector {
+/// What both kinds of loops have.
+class AnyLoop {
 public:
-    /// From the configuration with every key, as `tautscope config` prints it.
-    explicit Detector(std::string_view toml) : handle_(detail::create(&tautscope_detector_create, toml)) {}
-
-    /// Detects near a prediction, or in the whole workspace.
-    TautscopeDetection detect(const TautscopeImage &image,
-                              const std::optional<TautscopeStatePrediction> &prediction = std::nullopt) {
-        TautscopeDetection detection;
-        check(tautscope_detector_detect(handle_.get(), &image, prediction ? &*prediction : nullptr, &detection));
-        return detection;
-    }
-
-    TautscopeDetector *handle() noexcept { return handle_.get(); }
-
-private:
-    std::unique_ptr<TautscopeDetector, detail::Destroy> handle_;
-};
-
-/// The loop: reference in, command out; one thread at a time.
-class Loop {
-public:
-    /// From the configuration with every key, as `tautscope config` prints it.
-    explicit Loop(std::string_view toml) : handle_(detail::create(&tautscope_loop_create, toml)) {}
+    /// The number n of degrees of freedom.
+    std::size_t dofs() const noexcept { return dofs_; }
 
     /// The control period [s].
-    double period() {
-        double period = 0.0;
-        check(tautscope_loop_period(handle_.get(), &period));
-        return period;
+    double period() const noexcept { return period_; }
+
+    /// The state of the tip (n,) that the estimated slack predicts now.
+    Values predicted_state() {
+        Values state(dofs_);
+        check(tautscope_loop_predicted_state(handle_.get(), dofs_, state.data()));
+        return state;
     }
 
-    /// One control tick at `time` [s]: the command for a reference, made at `made_at` [s] if that is known.
-    Vector step(View<3> reference, double time, double made_at = unknown) {
-        Vector command;
-        check(tautscope_loop_step(handle_.get(), reference.data(), made_at, time, command.data()));
-        return command;
-    }
-
-    /// As `step`, without exceptions: with any result but OK, `command` is the last one.
-    TautscopeResult try_step(View<3> reference, double time, Vector &command, double made_at = unknown) noexcept {
-        return tautscope_loop_step(handle_.get(), reference.data(), made_at, time, command.data());
-    }
-
-    /// Image update with centroids u, v of both bands [px]; two NaN for a band that was not found.
-    TautscopeReport on_features(View<4> features, double captured_at) {
-        TautscopeReport report = empty_report();
-        check(tautscope_loop_on_features(handle_.get(), features.data(), captured_at, &report));
-        return report;
-    }
-
-    /// Image update without bands.
-    TautscopeReport on_features(std::nullopt_t, double captured_at) {
-        TautscopeReport report = empty_report();
-        check(tautscope_loop_on_features(handle_.get(), nullptr, captured_at, &report));
-        return report;
-    }
-
-    /// Image update: predicts, detects and updates, in this thread.
-    TautscopeReport on_frame(Detector &detector, const TautscopeImage &image, double captured_at) {
-        TautscopeReport report = empty_report();
-        check(tautscope_loop_on_frame(handle_.get(), detector.handle(), &image, captured_at, &report));
-        return report;
-    }
-
-    /// Where to detect in an image; first part of `on_frame`.
-    TautscopeStatePrediction predict_state(double captured_at) {
-        TautscopeStatePrediction prediction;
-        check(tautscope_loop_predict_state(handle_.get(), captured_at, &prediction));
-        return prediction;
-    }
-
-    /// Image update with the result of a `Detector`, which may run in another thread; last part of `on_frame`.
-    TautscopeReport on_detection(const TautscopeDetection &detection, double captured_at) {
-        TautscopeReport report = empty_report();
-        check(tautscope_loop_on_detection(handle_.get(), &detection, captured_at, &report));
-        return report;
+    /// The hysteresis estimated so far, in the first n entries.
+    TautscopeHysteresis hysteresis() {
+        TautscopeHysteresis hysteresis;
+        check(tautscope_loop_hysteresis(handle_.get(), &hysteresis));
+        return hysteresis;
     }
 
     /// Reaction and flags in force.
@@ -283,51 +240,127 @@ public:
 
     TautscopeLoop *handle() noexcept { return handle_.get(); }
 
-private:
+protected:
     static constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
-    static TautscopeReport empty_report() noexcept {
-        TautscopeReport report{};
+    explicit AnyLoop(std::string_view toml) : handle_(create(&tautscope_loop_create, toml)) {
+        check(tautscope_loop_size(handle_.get(), &dofs_, &period_));
+    }
+
+    template <class Report> static Report empty() noexcept {
+        Report report{};
         report.size = sizeof report;
         return report;
     }
 
-    std::unique_ptr<TautscopeLoop, detail::Destroy> handle_;
+    std::unique_ptr<TautscopeLoop, Destroy> handle_;
+
+private:
+    std::size_t dofs_ = 0;
+    double period_ = 0.0;
+};
+
+} // namespace detail
+
+/// Finds the two marker bands in images; one thread at a time.
+class Detector {
+public:
+    /// From the configuration with every key, as `tautscope config` prints it.
+    explicit Detector(std::string_view toml) : handle_(detail::create(&tautscope_detector_create, toml)) {}
+
+    /// Detects near a prediction, or in the whole workspace.
+    TautscopeDetection detect(const TautscopeImage &image,
+                              const std::optional<TautscopeStatePrediction> &prediction = std::nullopt) {
+        TautscopeDetection detection;
+        check(tautscope_detector_detect(handle_.get(), &image, prediction ? &*prediction : nullptr, &detection));
+        return detection;
+    }
+
+    TautscopeDetector *handle() noexcept { return handle_.get(); }
+
+private:
+    std::unique_ptr<TautscopeDetector, detail::Destroy> handle_;
+};
+
+/// The loop of the article's instrument: reference in, command out; one thread at a time.
+class Loop : public detail::AnyLoop {
+public:
+    /// From the configuration with every key, as `tautscope config` prints it.
+    explicit Loop(std::string_view toml) : AnyLoop(toml) {}
+
+    /// One control tick at `time` [s]: the command for a reference, made at `made_at` [s] if that is known.
+    Vector step(View<3> reference, double time, double made_at = unknown) {
+        Vector command;
+        check(try_step(reference, time, command, made_at));
+        return command;
+    }
+
+    /// As `step`, without exceptions: with any result but OK, `command` is the last one.
+    TautscopeResult try_step(View<3> reference, double time, Vector &command, double made_at = unknown) noexcept {
+        return tautscope_loop_step(handle_.get(), command.size(), reference.data(), made_at, time, command.data());
+    }
+
+    /// Image update with centroids u, v of both bands [px]; two NaN for a band that was not found.
+    TautscopeReport on_features(View<4> features, double captured_at) {
+        auto report = empty<TautscopeReport>();
+        check(tautscope_loop_on_features(handle_.get(), features.data(), captured_at, &report));
+        return report;
+    }
+
+    /// Image update without bands.
+    TautscopeReport on_features(std::nullopt_t, double captured_at) {
+        auto report = empty<TautscopeReport>();
+        check(tautscope_loop_on_features(handle_.get(), nullptr, captured_at, &report));
+        return report;
+    }
+
+    /// Image update: predicts, detects and updates, in this thread.
+    TautscopeReport on_frame(Detector &detector, const TautscopeImage &image, double captured_at) {
+        auto report = empty<TautscopeReport>();
+        check(tautscope_loop_on_frame(handle_.get(), detector.handle(), &image, captured_at, &report));
+        return report;
+    }
+
+    /// Where to detect in an image; first part of `on_frame`.
+    TautscopeStatePrediction predict_state(double captured_at) {
+        TautscopeStatePrediction prediction;
+        check(tautscope_loop_predict_state(handle_.get(), captured_at, &prediction));
+        return prediction;
+    }
+
+    /// Image update with the result of a `Detector`, which may run in another thread; last part of `on_frame`.
+    TautscopeReport on_detection(const TautscopeDetection &detection, double captured_at) {
+        auto report = empty<TautscopeReport>();
+        check(tautscope_loop_on_detection(handle_.get(), &detection, captured_at, &report));
+        return report;
+    }
 };
 
 /// The loop of 1 to 8 degrees of freedom whose tip any sensor measures; one thread at a time.
-class Axes {
+class Axes : public detail::AnyLoop {
 public:
     /// From a configuration with `[[dof]]`; keys that it does not have have their defaults.
-    explicit Axes(std::string_view toml) : handle_(detail::create(&tautscope_axes_create, toml)) {
-        check(tautscope_axes_size(handle_.get(), &dofs_, &period_));
-    }
-
-    /// The number n of degrees of freedom.
-    std::size_t dofs() const noexcept { return dofs_; }
-
-    /// The control period [s].
-    double period() const noexcept { return period_; }
+    explicit Axes(std::string_view toml) : AnyLoop(toml) {}
 
     /// One control tick at `time` [s]: the command (n,) for a reference (n,), made at `made_at` [s] if that is known.
     Values step(Numbers reference, double time, double made_at = unknown) {
-        Values command(dofs_);
+        Values command(dofs());
         check(try_step(reference, time, command, made_at));
         return command;
     }
 
     /// As `step`, without exceptions: with any result but OK, `command` is the last one.
     TautscopeResult try_step(Numbers reference, double time, Values &command, double made_at = unknown) noexcept {
-        command = Values(dofs_);
-        return tautscope_axes_step(handle_.get(), reference.size(), reference.data(), made_at, time, command.data());
+        command = Values(dofs());
+        return tautscope_loop_step(handle_.get(), reference.size(), reference.data(), made_at, time, command.data());
     }
 
     /// Update with the tip measured degree by degree (n,); NaN for what was not measured. Without a covariance (n, n), row by
     /// row, `measurement.tip_deviation` is used.
-    TautscopeAxesReport on_tip(Numbers values, double captured_at, Numbers covariance = {}, std::uint32_t sensor = 0) {
+    TautscopeTipReport on_tip(Numbers values, double captured_at, Numbers covariance = {}, std::uint32_t sensor = 0) {
         const TautscopeMeasurement measurement = measured(values, captured_at, covariance, sensor, 0);
-        TautscopeAxesReport report = empty_report();
-        check(tautscope_axes_on_tip(handle_.get(), &measurement, &report));
+        auto report = empty<TautscopeTipReport>();
+        check(tautscope_loop_on_tip(handle_.get(), &measurement, &report));
         return report;
     }
 
@@ -337,7 +370,7 @@ public:
     /// `double *jacobian` also dz/dq (m, n) row by row, else central differences are used. It may return false where the sensor
     /// sees nothing. `point` is 2 for u, v of points of an image, which are right or wrong together.
     template <class Predict>
-    TautscopeAxesReport on_measurement(Numbers values, double captured_at, Numbers covariance, Predict &&predict,
+    TautscopeTipReport on_measurement(Numbers values, double captured_at, Numbers covariance, Predict &&predict,
                                        std::uint32_t sensor = 0, std::uint32_t point = 1) {
         struct Call {
             std::remove_reference_t<Predict> *predict;
@@ -357,9 +390,9 @@ public:
             }
         };
         const TautscopeMeasurement measurement = measured(values, captured_at, covariance, sensor, point);
-        TautscopeAxesReport report = empty_report();
+        auto report = empty<TautscopeTipReport>();
         const TautscopeResult result =
-            tautscope_axes_on_measurement(handle_.get(), &measurement, forward, &call, &report);
+            tautscope_loop_on_measurement(handle_.get(), &measurement, forward, &call, &report);
         if (call.error) {
             std::rethrow_exception(call.error);
         }
@@ -367,52 +400,7 @@ public:
         return report;
     }
 
-    /// The state of the tip (n,) that the estimated slack predicts now.
-    Values predicted_state() {
-        Values state(dofs_);
-        check(tautscope_axes_predicted_state(handle_.get(), dofs_, state.data()));
-        return state;
-    }
-
-    /// The hysteresis estimated so far, in the first n entries.
-    TautscopeAxesHysteresis hysteresis() {
-        TautscopeAxesHysteresis hysteresis;
-        check(tautscope_axes_hysteresis(handle_.get(), &hysteresis));
-        return hysteresis;
-    }
-
-    /// Reaction and flags in force.
-    TautscopeSupervision supervision() {
-        TautscopeSupervision supervision;
-        check(tautscope_axes_supervision(handle_.get(), &supervision));
-        return supervision;
-    }
-
-    /// Resumes held motion, without a jump of the command.
-    void engage() { check(tautscope_axes_engage(handle_.get())); }
-
-    /// Acknowledges the warnings.
-    void acknowledge() { check(tautscope_axes_acknowledge(handle_.get())); }
-
-    /// Uses a share of the compensation, 0 to 1.
-    void set_compensation(double share) { check(tautscope_axes_set_compensation(handle_.get(), share)); }
-
-    /// Raises a flag that only the rig can detect.
-    void raise_flag(TautscopeFlag flag) {
-        check(tautscope_axes_raise_flag(handle_.get(), static_cast<std::uint32_t>(flag)));
-    }
-
-    TautscopeAxes *handle() noexcept { return handle_.get(); }
-
 private:
-    static constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
-
-    static TautscopeAxesReport empty_report() noexcept {
-        TautscopeAxesReport report{};
-        report.size = sizeof report;
-        return report;
-    }
-
     static TautscopeMeasurement measured(Numbers values, double captured_at, Numbers covariance, std::uint32_t sensor,
                                          std::uint32_t point) {
         const std::size_t count = values.size();
@@ -438,10 +426,56 @@ private:
             return call() ? 1 : 0;
         }
     }
+};
 
-    std::unique_ptr<TautscopeAxes, detail::Destroy> handle_;
-    std::size_t dofs_ = 0;
-    double period_ = 0.0;
+/// The article's inverse of the plays of 1 to 8 degrees of freedom, each by itself, Eqs. (2)-(3).
+class Compensator {
+public:
+    explicit Compensator(const std::vector<TautscopeCompensatorSettings> &settings)
+        : handle_(detail::create_each(&tautscope_compensator_create, settings)), dofs_(settings.size()) {}
+
+    /// The command (n,) for the next reference (n,).
+    Values step(Numbers reference) {
+        Values command(dofs_);
+        check(tautscope_compensator_step(handle_.get(), reference.size(), reference.data(), command.data()));
+        return command;
+    }
+
+    /// Changes the contact offsets (n,), input minus output; the command does not move.
+    void set_offsets(Numbers delta_minus, Numbers delta_plus) {
+        const bool is_each = delta_minus.size() == delta_plus.size();
+        check(tautscope_compensator_set_offsets(handle_.get(), is_each ? delta_plus.size() : 0, delta_minus.data(),
+                                                delta_plus.data()));
+    }
+
+private:
+    std::unique_ptr<TautscopeCompensator, detail::Destroy> handle_;
+    std::size_t dofs_;
+};
+
+/// The article's estimation of the contact offsets of 1 to 8 degrees of freedom, each by itself, Eqs. (4)-(6).
+class Estimator {
+public:
+    explicit Estimator(const std::vector<TautscopeEstimatorSettings> &settings)
+        : handle_(detail::create_each(&tautscope_estimator_create, settings)), minus_(settings.size()),
+          plus_(settings.size()) {}
+
+    /// Updates the offsets from a command (n,) and the output (n,) measured at the same instant; NaN for what was not measured.
+    void update(Numbers command, Numbers measured) {
+        const bool is_each = command.size() == measured.size();
+        check(tautscope_estimator_update(handle_.get(), is_each ? command.size() : 0, command.data(), measured.data(),
+                                         minus_.data(), plus_.data()));
+    }
+
+    /// Negative contact offsets (n,) after the last update, input minus output.
+    const Values &delta_minus() const noexcept { return minus_; }
+
+    /// Positive contact offsets (n,) after the last update, input minus output.
+    const Values &delta_plus() const noexcept { return plus_; }
+
+private:
+    std::unique_ptr<TautscopeEstimator, detail::Destroy> handle_;
+    Values minus_, plus_;
 };
 
 } // namespace tautscope

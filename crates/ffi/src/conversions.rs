@@ -4,8 +4,8 @@ use tautscope_core as core;
 use tautscope_vision as vision;
 
 use crate::types::{
-    TautscopeAxesHysteresis, TautscopeAxesReport, TautscopeReaction, TautscopeRejection,
-    TautscopeReport, TautscopeStatus, TautscopeSupervision, TautscopeTrigger,
+    TautscopeHysteresis, TautscopeReaction, TautscopeRejection, TautscopeReport, TautscopeStatus,
+    TautscopeSupervision, TautscopeTipReport, TautscopeTrigger,
 };
 
 /// The bits of a set of flags.
@@ -111,7 +111,7 @@ impl TautscopeReport {
     }
 }
 
-impl TautscopeAxesReport {
+impl TautscopeTipReport {
     /// The report of a measurement at a time in s.
     pub fn new(report: &core::AxesReport, axes: &dyn core::Axes, captured_at: f64) -> Self {
         let (now, play) = (axes.supervision(), axes.play());
@@ -135,8 +135,8 @@ impl TautscopeAxesReport {
     }
 }
 
-impl From<core::AxesHysteresis> for TautscopeAxesHysteresis {
-    fn from(found: core::AxesHysteresis) -> Self {
+impl From<core::SlackEstimate<{ core::DOFS }>> for TautscopeHysteresis {
+    fn from(found: core::SlackEstimate<{ core::DOFS }>) -> Self {
         Self {
             half_width: found.half_width,
             width_std: found.width_std,

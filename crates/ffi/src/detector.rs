@@ -83,11 +83,8 @@ pub unsafe extern "C" fn tautscope_detector_create(
 /// The detector came from `tautscope_detector_create` and is not used again.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tautscope_detector_destroy(handle: *mut TautscopeDetector) {
-    let _ = guarded(|| {
-        // SAFETY: the caller's contract.
-        unsafe { take_back(handle) };
-        Ok(())
-    });
+    // SAFETY: the caller's contract.
+    unsafe { take_back(handle) };
 }
 
 /// Detects the bands in an image. It allocates only for an image that is larger than those before.

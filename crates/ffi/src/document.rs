@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
-use tautscope_axes::AxesSettings;
+use tautscope_axes::{AnyLoop, AxesSettings, Selection};
 use tautscope_core as core;
 use tautscope_vision::PixelFormat;
 use toml::{Table, Value};
@@ -45,50 +45,60 @@ struct Sine {
     amplitude: f64,
 }
 
-#[derive(Deserialize)]
-struct ProfileDocument {
-    profile: String,
+/// A loop at rest, as a configuration describes it.
+pub struct LoopDocument {
+    /// The loop.
+    pub inner: AnyLoop,
+    /// Of a loop with `[[dof]]`.
+    pub sensors: Sensors,
+    /// Control period in s.
+    pub period: f64,
+}
+
+/// What the sensors of a loop with `[[dof]]` need, `[measurement]`.
+#[derive(Debug, Default, Deserialize)]
+pub struct Sensors {
+    /// Standard deviation of a tip that is measured degree by degree, in `width_limit`.
+    pub tip_deviation: f64,
+    /// How much earlier than its time stamps say each sensor measures, in s.
     #[serde(default)]
-    dof: Vec<serde::de::IgnoredAny>,
+    pub delays: Vec<f64>,
+    /// `width_limit` of each degree of freedom [m or rad].
+    #[serde(skip)]
+    pub widths: Vec<f64>,
 }
 
-/// The profiles of the loop.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Profile {
-    /// The article's blocks.
-    Paper,
-    /// The vector law on one linear filter of fixed plays.
-    Best,
-}
-
-/// Settings and profile of a loop.
-///
-/// # Errors
-/// The text is not TOML in UTF-8, a key is missing, or a value is of the wrong kind.
-pub fn loop_settings(text: &[u8]) -> Result<(core::Settings, Profile), TautscopeResult> {
-    let ProfileDocument { profile, dof } = parsed(text)?;
-    if !dof.is_empty() {
-        return Err(config(format_args!(
-            "dof: got {} degrees of freedom, expected none: they are for `tautscope_axes_create`",
-            dof.len()
-        )));
-    }
-    let profile = match profile.as_str() {
-        "paper" => Profile::Paper,
-        "best" => Profile::Best,
-        other => {
-            return Err(config(format_args!(
-                "profile: got {other:?}, expected \"paper\" or \"best\""
-            )));
+impl LoopDocument {
+    /// The loop of a configuration: with `[[dof]]` keys that are not in the text have their defaults.
+    ///
+    /// # Errors
+    /// The text is not TOML in UTF-8, a value is of the wrong kind or out of range, or a key is missing; with `[[dof]]` also one
+    /// that is unknown or of another instrument.
+    pub fn new(text: &[u8]) -> Result<Self, TautscopeResult> {
+        let wrong = |error: core::ConfigError| config(format_args!("{error}"));
+        let selection: Selection = parsed(text)?;
+        if selection.has_axes() {
+            let (axes, mut sensors) = axes_document(text)?;
+            sensors.widths = axes.dof.iter().map(|dof| dof.width_limit).collect();
+            return Ok(Self {
+                inner: axes.build(true).map_err(wrong)?,
+                sensors,
+                period: axes.control.period,
+            });
         }
-    };
-    Ok((parsed(text)?, profile))
+        let settings: core::Settings = parsed(text)?;
+        Ok(Self {
+            inner: selection.build_bands(&settings).map_err(wrong)?,
+            sensors: Sensors::default(),
+            period: settings.control.period,
+        })
+    }
 }
 
 /// Settings of a detector and the model it predicts the bands with.
 ///
 /// # Errors
-/// As [`loop_settings`].
+/// As [`LoopDocument::new`].
 pub fn detector_settings(
     text: &[u8],
 ) -> Result<(DetectionDocument, core::FeatureModel, PixelFormat), TautscopeResult> {
@@ -113,29 +123,7 @@ const DEFAULTS: &str = include_str!("defaults.toml");
 const OPTIONAL: [&str; 5] = ["name", "width_limit", "range", "speed", "expected_width"];
 
 /// Settings of a loop with `[[dof]]`.
-#[derive(Debug)]
-pub struct AxesDocument {
-    /// What the loop reads.
-    pub axes: AxesSettings,
-    /// `[measurement]`.
-    pub measurement: Measurement,
-}
-
-/// What the sensors of a loop with `[[dof]]` need, `[measurement]`.
-#[derive(Debug, Deserialize)]
-pub struct Measurement {
-    /// Standard deviation of a tip that is measured degree by degree, in `width_limit`.
-    pub tip_deviation: f64,
-    /// How much earlier than its time stamps say each sensor measures, in s.
-    #[serde(default)]
-    pub delays: Vec<f64>,
-}
-
-/// Settings of a loop with `[[dof]]`; keys that are not in the text have their defaults.
-///
-/// # Errors
-/// The text is not TOML in UTF-8, or a key is missing, unknown, of another instrument, or of the wrong kind.
-pub fn axes_document(text: &[u8]) -> Result<AxesDocument, TautscopeResult> {
+fn axes_document(text: &[u8]) -> Result<(AxesSettings, Sensors), TautscopeResult> {
     let wrong = |error: toml::de::Error| config(format_args!("configuration: {error}"));
     let given: Table = toml::from_str(utf8(text)?).map_err(wrong)?;
     let mut table: Table = toml::from_str(DEFAULTS).map_err(wrong)?;
@@ -165,14 +153,11 @@ pub fn axes_document(text: &[u8]) -> Result<AxesDocument, TautscopeResult> {
                     dofs.push(Value::Table(dof));
                 }
             }
-            ("profile", value) if value.as_str() != Some("best") => {
-                return Err(config(format_args!(
-                    "profile: got {:?}, expected \"best\"",
-                    value.as_str().unwrap_or_default()
-                )));
+            ("profile", value) => {
+                table.insert(name, value);
             }
             // Not used with `[[dof]]`, but for defaults.
-            ("profile" | "drives" | "insertion" | "rotation" | "bending", _) => {}
+            ("drives" | "insertion" | "rotation" | "bending", _) => {}
             (name, own) => match table.get_mut(name) {
                 Some(Value::Table(section)) if SECTIONS.contains(&name) => {
                     merge(section, own, name, &[])?;
@@ -183,10 +168,8 @@ pub fn axes_document(text: &[u8]) -> Result<AxesDocument, TautscopeResult> {
         }
     }
     table.insert("dof".into(), Value::Array(dofs));
-    Ok(AxesDocument {
-        measurement: table["measurement"].clone().try_into().map_err(wrong)?,
-        axes: table.try_into().map_err(wrong)?,
-    })
+    let sensors = table["measurement"].clone().try_into().map_err(wrong)?;
+    Ok((table.try_into().map_err(wrong)?, sensors))
 }
 
 /// Sections that a loop with `[[dof]]` reads.
@@ -236,7 +219,7 @@ pub fn config(message: std::fmt::Arguments<'_>) -> TautscopeResult {
 fn parsed<T: DeserializeOwned>(text: &[u8]) -> Result<T, TautscopeResult> {
     toml::from_str(utf8(text)?).map_err(|error| {
         config(format_args!(
-            "configuration: {error}every key is needed, as `tautscope config` prints them"
+            "configuration: {error}every key is needed, as `tautscope config` prints them, or [[dof]]"
         ))
     })
 }

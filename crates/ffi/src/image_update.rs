@@ -3,7 +3,7 @@
 
 use crate::detector::{TautscopeDetector, detect};
 use crate::pointers::{check_report, read, write, write_report};
-use crate::reduction::{TautscopeLoop, check_finite, on_loop};
+use crate::reduction::{TautscopeLoop, check_finite};
 use crate::result::{TautscopeResult, failed, with_handle};
 use crate::types::{
     TautscopeDetection, TautscopeImage, TautscopeRejection, TautscopeReport,
@@ -17,10 +17,10 @@ impl TautscopeLoop {
         covariance: Option<&[[f64; 4]; 4]>,
         captured_at: f64,
         checksum: Option<u64>,
-    ) -> TautscopeReport {
-        let report =
-            on_loop!(self, inner => inner.on_features(features, covariance, captured_at, checksum));
-        TautscopeReport::new(&report, captured_at)
+    ) -> Result<TautscopeReport, TautscopeResult> {
+        let bands = self.bands()?;
+        let report = bands.on_features(features, covariance, captured_at, checksum);
+        Ok(TautscopeReport::new(&report, captured_at))
     }
 
     fn on_detection(
@@ -33,22 +33,23 @@ impl TautscopeLoop {
             .map(|reason| reason == TautscopeRejection::None as u32);
         check_bands(&detection.features, is_found)?;
         let found = is_found.contains(&true);
-        Ok(self.update(
+        self.update(
             found.then_some(detection.features),
             found.then_some(&detection.covariance),
             captured_at,
             Some(detection.checksum.into()),
-        ))
+        )
     }
 
-    fn predict(&mut self, captured_at: f64) -> TautscopeStatePrediction {
-        let known = on_loop!(self, inner => inner.predict_state(captured_at));
-        TautscopeStatePrediction {
+    fn predict(&mut self, captured_at: f64) -> Result<TautscopeStatePrediction, TautscopeResult> {
+        let bands = self.bands()?;
+        let known = bands.predict_state(captured_at);
+        Ok(TautscopeStatePrediction {
             state: known.map_or([f64::NAN; 3], |known| known.state),
             std: known.map_or([f64::NAN; 3], |known| known.deviation),
-            geometry: on_loop!(self, inner => inner.geometry()),
+            geometry: bands.geometry().map_or([0.0; 3], |found| found.errors()),
             is_known: known.is_some().into(),
-        }
+        })
     }
 }
 
@@ -82,7 +83,7 @@ pub unsafe extern "C" fn tautscope_loop_on_features(
             }
             check_bands(&[*ua, *va, *ub, *vb], is_found)?;
         }
-        Ok(handle.update(features.copied(), None, captured_at, None))
+        handle.update(features.copied(), None, captured_at, None)
     };
     // SAFETY: the caller's contract.
     unsafe { report_update(handle, captured_at, report, update) }
@@ -102,7 +103,7 @@ pub unsafe extern "C" fn tautscope_loop_predict_state(
     with_handle(unsafe { handle.as_mut() }, |handle| {
         check_finite("captured_at", captured_at)?;
         // SAFETY: the caller's contract.
-        *unsafe { write("prediction", prediction) }? = handle.predict(captured_at);
+        *unsafe { write("prediction", prediction) }? = handle.predict(captured_at)?;
         Ok(())
     })
 }
@@ -148,7 +149,7 @@ pub unsafe extern "C" fn tautscope_loop_on_frame(
     // SAFETY: the caller's contract.
     let handle = unsafe { handle.as_mut() };
     let update = |handle: &mut TautscopeLoop| {
-        let prediction = handle.predict(captured_at);
+        let prediction = handle.predict(captured_at)?;
         let mut detection = None;
         // SAFETY: the caller's contract.
         let result = with_handle(unsafe { detector.as_mut() }, |detector| {

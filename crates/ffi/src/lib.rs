@@ -14,12 +14,12 @@
 #[cfg(test)]
 mod tests;
 
-mod axes;
-mod axes_update;
+mod article;
 mod conversions;
 mod detector;
 mod document;
 mod image_update;
+mod measurement;
 mod names;
 mod pointers;
 mod reduction;

@@ -1,7 +1,7 @@
 //! Pointers of a C caller as references, with null checked.
 #![allow(unsafe_code)]
 
-use crate::result::{TautscopeResult, failed, null};
+use crate::result::{TautscopeResult, failed, guarded, null};
 
 /// What a pointer points to.
 ///
@@ -149,7 +149,11 @@ pub unsafe fn give<T>(place: *mut *mut T, value: T) -> Result<(), TautscopeResul
 /// If not null, it came from [`give`], and nobody uses it any more.
 pub unsafe fn take_back<T>(pointer: *mut T) {
     if !pointer.is_null() {
-        // SAFETY: `give` made it from a box.
-        drop(unsafe { Box::from_raw(pointer) });
+        // Dropping plain numbers does not panic; should it, the memory is lost and no more.
+        let _ = guarded(|| {
+            // SAFETY: `give` made it from a box.
+            drop(unsafe { Box::from_raw(pointer) });
+            Ok(())
+        });
     }
 }

@@ -1,38 +1,23 @@
 //! `TautscopeLoop`, the loop of Fig. 6, and its control tick.
 #![allow(unsafe_code)]
 
-use tautscope_core as core;
+use tautscope_axes::AnyLoop;
+use tautscope_core::{Axes, BandLoop, DOFS};
 
-use crate::document::{Profile, config, loop_settings};
-use crate::pointers::{bytes, give, read, take_back, write};
+use crate::document::{LoopDocument, Sensors};
+use crate::pointers::{bytes, give, numbers, numbers_mut, take_back, write};
 use crate::result::{Handle, TautscopeResult, failed, guarded, with_handle};
+use crate::types::TautscopeHysteresis;
 
-type Reduction<P> = Box<core::HysteresisReduction<P, Vec<core::Entry>>>;
-
-/// The loop: reference in, command out; images update the estimate of the hysteresis.
+/// The loop: reference in, command out; images or other measurements update the estimate of the hysteresis.
 pub struct TautscopeLoop {
-    pub(crate) profile: Blocks,
+    pub(crate) inner: AnyLoop,
+    pub(crate) sensors: Sensors,
     period: f64,
     /// The last command, NaN before the first reference.
-    command: [f64; 3],
+    command: [f64; DOFS],
     is_broken: bool,
 }
-
-pub(crate) enum Blocks {
-    Paper(Reduction<core::Paper>),
-    Best(Reduction<core::Best>),
-}
-
-/// Evaluates an expression with the loop of either profile.
-macro_rules! on_loop {
-    ($handle:expr, $name:ident => $body:expr) => {
-        match &mut $handle.profile {
-            $crate::reduction::Blocks::Paper($name) => $body,
-            $crate::reduction::Blocks::Best($name) => $body,
-        }
-    };
-}
-pub(crate) use on_loop;
 
 impl Handle for TautscopeLoop {
     fn is_broken(&mut self) -> &mut bool {
@@ -42,30 +27,57 @@ impl Handle for TautscopeLoop {
 
 impl TautscopeLoop {
     fn new(text: &[u8]) -> Result<Self, TautscopeResult> {
-        let (settings, profile) = loop_settings(text)?;
+        let document = LoopDocument::new(text)?;
         Ok(Self {
-            profile: match profile {
-                Profile::Paper => Blocks::Paper(build(&settings)?),
-                Profile::Best => Blocks::Best(build(&settings)?),
-            },
-            period: settings.control.period,
-            command: [f64::NAN; 3],
+            inner: document.inner,
+            sensors: document.sensors,
+            period: document.period,
+            command: [f64::NAN; DOFS],
             is_broken: false,
         })
     }
-}
 
-fn build<P: core::BandProfile>(settings: &core::Settings) -> Result<Reduction<P>, TautscopeResult> {
-    let storage = vec![core::Entry::BLANK; settings.history_entries()];
-    core::HysteresisReduction::new(settings, storage)
-        .map(Box::new)
-        .map_err(|error| config(format_args!("{error}")))
+    /// The loop of the article's instrument, for its bands.
+    pub(crate) fn bands(&mut self) -> Result<&mut dyn BandLoop, TautscopeResult> {
+        match &mut self.inner {
+            AnyLoop::Bands(inner) => Ok(inner.as_mut()),
+            AnyLoop::Axes(_) => Err(failed(
+                TautscopeResult::Signal,
+                format_args!(
+                    "images: got a loop with [[dof]], which takes measurements of the tip"
+                ),
+            )),
+        }
+    }
+
+    /// The loop with `[[dof]]`, and its sensors.
+    pub(crate) fn axes(&mut self) -> Result<(&mut dyn Axes, &Sensors), TautscopeResult> {
+        match &mut self.inner {
+            AnyLoop::Axes(inner) => Ok((inner.as_mut(), &self.sensors)),
+            AnyLoop::Bands(_) => Err(failed(
+                TautscopeResult::Signal,
+                format_args!("measurement: got a loop without [[dof]], which takes images"),
+            )),
+        }
+    }
+
+    pub(crate) fn check_dofs(&self, name: &str, found: usize) -> Result<(), TautscopeResult> {
+        let dofs = self.inner.dofs();
+        if found == dofs {
+            return Ok(());
+        }
+        Err(failed(
+            TautscopeResult::Size,
+            format_args!("{name}: got {found}, expected {dofs}, the degrees of freedom"),
+        ))
+    }
 }
 
 /// Creates a loop at rest.
 ///
-/// `toml` is the configuration with every key, as `tautscope config` prints it, `length` its bytes. Its key `profile` selects
-/// the profile. `*created` is the loop; destroy it with `tautscope_loop_destroy`.
+/// `toml` is the configuration, `length` its bytes; its key `profile` selects the profile. With `[[dof]]`, of which each needs a
+/// `name` and a `width_limit`, keys that it does not have have their defaults; without, it has every key, as `tautscope config`
+/// prints it. `*created` is the loop; destroy it with `tautscope_loop_destroy`.
 ///
 /// # Safety
 /// `toml` points to `length` readable bytes; `created` is writable.
@@ -89,43 +101,48 @@ pub unsafe extern "C" fn tautscope_loop_create(
 /// The loop came from `tautscope_loop_create` and is not used again.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tautscope_loop_destroy(handle: *mut TautscopeLoop) {
-    // Dropping plain numbers does not panic; should it, the memory is lost and no more.
-    let _ = guarded(|| {
-        // SAFETY: the caller's contract.
-        unsafe { take_back(handle) };
-        Ok(())
-    });
+    // SAFETY: the caller's contract.
+    unsafe { take_back(handle) };
 }
 
-/// The control period of the configuration (s).
+/// The number n of degrees of freedom, and the control period of the configuration (s). Either place may be null.
 ///
 /// # Safety
-/// The handle is valid and used by this thread only; `period` is writable.
+/// The handle is valid and used by this thread only; `dofs` and `period` are null or writable.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn tautscope_loop_period(
+pub unsafe extern "C" fn tautscope_loop_size(
     handle: *mut TautscopeLoop,
+    dofs: *mut usize,
     period: *mut f64,
 ) -> TautscopeResult {
     // SAFETY: the caller's contract.
     with_handle(unsafe { handle.as_mut() }, |handle| {
         // SAFETY: the caller's contract.
-        *unsafe { write("period", period) }? = handle.period;
+        let (dofs, period) = unsafe { (dofs.as_mut(), period.as_mut()) };
+        if let Some(dofs) = dofs {
+            *dofs = handle.inner.dofs();
+        }
+        if let Some(period) = period {
+            *period = handle.period;
+        }
         Ok(())
     })
 }
 
-/// One control tick: the command for a reference, Eqs. (2)-(3). It does not allocate, block or read a clock.
+/// One control tick: the command for a reference. It does not allocate, block or read a clock.
 ///
-/// `reference` and `command` are insertion, rotation, bending [m, rad, rad]. `time` is the caller's clock (s). `made_at` is when
-/// the reference was made on that clock (s), NaN if not known.
+/// `reference` and `command` are (n,) [m or rad], without `[[dof]]` insertion, rotation, bending [m, rad, rad]; `dofs` is n.
+/// `time` is the caller's clock (s). `made_at` is when the reference was made on that clock (s), NaN if not known.
 ///
-/// With any result but OK, and while motion is held, `command` is the last one, NaN before the first.
+/// With any result but OK, and while motion is held, `command` is the last one, NaN before the first; with
+/// `TAUTSCOPE_RESULT_SIZE` nothing is written.
 ///
 /// # Safety
-/// The handle is valid and used by this thread only; `reference` points to three numbers, `command` to place for three.
+/// The handle is valid and used by this thread only; `reference` points to `dofs` numbers, `command` to place for as many.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tautscope_loop_step(
     handle: *mut TautscopeLoop,
+    dofs: usize,
     reference: *const f64,
     made_at: f64,
     time: f64,
@@ -133,18 +150,64 @@ pub unsafe extern "C" fn tautscope_loop_step(
 ) -> TautscopeResult {
     // SAFETY: the caller's contract.
     with_handle(unsafe { handle.as_mut() }, |handle| {
+        handle.check_dofs("dofs", dofs)?;
+        // The caller may use one array for both.
         // SAFETY: the caller's contract.
-        let command = unsafe { write("command", command.cast::<[f64; 3]>()) }?;
-        *command = handle.command;
+        let given = unsafe { numbers("reference", reference, dofs) };
+        let mut taken = [f64::NAN; DOFS];
+        let given = given.map(|values| taken[..dofs].copy_from_slice(values));
         // SAFETY: the caller's contract.
-        let reference = unsafe { read("reference", reference.cast::<[f64; 3]>()) }?;
-        for value in reference {
+        let command = unsafe { numbers_mut("command", command, dofs) }?;
+        command.copy_from_slice(&handle.command[..dofs]);
+        given?;
+        for value in &taken[..dofs] {
             check_finite("reference", *value)?;
         }
         check_finite("time", time)?;
-        let made_at = check_made_at(made_at)?;
-        handle.command = on_loop!(handle, inner => inner.step(*reference, made_at, time));
-        *command = handle.command;
+        if made_at.is_infinite() {
+            return Err(not_finite("made_at", made_at));
+        }
+        let made_at = (!made_at.is_nan()).then_some(made_at);
+        let next = &mut handle.command[..dofs];
+        handle.inner.step(&taken[..dofs], made_at, time, next);
+        command.copy_from_slice(next);
+        Ok(())
+    })
+}
+
+/// The state of the tip (n,) [m or rad] that the estimated slack predicts now; NaN before the first tick. `dofs` is n.
+///
+/// # Safety
+/// The handle is valid and used by this thread only; `state` points to place for `dofs` numbers.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tautscope_loop_predicted_state(
+    handle: *mut TautscopeLoop,
+    dofs: usize,
+    state: *mut f64,
+) -> TautscopeResult {
+    // SAFETY: the caller's contract.
+    with_handle(unsafe { handle.as_mut() }, |handle| {
+        handle.check_dofs("dofs", dofs)?;
+        // SAFETY: the caller's contract.
+        let state = unsafe { numbers_mut("state", state, dofs) }?;
+        state.copy_from_slice(&handle.inner.predicted_state()[..dofs]);
+        Ok(())
+    })
+}
+
+/// The hysteresis estimated so far.
+///
+/// # Safety
+/// The handle is valid and used by this thread only; `hysteresis` is writable.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tautscope_loop_hysteresis(
+    handle: *mut TautscopeLoop,
+    hysteresis: *mut TautscopeHysteresis,
+) -> TautscopeResult {
+    // SAFETY: the caller's contract.
+    with_handle(unsafe { handle.as_mut() }, |handle| {
+        // SAFETY: the caller's contract.
+        *unsafe { write("hysteresis", hysteresis) }? = handle.inner.slack().into();
         Ok(())
     })
 }
@@ -155,14 +218,6 @@ pub fn check_finite(name: &str, value: f64) -> Result<(), TautscopeResult> {
     } else {
         Err(not_finite(name, value))
     }
-}
-
-/// When a reference was made, if that is known.
-pub fn check_made_at(made_at: f64) -> Result<Option<f64>, TautscopeResult> {
-    if made_at.is_infinite() {
-        return Err(not_finite("made_at", made_at));
-    }
-    Ok((!made_at.is_nan()).then_some(made_at))
 }
 
 fn not_finite(name: &str, value: f64) -> TautscopeResult {

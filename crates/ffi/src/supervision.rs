@@ -4,7 +4,7 @@
 use tautscope_core as core;
 
 use crate::pointers::write;
-use crate::reduction::{TautscopeLoop, on_loop};
+use crate::reduction::TautscopeLoop;
 use crate::result::{TautscopeResult, failed, with_handle};
 use crate::types::TautscopeSupervision;
 
@@ -20,8 +20,7 @@ pub unsafe extern "C" fn tautscope_loop_supervision(
     // SAFETY: the caller's contract.
     with_handle(unsafe { handle.as_mut() }, |handle| {
         // SAFETY: the caller's contract.
-        *unsafe { write("supervision", supervision) }? =
-            on_loop!(handle, inner => inner.supervision()).into();
+        *unsafe { write("supervision", supervision) }? = handle.inner.supervision().into();
         Ok(())
     })
 }
@@ -34,7 +33,7 @@ pub unsafe extern "C" fn tautscope_loop_supervision(
 pub unsafe extern "C" fn tautscope_loop_engage(handle: *mut TautscopeLoop) -> TautscopeResult {
     // SAFETY: the caller's contract.
     with_handle(unsafe { handle.as_mut() }, |handle| {
-        on_loop!(handle, inner => inner.engage());
+        handle.inner.engage();
         Ok(())
     })
 }
@@ -47,7 +46,7 @@ pub unsafe extern "C" fn tautscope_loop_engage(handle: *mut TautscopeLoop) -> Ta
 pub unsafe extern "C" fn tautscope_loop_acknowledge(handle: *mut TautscopeLoop) -> TautscopeResult {
     // SAFETY: the caller's contract.
     with_handle(unsafe { handle.as_mut() }, |handle| {
-        on_loop!(handle, inner => inner.acknowledge());
+        handle.inner.acknowledge();
         Ok(())
     })
 }
@@ -63,7 +62,8 @@ pub unsafe extern "C" fn tautscope_loop_set_compensation(
 ) -> TautscopeResult {
     // SAFETY: the caller's contract.
     with_handle(unsafe { handle.as_mut() }, |handle| {
-        on_loop!(handle, inner => inner.set_compensation(share)).map_err(share_error)
+        let done = handle.inner.set_compensation(share);
+        done.map_err(|error| failed(TautscopeResult::Signal, format_args!("{error}")))
     })
 }
 
@@ -79,24 +79,14 @@ pub unsafe extern "C" fn tautscope_loop_raise_flag(
 ) -> TautscopeResult {
     // SAFETY: the caller's contract.
     with_handle(unsafe { handle.as_mut() }, |handle| {
-        let known = known_flag(flag)?;
-        on_loop!(handle, inner => inner.raise(known));
+        let known = core::Flag::ALL.get(flag as usize).copied();
+        let wrong = || {
+            failed(
+                TautscopeResult::Signal,
+                format_args!("flag: got {flag}, expected a TautscopeFlag"),
+            )
+        };
+        handle.inner.raise(known.ok_or_else(wrong)?);
         Ok(())
     })
-}
-
-/// The flag of a number.
-pub fn known_flag(flag: u32) -> Result<core::Flag, TautscopeResult> {
-    let known = core::Flag::ALL.get(flag as usize).copied();
-    known.ok_or_else(|| {
-        failed(
-            TautscopeResult::Signal,
-            format_args!("flag: got {flag}, expected a TautscopeFlag"),
-        )
-    })
-}
-
-/// The error of a share of the compensation.
-pub fn share_error(error: core::ConfigError) -> TautscopeResult {
-    failed(TautscopeResult::Signal, format_args!("{error}"))
 }

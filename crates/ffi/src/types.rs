@@ -204,7 +204,7 @@ pub struct TautscopeMeasurement {
     pub count: usize,
     /// Covariance (m, m) row by row, or null, where the function allows it.
     pub covariance: *const f64,
-    /// When it was measured, on the clock of `tautscope_axes_step` (s).
+    /// When it was measured, on the clock of `tautscope_loop_step` (s).
     pub captured_at: f64,
     /// Which of 4 sensors with rates and delays of their own, 0 to 3.
     pub sensor: u32,
@@ -214,10 +214,10 @@ pub struct TautscopeMeasurement {
 
 /// Result of an update by a measurement; values that are not known are NaN.
 ///
-/// Of n degrees of freedom and m values the first n and m entries are used. Set `size` to `sizeof(TautscopeAxesReport)` first.
+/// Of n degrees of freedom and m values the first n and m entries are used. Set `size` to `sizeof(TautscopeTipReport)` first.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TautscopeAxesReport {
+pub struct TautscopeTipReport {
     /// Bytes of the structure as the caller knows it.
     pub size: u32,
     /// Result of the update.
@@ -253,16 +253,16 @@ pub struct TautscopeAxesReport {
 /// Estimated hysteresis of n degrees of freedom, in the first n entries [m or rad].
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TautscopeAxesHysteresis {
+pub struct TautscopeHysteresis {
     /// Half widths of the slack of each DOF that moves alone.
     pub half_width: [f64; 8],
-    /// Standard deviations of the half widths.
+    /// Standard deviations of the half widths; NaN in profile `paper`.
     pub width_std: [f64; 8],
     /// Centres of the contact offsets, input minus output.
     pub centre: [f64; 8],
-    /// Travel of the tip over that of the command in contact.
+    /// Travel of the tip over that of the command in contact; 1 in profile `paper`.
     pub gain: [f64; 8],
-    /// Standard deviations of the gains.
+    /// Standard deviations of the gains; NaN in profile `paper`.
     pub gain_std: [f64; 8],
 }
 
@@ -271,7 +271,7 @@ pub struct TautscopeAxesHysteresis {
 unsafe impl crate::pointers::Sized32 for TautscopeReport {}
 // SAFETY: likewise.
 #[allow(unsafe_code)]
-unsafe impl crate::pointers::Sized32 for TautscopeAxesReport {}
+unsafe impl crate::pointers::Sized32 for TautscopeTipReport {}
 
 /// State of the supervision.
 #[repr(C)]

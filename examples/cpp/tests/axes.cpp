@@ -2,10 +2,12 @@
    configuration, without allocation; and what is refused. */
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <iterator>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "../allocations.hpp"
 #include "../recording.hpp"
@@ -35,7 +37,7 @@ bool predict_with_jacobian(const double *q, double *z, double *jacobian) {
     return true;
 }
 
-TautscopeAxesReport update(tautscope::Axes &axes, const Update &now) {
+TautscopeTipReport update(tautscope::Axes &axes, const Update &now) {
     const auto kind = static_cast<std::uint32_t>(now.kind);
     switch (kind) {
     case 0:
@@ -69,7 +71,7 @@ template <std::size_t M> bool starts_with(const double (&values)[M], const std::
     return is_same(first, expected);
 }
 
-bool is_expected(const TautscopeAxesReport &report, const Update &expected, const TautscopeAxesHysteresis &found) {
+bool is_expected(const TautscopeTipReport &report, const Update &expected, const TautscopeHysteresis &found) {
     return report.status == static_cast<TautscopeStatus>(expected.status) &&
            report.reaction == static_cast<TautscopeReaction>(expected.reaction) &&
            report.flags == static_cast<std::uint32_t>(expected.flags) &&
@@ -92,7 +94,7 @@ int run(const std::string &recording, const std::string &configuration) {
         const double values[] = {command[0], command[1], command[2]};
         wrong += !is_same(values, now.command);
         for (; next < updates.size() && static_cast<std::size_t>(updates[next].tick) == tick; ++next) {
-            const TautscopeAxesReport report = update(axes, updates[next]);
+            const TautscopeTipReport report = update(axes, updates[next]);
             wrong += !is_expected(report, updates[next], axes.hysteresis());
             used += report.status == TAUTSCOPE_STATUS_OK;
         }
@@ -131,11 +133,48 @@ int errors() {
     return wrong;
 }
 
+/* The article's scheme of two axes is that of each by itself, and finds the width of each play. */
+int article() {
+    const auto compensators = [](std::size_t count) {
+        return tautscope::Compensator(std::vector<TautscopeCompensatorSettings>(count, {5.0, 5.0, 0.0, 0.0, 0.0}));
+    };
+    const auto estimators = [](std::size_t count) {
+        return tautscope::Estimator(std::vector<TautscopeEstimatorSettings>(count, {0.02, 0.4, 0.25, 0.0, 0.0}));
+    };
+    auto both = compensators(2);
+    auto found = estimators(2);
+    tautscope::Compensator alone[] = {compensators(1), compensators(1)};
+    tautscope::Estimator each[] = {estimators(1), estimators(1)};
+    const double half[] = {0.2, 0.3};
+    double tip[] = {0.0, 0.0};
+    int wrong = 0;
+    for (int tick = 0; tick < 5000; ++tick) {
+        const double reference[] = {std::sin(0.01 * tick), std::sin(0.007 * tick)};
+        const tautscope::Values command = both.step(reference);
+        for (std::size_t axis : {0, 1}) {
+            tip[axis] = std::clamp(tip[axis], command[axis] - half[axis], command[axis] + half[axis]);
+            wrong += alone[axis].step({reference[axis]})[0] != command[axis];
+            each[axis].update({command[axis]}, {tip[axis]});
+            alone[axis].set_offsets(each[axis].delta_minus(), each[axis].delta_plus());
+        }
+        found.update(command, tip);
+        both.set_offsets(found.delta_minus(), found.delta_plus());
+    }
+    for (std::size_t axis : {0, 1}) {
+        wrong += !(std::abs(found.delta_plus()[axis] - found.delta_minus()[axis] - 2 * half[axis]) < 0.05);
+    }
+    wrong += refuses([&] { both.step({0.1}); }, "dofs: got 1, expected 2");
+    wrong += refuses([&] { both.set_offsets({0.2, 0.2}, {0.1, 0.1}); }, "delta_minus");
+    wrong += refuses([&] { found.update({0.1, 0.2}, {0.1}); }, "dofs");
+    wrong += refuses([&] { compensators(9); }, "1 to 8");
+    return wrong;
+}
+
 } // namespace
 
 int main(int count, char **arguments) try {
-    const std::string recording = count == 2 ? arguments[1] : "axes";
-    return run(recording, recording + ".toml") + run(recording, recording + "-short.toml") + errors();
+    const std::string recording = count == 2 ? arguments[1] : "axes_best";
+    return run(recording, recording + ".toml") + run(recording, recording + "-short.toml") + errors() + article();
 } catch (const std::exception &error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 1;

@@ -51,7 +51,7 @@ TautscopeResult create(const std::string &toml) {
 }
 
 void check_configuration(const std::string &toml) {
-    FAILS(create(""), CONFIG, "profile");
+    FAILS(create(""), CONFIG, "[[dof]]");
     FAILS(create(replaced(toml, "[control]", "[controls]")), CONFIG, "control");
     FAILS(create(replaced(toml, "free_gain", "fre_gain")), CONFIG, "free_gain");
     FAILS(create(replaced(toml, "\nperiod = 0.001", "\nperiod = -1.0")), CONFIG, "period: got -1");
@@ -85,9 +85,9 @@ void check_step(const std::string &toml) {
         FAILS(loop.try_step(first, wrong, command), SIGNAL, "time");
     }
     FAILS(loop.try_step(first, 0.001, command, infinity), SIGNAL, "made_at");
-    FAILS(tautscope_loop_step(loop.handle(), nullptr, nan, 0.001, command.data()), NULL_POINTER, "reference");
-    FAILS(tautscope_loop_step(loop.handle(), first, nan, 0.001, nullptr), NULL_POINTER, "command");
-    FAILS(tautscope_loop_step(nullptr, first, nan, 0.001, command.data()), NULL_POINTER, "handle");
+    FAILS(tautscope_loop_step(loop.handle(), 3, nullptr, nan, 0.001, command.data()), NULL_POINTER, "reference");
+    FAILS(tautscope_loop_step(loop.handle(), 3, first, nan, 0.001, nullptr), NULL_POINTER, "command");
+    FAILS(tautscope_loop_step(nullptr, 3, first, nan, 0.001, command.data()), NULL_POINTER, "handle");
     EXPECT(loop.step(second, 0.001) == undisturbed.step(second, 0.001));
     const std::vector<double> two{0.025, 0.0};
     EXPECT(thrown([&] { loop.step(two, 0.002); }) == TAUTSCOPE_RESULT_SIZE);

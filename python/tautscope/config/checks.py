@@ -121,12 +121,11 @@ _OF_THE_ARTICLE = (
 """Keys of [safety] that a robot with [[dof]] does not use."""
 
 
-def check_axes(dofs: Sequence[DofEntry], profile: str, safety: SafetyConfig) -> None:
+def check_axes(dofs: Sequence[DofEntry], safety: SafetyConfig) -> None:
     """Check the entries of [[dof]] with each other; keys from the root."""
     if not dofs:
         return
     _require(len(dofs) <= MOST_DOFS, "dof", f"{len(dofs)} entries", f"1 to {MOST_DOFS}")
-    _require(profile == "best", "profile", profile, '"best" with [[dof]]')
     for index, dof in enumerate(dofs):
         names = [other.name for other in dofs[:index]]
         _require(dof.name not in names, f"dof[{index}].name", dof.name, "a name used once")

@@ -81,7 +81,7 @@ class Config(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     def __post_init__(self) -> None:
         Section.__post_init__(self)
         check_references(self.safety, self.experiment, {dof: self[dof] for dof in Dof})
-        check_axes(self.dof, self.profile, self.safety)
+        check_axes(self.dof, self.safety)
         check_topics(self.dof, self.kinematics, self.measurement)
 
     @property

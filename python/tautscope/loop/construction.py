@@ -14,7 +14,10 @@ from tautscope.dof import Dof
 def core_settings(config: Config, compensate: bool = True) -> dict[str, Any]:
     """The table of settings that the core reads; without compensation every gain is 1."""
     document: dict[str, Any] = msgspec.to_builtins(config)
-    if not compensate:
+    if config.dof:
+        # Not used with [[dof]]: only its defaults that are no lengths.
+        document["insertion"] = msgspec.to_builtins(Config().insertion)
+    elif not compensate:
         for dof in Dof:
             document[dof.label]["free_gain"] = 1.0
     return document
@@ -68,13 +71,6 @@ def build_state_estimator(config: Config) -> _core.StateEstimator:
     return _core.StateEstimator(observable_deviation=(insertion, rotation, bending))
 
 
-def build_axes(config: Config, compensate: bool = True) -> _core.AxesReduction:
-    """The loop of a robot with [[dof]], without the input checks of `HysteresisReduction`."""
-    # [insertion] is not used with [[dof]]: only its defaults that are no lengths.
-    article = {"insertion": msgspec.to_builtins(Config().insertion)}
-    return _core.AxesReduction(core_settings(config) | article, compensate)
-
-
 def build_loop(config: Config, compensate: bool = True) -> _core.Reduction:
     """The whole loop, Fig. 6, without the input checks of `HysteresisReduction`."""
-    return _core.Reduction(core_settings(config, compensate), config.profile)
+    return _core.Reduction(core_settings(config, compensate), compensate)

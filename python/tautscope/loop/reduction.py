@@ -15,7 +15,7 @@ from tautscope._core import MOST_SENSORS, MOST_VALUES
 from tautscope.config import Config
 from tautscope.dof import display_text
 from tautscope.errors import SignalError
-from tautscope.loop.construction import build_axes, build_loop
+from tautscope.loop.construction import build_loop
 from tautscope.loop.kinematics import Predict, build_kinematics
 from tautscope.loop.measurement import (
     Measurement,
@@ -172,14 +172,9 @@ class HysteresisReduction:
         self.on_event: Callable[[str], None] | None = None
         self._disabled = disabled_monitors(config)
         self._dofs = len(config.dofs)
-        self._loop: _core.Reduction | _core.AxesReduction
-        self._bands: _core.Reduction | None = None
-        self._axes: _core.AxesReduction | None = None
+        self._loop = build_loop(config, compensate)
         if config.dof:
-            self._loop = self._axes = build_axes(config, compensate)
             self._sensors = Sensors(config, build_kinematics(config))
-        else:
-            self._loop = self._bands = build_loop(config, compensate)
 
     def __repr__(self) -> str:
         slack = display_text(self.delta_plus - self.delta_minus, self._config.dofs)
@@ -451,10 +446,9 @@ class HysteresisReduction:
     @property
     def hysteresis(self) -> HysteresisEstimate | None:
         """The estimated hysteresis; None in profile ``paper``."""
-        if self._axes is not None:
-            return HysteresisEstimate(*self._axes.hysteresis)
-        found = self._band_loop("hysteresis").hysteresis
-        return None if found is None else HysteresisEstimate(*found)
+        if self._config.profile == "paper":
+            return None
+        return HysteresisEstimate(*self._loop.hysteresis)
 
     @cached_property
     def _detector(self) -> MarkerDetector:
@@ -469,13 +463,13 @@ class HysteresisReduction:
         return partial(self._detector.detect, frame.image, None, prediction)
 
     def _band_loop(self, call: str) -> _core.Reduction:
-        if self._bands is None:
+        if self._config.dof:
             allowed = "a configuration without [[dof]]; on_tip, on_pose, on_points with it"
             raise SignalError(call, "[[dof]]", allowed)
-        return self._bands
+        return self._loop
 
     def _axes_sensors(self, call: str) -> Sensors:
-        if self._axes is None:
+        if not self._config.dof:
             raise SignalError(call, "no [[dof]]", "a configuration with [[dof]]; tautscope.axes")
         return self._sensors
 
@@ -485,8 +479,7 @@ class HysteresisReduction:
             raise SignalError("sensor", sensor, f"0 to {MOST_SENSORS - 1}")
         delays = self._config.measurement.delays
         captured_at -= delays[sensor] if sensor < len(delays) else 0.0
-        assert self._axes is not None
-        result = self._axes.on_reading(
+        result = self._loop.on_reading(
             reading.values,
             reading.covariance,
             captured_at,
@@ -494,10 +487,7 @@ class HysteresisReduction:
             reading.point,
             sensor,
         )
-        self.updates += 1
-        now = self.supervision
-        warnings = (*self._disabled, *now.flags)
-        return Report(None, captured_at, Status(result[0]), *result[1:], now.reaction, warnings)
+        return self._report(result, captured_at)
 
     def _notify(self, what: str) -> None:
         if self.on_event is not None:
@@ -513,6 +503,11 @@ class HysteresisReduction:
     ) -> Report:
         loop = self._band_loop("on_features")
         result = loop.on_features(features, captured_at, covariance, image_checksum)
+        return self._report(result, captured_at, detection)
+
+    def _report(
+        self, result: _core._Update, captured_at: float, detection: Detection | None = None
+    ) -> Report:
         self.updates += 1
         now = self.supervision
         warnings = (*self._disabled, *now.flags)

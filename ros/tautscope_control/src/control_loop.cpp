@@ -107,7 +107,7 @@ Tick ControlLoop::step(double time) noexcept {
     }
     has_new_reference_ = false;
     if (is_finite(used_)) {
-        tautscope_loop_step(loop_.handle(), used_.data(), made_at, time, command_.data());
+        tautscope_loop_step(loop_.handle(), used_.size(), used_.data(), made_at, time, command_.data());
     }
     update_state();
     return {command_, is_finite(command_) && state_ != OperatingState::fault, state_};

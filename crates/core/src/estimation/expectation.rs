@@ -12,13 +12,13 @@ use crate::model::outline::BandImage;
 /// States from which the best is sought.
 const STARTS: usize = 3;
 
-/// What is believed of the state before an image is looked at: normal, each DOF by itself.
+/// What is believed of the state before a measurement is looked at: normal, each DOF by itself.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Belief {
-    /// Most probable state (3,) [m, rad, rad].
-    pub state: PerDof<f64>,
-    /// Standard deviations (3,) [m, rad, rad].
-    pub deviation: PerDof<f64>,
+pub struct Belief<const N: usize = 3> {
+    /// Most probable state (N,) [m or rad].
+    pub state: [f64; N],
+    /// Standard deviations (N,) [m or rad].
+    pub deviation: [f64; N],
 }
 
 /// The feature model with errors (8,) of its geometry, in their standard deviations.

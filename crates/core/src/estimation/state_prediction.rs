@@ -1,13 +1,10 @@
 //! State prediction of profile `paper` for the marker detection.
 
-use core::f64::consts::{FRAC_PI_2, PI};
-
-use crate::article::state::StateEstimate;
-use crate::dof::PerDof;
+use crate::dof::zip_with;
 use crate::error::{ConfigError, require_positive};
 use crate::estimation::expectation::Belief;
 use crate::estimation::history::Entry;
-use crate::math::linear::{add, square};
+use crate::math::linear::square;
 
 /// Error of one linear step, as a share of the step.
 const STEP_ERROR: f64 = 0.25;
@@ -27,9 +24,9 @@ const MISSED: f64 = 0.15;
 /// and, of the linear step of Eq. (16), a quarter of the correction. Every image without markers makes it half as large
 /// again, up to a part of `start_deviation`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StatePrediction {
-    start_deviation: PerDof<f64>,
-    last: PerDof<Last>,
+pub struct StatePrediction<const N: usize> {
+    start_deviation: [f64; N],
+    last: [Last; N],
 }
 
 /// One DOF at the last image that determined it.
@@ -42,7 +39,11 @@ struct Last {
 }
 
 /// Standard deviation of an estimate by one linear step from the predicted state to `state`, from that of the markers.
-pub fn step_deviation(past: &Entry, state: PerDof<f64>, deviation: PerDof<f64>) -> PerDof<f64> {
+pub fn step_deviation<const N: usize>(
+    past: &Entry<N>,
+    state: [f64; N],
+    deviation: [f64; N],
+) -> [f64; N] {
     let mut own = deviation;
     let seen = state.into_iter().zip(past.predicted_state);
     for (own, (state, predicted)) in own.iter_mut().zip(seen) {
@@ -51,12 +52,12 @@ pub fn step_deviation(past: &Entry, state: PerDof<f64>, deviation: PerDof<f64>) 
     own
 }
 
-impl StatePrediction {
+impl<const N: usize> StatePrediction<N> {
     /// Before the first image: at the prediction.
     ///
     /// # Errors
     /// A start deviation is not a finite number above 0.
-    pub fn new(start_deviation: PerDof<f64>) -> Result<Self, ConfigError> {
+    pub fn new(start_deviation: [f64; N]) -> Result<Self, ConfigError> {
         for start in start_deviation {
             require_positive("start_deviation", start)?;
         }
@@ -72,9 +73,9 @@ impl StatePrediction {
     }
 
     /// The prediction at a moment of the history.
-    pub(crate) fn at(&self, past: &Entry) -> Belief {
+    pub(crate) fn at(&self, past: &Entry<N>) -> Belief<N> {
         let mut belief = Belief {
-            state: add(past.predicted_state, -1.0, past.corrected),
+            state: zip_with(past.predicted_state, past.corrected, |q, moved| q - moved),
             deviation: self.start_deviation,
         };
         let now = belief.state.iter_mut().zip(&mut belief.deviation);
@@ -84,44 +85,34 @@ impl StatePrediction {
             let variance = square(last.deviation) + square(moved);
             *deviation = deviation.min(libm::sqrt(variance));
         }
-        belief.state = turn(belief.state, half_turn(past.predicted_state, belief.state));
         belief
     }
 
-    /// Updates the prediction with an estimate by one linear step, with its standard deviation by [`step_deviation`].
-    pub(crate) fn update(
-        &mut self,
-        past: &Entry,
-        estimate: &StateEstimate,
-        deviation: PerDof<f64>,
-    ) {
-        self.set(past, estimate.state, deviation, estimate.observable);
-    }
-
-    /// Makes the prediction less certain after an image without markers.
-    pub(crate) fn miss(&mut self, past: &Entry) {
-        let Belief { state, deviation } = self.at(past);
-        let mut wider = deviation;
+    /// Makes the prediction `prior` less certain after an image without markers.
+    pub(crate) fn miss(&mut self, past: &Entry<N>, prior: &Belief<N>) {
+        let mut wider = prior.deviation;
         for (deviation, start) in wider.iter_mut().zip(self.start_deviation) {
             *deviation = deviation.max((MISS * *deviation).min(MISSED * start));
         }
-        self.set(past, state, wider, [true; 3]);
+        self.set(past, prior.state, wider, [true; N]);
     }
 
-    /// Makes the prediction as uncertain as at the start.
-    pub(crate) fn reset(&mut self, past: &Entry) {
-        let state = self.at(past).state;
-        self.set(past, state, self.start_deviation, [true; 3]);
+    /// Makes the prediction `prior` as uncertain as at the start.
+    pub(crate) fn reset(&mut self, past: &Entry<N>, prior: &Belief<N>) {
+        self.set(past, prior.state, self.start_deviation, [true; N]);
     }
 
-    fn set(
+    /// Sets the prediction of the DOFs that are `known` to an estimate by one linear step, with its standard deviation by
+    /// [`step_deviation`].
+    pub(crate) fn set(
         &mut self,
-        past: &Entry,
-        state: PerDof<f64>,
-        deviation: PerDof<f64>,
-        known: PerDof<bool>,
+        past: &Entry<N>,
+        state: [f64; N],
+        deviation: [f64; N],
+        known: [bool; N],
     ) {
-        let correction = add(add(state, -1.0, past.predicted_state), 1.0, past.corrected);
+        let apart = zip_with(state, past.predicted_state, |state, q| state - q);
+        let correction = zip_with(apart, past.corrected, |apart, moved| apart + moved);
         let new = correction.iter().zip(deviation).zip(past.travel);
         for ((last, known), ((correction, deviation), travel)) in
             self.last.iter_mut().zip(known).zip(new)
@@ -133,49 +124,6 @@ impl StatePrediction {
                     travel,
                 };
             }
-        }
-    }
-}
-
-/// By how much to [`turn`] a state, in rad, for the name of its posture that is nearer to an expected one; 0: not.
-///
-/// Wrong where the rotation is expected a quarter of a turn off.
-fn half_turn(expected: PerDof<f64>, state: PerDof<f64>) -> f64 {
-    let ([_, expected, _], [_, rotation, _]) = (expected, state);
-    let away = rotation - expected;
-    if away.abs() > FRAC_PI_2 {
-        -PI.copysign(away)
-    } else {
-        0.0
-    }
-}
-
-/// The same posture by another name, `half_turn` being pi, -pi or 0; images never tell them apart:
-///
-/// ```text
-/// (q1, q2, q3) = (q1, q2 + pi, -q3) = (q1, q2 - pi, -q3)
-/// ```
-fn turn([insertion, rotation, bending]: PerDof<f64>, half_turn: f64) -> PerDof<f64> {
-    let side = if half_turn.abs() > 0.0 { -1.0 } else { 1.0 };
-    [insertion, rotation + half_turn, side * bending]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_posture_goes_by_the_name_nearer_to_what_is_expected() {
-        for turns in -8_i32..=8 {
-            let rotation = 0.1 + 0.35 * f64::from(turns);
-            let state = [0.03, rotation, 0.9];
-            let expected = [0.0, 0.2, 1.0];
-            let [insertion, named, bending] = turn(state, half_turn(expected, state));
-            assert!((named - 0.2).abs() <= FRAC_PI_2 + 1e-12, "{rotation}");
-            let turns = (named - rotation) / PI;
-            assert!((turns - turns.round()).abs() < 1e-12 && turns.abs() < 1.5);
-            let side = if turns.abs() > 0.5 { -0.9 } else { 0.9 };
-            assert!((insertion - 0.03).abs() + (bending - side).abs() < 1e-12);
         }
     }
 }

@@ -3,24 +3,23 @@
 use nalgebra::{SMatrix, SVector};
 
 use crate::article::estimator::Triggers;
-use crate::article::play::Play;
+use crate::article::play_limit::PlayLimit;
 use crate::dof::all_finite;
 use crate::error::ConfigError;
 use crate::estimation::history::Entry;
-use crate::estimation::measurement::{Linear, Observed, Sensor};
+use crate::estimation::measurement::{Linear, Observed, Prior, Sensor};
+use crate::r#loop::any_loop::{DOFS, Loop, padded};
 use crate::r#loop::best::Best;
 use crate::r#loop::image_update::Outcome;
 use crate::r#loop::measurement::Measurement;
+use crate::r#loop::paper::{Paper, StateEstimation};
+use crate::r#loop::profile::ProfileBlocks;
 use crate::r#loop::reduction::HysteresisReduction;
 use crate::r#loop::report::Status;
 use crate::r#loop::settings::LoopSettings;
 use crate::r#loop::sight::Sight;
-use crate::supervision::flags::Flag;
 use crate::supervision::frame_gate::ImageIdentity;
-use crate::supervision::monitors::Supervision;
 
-/// Most DOFs of a loop.
-pub const DOFS: usize = 8;
 /// Most values of a measurement.
 pub const VALUES: usize = 16;
 
@@ -77,66 +76,33 @@ pub struct AxesReport {
     pub triggers: [Triggers; DOFS],
 }
 
-/// Estimated hysteresis of n DOFs, in the first n entries [m or rad].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AxesHysteresis {
-    /// Half widths.
-    pub half_width: [f64; DOFS],
-    /// Standard deviations of the half widths.
-    pub width_std: [f64; DOFS],
-    /// Centres of the contact offsets, input minus output.
-    pub centre: [f64; DOFS],
-    /// Travel of the tip over that of the command in contact.
-    pub gain: [f64; DOFS],
-    /// Standard deviations of the gains.
-    pub gain_std: [f64; DOFS],
-}
-
-/// A loop of N DOFs, D = N `COEFFICIENTS`, with profile `best`.
-pub type AxesReduction<const N: usize, const D: usize, S> =
-    HysteresisReduction<Best<N, N, 0, D>, S, (), N>;
-
-/// A loop whose number of DOFs n is known at run time: arrays have n entries, or n of `DOFS`.
-pub trait Axes {
-    /// Number of DOFs.
-    fn dofs(&self) -> usize;
-
-    /// Control tick, as [`HysteresisReduction::step`]: `command` (n,) for a reference (n,).
-    fn step(&mut self, reference: &[f64], stamp: Option<f64>, time: f64, command: &mut [f64]);
-
+/// A loop of n DOFs whose tip any sensor measures.
+pub trait Axes: Loop {
     /// Update by a measurement.
     fn on_reading(&mut self, reading: &Reading<'_>) -> AxesReport;
-
-    /// The predicted state now.
-    fn predicted_state(&self) -> [f64; DOFS];
-
-    /// The estimated contact offsets.
-    fn play(&self) -> [Play; DOFS];
-
-    /// The estimated hysteresis.
-    fn hysteresis(&self) -> AxesHysteresis;
-
-    /// State of the supervision.
-    fn supervision(&self) -> Supervision;
-
-    /// As [`HysteresisReduction::set_compensation`].
-    ///
-    /// # Errors
-    /// The share is not from 0 to 1.
-    fn set_compensation(&mut self, share: f64) -> Result<(), ConfigError>;
-
-    /// As [`HysteresisReduction::engage`].
-    fn engage(&mut self);
-
-    /// As [`HysteresisReduction::acknowledge`].
-    fn acknowledge(&mut self);
-
-    /// As [`HysteresisReduction::raise`].
-    fn raise(&mut self, flag: Flag);
 }
 
-impl<const N: usize, const D: usize, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>>
-    AxesReduction<N, D, S>
+/// A profile for any sensor of N DOFs: `Paper<N, StateFromSensor<N>>`, or `Best<N, N, 0, D>` with D = N `COEFFICIENTS`.
+#[expect(private_bounds, reason = "only this crate implements profiles")]
+pub trait SensorProfile<const N: usize>: SensorBlocks<N> {}
+
+impl<const N: usize, P: SensorBlocks<N>> SensorProfile<N> for P {}
+
+/// The parts of a profile for any sensor.
+pub(crate) trait SensorBlocks<const N: usize>: ProfileBlocks<N> {
+    /// A profile at rest.
+    fn of_axes(settings: &LoopSettings<N>, limits: [PlayLimit; N]) -> Result<Self, ConfigError>;
+
+    /// The measurement of a sensor at a tick of the history; None where its model sees nothing.
+    fn measure(
+        &self,
+        reading: &Reading<'_>,
+        past: &Entry<N>,
+    ) -> Option<(Measurement<N, Self::Evidence>, View<N>)>;
+}
+
+impl<P: SensorProfile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, const N: usize>
+    HysteresisReduction<P, S, (), N>
 {
     /// A loop at rest, with storage for at least `control.history`.
     ///
@@ -144,23 +110,13 @@ impl<const N: usize, const D: usize, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>>
     /// A setting is out of range, or the storage is too small.
     pub fn of_axes(settings: &LoopSettings<N>, storage: S) -> Result<Self, ConfigError> {
         const { assert!(N >= 1 && N <= DOFS) };
-        let make = |limits| Best::with_geometry(settings, limits, [], [SLACK_CHANGED; N], f64::NAN);
-        Self::with_profile(settings, make, (), storage)
+        Self::with_profile(settings, |limits| P::of_axes(settings, limits), (), storage)
     }
 }
 
-impl<const N: usize, const D: usize, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>> Axes
-    for AxesReduction<N, D, S>
+impl<P: SensorProfile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, const N: usize> Axes
+    for HysteresisReduction<P, S, (), N>
 {
-    fn dofs(&self) -> usize {
-        N
-    }
-
-    fn step(&mut self, reference: &[f64], stamp: Option<f64>, time: f64, command: &mut [f64]) {
-        let next = Self::step(self, taken(reference), stamp, time);
-        command.iter_mut().zip(next).for_each(|(to, of)| *to = of);
-    }
-
     fn on_reading(&mut self, reading: &Reading<'_>) -> AxesReport {
         let identity = identity(reading.values);
         let outcome = self.update_by(reading, reading.captured_at, reading.sensor, identity);
@@ -190,46 +146,6 @@ impl<const N: usize, const D: usize, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>> A
             triggers: padded(triggers, Triggers::default()),
         }
     }
-
-    fn predicted_state(&self) -> [f64; DOFS] {
-        padded(Self::predicted_state(self), f64::NAN)
-    }
-
-    fn play(&self) -> [Play; DOFS] {
-        padded(Self::play(self), Play::from_ordered(f64::NAN, f64::NAN))
-    }
-
-    fn hysteresis(&self) -> AxesHysteresis {
-        let (slack, deviation) = (self.profile.slack, self.profile.estimate.slack_deviation());
-        let all = |values| padded(values, f64::NAN);
-        AxesHysteresis {
-            half_width: all(slack.map(|own| own.half_width)),
-            width_std: all(deviation.map(|own| own.half_width)),
-            centre: all(slack.map(|own| own.centre)),
-            gain: all(slack.map(|own| own.gain)),
-            gain_std: all(deviation.map(|own| own.gain)),
-        }
-    }
-
-    fn supervision(&self) -> Supervision {
-        Self::supervision(self)
-    }
-
-    fn set_compensation(&mut self, share: f64) -> Result<(), ConfigError> {
-        Self::set_compensation(self, share)
-    }
-
-    fn engage(&mut self) {
-        Self::engage(self);
-    }
-
-    fn acknowledge(&mut self) {
-        Self::acknowledge(self);
-    }
-
-    fn raise(&mut self, flag: Flag) {
-        Self::raise(self, flag);
-    }
 }
 
 /// What a report says of a measurement.
@@ -242,7 +158,7 @@ pub struct View<const N: usize> {
     innovation: [f64; VALUES],
 }
 
-impl<const N: usize, const D: usize> Sight<Best<N, N, 0, D>, N> for Reading<'_> {
+impl<P: SensorBlocks<N>, const N: usize> Sight<P, N> for Reading<'_> {
     type View = View<N>;
 
     fn is_usable(&self) -> bool {
@@ -252,17 +168,30 @@ impl<const N: usize, const D: usize> Sight<Best<N, N, 0, D>, N> for Reading<'_> 
 
     fn measure(
         &self,
-        profile: &Best<N, N, 0, D>,
+        profile: &P,
+        past: &Entry<N>,
+    ) -> Option<(Measurement<N, P::Evidence>, View<N>)> {
+        profile.measure(self, past)
+    }
+}
+
+impl<const N: usize, const D: usize> SensorBlocks<N> for Best<N, N, 0, D> {
+    fn of_axes(settings: &LoopSettings<N>, limits: [PlayLimit; N]) -> Result<Self, ConfigError> {
+        Self::with_geometry(settings, limits, [], [SLACK_CHANGED; N], f64::NAN)
+    }
+
+    fn measure(
+        &self,
+        reading: &Reading<'_>,
         _: &Entry<N>,
-    ) -> Option<(Measurement<N, Linear<N, N, 0>>, View<N>)> {
-        let prior = profile.estimate.prior(&profile.measured);
-        let observed = self.observed();
-        let price = profile.settings.outlier_distance;
-        let found = observed.most_probable(self, &prior, around(), price)?;
-        let linear = observed.linearize(self, &prior, found.used, &profile.estimate.noise())?;
-        let (expected, _) = Sensor::<N, VALUES, 0>::features(self, &prior.state.into(), &[])?;
+    ) -> Option<(Measurement<N, Self::Evidence>, View<N>)> {
+        let prior = self.estimate.prior(&self.measured);
+        let observed = reading.observed();
+        let price = self.settings.outlier_distance;
+        let found = observed.most_probable(reading, &prior, around(), price)?;
+        let linear = observed.linearize(reading, &prior, found.used, &self.estimate.noise())?;
         let rows = compressed(linear);
-        let observable = determined(&rows.by_state, profile.estimate.transmission().unit());
+        let observable = determined(&rows.by_state, self.estimate.transmission().unit());
         let used = found.used.iter().filter(|used| **used).count();
         #[expect(clippy::cast_precision_loss, reason = "small numbers")]
         let per_dof = N as f64 / used.max(N) as f64;
@@ -270,20 +199,56 @@ impl<const N: usize, const D: usize> Sight<Best<N, N, 0, D>, N> for Reading<'_> 
             state: found.state,
             observable,
             distance: libm::sqrt(found.distance_squared * per_dof),
-            is_partial: self.values.iter().any(|value| value.is_nan()),
+            is_partial: reading.is_partial(),
             has_outlier: found.used != observed.seen,
             evidence: rows,
         };
-        let mut predicted = [f64::NAN; VALUES];
-        let known = predicted.iter_mut().zip(expected).zip(self.values);
-        known.for_each(|((to, of), _)| *to = of);
-        let view = View {
-            state: found.state,
-            std: found.std,
-            observable,
-            predicted,
-            innovation: (observed.features - SVector::from(predicted)).into(),
+        let view = reading.view(prior.state.into(), found.state, found.std, observable)?;
+        Some((measurement, view))
+    }
+}
+
+/// State estimation of profile `paper` from any sensor: one linear step of least squares, Eqs. (13)-(16).
+#[derive(Debug, Clone, PartialEq)]
+pub struct StateFromSensor<const N: usize> {
+    unit: [f64; N],
+}
+
+impl<const N: usize> StateEstimation<N> for StateFromSensor<N> {}
+
+impl<const N: usize> SensorBlocks<N> for Paper<N, StateFromSensor<N>> {
+    fn of_axes(settings: &LoopSettings<N>, limits: [PlayLimit; N]) -> Result<Self, ConfigError> {
+        let unit = settings.transmission()?.unit();
+        Self::with_estimation(&settings.dofs, limits, StateFromSensor { unit })
+    }
+
+    /// The step starts from the state prediction of the last measurements: a DOF that is not determined is held there.
+    fn measure(
+        &self,
+        reading: &Reading<'_>,
+        past: &Entry<N>,
+    ) -> Option<(Measurement<N, Self::Evidence>, View<N>)> {
+        let belief = self.prior(past);
+        let prior = Prior {
+            state: belief.state.into(),
+            covariance: SMatrix::zeros(),
+            geometry: SVector::zeros(),
+            slope: SMatrix::zeros(),
+            geometry_covariance: SMatrix::zeros(),
         };
+        let observed = reading.observed();
+        let rows = compressed(observed.linearize(reading, &prior, observed.seen, &[0.0; N])?);
+        let observable = determined(&rows.by_state, self.estimation.unit);
+        let (state, std) = least_squares(&rows, belief.state, observable)?;
+        let measurement = Measurement {
+            state,
+            observable,
+            distance: self.distance(past, &belief, state, std, observable),
+            is_partial: reading.is_partial(),
+            has_outlier: false,
+            evidence: std,
+        };
+        let view = reading.view(belief.state, state, std, observable)?;
         Some((measurement, view))
     }
 }
@@ -319,6 +284,35 @@ impl<const N: usize> Sensor<N, VALUES, 0> for Reading<'_> {
 }
 
 impl Reading<'_> {
+    fn is_partial(&self) -> bool {
+        self.values.iter().any(|value| value.is_nan())
+    }
+
+    /// What a report says of it, with the values that are expected in a state.
+    fn view<const N: usize>(
+        &self,
+        expected: [f64; N],
+        state: [f64; N],
+        std: [f64; N],
+        observable: [bool; N],
+    ) -> Option<View<N>> {
+        let (expected, _) = Sensor::<N, VALUES, 0>::features(self, &expected, &[])?;
+        let (mut predicted, mut innovation) = ([f64::NAN; VALUES], [f64::NAN; VALUES]);
+        let known = predicted.iter_mut().zip(&mut innovation);
+        for ((predicted, innovation), (expected, value)) in
+            known.zip(expected.iter().zip(self.values))
+        {
+            (*predicted, *innovation) = (*expected, value - expected);
+        }
+        Some(View {
+            state,
+            std,
+            observable,
+            predicted,
+            innovation,
+        })
+    }
+
     fn observed(&self) -> Observed<VALUES> {
         let mut features = SVector::<f64, VALUES>::repeat(f64::NAN);
         let mut seen = [false; VALUES];
@@ -395,21 +389,34 @@ fn determined<const N: usize>(rows: &SMatrix<f64, N, N>, unit: [f64; N]) -> [boo
     })
 }
 
+/// The state (N,) with its standard deviations by least squares, Eq. (16): a DOF that is not `observable` stays where it is,
+/// with a standard deviation of NaN.
+fn least_squares<const N: usize>(
+    rows: &Linear<N, N, 0>,
+    state: [f64; N],
+    observable: [bool; N],
+) -> Option<([f64; N], [f64; N])> {
+    let (state, mut by_state) = (SVector::from(state), rows.by_state);
+    let innovation = rows.value - by_state * state;
+    let mut held = SVector::<f64, N>::zeros();
+    let columns = by_state.column_iter_mut().zip(held.iter_mut());
+    for ((mut column, held), _) in columns.zip(observable).filter(|(_, known)| !known) {
+        column.fill(0.0);
+        *held = 1.0;
+    }
+    let normal = by_state.tr_mul(&by_state) + SMatrix::from_diagonal(&held);
+    let factor = normal.cholesky()?;
+    let step = factor.solve(&by_state.tr_mul(&innovation));
+    let mut std: [f64; N] = factor.inverse().diagonal().map(libm::sqrt).into();
+    for (std, _) in std.iter_mut().zip(observable).filter(|(_, known)| !known) {
+        *std = f64::NAN;
+    }
+    Some(((state + step).into(), std))
+}
+
 /// A checksum of the bits of values (Fowler, Noll, Vo); None without a number.
 fn identity(values: &[f64]) -> Option<ImageIdentity> {
     let known = values.iter().any(|value| value.is_finite());
     let mix = |sum: u64, value: &f64| (sum ^ value.to_bits()).wrapping_mul(0x0100_0000_01b3);
     known.then(|| ImageIdentity::Checksum(values.iter().fold(0xcbf2_9ce4_8422_2325, mix)))
-}
-
-fn taken<const N: usize>(values: &[f64]) -> [f64; N] {
-    let mut taken = [f64::NAN; N];
-    taken.iter_mut().zip(values).for_each(|(to, of)| *to = *of);
-    taken
-}
-
-fn padded<T: Copy, const N: usize>(values: [T; N], fill: T) -> [T; DOFS] {
-    let mut padded = [fill; DOFS];
-    padded.iter_mut().zip(values).for_each(|(to, of)| *to = of);
-    padded
 }

@@ -15,10 +15,9 @@ use crate::r#loop::image_update::completeness;
 use crate::r#loop::measurement::Measurement;
 use crate::r#loop::paper::state_estimator;
 use crate::r#loop::profile::{BandBlocks, BandsView, Image, Seen};
-use crate::r#loop::reduction::HysteresisReduction;
-use crate::r#loop::report::HysteresisEstimate;
+use crate::r#loop::report::GeometryEstimate;
 use crate::r#loop::settings::Settings;
-use crate::model::features::{FeatureModel, FeaturePrediction, GEOMETRY};
+use crate::model::features::{FeatureModel, FeaturePrediction};
 
 /// Limits of the low-passed error of the predicted tip, in units.
 const SLACK_CHANGED: PerDof<f64> = [0.13, 0.3, 0.13];
@@ -150,29 +149,14 @@ impl BandBlocks for Best {
         Some((measurement, view))
     }
 
-    fn geometry(&self) -> [f64; GEOMETRY] {
-        let ([unevenness, u, v, ..], _) = self.estimate.geometry();
-        [unevenness, u, v]
-    }
-}
-
-impl<S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<Best, S> {
-    /// The estimated hysteresis.
-    pub fn hysteresis(&self) -> HysteresisEstimate {
-        let slack = &self.profile.slack;
-        let deviation = self.profile.estimate.slack_deviation();
-        let ([unevenness, u, v, ..], [_, u_std, v_std, ..]) = self.profile.estimate.geometry();
-        HysteresisEstimate {
-            half_width: slack.map(|slack| slack.half_width),
-            width_std: deviation.map(|own| own.half_width),
-            centre: slack.map(|slack| slack.centre),
-            shared: self.profile.estimate.shared(),
-            gain: slack.map(|slack| slack.gain),
-            gain_std: deviation.map(|own| own.gain),
+    fn geometry(&self) -> Option<GeometryEstimate> {
+        let ([unevenness, u, v, ..], [_, u_std, v_std, ..]) = self.estimate.geometry();
+        Some(GeometryEstimate {
+            shared: self.estimate.shared(),
             unevenness,
             image_shift: [u, v],
             image_shift_std: [u_std, v_std],
-        }
+        })
     }
 }
 

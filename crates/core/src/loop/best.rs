@@ -11,6 +11,7 @@ use crate::estimation::measurement::Linear;
 use crate::law::vector_law::{Bounds, VectorLaw};
 use crate::r#loop::measurement::Measurement;
 use crate::r#loop::profile::{ProfileBlocks, Updated};
+use crate::r#loop::report::SlackEstimate;
 use crate::r#loop::settings::LoopSettings;
 use crate::model::features::GEOMETRY;
 use crate::model::plays::{COEFFICIENTS, Plays, Row};
@@ -112,6 +113,17 @@ impl<const N: usize, const M: usize, const G: usize, const D: usize> ProfileBloc
             *play = Play::from_ordered(minus, plus);
         }
         plays
+    }
+
+    fn slack_estimate(&self) -> SlackEstimate<N> {
+        let (slack, deviation) = (self.slack, self.estimate.slack_deviation());
+        SlackEstimate {
+            half_width: slack.map(|own| own.half_width),
+            width_std: deviation.map(|own| own.half_width),
+            centre: slack.map(|own| own.centre),
+            gain: slack.map(|own| own.gain),
+            gain_std: deviation.map(|own| own.gain),
+        }
     }
 
     fn keep_up<S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>>(

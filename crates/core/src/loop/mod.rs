@@ -1,5 +1,6 @@
 //! The whole loop, Fig. 6.
 
+pub(crate) mod any_loop;
 pub(crate) mod axes;
 pub(crate) mod bands;
 pub(crate) mod best;

@@ -1,10 +1,12 @@
 //! Profile `paper`: the article's compensator, estimator and state estimation, Eqs. (2)-(6) and (13)-(16).
 
+use core::f64::consts::{FRAC_PI_2, PI};
+
 use crate::article::compensator::{Compensator, CompensatorState};
 use crate::article::estimator::{Estimator, EstimatorState, Triggers};
 use crate::article::play::Play;
 use crate::article::play_limit::PlayLimit;
-use crate::article::state::{StateEstimate, StateEstimator, found};
+use crate::article::state::{StateEstimator, found};
 use crate::dof::{PerDof, try_each, zip_with};
 use crate::error::ConfigError;
 use crate::estimation::expectation::Belief;
@@ -36,15 +38,27 @@ pub struct Paper<const N: usize = 3, E = StateFromImages> {
     axes: [ArticleAxis; N],
     /// Sum of the changes of the predicted state by images so far.
     corrected: [f64; N],
-    estimation: E,
+    prediction: StatePrediction<N>,
+    coupled_std: [f64; N],
+    pub(super) estimation: E,
 }
 
-/// State estimation from images, Eqs. (13)-(16), with its prediction.
+/// How profile `paper` estimates the state.
+pub trait StateEstimation<const N: usize>: Sized {
+    /// A state by the name that is nearest to the predicted state, where one posture has several.
+    fn named(_predicted: [f64; N], state: [f64; N]) -> [f64; N] {
+        state
+    }
+}
+
+/// State estimation from images, Eqs. (13)-(16).
 #[derive(Debug, Clone, PartialEq)]
-pub struct StateFromImages {
-    estimator: StateEstimator,
-    prediction: StatePrediction,
-    coupled_std: PerDof<f64>,
+pub struct StateFromImages(StateEstimator);
+
+impl StateEstimation<3> for StateFromImages {
+    fn named(predicted: PerDof<f64>, state: PerDof<f64>) -> PerDof<f64> {
+        turn(state, half_turn(predicted, state))
+    }
 }
 
 impl<const N: usize, E> Law<N> for Paper<N, E> {
@@ -82,68 +96,69 @@ impl<const N: usize, E> Law<N> for Paper<N, E> {
     }
 }
 
-impl ProfileBlocks<3> for Paper {
-    type Evidence = (StateEstimate, PerDof<f64>);
+impl<const N: usize, E: StateEstimation<N>> ProfileBlocks<N> for Paper<N, E> {
+    /// Standard deviation of the state estimate.
+    type Evidence = [f64; N];
 
     const IS_COUPLED: bool = false;
 
-    fn predicted_state(&self) -> PerDof<f64> {
+    fn predicted_state(&self) -> [f64; N] {
         self.axes
             .each_ref()
             .map(|axis| axis.compensation.predicted_state())
     }
 
-    fn corrected(&self) -> PerDof<f64> {
+    fn corrected(&self) -> [f64; N] {
         self.corrected
     }
 
-    fn play(&self) -> PerDof<Play> {
+    fn play(&self) -> [Play; N] {
         self.axes.each_ref().map(|axis| axis.estimation.play())
     }
 
-    fn keep_up<S: AsRef<[Entry]> + AsMut<[Entry]>>(&mut self, _: &History<S>, _: bool) {}
+    fn keep_up<S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>>(&mut self, _: &History<S, N>, _: bool) {}
 
-    fn advance<S: AsRef<[Entry]> + AsMut<[Entry]>>(&mut self, _: &History<S>, _: &Entry) {}
+    fn advance<S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>>(
+        &mut self,
+        _: &History<S, N>,
+        _: &Entry<N>,
+    ) {
+    }
 
     fn update(
         &mut self,
-        past: &Entry,
-        measurement: &Measurement<3, Self::Evidence>,
+        past: &Entry<N>,
+        measurement: &Measurement<N, Self::Evidence>,
         updates_offsets: bool,
-    ) -> Updated<3> {
-        let (estimate, state_deviation) = &measurement.evidence;
-        let std = step_deviation(past, estimate.state, *state_deviation);
-        self.estimation.prediction.update(past, estimate, std);
+    ) -> Updated<N> {
+        let (state, observable) = (measurement.state, measurement.observable);
+        let std = step_deviation(past, state, measurement.evidence);
+        self.prediction.set(past, state, std, observable);
         if !updates_offsets {
             return Updated::NOTHING;
         }
-        let (triggers, raised) =
-            self.update_offsets(past.command, estimate.state, estimate.observable);
+        let (triggers, raised) = self.update_offsets(past.command, state, observable);
         Updated { triggers, raised }
     }
 
-    fn miss(&mut self, past: &Entry) {
-        self.estimation.prediction.miss(past);
+    fn miss(&mut self, past: &Entry<N>) {
+        self.prediction.miss(past, &self.prior(past));
     }
 
-    fn reset_prediction(&mut self, past: &Entry) {
-        self.estimation.prediction.reset(past);
+    fn reset_prediction(&mut self, past: &Entry<N>) {
+        self.prediction.reset(past, &self.prior(past));
     }
 }
 
 impl BandBlocks for Paper {
     fn new(settings: &Settings, limits: PerDof<PlayLimit>) -> Result<Self, ConfigError> {
         let dofs = settings.dofs();
-        let estimation = StateFromImages {
-            estimator: state_estimator(&dofs)?,
-            prediction: StatePrediction::new(dofs.map(|dof| dof.start_deviation))?,
-            coupled_std: dofs.map(|dof| COUPLED * dof.start_deviation),
-        };
+        let estimation = StateFromImages(state_estimator(&dofs)?);
         Self::with_estimation(&dofs, limits, estimation)
     }
 
     fn predict<S: AsRef<[Entry]> + AsMut<[Entry]>>(&self, _: &History<S>, past: &Entry) -> Belief {
-        self.estimation.prediction.at(past)
+        self.prior(past)
     }
 
     /// One linear step from the prediction, Eqs. (13)-(16). With one band the step starts from the state prediction of the
@@ -155,30 +170,25 @@ impl BandBlocks for Paper {
         image: Image<'_>,
     ) -> Option<Seen<Self::Evidence>> {
         let used = found(image.features);
-        let prior = self.estimation.prediction.at(past);
+        let prior = self.prior(past);
         let start = if used == [true; 2] {
             past.predicted_state
         } else {
             prior.state
         };
         let prediction = model.predict(start)?;
-        let estimate = self
-            .estimation
-            .estimator
-            .estimate(start, &prediction, image.features);
+        let StateFromImages(estimator) = &self.estimation;
+        let estimate = estimator.estimate(start, &prediction, image.features);
         let state_deviation = estimate.state_deviation(image.covariance.unwrap_or(&UNIT));
         let (is_partial, has_outlier) = completeness(used, image.features);
+        let (state, observable) = (estimate.state, estimate.observable);
         let measurement = Measurement {
-            state: estimate.state,
-            observable: estimate.observable,
-            distance: self.estimation.distance(
-                &prior,
-                &estimate,
-                step_deviation(past, prior.state, state_deviation),
-            ),
+            state,
+            observable,
+            distance: self.distance(past, &prior, state, state_deviation, observable),
             is_partial,
             has_outlier,
-            evidence: (estimate, state_deviation),
+            evidence: state_deviation,
         };
         let view = BandsView {
             estimate,
@@ -187,6 +197,42 @@ impl BandBlocks for Paper {
             state_deviation,
         };
         Some((measurement, view))
+    }
+}
+
+impl<const N: usize, E: StateEstimation<N>> Paper<N, E> {
+    /// The state prediction at a moment of the history.
+    pub(super) fn prior(&self, past: &Entry<N>) -> Belief<N> {
+        let belief = self.prediction.at(past);
+        Belief {
+            state: E::named(past.predicted_state, belief.state),
+            ..belief
+        }
+    }
+
+    /// Largest innovation of a DOF, measured less predicted state, in standard deviations of prediction and measurement
+    /// together, and of what the error of another DOF makes of a linear step.
+    pub(super) fn distance(
+        &self,
+        past: &Entry<N>,
+        prior: &Belief<N>,
+        state: [f64; N],
+        std: [f64; N],
+        observable: [bool; N],
+    ) -> f64 {
+        let innovations = state.into_iter().zip(prior.state);
+        let stds = step_deviation(past, prior.state, std);
+        let stds = stds.into_iter().zip(prior.deviation).zip(self.coupled_std);
+        innovations
+            .zip(stds)
+            .zip(observable)
+            .filter(|(_, observable)| *observable)
+            .map(|(((state, predicted), ((own, prior), coupled)), _)| {
+                let variance = own * own + prior * prior + coupled * coupled;
+                (state - predicted).abs() / libm::sqrt(variance)
+            })
+            .filter(|distance| distance.is_finite())
+            .fold(0.0, f64::max)
     }
 }
 
@@ -204,6 +250,8 @@ impl<const N: usize, E> Paper<N, E> {
         Ok(Self {
             axes: zip_with(axes, limits, |axis, limit| ArticleAxis { limit, ..axis }),
             corrected: [0.0; N],
+            prediction: StatePrediction::new(dofs.map(|dof| dof.start_deviation))?,
+            coupled_std: dofs.map(|dof| COUPLED * dof.start_deviation),
             estimation,
         })
     }
@@ -235,25 +283,6 @@ impl<const N: usize, E> Paper<N, E> {
             *corrected += if moved.is_finite() { moved } else { 0.0 };
         }
         (triggers, raised)
-    }
-}
-
-impl StateFromImages {
-    /// Largest innovation of a DOF, measured less predicted state, in standard deviations of prediction and measurement
-    /// together, and of what the error of another DOF makes of a linear step.
-    fn distance(&self, prior: &Belief, estimate: &StateEstimate, std: PerDof<f64>) -> f64 {
-        let innovations = estimate.state.into_iter().zip(prior.state);
-        let stds = std.into_iter().zip(prior.deviation).zip(self.coupled_std);
-        innovations
-            .zip(stds)
-            .zip(estimate.observable)
-            .filter(|(_, observable)| *observable)
-            .map(|(((state, predicted), ((own, prior), coupled)), _)| {
-                let variance = own * own + prior * prior + coupled * coupled;
-                (state - predicted).abs() / libm::sqrt(variance)
-            })
-            .filter(|distance| distance.is_finite())
-            .fold(0.0, f64::max)
     }
 }
 
@@ -317,5 +346,48 @@ impl ArticleAxis {
                 .retune(&mut self.compensation, self.estimation.play());
         }
         (triggers, is_limited)
+    }
+}
+
+/// By how much to [`turn`] a state, in rad, for the name of its posture that is nearer to an expected one; 0: not.
+///
+/// Wrong where the rotation is expected a quarter of a turn off.
+fn half_turn(expected: PerDof<f64>, state: PerDof<f64>) -> f64 {
+    let ([_, expected, _], [_, rotation, _]) = (expected, state);
+    let away = rotation - expected;
+    if away.abs() > FRAC_PI_2 {
+        -PI.copysign(away)
+    } else {
+        0.0
+    }
+}
+
+/// The same posture by another name, `half_turn` being pi, -pi or 0; images never tell them apart:
+///
+/// ```text
+/// (q1, q2, q3) = (q1, q2 + pi, -q3) = (q1, q2 - pi, -q3)
+/// ```
+fn turn([insertion, rotation, bending]: PerDof<f64>, half_turn: f64) -> PerDof<f64> {
+    let side = if half_turn.abs() > 0.0 { -1.0 } else { 1.0 };
+    [insertion, rotation + half_turn, side * bending]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_posture_goes_by_the_name_nearer_to_what_is_expected() {
+        for turns in -8_i32..=8 {
+            let rotation = 0.1 + 0.35 * f64::from(turns);
+            let state = [0.03, rotation, 0.9];
+            let expected = [0.0, 0.2, 1.0];
+            let [insertion, named, bending] = turn(state, half_turn(expected, state));
+            assert!((named - 0.2).abs() <= FRAC_PI_2 + 1e-12, "{rotation}");
+            let turns = (named - rotation) / PI;
+            assert!((turns - turns.round()).abs() < 1e-12 && turns.abs() < 1.5);
+            let side = if turns.abs() > 0.5 { -0.9 } else { 0.9 };
+            assert!((insertion - 0.03).abs() + (bending - side).abs() < 1e-12);
+        }
     }
 }

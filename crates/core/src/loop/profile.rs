@@ -9,8 +9,9 @@ use crate::error::ConfigError;
 use crate::estimation::expectation::Belief;
 use crate::estimation::history::{Entry, History};
 use crate::r#loop::measurement::Measurement;
+use crate::r#loop::report::{GeometryEstimate, SlackEstimate};
 use crate::r#loop::settings::Settings;
-use crate::model::features::{FeatureModel, GEOMETRY};
+use crate::model::features::FeatureModel;
 use crate::supervision::flags::Flags;
 use crate::supervision::monitors::Law;
 
@@ -83,6 +84,18 @@ pub(crate) trait ProfileBlocks<const N: usize>: Law<N> + Sized {
     /// The estimated play of each DOF.
     fn play(&self) -> [Play; N];
 
+    /// The estimated slack of each DOF.
+    fn slack_estimate(&self) -> SlackEstimate<N> {
+        let play = self.play();
+        SlackEstimate {
+            half_width: play.map(|play| play.width() / 2.0),
+            width_std: [f64::NAN; N],
+            centre: play.map(|play| f64::midpoint(play.delta_minus(), play.delta_plus())),
+            gain: [1.0; N],
+            gain_std: [f64::NAN; N],
+        }
+    }
+
     /// Keeps up with the history at the end of a control tick.
     fn keep_up<S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>>(
         &mut self,
@@ -151,13 +164,15 @@ pub(crate) trait BandBlocks: ProfileBlocks<3> {
         image: Image<'_>,
     ) -> Option<Seen<Self::Evidence>>;
 
-    /// What images have found of the geometry, as [`FeatureModel::with_geometry`] has it.
-    fn geometry(&self) -> [f64; GEOMETRY] {
-        [0.0; GEOMETRY]
+    /// What images say of the geometry, if it is estimated.
+    fn geometry(&self) -> Option<GeometryEstimate> {
+        None
     }
 
     /// The feature model as far as images have corrected the configured one.
     fn feature_model(&self, configured: &FeatureModel) -> FeatureModel {
-        configured.with_geometry(self.geometry())
+        self.geometry().map_or(*configured, |found| {
+            configured.with_geometry(found.errors())
+        })
     }
 }

@@ -8,7 +8,7 @@ use crate::estimation::expectation::Belief;
 use crate::estimation::history::{Entry, History};
 use crate::r#loop::profile::{BandProfile, Profile};
 use crate::r#loop::settings::{LoopSettings, Settings};
-use crate::model::features::{FeatureModel, GEOMETRY};
+use crate::model::features::FeatureModel;
 use crate::supervision::flags::Flag;
 use crate::supervision::monitors::{Monitors, SENSORS, Supervision};
 
@@ -45,12 +45,6 @@ impl<P: BandProfile, S: AsRef<[Entry]> + AsMut<[Entry]>> HysteresisReduction<P, 
     pub fn predict_state(&self, captured_at: f64) -> Option<Belief> {
         let past = self.history.at(captured_at)?;
         Some(self.profile.predict(&self.history, &past))
-    }
-
-    /// What images have found of the geometry: unevenness of the section, shift (2,) of the image in px;
-    /// [`FeatureModel::with_geometry`].
-    pub fn geometry(&self) -> [f64; GEOMETRY] {
-        self.profile.geometry()
     }
 
     /// Predicted features (4,) in px of a frame captured at `captured_at` in s.

@@ -46,25 +46,39 @@ pub struct Report {
     pub supervision: Supervision,
 }
 
-/// The estimated hysteresis in profile `best`.
+/// The estimated slack of N DOFs [m or rad].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct HysteresisEstimate {
-    /// Half widths (3,) [m, rad, rad].
-    pub half_width: PerDof<f64>,
-    /// Standard deviations of the half widths (3,) [m, rad, rad].
-    pub width_std: PerDof<f64>,
-    /// Centres of the contact offsets (3,), input minus output, [m, rad, rad].
-    pub centre: PerDof<f64>,
+pub struct SlackEstimate<const N: usize> {
+    /// Half widths.
+    pub half_width: [f64; N],
+    /// Standard deviations of the half widths; NaN in profile `paper`.
+    pub width_std: [f64; N],
+    /// Centres of the contact offsets, input minus output.
+    pub centre: [f64; N],
+    /// Travel of the tip over that of the command in contact; 1 in profile `paper`.
+    pub gain: [f64; N],
+    /// Standard deviations of the gains; NaN in profile `paper`.
+    pub gain_std: [f64; N],
+}
+
+/// What profile `best` estimates of the article's instrument beside its slack.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GeometryEstimate {
     /// Share of the friction that insertion and rotation have in common, 0 to 1.
     pub shared: f64,
-    /// Travel of the tip over that of the command in contact (3,).
-    pub gain: PerDof<f64>,
-    /// Standard deviations of the gains (3,).
-    pub gain_std: PerDof<f64>,
     /// Unevenness of the section's curvature: half of the difference of its ends, over the mean.
     pub unevenness: f64,
     /// Shift of the image (2,) in px against the configured camera.
     pub image_shift: [f64; 2],
     /// Its standard deviations (2,) in px.
     pub image_shift_std: [f64; 2],
+}
+
+impl GeometryEstimate {
+    /// As [`crate::FeatureModel::with_geometry`] has it: unevenness, shift (2,) in px.
+    #[must_use]
+    pub const fn errors(&self) -> [f64; 3] {
+        let [u, v] = self.image_shift;
+        [self.unevenness, u, v]
+    }
 }

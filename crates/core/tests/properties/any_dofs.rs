@@ -4,7 +4,7 @@ use crate::article::compensator::{Compensator, CompensatorState};
 use crate::article::play::{Play, PlayState};
 use crate::article::play_limit::PlayLimit;
 use crate::dof::Friction;
-use crate::r#loop::paper::Paper;
+use crate::r#loop::paper::{Paper, StateEstimation};
 use crate::settings::DofSettings;
 use crate::supervision::command_limiter::{CommandLimiters, LimiterResult};
 use crate::supervision::flags::{Flag, Flags};
@@ -221,7 +221,11 @@ fn n_dofs_are_n_times_one<const N: usize>(ticks: &[(Vec<f64>, Vec<f64>)]) -> Che
     Ok(())
 }
 
-type Article<const N: usize> = Paper<N, ()>;
+type Article<const N: usize> = Paper<N, Measured>;
+
+struct Measured;
+
+impl<const N: usize> StateEstimation<N> for Measured {}
 
 fn supervised<const N: usize>(group: [usize; N], half_width: f64) -> (Monitors<N>, Article<N>) {
     let mut dofs = dofs_in(units::<N>());
@@ -230,7 +234,7 @@ fn supervised<const N: usize>(group: [usize; N], half_width: f64) -> (Monitors<N
     }
     let friction = Friction::new(group, [1.0; N]).unwrap();
     let monitors = Monitors::new(&safety_in(units()), &dofs, PERIOD, friction).unwrap();
-    let law = Article::with_estimation(&dofs, monitors.play_limits(), ()).unwrap();
+    let law = Article::with_estimation(&dofs, monitors.play_limits(), Measured).unwrap();
     (monitors, law)
 }
 
@@ -314,7 +318,7 @@ fn fading_takes_the_travel_of_all<const N: usize>(group: [usize; N]) {
 /// The tip of an observed DOF follows, whatever the others do; without images of it nothing is compensated.
 fn offsets_converge_where_observed<const N: usize>() {
     let dofs = dofs_in(units::<N>());
-    let mut law = Article::with_estimation(&dofs, [PlayLimit::NONE; N], ()).unwrap();
+    let mut law = Article::with_estimation(&dofs, [PlayLimit::NONE; N], Measured).unwrap();
     let plays = units::<N>().map(|unit| Play::new(-4.0 * unit, 6.0 * unit).unwrap());
     let mut tips = [PlayState { output: 0.0 }; N];
     let observed = core::array::from_fn(|dof| dof != 2);

@@ -1,18 +1,18 @@
-//! `TautscopeAxes`: configurations and arguments that are refused, and a sensor of the caller's. Without files, also for Miri.
+//! `TautscopeLoop` with `[[dof]]`: configurations and arguments that are refused, and a sensor of the caller's. Without files, also for Miri.
 #![allow(unsafe_code)]
 
 use std::ffi::{CStr, c_int, c_void};
 use std::mem::MaybeUninit;
 use std::ptr::{null, null_mut};
 
-use crate::axes::{
-    TautscopeAxes, tautscope_axes_create, tautscope_axes_destroy, tautscope_axes_hysteresis,
-    tautscope_axes_predicted_state, tautscope_axes_raise_flag, tautscope_axes_set_compensation,
-    tautscope_axes_size, tautscope_axes_step,
+use crate::measurement::{tautscope_loop_on_measurement, tautscope_loop_on_tip};
+use crate::reduction::{
+    TautscopeLoop, tautscope_loop_create, tautscope_loop_destroy, tautscope_loop_hysteresis,
+    tautscope_loop_predicted_state, tautscope_loop_size, tautscope_loop_step,
 };
-use crate::axes_update::{tautscope_axes_on_measurement, tautscope_axes_on_tip};
 use crate::result::{TautscopeResult, tautscope_error_message};
-use crate::types::{TautscopeAxesReport, TautscopeMeasurement, TautscopeStatus};
+use crate::supervision::{tautscope_loop_raise_flag, tautscope_loop_set_compensation};
+use crate::types::{TautscopeMeasurement, TautscopeStatus, TautscopeTipReport};
 
 const ONE: &str = "[[dof]]\nname = \"a\"\nwidth_limit = 1.2\n";
 
@@ -27,10 +27,10 @@ fn named(count: usize) -> String {
     (0..count).map(dof).collect()
 }
 
-fn create(toml: &str) -> (TautscopeResult, *mut TautscopeAxes) {
+fn create(toml: &str) -> (TautscopeResult, *mut TautscopeLoop) {
     let mut handle = null_mut();
     // SAFETY: a text and its length.
-    let result = unsafe { tautscope_axes_create(toml.as_ptr(), toml.len(), &raw mut handle) };
+    let result = unsafe { tautscope_loop_create(toml.as_ptr(), toml.len(), &raw mut handle) };
     (result, handle)
 }
 
@@ -38,7 +38,7 @@ fn create(toml: &str) -> (TautscopeResult, *mut TautscopeAxes) {
 fn configurations_that_are_wrong_name_their_key() {
     let dof = |keys: &str| format!("{ONE}{keys}");
     for (toml, words) in [
-        (String::new(), "1 to 8 degrees of freedom"),
+        (String::new(), "[[dof]]"),
         (named(9), "1 to 8 degrees of freedom"),
         ("[[dof]]\nname = \"a\"".into(), "width_limit"),
         ("[[dof]]\nwidth_limit = 1".into(), "name"),
@@ -59,7 +59,7 @@ fn configurations_that_are_wrong_name_their_key() {
         ),
         (dof("[control]\nperiod = 0"), "period"),
         (dof("[law]\ntip_gain = -1"), "tip_gain"),
-        (format!("profile = \"paper\"\n{ONE}"), "profile"),
+        (format!("profile = \"worst\"\n{ONE}"), "worst"),
         ("dof = 1".into(), "dof"),
         ("dof = [1]".into(), "dof"),
         ("control = 1".into(), "control"),
@@ -80,8 +80,8 @@ fn any_count_of_dofs_from_one_to_eight_has_a_loop() {
         let (mut dofs, mut period) = (0, 0.0);
         // SAFETY: the handle is valid until it is destroyed.
         unsafe {
-            tautscope_axes_size(handle, &raw mut dofs, &raw mut period);
-            tautscope_axes_destroy(handle);
+            tautscope_loop_size(handle, &raw mut dofs, &raw mut period);
+            tautscope_loop_destroy(handle);
         }
         assert_eq!((dofs, period), (count, 0.005));
     }
@@ -120,28 +120,28 @@ fn arguments_that_are_wrong_change_nothing() {
     let (from, to) = (reference.as_ptr(), command.as_mut_ptr());
     // SAFETY: the handle is valid until it is destroyed; null is allowed.
     unsafe {
-        let step = |count, from, time| tautscope_axes_step(handle, count, from, nan, time, to);
+        let step = |count, from, time| tautscope_loop_step(handle, count, from, nan, time, to);
         assert_eq!(step(1, from, 0.0), Ok);
         assert_eq!(step(2, from, 0.0), Size);
         assert_eq!(step(1, null(), 0.0), NullPointer);
         assert_eq!(step(1, [nan].as_ptr(), 0.0), Signal);
         assert_eq!(step(1, from, nan), Signal);
         assert_eq!(
-            tautscope_axes_step(handle, 1, from, nan, 0.0, null_mut()),
+            tautscope_loop_step(handle, 1, from, nan, 0.0, null_mut()),
             NullPointer
         );
         assert_eq!(
-            tautscope_axes_step(null_mut(), 1, from, nan, 0.0, to),
+            tautscope_loop_step(null_mut(), 1, from, nan, 0.0, to),
             NullPointer
         );
         assert_eq!(command.map(f64::to_bits), reference.map(f64::to_bits));
 
         let tip = |given: TautscopeMeasurement| {
-            tautscope_axes_on_tip(handle, &raw const given, null_mut())
+            tautscope_loop_on_tip(handle, &raw const given, null_mut())
         };
         assert_eq!(tip(good), Ok);
         assert_eq!(
-            tautscope_axes_on_tip(handle, null(), null_mut()),
+            tautscope_loop_on_tip(handle, null(), null_mut()),
             NullPointer
         );
         assert_eq!(
@@ -169,7 +169,7 @@ fn arguments_that_are_wrong_change_nothing() {
         );
 
         let own = |given: TautscopeMeasurement, predict| {
-            tautscope_axes_on_measurement(handle, &raw const given, predict, null_mut(), null_mut())
+            tautscope_loop_on_measurement(handle, &raw const given, predict, null_mut(), null_mut())
         };
         assert_eq!(own(good, Some(half)), Ok);
         assert_eq!(own(good, None), NullPointer);
@@ -187,17 +187,17 @@ fn arguments_that_are_wrong_change_nothing() {
             Signal
         );
 
-        let mut report = MaybeUninit::<TautscopeAxesReport>::zeroed();
+        let mut report = MaybeUninit::<TautscopeTipReport>::zeroed();
         assert_eq!(
-            tautscope_axes_on_tip(handle, &raw const good, report.as_mut_ptr()),
+            tautscope_loop_on_tip(handle, &raw const good, report.as_mut_ptr()),
             Size
         );
-        assert_eq!(tautscope_axes_predicted_state(handle, 3, to), Size);
-        assert_eq!(tautscope_axes_hysteresis(handle, null_mut()), NullPointer);
-        assert_eq!(tautscope_axes_set_compensation(handle, 1.5), Signal);
-        assert_eq!(tautscope_axes_raise_flag(handle, 99), Signal);
-        tautscope_axes_destroy(handle);
-        tautscope_axes_destroy(null_mut());
+        assert_eq!(tautscope_loop_predicted_state(handle, 3, to), Size);
+        assert_eq!(tautscope_loop_hysteresis(handle, null_mut()), NullPointer);
+        assert_eq!(tautscope_loop_set_compensation(handle, 1.5), Signal);
+        assert_eq!(tautscope_loop_raise_flag(handle, 99), Signal);
+        tautscope_loop_destroy(handle);
+        tautscope_loop_destroy(null_mut());
     }
 }
 
@@ -207,12 +207,12 @@ fn a_sensor_of_the_callers_measures_the_tip() {
     let mut command = [0.0];
     let mut calls = 0_u32;
     // As in C: only the size is set.
-    let mut report = MaybeUninit::<TautscopeAxesReport>::uninit();
+    let mut report = MaybeUninit::<TautscopeTipReport>::uninit();
     let place = report.as_mut_ptr();
     // SAFETY: the handle is valid until it is destroyed, and the places are writable.
     let report = unsafe {
-        (&raw mut (*place).size).write(u32::try_from(size_of::<TautscopeAxesReport>()).unwrap());
-        tautscope_axes_step(
+        (&raw mut (*place).size).write(u32::try_from(size_of::<TautscopeTipReport>()).unwrap());
+        tautscope_loop_step(
             handle,
             1,
             [0.2].as_ptr(),
@@ -223,7 +223,7 @@ fn a_sensor_of_the_callers_measures_the_tip() {
         let seen = measurement(&[0.05], &1e-6);
         let context = (&raw mut calls).cast();
         let result =
-            tautscope_axes_on_measurement(handle, &raw const seen, Some(nothing), context, place);
+            tautscope_loop_on_measurement(handle, &raw const seen, Some(nothing), context, place);
         assert_eq!(result, TautscopeResult::Ok);
         assert_ne!((*place).status, TautscopeStatus::Ok);
         let again = TautscopeMeasurement {
@@ -231,9 +231,9 @@ fn a_sensor_of_the_callers_measures_the_tip() {
             ..seen
         };
         let result =
-            tautscope_axes_on_measurement(handle, &raw const again, Some(half), null_mut(), place);
+            tautscope_loop_on_measurement(handle, &raw const again, Some(half), null_mut(), place);
         assert_eq!(result, TautscopeResult::Ok);
-        tautscope_axes_destroy(handle);
+        tautscope_loop_destroy(handle);
         report.assume_init()
     };
     assert!(calls > 0);

@@ -18,7 +18,7 @@ use crate::result::{
     Handle, TautscopeResult, failed, guarded, tautscope_error_message, with_handle,
 };
 use crate::supervision::tautscope_loop_engage;
-use crate::types::{TautscopeAxesReport, TautscopeFlag, TautscopePixelFormat, TautscopeReport};
+use crate::types::{TautscopeFlag, TautscopePixelFormat, TautscopeReport, TautscopeTipReport};
 
 fn text(pointer: *const std::ffi::c_char) -> &'static str {
     // SAFETY: a text of the library, which ends with a zero.
@@ -115,6 +115,7 @@ fn null_pointers_are_errors() {
             tautscope_detector_create(null(), 3, &raw mut detector),
             tautscope_loop_step(
                 null_mut(),
+                3,
                 reference.as_ptr(),
                 f64::NAN,
                 0.0,
@@ -138,7 +139,7 @@ fn a_configuration_that_cannot_be_read_is_an_error() {
     for (toml, expected) in [
         (&b"\xff\xfe"[..], "UTF-8"),
         (b"profile = ", "configuration"),
-        (b"", "profile"),
+        (b"", "[[dof]]"),
         (b"profile = \"worst\"", "\"worst\""),
         (b"profile = \"best\"", "every key is needed"),
     ] {
@@ -182,7 +183,7 @@ fn the_report_has_no_padding() {
 #[test]
 fn the_report_of_axes_has_no_padding() {
     assert_eq!(
-        size_of::<TautscopeAxesReport>(),
+        size_of::<TautscopeTipReport>(),
         4 * 4 + 8 * (1 + 5 * 8 + 2 * 16) + 4 * 24
     );
 }

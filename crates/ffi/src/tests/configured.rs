@@ -62,7 +62,7 @@ fn a_loop_is_created_used_and_destroyed() {
             time = 0.001 * f64::from(step);
             let reference = [0.025 + time, 0.0, 0.9];
             let (from, to) = (reference.as_ptr(), command.as_mut_ptr());
-            assert_eq!(tautscope_loop_step(handle, from, f64::NAN, time, to), ok);
+            assert_eq!(tautscope_loop_step(handle, 3, from, f64::NAN, time, to), ok);
         }
         assert!(command.iter().all(|value| value.is_finite()));
 

@@ -16,10 +16,10 @@ fn header_is_generated_from_these_sources() {
         "result",
         "reduction",
         "image_update",
+        "measurement",
         "supervision",
         "detector",
-        "axes",
-        "axes_update",
+        "article",
     ] {
         builder = builder.with_src(folder.join(format!("src/{file}.rs")));
     }

@@ -1,4 +1,4 @@
-//! Updates of `TautscopeAxes` by measurements: of the tip degree by degree, or of a sensor with a model of the caller's.
+//! Updates of `TautscopeLoop` by measurements: of the tip degree by degree, or of a sensor with a model of the caller's.
 #![allow(unsafe_code)]
 
 use std::ffi::{c_int, c_void};
@@ -6,11 +6,11 @@ use std::ffi::{c_int, c_void};
 use tautscope_core as core;
 use tautscope_core::{DOFS, SENSORS, VALUES};
 
-use crate::axes::TautscopeAxes;
+use crate::document::Sensors;
 use crate::pointers::{check_report, numbers, read, write_report};
-use crate::reduction::check_finite;
+use crate::reduction::{TautscopeLoop, check_finite};
 use crate::result::{TautscopeResult, failed, null, with_handle};
-use crate::types::{TautscopeAxesReport, TautscopeMeasurement};
+use crate::types::{TautscopeMeasurement, TautscopeTipReport};
 
 /// Step of a central difference, in `width_limit`.
 const STEP: f64 = 1e-5;
@@ -41,10 +41,10 @@ struct Checked<'a> {
 
 impl<'a> Checked<'a> {
     /// # Safety
-    /// The caller's contract of `tautscope_axes_on_measurement`.
+    /// The caller's contract of `tautscope_loop_on_measurement`.
     unsafe fn new(
         measurement: *const TautscopeMeasurement,
-        delays: &[f64],
+        sensors: &Sensors,
     ) -> Result<Self, TautscopeResult> {
         // SAFETY: the caller's contract.
         let given = unsafe { read("measurement", measurement) }?;
@@ -86,18 +86,18 @@ impl<'a> Checked<'a> {
             values,
             covariance,
             point: given.point.max(1) as usize,
-            captured_at: given.captured_at - delays.get(sensor).unwrap_or(&0.0),
+            captured_at: given.captured_at - sensors.delays.get(sensor).unwrap_or(&0.0),
             sensor,
         })
     }
 
     fn update(
         &self,
-        handle: &mut TautscopeAxes,
+        axes: &mut dyn core::Axes,
         covariance: &[f64],
         model: &dyn core::Predict,
-    ) -> TautscopeAxesReport {
-        let report = handle.axes.on_reading(&core::Reading {
+    ) -> TautscopeTipReport {
+        let report = axes.on_reading(&core::Reading {
             values: self.values,
             covariance,
             point: self.point,
@@ -105,7 +105,7 @@ impl<'a> Checked<'a> {
             sensor: self.sensor,
             model,
         });
-        TautscopeAxesReport::new(&report, handle.axes.as_ref(), self.captured_at)
+        TautscopeTipReport::new(&report, axes, self.captured_at)
     }
 }
 
@@ -132,7 +132,7 @@ struct Own {
 impl Own {
     fn call(&self, state: &[f64], values: &mut [f64], jacobian: &mut [f64]) -> bool {
         let (values, jacobian) = (values.as_mut_ptr(), jacobian.as_mut_ptr());
-        // SAFETY: the contract of `tautscope_axes_on_measurement`; the arrays have the lengths it states.
+        // SAFETY: the contract of `tautscope_loop_on_measurement`; the arrays have the lengths it states.
         unsafe { (self.function)(self.context, state.as_ptr(), values, jacobian) != 0 }
     }
 
@@ -168,7 +168,7 @@ impl core::Predict for Own {
     }
 }
 
-/// Update with the tip measured degree by degree. It does not allocate.
+/// Update of a loop with `[[dof]]` by the tip measured degree by degree. It does not allocate.
 ///
 /// `measurement` has n values [m or rad]; without a covariance `measurement.tip_deviation` of the configuration is used. `report`
 /// may be null.
@@ -177,65 +177,78 @@ impl core::Predict for Own {
 /// The handle is valid and used by this thread only; `measurement` and what it points to are readable; `report` is null or points to
 /// as many writable bytes as its member `size` states.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn tautscope_axes_on_tip(
-    handle: *mut TautscopeAxes,
+pub unsafe extern "C" fn tautscope_loop_on_tip(
+    handle: *mut TautscopeLoop,
     measurement: *const TautscopeMeasurement,
-    report: *mut TautscopeAxesReport,
+    report: *mut TautscopeTipReport,
 ) -> TautscopeResult {
-    // SAFETY: the caller's contract.
-    with_handle(unsafe { handle.as_mut() }, |handle| {
-        // SAFETY: the caller's contract.
-        unsafe { check_report(report) }?;
-        // SAFETY: the caller's contract.
-        let checked = unsafe { Checked::new(measurement, &handle.document.measurement.delays) }?;
+    let update = |handle: &mut TautscopeLoop, checked: &Checked<'_>| {
         let dofs = checked.values.len();
         handle.check_dofs("measurement.count", dofs)?;
+        let (axes, sensors) = handle.axes()?;
         let mut covariance = [0.0; DOFS * DOFS];
-        for dof in 0..dofs {
-            let std = handle.document.measurement.tip_deviation * handle.width(dof);
+        for (dof, width) in sensors.widths.iter().enumerate() {
+            let std = sensors.tip_deviation * width;
             covariance[dof * (dofs + 1)] = std * std;
         }
         let covariance = checked.covariance.unwrap_or(&covariance[..dofs * dofs]);
-        let done = checked.update(handle, covariance, &Tip);
-        // SAFETY: checked above.
-        unsafe { write_report(report, &done) };
-        Ok(())
-    })
+        Ok(checked.update(axes, covariance, &Tip))
+    };
+    // SAFETY: the caller's contract.
+    unsafe { report_update(handle.as_mut(), measurement, report, update) }
 }
 
-/// Update with any measurement of the tip: `predict` is what the sensor would measure in a state. It does not allocate.
+/// Update of a loop with `[[dof]]` by any measurement of the tip: `predict` is what the sensor would measure in a state. It does
+/// not allocate.
 ///
 /// `measurement` has up to 16 values and a covariance. `predict` is called several times, with `context`, before this returns.
 /// `report` may be null.
 ///
 /// # Safety
-/// As `tautscope_axes_on_tip`; `predict` keeps to `TautscopePredict` and throws no exception.
+/// As `tautscope_loop_on_tip`; `predict` keeps to `TautscopePredict` and throws no exception.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn tautscope_axes_on_measurement(
-    handle: *mut TautscopeAxes,
+pub unsafe extern "C" fn tautscope_loop_on_measurement(
+    handle: *mut TautscopeLoop,
     measurement: *const TautscopeMeasurement,
     predict: TautscopePredict,
     context: *mut c_void,
-    report: *mut TautscopeAxesReport,
+    report: *mut TautscopeTipReport,
 ) -> TautscopeResult {
-    // SAFETY: the caller's contract.
-    with_handle(unsafe { handle.as_mut() }, |handle| {
-        // SAFETY: the caller's contract.
-        unsafe { check_report(report) }?;
-        // SAFETY: the caller's contract.
-        let checked = unsafe { Checked::new(measurement, &handle.document.measurement.delays) }?;
+    let update = |handle: &mut TautscopeLoop, checked: &Checked<'_>| {
+        let (axes, sensors) = handle.axes()?;
         let covariance = checked.covariance;
         let covariance = covariance.ok_or_else(|| null("measurement.covariance"))?;
         let mut steps = [0.0; DOFS];
-        for (step, dof) in steps.iter_mut().zip(&handle.document.axes.dof) {
-            *step = STEP * dof.width_limit;
+        for (step, width) in steps.iter_mut().zip(&sensors.widths) {
+            *step = STEP * width;
         }
         let model = Own {
             function: predict.ok_or_else(|| null("predict"))?,
             context,
             steps,
         };
-        let done = checked.update(handle, covariance, &model);
+        Ok(checked.update(axes, covariance, &model))
+    };
+    // SAFETY: the caller's contract.
+    unsafe { report_update(handle.as_mut(), measurement, report, update) }
+}
+
+/// Updates a loop by a measurement, and writes the report.
+///
+/// # Safety
+/// The caller's contract of `tautscope_loop_on_tip`.
+unsafe fn report_update(
+    handle: Option<&mut TautscopeLoop>,
+    measurement: *const TautscopeMeasurement,
+    report: *mut TautscopeTipReport,
+    update: impl FnOnce(&mut TautscopeLoop, &Checked<'_>) -> Result<TautscopeTipReport, TautscopeResult>,
+) -> TautscopeResult {
+    with_handle(handle, |handle| {
+        // SAFETY: the caller's contract.
+        unsafe { check_report(report) }?;
+        // SAFETY: the caller's contract.
+        let checked = unsafe { Checked::new(measurement, &handle.sensors) }?;
+        let done = update(handle, &checked)?;
         // SAFETY: checked above.
         unsafe { write_report(report, &done) };
         Ok(())

@@ -1,0 +1,157 @@
+//! Loops as objects, whose number of DOFs and profile are known at run time.
+
+use crate::article::play::Play;
+use crate::error::ConfigError;
+use crate::estimation::expectation::Belief;
+use crate::estimation::history::Entry;
+use crate::r#loop::profile::{BandProfile, Profile};
+use crate::r#loop::reduction::HysteresisReduction;
+use crate::r#loop::report::{GeometryEstimate, Report, SlackEstimate};
+use crate::supervision::flags::Flag;
+use crate::supervision::monitors::Supervision;
+
+/// Most DOFs of a loop.
+pub const DOFS: usize = 8;
+
+/// A loop of n DOFs: slices have n entries, arrays n of `DOFS`.
+pub trait Loop {
+    /// Number of DOFs.
+    fn dofs(&self) -> usize;
+
+    /// Control tick, as [`HysteresisReduction::step`]: `command` (n,) for a reference (n,).
+    fn step(&mut self, reference: &[f64], stamp: Option<f64>, time: f64, command: &mut [f64]);
+
+    /// The predicted state now.
+    fn predicted_state(&self) -> [f64; DOFS];
+
+    /// The estimated contact offsets.
+    fn play(&self) -> [Play; DOFS];
+
+    /// The estimated slack.
+    fn slack(&self) -> SlackEstimate<DOFS>;
+
+    /// State of the supervision.
+    fn supervision(&self) -> Supervision;
+
+    /// As [`HysteresisReduction::set_compensation`].
+    ///
+    /// # Errors
+    /// The share is not from 0 to 1.
+    fn set_compensation(&mut self, share: f64) -> Result<(), ConfigError>;
+
+    /// As [`HysteresisReduction::engage`].
+    fn engage(&mut self);
+
+    /// As [`HysteresisReduction::acknowledge`].
+    fn acknowledge(&mut self);
+
+    /// As [`HysteresisReduction::raise`].
+    fn raise(&mut self, flag: Flag);
+}
+
+/// A loop of the article's instrument, with the functions of [`HysteresisReduction`] for its bands.
+#[expect(missing_docs, reason = "at the functions of the loop")]
+pub trait BandLoop: Loop {
+    fn on_features(
+        &mut self,
+        measured: Option<[f64; 4]>,
+        covariance: Option<&[[f64; 4]; 4]>,
+        captured_at: f64,
+        checksum: Option<u64>,
+    ) -> Report;
+
+    fn predict_state(&self, captured_at: f64) -> Option<Belief>;
+
+    fn predicted_features(&self, captured_at: f64) -> Option<[f64; 4]>;
+
+    /// What images say of the geometry; None in profile `paper`.
+    fn geometry(&self) -> Option<GeometryEstimate>;
+}
+
+impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize> Loop
+    for HysteresisReduction<P, S, V, N>
+{
+    fn dofs(&self) -> usize {
+        N
+    }
+
+    fn step(&mut self, reference: &[f64], stamp: Option<f64>, time: f64, command: &mut [f64]) {
+        let mut taken = [f64::NAN; N];
+        taken
+            .iter_mut()
+            .zip(reference)
+            .for_each(|(to, of)| *to = *of);
+        let next = Self::step(self, taken, stamp, time);
+        command.iter_mut().zip(next).for_each(|(to, of)| *to = of);
+    }
+
+    fn predicted_state(&self) -> [f64; DOFS] {
+        padded(Self::predicted_state(self), f64::NAN)
+    }
+
+    fn play(&self) -> [Play; DOFS] {
+        padded(Self::play(self), Play::from_ordered(f64::NAN, f64::NAN))
+    }
+
+    fn slack(&self) -> SlackEstimate<DOFS> {
+        let own = self.profile.slack_estimate();
+        SlackEstimate {
+            half_width: padded(own.half_width, f64::NAN),
+            width_std: padded(own.width_std, f64::NAN),
+            centre: padded(own.centre, f64::NAN),
+            gain: padded(own.gain, f64::NAN),
+            gain_std: padded(own.gain_std, f64::NAN),
+        }
+    }
+
+    fn supervision(&self) -> Supervision {
+        Self::supervision(self)
+    }
+
+    fn set_compensation(&mut self, share: f64) -> Result<(), ConfigError> {
+        Self::set_compensation(self, share)
+    }
+
+    fn engage(&mut self) {
+        Self::engage(self);
+    }
+
+    fn acknowledge(&mut self) {
+        Self::acknowledge(self);
+    }
+
+    fn raise(&mut self, flag: Flag) {
+        Self::raise(self, flag);
+    }
+}
+
+impl<P: BandProfile, S: AsRef<[Entry]> + AsMut<[Entry]>> BandLoop for HysteresisReduction<P, S> {
+    fn on_features(
+        &mut self,
+        measured: Option<[f64; 4]>,
+        covariance: Option<&[[f64; 4]; 4]>,
+        captured_at: f64,
+        checksum: Option<u64>,
+    ) -> Report {
+        Self::on_features(self, measured, covariance, captured_at, checksum)
+    }
+
+    fn predict_state(&self, captured_at: f64) -> Option<Belief> {
+        Self::predict_state(self, captured_at)
+    }
+
+    fn predicted_features(&self, captured_at: f64) -> Option<[f64; 4]> {
+        Self::predicted_features(self, captured_at)
+    }
+
+    fn geometry(&self) -> Option<GeometryEstimate> {
+        self.profile.geometry()
+    }
+}
+
+/// The values of n DOFs as the first of `DOFS`.
+pub(super) fn padded<T: Copy, const N: usize>(values: [T; N], fill: T) -> [T; DOFS] {
+    let mut padded = [fill; DOFS];
+    padded.iter_mut().zip(values).for_each(|(to, of)| *to = of);
+    padded
+}
