@@ -245,6 +245,8 @@ pub struct View<const N: usize> {
 impl<const N: usize, const D: usize> Sight<Best<N, N, 0, D>, N> for Reading<'_> {
     type View = View<N>;
 
+    const IS_WHOLE: bool = false;
+
     fn is_usable(&self) -> bool {
         let known = |value: &f64| value.is_finite();
         self.values.iter().any(known) && self.values.iter().all(|v| known(v) || v.is_nan())
