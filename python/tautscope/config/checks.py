@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from tautscope._core import DETECTORS, MOST_DOFS, MOST_RANGE
-from tautscope.config.axes import DofEntry
+from tautscope.config.axes import DofEntry, KinematicsConfig
 from tautscope.config.control import ControlConfig
 from tautscope.config.dof import DofConfig
 from tautscope.config.drives import DrivesConfig
@@ -120,8 +120,14 @@ _OF_THE_ARTICLE = (
 """Keys of [safety] that a robot with [[dof]] does not use."""
 
 
-def check_axes(dofs: Sequence[DofEntry], profile: str, safety: SafetyConfig) -> None:
-    """Check the entries of [[dof]] with each other; keys from the root."""
+def check_axes(
+    dofs: Sequence[DofEntry], kinematics: KinematicsConfig, profile: str, safety: SafetyConfig
+) -> None:
+    """Check the entries of [[dof]] with each other, and what names them; keys from the root."""
+    known = [dof.name for dof in dofs] if kinematics.kind in ("two_planes", "segments") else []
+    for index, name in enumerate(kinematics.without):
+        allowed = "a name of [[dof]], and kind two_planes or segments"
+        _require(name in known, f"kinematics.without[{index}]", name, allowed)
     if not dofs:
         return
     _require(len(dofs) <= MOST_DOFS, "dof", f"{len(dofs)} entries", f"1 to {MOST_DOFS}")

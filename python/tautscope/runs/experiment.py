@@ -11,6 +11,7 @@ import numpy as np
 
 from tautscope.config import Config
 from tautscope.errors import MotionHeldError, SignalError
+from tautscope.loop.actuators import with_actuators
 from tautscope.loop.measurement import Measurement
 from tautscope.loop.reduction import HysteresisReduction, Report
 from tautscope.loop.references import DatedReference, Reference
@@ -113,6 +114,7 @@ def run_experiment(
         segments = tuple(reference.segments)
         return Recording(trace, frames, config, compensate, segments, recorder.snapshot, warnings)
 
+    rig = with_actuators(rig, config)
     dated = reference if isinstance(reference, DatedReference) else None
     sample = check_sample(rig.reset(), config)
     start = sample.time
