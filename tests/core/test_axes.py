@@ -270,6 +270,7 @@ def test_a_late_sensor_counts_at_the_time_of_its_measurement() -> None:
             errors.append(report.state_estimate - tips[-41])
             assert report.status in ("ok", "refused"), report
     assert np.abs(errors[-200:]).max() < 0.02
+    assert loop.supervision.lead == 1.0
     reference = np.sin(time * np.array([1.0, 0.8]))
     assert np.abs(tips[-1] - reference).max() < 0.12
 

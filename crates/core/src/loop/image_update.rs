@@ -98,7 +98,7 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
         if let Some(last) = self.last_used.get_mut(sensor) {
             *last = captured_at;
         }
-        let is_missing = self.is_missing(past.time, measurement.observable) || I::IS_WHOLE;
+        let is_missing = self.is_missing(measurement.observable) || I::IS_WHOLE;
         let (status, triggers) = self.accept(&past, &measurement, is_missing, raised);
         Outcome {
             status,
@@ -134,13 +134,14 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
     }
 
     /// Whether no measurement has determined a DOF for so long that its sensor counts as silent.
-    fn is_missing(&mut self, time: f64, observable: [bool; N]) -> bool {
+    fn is_missing(&mut self, observable: [bool; N]) -> bool {
+        let now = self.history.newest_time();
         let mut is_missing = false;
         for (at, is_observable) in self.determined_at.iter_mut().zip(observable) {
             if is_observable || *at == f64::NEG_INFINITY {
-                *at = at.max(time);
+                *at = now;
             }
-            is_missing |= self.monitors.is_gap(time - *at);
+            is_missing |= self.monitors.is_gap(now - *at);
         }
         is_missing
     }

@@ -24,7 +24,7 @@ pub struct HysteresisReduction<P, S = [Entry; 256], V = FeatureModel, const N: u
     pub(super) monitors: Monitors<N>,
     /// Time of capture of the last measurement of each sensor that was used.
     pub(super) last_used: [f64; SENSORS],
-    /// Time of capture of the last measurement that determined each DOF, of the first one before there is one.
+    /// Time of arrival of the last measurement that determined each DOF, of the first one before there is one.
     pub(super) determined_at: [f64; N],
     travel: [f64; N],
 }
