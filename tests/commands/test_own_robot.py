@@ -1,5 +1,6 @@
 """A newcomer's path: a rig of 2 DOFs with an EM tracker in 30 lines, and `run --rig`."""
 
+import io
 import json
 from pathlib import Path
 
@@ -7,6 +8,9 @@ import numpy as np
 import pytest
 from tautscope.cli import main
 from tautscope.config import load_config
+from tautscope.hardware import jog
+from tautscope.hardware.doctor import rig as rig_checks
+from tautscope.loop.kinematics import TwoPlanes
 from tautscope.runs.recording import Recording
 
 RIG = """
@@ -169,3 +173,123 @@ def test_nothing_moves_without_an_answer(
     options = ["--config", str(folder / "robot.toml"), "--rig", "catheter_of_a_newcomer:Catheter"]
     assert main(["calibrate", "latency", *options]) == 2
     assert "nothing moved" in capsys.readouterr().err
+
+
+def doctor(folder: Path, monkeypatch: pytest.MonkeyPatch, rig: str, *options: str) -> int:
+    monkeypatch.setattr(rig_checks, "HOLD", 1.0)
+    name = f"rig_of_{folder.name}"
+    (folder / f"{name}.py").write_text(rig, encoding="utf-8")
+    arguments = ["doctor", "--config", "robot.toml", "--rig", f"{name}:Catheter"]
+    return main([*arguments, *options])
+
+
+def test_doctor_approves_of_the_rig_of_thirty_lines(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert doctor(folder, monkeypatch, RIG, "--yes", "--json") == 0
+    found = {each["what"]: each for each in json.loads(capsys.readouterr().out)["findings"]}
+    assert found["sensor 0, Pose"]["data"]["rate"] == pytest.approx(40)
+    assert found["clock"]["data"]["median"] == pytest.approx(0.005)
+    assert found["degrees of freedom"]["status"] == "ok"
+    assert {each["status"] for each in found.values()} == {"ok", "note"}
+    assert found["pace"]["status"] == found["measurement.delays"]["status"] == "note"
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        ("self.ticks * 0.005", "self.ticks * 5.0", 1, "clock", "5000 ms per step"),
+        (
+            "Sample(time, command",
+            "Sample(time, 57.3 * command + 30",
+            1,
+            "applied bend_x",
+            "its range",
+        ),
+        (
+            "Sample(time, command",
+            "Sample(time, command + self.ticks / 400",
+            1,
+            "applied bend_x",
+            "",
+        ),
+        ("Sample(time, command", "Sample(time, [0.0, 0.0, 0.0]", 1, "samples", "array (3,)"),
+        ("Pose(position", "Pose(1e3 * position", 1, "sensor 0, Pose", "m and rad"),
+        ("3), time", "3), time + 1.0", 1, "sensor 0, Pose", "not after it"),
+        ("3), time", "3), time - 1.0", 1, "sensor 0, Pose", "safety.frame_age"),
+        ("3), time", "3), time // 0.1 * 0.1", 0, "sensor 0, Pose", "once"),
+        ("self.noise(0, 3e-4, 3)", "0", 0, "sensor 0, Pose", "100% repeat"),
+        ("% 5 == 0", "% 60 == 0", 1, "sensor 0, Pose", "safety.frame_gap"),
+        ("(pose,) if self.ticks % 5 == 0 else ()", "()", 1, "sensors", "nothing was measured"),
+        ("time, rotation)", "time, 2 * rotation)", 1, "sensors", "orientation"),
+        ("time, rotation)", "time)", 0, "degrees of freedom", "bend_x to 0.0"),
+        ("3), time, rotation", "3) * [1, np.nan, np.nan], time", 1, "degrees of freedom", "bend_y"),
+        ("self.noise(0, 3e-4, 3)", "np.nan", 1, "sensors", "position"),
+    ],
+)
+def test_doctor_names_what_is_wrong_with_a_rig(
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    case: tuple[str, str, int, str, str],
+) -> None:
+    change, by, status, what, found = case
+    text = RIG.replace(change, by)
+    assert text != RIG
+    assert doctor(folder, monkeypatch, text, "--yes", "--json") == status
+    every = json.loads(capsys.readouterr().out)["findings"]
+    (wrong,) = (each for each in every if each["what"] == what)
+    assert found in wrong["found"] + wrong["todo"], wrong
+    assert wrong["status"] == ("missing" if status else "ok" if what.startswith("deg") else "note")
+    assert wrong["todo"] or wrong["status"] == "ok"
+
+
+def test_doctor_resets_no_rig_without_an_answer(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.stdin", io.StringIO("\n"))
+    text = RIG.replace("def reset(self):", "def reset(self):\n        raise SystemError")
+    assert doctor(folder, monkeypatch, text) == 0
+    assert "nothing moved" in capsys.readouterr().out
+
+
+def test_a_jog_shows_what_the_tip_did(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(jog, "DURATION", 1.0)
+    options = ["--rig", "catheter_of_a_newcomer:Catheter", "--config", "robot.toml"]
+    assert main(["jog", "bend_x", "0.9", *options, "--yes", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["moved"] == pytest.approx(0.9, abs=1e-3)
+    assert found["ended_at"] == pytest.approx(0.0, abs=1e-9)
+    # The tip is 0.3 rad behind on the way out, and 0.3 rad ahead at the end.
+    tips = [TwoPlanes(load_config("robot.toml")).tip(np.array([q, 0.0]))[0] for q in (0, 0.6, 0.3)]
+    (seen,) = found["sensors"]
+    assert seen["moved"] == pytest.approx(np.linalg.norm(tips[1] - tips[0]), rel=0.1)
+    assert seen["ended_at"] == pytest.approx(np.linalg.norm(tips[2] - tips[0]), rel=0.1)
+    assert main(["jog", "bend_x", "0.9", *options, "--yes"]) == 0
+    assert "position, sensor 0: moved" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["bend_z", "0.1"], "dof: got 'bend_z', expected one of bend_x, bend_y"),
+        (["bend_x", "1.1"], "distance: got 1.1, expected at most 1 m or rad"),
+        (["bend_y", "0.9"], "distance: got 0.9, expected within range [-0.5, 0.5]"),
+        (["bend_y", "0.1"], "answer: got 'no'"),
+    ],
+)
+def test_a_wrong_jog_moves_nothing(
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[str],
+    message: str,
+) -> None:
+    text = "[-0.5, 0.5]".join(ROBOT.rsplit("[-1.5, 1.5]", 1))
+    (folder / "robot.toml").write_text(text, encoding="utf-8")
+    monkeypatch.setattr("sys.stdin", io.StringIO("n" if "answer" in message else "y"))
+    options = ["--rig", "catheter_of_a_newcomer:Catheter", "--config", "robot.toml"]
+    assert main(["jog", *arguments, *options]) == 2
+    assert message in capsys.readouterr().err

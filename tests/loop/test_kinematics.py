@@ -71,6 +71,17 @@ def test_segments_are_the_integral_of_constant_curvatures(q: tuple[float, ...]) 
     np.testing.assert_allclose(orientation, frame, atol=1e-8)
 
 
+@pytest.mark.parametrize("kind", ["two_planes", "segments"])
+def test_a_gripper_does_not_move_the_tip(kind: str) -> None:
+    dofs = [{"name": name, "width_limit": 1.0} for name in ("bend_x", "grip", "bend_y")]
+    document = {"dof": dofs, "kinematics": {"kind": kind, "without": ["grip"]}}
+    others = {"dof": dofs[::2], "kinematics": {"kind": kind}}
+    found = build_kinematics(from_document(document)).tip(np.array([0.4, 7.0, -0.3]))
+    expected = build_kinematics(from_document(others)).tip(np.array([0.4, -0.3]))
+    for one, other in zip(found, expected, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
 def test_segments_have_two_degrees_of_freedom_each() -> None:
     with pytest.raises(ConfigError, match="two degrees of freedom per segment"):
         build_kinematics(segments(3))

@@ -10,7 +10,10 @@ from typing import TYPE_CHECKING
 from tautscope.commands import arguments
 from tautscope.commands.article_config import article_config
 from tautscope.commands.printing import print_json
+from tautscope.commands.question import ask
+from tautscope.config import load_config
 from tautscope.config.placeholders import MARK, placeholders
+from tautscope.errors import ConfigError, FieldError
 from tautscope.extras import missing_modules
 
 if TYPE_CHECKING:
@@ -18,6 +21,11 @@ if TYPE_CHECKING:
 
     from tautscope.config import Config
     from tautscope.hardware.doctor.check_result import CheckResult
+
+QUESTION = (
+    "The rig will be reset, WHICH MAY MOVE ITS MOTORS to their start, and held there for 3 s. "
+    "Type y to go on: "
+)
 
 
 def add_parser(verbs: arguments.Verbs) -> None:
@@ -30,6 +38,14 @@ def add_parser(verbs: arguments.Verbs) -> None:
         "open its camera, configure its drives and read the settings back. No motor is enabled. "
         "Exit status 0 if nothing is missing, else 1.",
     )
+    doctor.add_argument(
+        "--rig",
+        metavar="MODULE:CLASS",
+        help="check a rig of your own with [[dof]] instead, while it is held for 3 s: shapes, "
+        "units, clock, rates and delays, and whether its sensors determine every degree of "
+        "freedom; docs/robots.md",
+    )
+    doctor.add_argument("--yes", action="store_true", help="reset the rig without asking")
     arguments.add_config(doctor)
     arguments.add_json(doctor)
     doctor.set_defaults(run=_doctor)
@@ -81,14 +97,44 @@ def run_checks(config: Config, *, is_rig: bool, folder: Path) -> Iterator[CheckR
     yield from check_calibration(config.calibration, serial_numbers)
 
 
+def check_own(options: argparse.Namespace, config: Config) -> Iterator[CheckResult]:
+    """Open the rig of ``--rig``, and check it if it may be reset.
+
+    Raises:
+        ConfigError: There is no such rig, or the configuration has no [[dof]].
+    """
+    from tautscope.hardware.doctor.check_result import CheckResult  # noqa: PLC0415
+    from tautscope.hardware.doctor.rig import check_rig  # noqa: PLC0415
+    from tautscope.runs.rigs import rig_maker  # noqa: PLC0415
+
+    if not config.dof:
+        raise ConfigError("dof", "none", "degrees of freedom: [[dof]], in --config")
+    rig = rig_maker(options.rig)(config)
+    try:
+        period = f"control_period {1e3 * config.control.period:g} ms, as control.period"
+        yield CheckResult("rig", options.rig, "ok", period)
+        if options.yes or ask(QUESTION, config.camera).strip() in ("y", "yes"):
+            yield from check_rig(rig, config)
+        else:
+            todo = "Answer y, or give --yes"
+            yield CheckResult("rig", "samples", "note", "not checked: nothing moved", todo)
+    finally:
+        rig.close()
+
+
 def _doctor(options: argparse.Namespace) -> int:
     from tautscope.hardware.signals import exit_on_signals  # noqa: PLC0415
 
-    config = article_config(options.config)
+    if options.rig is None and options.yes:
+        raise FieldError("--yes", True, "--rig: without it nothing moves")
+    config = article_config(options.config) if options.rig is None else load_config(options.config)
     marked = placeholders(options.config)
     findings: list[CheckResult] = []
     with exit_on_signals():
-        checks = run_checks(config, is_rig=options.config is not None, folder=Path.cwd())
+        if options.rig is None:
+            checks = run_checks(config, is_rig=options.config is not None, folder=Path.cwd())
+        else:
+            checks = check_own(options, config)
         for found in itertools.chain(_check_placeholders(marked), checks):
             findings.append(found)
             if not options.json:
@@ -96,10 +142,9 @@ def _doctor(options: argparse.Namespace) -> int:
     missing = sum(found.status == "missing" for found in findings)
     if options.json:
         print_json({"complete": not missing, "findings": [found.to_json() for found in findings]})
-    elif missing:
-        print(f"\n{missing} missing. No motor was enabled.")
     else:
-        print("\nAll there. No motor was enabled.")
+        result = f"{missing} missing." if missing else "All there."
+        print(f"\n{result} No motor was enabled." if options.rig is None else f"\n{result}")
     return 1 if missing else 0
 
 

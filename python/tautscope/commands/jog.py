@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import asdict
+from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
 from tautscope.commands.article_config import article_config
 from tautscope.commands.calibration_rig import refuse_wrong_limits
 from tautscope.commands.printing import print_json
+from tautscope.config import load_config
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError, FieldError
+
+if TYPE_CHECKING:
+    from tautscope.hardware.jog import SensorMotion
 
 
 def add_parser(verbs: arguments.Verbs) -> None:
@@ -23,9 +29,18 @@ def add_parser(verbs: arguments.Verbs) -> None:
         "THE MOTOR MOVES; have an emergency stop within reach.",
         extras=["hardware"],
     )
-    jog.add_argument("dof", choices=[dof.label for dof in Dof], help="the motor")
+    jog.add_argument("dof", help="the motor: insertion, rotation, bending, or a name of [[dof]]")
     jog.add_argument(
-        "distance", type=float, metavar="DISTANCE", help="m or rad, at most 0.002 m or 0.2 rad"
+        "distance",
+        type=float,
+        metavar="DISTANCE",
+        help="m or rad, at most 0.002 m or 0.2 rad; with --rig at most width_limit",
+    )
+    jog.add_argument(
+        "--rig",
+        metavar="MODULE:CLASS",
+        help="move a degree of freedom of a rig of your own with [[dof]], and print what its "
+        "sensors measured; docs/robots.md",
     )
     jog.add_argument("--yes", action="store_true", help="start without asking")
     arguments.add_config(jog, required=True)
@@ -34,25 +49,49 @@ def add_parser(verbs: arguments.Verbs) -> None:
 
 
 def _jog(options: argparse.Namespace) -> None:
-    from tautscope.hardware.jog import check_distance, jog  # noqa: PLC0415
+    from tautscope.hardware.jog import check_distance, jog, jog_rig  # noqa: PLC0415
 
-    config, dof, distance = (
-        article_config(options.config),
-        Dof[options.dof.upper()],
+    config, distance = (
+        (load_config if options.rig else article_config)(options.config),
         options.distance,
     )
-    if config.drives is None:
-        raise ConfigError("drives", None, "a section [drives] that names the motors")
+    names = [dof.label for dof in config.dofs]
+    if options.dof not in names:
+        raise FieldError("dof", options.dof, f"one of {', '.join(names)}")
+    index = names.index(options.dof)
+    dof = config.dofs[index]
+    if options.rig is None and config.drives is None:
+        raise ConfigError("drives", None, "a section [drives] that names the motors, or --rig")
     check_distance(dof, distance)
+    if options.rig is not None:
+        from tautscope.runs.rigs import rig_maker  # noqa: PLC0415
+
+        make_rig = rig_maker(options.rig)
     refuse_wrong_limits(options.config)
     if not options.yes:
-        question = f"The {dof.label} motor will move by {distance:g} and back. Type y to start: "
+        before = "After a reset, which may move all motors to their start, " if options.rig else ""
+        question = f"{before}{dof.label} will move by {distance:g} and back. Type y to start: "
         print(question, end="", file=sys.stderr, flush=True)
         if sys.stdin.readline().strip().lower() not in ("y", "yes"):
             raise FieldError("answer", "no", "y, or the option --yes; nothing moved")
-    largest, end = jog(config.drives, dof, distance)
+    seen: list[SensorMotion] = []
+    if options.rig is not None:
+        rig = make_rig(config)
+        try:
+            largest, end, seen = jog_rig(rig, config, index, distance)
+        finally:
+            rig.close()
+    else:
+        assert config.drives is not None
+        largest, end = jog(config.drives, Dof(index), distance)
     if options.json:
-        print_json({"dof": dof.label, "moved": largest, "ended_at": end})
+        found = {"dof": dof.label, "moved": largest, "ended_at": end}
+        print_json(found | ({"sensors": [asdict(each) for each in seen]} if options.rig else {}))
         return
     scale, unit = dof.display_scale, dof.display_unit
     print(f"{dof.label}: moved {scale * largest:.4f} {unit}, ended at {scale * end:.4f} {unit}")
+    for each in seen:
+        print(
+            f"{each.what}, sensor {each.sensor}: moved {each.scale * each.moved:.4g} {each.unit}, "
+            f"ended at {each.scale * each.ended_at:.4g} {each.unit}"
+        )

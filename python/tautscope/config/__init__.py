@@ -5,6 +5,7 @@ default: [paper] is Reilink et al. 2013, [ours] is chosen here, [geometry] is a 
 that no publication describes. Missing keys have their defaults.
 """
 
+from tautscope.config.actuators import ActuatorsConfig
 from tautscope.config.axes import DofEntry, KinematicsConfig, MeasurementConfig, TopicConfig
 from tautscope.config.calibration import CalibrationConfig, CalibrationRecord
 from tautscope.config.camera import (
@@ -49,6 +50,7 @@ from tautscope.config.vision import VisionConfig
 __all__ = [
     "DISTURBANCES",
     "RIGS",
+    "ActuatorsConfig",
     "AxisConfig",
     "CableConfig",
     "CalibrationConfig",

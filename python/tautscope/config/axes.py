@@ -86,6 +86,9 @@ class KinematicsConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only
     """Of the bending section of "two_planes", or of each of "segments" [m]."""
     tip_length: Positive = 0.015
     """From its end to the sensor [m]."""
+    without: tuple[Name, ...] = ()
+    """Degrees of freedom that do not move the tip, as of a gripper, with "two_planes" and
+    "segments"; a `Tip` of a further sensor measures them."""
 
 
 class TopicConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):

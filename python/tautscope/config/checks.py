@@ -121,8 +121,14 @@ _OF_THE_ARTICLE = (
 """Keys of [safety] that a robot with [[dof]] does not use."""
 
 
-def check_axes(dofs: Sequence[DofEntry], safety: SafetyConfig) -> None:
-    """Check the entries of [[dof]] with each other; keys from the root."""
+def check_axes(
+    dofs: Sequence[DofEntry], kinematics: KinematicsConfig, safety: SafetyConfig
+) -> None:
+    """Check the entries of [[dof]] with each other, and what names them; keys from the root."""
+    known = [dof.name for dof in dofs] if kinematics.kind in ("two_planes", "segments") else []
+    for index, name in enumerate(kinematics.without):
+        allowed = "a name of [[dof]], and kind two_planes or segments"
+        _require(name in known, f"kinematics.without[{index}]", name, allowed)
     if not dofs:
         return
     _require(len(dofs) <= MOST_DOFS, "dof", f"{len(dofs)} entries", f"1 to {MOST_DOFS}")

@@ -17,6 +17,8 @@ def allowed_values(kind: types.Type) -> str:
             text = (
                 "a number" if isinstance(kind, types.FloatType) else "a whole number"
             ) + _bounds(kind)
+        case types.StrType(pattern=str(pattern), min_length=least, max_length=most):
+            text = f"a text of {least} to {most} characters like {pattern}"
         case types.StrType():
             text = "a text"
         case types.BoolType():
@@ -25,8 +27,10 @@ def allowed_values(kind: types.Type) -> str:
             text = f"{len(items)} values, each {allowed_values(items[0])}"
         case types.TupleType(item_types=items):
             text = "a list of " + " and ".join(map(allowed_values, items))
-        case types.VarTupleType(item_type=item):
-            text = f"a list, each item {allowed_values(item)}"
+        case types.VarTupleType(item_type=item, max_length=most):
+            text = (
+                f"a list{f' of at most {most}' if most else ''}, each item {allowed_values(item)}"
+            )
         case types.DictType(value_type=value):
             text = f"a table, each value {allowed_values(value)}"
         case types.UnionType(types=members):

@@ -8,6 +8,7 @@ from typing import Any, Literal
 import msgspec
 from msgspec import field
 
+from tautscope.config.actuators import ActuatorsConfig, check_actuators
 from tautscope.config.axes import DofEntry, KinematicsConfig, MeasurementConfig
 from tautscope.config.calibration import CalibrationConfig
 from tautscope.config.camera import CameraConfig
@@ -77,12 +78,16 @@ class Config(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The degrees of freedom of another robot; without them those of the article."""
     kinematics: KinematicsConfig = field(default_factory=KinematicsConfig)
     measurement: MeasurementConfig = field(default_factory=MeasurementConfig)
+    actuators: ActuatorsConfig | None = None
+    """Motors that are not the degrees of freedom."""
 
     def __post_init__(self) -> None:
         Section.__post_init__(self)
         check_references(self.safety, self.experiment, {dof: self[dof] for dof in Dof})
-        check_axes(self.dof, self.safety)
+        check_axes(self.dof, self.kinematics, self.safety)
         check_topics(self.dof, self.kinematics, self.measurement)
+        if self.actuators is not None:
+            check_actuators(self.actuators, self.dof, self.drives)
 
     @property
     def dofs(self) -> tuple[NamedDof, ...]:

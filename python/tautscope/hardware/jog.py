@@ -3,29 +3,37 @@
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tautscope.config import DrivesConfig
-from tautscope.dof import Dof
-from tautscope.errors import STOPPED, FieldError, TautscopeError
+from tautscope.config import Config, DrivesConfig
+from tautscope.dof import Dof, NamedDof
+from tautscope.errors import STOPPED, FieldError, SignalError, TautscopeError
 from tautscope.hardware.drives import open_drives
 from tautscope.hardware.signals import exit_on_signals
+from tautscope.loop.measurement import Measurement, Pose, Tip, raw_values
+from tautscope.loop.rig import Rig, check_sample
 
 DURATION = 4.0
 """Duration of the motion out and back [s]."""
 LARGEST = (2e-3, 0.2, 0.2)
-"""Largest distance of a first test [m, rad, rad]."""
+"""Largest distance of a first test of the article's DOFs [m, rad, rad]."""
+_RESTS = ((0.0, 0.1), (0.45, 0.55), (0.9, 1.0))
+"""Parts of the motion of a rig in which it rests: at its start, out and back [share of it]."""
 
 
-def check_distance(dof: Dof, distance: float) -> None:
+def check_distance(dof: NamedDof, distance: float) -> None:
     """Check the distance of a jog [m or rad].
 
     Raises:
-        FieldError: It is 0, not finite, or beyond `LARGEST`.
+        FieldError: It is 0, not finite, or beyond `LARGEST`, or ``width_limit`` of an entry of
+            [[dof]], beyond which the tip moves for sure.
     """
-    if not 0 < abs(distance) <= LARGEST[dof]:
-        raise FieldError("distance", distance, f"at most {LARGEST[dof]:g} m or rad, and not 0")
+    largest = LARGEST[dof] if isinstance(dof, Dof) else getattr(dof, "width_limit", 0.0)
+    if not 0 < abs(distance) <= largest:
+        raise FieldError("distance", distance, f"at most {largest:g} m or rad, and not 0")
 
 
 def jog(config: DrivesConfig, dof: Dof, distance: float) -> tuple[float, float]:
@@ -48,7 +56,7 @@ def jog(config: DrivesConfig, dof: Dof, distance: float) -> tuple[float, float]:
         try:
             for step in range(steps + 1):
                 command = begin.copy()
-                command[dof] += distance * (1 - np.cos(2 * np.pi * step / steps)) / 2
+                command[dof] += distance * _raised(step / steps)
                 applied.append(drives.exchange(command))
                 due += config.cycle
                 time.sleep(max(0.0, due - time.monotonic()))
@@ -57,3 +65,95 @@ def jog(config: DrivesConfig, dof: Dof, distance: float) -> tuple[float, float]:
             raise
     moved = np.array(applied)[:, dof] - begin[dof]
     return float(moved[np.abs(moved).argmax()]), float(moved[-1])
+
+
+@dataclass(frozen=True, slots=True)
+class SensorMotion:
+    """What a sensor measured of a jog: means while the rig rests out and back, less the start.
+
+    Attributes:
+        sensor: Its number.
+        what: "tip" of the degree of freedom itself, "position" or "points" as distances.
+        moved: Out [m, rad or px]; without a sign of a distance.
+        ended_at: Back.
+        unit: In which it is shown.
+        scale: Factor to this unit.
+    """
+
+    sensor: int
+    what: str
+    moved: float
+    ended_at: float
+    unit: str
+    scale: float
+
+
+def jog_rig(
+    rig: Rig, config: Config, index: int, distance: float
+) -> tuple[float, float, list[SensorMotion]]:
+    """Move a degree of freedom of a rig by `distance` [m or rad] and back, with `_RESTS`.
+
+    THE MOTORS MOVE: first `Rig.reset`, then the one from where it is. The caller closes the rig.
+
+    Returns:
+        Largest displacement and displacement at the end, as the rig reports them, and what each
+        sensor measured.
+
+    Raises:
+        FieldError: The distance is not allowed, or leaves the range.
+        SignalError: A sample is not as `tautscope.Sample` says.
+    """
+    dof = config.dof[index]
+    check_distance(dof, distance)
+    with exit_on_signals():
+        begin = np.array(check_sample(rig.reset(), config).applied, dtype=np.float64)
+        if not np.isfinite(begin).all():
+            allowed = "where the motors are; of actuators.map a class with dofs(motors)"
+            raise SignalError("sample.applied", begin.tolist(), allowed)
+        low, high = dof.range or (-np.inf, np.inf)
+        if not low <= begin[index] + distance <= high:
+            allowed = f"within range {[low, high]}: {dof.name} is at {begin[index]:.4g}"
+            raise FieldError("distance", distance, allowed)
+        steps = round(DURATION / config.control.period)
+        applied: list[float] = []
+        measured: dict[int, list[tuple[float, Measurement]]] = {}
+        for step in range(steps + 1):
+            command = begin.copy()
+            phase = np.interp(step / steps, np.ravel(_RESTS), (0.0, 0.0, 0.5, 0.5, 1.0, 1.0))
+            command[index] += distance * _raised(float(phase))
+            sample = check_sample(rig.step(command), config)
+            applied.append(sample.applied[index] - begin[index])
+            for each in sample.measurements:
+                measured.setdefault(each.sensor, []).append((step / steps, each))
+    largest = max(applied, key=abs)
+    seen = [_seen(sensor, own, config, index) for sensor, own in sorted(measured.items())]
+    return float(largest), float(applied[-1]), [each for each in seen if each is not None]
+
+
+def _seen(
+    sensor: int, own: list[tuple[float, Measurement]], config: Config, index: int
+) -> SensorMotion | None:
+    """What a sensor measured; None if it did not in each of `_RESTS`."""
+    means: list[NDArray[np.float64]] = []
+    for begin, end in _RESTS:
+        near = [raw_values(each) for time, each in own if begin <= time <= end]
+        if not near:
+            return None
+        means.append(np.mean(near, axis=0))
+    start, out, back = means
+    first = own[0][1]
+    if isinstance(first, Tip):
+        dof = config.dof[index]
+        moved, ended = (float(each[index] - start[index]) for each in (out, back))
+        if np.isnan(moved + ended):
+            return None
+        return SensorMotion(sensor, "tip", moved, ended, dof.display_unit, dof.display_scale)
+    moved, ended = (float(np.sqrt(np.nansum((each - start) ** 2))) for each in (out, back))
+    if isinstance(first, Pose):
+        return SensorMotion(sensor, "position", moved, ended, "mm", 1e3)
+    return SensorMotion(sensor, "points", moved, ended, "px", 1.0)
+
+
+def _raised(share: float) -> float:
+    """A raised cosine: 0 at both ends, 1 in the middle."""
+    return float((1 - np.cos(2 * np.pi * share)) / 2)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Protocol, runtime_checkable
 
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from tautscope.config import Config
 from tautscope.errors import ConfigError
-from tautscope.loop.named_class import named_class
+from tautscope.loop.named_class import instance, named_class
 
 Floats = NDArray[np.float64]
 Predict = Callable[[Floats], Floats]
@@ -54,14 +55,15 @@ class TwoPlanes:
     NAMES = ("bend_x", "bend_y", "insertion", "rotation")
 
     def __init__(self, config: Config) -> None:
-        names = [dof.label for dof in config.dofs]
-        for name in names:
+        places = _moving(config)
+        for name in places:
             if name not in self.NAMES:
-                raise ConfigError("dof.name", name, "one of " + ", ".join(self.NAMES))
+                allowed = f"one of {', '.join(self.NAMES)}, or named in kinematics.without"
+                raise ConfigError("dof.name", name, allowed)
         for name in self.NAMES[:2]:
-            if name not in names:
-                raise ConfigError("dof", names, f'a degree of freedom "{name}"')
-        self._place = [names.index(name) if name in names else None for name in self.NAMES]
+            if name not in places:
+                raise ConfigError("dof", list(places), f'a degree of freedom "{name}"')
+        self._place = [places.get(name) for name in self.NAMES]
         self._length, self._tip = config.kinematics.length, config.kinematics.tip_length
 
     def tip(self, q: Floats) -> tuple[Floats, Floats]:
@@ -70,9 +72,12 @@ class TwoPlanes:
             0.0 if place is None else float(q[place]) for place in self._place
         )
         arc, turned = _arc(bend_x, bend_y, self._length)
+        position = arc + turned[:, 2] * self._tip
+        position[2] += insertion
+        if self._place[3] is None:
+            return position, turned
         about = rotation_matrix(np.array([0.0, 0.0, rotation]))
-        position = about @ (arc + turned[:, 2] * self._tip + np.array([0.0, 0.0, insertion]))
-        return position, about @ turned
+        return about @ position, about @ turned
 
 
 class Segments:
@@ -90,27 +95,34 @@ class Segments:
     """
 
     def __init__(self, config: Config) -> None:
-        if len(config.dofs) % 2:
-            raise ConfigError("dof", len(config.dofs), "two degrees of freedom per segment")
+        self._places = list(_moving(config).values())
+        if len(self._places) % 2:
+            raise ConfigError("dof", len(self._places), "two degrees of freedom per segment")
         self._length, self._tip = config.kinematics.length, config.kinematics.tip_length
 
     def tip(self, q: Floats) -> tuple[Floats, Floats]:
         """Position (3,) [m] and rotation matrix (3, 3) of the tip in a state q (n,)."""
         position, turned = np.zeros(3), np.eye(3)
-        for bend_x, bend_y in np.reshape(q, (-1, 2)).tolist():
+        for bend_x, bend_y in np.reshape(q[self._places], (-1, 2)).tolist():
             arc, about = _arc(bend_x, bend_y, self._length)
             position = position + turned @ arc
             turned = turned @ about
         return position + turned[:, 2] * self._tip, turned
 
 
+def _moving(config: Config) -> dict[str, int]:
+    """Name and place of each degree of freedom that moves the tip."""
+    without = config.kinematics.without
+    return {dof.label: k for k, dof in enumerate(config.dofs) if dof.label not in without}
+
+
 def _arc(bend_x: float, bend_y: float, length: float) -> tuple[Floats, Floats]:
     """End (3,) and rotation matrix (3, 3) of an arc that begins at 0 along z."""
-    angle = np.hypot(bend_x, bend_y)
+    angle = math.hypot(bend_x, bend_y)
     if angle < _SMALL:
         along, aside = 1.0 - angle**2 / 6, 0.5
     else:
-        along, aside = np.sin(angle) / angle, (1.0 - np.cos(angle)) / angle**2
+        along, aside = math.sin(angle) / angle, (1.0 - math.cos(angle)) / angle**2
     turned = rotation_matrix(np.array([-bend_y, bend_x, 0.0]))
     return length * np.array([bend_x * aside, bend_y * aside, along]), turned
 
@@ -131,14 +143,10 @@ def build_kinematics(config: Config) -> Kinematics | None:
     if kind == "segments":
         return Segments(config)
     field, allowed = "kinematics.kind", '"joints", "two_planes", "segments" or "module:Class"'
-    make = named_class(field, kind, allowed)
-    try:
-        made = make()
-    except TypeError as error:
-        raise ConfigError(field, kind, f"a class without arguments ({error})") from None
-    if not isinstance(made, Kinematics):
+    kinematics = instance(field, kind, named_class(field, kind, allowed))
+    if not isinstance(kinematics, Kinematics):
         raise ConfigError(field, kind, "a class with the method tip(q)")
-    return made
+    return kinematics
 
 
 def jacobian_by_differences(predict: Predict, q: Floats, steps: Floats) -> Floats:
@@ -154,24 +162,29 @@ def jacobian_by_differences(predict: Predict, q: Floats, steps: Floats) -> Float
 
 def rotation_matrix(vector: Floats) -> Floats:
     """Rotation matrix (3, 3) of a rotation vector (3,) [rad], by Rodrigues' formula."""
-    angle = float(np.sqrt(vector @ vector))
-    x, y, z = vector
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    # In single numbers: a pose is predicted some tens of times per measurement.
+    x, y, z = np.asarray(vector, dtype=np.float64).tolist()
+    square = x * x + y * y + z * z
+    angle = math.sqrt(square)
     if angle < _SMALL:
-        first, second = 1.0 - angle**2 / 6, 0.5 - angle**2 / 24
+        first, second = 1.0 - square / 6, 0.5 - square / 24
     else:
-        first, second = np.sin(angle) / angle, (1.0 - np.cos(angle)) / angle**2
-    turned: Floats = np.eye(3) + first * cross + second * (cross @ cross)
-    return turned
+        first, second = math.sin(angle) / angle, (1.0 - math.cos(angle)) / square
+    cosine = 1.0 - second * square
+    return np.array(
+        [
+            [cosine + second * x * x, second * x * y - first * z, second * x * z + first * y],
+            [second * x * y + first * z, cosine + second * y * y, second * y * z - first * x],
+            [second * x * z - first * y, second * y * z + first * x, cosine + second * z * z],
+        ]
+    )
 
 
 def rotation_vector(matrix: Floats) -> Floats:
     """Rotation vector (3,) [rad] of a rotation matrix (3, 3); not near half a turn."""
-    skew = np.array(
-        [matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]]
-    )
-    sine = float(np.sqrt(skew @ skew)) / 2
-    cosine = (float(np.trace(matrix)) - 1) / 2
-    angle = np.arctan2(sine, cosine)
-    vector: Floats = skew / 2 * (1.0 + angle**2 / 6 if sine < _SMALL else angle / sine)
-    return vector
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = matrix.tolist()
+    skew = (zy - yz, xz - zx, yx - xy)
+    sine = math.hypot(*skew) / 2
+    angle = math.atan2(sine, (xx + yy + zz - 1) / 2)
+    scale = (1.0 + angle**2 / 6 if sine < _SMALL else angle / sine) / 2
+    return np.array([scale * each for each in skew])

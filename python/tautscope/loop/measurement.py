@@ -66,6 +66,14 @@ class Points:
 Measurement = Tip | Pose | Points
 
 
+def raw_values(measurement: Measurement) -> Floats:
+    """The values (n,), position (3,) or pixels (k, 2) of a measurement."""
+    if isinstance(measurement, Tip):
+        return np.asarray(measurement.values, dtype=np.float64)
+    found = measurement.position if isinstance(measurement, Pose) else measurement.pixels
+    return np.asarray(found, dtype=np.float64)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Reading:
     """Values (m,), their covariance (m, m), the model of the sensor, and how many are one point."""
@@ -103,7 +111,7 @@ class Sensors:
         Raises:
             SignalError: The values are not n numbers or NaN, or the covariance is none.
         """
-        found = check_numbers("values", values, (self._count,), "numbers or NaN")
+        found = check_numbers("values", values, (self._count,), "numbers or NaN, not all NaN")
         std = self._config.measurement.tip_deviation * self._widths
         identity = np.eye(self._count)
         return Reading(found, _covariance(covariance, std), lambda q: (q, identity))
@@ -118,7 +126,7 @@ class Sensors:
                 tip.
         """
         kinematics = self._with("tip", "on_pose")
-        place = check_numbers("position", position, (3,), "numbers or NaN")
+        place = check_numbers("position", position, (3,), "numbers or NaN, not all NaN")
         settings = self._config.measurement
         std = np.full(3, settings.position_deviation)
         if orientation is None:
@@ -140,9 +148,8 @@ class Sensors:
             SignalError: The pixels are not (k, 2) numbers or NaN, or the kinematics has no points.
         """
         kinematics = self._with("points", "on_points")
-        shape = np.shape(pixels)
-        count = shape[0] if len(shape) == 2 and 1 <= shape[0] <= MOST_VALUES // 2 else 1
-        found = check_numbers("pixels", pixels, (count, 2), "numbers or NaN").ravel()
+        count = min(max(len(np.atleast_1d(np.asarray(pixels, dtype=object))), 1), MOST_VALUES // 2)
+        found = check_numbers("pixels", pixels, (count, 2), "numbers or NaN, not all NaN").ravel()
         std = np.full(found.size, self._config.measurement.point_deviation)
 
         def predict(q: Floats) -> Floats:

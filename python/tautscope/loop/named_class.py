@@ -28,3 +28,15 @@ def named_class(field: str, name: str, allowed: str) -> Any:
         return getattr(import_module(module), attribute)
     except (ImportError, AttributeError) as error:
         raise ConfigError(field, name, f"{allowed} ({error})") from None
+
+
+def instance(field: str, name: str, found: Any) -> Any:
+    """What a class of the user makes without arguments.
+
+    Raises:
+        ConfigError: It needs arguments.
+    """
+    try:
+        return found()
+    except TypeError as error:
+        raise ConfigError(field, name, f"a class without arguments ({error})") from None

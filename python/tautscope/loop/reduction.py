@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tautscope._core import MOST_SENSORS, MOST_VALUES
+from tautscope._core import MOST_SENSORS
 from tautscope.config import Config
 from tautscope.dof import display_text
 from tautscope.errors import SignalError
@@ -27,9 +27,9 @@ from tautscope.loop.safety import Reaction, Supervision, checksum, disabled_moni
 from tautscope.loop.signal_checks import (
     check_covariance,
     check_features,
-    check_numbers,
     check_signal,
     check_time,
+    check_values,
 )
 from tautscope.loop.state_prediction import StatePrediction
 
@@ -356,12 +356,8 @@ class HysteresisReduction:
             SignalError: As `on_tip`; a result of `predict` or `jacobian` has another shape.
         """
         sensors = self._axes_sensors("on_measurement")
-        count = len(np.atleast_1d(values)) if np.ndim(values) == 1 else 0
-        if not 1 <= count <= MOST_VALUES:
-            raise SignalError(
-                "values", f"an array {np.shape(values)}", f"1 to {MOST_VALUES} numbers or NaN"
-            )
-        found = check_numbers("values", values, (count,), "numbers or NaN")
+        found = check_values(values)
+        count = len(found)
         known = check_covariance("covariance", covariance, count)
         reading = sensors.own(found, known, predict, jacobian)
         return self._update_by(reading, captured_at, sensor)

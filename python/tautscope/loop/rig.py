@@ -105,13 +105,24 @@ def check_sample(sample: Sample, config: Config) -> Sample:
         raise SignalError("sample", type(sample).__name__, "a tautscope.Sample from the rig")
     count = len(config.dofs)
     check_time("sample.time", sample.time)
+    allowed = f"an array ({count},), one number per degree of freedom"
     for name in ("applied", "true_state"):
         value = getattr(sample, name)
-        if value is not None and np.shape(value) != (count,):
-            allowed = f"an array ({count},), one per degree of freedom"
-            raise SignalError(f"sample.{name}", f"an array {np.shape(value)}", allowed)
+        if value is None:
+            if name == "true_state":
+                continue
+            raise SignalError(f"sample.{name}", value, allowed)
+        try:
+            shape = np.asarray(value, dtype=np.float64).shape
+        except (TypeError, ValueError):
+            raise SignalError(f"sample.{name}", value, allowed) from None
+        if shape != (count,):
+            raise SignalError(f"sample.{name}", f"an array {shape}", allowed)
+    if not isinstance(sample.frame, Frame | None):
+        raise SignalError("sample.frame", type(sample.frame).__name__, "a tautscope.Frame or None")
     for one in sample.measurements:
         if not isinstance(one, Tip | Pose | Points):
             allowed = "a Tip, Pose or Points, or several in a tuple"
             raise SignalError("sample.measurement", type(one).__name__, allowed)
+        check_time("sample.measurement.captured_at", one.captured_at)
     return sample

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tautscope._core import MOST_VALUES
 from tautscope.errors import SignalError
 
 
@@ -67,6 +68,22 @@ def check_numbers(
     if array.shape != shape or np.isinf(array).any() or np.isnan(array).all():
         raise SignalError(field, array.tolist(), allowed)
     return array
+
+
+def check_values(values: ArrayLike) -> NDArray[np.float64]:
+    """1 to `MOST_VALUES` numbers or NaN as an array, none infinite and not all NaN.
+
+    Raises:
+        SignalError: They are anything else.
+    """
+    allowed = f"1 to {MOST_VALUES} numbers or NaN, not all NaN"
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise SignalError("values", values, allowed) from None
+    if array.ndim != 1 or not 1 <= len(array) <= MOST_VALUES:
+        raise SignalError("values", f"an array {array.shape}", allowed)
+    return check_numbers("values", array, array.shape, "numbers or NaN, not all NaN")
 
 
 def check_covariance(field: str, values: ArrayLike, count: int) -> NDArray[np.float64]:

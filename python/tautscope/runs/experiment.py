@@ -9,6 +9,7 @@ import numpy as np
 
 from tautscope.config import Config
 from tautscope.errors import MotionHeldError
+from tautscope.loop.actuators import with_actuators
 from tautscope.loop.measurement import Measurement
 from tautscope.loop.reduction import HysteresisReduction, Report
 from tautscope.loop.references import DatedReference, Reference
@@ -73,6 +74,7 @@ def run_experiment(
             rig's clock does not advance.
         FrameError: An image is not what the configured camera gives.
     """
+    rig = with_actuators(rig, config)
     dated = reference if isinstance(reference, DatedReference) else None
     ticks = ControlLoop(config, rig, compensate=compensate, look=look, executor=executor)
     if log is not None:

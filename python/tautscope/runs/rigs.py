@@ -9,6 +9,7 @@ from importlib.metadata import entry_points
 
 from tautscope.config import Config
 from tautscope.errors import ConfigError
+from tautscope.loop.actuators import with_actuators
 from tautscope.loop.named_class import named_class
 from tautscope.loop.rig import Rig
 
@@ -19,7 +20,8 @@ GROUP = "tautscope.rigs"
 def rig_maker(name: str) -> Callable[[Config], Rig]:
     """What makes the rig of a name: ``module:Class``, or an entry point of `GROUP`.
 
-    The class is called with the configuration if its constructor takes an argument, else without.
+    The class is called with the configuration if its constructor needs an argument, or has one
+    named config; else without.
 
     Raises:
         ConfigError: There is none of this name, or what it makes is no `Rig`.
@@ -28,9 +30,15 @@ def rig_maker(name: str) -> Callable[[Config], Rig]:
     found = entry_points(group=GROUP, name=name)
     made = next(iter(found)).load() if found else named_class(field, name, allowed)
     try:
-        takes_config = bool(inspect.signature(made).parameters)
+        parameters = inspect.signature(made).parameters.values()
     except (TypeError, ValueError):
         raise ConfigError(field, name, "a class of yours, with control_period") from None
+
+    variable = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
+    takes_config = any(
+        each.name == "config" or (each.default is each.empty and each.kind not in variable)
+        for each in parameters
+    )
 
     def make(config: Config) -> Rig:
         rig = made(config) if takes_config else made()
@@ -41,7 +49,7 @@ def rig_maker(name: str) -> Callable[[Config], Rig]:
         if not math.isclose(rig.control_period, period, rel_tol=1e-6):
             allowed = f"that of the rig, {rig.control_period:g} s"
             raise ConfigError("control.period", period, allowed)
-        return rig  # type: ignore[no-any-return]
+        return with_actuators(rig, config)
 
     return make
 

@@ -98,7 +98,8 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
         if let Some(last) = self.last_used.get_mut(sensor) {
             *last = captured_at;
         }
-        let (status, triggers) = self.accept(&past, &measurement, raised);
+        let is_missing = self.is_missing(measurement.observable) || I::IS_WHOLE;
+        let (status, triggers) = self.accept(&past, &measurement, is_missing, raised);
         Outcome {
             status,
             past: Some(past),
@@ -132,11 +133,27 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
         }
     }
 
+    /// Whether no measurement has determined a DOF for so long that its sensor counts as silent.
+    fn is_missing(&mut self, observable: [bool; N]) -> bool {
+        let now = self.history.newest_time();
+        let mut is_missing = false;
+        for (at, is_observable) in self.determined_at.iter_mut().zip(observable) {
+            if is_observable || *at == f64::NEG_INFINITY {
+                *at = now;
+            }
+            is_missing |= self.monitors.is_gap(now - *at);
+        }
+        is_missing
+    }
+
     /// Updates the estimates from a measurement that has passed the checks.
+    ///
+    /// A DOF that it did not determine is worth a flag where `is_missing`: no other sensor does.
     fn accept(
         &mut self,
         past: &Entry<N>,
         measurement: &Measurement<N, P::Evidence>,
+        is_missing: bool,
         raised: &mut Flags,
     ) -> (Status, [Triggers; N]) {
         let status = if measurement.is_partial {
@@ -168,8 +185,14 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
         *raised = motion.union(
             self.monitors.enabled(
                 conspicuous
-                    .union(Flags::when(status == Status::Partial, Flag::Merged))
-                    .union(Flags::when(status == Status::Held, Flag::Unobservable)),
+                    .union(Flags::when(
+                        is_missing && status == Status::Partial,
+                        Flag::Merged,
+                    ))
+                    .union(Flags::when(
+                        is_missing && status == Status::Held,
+                        Flag::Unobservable,
+                    )),
             ),
         );
         (status, triggers)

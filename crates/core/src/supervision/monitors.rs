@@ -219,6 +219,12 @@ impl<const N: usize> Monitors<N> {
         gate.check_innovation(distance)
     }
 
+    /// Whether a time without a measurement, in s, is so long that a sensor counts as lost.
+    pub(crate) const fn is_gap(&self, gap: f64) -> bool {
+        let [gate, ..] = &self.frames;
+        gate.is_gap(gap)
+    }
+
     fn check_gap(&self, time: f64) -> Flags {
         let gates = self.frames.iter();
         gates.fold(Flags::NONE, |flags, gate| flags.union(gate.check_gap(time)))

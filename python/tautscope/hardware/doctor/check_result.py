@@ -15,7 +15,8 @@ class CheckResult:
     """The result of one check.
 
     Attributes:
-        group: ``computer``, ``camera``, ``drives``, ``calibration`` or ``recording``.
+        group: ``computer``, ``camera``, ``drives``, ``calibration``, ``recording``, or ``rig``
+            of a rig of one's own.
         what: The object of the check.
         status: ``ok``; ``missing`` if a run needs it; ``note`` for information.
         found: The result in words.

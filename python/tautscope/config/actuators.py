@@ -1,0 +1,95 @@
+"""Motors of a robot whose motors are not its degrees of freedom."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from tautscope.config.axes import DofEntry, Name
+from tautscope.config.section import Section, relation
+from tautscope.errors import ConfigError
+
+
+class ActuatorsConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Motors of a robot with [[dof]] that are not its degrees of freedom.
+
+    Antagonistic pairs, coupled tendons, gears and signs: motor positions = matrix times command +
+    offsets. A rig then takes and reports the positions of the motors. Without this section it takes
+    the command.
+    """
+
+    matrix: tuple[tuple[float, ...], ...] = ()
+    """A row per motor: its motion over that of each degree of freedom."""
+    offsets: tuple[float, ...] = ()
+    """Of each motor, its position at command 0; without it 0."""
+    limits: tuple[tuple[float, float], ...] = ()
+    """Least and largest position of each motor; a command beyond them is followed as far as they
+    allow."""
+    names: tuple[Name, ...] = ()
+    """Of the motors in messages; without it motor_1, motor_2, ..."""
+    units: tuple[str, ...] = ()
+    """Of the motors in messages, as mm, rad or counts."""
+    map: str = ""
+    """In place of matrix and offsets: "module:function" of yours from the command to the motors, or
+    "module:Class" with the method motors(dofs) and, if motors are reported, dofs(motors)."""
+
+
+@relation(ActuatorsConfig)
+def _check_actuators(actuators: ActuatorsConfig) -> None:
+    if bool(actuators.matrix) == bool(actuators.map):
+        found = "both" if actuators.map else "neither"
+        raise ConfigError("matrix", found, "either matrix or map")
+    if actuators.map and actuators.offsets:
+        raise ConfigError("offsets", actuators.offsets, "no offsets with map: it has its own")
+    given = {name: getattr(actuators, name) for name in ("offsets", "limits", "names", "units")}
+    count = len(actuators.matrix) or max(map(len, given.values()))
+    for name, values in given.items():
+        if values and len(values) != count:
+            raise ConfigError(name, values, f"{count} values, one per motor")
+    for index, (low, high) in enumerate(actuators.limits):
+        if not low < high:
+            allowed = "the lower limit, then the upper"
+            raise ConfigError(f"limits[{index}]", (low, high), allowed)
+    for index, name in enumerate(actuators.names):
+        if name in actuators.names[:index]:
+            raise ConfigError(f"names[{index}]", name, "a name used once")
+
+
+def check_actuators(actuators: ActuatorsConfig, dofs: Sequence[DofEntry], drives: Any) -> None:
+    """Check section ``actuators`` with [[dof]]; keys from the root."""
+    if not dofs or drives is not None:
+        found = "[drives]" if dofs else "no [[dof]]"
+        allowed = "[[dof]], and a rig of your own; [drives] has its own gains and limits"
+        raise ConfigError("actuators", found, allowed)
+    for index, row in enumerate(actuators.matrix):
+        if len(row) != len(dofs):
+            allowed = f"{len(dofs)} numbers, one per degree of freedom"
+            raise ConfigError(f"actuators.matrix[{index}]", row, allowed)
+    if not actuators.matrix:
+        return
+    scaled, _ = scaled_matrix(actuators, dofs)
+    _, sizes, directions = np.linalg.svd(scaled, full_matrices=True)
+    rank = int(np.sum(sizes > 1e-9))
+    if rank < len(dofs):
+        moved = np.abs(directions[rank:]).max(axis=0) > 1e-6
+        names = " and ".join(
+            dof.name for dof, is_moved in zip(dofs, moved, strict=True) if is_moved
+        )
+        allowed = f"rank {len(dofs)}: the motors do not determine {names}"
+        raise ConfigError("actuators.matrix", f"rank {rank}", allowed)
+
+
+def scaled_matrix(
+    actuators: ActuatorsConfig, dofs: Sequence[DofEntry]
+) -> tuple[np.ndarray[Any, np.dtype[np.float64]], np.ndarray[Any, np.dtype[np.float64]]]:
+    """The matrix (m, n) in units of width_limit, each row of length 1, and those lengths (m,).
+
+    Units differ from motor to motor; neither the rank nor a least-squares solution may depend on
+    them.
+    """
+    matrix = np.array(actuators.matrix) * [dof.width_limit for dof in dofs]
+    lengths = np.linalg.norm(matrix, axis=1)
+    lengths[lengths == 0.0] = 1.0
+    return matrix / lengths[:, None], lengths

@@ -1,0 +1,147 @@
+"""Wrong input of a robot's configuration, loop and rig: each error has field, value and remedy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from tautscope import Config, HysteresisReduction, Sample, Tip, axes
+from tautscope.config import from_document
+from tautscope.errors import FieldError
+from tautscope.loop.rig import check_sample
+
+NAN, EYE = float("nan"), np.eye(3)
+
+
+class NoTip:
+    """No kinematics."""
+
+
+def one(**keys: Any) -> Config:
+    return from_document({"dof": [{"name": "a", "width_limit": 1.0} | keys]})
+
+
+def planes(**sections: Any) -> Config:
+    dofs = [{"name": f"bend_{axis}", "width_limit": 1.0} for axis in "xy"]
+    return from_document({"dof": dofs, "kinematics": {"kind": "two_planes"}} | sections)
+
+
+def kind(name: str) -> HysteresisReduction:
+    return HysteresisReduction(planes(kinematics={"kind": name}))
+
+
+def loop() -> HysteresisReduction:
+    made = HysteresisReduction(planes())
+    made.step([0.0, 0.0], 0.0)
+    return made
+
+
+def sample(**parts: Any) -> Sample:
+    whole = {"time": 0.0, "applied": np.zeros(2)} | parts
+    return check_sample(Sample(**whole), planes())
+
+
+Case = tuple[Callable[[], object], str, str, str]
+"""A call, and of its error the field, a part of the value, and a part of what is allowed."""
+CONFIGURATIONS: list[Case] = [
+    (lambda: one(name="Bend X"), "dof[0].name", "Bend X", "^[a-z]"),
+    (lambda: one(name=""), "dof[0].name", "''", "1 to 32 characters"),
+    (lambda: one(unit="deg"), "dof[0].unit", "deg", '"m" or "rad"'),
+    (lambda: one(width_limit=0.0), "dof[0].width_limit", "0.0", "above 0"),
+    (lambda: one(width_limit=NAN), "dof[0].width_limit", "nan", "a number above 0"),
+    (lambda: one(width_limit="1 rad"), "dof[0].width_limit", "1 rad", "a number above 0"),
+    (lambda: one(range=[1.0, -1.0]), "dof[0].range", "1.0, -1.0", "lower limit, then the upper"),
+    (lambda: one(range=[-180, 180]), "dof[0].range", "-180", "not mm and degrees"),
+    (lambda: one(range=[1.0]), "dof[0].range", "[1.0]", "2 values"),
+    (lambda: one(speed=-1.0), "dof[0].speed", "-1.0", "above 0"),
+    (lambda: one(lever=0.0), "dof[0].lever", "0.0", "above 0"),
+    (lambda: one(gain_limit=0.5), "dof[0].gain_limit", "0.5", "at least 1"),
+    (lambda: one(expected_width=2.0), "dof[0].expected_width", "2.0", "width_limit"),
+    (lambda: one(delta_minus=0.2), "dof[0].delta_minus", "0.2", "delta_plus"),
+    (lambda: one(widht=1.0), "dof[0].widht", "1.0", "no such key"),
+    (lambda: from_document({"dof": [{"name": "a"}]}), "dof[0].width_limit", "None", "no default"),
+    (lambda: from_document({"dof": {"name": "a"}}), "dof", "'a'", "a list"),
+    (lambda: axes(2, width_limit=1.0, names=["a", "a"]), "dof[1].name", "'a'", "used once"),
+    (lambda: axes(9, width_limit=1.0), "count", "9", "1 to 8"),
+    (lambda: axes(3, width_limit=[1.0, 2.0]), "width_limit", "[1.0, 2.0]", "one value, or 3"),
+    (lambda: from_document({"dof": [{"name": f"a{k}", "width_limit": 1.0} for k in range(9)]}),
+     "dof", "9 entries", "1 to 8"),
+    (lambda: planes(safety={"width_limit": [1.0] * 3}), "safety.width_limit", "1.0", "[[dof]]"),
+    (lambda: planes(measurement={"delays": [-0.1]}), "measurement.delays[0]", "-0.1", "at least 0"),
+    (lambda: planes(measurement={"delays": [0.1] * 5}), "measurement.delays", "0.1", "at most 4"),
+    (lambda: planes(kinematics={"length": 0}), "kinematics.length", "0", "above 0"),
+    (lambda: planes(kinematics={"kind": "two_planes", "without": ["grip"]}),
+     "kinematics.without[0]", "grip", "a name of [[dof]]"),
+    (lambda: planes(kinematics={"without": ["bend_x"]}), "kinematics.without[0]", "bend_x", "kind"),
+    (lambda: kind("joint"), "kinematics.kind", "joint", '"two_planes"'),
+    (lambda: kind("no_such_module:Robot"), "kinematics.kind", "no_such_module", "module:Class"),
+    (lambda: kind("test_wrong_input:Nothing"), "kinematics.kind", "Nothing", "module:Class"),
+    (lambda: kind("test_wrong_input:NoTip"), "kinematics.kind", "NoTip", "the method tip(q)"),
+    (lambda: HysteresisReduction(one().replace(**{"kinematics.kind": "two_planes"})),
+     "dof.name", "'a'", "bend_x"),
+]  # fmt: skip
+SIGNALS: list[Case] = [
+    (lambda: loop().step([0.0] * 3), "reference", "[0.0, 0.0, 0.0]", "2 finite numbers"),
+    (lambda: loop().step([0.0, NAN]), "reference", "nan", "2 finite numbers"),
+    (lambda: loop().step("ab"), "reference", "'ab'", "2 finite numbers"),
+    (lambda: loop().step([0.0, 0.0], NAN), "time", "nan", "finite number of seconds"),
+    (lambda: loop().on_tip([0.0], 0.0), "values", "[0.0]", "an array (2,)"),
+    (lambda: loop().on_tip([NAN, NAN], 0.0), "values", "[nan, nan]", "not all NaN"),
+    (lambda: loop().on_tip([np.inf, 0.0], 0.0), "values", "inf", "numbers or NaN"),
+    (lambda: loop().on_tip("ab", 0.0), "values", "'ab'", "an array (2,)"),
+    (lambda: loop().on_tip([[0], [0, 1]], 0.0), "values", "[[0], [0, 1]]", "an array (2,)"),
+    (lambda: loop().on_tip([0.0, 0.0], NAN), "captured_at", "nan", "seconds"),
+    (lambda: loop().on_tip([0.0, 0.0], "now"), "captured_at", "'now'", "seconds"),
+    (lambda: loop().on_tip([0.0, 0.0], 0.0, EYE), "covariance", "1.0", "(2, 2)"),
+    (lambda: loop().on_tip([0.0, 0.0], 0.0, [0.1, 0.1]), "covariance", "0.1", "(2, 2)"),
+    (lambda: loop().on_tip([0.0, 0.0], 0.0, [[1, 2], [0, 1]]), "covariance", "2.0", "symmetric"),
+    (lambda: loop().on_tip([0.0, 0.0], 0.0, -EYE[:2, :2]), "covariance", "-1.0", "positive"),
+    (lambda: loop().on_tip([0.0, 0.0], 0.0, sensor=4), "sensor", "4", "0 to 3"),
+    (lambda: loop().on_pose([0.0] * 2, 0.0), "position", "[0.0, 0.0]", "an array (3,)"),
+    (lambda: loop().on_pose([0.0] * 3, 0.0, [0, 0, 0, 2]), "orientation", "2.0", "of length 1"),
+    (lambda: loop().on_pose([0.0] * 3, 0.0, [NAN, 0, 0, 1]), "orientation", "nan", "quaternion"),
+    (lambda: loop().on_pose([0.0] * 3, 0.0, [0, 0, 0]), "orientation", "[0.0", "x, y, z, w"),
+    (lambda: loop().on_pose([0.0] * 3, 0.0, -EYE), "orientation", "-1.0", "rotation matrix (3, 3)"),
+    (lambda: loop().on_pose([0.0] * 3, 0.0, 2 * EYE), "orientation", "2.0", "rotation matrix"),
+    (lambda: loop().on_pose([0.0] * 3, 0.0, EYE, EYE), "covariance", "1.0", "(6, 6)"),
+    (lambda: loop().on_points([[0.0, 0.0]], 0.0), "on_points", "two_planes", "points(q)"),
+    (lambda: loop().on_measurement([], 0.0, EYE, len), "values", "(0,)", "1 to 16"),
+    (lambda: loop().on_measurement(np.ones(17), 0.0, EYE, len), "values", "(17,)", "1 to 16"),
+    (lambda: loop().on_measurement([[1], [1, 2]], 0.0, EYE, len), "values", "[1, 2]", "1 to 16"),
+    (lambda: loop().on_measurement([1.0], 0.0, [[1.0]], lambda q: q), "predict(q)", "(2,)", "(1,)"),
+    (lambda: loop().on_measurement([1.0], 0.0, [[1.0]], lambda q: q[:1], jacobian=lambda q: q),
+     "jacobian(q)", "(2,)", "(1, 2)"),
+    (lambda: loop().on_features(np.ones(4), 0.0), "on_features", "[[dof]]", "on_tip"),
+    (lambda: loop().predict_state(0.0), "predict_state", "[[dof]]", "on_tip"),
+    (lambda: HysteresisReduction(Config()).on_tip([0.0], 0.0), "on_tip", "no [[dof]]", "axes"),
+    (lambda: loop().set_compensation(1.5), "compensation", "1.5", "0 to 1"),
+]  # fmt: skip
+SAMPLES: list[Case] = [
+    (lambda: check_sample((0.0, [0, 0]), planes()),  # type: ignore[arg-type]
+     "sample", "tuple", "tautscope.Sample"),
+    (lambda: sample(time=NAN), "sample.time", "nan", "seconds"),
+    (lambda: sample(time="0"), "sample.time", "'0'", "seconds"),
+    (lambda: sample(applied=np.zeros(3)), "sample.applied", "(3,)", "an array (2,)"),
+    (lambda: sample(applied=None), "sample.applied", "None", "an array (2,)"),
+    (lambda: sample(applied=[[0], [0, 1]]), "sample.applied", "[0, 1]", "an array (2,)"),
+    (lambda: sample(true_state=[0.0]), "sample.true_state", "(1,)", "an array (2,)"),
+    (lambda: sample(frame=np.zeros((2, 2, 3))), "sample.frame", "ndarray", "tautscope.Frame"),
+    (lambda: sample(measurement=1.0), "sample.measurement", "float", "Tip, Pose or Points"),
+    (lambda: sample(measurement=[Tip([0, 0], 0.0)]), "sample.measurement", "list", "in a tuple"),
+    (lambda: sample(measurement=None), "sample.measurement", "NoneType", "Tip, Pose or Points"),
+    (lambda: sample(measurement=Tip([0, 0], NAN)),
+     "sample.measurement.captured_at", "nan", "seconds"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("case", [*CONFIGURATIONS, *SIGNALS, *SAMPLES], ids=lambda case: case[1])
+def test_an_error_says_where_what_and_what_may_come(case: Case) -> None:
+    call, field, value, allowed = case
+    with pytest.raises(FieldError) as caught:
+        call()
+    assert caught.value.field == field
+    found, _, expected = str(caught.value).removeprefix(f"{field}: got ").partition(", expected ")
+    assert value in found
+    assert allowed in expected
