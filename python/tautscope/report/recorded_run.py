@@ -34,8 +34,15 @@ class RecordedRun:
 
     @property
     def is_tip_known(self) -> bool:
-        """Whether the true state of the tip is recorded; otherwise the camera measures it."""
-        return bool(np.isfinite(per_dof(self.main.trace, "true")).any())
+        """Whether the true state of the tip is recorded; otherwise it is the one measured."""
+        return bool(np.isfinite(per_dof(self.main.trace, "true", self.main.config.dofs)).any())
+
+    @property
+    def tip(self) -> str:
+        """Whose errors the figures are."""
+        if self.is_tip_known:
+            return "of the true tip"
+        return "by sensor" if self.main.config.dof else "by camera"
 
     @property
     def results(self) -> Results:
@@ -49,7 +56,7 @@ class RecordedRun:
 
     @property
     def operator_results(self) -> OperatorResults:
-        """Tracking of another motion, by the true tip if it is known; empty for the experiment."""
+        """Tracking of another motion, of `tip`; empty for the experiment."""
         if self.main.segments:
             return {}
         if not self.main.compensated:
@@ -71,11 +78,23 @@ class RecordedRun:
             for dof, found in self.results.items()
         } | operator_to_json(self.operator_results)
 
+    def summary(self) -> dict[str, Any]:
+        """The results as JSON: `to_json`, and what they are of."""
+        return {
+            "profile": self.main.config.profile,
+            "is_compensated": self.main.compensated,
+            "ticks": len(self.main.trace),
+            "updates": len(self.main.frames),
+            "is_tip_known": self.is_tip_known,
+            "dof": self.to_json(),
+            "warnings": list(self.main.warnings),
+        }
+
     def section(self) -> str:
         """The tables as HTML."""
         if self.main.segments:
             return table1_section(self.results, is_tip_known=self.is_tip_known)
-        return recorded_motion_section(self.operator_results, is_tip_known=self.is_tip_known)
+        return recorded_motion_section(self.operator_results, self.tip)
 
     def figure(self) -> tuple[str, CaptionedFigure]:
         """The figure and the name of its file."""
@@ -83,7 +102,6 @@ class RecordedRun:
         from tautscope.report.figures import figure9  # noqa: PLC0415
         from tautscope.report.operator_figure import draw_operator_motion  # noqa: PLC0415
 
-        tip = "true tip" if self.is_tip_known else "tip as the camera measures it"
         if self.main.segments:
             return "fig9.png", CaptionedFigure(
                 figure9(self.uncompensated, self.main),
@@ -94,6 +112,6 @@ class RecordedRun:
             )
         return "tracking.png", CaptionedFigure(
             draw_operator_motion(self.uncompensated, self.main),
-            f"The recorded motion. (a)-(c) reference, command and the {tip}, in a part of the run. "
-            "(d)-(f) tracking error over the whole run.",
+            f"The motion, figures {self.tip}. Left: reference, command and tip, in a part of the "
+            "run. Right: tracking error over the whole run.",
         )
