@@ -22,7 +22,7 @@ from tautscope.runs.recording import Recording, per_dof
 class RecordedRun:
     """A run, and perhaps one of the same reference without compensation to compare it with.
 
-    A run with segments is the article's experiment, one without is another motion.
+    A run of the article's instrument with segments is its experiment, any other another motion.
 
     Attributes:
         main: The run, with compensation or without.
@@ -31,6 +31,11 @@ class RecordedRun:
 
     main: Recording
     uncompensated: Recording | None = None
+
+    @property
+    def is_experiment(self) -> bool:
+        """Whether the run is the article's experiment."""
+        return bool(self.main.segments) and not self.main.config.dof
 
     @property
     def is_tip_known(self) -> bool:
@@ -50,6 +55,8 @@ class RecordedRun:
 
         Empty for another motion.
         """
+        if not self.is_experiment:
+            return {}
         if not self.main.compensated:
             return evaluate_uncompensated(self.main)
         return evaluate(self.uncompensated, self.main)
@@ -57,7 +64,7 @@ class RecordedRun:
     @property
     def operator_results(self) -> OperatorResults:
         """Tracking of another motion, of `tip`; empty for the experiment."""
-        if self.main.segments:
+        if self.is_experiment:
             return {}
         if not self.main.compensated:
             return evaluate_uncompensated_motion(self.main)
@@ -92,7 +99,7 @@ class RecordedRun:
 
     def section(self) -> str:
         """The tables as HTML."""
-        if self.main.segments:
+        if self.is_experiment:
             return table1_section(self.results, is_tip_known=self.is_tip_known)
         return recorded_motion_section(self.operator_results, self.tip)
 
@@ -102,7 +109,7 @@ class RecordedRun:
         from tautscope.report.figures import figure9  # noqa: PLC0415
         from tautscope.report.operator_figure import draw_operator_motion  # noqa: PLC0415
 
-        if self.main.segments:
+        if self.is_experiment:
             return "fig9.png", CaptionedFigure(
                 figure9(self.uncompensated, self.main),
                 "Fig. 9. First row: reference, command, estimate and both "
