@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from tautscope import Pose, Sample, Tip, run_experiment
 from tautscope.config import from_document
 from tautscope.loop.kinematics import TwoPlanes
-from tautscope.report.robot_run import motion_of
+from tautscope.report.operator_motion import motion_of
 
 CONFIG = from_document(
     tomllib.loads("""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from tautscope.calibration.sensor_delay import find_delay, move
 from tautscope.config import load_config
-from tautscope.report.robot_run import motion_of, run_robot
+from tautscope.report.operator_motion import evaluate_operator_motion, motion_of
+from tautscope.runs.experiment import run_experiment
 from tautscope.twin.colonoscope import ColonoscopeTwin
 
 DELAY, UNTOLD = 0.05, 0.1
@@ -19,13 +20,12 @@ def simulate(job: Job) -> list[float]:
     config = load_config("colonoscope")
     if what == "motion":
         motion = motion_of(config, seed, 120.0)
-        found = run_robot(lambda _: ColonoscopeTwin(seed, delay=DELAY), config, motion, _ignore)
-        return [result.reduction for result in found.results]
+        runs = [
+            run_experiment(ColonoscopeTwin(seed, delay=DELAY), motion, config, compensate)
+            for compensate in (False, True)
+        ]
+        return [result.reduction for result in evaluate_operator_motion(*runs).values()]
     rig = ColonoscopeTwin(seed, delay=UNTOLD, told_delay=0.0)
     passage = move(rig, motion_of(config, seed, 60.0), config)
     rig.close()
     return [find_delay(passage, config).delay]
-
-
-def _ignore(_: float) -> None:
-    pass

@@ -9,7 +9,7 @@ from tautscope.errors import MissingExtraError
 
 MODULES = {
     "analysis": ("matplotlib", "polars", "rich", "scipy"),
-    "twin": ("cv2", "matplotlib", "mujoco", "rich"),
+    "twin": ("cv2", "matplotlib", "mcap", "mujoco", "rich"),
     "console": ("cv2", "mcap", "websockets"),
     "ros2": ("cv2", "mcap", "rosbags", "zenoh"),
     "hardware": ("av", "can", "canopen", "cv2", "matplotlib", "mcap", "polars", "rich"),

@@ -33,27 +33,27 @@ def test_it_is_the_error_with_and_without_compensation_that_is_told() -> None:
     run(achieved, 0.0, [0.3, 0.3, 0.3], 0.0)
     run(achieved, 100.0, [FAR] * 3, 0.5)  # neither
     run(achieved, 200.0, [0.02, 0.05, 0.05], 1.0)
-    first, second = achieved.results()
+    first, second = achieved.results().values()
     assert first.uncompensated_rms == pytest.approx(0.3)
     assert first.compensated_rms == pytest.approx(0.05)  # after the first half
     assert second.compensated_rms == pytest.approx(0.1)
-    text = achieved_text([first, second], CONFIG)
+    text = achieved_text(achieved.results())
     assert text.startswith("Tip less reference, RMS: axis_1 0.05 rad, 0.3 without compensation,")
 
 
 def test_only_the_last_minutes_count() -> None:
     achieved = Achieved(CONFIG)
     run(achieved, 0.0, [FAR] + [0.05] * round(WINDOW / 20), 1.0)
-    (first, _) = achieved.results()
+    (first, _) = achieved.results().values()
     assert first.largest == pytest.approx(0.05)
     assert np.isnan(first.uncompensated_rms)
-    assert "without" not in achieved_text(achieved.results(), CONFIG)
+    assert "without" not in achieved_text(achieved.results())
 
 
 def test_nothing_is_told_where_nothing_was_measured() -> None:
     achieved = Achieved(CONFIG)
-    assert achieved.results() == []
+    assert achieved.results() == {}
     for number in range(10):
         now = number * PERIOD
         achieved.add_tick(Sample(now, np.zeros(2)), np.zeros(2), np.zeros(2), 1.0)
-    assert achieved.results() == []
+    assert achieved.results() == {}

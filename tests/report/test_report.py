@@ -52,7 +52,7 @@ def demo(runs: tuple[Recording, Recording]) -> Demo:
     uncompensated, compensated = runs
     result = evaluate(uncompensated, compensated)
     config = compensated.config.replace(**{"twin.background": "<b>&"})
-    figures = {dof: OperatorResult(3e-3, 1e-3, 0.66, 2e-3, 1.5, 1e-4, 0.9) for dof in Dof}
+    figures = {dof: OperatorResult(3e-3, 1e-3, 0.66, 2e-3, 1.5, 1e-4, 0.9, 8e-3) for dof in Dof}
     worse = {dof: replace(each, reduction=0.5, overspeed=4.4) for dof, each in figures.items()}
     return Demo(
         config,

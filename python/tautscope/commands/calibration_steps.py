@@ -114,8 +114,8 @@ def _doctor(options: argparse.Namespace, config: Config, folder: Path) -> Calibr
 
 
 def _motion(options: argparse.Namespace, config: Config, folder: Path) -> CalibrationResult:
-    from tautscope.commands.hardware import summary_line  # noqa: PLC0415
     from tautscope.commands.progress import progress_bar  # noqa: PLC0415
+    from tautscope.commands.result_lines import summary_line  # noqa: PLC0415
     from tautscope.report import figures  # noqa: PLC0415
     from tautscope.report.results import evaluate  # noqa: PLC0415
 

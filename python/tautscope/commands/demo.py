@@ -134,7 +134,8 @@ def _run_robot(options: argparse.Namespace) -> None:
         raise FieldError("--seeds", options.seeds, "1 with --robot")
     config = load_config(options.config or options.robot, options.profile)
     seed = options.seed or 0
-    robot.run(options, config, lambda _: ColonoscopeTwin(seed), "demo", seed=seed)
+    name = f"simulated {options.robot}, seed {seed}"
+    robot.run(options, config, name, lambda _: ColonoscopeTwin(seed), "demo", seed=seed)
 
 
 def _duration(trial: Trial) -> float:

@@ -12,7 +12,6 @@ from typing import Any
 from rich.table import Table
 
 from tautscope.commands.printing import console, print_json
-from tautscope.dof import Dof
 from tautscope.log.comparison import EstimationQuality, estimation_quality, write_replay
 from tautscope.report.tables import finite_or_none
 from tautscope.runs.recording import Recording
@@ -45,11 +44,11 @@ def write_estimates(
             **facts,
             "dof": {},
         }
-        for dof, figures in after.items():
+        for label, figures in after.items():
             entry = {"replayed": _finite(figures)}
             if before is not None:
-                entry["recorded"] = _finite(before[dof])
-            document["dof"][dof.label] = entry
+                entry["recorded"] = _finite(before[label])
+            document["dof"][label] = entry
         print_json(document)
         return
     _print_table(replayed, before, after)
@@ -58,26 +57,28 @@ def write_estimates(
 
 def _print_table(
     replayed: Recording,
-    before: dict[Dof, EstimationQuality] | None,
-    after: dict[Dof, EstimationQuality],
+    before: dict[str, EstimationQuality] | None,
+    after: dict[str, EstimationQuality],
 ) -> None:
+    noun = "measurements" if replayed.config.dof else "images"
     table = Table(box=None, pad_edge=False, title_justify="left", title_style="bold")
-    table.title = f"Estimates from {len(replayed.frames)} images"
+    table.title = f"Estimates from {len(replayed.frames)} {noun}"
     table.add_column("", no_wrap=True)
-    for dof in after:
+    dofs = replayed.config.dofs
+    for dof in dofs:
         unit = f"{dof.label} [{dof.display_unit}]"
         if before is not None:
             table.add_column(f"{unit}\nrecorded", justify="right", style="dim", no_wrap=True)
         table.add_column("\nreplayed" if before else unit, justify="right", no_wrap=True)
     for title, name in (
         ("backlash width at the end", "width"),
-        ("images with the DOF observable", "seen"),
+        (f"{noun} with the DOF observable", "seen"),
         ("RMS error of the estimate", "state_rms"),
         ("RMS change of the estimate", "change_rms"),
     ):
         cells = []
-        for dof, figures in after.items():
-            pair = [figures] if before is None else [before[dof], figures]
+        for dof in dofs:
+            pair = [each[dof.label] for each in (before, after) if each is not None]
             cells += [_cell(getattr(each, name), name, dof.display_scale) for each in pair]
         if any(cells):
             table.add_row(title, *cells)

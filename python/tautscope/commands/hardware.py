@@ -3,25 +3,18 @@
 from __future__ import annotations
 
 import argparse
-import math
 import sys
-from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments, robot
 from tautscope.commands.article_config import article_config
 from tautscope.commands.held_run import recording_saved
 from tautscope.commands.positions import add_reference, read_reference
 from tautscope.commands.printing import announce, print_json
+from tautscope.commands.result_lines import result_lines
 from tautscope.config import load_config
 from tautscope.config.placeholders import refuse_placeholders
-from tautscope.dof import NamedDof
 from tautscope.errors import FieldError
 from tautscope.loop.references import SineSequence
-
-if TYPE_CHECKING:
-    from tautscope.report.operator_motion import OperatorResult
-    from tautscope.report.recorded_run import RecordedRun
-    from tautscope.report.results import DofResult
 
 
 def add_parser(verbs: arguments.Verbs) -> None:
@@ -78,7 +71,7 @@ def _run(options: argparse.Namespace) -> int:
             what = "neither --reference nor --periods nor --compare"
             raise FieldError("--rig", options.rig, what)
         config = load_config(options.config, options.profile)
-        robot.run(options, config, rig_maker(options.rig), "run", seed=0)
+        robot.run(options, config, options.rig, rig_maker(options.rig), "run", seed=0)
         return 0
     if options.seconds is not None:
         raise FieldError("--seconds", options.seconds, "--rig")
@@ -116,43 +109,3 @@ def _run(options: argparse.Namespace) -> int:
         print(f"Warning: {warning}.")
     print(f"Report, figures and traces: {folder / 'report.html'}")
     return 0
-
-
-def result_lines(run: RecordedRun) -> list[str]:
-    """A line of results per DOF."""
-    tip = "of the true tip" if run.is_tip_known else "by camera"
-    if not run.main.compensated:
-        shown = {
-            dof: f"slack {_shown(dof, result.uncompensated_estimate)}, by camera"
-            for dof, result in run.results.items()
-        } | {
-            dof: f"tracking error {_shown(dof, tracking.uncompensated_rms)} RMS, {tip}"
-            for dof, tracking in run.operator_results.items()
-        }
-        return [f"{dof.label}: without compensation {text}" for dof, text in shown.items()]
-    return [summary_line(dof, result) for dof, result in run.results.items()] + [
-        tracking_line(dof, tracking, tip) for dof, tracking in run.operator_results.items()
-    ]
-
-
-def summary_line(dof: NamedDof, result: DofResult) -> str:
-    """One line of results of a DOF from its state estimates; a dash for unknown values."""
-    line = f"{dof.label}: remaining slack {_shown(dof, result.compensated_estimate)}"
-    if not math.isnan(result.uncompensated_estimate):
-        reduction = result.reduction_estimate
-        percent = "-" if math.isnan(reduction) else f"{reduction:.0%}"
-        line += f" of {_shown(dof, result.uncompensated_estimate)}, reduction {percent}"
-    return f"{line}; tracking error {_shown(dof, result.tracking_estimate)} RMS; by camera"
-
-
-def tracking_line(dof: NamedDof, result: OperatorResult, tip: str = "by camera") -> str:
-    """One line of the tracking of a recorded motion; a dash for unknown values."""
-    line = f"{dof.label}: tracking error {_shown(dof, result.compensated_rms)} RMS"
-    if not math.isnan(result.reduction):
-        before = _shown(dof, result.uncompensated_rms)
-        line += f", without compensation {before}, reduction {result.reduction:.0%}"
-    return f"{line}; largest {_shown(dof, result.largest)}; {tip}"
-
-
-def _shown(dof: NamedDof, value: float) -> str:
-    return "-" if math.isnan(value) else f"{dof.display_scale * value:.3g} {dof.display_unit}"

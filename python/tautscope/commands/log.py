@@ -17,7 +17,7 @@ from tautscope.commands.video_options import (
     check_video_options,
     read_motor_options,
 )
-from tautscope.config import Config
+from tautscope.config import Config, load_config
 from tautscope.errors import FieldError
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def add_parsers(verbs: arguments.Verbs) -> None:
         "export",
         help="export a log as CSV or as a rosbag2 folder",
         description="Export a log, complete or truncated, as CSV (one line per tick, one line per "
-        "image) or as a rosbag2 folder.",
+        "update) or as a rosbag2 folder.",
         extras=["hardware"],
     )
     export.add_argument("file", type=Path, metavar="FILE.mcap")
@@ -193,13 +193,13 @@ def _estimate_from_log(options: argparse.Namespace, log: Log) -> int:
     if options.config is None:
         config = log.config.replace(profile=options.profile)
     else:
-        config = article_config(options.config, options.profile)
+        config = load_config(options.config, options.profile)
     folder = _folder(options)
     replayed, skipped = estimate_from_log(log, config)
     write_estimates(folder, replayed, log.recording(), as_json=options.json)
     if not options.json:
         if skipped:
-            print(f"{skipped} image updates were skipped: their images are not in the log.")
+            print(f"{skipped} updates were skipped: their images are not in the log.")
         _print_warnings(log)
     return 0
 

@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import argparse
+import json
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from tautscope.commands import arguments
 from tautscope.commands.held_run import recording_saved
-from tautscope.commands.printing import announce, console, print_json
+from tautscope.commands.printing import announce, print_json
+from tautscope.commands.result_lines import result_lines
 from tautscope.config import Config
 from tautscope.loop.rig import Rig
 
 if TYPE_CHECKING:
-    from tautscope.report.robot_run import RobotRun
+    from tautscope.runs.recording import Recording
 
 DURATION = 120.0
 """Duration of each of the two runs [s]."""
-BYTES_PER_SECOND = 60e3
+BYTES_PER_SECOND = 170e3
+"""Of logs and tables of three degrees of freedom."""
 
 
 def add_seconds(parser: argparse.ArgumentParser, of: str, default: float = DURATION) -> None:
@@ -35,51 +36,52 @@ def add_seconds(parser: argparse.ArgumentParser, of: str, default: float = DURAT
 def run(
     options: argparse.Namespace,
     config: Config,
+    name: str,
     make_rig: Callable[[Config], Rig],
     verb: str,
     *,
     seed: int,
 ) -> None:
-    """Run without and with compensation, print a line per degree of freedom, write the folder."""
+    """Run without and with compensation, print a line per degree of freedom, write the folder.
+
+    The logs are written during the runs; also after SIGTERM and SIGHUP the rig is closed.
+    """
     from tautscope.commands.progress import progress_bar  # noqa: PLC0415
-    from tautscope.report.robot_run import (  # noqa: PLC0415
-        motion_of,
-        run_robot,
-        write_robot_folder,
-    )
+    from tautscope.hardware.signals import exit_on_signals  # noqa: PLC0415
+    from tautscope.log.writer import run_log  # noqa: PLC0415
+    from tautscope.report.operator_motion import motion_of  # noqa: PLC0415
+    from tautscope.report.recorded_run import RecordedRun  # noqa: PLC0415
+    from tautscope.report.run_folder import write_report  # noqa: PLC0415
+    from tautscope.runs.experiment import run_experiment  # noqa: PLC0415
     from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
 
     folder = check_free(options.out or default_folder(verb))
     motion = motion_of(config, seed, options.seconds or DURATION)
     seconds = 2 * motion.duration
     announce("2 runs", seconds, seconds * BYTES_PER_SECOND, folder)
-    with recording_saved(folder), progress_bar("2 runs") as progress:
-        found = run_robot(make_rig, config, motion, progress)
-    write_robot_folder(found, folder)
+    runs: list[Recording] = []
+    with recording_saved(folder), exit_on_signals(), progress_bar("2 runs") as progress:
+
+        def report(now: float, end: float) -> None:
+            progress((len(runs) + min(now / end, 1.0)) / 2)
+
+        for suffix, compensate in (("_uncompensated", False), ("", True)):
+            rig = make_rig(config)
+            path = folder / f"{suffix[1:] or 'compensated'}.mcap"
+            try:
+                with run_log(path, config, compensate=compensate, wait=True) as log:
+                    runs.append(run_experiment(rig, motion, config, compensate, report, log=log))
+            finally:
+                rig.close()
+            runs[-1].write(folder, suffix)
+    found = RecordedRun(runs[1], runs[0])
+    write_report(found, folder, {"rig": name})
+    (folder / "run.json").write_text(json.dumps(found.summary(), indent=1), encoding="utf-8")
     if options.json:
-        print_json({"folder": str(folder), **found.to_json()})
+        print_json({"folder": str(folder), **found.summary()})
         return
-    _print(found)
-    for warning in found.compensated.warnings:
+    for line in result_lines(found):
+        print(line)
+    for warning in found.main.warnings:
         print(f"Warning: {warning}.")
-    print(f"Figure and traces: {folder / 'motion.png'}")
-
-
-def _print(found: RobotRun) -> None:
-    from rich.table import Table  # noqa: PLC0415
-
-    table = Table(box=None, pad_edge=False)
-    table.add_column("tip less reference, RMS", no_wrap=True)
-    for title in ("without", "with compensation", "less by", "largest", "slack found"):
-        table.add_column(title, justify="right")
-    for result, dof in zip(found.results, found.compensated.config.dofs, strict=True):
-        shown = (
-            f"{dof.display_scale * value:.3g}"
-            for value in (result.uncompensated_rms, result.compensated_rms)
-        )
-        rest = (f"{dof.display_scale * value:.3g}" for value in (result.largest, result.slack))
-        less = f"{result.reduction:.0%}"
-        table.add_row(f"{result.name} [{result.unit}]", *shown, less, *rest)
-    console().print(table)
-    if np.isnan(found.compensated.trace[f"true_{found.results[0].name}"]).all():
-        print("The tip is the one measured: this rig does not know its true tip.")
+    print(f"Report, figures, logs and traces: {folder / 'report.html'}")

@@ -25,7 +25,7 @@ def run(options: argparse.Namespace) -> int:
     from tautscope.calibration.result import CalibrationResult  # noqa: PLC0415
     from tautscope.calibration.sensor_delay import find_delay, move  # noqa: PLC0415
     from tautscope.commands.progress import progress_bar  # noqa: PLC0415
-    from tautscope.report.robot_run import motion_of  # noqa: PLC0415
+    from tautscope.report.operator_motion import motion_of  # noqa: PLC0415
     from tautscope.runs.rigs import rig_maker  # noqa: PLC0415
 
     config = load_config(options.config)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 
 from tautscope.config import Config
@@ -14,7 +13,7 @@ from tautscope.hardware.realtime import OTHERS, VISION, realtime_executor, realt
 from tautscope.hardware.rig import HardwareRig
 from tautscope.hardware.run_results import HardwareRun, ProtocolRun
 from tautscope.hardware.signals import exit_on_signals
-from tautscope.log.writer import LogWriter
+from tautscope.log.writer import LogWriter, run_log
 from tautscope.loop.measurement import Measurement
 from tautscope.loop.reduction import Report
 from tautscope.loop.references import Reference, SineSequence
@@ -82,7 +81,7 @@ def _run(
     compensate: bool,
     progress: Callable[[float], None],
 ) -> ProtocolRun:
-    with LogWriter(path, config, compensate=compensate, segments=reference.segments) as log:
+    with run_log(path, config, compensate=compensate, segments=reference.segments) as log:
 
         def warn(text: str) -> None:
             _LOG.warning("%s", text)
@@ -90,7 +89,6 @@ def _run(
 
         rig.warn = warn
         executor = realtime_executor("vision", VISION)
-        monitored = _MonitoredLog(log, config)
         try:
             recording = run_experiment(
                 rig,
@@ -98,21 +96,14 @@ def _run(
                 config,
                 compensate,
                 lambda elapsed, duration: progress(min(elapsed / duration, 1.0)),
-                log=monitored,
+                log=_MonitoredLog(log, config),
                 executor=executor,
                 watch=lambda supervision: _apply_reaction(rig, supervision),
             )
         except BaseException as error:
             log.warn(f"{type(error).__name__}: {error}")
-            if monitored.has_begun:
-                error.add_note(f"The log of the run is {path}: `tautscope report {path}`")
-                if isinstance(error, TautscopeError):
-                    error.exit_status = STOPPED
-            else:  # nothing to keep: the same folder can be used again
-                log.close()
-                path.unlink()
-                with suppress(OSError):
-                    path.parent.rmdir()
+            if log.has_begun and isinstance(error, TautscopeError):
+                error.exit_status = STOPPED
             raise
         finally:
             rig.close()
@@ -151,11 +142,6 @@ class _MonitoredLog:
         self._log = log
         self._config = config
         self._monitor: PlausibilityMonitor | None = None
-
-    @property
-    def has_begun(self) -> bool:
-        """Whether the loop has commanded the motors."""
-        return self._monitor is not None
 
     def tick(
         self, sample: Sample, reference: Floats, command: Floats, made_at: float | None = None

@@ -12,9 +12,9 @@ from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.hardware.timing import Timing
 from tautscope.log.writer import LogSummary
-from tautscope.report import tables
 from tautscope.report.recorded_run import RecordedRun
-from tautscope.report.report import CaptionedFigure, run_report
+from tautscope.report.report import CaptionedFigure
+from tautscope.report.run_folder import write_report
 from tautscope.report.tables import finite_or_none
 from tautscope.runs.recording import Recording, Table
 
@@ -68,43 +68,23 @@ class HardwareRun:
 
 def write_run_folder(run: HardwareRun, folder: Path) -> None:
     """Write tables, timing, figures and report into the folder of the logs."""
-    from tautscope.figure_style import style  # noqa: PLC0415
     from tautscope.hardware.timing_figure import timing_figure  # noqa: PLC0415  matplotlib
 
     first, recorded = run.compensated, run.recorded
     first.recording.write(folder)
-    timing = timing_figure(first.timing)
-    name, main = recorded.figure()
-    shown = [
-        main,
-        CaptionedFigure(
-            timing,
-            "Timing of the run. (a), (b) delay of each set-point after its due time; "
-            "(c), (d) age of each frame when the loop took it.",
-        ),
-    ]
+    timing = CaptionedFigure(
+        timing_figure(first.timing),
+        "Timing of the run. (a), (b) delay of each set-point after its due time; "
+        "(c), (d) age of each frame when the loop took it.",
+    )
     if run.uncompensated is not None:
         run.uncompensated.recording.write(folder, "_uncompensated")
         run.uncompensated.timing.write(folder, "_uncompensated")
-    if results := recorded.results:
-        tables.write_csv(
-            folder / "table1.csv", [run.config.twin.seed], {run.config.profile: [results]}
-        )
     facts = {
         "control": f"{1 / first.timing.cycle:g} Hz, {first.timing.lost} cycles lost",
         "log": first.log.path.name,
     }
-    with style():
-        timing.savefig(folder / "timing.png")
-        main.figure.savefig(folder / name)
-        page = run_report(
-            run.config,
-            facts,
-            recorded.section(),
-            shown,
-            first.recording.warnings,
-        )
-    (folder / "report.html").write_text(page, encoding="utf-8")
+    write_report(recorded, folder, facts, [("timing.png", timing)])
     (folder / "run.json").write_text(json.dumps(run.to_json(), indent=1), encoding="utf-8")
     first.timing.write(folder)
 

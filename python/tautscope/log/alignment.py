@@ -89,8 +89,11 @@ def align_recording(recording: Recording, limit: float = LIMIT) -> DelayEstimate
     the delay. The bands are those that were found in the run.
 
     Raises:
-        RecordError: The run has fewer than two ticks or images.
+        RecordError: The run has fewer than two ticks or images, or another sensor.
     """
+    if recording.config.dof:
+        allowed = "images; of another sensor `tautscope calibrate latency --rig` finds the delay"
+        raise RecordError("log", "no images", allowed)
     trace, frames = recording.trace, recording.frames
     if min(len(trace), len(frames)) < 2:
         found = f"{len(trace)} ticks and {len(frames)} images"

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope.dof import Dof
 from tautscope.report import metrics
 from tautscope.runs.output_folder import new_folder
 from tautscope.runs.recording import Recording, Table
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
 
 NAN = float("nan")
 LEAST_SEEN = 10
-"""Images in which a DOF was observable, below which its backlash is unknown."""
+"""Updates in which a DOF was observable, below which its backlash is unknown."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,8 +27,8 @@ class EstimationQuality:
 
     Attributes:
         width: Backlash width at the end, delta_plus - delta_minus; NaN if the motor travelled less
-            than `update_distance`, or fewer than `LEAST_SEEN` images showed the DOF.
-        seen: Share of the images in which the DOF was observable.
+            than that, or fewer than `LEAST_SEEN` updates showed the DOF.
+        seen: Share of the updates in which the DOF was observable.
         state_rms: RMS error of the estimate over these images, if the true state is known.
         change_rms: RMS difference from the estimate of the other run, over the images in which the
             DOF was observable in both.
@@ -43,13 +42,13 @@ class EstimationQuality:
 
 def estimation_quality(
     run: Recording, other: Recording | None = None
-) -> dict[Dof, EstimationQuality]:
-    """Quality of the estimates per DOF, compared with another run on the same images."""
-    return {dof: _quality(run, other, dof) for dof in Dof}
+) -> dict[str, EstimationQuality]:
+    """Quality of the estimates by DOF, compared with another run on the same inputs."""
+    return {dof.label: _quality(run, other, dof.label) for dof in run.config.dofs}
 
 
-def _quality(run: Recording, other: Recording | None, dof: Dof) -> EstimationQuality:
-    frames, name = run.frames, dof.label
+def _quality(run: Recording, other: Recording | None, name: str) -> EstimationQuality:
+    frames = run.frames
     seen = frames[f"observable_{name}"]
     error = (frames[f"estimate_{name}"] - frames[f"true_{name}"])[seen]
     error = error[np.isfinite(error)]
@@ -64,13 +63,14 @@ def _quality(run: Recording, other: Recording | None, dof: Dof) -> EstimationQua
             for table, rows in ((frames, mine), (other.frames, theirs))
         ]
         change = values[0] - values[1]
+    width = float(_width(run.trace[-1:], name)[0]) if len(run.trace) else NAN
+    # No travel shows slack wider than itself; 0 is the estimate before any.
     is_known = (
-        len(run.trace) > 0
-        and float(np.ptp(run.trace[f"command_{name}"])) >= run.config[dof].update_distance
+        0 < width <= float(np.ptp(run.trace[f"command_{name}"]))
         and np.count_nonzero(seen) >= LEAST_SEEN
     )
     return EstimationQuality(
-        width=float(_width(run.trace[-1:], name)[0]) if is_known else NAN,
+        width=width if is_known else NAN,
         seen=float(np.mean(seen)) if len(seen) else NAN,
         state_rms=metrics.rms(error) if len(error) else NAN,
         change_rms=metrics.rms(change) if len(change) else NAN,
@@ -92,9 +92,10 @@ def replay_figure(replayed: Recording, recorded: Recording | None = None) -> Fig
         runs.insert(0, (recorded, "recorded", GREY, 1.8))
     start = float(replayed.trace["time"][0])
     with style():
-        figure = Figure(figsize=(PAGE, 5.0), layout="constrained")
-        axes = figure.subplots(3, 2, sharex=True)
-        for (state_axis, width_axis), dof in zip(axes, Dof, strict=True):
+        dofs = replayed.config.dofs
+        figure = Figure(figsize=(PAGE, 1.5 * len(dofs) + 0.5), layout="constrained")
+        axes = figure.subplots(len(dofs), 2, sharex=True, squeeze=False)
+        for (state_axis, width_axis), dof in zip(axes, dofs, strict=True):
             scale, unit = dof.display_scale, dof.display_unit
             times = replayed.trace["time"] - start
             command = replayed.trace[f"command_{dof.label}"] * scale

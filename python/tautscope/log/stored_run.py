@@ -100,17 +100,17 @@ def _from_log(path: Path) -> Recording:
     if log.damage:
         found.append(f"{path.name} is damaged or truncated: {log.damage.lost_bytes} bytes lost")
     if log.missing:
-        found.append(f"{log.missing} ticks or images of the run are not in {path.name}")
+        found.append(f"{log.missing} ticks or updates of the run are not in {path.name}")
     return replace(recording, warnings=tuple(found), snapshot=_snapshot(log, recording))
 
 
 def _updates(log: Log) -> list[tuple[int, Update]]:
-    """Indices and image updates, in the order of the recording's frames."""
+    """Indices and updates, in the order of the recording's frames."""
     return [(index, each) for index, each in log.events.items() if isinstance(each, Update)]
 
 
 def _flags(log: Log, recording: Recording) -> tuple[str, ...]:
-    """A line for each flag that was in force at an image."""
+    """A line for each flag that was in force at an update."""
     summary = FlagSummary()
     elapsed = recording.frames["arrived_at"] - recording.trace["time"][0]
     for at, (_, update) in zip(elapsed, _updates(log), strict=True):
@@ -135,6 +135,8 @@ def _checked(recording: Recording, path: Path) -> Recording:
 def _snapshot(log: Log, recording: Recording) -> Snapshot | None:
     """The image nearest to the middle of the run in which both bands were found, if any."""
     frames = recording.frames
+    if log.config.dof:
+        return None
     measured, predicted = (per_feature(frames, name) for name in ("features", "predicted_features"))
     has_bands = np.isfinite(measured).all(axis=1) & np.isfinite(predicted).all(axis=1)
     nearest = sorted(np.flatnonzero(has_bands), key=lambda k: abs(k - len(frames) / 2))
@@ -148,7 +150,10 @@ def _snapshot(log: Log, recording: Recording) -> Snapshot | None:
 
 def _check_same_reference(plain: Recording, compensated: Recording, path: str) -> None:
     """The references agree to a hundredth of their range while both runs last."""
-    first, second = (per_dof(run.trace, "reference") for run in (plain, compensated))
+    dofs = compensated.config.dofs
+    if plain.config.dofs != dofs:
+        raise RecordError("--uncompensated", path, "a run of the same degrees of freedom")
+    first, second = (per_dof(run.trace, "reference", dofs) for run in (plain, compensated))
     count = min(len(first), len(second))
     limit = 0.01 * np.ptp(second[:count], axis=0) + 1e-9
     if (np.abs(first[:count] - second[:count]).max(axis=0) > limit).any():

@@ -9,7 +9,8 @@ from __future__ import annotations
 import logging
 import time
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from copy import deepcopy
 from dataclasses import dataclass
 from os import PathLike
@@ -28,6 +29,27 @@ from tautscope.loop.references import Segment
 from tautscope.loop.rig import Frame, Sample
 
 _LOG = logging.getLogger(__name__)
+
+
+@contextmanager
+def run_log(path: Path, config: Config, **options: Any) -> Iterator[LogWriter]:
+    """The log of a run in a new folder, with the options of `LogWriter`.
+
+    A run that fails before its first tick leaves neither log nor folder; a later error gets a note
+    that names the log.
+    """
+    with LogWriter(path, config, **options) as log:
+        try:
+            yield log
+        except BaseException as error:
+            if log.has_begun:
+                error.add_note(f"The log of the run is {path}: `tautscope report {path}`")
+            else:  # nothing to keep: the same folder can be used again
+                log.close()
+                path.unlink()
+                with suppress(OSError):
+                    path.parent.rmdir()
+            raise
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,6 +177,11 @@ class LogWriter:
     def warn(self, text: str, now: float | None = None) -> None:
         """Record a warning, at a rig time [s]."""
         self._journal.warnings.append((now, text))
+
+    @property
+    def has_begun(self) -> bool:
+        """Whether there was a control tick."""
+        return self._ticks > 0
 
     @property
     def dropped(self) -> int:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 
 from tautscope.config import Config
 from tautscope.loop.measurement import Measurement
 from tautscope.loop.reduction import Report
 from tautscope.loop.rig import Frame, Sample
-from tautscope.report.robot_run import RobotResult, RobotRun
+from tautscope.report.operator_motion import OperatorResults, evaluate_operator_motion
 from tautscope.runs.recording import Floats, Recording
 from tautscope.runs.run_recorder import RunRecorder, update_row
 
@@ -43,26 +41,27 @@ class Achieved:
         for recorder in (self._without, self._with):
             recorder.add_frame(row, report.delta_minus, report.delta_plus)
 
-    def results(self) -> list[RobotResult]:
+    def results(self) -> OperatorResults:
         """Of each degree of freedom; none where the tip was not measured with compensation."""
         without, with_it = (
             Recording(*recorder.tables(), self._config, is_on, ())
             for is_on, recorder in ((False, self._without), (True, self._with))
         )
         if not _is_measured(with_it):
-            return []
-        return RobotRun(without if _is_measured(without) else None, with_it).results
+            return {}
+        first = without if _is_measured(without) else None
+        return evaluate_operator_motion(first, with_it, has_bound=False)
 
 
-def achieved_text(results: Iterable[RobotResult], config: Config) -> str:
+def achieved_text(results: OperatorResults) -> str:
     """One line with the figures of each degree of freedom."""
     parts = []
-    for result, dof in zip(results, config.dofs, strict=True):
-        scale, unit = dof.display_scale, result.unit
+    for dof, result in results.items():
+        scale, unit = dof.display_scale, dof.display_unit
         before = result.uncompensated_rms
         known = "" if np.isnan(before) else f", {scale * before:.3g} without compensation"
         parts.append(
-            f"{result.name} {scale * result.compensated_rms:.3g} {unit}{known}, "
+            f"{dof.label} {scale * result.compensated_rms:.3g} {unit}{known}, "
             f"slack found {scale * result.slack:.3g} {unit}"
         )
     return "Tip less reference, RMS: " + "; ".join(parts)

@@ -28,7 +28,7 @@ def draw_operator_motion(uncompensated: Recording | None, main: Recording) -> Fi
 
     Left: reference, command and tip over 20 s, the tip also without compensation.
     Right: tracking error of the tip over the whole run, without and with compensation.
-    The tip is the true one where it is known, else that of the images.
+    The tip is the true one where it is known, else the one measured.
     """
     runs = [(uncompensated, GREY)] if uncompensated is not None else []
     runs.append((main, BLUE if main.compensated else GREY))

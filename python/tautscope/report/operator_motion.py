@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope.config import Config
-from tautscope.dof import Dof, NamedDof
+from tautscope.config import Config, Sine
+from tautscope.dof import NamedDof
+from tautscope.errors import ConfigError
 from tautscope.loop.references import OperatorMotion
 from tautscope.report import metrics
 from tautscope.report.tracking_bound import tracking_bound
@@ -20,15 +21,17 @@ FIRST_SEED = 40
 """Seed of the motion on the twin of seed 0."""
 EVALUATED_AFTER = 40.0
 """Time after which a run counts; before it, the loop estimates the offsets [s]."""
+AMPLITUDE = 0.3
+"""Amplitude of another robot's motion about the middle of a range [share of the range]."""
 
 
 @dataclass(frozen=True, slots=True)
 class OperatorResult:
     """Figures of one DOF under an operator motion, from `evaluated_after` on [m or rad].
 
-    The tip is the true one, or where it is not known, on hardware, the estimate at the capture
-    times of the frames that measured the DOF ("by camera"). NaN without an uncompensated run;
-    overspeed and creep also by camera, whose noise they would measure.
+    The tip is the true one, or where it is not known, on hardware, the estimate at the times of the
+    images or measurements that measured the DOF. NaN without an uncompensated run; overspeed and
+    creep also without the true tip, because they would measure the sensor's noise.
 
     Attributes:
         uncompensated_rms: RMS of (tip - reference) without compensation.
@@ -38,7 +41,8 @@ class OperatorResult:
         overspeed: 99.9th percentile of |tip speed| over the peak of |reference speed|.
         creep: Travel of the true tip while every reference rests, with compensation.
         bound: The reduction of the vector law with exact knowledge on ideal plays of the article's
-            uncompensated widths (`tautscope.report.tracking_bound`).
+            uncompensated widths (`tautscope.report.tracking_bound`); NaN for another robot.
+        slack: Width of the slack found, delta_plus - delta_minus at the end.
     """
 
     uncompensated_rms: float
@@ -48,6 +52,7 @@ class OperatorResult:
     overspeed: float
     creep: float
     bound: float
+    slack: float
 
 
 OperatorResults = dict[NamedDof, OperatorResult]
@@ -59,6 +64,23 @@ def operator_motion(config: Config, *, is_disturbed: bool = False) -> OperatorMo
     return OperatorMotion(config.experiment, seed, is_disturbed=is_disturbed)
 
 
+def motion_of(config: Config, seed: int, duration: float) -> OperatorMotion:
+    """An operator motion over the ranges of the degrees of freedom of any robot.
+
+    Raises:
+        ConfigError: A degree of freedom has no range.
+    """
+    if not config.dof:
+        return OperatorMotion(config.experiment, seed, duration)
+    sines = []
+    for index, dof in enumerate(config.dof):
+        if dof.range is None:
+            raise ConfigError(f"dof[{index}].range", None, "a range, within which the tip moves")
+        low, high = dof.range
+        sines.append(Sine(centre=(low + high) / 2, amplitude=AMPLITUDE * (high - low)))
+    return OperatorMotion(sines, seed, duration)
+
+
 def evaluated_after(recording: Recording) -> float:
     """From when on a run is evaluated: after 40 s, or half of a shorter run [s]."""
     time = recording.trace["time"]
@@ -66,7 +88,7 @@ def evaluated_after(recording: Recording) -> float:
 
 
 def tip_and_reference(recording: Recording, dof: NamedDof) -> tuple[Floats, Floats, Floats]:
-    """Times [s, the rig's clock], the tip, true or by camera, and the reference, each (n,)."""
+    """Times [s, the rig's clock], the tip, true or estimated, and the reference, each (n,)."""
     trace, frames = recording.trace, recording.frames
     truth, reference = trace[f"true_{dof.label}"], trace[f"reference_{dof.label}"]
     if np.isfinite(truth).any():
@@ -77,15 +99,21 @@ def tip_and_reference(recording: Recording, dof: NamedDof) -> tuple[Floats, Floa
 
 
 def evaluate_operator_motion(
-    uncompensated: Recording | None, compensated: Recording
+    uncompensated: Recording | None, compensated: Recording, *, has_bound: bool = True
 ) -> OperatorResults:
-    """The figures of every DOF from a run with compensation, and one without it if there is one."""
+    """The figures of every DOF from a run with compensation, and one without it if there is one.
+
+    The bound, which takes seconds, is NaN without `has_bound`.
+    """
     run = compensated.trace
     first = int(run["time"].searchsorted(run["time"][0] + evaluated_after(compensated)))
-    references = per_dof(run, "reference")
-    bounds = tracking_bound(references, compensated.config, first=first)
+    config = compensated.config
+    references = per_dof(run, "reference", config.dofs)
+    bounds = np.full(len(config.dofs), np.nan)
+    if has_bound and not config.dof:
+        bounds = tracking_bound(references, config, first=first)
     results: OperatorResults = {}
-    for dof in Dof:
+    for index, dof in enumerate(config.dofs):
         tip = run[f"true_{dof.label}"][first:]
         errors = _tracking_errors(compensated, dof)
         before = (
@@ -97,9 +125,10 @@ def evaluate_operator_motion(
             compensated_rms=after,
             reduction=metrics.reduction(before, after),
             largest=metrics.largest_error(np.zeros_like(errors), errors),
-            overspeed=metrics.tip_overspeed(run["time"][first:], references[first:, dof], tip),
+            overspeed=metrics.tip_overspeed(run["time"][first:], references[first:, index], tip),
             creep=metrics.creep(references[first:], tip),
-            bound=float(bounds[dof]),
+            bound=float(bounds[index]),
+            slack=float(run[f"delta_plus_{dof.label}"][-1] - run[f"delta_minus_{dof.label}"][-1]),
         )
     return results
 

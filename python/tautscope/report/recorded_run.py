@@ -22,7 +22,7 @@ from tautscope.runs.recording import Recording, per_dof
 class RecordedRun:
     """A run, and perhaps one of the same reference without compensation to compare it with.
 
-    A run with segments is the article's experiment, one without is another motion.
+    A run of the article's instrument with segments is its experiment, any other another motion.
 
     Attributes:
         main: The run, with compensation or without.
@@ -33,9 +33,21 @@ class RecordedRun:
     uncompensated: Recording | None = None
 
     @property
+    def is_experiment(self) -> bool:
+        """Whether the run is the article's experiment."""
+        return bool(self.main.segments) and not self.main.config.dof
+
+    @property
     def is_tip_known(self) -> bool:
-        """Whether the true state of the tip is recorded; otherwise the camera measures it."""
-        return bool(np.isfinite(per_dof(self.main.trace, "true")).any())
+        """Whether the true state of the tip is recorded; otherwise it is the one measured."""
+        return bool(np.isfinite(per_dof(self.main.trace, "true", self.main.config.dofs)).any())
+
+    @property
+    def tip(self) -> str:
+        """Whose errors the figures are."""
+        if self.is_tip_known:
+            return "of the true tip"
+        return "by sensor" if self.main.config.dof else "by camera"
 
     @property
     def results(self) -> Results:
@@ -43,14 +55,16 @@ class RecordedRun:
 
         Empty for another motion.
         """
+        if not self.is_experiment:
+            return {}
         if not self.main.compensated:
             return evaluate_uncompensated(self.main)
         return evaluate(self.uncompensated, self.main)
 
     @property
     def operator_results(self) -> OperatorResults:
-        """Tracking of another motion, by the true tip if it is known; empty for the experiment."""
-        if self.main.segments:
+        """Tracking of another motion, of `tip`; empty for the experiment."""
+        if self.is_experiment:
             return {}
         if not self.main.compensated:
             return evaluate_uncompensated_motion(self.main)
@@ -71,11 +85,23 @@ class RecordedRun:
             for dof, found in self.results.items()
         } | operator_to_json(self.operator_results)
 
+    def summary(self) -> dict[str, Any]:
+        """The results as JSON: `to_json`, and what they are of."""
+        return {
+            "profile": self.main.config.profile,
+            "is_compensated": self.main.compensated,
+            "ticks": len(self.main.trace),
+            "updates": len(self.main.frames),
+            "is_tip_known": self.is_tip_known,
+            "dof": self.to_json(),
+            "warnings": list(self.main.warnings),
+        }
+
     def section(self) -> str:
         """The tables as HTML."""
-        if self.main.segments:
+        if self.is_experiment:
             return table1_section(self.results, is_tip_known=self.is_tip_known)
-        return recorded_motion_section(self.operator_results, is_tip_known=self.is_tip_known)
+        return recorded_motion_section(self.operator_results, self.tip)
 
     def figure(self) -> tuple[str, CaptionedFigure]:
         """The figure and the name of its file."""
@@ -83,8 +109,7 @@ class RecordedRun:
         from tautscope.report.figures import figure9  # noqa: PLC0415
         from tautscope.report.operator_figure import draw_operator_motion  # noqa: PLC0415
 
-        tip = "true tip" if self.is_tip_known else "tip as the camera measures it"
-        if self.main.segments:
+        if self.is_experiment:
             return "fig9.png", CaptionedFigure(
                 figure9(self.uncompensated, self.main),
                 "Fig. 9. First row: reference, command, estimate and both "
@@ -94,6 +119,6 @@ class RecordedRun:
             )
         return "tracking.png", CaptionedFigure(
             draw_operator_motion(self.uncompensated, self.main),
-            f"The recorded motion. (a)-(c) reference, command and the {tip}, in a part of the run. "
-            "(d)-(f) tracking error over the whole run.",
+            f"The motion, figures {self.tip}. Left: reference, command and tip, in a part of the "
+            "run. Right: tracking error over the whole run.",
         )

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from tautscope._core import __version__
 from tautscope.config import Config, dump_config
-from tautscope.dof import NamedDof
+from tautscope.dof import Dof, NamedDof
 from tautscope.report import tables
 from tautscope.report.operator_motion import OperatorResults
 from tautscope.report.results import Figures, Results
@@ -56,7 +56,8 @@ FIGURE5_CAPTION = (
     "threshold, (c) the regions of these pixels with markers A and B, and (d) measured and "
     "predicted features."
 )
-_BY_CAMERA = "Measured by the camera: the true state of the tip is not known on hardware."
+_IMAGES = "the endoscope\u2019s images"
+_UNKNOWN_TIP = ": the true state of the tip is not known on hardware"
 
 
 @dataclass(frozen=True)
@@ -99,8 +100,8 @@ def table1_section(results: Results, *, is_tip_known: bool = False) -> str:
     start = (
         "Of the true tip where it is not said to be by camera."
         if is_tip_known
-        else f"{_BY_CAMERA} The tracking error includes the first period, in which the contact "
-        "offsets are estimated."
+        else f"Figures are by camera{_UNKNOWN_TIP}. The tracking error includes the first period, "
+        "in which the contact offsets are estimated."
     )
     return f"""<h2>Table 1</h2>
 <div class="wide">{results_table({"rig": [results]}, by_camera=True)}</div>
@@ -108,22 +109,22 @@ def table1_section(results: Results, *, is_tip_known: bool = False) -> str:
 {row_explanations(measured_rows([results], ROWS))}"""
 
 
-def recorded_motion_section(results: OperatorResults, *, is_tip_known: bool = False) -> str:
-    """The tracking of a recorded motion."""
+def recorded_motion_section(results: OperatorResults, tip: str) -> str:
+    """The tracking of a recorded motion, with the words for whose tip it is."""
     rows = measured_rows([results], OPERATOR_ROWS)
     return f"""<h2>Recorded motion</h2>
 <div class="wide">{operator_table([results], rows)}</div>
-<p class="note">{"Of the true tip." if is_tip_known else _BY_CAMERA}
+<p class="note">Figures are {tip}{"" if tip == "of the true tip" else _UNKNOWN_TIP}.
 The first 40&nbsp;s, or half of a shorter run, do not count: there the contact offsets are
 estimated.</p>
-{row_explanations(rows)}"""
+{row_explanations(rows, has_goals=set(results) <= set(Dof))}"""
 
 
 def page(where: str, body: str, facts: dict[str, str], config: Config) -> str:
     """The page around a body, with the facts of the run and its configuration."""
     facts_list = "".join(f"<dt>{escape(k)}</dt><dd>{escape(v)}</dd>" for k, v in facts.items())
     return document(
-        "Hysteresis reduction from the endoscope\u2019s images",
+        f"Hysteresis reduction from {'measurements of the tip' if config.dof else _IMAGES}",
         f"""After Reilink, Stramigioli and Misra (Mechatronics 23, 2013, 652, doi
 10.1016/j.mechatronics.2013.06.006), {where}.""",
         f"""{body}
@@ -191,12 +192,18 @@ def results_table(columns: Mapping[str, Sequence[Results]], by_camera: bool = Fa
     )
 
 
-def row_explanations(rows: Sequence[Row], results: Sequence[dict[NamedDof, Figures]] = ()) -> str:
+def row_explanations(
+    rows: Sequence[Row],
+    results: Sequence[dict[NamedDof, Figures]] = (),
+    *,
+    has_goals: bool = True,
+) -> str:
     """A table of what each row means, its goal, and for which DOFs results of ``best`` meet it.
 
     Args:
         rows: Rows of the table above it.
         results: Results per seed, of which the median counts; none for another profile or rig.
+        has_goals: Whether to show the goals, which are those of the article's instrument.
     """
     middle: dict[NamedDof, Figures] = tables.median(results) if results else {}
     lines = []
@@ -208,16 +215,22 @@ def row_explanations(rows: Sequence[Row], results: Sequence[dict[NamedDof, Figur
             if row.holds(dof, value) is False
         )
         verdict = f"<b>missed: {missed}</b>" if missed else "holds" if row.goal else ""
+        goal = f"<td>{tables.goal_text(row)}</td>" * has_goals
         lines.append(
-            f"<tr><td>{escape(row.title)}</td><td>{escape(row.meaning)}</td>"
-            f"<td>{tables.goal_text(row)}</td>" + f"<td>{verdict}</td>" * bool(results) + "</tr>"
+            f"<tr><td>{escape(row.title)}</td><td>{escape(row.meaning)}</td>{goal}"
+            + f"<td>{verdict}</td>" * bool(results)
+            + "</tr>"
         )
-    heads = "<th>row</th><th>what it is</th><th>goal</th>" + "<th>result</th>" * bool(results)
+    heads = "<th>row</th><th>what it is</th>" + "<th>goal</th>" * has_goals
+    heads += "<th>result</th>" * bool(results)
+    note = (
+        '<p class="note">Goals are for profile &ldquo;best&rdquo; and the median of several '
+        "seeds; rows without one describe the instrument or explain the others.</p>"
+    )
     return (
         '<details open><summary>What the rows mean</summary><table class="meanings">'
         f"<thead><tr>{heads}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
-        '<p class="note">Goals are for profile &ldquo;best&rdquo; and the median of several '
-        "seeds; rows without one describe the instrument or explain the others.</p></details>"
+        f"{note * has_goals}</details>"
     )
 
 

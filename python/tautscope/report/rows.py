@@ -224,6 +224,12 @@ OPERATOR_ROWS = (
         "share",
         "min",
     ),
+    Row(
+        "slack",
+        "slack found",
+        "Width of the slack that the loop has found by the end of the run.",
+        "length",
+    ),
 )
 
 ARTICLE: dict[str, dict[NamedDof, float]] = {

@@ -272,7 +272,7 @@ class NodeControl:
     def _tell_result(self, run: ControlRun) -> None:
         """Publish, log and print what the compensation achieved."""
         if results := self._achieved.results():
-            text = achieved_text(results, self._config)
+            text = achieved_text(results)
             run.note(text)
             self._telemetry.result(text)
             self._on_result(text)

@@ -150,7 +150,7 @@ class InstrumentNode(LifecycleNode):
             self._last_state = OperatingState.DISABLED
             self._status_publisher.publish_state(self._control)
             if results := self._achieved.results():
-                self.get_logger().info(achieved_text(results, self._config))
+                self.get_logger().info(achieved_text(results))
 
     def _create_topics(self) -> None:
         publish, subscribe = self._publisher, self._subscribe

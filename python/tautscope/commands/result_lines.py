@@ -1,0 +1,53 @@
+"""The results of a recorded run as printed lines."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from tautscope.dof import NamedDof
+
+if TYPE_CHECKING:
+    from tautscope.report.operator_motion import OperatorResult
+    from tautscope.report.recorded_run import RecordedRun
+    from tautscope.report.results import DofResult
+
+
+def result_lines(run: RecordedRun) -> list[str]:
+    """A line of results per DOF."""
+    if not run.main.compensated:
+        shown = {
+            dof: f"slack {_shown(dof, result.uncompensated_estimate)}, by camera"
+            for dof, result in run.results.items()
+        } | {
+            dof: f"tracking error {_shown(dof, tracking.uncompensated_rms)} RMS, {run.tip}"
+            for dof, tracking in run.operator_results.items()
+        }
+        return [f"{dof.label}: without compensation {text}" for dof, text in shown.items()]
+    return [summary_line(dof, result) for dof, result in run.results.items()] + [
+        tracking_line(dof, tracking, run.tip) for dof, tracking in run.operator_results.items()
+    ]
+
+
+def summary_line(dof: NamedDof, result: DofResult) -> str:
+    """One line of results of a DOF from its state estimates; a dash for unknown values."""
+    line = f"{dof.label}: remaining slack {_shown(dof, result.compensated_estimate)}"
+    if not math.isnan(result.uncompensated_estimate):
+        reduction = result.reduction_estimate
+        percent = "-" if math.isnan(reduction) else f"{reduction:.0%}"
+        line += f" of {_shown(dof, result.uncompensated_estimate)}, reduction {percent}"
+    return f"{line}; tracking error {_shown(dof, result.tracking_estimate)} RMS; by camera"
+
+
+def tracking_line(dof: NamedDof, result: OperatorResult, tip: str) -> str:
+    """One line of the tracking of a recorded motion; a dash for unknown values."""
+    line = f"{dof.label}: tracking error {_shown(dof, result.compensated_rms)} RMS"
+    if not math.isnan(result.reduction):
+        before = _shown(dof, result.uncompensated_rms)
+        line += f", without compensation {before}, reduction {result.reduction:.0%}"
+    largest, slack = _shown(dof, result.largest), _shown(dof, result.slack)
+    return f"{line}; largest {largest}; {tip}; slack found {slack}"
+
+
+def _shown(dof: NamedDof, value: float) -> str:
+    return "-" if math.isnan(value) else f"{dof.display_scale * value:.3g} {dof.display_unit}"
