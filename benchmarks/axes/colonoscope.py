@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tautscope.calibration.sensor_delay import find_delay, move
+from tautscope.calibration.robot import fit, move
 from tautscope.config import load_config
 from tautscope.report.operator_motion import evaluate_operator_motion, motion_of
 from tautscope.runs.experiment import run_experiment
@@ -28,4 +28,4 @@ def simulate(job: Job) -> list[float]:
     rig = ColonoscopeTwin(seed, delay=UNTOLD, told_delay=0.0)
     passage = move(rig, motion_of(config, seed, 60.0), config)
     rig.close()
-    return [find_delay(passage, config).delay]
+    return [fit(passage, config, ["kinematics"]).values["measurement.delays[0]"]]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from tautscope.cli import main
 from tautscope.config import load_config
+from tautscope.errors import CalibrationError
 from tautscope.hardware import jog
 from tautscope.hardware.doctor import rig as rig_checks
 from tautscope.loop.kinematics import TwoPlanes
@@ -204,6 +205,34 @@ def test_the_delay_of_a_rig_is_written_into_its_configuration(
     assert "[measurement]" in capsys.readouterr().out
     (delay,) = load_config(folder / "robot.toml").measurement.delays
     assert delay == pytest.approx(0.005, abs=0.02)
+
+
+@pytest.mark.parametrize("is_stuck", [False, True])
+def test_the_kinematics_of_a_rig_is_written_or_what_the_sweep_leaves_open_is_named(
+    is_stuck: bool, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    name = f"stuck_{is_stuck}".lower()
+    text = RIG.replace("tip(self.tip)", "tip(self.tip * [1, 0])") if is_stuck else RIG
+    (folder / f"{name}.py").write_text(text, encoding="utf-8")
+    toml = folder / "robot.toml"
+    toml.write_text(ROBOT + "length = 0.07\n", encoding="utf-8")
+    options = ["calibrate", "robot", "--config", str(toml), "--yes", "--write"]
+    options += ["--rig", f"{name}:Catheter", "--seconds", "6"]
+    options += [f"--keep=kinematics.{key}" for key in ("base_position", "base_rotation")]
+    options += ["--keep=kinematics.sensor_rotation", "--keep=kinematics.tip_length"]
+    if is_stuck:
+        assert main(options) == CalibrationError.exit_status
+        assert "dof.bend_y.gain" in capsys.readouterr().err
+        assert load_config(toml).calibration.robot is None
+        return
+    assert main(options) == 0
+    assert "kinematics.length was 0.07" in capsys.readouterr().out
+    found = load_config(toml)
+    # The rig is made with the configuration: its section is 0.07 m long.
+    std = found.calibration.robot.std["kinematics.length"]
+    assert found.kinematics.length == pytest.approx(0.07, abs=3 * std)
+    assert 0 < std < 1e-3
+    assert found.measurement.delays[0] == pytest.approx(0.005, abs=0.02)
 
 
 def test_nothing_moves_without_an_answer(

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tautscope.commands import arguments, robot, sensor_latency
+from tautscope.commands import arguments, robot, robot_calibration
 from tautscope.commands.align import NO_ANSWER, print_delay
 from tautscope.commands.article_config import article_config
 from tautscope.commands.calibration_output import add_options, check_options, finish
@@ -22,6 +22,7 @@ from tautscope.commands.robot import DURATION
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import CalibrationError, ConfigError, FieldError
+from tautscope.extras import require_extras
 
 if TYPE_CHECKING:
     from tautscope.calibration.delay import DelayEstimate
@@ -60,7 +61,7 @@ def add_parser(kinds: arguments.Verbs) -> None:
         "--rig",
         metavar="MODULE:CLASS",
         help="delay of the sensors of a rig of your own with [[dof]], as measurement.delays: a "
-        "motion of all degrees of freedom within 60 %% of their ranges; docs/robots.md",
+        "sweep of all degrees of freedom within 80 %% of their ranges; docs/robots.md",
     )
     robot.add_seconds(latency, "a rig", DURATION / 2)
     add_rig_options(latency)
@@ -75,7 +76,8 @@ def _run(options: argparse.Namespace) -> int:
     if options.rig is not None:
         if options.file is not None or options.twin:
             raise FieldError("--rig", options.rig, "neither a file nor --twin")
-        return sensor_latency.run(options)
+        require_extras("--rig", ["analysis"])
+        return robot_calibration.run_latency(options)
     recording, serial_numbers = _recording(options)
     found = align_recording(recording)
     if not found.is_known:

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from tautscope._core import MOST_RANGE, SPEED
-from tautscope.config.fields import Gain, NonNegative, Positive
+from tautscope.config.fields import Gain, NonNegative, Positive, Vector3
 from tautscope.config.section import Section
 
 Name = Annotated[str, Meta(min_length=1, max_length=32, pattern=r"^[a-z][a-z0-9_]*$")]
@@ -89,6 +89,15 @@ class KinematicsConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only
     without: tuple[Name, ...] = ()
     """Degrees of freedom that do not move the tip, as of a gripper, with "two_planes" and
     "segments"; a `Tip` of a further sensor measures them."""
+    skew: float = 0.0
+    """Of "two_planes": by how much more than a right angle the plane of bend_y is turned from that
+    of bend_x, about z [rad]."""
+    base_position: Vector3 = (0.0, 0.0, 0.0)
+    """Origin of the kinematics in the frame of the sensor that measures poses [m]."""
+    base_rotation: Vector3 = (0.0, 0.0, 0.0)
+    """Rotation vector that turns the kinematics into that frame [rad]."""
+    sensor_rotation: Vector3 = (0.0, 0.0, 0.0)
+    """Rotation vector of the sensor at the tip against the tip of the kinematics [rad]."""
 
 
 class TopicConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):

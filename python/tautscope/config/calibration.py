@@ -44,7 +44,9 @@ class CalibrationConfig(Section, frozen=True, forbid_unknown_fields=True, kw_onl
     geometry: CalibrationRecord | None = None
     """Pose of the guide, lengths of the instrument, zeros and gains of the drives."""
     latency: CalibrationRecord | None = None
-    """Delay between motors and images."""
+    """Delay between motors and images, or of the sensors of a robot with [[dof]]."""
+    robot: CalibrationRecord | None = None
+    """Kinematics and delays of a robot with [[dof]]."""
 
 
 @relation(CalibrationRecord)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope.config import Config
+from tautscope.config import Config, KinematicsConfig
 from tautscope.errors import ConfigError
 from tautscope.loop.named_class import instance, named_class
 
@@ -37,8 +37,9 @@ class Kinematics(Protocol):
 class TwoPlanes:
     """A section of constant curvature that bends in two planes.
 
-    With the bending vector b = (bend_x, bend_y), theta = |b|, insertion s along z, rotation r about
-    z, length l of the section and t of the rigid tip:
+    With the skew k of the planes, the bending vector b = (bend_x - bend_y sin k, bend_y cos k),
+    theta = |b|, insertion s along z, rotation r about z, length l of the section and t of the rigid
+    tip:
 
         p = Rz(r) ((0, 0, s) + l (b_x, b_y) (1 - cos theta) / theta^2, l sin(theta) / theta in z
             + R(b) (0, 0, t)),      orientation Rz(r) R(b)
@@ -65,12 +66,14 @@ class TwoPlanes:
                 raise ConfigError("dof", list(places), f'a degree of freedom "{name}"')
         self._place = [places.get(name) for name in self.NAMES]
         self._length, self._tip = config.kinematics.length, config.kinematics.tip_length
+        self._aside, self._along = np.sin(config.kinematics.skew), np.cos(config.kinematics.skew)
 
     def tip(self, q: Floats) -> tuple[Floats, Floats]:
         """Position (3,) [m] and rotation matrix (3, 3) of the tip in a state q (n,)."""
         bend_x, bend_y, insertion, rotation = (
             0.0 if place is None else float(q[place]) for place in self._place
         )
+        bend_x, bend_y = bend_x - bend_y * self._aside, bend_y * self._along
         arc, turned = _arc(bend_x, bend_y, self._length)
         position = arc + turned[:, 2] * self._tip
         position[2] += insertion
@@ -78,6 +81,29 @@ class TwoPlanes:
             return position, turned
         about = rotation_matrix(np.array([0.0, 0.0, rotation]))
         return about @ position, about @ turned
+
+
+class Placed:
+    """A kinematics in the frame of a sensor.
+
+    With the base's position b and rotation B, and the rotation S of the sensor at the tip,
+
+        p' = b + B p,      R' = B R S.
+    """
+
+    def __init__(self, kinematics: Kinematics, config: KinematicsConfig) -> None:
+        self._kinematics = kinematics
+        self._position = np.array(config.base_position)
+        self._base = rotation_matrix(np.array(config.base_rotation))
+        self._sensor = rotation_matrix(np.array(config.sensor_rotation))
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._kinematics, name)
+
+    def tip(self, q: Floats) -> tuple[Floats, Floats]:
+        """Position (3,) [m] and rotation matrix (3, 3) that the sensor measures in a state."""
+        position, rotation = self._kinematics.tip(q)
+        return self._position + self._base @ position, self._base @ rotation @ self._sensor
 
 
 class Segments:
@@ -129,6 +155,17 @@ def _arc(bend_x: float, bend_y: float, length: float) -> tuple[Floats, Floats]:
 
 def build_kinematics(config: Config) -> Kinematics | None:
     """The kinematics of a configuration; None where the tip is measured degree by degree.
+
+    Raises:
+        ConfigError: As `own_kinematics`.
+    """
+    kinematics, own = own_kinematics(config), config.kinematics
+    is_placed = any((*own.base_position, *own.base_rotation, *own.sensor_rotation))
+    return Placed(kinematics, own) if is_placed and kinematics is not None else kinematics
+
+
+def own_kinematics(config: Config) -> Kinematics | None:
+    """The kinematics in its own frame.
 
     A class of yours is called without arguments.
 

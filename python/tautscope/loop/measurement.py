@@ -76,11 +76,20 @@ def raw_values(measurement: Measurement) -> Floats:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reading:
-    """Values (m,), their covariance (m, m), the model of the sensor, and how many are one point."""
+    """A measurement and its model.
+
+    Attributes:
+        values: (m,).
+        covariance: (m, m).
+        model: Of values and derivatives.
+        predict: The values of the model alone.
+        point: How many values are one point.
+    """
 
     values: Floats
     covariance: Floats
     model: Model
+    predict: Predict
     point: int = 1
 
 
@@ -114,7 +123,7 @@ class Sensors:
         found = check_numbers("values", values, (self._count,), "numbers or NaN, not all NaN")
         std = self._config.measurement.tip_deviation * self._widths
         identity = np.eye(self._count)
-        return Reading(found, _covariance(covariance, std), lambda q: (q, identity))
+        return Reading(found, _covariance(covariance, std), lambda q: (q, identity), np.copy)
 
     def pose(
         self, position: ArrayLike, orientation: ArrayLike | None, covariance: ArrayLike | None
@@ -177,7 +186,7 @@ class Sensors:
                 raise SignalError("jacobian(q)", f"an array {rows.shape}", shape)
             return _predicted(predict, values, q), rows
 
-        return Reading(values, covariance, model, point)
+        return Reading(values, covariance, model, partial(_predicted, predict, values), point)
 
     def _with(self, method: str, call: str) -> Kinematics:
         kinematics = self._kinematics

@@ -1,0 +1,10 @@
+"""Calibration of any robot: kinematics, zeros and gains, and delays, from a sweep of its motors.
+
+`Sweep` is the motion, `fit` estimates the parameters from what was recorded.
+"""
+
+from tautscope.calibration.robot.fit import RobotFit, fit
+from tautscope.calibration.robot.passage import Passage, move
+from tautscope.calibration.robot.sweep import Sweep
+
+__all__ = ["Passage", "RobotFit", "Sweep", "fit", "move"]

@@ -1,0 +1,203 @@
+"""What the sensors of a robot would measure in a motion, and its derivatives by parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from tautscope.calibration.robot.parameters import Parameter, with_values
+from tautscope.calibration.robot.passage import Passage
+from tautscope.config import Config
+from tautscope.loop.kinematics import STEP, build_kinematics, own_kinematics
+from tautscope.loop.measurement import Measurement, Points, Pose, Sensors, check_rotation
+
+Floats = NDArray[np.float64]
+
+PLAYS = 8
+"""Parallel plays of a degree of freedom, with half widths from 0 to half of `width_limit`."""
+MOST = 200
+"""Measurements that are used, evenly in time."""
+BEFORE = 0.1
+"""Share of the motion before the first that is used: the plays start in an unknown state."""
+_STEP = 1e-4
+"""Step of a difference over the standard deviation of a parameter's prior."""
+
+
+class Model:
+    """Values, model and derivatives of all measurements of a motion.
+
+    The tip of a degree of freedom follows its command c through parallel plays with weights
+    w >= 0:
+
+        q(t) = zero + sum_k w_k play_k(c)(t - delay - lag),      gain = sum_k w_k.
+
+    A lag is not negative. Loops that the plays do not describe look like one, where friction is
+    shared for example, and would otherwise be found as a delay.
+
+    Attributes:
+        values: (N, M) what was measured, 0 where nothing was.
+        is_seen: (N, M).
+        covariance: (N, M, M) of the sensors.
+        groups: (N, M) which key of [measurement] a covariance comes from, "" for the sensor's own.
+        times: (N,) time stamps [s].
+    """
+
+    def __init__(
+        self, passage: Passage, config: Config, parameters: Sequence[Parameter], signs: Floats
+    ) -> None:
+        self.config, self.parameters = config, parameters
+        self._passage, self.signs = passage, signs
+        self.own = _own(passage)
+        sensors = Sensors(config, build_kinematics(config))
+        self.readings = [sensors.reading(each) for each in self.own]
+        count, most = len(self.own), max(len(each.values) for each in self.readings)
+        self.values = np.full((count, most), np.nan)
+        self.covariance = np.tile(np.eye(most), (count, 1, 1))
+        self.groups = np.full((count, most), "", dtype=object)
+        for k, (one, reading) in enumerate(zip(self.own, self.readings, strict=True)):
+            m = len(reading.values)
+            self.values[k, :m] = reading.values
+            self.covariance[k, :m, :m] = reading.covariance
+            self.groups[k, :m] = _groups(one, m)
+        self.is_seen = np.isfinite(self.values)
+        self.values[~self.is_seen] = 0.0
+        self.times = np.array([each.captured_at for each in self.own])
+        is_pose = np.array([isinstance(each, Pose) for each in self.own], dtype=np.bool_)
+        self._poses, self._others = np.flatnonzero(is_pose), np.flatnonzero(~is_pose)
+        orientations = [each.orientation for each in self.own if isinstance(each, Pose)]
+        has = any(each is not None for each in orientations)
+        self._turned = np.array(
+            [np.eye(3) if each is None else check_rotation(each) for each in orientations if has]
+        )
+        self._last: tuple[object, tuple[Floats, Floats]] | None = None
+        self._sensor = np.array([each.sensor for each in self.own])
+        limits = np.array([dof.width_limit for dof in config.dof])
+        self.half_widths = np.outer(limits, np.linspace(0.0, 0.5, PLAYS))
+        self._plays = _plays(passage.commands, self.half_widths)
+        self._index = {each.name: k for k, each in enumerate(parameters)}
+        self.weights_from = len(parameters)
+
+    def start(self) -> Floats:
+        """Parameters at their starts, then the weights (n, PLAYS) of the plays."""
+        own = [each.start for each in self.parameters]
+        return np.array([*own, *[1.0 / PLAYS] * self.half_widths.size])
+
+    def motion(self, p: Floats) -> tuple[Floats, Floats]:
+        """States (N, n), and plays (N, n, PLAYS) by whose weights they change."""
+        names = [f"measurement.delays[{k}]" for k in self._sensor]
+        given = (*self.config.measurement.delays, *[0.0] * 4)
+        delays = np.array(
+            [self._of(p, name, given[k]) for name, k in zip(names, self._sensor, strict=True)]
+        )
+        lags = np.array([self._of(p, f"dof.{dof.name}.lag", 0.0) for dof in self.config.dof])
+        at = (self.times - delays - self._passage.times[0])[:, None] - lags
+        period = (self._passage.times[-1] - self._passage.times[0]) / (len(self._plays) - 1)
+        place = np.clip(at / period, 0, len(self._plays) - 1.001)
+        low, dofs = place.astype(int), np.arange(len(lags))
+        share = (place - low)[:, :, None]
+        plays = self._plays[low, dofs] * (1 - share) + self._plays[low + 1, dofs] * share
+        weights = p[self.weights_from :].reshape(plays.shape[1:])
+        zeros = [self._of(p, f"dof.{dof.name}.zero", 0.0) for dof in self.config.dof]
+        plays = plays * self.signs[:, None]
+        return np.sum(plays * weights, axis=2) + zeros, plays
+
+    def predict(self, p: Floats, states: Floats) -> Floats:
+        """(N, M) values that would be measured in states (N, n), 0 where nothing was."""
+        config = self._configured(p)
+        found = np.zeros(self.values.shape)
+        if self._poses.size:
+            kinematics = config.kinematics
+            base, sensor = (
+                Rotation.from_rotvec(each).as_matrix()
+                for each in (kinematics.base_rotation, kinematics.sensor_rotation)
+            )
+            places, turned = self._tips(config, states[self._poses])
+            found[self._poses, :3] = kinematics.base_position + places @ base.T
+            if self._turned.size:
+                relative = np.swapaxes(self._turned, 1, 2) @ base @ turned @ sensor
+                found[self._poses, 3:6] = Rotation.from_matrix(relative).as_rotvec()
+        for index in self._others:
+            reading = self.readings[index]
+            found[index, : len(reading.values)] = reading.predict(states[index])
+        return np.where(self.is_seen, found, 0.0)
+
+    def by_state(self, p: Floats, states: Floats) -> Floats:
+        """(N, M, n) derivatives of the values by the states."""
+        here, steps = self.predict(p, states), STEP * np.diag(2 * self.half_widths[:, -1])
+        columns = [(self.predict(p, states + step) - here) / step.max() for step in steps]
+        return np.stack(columns, axis=2)
+
+    def jacobian(self, p: Floats) -> Floats:
+        """(N, M, parameters and weights) derivatives of the values."""
+        states, plays = self.motion(p)
+        by_state = self.by_state(p, states)
+        columns = np.zeros((*self.values.shape, len(p)))
+        here = self.predict(p, states)
+        for index, each in enumerate(self.parameters):
+            step = np.zeros(len(p))
+            step[index] = _STEP * each.std
+            if each.name.startswith("kinematics."):
+                columns[:, :, index] = (self.predict(p + step, states) - here) / step[index]
+            else:
+                ahead, behind = (self.motion(p + way)[0] for way in (step, -step))
+                by_step = (ahead - behind) / (2 * step[index])
+                columns[:, :, index] = np.einsum("kmn,kn->km", by_state, by_step)
+        by_weights = by_state[:, :, :, None] * plays[:, None]
+        columns[:, :, self.weights_from :] = by_weights.reshape(*self.values.shape, -1)
+        return columns
+
+    def _configured(self, p: Floats) -> Config:
+        names = [each.name for each in self.parameters]
+        changes = with_values(self.config, dict(zip(names, p.tolist(), strict=False)))
+        own = {key: each for key, each in changes.items() if key.startswith("kinematics.")}
+        return self.config.replace(**own) if own else self.config
+
+    def _tips(self, config: Config, states: Floats) -> tuple[Floats, Floats]:
+        """Positions (N, 3) and rotations (N, 3, 3) in the frame of the kinematics.
+
+        The last are kept: most parameters change nothing of them.
+        """
+        own = config.kinematics
+        key = (own.length, own.tip_length, own.skew, states.tobytes())
+        if self._last is None or self._last[0] != key:
+            kinematics = own_kinematics(config)
+            found = [kinematics.tip(state) for state in states] if kinematics is not None else []
+            places, turned = zip(*found, strict=True)
+            self._last = key, (np.array(places), np.array(turned))
+        return self._last[1]
+
+    def _of(self, p: Floats, name: str, otherwise: float) -> float:
+        index = self._index.get(name)
+        return otherwise if index is None else float(p[index])
+
+
+def _own(passage: Passage) -> list[Measurement]:
+    """The measurements that are used, of each sensor at most `MOST` evenly."""
+    span = passage.times[-1] - passage.times[0]
+    after = passage.times[0] + BEFORE * span
+    found = [each for each in passage.measurements if each.captured_at > after]
+    return [replace(each) for each in found[:: max(1, -(-len(found) // MOST))]]
+
+
+def _groups(measurement: Measurement, count: int) -> list[str]:
+    if measurement.covariance is not None:
+        return [""] * count
+    if isinstance(measurement, Points):
+        return ["point_deviation"] * count
+    if isinstance(measurement, Pose):
+        return (["position_deviation"] * 3 + ["orientation_deviation"] * 3)[:count]
+    return [""] * count
+
+
+def _plays(commands: Floats, half_widths: Floats) -> Floats:
+    """(ticks, n, PLAYS) of plays that start in their middle."""
+    found = np.empty((len(commands), *half_widths.shape))
+    now = np.repeat(commands[0][:, None], half_widths.shape[1], axis=1)
+    for row, command in zip(found, commands[:, :, None], strict=True):
+        now = np.minimum(np.maximum(now, command - half_widths), command + half_widths)
+        row[:] = now
+    return found

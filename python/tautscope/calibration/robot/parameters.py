@@ -1,0 +1,104 @@
+"""Parameters of a robot's calibration: where they start, and how far they may be from there."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tautscope.config import Config
+from tautscope.errors import FieldError
+from tautscope.loop.measurement import Measurement, Points, Pose, Tip
+
+LENGTH, ANGLE, DELAY, LAG = 0.05, 0.5, 1.0, 0.03
+"""Standard deviations of priors: of positions [m], angles [rad], delays and lags [s]."""
+RELATIVE = 0.3
+"""Of lengths, as a share of them."""
+_SHORTEST = 1e-4
+"""Shortest length [m]."""
+_NAME = re.compile(r"(?P<path>[a-z_.]+)(\[(?P<index>\d)\])?")
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A parameter: a key of the configuration, ``dof.NAME.zero`` or ``dof.NAME.lag``."""
+
+    name: str
+    start: float
+    std: float
+    low: float = -math.inf
+
+
+def fitted(
+    config: Config, measurements: Iterable[Measurement], keep: Sequence[str]
+) -> tuple[Parameter, ...]:
+    """The parameters that a configuration and its sensors have, less those to keep.
+
+    The zeros of an insertion along and a rotation about the axis of "two_planes" are those of the
+    motors: they could not be told from the pose of the base.
+
+    Raises:
+        FieldError: `keep` names none.
+    """
+    kinds = {type(each) for each in measurements}
+    poses = [each for each in measurements if isinstance(each, Pose)]
+    sensors = sorted({each.sensor for each in measurements})
+    kinematics, found = config.kinematics, []
+    is_of_axis = {"insertion", "rotation"} if kinematics.kind == "two_planes" else set()
+    for dof in config.dof:
+        if dof.name not in is_of_axis or Tip in kinds:
+            found.append(Parameter(f"dof.{dof.name}.zero", 0.0, dof.width_limit))
+        if len(config.dof) > 1:
+            found.append(Parameter(f"dof.{dof.name}.lag", 0.0, LAG, 0.0))
+    delays = (*config.measurement.delays, *[0.0] * 4)
+    found += [Parameter(f"measurement.delays[{k}]", delays[k], DELAY) for k in sensors]
+    if poses or Points in kinds:
+        keys = {
+            "two_planes": ("length", "tip_length", "skew"),
+            "segments": ("length", "tip_length"),
+        }
+        for key in keys.get(kinematics.kind, ()):
+            start = getattr(kinematics, key)
+            is_length = key != "skew"
+            std, low = (RELATIVE * start, _SHORTEST) if is_length else (ANGLE, -math.inf)
+            found.append(Parameter(f"kinematics.{key}", start, std, low))
+    if poses:
+        found += _vector(config, "base_position", LENGTH) + _vector(config, "base_rotation", ANGLE)
+    if any(each.orientation is not None for each in poses):
+        found += _vector(config, "sensor_rotation", ANGLE)
+    for name in keep:
+        if not any(is_named(each.name, name) for each in found):
+            raise FieldError("--keep", name, ", ".join(each.name for each in found))
+    return tuple(each for each in found if not any(is_named(each.name, name) for name in keep))
+
+
+def is_named(name: str, by: str) -> bool:
+    """Whether a name is this one or an item of it."""
+    return name == by or name.startswith((f"{by}[", f"{by}."))
+
+
+def with_values(config: Config, values: Mapping[str, float]) -> dict[str, Any]:
+    """Changes of a configuration by values of parameters that are keys of it."""
+    changes: dict[str, Any] = {}
+    for name, value in values.items():
+        matched = _NAME.fullmatch(name)
+        if matched is None or name.startswith("dof."):
+            continue
+        path, index = matched["path"], matched["index"]
+        if index is None:
+            changes[path] = value
+            continue
+        section, key = path.split(".")
+        items = changes.setdefault(path, list(getattr(getattr(config, section), key)))
+        items += [0.0] * (int(index) + 1 - len(items))
+        items[int(index)] = max(value, 0.0) if section == "measurement" else value
+    return changes
+
+
+def _vector(config: Config, key: str, std: float) -> list[Parameter]:
+    values = np.asarray(getattr(config.kinematics, key)).tolist()
+    return [Parameter(f"kinematics.{key}[{k}]", value, std) for k, value in enumerate(values)]

@@ -1,0 +1,141 @@
+"""``tautscope calibrate robot``, and ``calibrate latency --rig``: any robot, from a sweep."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from tautscope.commands import arguments
+from tautscope.commands.calibration_output import add_options, check_options, finish
+from tautscope.commands.robot import DURATION, add_seconds
+from tautscope.config import Config, load_config
+from tautscope.errors import CalibrationError, ConfigError, FieldError
+
+if TYPE_CHECKING:
+    from tautscope.calibration.result import CalibrationResult
+    from tautscope.calibration.robot import RobotFit
+
+QUESTION = (
+    "THE MOTORS WILL MOVE, over 80 % of each range. Keep tissue and hands away, the emergency stop "
+    "within reach. Type y to start: "
+)
+SYSTEMATIC = 0.01
+"""Standard deviation of what loops take for a delay, or the reverse [s]."""
+
+
+def add_parser(kinds: arguments.Verbs) -> None:
+    """Add the command to the parser of ``tautscope calibrate``."""
+    robot = arguments.add_verb(
+        kinds,
+        "robot",
+        help="kinematics, zeros, gains and delay of a rig with [[dof]]",
+        description="Move all degrees of freedom by slow sines over 80 % of their ranges, and fit "
+        "lengths, pose of the sensor's frame, delay, zeros and gains to what was measured. THE "
+        "MOTORS MOVE, after a question.",
+        extras=["analysis"],
+    )
+    robot.add_argument("--rig", metavar="MODULE:CLASS", required=True, help="a rig of your own")
+    robot.add_argument(
+        "--keep",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="a parameter that stays as configured, as kinematics.tip_length, or all of "
+        "kinematics.base_rotation; repeatable",
+    )
+    add_seconds(robot, "the sweep", DURATION / 2)
+    robot.add_argument("--yes", action="store_true", help="move the motors without asking")
+    add_options(robot)
+    robot.set_defaults(run=_run)
+
+
+def _run(options: argparse.Namespace) -> int:
+    check_options(options)
+    config, found = _sweep(options, options.keep)
+    if found.undetermined:
+        keep = " ".join(f"--keep {name}" for name in found.undetermined if "gain" not in name)
+        remedy = "Check that each motor moves the tip, and move for longer or farther"
+        raise CalibrationError(
+            "The sweep does not determine " + ", ".join(found.undetermined),
+            f"{remedy}, or keep what is configured: {keep}" if keep else remedy,
+        )
+    finish(options, result("robot", found, config))
+    return 0
+
+
+def run_latency(options: argparse.Namespace) -> int:
+    """The delays alone, with the kinematics as configured.
+
+    Raises:
+        CalibrationError: Too little was measured.
+        TautscopeError: Errors of the rig.
+    """
+    config, found = _sweep(options, ("kinematics",))
+    finish(options, result("latency", found, config))
+    return 0
+
+
+def _sweep(options: argparse.Namespace, keep: Sequence[str]) -> tuple[Config, RobotFit]:
+    from tautscope.calibration.robot import Sweep, fit, move  # noqa: PLC0415
+    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
+    from tautscope.runs.rigs import rig_maker  # noqa: PLC0415
+
+    config = load_config(options.config)
+    if not config.dof:
+        raise ConfigError("dof", "none", "degrees of freedom: [[dof]]")
+    sweep = Sweep(config, options.seconds or DURATION / 2)
+    make = rig_maker(options.rig)
+    _confirm(options)
+    rig = make(config)
+    try:
+        with progress_bar("sweep") as progress:
+            passage = move(rig, sweep, config, progress)
+    finally:
+        rig.close()
+    return config, fit(passage, config, keep)
+
+
+def result(kind: str, found: RobotFit, config: Config) -> CalibrationResult:
+    """The fit in the form that all calibrations have; of ``latency`` the delays alone."""
+    from tautscope.calibration.result import CalibrationResult  # noqa: PLC0415
+    from tautscope.calibration.robot.parameters import with_values  # noqa: PLC0415
+
+    values = with_values(config, found.values)
+    values |= found.deviations
+    if kind == "latency":
+        values = {"measurement.delays": values["measurement.delays"]}
+    std = {
+        name: math.hypot(each, SYSTEMATIC) if name.startswith("measurement.delays") else each
+        for name, each in found.std.items()
+        if name.partition("[")[0] in values
+    }
+    notes = []
+    for name in values:
+        section, key = name.split(".")
+        before = getattr(getattr(config, section), key)
+        notes.append(f"{name} was {before}")
+    units = {dof.name: dof.unit for dof in config.dof}
+    for name, unit in units.items():
+        zero, gain, slack = (f"dof.{name}.{key}" for key in ("zero", "gain", "slack"))
+        at = (
+            f", zero {found.values[zero]:.4g} +- {found.std[zero]:.2g} {unit}"
+            if zero in found.values
+            else ""
+        )
+        notes.append(
+            f"{name}: gain {found.values[gain]:.4g} +- {found.std[gain]:.2g}{at}, slack "
+            f"{found.values[slack]:.3g} {unit}; not written, the loop estimates them"
+        )
+    data = {"fit": dict(found.values)}
+    return CalibrationResult(kind, values, std, notes=tuple(notes), data=data)
+
+
+def _confirm(options: argparse.Namespace) -> None:
+    try:
+        answer = "y" if options.yes else input(QUESTION)
+    except EOFError:
+        answer = ""
+    if answer.strip() not in ("y", "yes"):
+        raise FieldError("answer", "no", "y, or the option --yes; nothing moved")
