@@ -66,7 +66,10 @@ class TwoPlanes:
                 raise ConfigError("dof", list(places), f'a degree of freedom "{name}"')
         self._place = [places.get(name) for name in self.NAMES]
         self._length, self._tip = config.kinematics.length, config.kinematics.tip_length
-        self._aside, self._along = np.sin(config.kinematics.skew), np.cos(config.kinematics.skew)
+        self._aside, self._along = (
+            math.sin(config.kinematics.skew),
+            math.cos(config.kinematics.skew),
+        )
 
     def tip(self, q: Floats) -> tuple[Floats, Floats]:
         """Position (3,) [m] and rotation matrix (3, 3) of the tip in a state q (n,)."""
