@@ -39,6 +39,7 @@ OPERATOR_FIGURES = [
     "overspeed",
     "creep",
     "bound",
+    "slack",
 ]
 
 
