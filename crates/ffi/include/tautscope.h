@@ -325,6 +325,8 @@ typedef struct TautscopeStatePrediction {
     double state[3];
     // Their standard deviations [m, rad, rad].
     double std[3];
+    // What images have found of the geometry: unevenness of the section, shift u, v of the image (px).
+    double geometry[3];
     // 1, or 0 beyond the history: then the detection searches the whole workspace.
     uint32_t is_known;
 } TautscopeStatePrediction;
