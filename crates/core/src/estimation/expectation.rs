@@ -102,7 +102,7 @@ pub struct Expected {
 
 impl FeatureModel {
     /// The most probable state (3,), and its squared Mahalanobis distance from belief and features, for features (4,) with
-    /// standard deviations (4,) in px: [`Observed::most_probable`].
+    /// standard deviations (4,) in px: a Gauss-Newton with each step halved while it makes things worse.
     ///
     /// A feature of infinite deviation, or that is not finite, says nothing. None where the model sees no band. Wrong in another
     /// valley than the belief's.
