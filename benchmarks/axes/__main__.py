@@ -55,8 +55,8 @@ def to_rows(found: dict[Job, list[float]]) -> list[dict[str, Any]]:
 def colonoscope_table(found: dict[colonoscope.Job, list[float]]) -> str:
     """A Markdown table: a line per instrument."""
     lines = [
-        "| instrument | bend_x | bend_y | insertion | delay of 0.1 s found as |",
-        "|--:|--:|--:|--:|--:|",
+        "| instrument | bend_x | bend_y | insertion | with the preset | delay of 0.1 s found as |",
+        "|--:|--:|--:|--:|--:|--:|",
     ]
     for seed in dict.fromkeys(seed for _, seed in found):
         less = " | ".join(f"{each:.0%}" for each in found["motion", seed])

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from tautscope.calibration.robot import fit, move
+from tautscope.calibration.robot import Sweep, fit, move
+from tautscope.commands.robot_calibration import result
 from tautscope.config import load_config
 from tautscope.report.operator_motion import evaluate_operator_motion, motion_of
 from tautscope.runs.experiment import run_experiment
@@ -14,18 +15,29 @@ Job = tuple[str, int]
 """What is measured, "motion" or "delay", and the seed of instrument and motion."""
 
 
+KEPT = ("kinematics.base_rotation", "kinematics.sensor_rotation", "kinematics.skew")
+"""What is known of the twin: its tracker's axes are those of the kinematics."""
+
+
 def simulate(job: Job) -> list[float]:
-    """Reduction of the RMS tracking error of each degree of freedom, or the delay found [s]."""
+    """Reductions of the RMS tracking error, or the delay found [s].
+
+    Reductions are of each degree of freedom, calibrated as `tautscope calibrate robot --write`
+    does, and of the insertion with the preset.
+    """
     what, seed = job
     config = load_config("colonoscope")
-    if what == "motion":
-        motion = motion_of(config, seed, 120.0)
-        runs = [
-            run_experiment(ColonoscopeTwin(seed, delay=DELAY), motion, config, compensate)
-            for compensate in (False, True)
-        ]
-        return [result.reduction for result in evaluate_operator_motion(*runs).values()]
-    rig = ColonoscopeTwin(seed, delay=UNTOLD, told_delay=0.0)
-    passage = move(rig, motion_of(config, seed, 60.0), config)
-    rig.close()
-    return [fit(passage, config, ["kinematics"]).values["measurement.delays[0]"]]
+    if what == "delay":
+        rig = ColonoscopeTwin(seed, delay=UNTOLD, told_delay=0.0)
+        passage = move(rig, motion_of(config, seed, 60.0), config)
+        rig.close()
+        return [fit(passage, config, ["kinematics"]).values["measurement.delays[0]"]]
+    found = fit(move(ColonoscopeTwin(seed, delay=DELAY), Sweep(config), config), config, KEPT)
+    calibrated = config.replace(**result("robot", found, config).rounded_values())
+    motion = motion_of(config, seed, 120.0)
+    free, *runs = (
+        run_experiment(ColonoscopeTwin(seed, delay=DELAY), motion, own, compensate)
+        for own, compensate in ((config, False), (calibrated, True), (config, True))
+    )
+    own, preset = ([*evaluate_operator_motion(free, run).values()] for run in runs)
+    return [each.reduction for each in (*own, preset[-1])]

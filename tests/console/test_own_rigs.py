@@ -167,7 +167,6 @@ def test_what_is_the_articles_is_refused(colonoscope: RunningConsole) -> None:
     for name in ("sweep", "experiment"):
         reply = page.request(type="action", name=name)
         assert reply["reason"] == "only the article's instrument has this program"
-    assert '"best" with [[dof]]' in page.request(type="profile", profile="paper")["reason"]
     reply = page.request(type="setting", name="clutch", value=0, dof="rotation")
     assert reply["reason"] == "no degree of freedom 'rotation'"
     refused = colonoscope.control.operator.refused

@@ -42,13 +42,11 @@ class Layout(Struct, frozen=True):
         dofs: In the order of every (n,).
         sees_bands: Whether images of the bands are the measurement; they are shown, and commands
             name the image displayed. Without them commands name the state displayed.
-        profiles: That can be chosen.
         programs: Motions that run by themselves.
     """
 
     dofs: tuple[DofLayout, ...]
     sees_bands: bool
-    profiles: tuple[str, ...]
     programs: tuple[str, ...]
 
 
@@ -59,7 +57,6 @@ def layout_of(config: Config) -> Layout:
     return Layout(
         tuple(DofLayout(dof.label, dof.display_unit, ends) for dof, ends in dofs),
         not config.dof,
-        ("best",) if config.dof else ("best", "paper"),
         programs_of(config),
     )
 

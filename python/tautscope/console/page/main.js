@@ -96,12 +96,11 @@ $("profile").addEventListener("change", () => request({ type: "profile", profile
 /** The page of an instrument. */
 function build(found) {
   layout = found;
-  const { dofs, programs, profiles, sees_bands: seesBands } = layout;
+  const { dofs, programs, sees_bands: seesBands } = layout;
   if (seesBands) document.body.dataset.view = "image";
   document.body.dataset.dofs = dofs.length > 3 ? "many" : "few";
   document.body.style.setProperty("--dofs", dofs.length);
   for (const button of document.querySelectorAll("[data-program]")) button.hidden = !programs.includes(button.dataset.action);
-  $("profile").parentElement.hidden = profiles.length < 2;
   $("legend").hidden = !seesBands;
   charts = new Charts($("charts"), dofs);
   const send = (message) => control.send(message);
