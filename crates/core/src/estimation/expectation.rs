@@ -274,4 +274,29 @@ mod tests {
             );
         }
     }
+
+    /// The columns are the differences of the features of moved models; the centroid of a band and the image of its centre
+    /// move nearly alike.
+    #[test]
+    fn columns_are_derivatives() {
+        let at = model([5e-3, 4e-3, 12e-3], [0.1, -0.05, 0.3], [5e-3, 15e-3]);
+        let deviation = GeometryDeviation {
+            shift: 1e-5,
+            turn: 1e-4,
+            band: 1e-5,
+        };
+        let state = [20e-3, 0.4, 1.2];
+        let columns = at.by_displacement(state, &deviation).unwrap();
+        for (index, column) in columns.into_iter().enumerate() {
+            let mut one = [0.0; ERRORS];
+            one[index] = 1.0;
+            let moved = at.displaced(&deviation, one);
+            let before = at.predict(state).unwrap().features;
+            let after = moved.predict(state).unwrap().features;
+            let size = column.iter().map(|value| value.abs()).fold(0.0, f64::max);
+            for ((after, before), by) in after.into_iter().zip(before).zip(column) {
+                assert!((after - before - by).abs() < 0.15 * size, "{index} {by}");
+            }
+        }
+    }
 }
