@@ -29,9 +29,9 @@ def simulate(job: Job) -> list[float]:
     config = load_config("colonoscope")
     if what == "delay":
         rig = ColonoscopeTwin(seed, delay=UNTOLD, told_delay=0.0)
-        passage = move(rig, motion_of(config, seed, 60.0), config)
+        record = move(rig, motion_of(config, seed, 60.0), config)
         rig.close()
-        return [fit(passage, config, ["kinematics"]).values["measurement.delays[0]"]]
+        return [fit(record, config, ["kinematics"]).values["measurement.delays[0]"]]
     found = fit(move(ColonoscopeTwin(seed, delay=DELAY), Sweep(config), config), config, KEPT)
     calibrated = config.replace(**result("robot", found, config).rounded_values())
     motion = motion_of(config, seed, 120.0)

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 from tautscope import Config, Points, Pose, Sample, Tip, axes
-from tautscope.calibration.robot import Passage, RobotFit, Sweep, fit, move
+from tautscope.calibration.robot import MotionRecord, RobotFit, Sweep, fit, move
 from tautscope.config import DofEntry, KinematicsConfig
 from tautscope.errors import CalibrationError, ConfigError, FieldError
 from tautscope.loop.measurement import Measurement
@@ -74,7 +74,7 @@ class Robot:
         pass
 
 
-def passage(robot: Robot, config: Config, seconds: float = 30.0) -> Passage:
+def record(robot: Robot, config: Config, seconds: float = 30.0) -> MotionRecord:
     return move(robot, Sweep(config, seconds), config)
 
 
@@ -92,7 +92,7 @@ def test_gains_signs_zeros_and_delay_of_a_measured_tip(seed: int) -> None:
     config = config.replace(dof=dofs)
     gains, zeros, widths = rng.uniform(0.7, 1.2, 2) * [1, -1], rng.normal(0, 0.2, 2), [0.3, 0.6]
     robot = Robot(lambda q, t: Tip(q + rng.normal(0, 0.01, 2), t), gains, zeros, widths, 0.08)
-    found = fit(passage(robot, config), config)
+    found = fit(record(robot, config), config)
     assert not found.undetermined
     # The tip of a sample follows the command before it.
     true = {"measurement.delays[0]": 0.08 + PERIOD}
@@ -111,7 +111,7 @@ def test_the_kinematics_of_a_catheter_in_the_frame_of_a_tracker() -> None:
         return Pose(position, time, rotation)
 
     robot = Robot(measure, [0.9, 1.1], [0.1, -0.05], [0.3, 0.4])
-    found = fit(passage(robot, CATHETER, 13.0), CATHETER)
+    found = fit(record(robot, CATHETER, 13.0), CATHETER)
     assert not found.undetermined
     true = {"kinematics.length": LENGTH, "kinematics.tip_length": TIP, "kinematics.skew": SKEW}
     check(found, true)
@@ -137,13 +137,13 @@ def test_what_a_sweep_does_not_determine_is_named() -> None:
             return super().tip() * [1.0, 0.0]
 
     robot = Still(measure, [1.0, 1.0], [0.0, 0.0], [0.3, 0.3])
-    run = passage(robot, CATHETER, 13.0)
+    run = record(robot, CATHETER, 13.0)
     found = fit(run, CATHETER)
     assert "dof.bend_y.gain" in found.undetermined
     with pytest.raises(FieldError, match=r"--keep: got 'kinematics.sensor_rotation'"):
         fit(run, CATHETER, ["kinematics.sensor_rotation"])
     with pytest.raises(CalibrationError, match="Move for longer"):
-        fit(Passage(run.times, run.commands, run.measurements[:50]), CATHETER)
+        fit(MotionRecord(run.times, run.commands, run.measurements[:50]), CATHETER)
     with pytest.raises(ConfigError, match=r"dof\[0\].range"):
         Sweep(axes(1, width_limit=1.0))
 
@@ -160,7 +160,7 @@ def test_points_of_a_users_kinematics_have_zeros_and_gains_alone(
     def measure(q: np.ndarray, time: float) -> Points:
         return Points(Line().points(q) + rng.normal(0, 0.5, (1, 2)), time)
 
-    found = fit(passage(Robot(measure, [0.8], [0.3], [0.4]), config), config)
+    found = fit(record(Robot(measure, [0.8], [0.3], [0.4]), config), config)
     assert set(found.std) == {"dof.axis.zero", "dof.axis.gain", "measurement.delays[0]"}
     check(found, {"dof.axis.zero": 0.3, "dof.axis.gain": 0.8})
 

@@ -21,13 +21,12 @@ from console.pages import PERIOD
 from numpy.typing import ArrayLike
 from tautscope.config import Config, load_config
 from tautscope.console import lease, operator_input
-from tautscope.console.control_run import LiveRig
 from tautscope.console.live_twin import LiveTwin
 from tautscope.console.rig_control import RigControl
 from tautscope.console.session import Session
 from tautscope.console.start import web_server
 from tautscope.loop.measurement import Tip
-from tautscope.loop.rig import Frame, Sample
+from tautscope.loop.rig import Frame, Rig, Sample
 
 TIMEOUT, AGE = 1.5, 4.0
 """In place of `COMMAND_TIMEOUT` and `COMMAND_AGE` [s]."""
@@ -108,7 +107,7 @@ class Page(pages.Page):
 
 @contextmanager
 def running_console(
-    folder: Path, config: Config | None = None, rig: LiveRig | None = None
+    folder: Path, config: Config | None = None, rig: Rig | None = None
 ) -> Iterator[RunningConsole]:
     """A console of the twin, or of another rig, during the block."""
     config = small_config() if config is None else config

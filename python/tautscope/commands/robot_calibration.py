@@ -91,10 +91,10 @@ def _sweep(options: argparse.Namespace, keep: Sequence[str]) -> tuple[Config, Ro
     rig = make(config)
     try:
         with progress_bar("sweep") as progress:
-            passage = move(rig, sweep, config, progress)
+            record = move(rig, sweep, config, progress)
     finally:
         rig.close()
-    return config, fit(passage, config, keep)
+    return config, fit(record, config, keep)
 
 
 def result(kind: str, found: RobotFit, config: Config) -> CalibrationResult:

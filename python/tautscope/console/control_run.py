@@ -24,8 +24,6 @@ LATE = 2.0
 """A tick that begins so many control periods after the last one is late."""
 _TIMES = 200_000
 """Number of ticks whose times are kept."""
-LiveRig = Rig
-"""A rig whose `step` waits for the end of the control period."""
 
 
 class ReferenceSource(Protocol):
@@ -51,7 +49,7 @@ class ControlRun(ControlLoop):
 
     Args:
         config: Settings of the loop.
-        rig: A rig after its `reset`.
+        rig: A rig after its `reset`, whose `step` waits for the end of the control period.
         sample: Its newest sample.
         operator: The source of the reference.
         path: New file of the log.
@@ -72,7 +70,7 @@ class ControlRun(ControlLoop):
     def __init__(
         self,
         config: Config,
-        rig: LiveRig,
+        rig: Rig,
         sample: Sample,
         operator: ReferenceSource,
         *,

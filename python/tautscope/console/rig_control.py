@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from tautscope.config import Config
-from tautscope.console.control_run import ControlRun, LiveRig
+from tautscope.console.control_run import ControlRun
 from tautscope.console.lease import ImageTimes, Lease
 from tautscope.console.operator_input import OperatorInput
 from tautscope.console.paced_rig import PacedRig
@@ -21,7 +21,7 @@ from tautscope.hardware.plausibility import PlausibilityMonitor
 from tautscope.hardware.realtime import OTHERS, realtime
 from tautscope.hardware.rig import HardwareRig
 from tautscope.loop.kinematics import build_kinematics
-from tautscope.loop.rig import Sample, check_sample
+from tautscope.loop.rig import Rig, Sample, check_sample
 
 _LOG = logging.getLogger(__name__)
 INTERRUPTED = "STOP, or the page was away, while they were being enabled"
@@ -53,7 +53,7 @@ class RigControl:
             seconds, in which commands have to be received.
     """
 
-    def __init__(self, config: Config, rig: LiveRig, folder: Path, executor: Executor) -> None:
+    def __init__(self, config: Config, rig: Rig, folder: Path, executor: Executor) -> None:
         self.config = config
         self.folder = folder
         self.images = ImageTimes()

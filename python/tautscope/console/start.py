@@ -11,7 +11,6 @@ from pathlib import Path
 
 from tautscope.config import Config
 from tautscope.console.access import ADDRESS, new_token
-from tautscope.console.control_run import LiveRig
 from tautscope.console.paced_rig import PacedRig
 from tautscope.console.rig_control import RigControl
 from tautscope.console.server import run_server
@@ -25,7 +24,7 @@ from tautscope.loop.rig import Rig
 
 
 def start_console(
-    rig: LiveRig, config: Config, folder: Path, port: int, announce: Callable[[str], None]
+    rig: Rig, config: Config, folder: Path, port: int, announce: Callable[[str], None]
 ) -> int:
     """Serve the console of a rig until Ctrl-C; the exit status.
 
@@ -59,7 +58,7 @@ def start_console(
 
 def make_rig(
     config: Config, *, is_twin: bool, make: Callable[[Config], Rig] | None = None
-) -> tuple[LiveRig, Config]:
+) -> tuple[Rig, Config]:
     """The simulated instrument, or the drives and camera of a configuration; with its settings.
 
     With `make` what that makes of the configuration, a simulation or not.

@@ -12,14 +12,14 @@ from pathlib import Path
 import numpy as np
 
 from tautscope.config import Config
-from tautscope.console.control_run import ControlRun, LiveRig
+from tautscope.console.control_run import ControlRun
 from tautscope.console.paced_rig import PacedRig
 from tautscope.errors import MessageError, TautscopeError
 from tautscope.hardware.plausibility import PlausibilityMonitor
 from tautscope.hardware.realtime import OTHERS, realtime
 from tautscope.hardware.rig import HardwareRig
 from tautscope.loop.frame_layout import FrameLayout
-from tautscope.loop.rig import Frame
+from tautscope.loop.rig import Frame, Rig
 from tautscope.loop.safety import Reaction
 from tautscope.report.achieved import Achieved, achieved_text
 from tautscope.ros2.clock import Clock
@@ -69,7 +69,7 @@ class NodeControl:
         *,
         source: Source,
         sensors: Sensors,
-        make_rig: Callable[[Config], LiveRig],
+        make_rig: Callable[[Config], Rig],
         folder: Path,
         executor: Executor,
         clock: Clock,
@@ -79,7 +79,7 @@ class NodeControl:
         self._telemetry, self._make_rig = telemetry, make_rig
         self._source, self._sensors = Pausable(source), sensors
         self._on_result, self._achieved = on_result, Achieved(config)
-        self._rig: LiveRig | None = None
+        self._rig: Rig | None = None
         self.run: ControlRun | None = None
         self.fault = ""
         self._is_disabling = False

@@ -5,15 +5,14 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 
-from tautscope.console.control_run import LiveRig
 from tautscope.hardware.rig import HardwareRig
-from tautscope.loop.rig import Sample
+from tautscope.loop.rig import Rig, Sample
 
 _PERIOD = 0.005
 """Time between two calls of `must_stop` [s]."""
 
 
-def reset_rig(rig: LiveRig, must_stop: Callable[[], bool]) -> Sample:
+def reset_rig(rig: Rig, must_stop: Callable[[], bool]) -> Sample:
     """Reset a rig; drives of a configuration are quick-stopped as soon as `must_stop` is true.
 
     Args:

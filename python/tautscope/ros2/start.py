@@ -8,7 +8,6 @@ from concurrent.futures import Executor
 from pathlib import Path
 
 from tautscope.config import Config
-from tautscope.console.control_run import LiveRig
 from tautscope.errors import ConfigError
 from tautscope.hardware.realtime import (
     LOOP,
@@ -20,6 +19,7 @@ from tautscope.hardware.realtime import (
 )
 from tautscope.hardware.rig import HardwareRig
 from tautscope.hardware.signals import defer_signals, exit_on_signals
+from tautscope.loop.rig import Rig
 from tautscope.ros2.clock import Clock
 from tautscope.ros2.control import NodeControl
 from tautscope.ros2.driver import DriverRig
@@ -29,7 +29,7 @@ from tautscope.ros2.sensors import Sensors
 from tautscope.ros2.session import Node
 from tautscope.ros2.telemetry import Telemetry, Topics
 
-MakeRig = Callable[[Config], LiveRig]
+MakeRig = Callable[[Config], Rig]
 """Makes the rig that the loop commands."""
 _LOG = logging.getLogger(__name__)
 NAME = "tautscope"

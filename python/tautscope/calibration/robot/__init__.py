@@ -4,7 +4,7 @@
 """
 
 from tautscope.calibration.robot.fit import RobotFit, fit
-from tautscope.calibration.robot.passage import Passage, move
+from tautscope.calibration.robot.motion_record import MotionRecord, move
 from tautscope.calibration.robot.sweep import Sweep
 
-__all__ = ["Passage", "RobotFit", "Sweep", "fit", "move"]
+__all__ = ["MotionRecord", "RobotFit", "Sweep", "fit", "move"]

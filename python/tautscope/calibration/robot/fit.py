@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from tautscope.calibration.robot.model import PLAYS, Model
+from tautscope.calibration.robot.motion_record import MotionRecord
 from tautscope.calibration.robot.parameters import Parameter, fitted
-from tautscope.calibration.robot.passage import Passage
 from tautscope.config import Config
 from tautscope.errors import CalibrationError
 from tautscope.loop.kinematics import rotation_vector
@@ -59,7 +59,7 @@ class RobotFit:
     undetermined: tuple[str, ...]
 
 
-def fit(passage: Passage, config: Config, keep: Sequence[str] = ()) -> RobotFit:
+def fit(record: MotionRecord, config: Config, keep: Sequence[str] = ()) -> RobotFit:
     """Least squares over all measurements, with soft-L1 loss.
 
     A measurement z of covariance R is at h(q; theta), where the state q is that of the plays,
@@ -76,8 +76,8 @@ def fit(passage: Passage, config: Config, keep: Sequence[str] = ()) -> RobotFit:
         CalibrationError: There are too few measurements.
         FieldError: `keep` names no parameter.
     """
-    parameters = fitted(config, passage.measurements, keep)
-    model = Model(passage, config, parameters, np.ones(len(config.dof)))
+    parameters = fitted(config, record.measurements, keep)
+    model = Model(record, config, parameters, np.ones(len(config.dof)))
     if len(model.own) < LEAST:
         what = f"{len(model.own)} measurements in the motion"
         raise CalibrationError(what, f"Move for longer: {LEAST} are needed")

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from tautscope.calibration.robot.motion_record import MotionRecord
 from tautscope.calibration.robot.parameters import Parameter, with_values
-from tautscope.calibration.robot.passage import Passage
 from tautscope.config import Config
 from tautscope.loop.kinematics import STEP, build_kinematics, own_kinematics
 from tautscope.loop.measurement import Measurement, Points, Pose, Sensors, check_rotation
@@ -47,11 +47,11 @@ class Model:
     """
 
     def __init__(
-        self, passage: Passage, config: Config, parameters: Sequence[Parameter], signs: Floats
+        self, record: MotionRecord, config: Config, parameters: Sequence[Parameter], signs: Floats
     ) -> None:
         self.config, self.parameters = config, parameters
-        self._passage, self.signs = passage, signs
-        self.own = _own(passage)
+        self._record, self.signs = record, signs
+        self.own = _own(record)
         sensors = Sensors(config, build_kinematics(config))
         self.readings = [sensors.reading(each) for each in self.own]
         count, most = len(self.own), max(len(each.values) for each in self.readings)
@@ -77,7 +77,7 @@ class Model:
         self._sensor = np.array([each.sensor for each in self.own])
         limits = np.array([dof.width_limit for dof in config.dof])
         self.half_widths = np.outer(limits, np.linspace(0.0, 0.5, PLAYS))
-        self._plays = _plays(passage.commands, self.half_widths)
+        self._plays = _plays(record.commands, self.half_widths)
         self._index = {each.name: k for k, each in enumerate(parameters)}
         self.weights_from = len(parameters)
 
@@ -94,8 +94,8 @@ class Model:
             [self._of(p, name, given[k]) for name, k in zip(names, self._sensor, strict=True)]
         )
         lags = np.array([self._of(p, f"dof.{dof.name}.lag", 0.0) for dof in self.config.dof])
-        at = (self.times - delays - self._passage.times[0])[:, None] - lags
-        period = (self._passage.times[-1] - self._passage.times[0]) / (len(self._plays) - 1)
+        at = (self.times - delays - self._record.times[0])[:, None] - lags
+        period = (self._record.times[-1] - self._record.times[0]) / (len(self._plays) - 1)
         place = np.clip(at / period, 0, len(self._plays) - 1.001)
         low, dofs = place.astype(int), np.arange(len(lags))
         share = (place - low)[:, :, None]
@@ -175,11 +175,11 @@ class Model:
         return otherwise if index is None else float(p[index])
 
 
-def _own(passage: Passage) -> list[Measurement]:
+def _own(record: MotionRecord) -> list[Measurement]:
     """The measurements that are used, of each sensor at most `MOST` evenly."""
-    span = passage.times[-1] - passage.times[0]
-    after = passage.times[0] + BEFORE * span
-    found = [each for each in passage.measurements if each.captured_at > after]
+    span = record.times[-1] - record.times[0]
+    after = record.times[0] + BEFORE * span
+    found = [each for each in record.measurements if each.captured_at > after]
     return [replace(each) for each in found[:: max(1, -(-len(found) // MOST))]]
 
 

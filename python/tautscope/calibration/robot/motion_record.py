@@ -15,7 +15,7 @@ from tautscope.loop.rig import Rig, check_sample
 
 
 @dataclass(frozen=True, eq=False)
-class Passage:
+class MotionRecord:
     """Times (ticks,) [s] and commands (ticks, n) [m or rad] of a motion, and what was measured."""
 
     times: NDArray[np.float64]
@@ -25,7 +25,7 @@ class Passage:
 
 def move(
     rig: Rig, motion: Reference, config: Config, progress: Callable[[float], None] | None = None
-) -> Passage:
+) -> MotionRecord:
     """Move a rig without compensation: the command is the reference.
 
     Raises:
@@ -44,4 +44,4 @@ def move(
         sample = check_sample(rig.step(command), config)
         if progress is not None and len(times) % 200 == 0:
             progress(min(elapsed / motion.duration, 1.0))
-    return Passage(np.array(times), np.array(commands), tuple(measurements))
+    return MotionRecord(np.array(times), np.array(commands), tuple(measurements))
