@@ -2,6 +2,8 @@
 
 import pytest
 from drawn import DrawnRig, short_experiment
+from tautscope import axes
+from tautscope.config import Config
 from tautscope.loop.references import SineSequence
 from tautscope.loop.safety import DETECTORS, MEANINGS, Reaction
 from tautscope.runs.experiment import run_experiment
@@ -10,9 +12,11 @@ from tautscope.runs.recording import Recording
 
 
 def summarise(
-    images: list[tuple[Reaction, tuple[str, ...]]], latched: tuple[str, ...]
+    images: list[tuple[Reaction, tuple[str, ...]]],
+    latched: tuple[str, ...],
+    config: Config | None = None,
 ) -> list[str]:
-    flags = FlagSummary()
+    flags = FlagSummary(config or Config())
     for index, (reaction, warnings) in enumerate(images):
         flags.add(0.04 * index, warnings, reaction)
     return list(flags.lines(latched))
@@ -37,6 +41,11 @@ def test_a_flag_between_two_images_is_listed() -> None:
     (line,) = summarise([(Reaction.NONE, ())], ("reference_jump",))
     assert line.startswith("reference_jump (the reference jumped")
     assert line.endswith("between two images")
+
+
+def test_of_another_robot_they_are_measurements() -> None:
+    (line,) = summarise([(Reaction.WARN, ("late",))], ("late",), axes(2, width_limit=1.0))
+    assert "at 1 of 1 measurements, first" in line
 
 
 @pytest.mark.parametrize("reaction", Reaction)

@@ -111,7 +111,7 @@ def _updates(log: Log) -> list[tuple[int, Update]]:
 
 def _flags(log: Log, recording: Recording) -> tuple[str, ...]:
     """A line for each flag that was in force at an update."""
-    summary = FlagSummary()
+    summary = FlagSummary(recording.config)
     elapsed = recording.frames["arrived_at"] - recording.trace["time"][0]
     for at, (_, update) in zip(elapsed, _updates(log), strict=True):
         (status,) = topics.decode(topics.STATUS, update.raw[topics.STATUS])["status"]

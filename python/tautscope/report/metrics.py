@@ -174,14 +174,15 @@ def largest_error(reference: ArrayLike, tip: ArrayLike) -> float:
 def creep(references: ArrayLike, tip: ArrayLike) -> float:
     """Travel of the tip (n,) while every reference of (n, 3) rests, in the unit of the tip.
 
-    A sample counts if no reference changed since the one before it. NaN if the tip is not known.
+    A sample counts if no reference changed since the one before it. NaN if none does, or the tip is
+    not known.
     """
     desired, actual = np.asarray(references, dtype=np.float64), np.asarray(tip, dtype=np.float64)
     if desired.ndim != 2 or desired.shape[0] != actual.shape[0]:
         raise SignalError("references", desired.shape, f"one row for each of {len(actual)} samples")
-    if not np.isfinite(actual).any():
-        return np.nan
     rests = np.all(np.diff(desired, axis=0) == 0, axis=1)
+    if not (np.isfinite(actual).any() and rests.any()):
+        return np.nan
     return float(np.nansum(np.abs(np.diff(actual))[rests]))
 
 

@@ -142,7 +142,7 @@ class _ExperimentRecorder(RunRecorder):
     def __init__(self, config: Config, snapshot_after: float) -> None:
         super().__init__(config)
         self.snapshot: Snapshot | None = None
-        self.flags = FlagSummary()
+        self.flags = FlagSummary(config)
         self._snapshot_after = snapshot_after
         self._is_late = False
         self._measurements = 0

@@ -1,10 +1,11 @@
-"""Summary of the flags raised in a run, as sentences: meaning, number of images, reaction."""
+"""Summary of the flags raised in a run, as sentences: meaning, number of updates, reaction."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from tautscope.config import Config
 from tautscope.loop.safety import MEANINGS, REMEDIES, Reaction
 
 _CONSEQUENCES = {
@@ -22,41 +23,45 @@ _CONSEQUENCES = {
 @dataclass
 class _Count:
     first: float
-    images: int = 0
+    updates: int = 0
     reaction: Reaction = Reaction.NONE
 
 
 class FlagSummary:
-    """Counts the images at which each flag was in force, and keeps the strongest reaction."""
+    """Counts the updates at which each flag was in force, and keeps the strongest reaction.
 
-    def __init__(self) -> None:
-        self._images = 0
+    Args:
+        config: Of the run; its updates are by images, or by measurements of a robot with [[dof]].
+    """
+
+    def __init__(self, config: Config) -> None:
+        self._updates, self._what = 0, "measurements" if config.dof else "images"
         self._counts: dict[str, _Count] = {}
 
     def add(self, elapsed: float, flags: Sequence[str], reaction: Reaction) -> None:
-        """Add an image update.
+        """Add an update.
 
         Args:
             elapsed: Time since the start of the run [s].
             flags: In force at it.
             reaction: To them.
         """
-        self._images += 1
+        self._updates += 1
         for name in flags:
             if name in MEANINGS:
                 count = self._counts.setdefault(name, _Count(elapsed))
-                count.images += 1
+                count.updates += 1
                 count.reaction = max(count.reaction, reaction, key=lambda each: each.rank)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The flags that were in force at an image."""
+        """The flags that were in force at an update."""
         return tuple(self._counts)
 
     def lines(self, latched: Sequence[str]) -> tuple[str, ...]:
         """A line for each latched flag, by the names of `tautscope.loop.safety.DETECTORS`.
 
-        A flag that was in force at no image was raised and cleared between two images.
+        A flag that was in force at no update was raised and cleared between two.
         """
         return tuple(self._line(name) for name in latched)
 
@@ -66,8 +71,8 @@ class FlagSummary:
         remedy = f"; {REMEDIES[name]}" if name in REMEDIES else ""
         count = self._counts.get(name)
         if count is None:
-            return f"{flag} between two images{remedy}"
+            return f"{flag} between two {self._what}{remedy}"
         return (
-            f"{flag} at {count.images} of {self._images} images, first {count.first:.1f} s into "
-            f"the run; {_CONSEQUENCES[count.reaction]}{remedy}"
+            f"{flag} at {count.updates} of {self._updates} {self._what}, first {count.first:.1f} s "
+            f"into the run; {_CONSEQUENCES[count.reaction]}{remedy}"
         )
