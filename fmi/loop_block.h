@@ -21,7 +21,7 @@ enum { BLOCK_ENGAGE, BLOCK_ACKNOWLEDGE, BLOCK_DRIVE_FAULT, BLOCK_ACTIONS };
 
 typedef struct {
     TautscopeLoop *loop;
-    size_t dofs, measured; /* numbers of a reference and of a measurement: with [[dof]] the same, else 3 and those of two bands */
+    size_t dofs, measured; /* numbers of a reference and of a measurement */
     double period;
     int has_bands;
     TautscopeTipReport report; /* of the last measurement */
@@ -31,8 +31,9 @@ typedef struct {
     double share;
 } LoopBlock;
 
-/* Creates the loop from the file of a configuration, without [[dof]] with every key; on failure `message` says why. 1 on success. */
+/* Creates the loop from the file of a configuration, without [[dof]] with every key; else 0, and `message` says why. */
 static inline int block_create(LoopBlock *block, const char *file, char *message, size_t length) {
+    TautscopeStatePrediction bands;
     FILE *stream = fopen(file, "rb");
     char *toml = NULL;
     long size = -1;
@@ -50,7 +51,7 @@ static inline int block_create(LoopBlock *block, const char *file, char *message
     } else {
         (void)tautscope_loop_size(block->loop, &block->dofs, &block->period);
         /* With [[dof]] no bands can be predicted. */
-        block->has_bands = tautscope_loop_predict_state(block->loop, 0.0, &(TautscopeStatePrediction){.is_known = 0}) == TAUTSCOPE_RESULT_OK;
+        block->has_bands = tautscope_loop_predict_state(block->loop, 0.0, &bands) == TAUTSCOPE_RESULT_OK;
         block->measured = block->has_bands ? 4 : block->dofs;
     }
     free(toml);

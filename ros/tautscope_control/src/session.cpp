@@ -108,8 +108,7 @@ Session::Session(rclcpp_lifecycle::LifecycleNode &node, const std::string &prefi
         return;
     }
     worker_ = std::make_shared<DetectionWorker>(
-        config_, control_.detection(),
-        [this](const TautscopeReport &report) { on_report(report); },
+        config_, control_.detection(), [this](const TautscopeReport &report) { on_report(report); },
         [logger = logger_](const std::string &error) { RCLCPP_ERROR(logger, "Image not used: %s", error.c_str()); });
 
     image_group_ = node.create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive);

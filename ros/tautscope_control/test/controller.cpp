@@ -73,7 +73,8 @@ class Rig {
 public:
     Rig(pluginlib::ClassLoader<controller_interface::ChainableControllerInterface> &loader, const std::string &config,
         std::vector<std::string> names = joints_of_article, Numbers begin = start, unsigned int rate = 1000)
-        : command(begin.data(), begin.data() + begin.size()), measured(command), joints(std::move(names)), controller_(loader.createSharedInstance("tautscope_control/HysteresisController")) {
+        : command(begin.data(), begin.data() + begin.size()), measured(command), joints(std::move(names)),
+          controller_(loader.createSharedInstance("tautscope_control/HysteresisController")) {
         controller_interface::ControllerInterfaceParams parameters;
         parameters.controller_name = "instrument";
         parameters.controller_manager_update_rate = parameters.update_rate = rate;

@@ -1,5 +1,5 @@
-/* A robot with [[dof]] from record.py through the control loop: its commands and estimates have the bits that they had in Python, the
-   slack is found, nothing is allocated, and measurements come from another thread. */
+/* A robot with [[dof]] from record.py through the control loop: its commands and estimates have the bits that they had in Python,
+   the slack is found, nothing is allocated, and measurements come from another thread. */
 
 #include <array>
 #include <atomic>
@@ -72,7 +72,8 @@ void commands_and_estimates_are_those_of_python(const std::string &recording) {
             TautscopeTipReport report{};
             wrong += !control.detection().reports.pop(report) || report.status != static_cast<TautscopeStatus>(expected.status) ||
                      !has_bits(report.state_estimate, expected.state_estimate) ||
-                     !has_bits(report.delta_minus, expected.delta_minus) || !has_bits(report.delta_plus, expected.delta_plus);
+                     !has_bits(report.delta_minus, expected.delta_minus) ||
+                     !has_bits(report.delta_plus, expected.delta_plus);
         }
     }
     const unsigned long in_loop = allocations::count - allocated;
@@ -129,7 +130,8 @@ void wrong_measurements_change_nothing(const std::string &recording) {
     control.post(Request::enable);
     EXPECT(!control.set_reference(Numbers{0.1}, 0.0) && !control.set_reference(Numbers{0.1, std::nan("")}, 0.0));
     EXPECT(control.set_reference(Numbers{0.1, 1e-3}, 0.0) && control.step(0.0).is_sent);
-    EXPECT(control.detection().measurements.push({Values(Numbers{0.1}), 0.0, 0}) && control.detection().measurements.push({good.values, 0.0, 4}));
+    EXPECT(control.detection().measurements.push({Values(Numbers{0.1}), 0.0, 0}));
+    EXPECT(control.detection().measurements.push({good.values, 0.0, 4}));
     control.exchange();
     EXPECT(!has_report(control));
     EXPECT(control.detection().measurements.push(good));
