@@ -77,6 +77,8 @@ public:
             reference_interfaces_[i] = unknown;
         }
         used_message_ = received_.readFromRT()->number;
+        // What was measured before is dropped.
+        session_->control().exchange();
         session_->control().set_measured(measured);
         session_->control().post(Request::enable);
         return CallbackReturn::SUCCESS;
