@@ -11,6 +11,7 @@ from tautscope.commands import arguments
 from tautscope.commands.article_config import article_config
 from tautscope.commands.board_images import BoardImages, file_images, live_images, twin_images
 from tautscope.commands.calibration_output import add_options, check_options, finish
+from tautscope.commands.calibration_rig import add_twin, twin_seed
 from tautscope.commands.printing import print_json
 from tautscope.errors import FieldError
 
@@ -47,15 +48,7 @@ def add_parser(kinds: arguments.Verbs) -> None:
     camera.add_argument(
         "--ros", type=Path, metavar="FILE", help="also write a ROS camera_info file"
     )
-    camera.add_argument(
-        "--twin", action="store_true", help="show a simulated board to the twin's camera"
-    )
-    camera.add_argument(
-        "--seed",
-        type=arguments.natural,
-        metavar="N",
-        help="seed of the twin [twin.seed of the configuration]",
-    )
+    add_twin(camera, "show a simulated board to the twin's camera")
     add_options(camera)
     camera.set_defaults(run=_run)
 
@@ -153,8 +146,7 @@ def _images(options: argparse.Namespace, board: Board) -> BoardImages:
     if options.twin:
         from tautscope.twin.drawn_rig import draw_rig  # noqa: PLC0415
 
-        seed = config.twin.seed if options.seed is None else options.seed
-        return twin_images(draw_rig(config, seed), board)
+        return twin_images(draw_rig(config, twin_seed(options, config)), board)
     if options.config is None:
         raise FieldError("files", None, "images, a video, --config FILE of a rig, or --twin")
     return live_images(config, options.seconds)

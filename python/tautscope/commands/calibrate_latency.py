@@ -13,8 +13,10 @@ from tautscope.commands.align import NO_ANSWER, print_delay
 from tautscope.commands.article_config import article_config
 from tautscope.commands.calibration_output import add_options, check_options, finish
 from tautscope.commands.calibration_rig import (
+    ARTICLE_MOTION,
     add_rig_options,
     confirm_motion,
+    refuse_wrong_limits,
     simulated_experiment,
 )
 from tautscope.commands.printing import print_json
@@ -147,7 +149,8 @@ def _recording(options: argparse.Namespace) -> tuple[Recording, Mapping[str, str
         if config.drives is None:
             allowed = "a section [drives] that names the motors, a log, or --twin"
             raise ConfigError("drives", None, allowed)
-        confirm_motion(options)
+        refuse_wrong_limits(options.config)
+        confirm_motion(options, ARTICLE_MOTION, config)
     from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
 
     return record(options, config, check_free(options.log or default_folder("latency")))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import itertools
 from collections.abc import Callable
-from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,11 +15,7 @@ from tautscope.commands import (
     calibrate_geometry,
     calibrate_latency,
 )
-from tautscope.commands.calibration_rig import (
-    actual_rig,
-    rig_for_calibration,
-    simulated_experiment,
-)
+from tautscope.commands.calibration_rig import simulated_experiment, twin_seed
 from tautscope.config import Config
 from tautscope.errors import CalibrationError
 
@@ -53,7 +48,9 @@ def _camera(options: argparse.Namespace, config: Config, folder: Path) -> Calibr
 
     board = Board(options.columns, options.rows, options.square)
     if options.twin:
-        images = twin_images(actual_rig(config, options.seed), board)
+        from tautscope.twin.drawn_rig import draw_rig  # noqa: PLC0415
+
+        images = twin_images(draw_rig(config, twin_seed(options, config)), board)
     else:
         images = live_images(config, options.seconds)
     result, info = calibrate_camera.calibrate(images, board, options.model)
@@ -67,18 +64,9 @@ def _colour(options: argparse.Namespace, config: Config, folder: Path) -> Calibr
 
 
 def _geometry(options: argparse.Namespace, config: Config, folder: Path) -> CalibrationResult:
-    from tautscope.calibration.geometry import fit, sweep  # noqa: PLC0415
-    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
-    from tautscope.hardware.realtime import VISION, realtime_executor  # noqa: PLC0415
+    from tautscope.calibration.geometry import fit  # noqa: PLC0415
 
-    with ExitStack() as resources:
-        setup = resources.enter_context(rig_for_calibration(options))
-        executor = None
-        if not options.twin:
-            executor = resources.enter_context(realtime_executor("vision", VISION))
-        progress = resources.enter_context(progress_bar("sweep"))
-        recording = sweep(setup.rig, config, executor=executor, progress=progress)
-        serial_numbers = setup.serial_numbers()
+    recording, _, serial_numbers = calibrate_geometry.move(options, camera_is_known=False)
     # A board determines the intrinsics better than the instrument.
     found = fit(
         recording, config, intrinsics="focal" if config.calibration.camera is None else "none"

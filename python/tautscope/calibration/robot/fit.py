@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from tautscope.calibration.motion import MotionRecord
 from tautscope.calibration.robot.model import PLAYS, Model
-from tautscope.calibration.robot.motion_record import MotionRecord
 from tautscope.calibration.robot.parameters import Parameter, fitted
 from tautscope.config import Config
 from tautscope.errors import CalibrationError

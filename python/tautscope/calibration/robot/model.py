@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from tautscope.calibration.robot.motion_record import MotionRecord
+from tautscope.calibration.motion import MotionRecord
 from tautscope.calibration.robot.parameters import Parameter, with_values
 from tautscope.config import Config
 from tautscope.loop.kinematics import STEP, build_kinematics, own_kinematics
