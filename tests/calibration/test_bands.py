@@ -185,7 +185,7 @@ def test_the_discriminant_is_that_of_scikit_learn() -> None:
     # Equal priors weigh the covariances of both classes alike.
     model = LinearDiscriminantAnalysis(solver="lsqr", priors=[0.5, 0.5]).fit(pixels, names)
     expected = model.coef_[0] / np.abs(model.coef_).max()
-    assert fit.discriminant.weights == pytest.approx(expected, rel=0.02, abs=0.02)
+    assert fit.weights == pytest.approx(expected, rel=0.02, abs=0.02)
 
 
 def test_overexposed_pixels_are_ignored() -> None:

@@ -9,16 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.calibration.geometry.checks import LARGEST_RESIDUAL, check_record, find_doubts
-from tautscope.calibration.geometry.model import TIP_STD, Data, Model
+from tautscope.calibration.geometry.model import TIP_STD, Model
 from tautscope.calibration.geometry.parameters import Intrinsics, estimated
 from tautscope.calibration.geometry.recording import Recording, generic
 from tautscope.calibration.geometry.solver import Solution, solve
-from tautscope.calibration.geometry.values import (
-    Value,
-    changed_keys,
-    estimated_values,
-    key_stds,
-)
+from tautscope.calibration.geometry.values import Value, changes_and_stds, estimated_values
 from tautscope.config import Config
 from tautscope.errors import FieldError
 from tautscope.loop.state_prediction import StatePrediction
@@ -99,23 +94,15 @@ def fit(
         raise FieldError("band_distance", band_distance, "a length above instrument.band_length")
     active = estimated(intrinsics, by_band_distance=band_distance is not None)
     check_record(recording, config)
-    model = _model(recording, config, band_distance)
+    model = Model(config, recording.with_bands(), band_distance)
     solution = solve(model, active)
     for _ in range(DETECTIONS if recording.patches else 0):
         recording = _detect_again(recording, config, model, solution, band_distance)
         check_record(recording, config)
-        model = _model(recording, config, band_distance)
+        model = Model(config, recording.with_bands(), band_distance)
         solution = solve(model, active, solution.z)
     free = solve(model, active, solution.z, free_states=True)
     return _result(recording, config, model, (solution, free), active)
-
-
-def _model(recording: Recording, config: Config, band_distance: float | None) -> Model:
-    found = recording.found
-    data = Data(
-        recording.time, recording.motors, recording.captured_at[found], recording.features[found]
-    )
-    return Model(config, data, band_distance)
 
 
 def _detect_again(
@@ -126,14 +113,10 @@ def _detect_again(
     band_distance: float | None,
 ) -> Recording:
     """The record with the bands searched near the fitted or expected tip of every image."""
-    found, everywhere = (
-        recording.found,
-        Data(recording.time, recording.motors, recording.captured_at, recording.features),
-    )
-    tips = Model(config, everywhere, band_distance).expected(solution.z)[:, :3]
-    tips[found] = solution.states[:, :3]
-    fitted = config.replace(**model.geometry(solution.z).values())
-    detector, std = MarkerDetector(fitted), TIP_STD * np.array(config.safety.width_limit)
+    tips = Model(config, recording, band_distance).expected(solution.z)[:, :3]
+    tips[recording.found] = solution.states[:, :3]
+    detector = MarkerDetector(model.configured(solution.z))
+    std = TIP_STD * np.array(config.safety.width_limit)
     features, reasons = np.full_like(recording.features, np.nan), dict[str, int]()
     for index, (patch, tip) in enumerate(zip(recording.patches, tips, strict=True)):
         detection = detector.detect(patch.image(config.camera), None, StatePrediction(tip, std))
@@ -155,7 +138,7 @@ def _result(
     solution, _ = solutions
     doubts, warnings = find_doubts(model, *solutions, active)
     values = estimated_values(config, model, solution, active)
-    changes = changed_keys(config, model.geometry(solution.z), values)
+    changes, stds = changes_and_stds(config, model.configured(solution.z), values)
     delay, std = next(
         (value.after, value.std) for value in values if value.name == "camera.source.delay"
     )
@@ -173,7 +156,7 @@ def _result(
     return GeometryFit(
         config=config.replace(**changes),
         changes=changes,
-        std=key_stds(values, changes),
+        std=stds,
         pose_covariance=(solution.covariance * np.outer(model.prior_std, model.prior_std))[:6, :6],
         residual_px=_rms(solution.residuals),
         warnings=(*doubts, *warnings),

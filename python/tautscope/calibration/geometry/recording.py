@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from concurrent.futures import Executor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -111,6 +111,12 @@ class Recording:
     def found(self) -> NDArray[np.bool_]:
         """(images,) whether both bands were found."""
         return np.asarray(np.isfinite(self.features).all(axis=1))
+
+    def with_bands(self) -> Recording:
+        """The same of the images with both bands, without their pixels."""
+        found = self.found
+        stamps, features = self.captured_at[found], self.features[found]
+        return replace(self, captured_at=stamps, features=features, patches=())
 
 
 class Recorder(ImageRecorder):
