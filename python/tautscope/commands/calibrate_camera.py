@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
 from tautscope.commands.article_config import article_config
@@ -83,11 +84,12 @@ def add_board_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace) -> None:
-    from tautscope.calibration.camera.board import Board  # noqa: PLC0415
     from tautscope.runs.output_folder import check_free_file  # noqa: PLC0415
 
-    board = Board(options.columns, options.rows, options.square)
     if options.board is not None:
+        from tautscope.calibration.camera.board import Board  # noqa: PLC0415
+
+        board = Board(options.columns, options.rows, options.square)
         board.write_pdf(check_free_file(options.board))
         if options.json:
             print_json({"file": str(options.board)})
@@ -100,16 +102,22 @@ def _run(options: argparse.Namespace) -> None:
     if len(options.files) == 1 and options.files[0].suffix in (".yaml", ".yml"):
         finish(options, _import(options.files[0]))
         return
-    result, info = calibrate(_images(options, board), board, options.model)
+    if options.files and options.twin:
+        raise FieldError("--twin", True, "files or --twin, not both")
+    result, info = calibrate(options, options.files)
     if options.ros is not None:
         options.ros.write_text(info, encoding="utf-8")
     finish(options, result)
 
 
 def calibrate(
-    images: BoardImages, board: Board, model: Literal["pinhole", "fisheye"]
+    options: argparse.Namespace, files: Sequence[Path] = ()
 ) -> tuple[CalibrationResult, str]:
-    """Collect views until they suffice, or the images end, and fit the camera.
+    """Collect views of the board until they suffice, or the images end, and fit the camera.
+
+    Args:
+        options: With those of `add_board_options` and `add_twin`.
+        files: Images or a video, in place of the camera of the rig or the twin.
 
     Returns:
         The result, and the text of a ROS camera_info file.
@@ -117,11 +125,14 @@ def calibrate(
     Raises:
         CalibrationError: The views do not suffice.
     """
+    from tautscope.calibration.camera.board import Board  # noqa: PLC0415
     from tautscope.calibration.camera.camera_info import camera_info  # noqa: PLC0415
     from tautscope.calibration.camera.collector import ViewCollector  # noqa: PLC0415
     from tautscope.calibration.camera.intrinsics import fit_intrinsics  # noqa: PLC0415
     from tautscope.calibration.camera.result import camera_result  # noqa: PLC0415
 
+    board = Board(options.columns, options.rows, options.square)
+    images = file_images(files) if files else _camera_images(options, board)
     collector = ViewCollector(board, images.size, is_stream=images.is_stream)
     try:
         for image in images.images:
@@ -132,16 +143,12 @@ def calibrate(
     finally:
         images.images.close()
     collector.check()
-    fit = fit_intrinsics(collector.views, images.size, model)
+    fit = fit_intrinsics(collector.views, images.size, options.model)
     result = camera_result(fit, collector.coverage, images.serial_numbers)
     return result, camera_info(fit.intrinsics)
 
 
-def _images(options: argparse.Namespace, board: Board) -> BoardImages:
-    if options.files and options.twin:
-        raise FieldError("--twin", True, "files or --twin, not both")
-    if options.files:
-        return file_images(options.files)
+def _camera_images(options: argparse.Namespace, board: Board) -> BoardImages:
     config = article_config(options.config)
     if options.twin:
         from tautscope.twin.drawn_rig import draw_rig  # noqa: PLC0415

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
@@ -18,6 +19,7 @@ from tautscope.errors import ConfigError, FieldError
 from tautscope.extras import require_extras
 
 if TYPE_CHECKING:
+    from tautscope.hardware.run_results import HardwareRun
     from tautscope.loop.rig import Rig
     from tautscope.runs.recording import Recording
 
@@ -114,32 +116,26 @@ def rig_for_calibration(
             rig.close()
 
 
-def simulated_experiment(
-    options: argparse.Namespace,
-    config: Config,
-    progress: Callable[[float], None],
-    *,
-    compensate: bool = True,
-) -> Recording:
-    """Run the sines of a configuration on the twin of the options.
-
-    Args:
-        options: With those of `add_rig_options`, and ``--twin``.
-        config: Of the loop.
-        progress: Called with the share of the motion done.
-        compensate: Whether the hysteresis is compensated.
-    """
+def run_protocol(
+    options: argparse.Namespace, config: Config, folder: Path, title: str
+) -> tuple[Recording, HardwareRun | None]:
+    """Run the sines of a configuration on the rig, which logs them in a folder, or on the twin."""
+    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
     from tautscope.loop.references import SineSequence  # noqa: PLC0415
     from tautscope.runs.experiment import run_experiment  # noqa: PLC0415
 
-    with rig_for_calibration(options) as setup:
-        return run_experiment(
-            setup.rig,
-            SineSequence(config.experiment),
-            config,
-            compensate,
-            progress=lambda elapsed, duration: progress(elapsed / duration),
-        )
+    with progress_bar(title) as progress:
+        if not options.twin:
+            from tautscope.hardware.experiment import run_on_hardware  # noqa: PLC0415
+
+            run = run_on_hardware(config, folder, progress)
+            return run.compensated.recording, run
+        with rig_for_calibration(options) as setup:
+            motion = SineSequence(config.experiment)
+            recording = run_experiment(
+                setup.rig, motion, config, progress=lambda now, end: progress(now / end)
+            )
+            return recording, None
 
 
 def refuse_wrong_limits(config: str) -> None:

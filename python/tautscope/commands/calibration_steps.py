@@ -15,7 +15,7 @@ from tautscope.commands import (
     calibrate_geometry,
     calibrate_latency,
 )
-from tautscope.commands.calibration_rig import simulated_experiment, twin_seed
+from tautscope.commands.calibration_rig import run_protocol
 from tautscope.config import Config
 from tautscope.errors import CalibrationError
 
@@ -43,17 +43,7 @@ class Step:
 
 
 def _camera(options: argparse.Namespace, config: Config, folder: Path) -> CalibrationResult:
-    from tautscope.calibration.camera.board import Board  # noqa: PLC0415
-    from tautscope.commands.board_images import live_images, twin_images  # noqa: PLC0415
-
-    board = Board(options.columns, options.rows, options.square)
-    if options.twin:
-        from tautscope.twin.drawn_rig import draw_rig  # noqa: PLC0415
-
-        images = twin_images(draw_rig(config, twin_seed(options, config)), board)
-    else:
-        images = live_images(config, options.seconds)
-    result, info = calibrate_camera.calibrate(images, board, options.model)
+    result, info = calibrate_camera.calibrate(options)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "camera_info.yaml").write_text(info, encoding="utf-8")
     return result
@@ -102,25 +92,20 @@ def _doctor(options: argparse.Namespace, config: Config, folder: Path) -> Calibr
 
 
 def _motion(options: argparse.Namespace, config: Config, folder: Path) -> CalibrationResult:
-    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
     from tautscope.commands.result_lines import summary_line  # noqa: PLC0415
     from tautscope.report import figures  # noqa: PLC0415
     from tautscope.report.results import evaluate  # noqa: PLC0415
 
     config = config.replace(**{"experiment.periods": MOTION_PERIODS})
     place = _unused(folder, MOTION)
-    with progress_bar("first compensated motion") as progress:
-        if options.twin:
-            recording = simulated_experiment(options, config, progress)
-            place.mkdir(parents=True)
-            recording.write(place)
-        else:
-            from tautscope.hardware.experiment import run_on_hardware  # noqa: PLC0415
-            from tautscope.hardware.run_results import write_run_folder  # noqa: PLC0415
+    recording, run = run_protocol(options, config, place, "first compensated motion")
+    if run is None:
+        place.mkdir(parents=True)
+        recording.write(place)
+    else:
+        from tautscope.hardware.run_results import write_run_folder  # noqa: PLC0415
 
-            run = run_on_hardware(config, place, progress)
-            write_run_folder(run, place)
-            recording = run.compensated.recording
+        write_run_folder(run, place)
     results = evaluate(None, recording)
     figure = figures.figure9(None, recording)
     notes = [summary_line(dof, result) for dof, result in results.items()]

@@ -139,14 +139,13 @@ def _result(
     doubts, warnings = find_doubts(model, *solutions, active)
     values = estimated_values(config, model, solution, active)
     changes, stds = changes_and_stds(config, model.configured(solution.z), values)
-    delay, std = next(
-        (value.after, value.std) for value in values if value.name == "camera.source.delay"
-    )
-    if delay < -2 * std:
+    delay = next(value for value in values if value.name == "camera.source.delay")
+    if delay.after < -2 * delay.std:
         warnings.append(
-            f"Images are stamped {-delay * 1e3:.0f} ms before the motors' clock: "
+            f"Images are stamped {-delay.after * 1e3:.0f} ms before the motors' clock: "
             "camera.source.delay is set to 0, which cannot express it"
         )
+    explained = solution.residuals[np.abs(solution.residuals).max(axis=1) < LARGEST_RESIDUAL]
 
     def per_image(table: Floats) -> Floats:
         whole = np.full((len(recording.captured_at), table.shape[1]), np.nan)
@@ -158,7 +157,7 @@ def _result(
         changes=changes,
         std=stds,
         pose_covariance=(solution.covariance * np.outer(model.prior_std, model.prior_std))[:6, :6],
-        residual_px=_rms(solution.residuals),
+        residual_px=float(np.sqrt(np.mean(explained**2))) if len(explained) else float("nan"),
         warnings=(*doubts, *warnings),
         is_plausible=not doubts,
         values=values,
@@ -168,9 +167,3 @@ def _result(
         residuals=per_image(solution.residuals),
         expected=per_image(solution.expected[:, :3]),
     )
-
-
-def _rms(residuals: Floats) -> float:
-    """Root mean square of the residuals of explained images [px]; NaN if there is none."""
-    explained = residuals[np.abs(residuals).max(axis=1) < LARGEST_RESIDUAL]
-    return float(np.sqrt(np.mean(explained**2))) if len(explained) else float("nan")
