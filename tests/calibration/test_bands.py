@@ -6,10 +6,16 @@ import cv2
 import numpy as np
 import pytest
 from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
-from tautscope.calibration.bands.click import label_clicks
-from tautscope.calibration.bands.labels import BACKGROUND, BAND_A, BAND_B, labelled
+from tautscope.calibration.bands.labels import (
+    BACKGROUND,
+    BAND_A,
+    BAND_B,
+    from_mask,
+    label_clicks,
+    labelled,
+)
 from tautscope.calibration.bands.motion import find_moving_bands
-from tautscope.calibration.bands.result import fit_colour, from_mask
+from tautscope.calibration.bands.result import fit_colour
 from tautscope.errors import CalibrationError, FieldError
 
 GREEN, GREY, DARK, TISSUE = (40, 120, 35), (110, 112, 114), (25, 24, 26), (95, 110, 190)

@@ -127,7 +127,7 @@ def calibrate(
     """
     from tautscope.calibration.camera.board import Board  # noqa: PLC0415
     from tautscope.calibration.camera.camera_info import camera_info  # noqa: PLC0415
-    from tautscope.calibration.camera.collector import ViewCollector  # noqa: PLC0415
+    from tautscope.calibration.camera.coverage import ViewCollector  # noqa: PLC0415
     from tautscope.calibration.camera.intrinsics import fit_intrinsics  # noqa: PLC0415
     from tautscope.calibration.camera.result import camera_result  # noqa: PLC0415
 

@@ -119,7 +119,7 @@ def _result(
 
 
 def _clicked(files: Sequence[Path], clicks: Sequence[tuple[int, int]]) -> list[LabelledImage]:
-    from tautscope.calibration.bands.click import label_clicks  # noqa: PLC0415
+    from tautscope.calibration.bands.labels import label_clicks  # noqa: PLC0415
     from tautscope.calibration.images import read_image  # noqa: PLC0415
 
     if len(files) != 1:
@@ -128,7 +128,7 @@ def _clicked(files: Sequence[Path], clicks: Sequence[tuple[int, int]]) -> list[L
 
 
 def _masked(files: Sequence[Path]) -> list[LabelledImage]:
-    from tautscope.calibration.bands.result import from_mask  # noqa: PLC0415
+    from tautscope.calibration.bands.labels import from_mask  # noqa: PLC0415
     from tautscope.calibration.images import read_image  # noqa: PLC0415
 
     if len(files) % 2:

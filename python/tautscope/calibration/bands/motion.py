@@ -10,8 +10,14 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tautscope.calibration.bands.labels import LabelledImage, Mask, labelled
-from tautscope.calibration.bands.regions import LEAST_AREA, centroid, two_bands
+from tautscope.calibration.bands.labels import (
+    LEAST_AREA,
+    LabelledImage,
+    Mask,
+    centroid,
+    labelled,
+    two_bands,
+)
 from tautscope.calibration.colour import fit_discriminant
 from tautscope.calibration.images import to_bgr
 from tautscope.calibration.motion import (

@@ -10,15 +10,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from tautscope.calibration.bands.labels import (
-    BACKGROUND,
-    BAND_A,
-    BAND_B,
-    IGNORED,
-    Image,
-    LabelledImage,
-)
+from tautscope.calibration.bands.labels import BACKGROUND, BAND_A, BAND_B, LabelledImage
 from tautscope.calibration.colour import fit_discriminant
+from tautscope.calibration.motion import Image
 from tautscope.calibration.result import CalibrationResult
 from tautscope.errors import CalibrationError
 from tautscope.figure_style import BLACK, GREEN, GREY
@@ -150,10 +144,3 @@ def _figure(fit: ColourFit, images: Sequence[LabelledImage]) -> Figure:
     right.set(xlabel="w . x [grey levels]", ylabel="share of the pixels", yscale="log")
     right.legend(frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
     return figure
-
-
-def from_mask(image: Image, mask: Image) -> LabelledImage:
-    """Label an image by a mask: white on the bands, black elsewhere, grey where ignored."""
-    labels = np.full(mask.shape, IGNORED, np.uint8)
-    labels[mask > 250], labels[mask < 5] = BAND_A, BACKGROUND
-    return LabelledImage(image, labels)

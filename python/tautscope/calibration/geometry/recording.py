@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope.calibration.bands.regions import centroid, two_bands
+from tautscope.calibration.bands.labels import centroid, two_bands
 from tautscope.calibration.images import to_bgr
 from tautscope.calibration.motion import (
     DURATION,
