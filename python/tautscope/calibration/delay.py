@@ -110,6 +110,11 @@ class DelayEstimate:
     model: Probe | None = None
     turning_points: Probe | None = None
 
+    @classmethod
+    def unknown(cls, reason: str, *probes: Probe) -> DelayEstimate:
+        """No answer, with the probes that have a value, the model first."""
+        return cls(math.nan, math.nan, math.nan, math.nan, reason, *probes)
+
     @property
     def is_known(self) -> bool:
         """Whether there is an answer."""
@@ -162,10 +167,10 @@ def estimate_delay(
         and np.count_nonzero(np.isfinite(tips[:, dof])) >= LEAST_IMAGES
     ]
     if not np.any(np.ptp(motors, axis=0) > 0):
-        return _unknown("no motor moved")
+        return DelayEstimate.unknown("no motor moved")
     if not signals:
         seen = int(np.isfinite(tips).sum(axis=0).max(initial=0))
-        return _unknown(
+        return DelayEstimate.unknown(
             f"only {seen} images measure a DOF whose motor moved; at least {LEAST_IMAGES} are "
             "needed"
         )
@@ -174,7 +179,7 @@ def estimate_delay(
     for name, fit in (("model", fit_model), ("turning points", fit_turning_points)):
         found = search.run(fit)
         if isinstance(found, str):
-            return _unknown(f"{name}: {found}", *results)
+            return DelayEstimate.unknown(f"{name}: {found}", *results)
         results.append(found)
     model, turning_points = results
     return _combined(model, turning_points, float(stamps[-1] - stamps[0]))
@@ -188,7 +193,7 @@ def _combined(model: Probe, turning_points: Probe, span: float) -> DelayEstimate
         - 3 * math.hypot(model.drift_std, turning_points.drift_std),
     )
     if apart > AGREEMENT:
-        return _unknown(
+        return DelayEstimate.unknown(
             f"the probes disagree by {apart:.2f} s: the model says {model.middle:.3f} s, the "
             f"turning points {turning_points.middle:.3f} s in the middle of the record",
             model,
@@ -196,7 +201,7 @@ def _combined(model: Probe, turning_points: Probe, span: float) -> DelayEstimate
         )
     std = max(turning_points.delay_std, difference / 2)
     if std > AGREEMENT / 1.5:
-        return _unknown(f"uncertain by {std:.2f} s", model, turning_points)
+        return DelayEstimate.unknown(f"uncertain by {std:.2f} s", model, turning_points)
     found = turning_points
     drift_std = max(model.drift_std, found.drift_std)
     least = min(abs(model.drift), abs(found.drift))
@@ -318,13 +323,6 @@ def _line(
     mean = np.append(w @ levels / w.sum(), 0.0)
     std = math.sqrt(float(mean @ covariance @ mean))
     return float(mean @ found), std, float(found[-1]), math.sqrt(float(covariance[-1, -1]))
-
-
-def _unknown(
-    reason: str, model: Probe | None = None, turning_points: Probe | None = None
-) -> DelayEstimate:
-    nan = math.nan
-    return DelayEstimate(nan, nan, nan, nan, reason, model, turning_points)
 
 
 def _checked(

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING
 from tautscope.commands import arguments
 from tautscope.commands.article_config import article_config
 from tautscope.commands.board_images import BoardImages, file_images, live_images, twin_images
-from tautscope.commands.calibration_output import add_options, check_options, finish
+from tautscope.commands.calibration_output import add_options, check_options, finish, finish_file
 from tautscope.commands.calibration_rig import add_twin, twin_seed
-from tautscope.commands.printing import print_json
 from tautscope.errors import FieldError
 
 if TYPE_CHECKING:
@@ -91,10 +90,8 @@ def _run(options: argparse.Namespace) -> None:
 
         board = Board(options.columns, options.rows, options.square)
         board.write_pdf(check_free_file(options.board))
-        if options.json:
-            print_json({"file": str(options.board)})
-        else:
-            print(f"Print {options.board} at 100 %, and measure its ruler and squares.")
+        text = f"Print {options.board} at 100 %, and measure its ruler and squares."
+        finish_file(options, options.board, text)
         return
     check_options(options)
     if options.ros is not None:

@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
-from tautscope.commands.calibration_output import add_options, check_options, finish
+from tautscope.commands.calibration_output import add_options, check_options, finish, finish_file
 from tautscope.commands.calibration_rig import add_rig_options, rig_for_calibration
-from tautscope.commands.printing import print_json
 from tautscope.commands.recorded_motion import add_motor_options, read_motion
 from tautscope.errors import FieldError
 
@@ -94,10 +93,7 @@ def _write_page(options: argparse.Namespace, files: Sequence[Path]) -> None:
     if len(files) != 1:
         raise FieldError("files", len(files), "one image, with --page")
     write_click_page(files[0], options.page)
-    if options.json:
-        print_json({"file": str(options.page)})
-    else:
-        print(f"Open {options.page} in a browser, and click on the bands.")
+    finish_file(options, options.page, f"Open {options.page} in a browser, and click on the bands.")
 
 
 def calibrate(options: argparse.Namespace) -> CalibrationResult:
