@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -117,14 +118,13 @@ def _detect_again(
     tips[recording.found] = solution.states[:, :3]
     detector = MarkerDetector(model.configured(solution.z))
     std = TIP_STD * np.array(config.safety.width_limit)
-    features, reasons = np.full_like(recording.features, np.nan), dict[str, int]()
+    features, reasons = np.full_like(recording.features, np.nan), Counter[str]()
     for index, (patch, tip) in enumerate(zip(recording.patches, tips, strict=True)):
         detection = detector.detect(patch.image(config.camera), None, StatePrediction(tip, std))
         if detection.valid:
             features[index] = detection.features
         else:
-            reason = generic(detection.reason)
-            reasons[reason] = reasons.get(reason, 0) + 1
+            reasons[generic(detection.reason)] += 1
     return replace(recording, features=features, reasons=reasons)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 
@@ -138,7 +139,7 @@ class Recorder(ImageRecorder):
         self._detector = MarkerDetector(config)
         self._model = build_feature_model(config)
         self._images: list[tuple[float, Floats, Patch, float]] = []
-        self._reasons: dict[str, int] = {}
+        self._reasons = Counter[str]()
         self._regions: list[tuple[float, Floats]] = []
 
     def add_image(self, image: Image, captured_at: float) -> Detection:
@@ -150,8 +151,7 @@ class Recorder(ImageRecorder):
         self.used(captured_at)
         detection = self._detector.detect(image)
         if not detection.valid:
-            reason = generic(detection.reason)
-            self._reasons[reason] = self._reasons.get(reason, 0) + 1
+            self._reasons[generic(detection.reason)] += 1
         features = detection.features if detection.valid else np.full(4, np.nan)
         self._regions.append((captured_at, self._by_regions(image)))
         patch = self._patch(image, detection)
@@ -195,7 +195,7 @@ class Recorder(ImageRecorder):
             np.array(captured_at),
             np.array(features),
             patches,
-            dict(sorted(self._reasons.items(), key=lambda each: -each[1])),
+            dict(self._reasons.most_common()),
             float(np.median(saturated)),
         )
 
