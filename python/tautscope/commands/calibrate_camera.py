@@ -110,17 +110,10 @@ def _run(options: argparse.Namespace) -> None:
 def calibrate(
     options: argparse.Namespace, files: Sequence[Path] = ()
 ) -> tuple[CalibrationResult, str]:
-    """Collect views of the board until they suffice, or the images end, and fit the camera.
+    """The result, and the text of a ROS camera_info file.
 
-    Args:
-        options: With those of `add_board_options` and `add_twin`.
-        files: Images or a video, in place of the camera of the rig or the twin.
-
-    Returns:
-        The result, and the text of a ROS camera_info file.
-
-    Raises:
-        CalibrationError: The views do not suffice.
+    Views of the board are collected until they suffice, or the images end. Files are images or a
+    video, in place of the camera of the rig or the twin.
     """
     from tautscope.calibration.camera.board import Board  # noqa: PLC0415
     from tautscope.calibration.camera.camera_info import camera_info  # noqa: PLC0415

@@ -94,12 +94,7 @@ def _run(options: argparse.Namespace) -> int:
 def move(
     options: argparse.Namespace, *, camera_is_known: bool
 ) -> tuple[Recording, Config, Mapping[str, str]]:
-    """The record of a sweep of the rig or the twin, its configuration and its devices.
-
-    Args:
-        options: With those of `add_rig_options`.
-        camera_is_known: As of `rig_for_calibration`.
-    """
+    """The record of a sweep of the rig or the twin, its configuration and its devices."""
     from tautscope.calibration.geometry import sweep  # noqa: PLC0415
     from tautscope.commands.progress import progress_bar  # noqa: PLC0415
 
@@ -141,11 +136,7 @@ def table(found: GeometryFit) -> list[str]:
 def result(
     found: GeometryFit, serial_numbers: Mapping[str, str], *, with_figures: bool = True
 ) -> CalibrationResult:
-    """The result in the form that all calibrations have.
-
-    Raises:
-        RecordError: The model does not explain the record.
-    """
+    """The result in the form that all calibrations have; an error if it is not plausible."""
     from tautscope.calibration.result import CalibrationResult  # noqa: PLC0415
 
     if not found.is_plausible:

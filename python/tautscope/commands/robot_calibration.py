@@ -63,12 +63,7 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def run_latency(options: argparse.Namespace) -> int:
-    """The delays alone, with the kinematics as configured.
-
-    Raises:
-        CalibrationError: Too little was measured.
-        TautscopeError: Errors of the rig.
-    """
+    """The delays alone, with the kinematics as configured."""
     config, found = _sweep(options, ("kinematics",))
     finish(options, result("latency", found, config))
     return 0

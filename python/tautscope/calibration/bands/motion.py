@@ -94,12 +94,7 @@ class ImageSequence(ImageRecorder):
         return np.column_stack([np.interp(self.times, at, dof) for dof in applied.T])
 
     def label(self) -> list[LabelledImage]:
-        """The images in which the bands were found, see `find_moving_bands`.
-
-        Raises:
-            RecordError: There is no image or no position.
-            FieldError, CalibrationError: As `find_moving_bands`.
-        """
+        """The images in which the bands were found, see `find_moving_bands`."""
         if not self.ticks or not self.images:
             found = f"{len(self.ticks)} motor positions and {len(self.images)} images"
             raise RecordError("recording", found, "both, of the same motion")
@@ -107,16 +102,7 @@ class ImageSequence(ImageRecorder):
 
 
 def record_motion(rig: Rig, config: Config, progress: Progress | None = None) -> ImageSequence:
-    """Move insertion and bending in sines within the range of the experiment, and keep images.
-
-    Args:
-        rig: It is reset first; the caller closes it.
-        config: Configuration of the rig.
-        progress: Called with the share of the motion done, 0 to 1, once per second.
-
-    Raises:
-        TautscopeError: As `move_rig`.
-    """
+    """Move insertion and bending, as `move_rig`, within the experiment's range; keep images."""
     centre, amplitude = article_sines(config)
     found = ImageSequence(config)
     motion = Sines(centre, amplitude * _SHARE, DURATION / np.array(_TURNS), DURATION)

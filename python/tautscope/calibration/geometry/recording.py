@@ -222,14 +222,9 @@ def sweep(
     executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> Recording:
-    """Move all degrees of freedom of a rig at once (`sweep_motion`), and record motors and images.
+    """Move all degrees of freedom at once (`sweep_motion`), and record motors and images.
 
-    Args:
-        rig: It is reset first; the caller closes it.
-        config: Configuration of the rig.
-        duration: [s].
-        executor: As of `ImageRecorder`.
-        progress: Called with the share of the motion done, 0 to 1, once per second.
+    As `move_rig`, with the duration [s] and an executor as of `ImageRecorder`.
 
     Raises:
         RecordError: No image arrived.
