@@ -134,7 +134,7 @@ def move_rig(
     while (elapsed := sample.time - start) < motion.duration:
         command = loop.step(motion(elapsed), time=sample.time)
         yield sample, command
-        if sample.frame is not None:
+        if sample.frame is not None and not config.dof:
             # Only its arrival counts: its stamp may be wrong by the delay that is to be found.
             loop.on_features(None, sample.time)
         held = held + 1 if loop.supervision.reaction.rank >= Reaction.HOLD_MOTION.rank else 0

@@ -70,6 +70,7 @@ def _read_log(
 
     log = read_log(file)
     config = log.config if options.config is None else article_config(options.config)
+    config = config.replace(**{"camera.pixel_format": log.config.camera.pixel_format})
     recorder = make(config)
     captured = (FRAME_COLUMNS.names or ()).index("captured_at")
     for index, event in log.events.items():
