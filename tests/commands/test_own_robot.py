@@ -238,7 +238,7 @@ def test_the_kinematics_of_a_rig_is_written_or_what_the_sweep_leaves_open_is_nam
 def test_nothing_moves_without_an_answer(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("builtins.input", lambda _: "n")
+    monkeypatch.setattr("sys.stdin", io.StringIO("n\n"))
     options = ["--config", str(folder / "robot.toml"), "--rig", "catheter_of_a_newcomer:Catheter"]
     assert main(["calibrate", "latency", *options]) == 2
     assert "nothing moved" in capsys.readouterr().err

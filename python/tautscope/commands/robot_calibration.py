@@ -9,18 +9,15 @@ from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
 from tautscope.commands.calibration_output import add_options, check_options, finish
+from tautscope.commands.calibration_rig import add_yes, confirm_motion
 from tautscope.commands.robot import DURATION, add_seconds
 from tautscope.config import Config, load_config
-from tautscope.errors import CalibrationError, ConfigError, FieldError
+from tautscope.errors import CalibrationError, ConfigError
 
 if TYPE_CHECKING:
     from tautscope.calibration.result import CalibrationResult
     from tautscope.calibration.robot import RobotFit
 
-QUESTION = (
-    "THE MOTORS WILL MOVE, over 80 % of each range. Keep tissue and hands away, the emergency stop "
-    "within reach. Type y to start: "
-)
 SYSTEMATIC = 0.01
 """Standard deviation of what loops take for a delay, or the reverse [s]."""
 
@@ -46,7 +43,7 @@ def add_parser(kinds: arguments.Verbs) -> None:
         "kinematics.base_rotation; repeatable",
     )
     add_seconds(robot, "the sweep", DURATION / 2)
-    robot.add_argument("--yes", action="store_true", help="move the motors without asking")
+    add_yes(robot)
     add_options(robot)
     robot.set_defaults(run=_run)
 
@@ -66,28 +63,23 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def run_latency(options: argparse.Namespace) -> int:
-    """The delays alone, with the kinematics as configured.
-
-    Raises:
-        CalibrationError: Too little was measured.
-        TautscopeError: Errors of the rig.
-    """
+    """The delays alone, with the kinematics as configured."""
     config, found = _sweep(options, ("kinematics",))
     finish(options, result("latency", found, config))
     return 0
 
 
 def _sweep(options: argparse.Namespace, keep: Sequence[str]) -> tuple[Config, RobotFit]:
-    from tautscope.calibration.robot import Sweep, fit, move  # noqa: PLC0415
+    from tautscope.calibration.robot import fit, move, sweep_motion  # noqa: PLC0415
     from tautscope.commands.progress import progress_bar  # noqa: PLC0415
     from tautscope.runs.rigs import rig_maker  # noqa: PLC0415
 
     config = load_config(options.config)
     if not config.dof:
         raise ConfigError("dof", "none", "degrees of freedom: [[dof]]")
-    sweep = Sweep(config, options.seconds or DURATION / 2)
+    sweep = sweep_motion(config, options.seconds or DURATION / 2)
     make = rig_maker(options.rig)
-    _confirm(options)
+    confirm_motion(options, "over 80 % of each range. Keep", config)
     rig = make(config)
     try:
         with progress_bar("sweep") as progress:
@@ -130,12 +122,3 @@ def result(kind: str, found: RobotFit, config: Config) -> CalibrationResult:
         )
     data = {"fit": dict(found.values)}
     return CalibrationResult(kind, values, std, notes=tuple(notes), data=data)
-
-
-def _confirm(options: argparse.Namespace) -> None:
-    try:
-        answer = "y" if options.yes else input(QUESTION)
-    except EOFError:
-        answer = ""
-    if answer.strip() not in ("y", "yes"):
-        raise FieldError("answer", "no", "y, or the option --yes; nothing moved")

@@ -115,8 +115,8 @@ class Detection:
     def colours_drifted(self) -> bool:
         """Whether a band was found, but not by the trained discriminant.
 
-        Exposure or white balance then differ from the training pixels; `ColorDiscriminant.fit`
-        should be given new ones.
+        Exposure or white balance then differ from the training pixels; `tautscope calibrate
+        colour` finds new ones.
         """
         return self.discriminant > 0 and any(self.found)
 
