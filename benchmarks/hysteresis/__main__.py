@@ -1,7 +1,7 @@
 """Hysteresis that profiles `best` and `paper` leave, on the twin.
 
 Every value is the median over the seeds, with the worst seed. Camera images are the only feedback.
-`--write` updates docs/hysteresis.md, its figures, and the table of the README.
+`--write` updates docs/hysteresis.md and its figures.
 """
 
 from __future__ import annotations

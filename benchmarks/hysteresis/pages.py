@@ -7,16 +7,14 @@ from collections.abc import Sequence
 from common.doc_pages import insert
 from common.paths import ROOT
 from hysteresis.figures import FIGURES
-from hysteresis.tables import Row, full, short
+from hysteresis.tables import Row, full
 
 PAGE = ROOT / "docs" / "hysteresis.md"
-README = ROOT / "README.md"
 FOLDER = ROOT / "docs" / "figures" / "hysteresis"
 
 
 def write_tables(rows: Sequence[Row], drawn: Sequence[str], conditions: str) -> None:
-    """Write the table of the README, that of the page, and the page's figures."""
-    insert(README, "hysteresis", f"{short(rows)}\n\n{conditions}".replace(" (worst)", ""))
+    """Write the table of the page, and its figures."""
     insert(PAGE, "hysteresis", f"{conditions}\n\n{full(rows)}")
     folder = FOLDER.relative_to(PAGE.parent).as_posix()
     images = [f"![{FIGURES[name][1]}]({folder}/{name}.png)" for name in drawn]

@@ -8,7 +8,7 @@ from statistics import median
 from typing import Any
 
 import numpy as np
-from hysteresis.goals import CONDITIONS, GOALS, LATENCIES
+from hysteresis.goals import GOALS
 from tautscope.dof import Dof
 
 Row = dict[str, Any]
@@ -17,26 +17,6 @@ Values = Mapping[tuple[str, Dof, str], Mapping[int, float]]
 
 POINTS = 0.03
 """Largest distance of the worst seed from the median for a share to count as steady."""
-
-SHORT: dict[str, tuple[str, ...]] = {
-    "reduction of mean width": ("reduction of mean width",),
-    "reduction of max width": ("reduction of max width",),
-    "tip overspeed, times the reference's": ("tip overspeed",),
-    "start [periods]": ("start",),
-    "three DOFs at once: reduction": ("three DOFs at once: reduction",),
-    "width 10-2-10 mm: overshoot [mm]": ("width 10-2-10 mm: overshoot",),
-    "strokes until within 10 %": ("width 10-2-10 mm: strokes until within 10 %",),
-    "start value 50 % too wide: overshoot [mm]": ("start 50 % too wide: overshoot",),
-    "latency 0 or 200 ms: change": tuple(
-        f"latency {name}: change of reduction" for name in LATENCIES
-    ),
-    "tremor 2 mm at rest: motor [mm]": ("tremor at rest: motor",),
-    "tremor 2 mm at rest: tip [mm]": ("tremor at rest: tip",),
-    f"worst of {len(CONDITIONS)} image conditions: change": tuple(
-        f"{name}: change of reduction" for name in CONDITIONS
-    ),
-}
-"""Rows of the README, and the quantities of which each shows the worst."""
 
 
 def pair(by_seed: Values) -> Values:
@@ -150,52 +130,3 @@ def full(rows: Sequence[Row]) -> str:
         unit = "" if last["unit"] == "share" else f" [{last['unit']}]"
         lines.append(f"| {what}{unit} | {dof} | {shown[0]} | {shown[1]} | {goal(last)} |")
     return "\n".join(lines)
-
-
-def short(rows: Sequence[Row]) -> str:
-    """Return the Markdown table of the README: medians, of each DOF where there are three."""
-    lines = ["| | `paper` | `best` | goal |", "|---|---|---|---|"]
-    for label, whats in SHORT.items():
-        cells = {name: _worst_rows(rows, whats, name) for name in ("paper", "best")}
-        some = cells["best"] or cells["paper"]
-        if not some:
-            continue
-        bound = "at least" if some[0]["sense"] == "min" else "at most"
-        target = show(some[0]["goal"], some[0]["unit"]).replace(".0 %", " %")
-        lines.append(
-            f"| {label} | {_cell(cells['paper'])} | {_cell(cells['best'])} "
-            f"| {bound} {target}{_missed(cells['best'])} |"
-        )
-    return "\n".join(lines)
-
-
-def _missed(rows: Sequence[Row]) -> str:
-    """Name the DOFs whose goal is not reached."""
-    names = [row["dof"] for row in rows if not row["holds"]]
-    return f"; missed in {', '.join(names)}" if names else ""
-
-
-def _worst_rows(rows: Sequence[Row], whats: Sequence[str], name: str) -> list[Row]:
-    """Return for each DOF the row with the worst median."""
-    found = []
-    for dof in Dof:
-        mine = [
-            row
-            for row in rows
-            if row["what"] in whats and row["dof"] == dof.label and row["profile"] == name
-        ]
-        if mine:
-            bad = [np.inf if row["median"] is None else _badness(row) for row in mine]
-            found.append(mine[int(np.argmax(bad))])
-    return found
-
-
-def _badness(row: Row) -> float:
-    return float(row["median"] if row["sense"] == "max" else -row["median"])
-
-
-def _cell(rows: Sequence[Row]) -> str:
-    texts = [show(row["median"], row["unit"]) for row in rows]
-    if all(text.endswith(" %") for text in texts) and texts:
-        return ", ".join(text.removesuffix(" %") for text in texts) + " %"
-    return ", ".join(texts)

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from common.doc_pages import insert
 from hysteresis import ablation, tables
-from hysteresis.goals import GOALS
 from hysteresis.measures import fold_reduction
 from hysteresis.scenarios import SCENARIOS
 from hysteresis.simulation import Sines, uncompensated
@@ -120,8 +119,3 @@ def test_text_is_inserted_between_the_markers(tmp_path: Path) -> None:
     assert page.read_text() == "a\n<!-- x: begin -->\nnew \\1\n<!-- x: end -->\nb\n"
     with pytest.raises(ValueError, match="y: begin"):
         insert(page, "y", "new")
-
-
-def test_every_short_row_has_one_goal() -> None:
-    for whats in tables.SHORT.values():
-        assert len({(GOALS[what].value, GOALS[what].sense) for what in whats}) == 1
