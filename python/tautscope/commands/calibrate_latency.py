@@ -18,6 +18,7 @@ from tautscope.commands.calibration_rig import (
     simulated_experiment,
 )
 from tautscope.commands.printing import print_json
+from tautscope.commands.rig_choice import add_rig
 from tautscope.commands.robot import DURATION
 from tautscope.config import Config
 from tautscope.dof import Dof
@@ -57,11 +58,10 @@ def add_parser(kinds: arguments.Verbs) -> None:
         metavar="DIR",
         help="folder of the log of a motion on a rig, new or empty [runs/<date-time>-latency]",
     )
-    latency.add_argument(
-        "--rig",
-        metavar="MODULE:CLASS",
-        help="delay of the sensors of a rig of your own with [[dof]], as measurement.delays: a "
-        "sweep of all degrees of freedom within 80 %% of their ranges; docs/robots.md",
+    add_rig(
+        latency,
+        "delay of the sensors of a rig of your own with [[dof]], as measurement.delays: a sweep of "
+        "all degrees of freedom within 80 %% of their ranges",
     )
     robot.add_seconds(latency, "a rig", DURATION / 2)
     add_rig_options(latency)

@@ -11,7 +11,8 @@ from tautscope.commands import arguments, robot
 from tautscope.commands.article_config import article_config
 from tautscope.commands.held_run import recording_saved
 from tautscope.commands.printing import announce, console, print_json
-from tautscope.config import DISTURBANCES, Config, load_config
+from tautscope.commands.rig_choice import add_robot, choose_rig
+from tautscope.config import DISTURBANCES, Config
 from tautscope.errors import FieldError, MissingPathError
 from tautscope.loop.references import SineSequence
 
@@ -67,10 +68,9 @@ def add_parser(verbs: arguments.Verbs) -> None:
         metavar="NAME[,NAME]",
         help=f"image disturbances: {', '.join(DISTURBANCES)} [twin.disturb of the configuration]",
     )
-    demo.add_argument(
-        "--robot",
-        choices=["colonoscope"],
-        help="another simulated robot in place of the article's instrument: the steerable tip of a "
+    add_robot(
+        demo,
+        "another simulated robot in place of the article's instrument: the steerable tip of a "
         "colonoscope with an EM tracker; an operator's motion without and with compensation",
     )
     robot.add_seconds(demo, "--robot")
@@ -125,17 +125,14 @@ def _run(options: argparse.Namespace) -> None:
 
 
 def _run_robot(options: argparse.Namespace) -> None:
-    from tautscope.twin.colonoscope import ColonoscopeTwin  # noqa: PLC0415
-
     for name in ("background", "disturb"):
         if getattr(options, name) is not None:
             raise FieldError(f"--{name}", getattr(options, name), "no --robot, which has no camera")
     if options.seeds != 1:
         raise FieldError("--seeds", options.seeds, "1 with --robot")
-    config = load_config(options.config or options.robot, options.profile)
+    config, make = choose_rig(options)
     seed = options.seed or 0
-    name = f"simulated {options.robot}, seed {seed}"
-    robot.run(options, config, name, lambda _: ColonoscopeTwin(seed), "demo", seed=seed)
+    robot.run(options, config, f"simulated {options.robot}, seed {seed}", make, "demo", seed=seed)
 
 
 def _duration(trial: Trial) -> float:

@@ -11,7 +11,7 @@ from tautscope.commands.held_run import recording_saved
 from tautscope.commands.positions import add_reference, read_reference
 from tautscope.commands.printing import announce, print_json
 from tautscope.commands.result_lines import result_lines
-from tautscope.config import load_config
+from tautscope.commands.rig_choice import add_rig, choose_rig
 from tautscope.config.placeholders import refuse_placeholders
 from tautscope.errors import FieldError
 from tautscope.loop.references import SineSequence
@@ -45,11 +45,10 @@ def add_parser(verbs: arguments.Verbs) -> None:
         help="periods of the reference per DOF [experiment.periods of the configuration]",
     )
     add_reference(run, "the article's experiment")
-    run.add_argument(
-        "--rig",
-        metavar="MODULE:CLASS",
-        help="run an operator's motion, without and then with compensation, on a rig of your own "
-        "in place of [drives] and [camera]: docs/robots.md",
+    add_rig(
+        run,
+        "run an operator's motion, without and then with compensation, on a rig of your own in "
+        "place of [drives] and [camera]",
     )
     robot.add_seconds(run, "a rig")
     arguments.add_out(run, "run")
@@ -65,13 +64,11 @@ def _run(options: argparse.Namespace) -> int:
     from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
 
     if options.rig is not None:
-        from tautscope.runs.rigs import rig_maker  # noqa: PLC0415
-
         if options.reference is not None or options.periods is not None or options.compare:
             what = "neither --reference nor --periods nor --compare"
             raise FieldError("--rig", options.rig, what)
-        config = load_config(options.config, options.profile)
-        robot.run(options, config, options.rig, rig_maker(options.rig), "run", seed=0)
+        config, make = choose_rig(options)
+        robot.run(options, config, options.rig, make, "run", seed=0)
         return 0
     if options.seconds is not None:
         raise FieldError("--seconds", options.seconds, "--rig")

@@ -11,7 +11,7 @@ from tautscope.commands import arguments
 from tautscope.commands.article_config import article_config
 from tautscope.commands.calibration_rig import refuse_wrong_limits
 from tautscope.commands.printing import print_json
-from tautscope.config import load_config
+from tautscope.commands.rig_choice import add_rig, choose_rig
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError, FieldError
 
@@ -36,11 +36,10 @@ def add_parser(verbs: arguments.Verbs) -> None:
         metavar="DISTANCE",
         help="m or rad, at most 0.002 m or 0.2 rad; with --rig at most width_limit",
     )
-    jog.add_argument(
-        "--rig",
-        metavar="MODULE:CLASS",
-        help="move a degree of freedom of a rig of your own with [[dof]], and print what its "
-        "sensors measured; docs/robots.md",
+    add_rig(
+        jog,
+        "move a degree of freedom of a rig of your own with [[dof]], and print what its sensors "
+        "measured",
     )
     jog.add_argument("--yes", action="store_true", help="start without asking")
     arguments.add_config(jog, required=True)
@@ -51,10 +50,11 @@ def add_parser(verbs: arguments.Verbs) -> None:
 def _jog(options: argparse.Namespace) -> None:
     from tautscope.hardware.jog import check_distance, jog, jog_rig  # noqa: PLC0415
 
-    config, distance = (
-        (load_config if options.rig else article_config)(options.config),
-        options.distance,
-    )
+    distance = options.distance
+    if options.rig is None:
+        config = article_config(options.config)
+    else:
+        config, make_rig = choose_rig(options)
     names = [dof.label for dof in config.dofs]
     if options.dof not in names:
         raise FieldError("dof", options.dof, f"one of {', '.join(names)}")
@@ -63,10 +63,6 @@ def _jog(options: argparse.Namespace) -> None:
     if options.rig is None and config.drives is None:
         raise ConfigError("drives", None, "a section [drives] that names the motors, or --rig")
     check_distance(dof, distance)
-    if options.rig is not None:
-        from tautscope.runs.rigs import rig_maker  # noqa: PLC0415
-
-        make_rig = rig_maker(options.rig)
     refuse_wrong_limits(options.config)
     if not options.yes:
         before = "After a reset, which may move all motors to their start, " if options.rig else ""

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
 from tautscope.commands.calibration_output import add_options, check_options, finish
+from tautscope.commands.rig_choice import add_rig, choose_rig
 from tautscope.commands.robot import DURATION, add_seconds
-from tautscope.config import Config, load_config
+from tautscope.config import Config
 from tautscope.errors import CalibrationError, ConfigError, FieldError
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ def add_parser(kinds: arguments.Verbs) -> None:
         "MOTORS MOVE, after a question.",
         extras=["analysis"],
     )
-    robot.add_argument("--rig", metavar="MODULE:CLASS", required=True, help="a rig of your own")
+    add_rig(robot, "a rig of your own", required=True)
     robot.add_argument(
         "--keep",
         action="append",
@@ -80,13 +81,11 @@ def run_latency(options: argparse.Namespace) -> int:
 def _sweep(options: argparse.Namespace, keep: Sequence[str]) -> tuple[Config, RobotFit]:
     from tautscope.calibration.robot import Sweep, fit, move  # noqa: PLC0415
     from tautscope.commands.progress import progress_bar  # noqa: PLC0415
-    from tautscope.runs.rigs import rig_maker  # noqa: PLC0415
 
-    config = load_config(options.config)
+    config, make = choose_rig(options)
     if not config.dof:
         raise ConfigError("dof", "none", "degrees of freedom: [[dof]]")
     sweep = Sweep(config, options.seconds or DURATION / 2)
-    make = rig_maker(options.rig)
     _confirm(options)
     rig = make(config)
     try:
