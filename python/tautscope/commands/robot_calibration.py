@@ -99,22 +99,25 @@ def _sweep(options: argparse.Namespace, keep: Sequence[str]) -> tuple[Config, Ro
 def result(kind: str, found: RobotFit, config: Config) -> CalibrationResult:
     """The fit in the form that all calibrations have; of ``latency`` the delays alone."""
     from tautscope.calibration.result import CalibrationResult  # noqa: PLC0415
+    from tautscope.calibration.robot.motor_map import motor_map  # noqa: PLC0415
     from tautscope.calibration.robot.parameters import with_values  # noqa: PLC0415
 
-    values = with_values(config, found.values)
-    values |= found.deviations
+    motors, motor_std = motor_map(config, found)
+    values = {**with_values(config, found.values), **found.deviations, **motors}
     if kind == "latency":
         values = {"measurement.delays": values["measurement.delays"]}
     std = {
         name: math.hypot(each, SYSTEMATIC) if name.startswith("measurement.delays") else each
-        for name, each in found.std.items()
+        for name, each in (*found.std.items(), *motor_std.items())
         if name.partition("[")[0] in values
     }
     notes = []
     for name in values:
         section, key = name.split(".")
-        before = getattr(getattr(config, section), key)
+        before = getattr(getattr(config, section), key, "not there")
         notes.append(f"{name} was {before}")
+    is_written = "actuators.matrix" in values
+    written = "in actuators.matrix and offsets" if is_written else "not written"
     units = {dof.name: dof.unit for dof in config.dof}
     for name, unit in units.items():
         zero, gain, slack = (f"dof.{name}.{key}" for key in ("zero", "gain", "slack"))
@@ -125,7 +128,7 @@ def result(kind: str, found: RobotFit, config: Config) -> CalibrationResult:
         )
         notes.append(
             f"{name}: gain {found.values[gain]:.4g} +- {found.std[gain]:.2g}{at}, slack "
-            f"{found.values[slack]:.3g} {unit}; not written, the loop estimates them"
+            f"{found.values[slack]:.3g} {unit}; gain and zero are {written}"
         )
     data = {"fit": dict(found.values)}
     return CalibrationResult(kind, values, std, notes=tuple(notes), data=data)
