@@ -279,7 +279,7 @@ def test_gains_signs_and_zeros_are_right_after_one_calibration(
 def test_nothing_moves_without_an_answer(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("builtins.input", lambda _: "n")
+    monkeypatch.setattr("sys.stdin", io.StringIO("n\n"))
     options = ["--config", str(folder / "robot.toml"), "--rig", "catheter_of_a_newcomer:Catheter"]
     assert main(["calibrate", "latency", *options]) == 2
     assert "nothing moved" in capsys.readouterr().err

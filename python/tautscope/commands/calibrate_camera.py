@@ -26,6 +26,7 @@ def add_parser(kinds: arguments.Verbs) -> None:
     camera = arguments.add_verb(
         kinds,
         "camera",
+        _run,
         help="intrinsics of the camera, with a ChArUco board",
         description="Calibrate the camera with a ChArUco board, from images, a video, the live "
         "camera of --config, or a ROS camera_info file; print the section [camera]. Live and in a "
@@ -57,7 +58,6 @@ def add_parser(kinds: arguments.Verbs) -> None:
         help="seed of the twin [twin.seed of the configuration]",
     )
     add_options(camera)
-    camera.set_defaults(run=_run)
 
 
 def add_board_options(parser: argparse.ArgumentParser) -> None:

@@ -24,6 +24,7 @@ def add_parser(kinds: arguments.Verbs) -> None:
     colour = arguments.add_verb(
         kinds,
         "colour",
+        _run,
         help="colour of the bands, from their motion, clicks or masks",
         description="Fit the colour of the bands, and print the section [vision]. Without files, "
         "the rig of --config or the twin moves insertion and bending for 10 s, and the bands are "
@@ -66,7 +67,6 @@ def add_parser(kinds: arguments.Verbs) -> None:
     )
     add_rig_options(colour)
     add_options(colour)
-    colour.set_defaults(run=_run)
 
 
 def _pixel(text: str) -> tuple[int, int]:
@@ -82,7 +82,6 @@ def _run(options: argparse.Namespace) -> None:
         _write_page(options, files)
         return
     check_options(options)
-    serial_numbers: Mapping[str, str] = {}
     if options.click:
         images = _clicked(files, options.click)
     elif not files:
@@ -92,7 +91,7 @@ def _run(options: argparse.Namespace) -> None:
         images = _moving(options, files[0])
     else:
         images = _masked(files)
-    finish(options, result(images, serial_numbers))
+    finish(options, result(images, {}))
 
 
 def _write_page(options: argparse.Namespace, files: Sequence[Path]) -> None:
@@ -115,7 +114,7 @@ def calibrate(options: argparse.Namespace) -> CalibrationResult:
 
     with rig_for_calibration(options) as setup, progress_bar("motion") as progress:
         found = record_motion(setup.rig, setup.config, progress)
-        serial_numbers = setup.serial_numbers()
+        serial_numbers = setup.serial_numbers
     images = find_moving_bands(found.images, found.times, found.positions)
     return result(images, serial_numbers)
 

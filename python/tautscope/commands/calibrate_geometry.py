@@ -40,6 +40,7 @@ def add_parser(kinds: arguments.Verbs) -> None:
     geometry = arguments.add_verb(
         kinds,
         "geometry",
+        _run,
         help="pose of the channel, lengths and delay, from the instrument's own motion",
         description="Estimate the pose of the channel in the camera frame, the lengths of section "
         "and bands, focal length and delay of the images, with standard deviations. Without a "
@@ -80,7 +81,6 @@ def add_parser(kinds: arguments.Verbs) -> None:
     )
     add_rig_options(geometry)
     add_options(geometry)
-    geometry.set_defaults(run=_run)
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -184,7 +184,7 @@ def _from_hardware(options: argparse.Namespace) -> _Source:
         progress_bar("sweep") as progress,
     ):
         recording = sweep(setup.rig, config, executor=executor, progress=progress)
-        return _Source(recording, config, setup.serial_numbers())
+        return _Source(recording, config, setup.serial_numbers)
 
 
 def _refuse(options: argparse.Namespace, found: GeometryFit) -> int:

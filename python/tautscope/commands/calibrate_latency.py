@@ -42,6 +42,7 @@ def add_parser(kinds: arguments.Verbs) -> None:
     latency = arguments.add_verb(
         kinds,
         "latency",
+        _run,
         help="delay of the images behind the motors",
         description="Estimate the delay of the images behind the motors, as `tautscope align`, and "
         "print camera.source.delay. Each DOF moves by a sine, without compensation, three periods "
@@ -66,7 +67,6 @@ def add_parser(kinds: arguments.Verbs) -> None:
     robot.add_seconds(latency, "a rig", DURATION / 2)
     add_rig_options(latency)
     add_options(latency)
-    latency.set_defaults(run=_run)
 
 
 def _run(options: argparse.Namespace) -> int:

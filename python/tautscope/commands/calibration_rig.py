@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
 from tautscope.commands.article_config import article_config
-from tautscope.commands.question import ask
+from tautscope.commands.question import confirm
 from tautscope.config import Config
 from tautscope.config.placeholders import MARK, placeholders
 from tautscope.errors import ConfigError, FieldError
@@ -28,15 +28,12 @@ class Setup:
     Attributes:
         rig: To be moved; it is closed with the block.
         config: What is known of it.
+        serial_numbers: Of camera and drives, where they have one.
     """
 
     rig: Rig
     config: Config
-    serials: Mapping[str, str]
-
-    def serial_numbers(self) -> Mapping[str, str]:
-        """Serial numbers of camera and drives, where they have one."""
-        return self.serials
+    serial_numbers: Mapping[str, str]
 
 
 def add_rig_options(parser: argparse.ArgumentParser) -> None:
@@ -154,11 +151,8 @@ def confirm_motion(options: argparse.Namespace) -> None:
         FieldError: The answer is not y.
     """
     refuse_wrong_limits(options.config)
-    if options.yes:
-        return
     question = (
         "THE MOTORS WILL MOVE, in the range of [experiment]. Hold the scope still, keep tissue and "
-        "hands away, the emergency stop within reach. Type y to start: "
+        "hands away, the emergency stop within reach."
     )
-    if ask(question, article_config(options.config).camera).strip() not in ("y", "yes"):
-        raise FieldError("answer", "no", "y, or the option --yes; nothing moved")
+    confirm(question, options, article_config(options.config).camera)

@@ -78,7 +78,7 @@ def _geometry(options: argparse.Namespace, config: Config, folder: Path) -> Cali
             executor = resources.enter_context(realtime_executor("vision", VISION))
         progress = resources.enter_context(progress_bar("sweep"))
         recording = sweep(setup.rig, config, executor=executor, progress=progress)
-        serial_numbers = setup.serial_numbers()
+        serial_numbers = setup.serial_numbers
     # A board determines the intrinsics better than the instrument.
     found = fit(
         recording, config, intrinsics="focal" if config.calibration.camera is None else "none"

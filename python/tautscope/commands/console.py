@@ -18,6 +18,7 @@ def add_parser(verbs: arguments.Verbs) -> None:
     console = arguments.add_verb(
         verbs,
         "console",
+        _console,
         help="see, steer and stop the instrument in a browser",
         description="Serve the operator's console on 127.0.0.1 and print its address with a new "
         "token. Without --twin or --replay THE MOTORS of the configuration, or of --rig, MOVE, "
@@ -37,7 +38,6 @@ def add_parser(verbs: arguments.Verbs) -> None:
     )
     arguments.add_out(console, "console")
     arguments.add_json(console)
-    console.set_defaults(run=_console)
 
 
 def _console(options: argparse.Namespace) -> int:
@@ -54,10 +54,9 @@ def _console(options: argparse.Namespace) -> int:
         )
     require_extras("tautscope console", ["twin" if options.twin else "hardware"])
     from tautscope.console.start import start_console  # noqa: PLC0415
-    from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
 
     config, make = choose_rig(options, in_real_time=True)
-    folder = check_free(options.out or default_folder("console"))
+    folder = arguments.out_folder(options)
     what, note = rig_in_words(options), "Whoever has this address can move it."
     return start_console(
         make(config),

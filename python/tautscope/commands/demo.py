@@ -37,6 +37,7 @@ def add_parser(verbs: arguments.Verbs) -> None:
     demo = arguments.add_verb(
         verbs,
         "demo",
+        _run,
         help="run the article's experiment on the simulated instrument",
         description="Run the article's experiment and an operator motion on the simulated "
         "instrument, each with and without compensation, with camera images as the only feedback. "
@@ -77,13 +78,11 @@ def add_parser(verbs: arguments.Verbs) -> None:
     arguments.add_out(demo, "demo")
     arguments.add_config(demo)
     arguments.add_json(demo)
-    demo.set_defaults(run=_run)
 
 
 def _run(options: argparse.Namespace) -> None:
     from tautscope.commands.progress import progress_bar  # noqa: PLC0415
     from tautscope.report import demo, tables  # noqa: PLC0415
-    from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
 
     if options.robot is not None:
         _run_robot(options)
@@ -91,7 +90,7 @@ def _run(options: argparse.Namespace) -> None:
     if options.seconds is not None:
         raise FieldError("--seconds", options.seconds, "--robot")
     config = _load(options)
-    folder = check_free(options.out or default_folder("demo"))
+    folder = arguments.out_folder(options)
     first = config.twin.seed
     seeds = range(first, first + options.seeds)
     trials = demo.demo_trials(config)
@@ -132,7 +131,7 @@ def _run_robot(options: argparse.Namespace) -> None:
         raise FieldError("--seeds", options.seeds, "1 with --robot")
     config, make = choose_rig(options)
     seed = options.seed or 0
-    robot.run(options, config, f"simulated {options.robot}, seed {seed}", make, "demo", seed=seed)
+    robot.run(options, config, f"simulated {options.robot}, seed {seed}", make, seed=seed)
 
 
 def _duration(trial: Trial) -> float:

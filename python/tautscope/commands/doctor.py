@@ -34,6 +34,7 @@ def add_parser(verbs: arguments.Verbs) -> None:
     doctor = arguments.add_verb(
         verbs,
         "doctor",
+        _doctor,
         help="check a rig, and say what is missing and what to do",
         description="Check the computer, its cameras and CAN interfaces; with a configuration, "
         "open its camera, configure its drives and read the settings back. No motor is enabled. "
@@ -47,7 +48,6 @@ def add_parser(verbs: arguments.Verbs) -> None:
     doctor.add_argument("--yes", action="store_true", help="reset the rig without asking")
     arguments.add_config(doctor)
     arguments.add_json(doctor)
-    doctor.set_defaults(run=_doctor)
 
 
 def run_checks(config: Config, *, is_rig: bool, folder: Path) -> Iterator[CheckResult]:

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
 from tautscope.commands.calibration_output import add_options, check_options, finish
+from tautscope.commands.question import confirm
 from tautscope.commands.rig_choice import add_rig, choose_rig
 from tautscope.commands.robot import DURATION, add_seconds
 from tautscope.config import Config
-from tautscope.errors import CalibrationError, ConfigError, FieldError
+from tautscope.errors import CalibrationError, ConfigError
 
 if TYPE_CHECKING:
     from tautscope.calibration.result import CalibrationResult
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 QUESTION = (
     "THE MOTORS WILL MOVE, over 80 % of each range. Keep tissue and hands away, the emergency stop "
-    "within reach. Type y to start: "
+    "within reach."
 )
 SYSTEMATIC = 0.01
 """Standard deviation of what loops take for a delay, or the reverse [s]."""
@@ -31,6 +32,7 @@ def add_parser(kinds: arguments.Verbs) -> None:
     robot = arguments.add_verb(
         kinds,
         "robot",
+        _run,
         help="kinematics, zeros, gains and delay of a rig with [[dof]]",
         description="Move all degrees of freedom by slow sines over 80 % of their ranges, and fit "
         "lengths, pose of the sensor's frame, delay, zeros and gains to what was measured. THE "
@@ -49,7 +51,6 @@ def add_parser(kinds: arguments.Verbs) -> None:
     add_seconds(robot, "the sweep", DURATION / 2)
     robot.add_argument("--yes", action="store_true", help="move the motors without asking")
     add_options(robot)
-    robot.set_defaults(run=_run)
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -86,7 +87,7 @@ def _sweep(options: argparse.Namespace, keep: Sequence[str]) -> tuple[Config, Ro
     if not config.dof:
         raise ConfigError("dof", "none", "degrees of freedom: [[dof]]")
     sweep = Sweep(config, options.seconds or DURATION / 2)
-    _confirm(options)
+    confirm(QUESTION, options, config.camera)
     rig = make(config)
     try:
         with progress_bar("sweep") as progress:
@@ -132,12 +133,3 @@ def result(kind: str, found: RobotFit, config: Config) -> CalibrationResult:
         )
     data = {"fit": dict(found.values)}
     return CalibrationResult(kind, values, std, notes=tuple(notes), data=data)
-
-
-def _confirm(options: argparse.Namespace) -> None:
-    try:
-        answer = "y" if options.yes else input(QUESTION)
-    except EOFError:
-        answer = ""
-    if answer.strip() not in ("y", "yes"):
-        raise FieldError("answer", "no", "y, or the option --yes; nothing moved")

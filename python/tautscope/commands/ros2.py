@@ -18,6 +18,7 @@ def add_parser(verbs: arguments.Verbs) -> None:
     ros2 = arguments.add_verb(
         verbs,
         "ros2",
+        _ros2,
         help="run the loop as a node of ROS 2, without a ROS installation",
         description="Run the loop as a node of ROS 2: messages of rmw_zenoh over Zenoh. References "
         "come from ROS; docs/interfaces/ros2.md lists the topics. Without --twin or --driver THE "
@@ -81,7 +82,6 @@ def add_parser(verbs: arguments.Verbs) -> None:
     )
     arguments.add_out(ros2, "ros2")
     arguments.add_json(ros2)
-    ros2.set_defaults(run=_ros2)
 
 
 def _ros2(options: argparse.Namespace) -> int:
@@ -91,7 +91,6 @@ def _ros2(options: argparse.Namespace) -> int:
     from tautscope.ros2.inputs import JoyAxes  # noqa: PLC0415
     from tautscope.ros2.session import Node  # noqa: PLC0415
     from tautscope.ros2.start import NAME, start_node  # noqa: PLC0415
-    from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
 
     if options.driver and options.robot is None:
         config, make_rig = load_config(options.config, options.profile), None
@@ -100,7 +99,7 @@ def _ros2(options: argparse.Namespace) -> int:
     if options.device == "joy" and len(options.axes) != len(config.dofs):
         allowed = f"{len(config.dofs)} axes, one per degree of freedom"
         raise ConfigError("--axes", list(options.axes), allowed)
-    folder = check_free(options.out or default_folder("ros2"))
+    folder = arguments.out_folder(options)
     endpoints = {"connect": options.connect}
     if options.listen is not None:
         endpoints = {"connect": "", "listen": options.listen}
