@@ -11,6 +11,7 @@ from tautscope.commands import arguments
 from tautscope.commands.article_config import article_config
 from tautscope.commands.board_images import BoardImages, file_images, live_images, twin_images
 from tautscope.commands.calibration_output import add_options, check_options, finish
+from tautscope.commands.calibration_rig import actual_rig
 from tautscope.commands.printing import print_json
 from tautscope.errors import FieldError
 
@@ -151,10 +152,7 @@ def _images(options: argparse.Namespace, board: Board) -> BoardImages:
         return file_images(options.files)
     config = article_config(options.config)
     if options.twin:
-        from tautscope.twin.drawn_rig import draw_rig  # noqa: PLC0415
-
-        seed = config.twin.seed if options.seed is None else options.seed
-        return twin_images(draw_rig(config, seed), board)
+        return twin_images(actual_rig(config, options.seed), board)
     if options.config is None:
         raise FieldError("files", None, "images, a video, --config FILE of a rig, or --twin")
     return live_images(config, options.seconds)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
 from tautscope.commands import arguments
-from tautscope.commands.printing import print_json
+from tautscope.commands.printing import print_now
 from tautscope.commands.rig_choice import add_rig, add_robot, choose_rig, rig_in_words
 from tautscope.errors import ConfigError
 from tautscope.extras import require_extras
@@ -43,33 +42,21 @@ def add_parser(verbs: arguments.Verbs) -> None:
 def _console(options: argparse.Namespace) -> int:
     if not 0 <= options.port <= 65535:
         raise ConfigError("port", options.port, "a port from 0 to 65535")
+
+    def announce(url: str) -> None:
+        text = f"The console of {what}: {url}\n{note} Ctrl-C ends."
+        print_now(options.json, "url", url, text)
+
     if options.replay is not None:
         require_extras("tautscope console --replay", ["hardware"])
         from tautscope.console.log_player import play  # noqa: PLC0415
 
-        return play(
-            options.replay,
-            options.port,
-            lambda url: _announce(options.json, url, str(options.replay), "Nothing moves."),
-        )
+        what, note = str(options.replay), "Nothing moves."
+        return play(options.replay, options.port, announce)
     require_extras("tautscope console", ["twin" if options.twin else "hardware"])
     from tautscope.console.start import start_console  # noqa: PLC0415
 
     config, make = choose_rig(options, in_real_time=True)
     folder = arguments.out_folder(options)
     what, note = rig_in_words(options), "Whoever has this address can move it."
-    return start_console(
-        make(config),
-        config,
-        folder,
-        options.port,
-        lambda url: _announce(options.json, url, what, note),
-    )
-
-
-def _announce(is_json: bool, url: str, what: str, note: str) -> None:
-    if is_json:
-        print_json({"url": url})
-    else:
-        print(f"The console of {what}: {url}\n{note} Ctrl-C ends.")
-    sys.stdout.flush()
+    return start_console(make(config), config, folder, options.port, announce)

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from tautscope.dof import NamedDof
     from tautscope.report.demo import Demo
     from tautscope.report.rows import Row
-    from tautscope.runs.trials import Trial
 
 SPEED = 12.0
 """Simulated seconds per second and processor, measured on two shared cores in 2026."""
@@ -95,7 +94,8 @@ def _run(options: argparse.Namespace) -> None:
     seeds = range(first, first + options.seeds)
     trials = demo.demo_trials(config)
     runs = len(seeds) * len(trials)
-    seconds = sum(map(_duration, trials))
+    motions = (each.motion or SineSequence(each.config.experiment) for each in trials)
+    seconds = sum(motion.duration for motion in motions)
     processors = min(os.cpu_count() or 1, runs)
     announce(
         f"{runs} runs with {'seeds' if len(seeds) > 1 else 'seed'} {', '.join(map(str, seeds))}",
@@ -132,11 +132,6 @@ def _run_robot(options: argparse.Namespace) -> None:
     config, make = choose_rig(options)
     seed = options.seed or 0
     robot.run(options, config, f"simulated {options.robot}, seed {seed}", make, seed=seed)
-
-
-def _duration(trial: Trial) -> float:
-    """Simulated time of a run [s]."""
-    return (trial.motion or SineSequence(trial.config.experiment)).duration
 
 
 def _load(options: argparse.Namespace) -> Config:

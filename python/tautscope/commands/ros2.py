@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import sys
 
 from tautscope.commands import arguments
-from tautscope.commands.printing import print_json
+from tautscope.commands.printing import print_now
 from tautscope.commands.rig_choice import add_rig, add_robot, choose_rig, rig_in_words
 from tautscope.config import load_config
 from tautscope.errors import ConfigError
@@ -121,19 +120,11 @@ def _ros2(options: argparse.Namespace) -> int:
             make_rig=make_rig,
             device=options.device,
             layout=JoyAxes(tuple(options.axes), options.button),
-            on_result=lambda text: _print(options, "result", text),
+            on_result=lambda text: print_now(options.json, "result", text, text),
         )
 
 
 def _announce(options: argparse.Namespace, name: str) -> None:
     what = "a driver in ROS" if options.driver else rig_in_words(options)
     text = f"The node {name} commands {what}, once it is enabled. Ctrl-C ends."
-    _print(options, "node", name, text)
-
-
-def _print(options: argparse.Namespace, key: str, value: str, text: str = "") -> None:
-    if options.json:
-        print_json({key: value})
-    else:
-        print(text or value)
-    sys.stdout.flush()
+    print_now(options.json, "node", name, text)
