@@ -20,6 +20,7 @@ from xml.etree import ElementTree
 
 from tautscope import Config, TautscopeError, __version__, load_config
 from tautscope.config import dump_config
+from tautscope.errors import ConfigError
 
 try:
     import fmpy
@@ -29,7 +30,6 @@ except ModuleNotFoundError:
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
-DOFS = {"insertion": "m", "rotation": "rad", "bending": "rad"}
 COORDINATES = ("a_x", "a_y", "b_x", "b_y")
 LIBRARIES = ("-lpthread", "-ldl", "-lm")
 TIME_LIMIT = 60
@@ -40,13 +40,15 @@ On a busy computer a start takes a tenth of it, most of it for imports.
 
 
 class Variable(NamedTuple):
-    """A variable of a unit; its index is its value reference."""
+    """A variable of a unit; its index is its value reference. `*` is every degree of freedom."""
 
     name: str
     role: Literal["time", "input", "fixed", "tunable", "output"]
     description: str
     unit: str = ""
     start: float | bool | str = 0.0
+    group: str = ""
+    """The name before `*`: the first one's in C."""
 
     @property
     def type(self) -> str:
@@ -54,17 +56,14 @@ class Variable(NamedTuple):
         return {bool: "Boolean", int: "Int32", str: "String"}.get(type(self.start), "Float64")
 
 
-def per_dof(prefix: str, role: Literal["input", "output"], description: str) -> list[Variable]:
-    """A variable for each degree of freedom."""
-    return [Variable(f"{prefix}_{dof}", role, description, unit) for dof, unit in DOFS.items()]
-
-
-def markers(role: Literal["input", "output"]) -> list[Variable]:
-    """What an image contributes."""
+def measured(role: Literal["input", "output"]) -> list[Variable]:
+    """What an image contributes; of a robot with [[dof]], what its sensor does."""
     band = "Centroid of a marker band; NaN if it was not found"
     return [
         Variable("has_image", role, "Whether an image has arrived since the last step", "", False),
-        Variable("captured_at", role, "When the last image was captured", "s"),
+        Variable("has_measured", role, "Whether it was measured since the last step", "", False),
+        Variable("captured_at", role, "When the last image or measurement was taken", "s"),
+        Variable("measured_*", role, "Position of the tip; NaN: not measured"),
         *(Variable(f"features_{name}", role, band, "px") for name in COORDINATES),
     ]
 
@@ -72,39 +71,39 @@ def markers(role: Literal["input", "output"]) -> list[Variable]:
 TIME = Variable("time", "time", "Time of the simulation", "s")
 TWIN = [
     TIME,
-    *per_dof("command", "input", "Command to the drives"),
+    Variable("command_*", "input", "Command to the drives"),
     Variable("seed", "fixed", "Random seed: another instrument", "", 0),
     Variable(
         "has_camera", "fixed", "Whether there are images; without them it is faster", "", True
     ),
     Variable("python", "fixed", "Python interpreter with tautscope[twin]", "", sys.executable),
-    *per_dof("applied", "output", "Position that the drives report"),
-    *per_dof("true", "output", "State of the tip"),
-    *markers("output"),
+    Variable("applied_*", "output", "Position that the drives report"),
+    Variable("true_*", "output", "State of the tip"),
+    *measured("output"),
 ]
 """`twin.c` expects the outputs together, as `twin_process.py` sends them."""
 
 LOOP = [
     TIME,
-    *per_dof("reference", "input", "Reference of the operator"),
+    Variable("reference_*", "input", "Reference of the operator"),
     Variable("reference_age", "input", "Time since the reference was made; NaN: not known", "s"),
-    *markers("input"),
+    *measured("input"),
     Variable("engage", "input", "Rising edge: resume held motion", "", False),
     Variable("acknowledge", "input", "Rising edge: acknowledge warnings", "", False),
     Variable("drive_fault", "input", "Rising edge: a drive has failed", "", False),
     Variable("compensation", "tunable", "Share of the compensation in use, 0 to 1", "", 1.0),
-    *per_dof("command", "output", "Command to the drives"),
-    *per_dof("delta_minus", "output", "Negative contact offset"),
-    *per_dof("delta_plus", "output", "Positive contact offset"),
-    *per_dof("estimate", "output", "State estimate; NaN: not known"),
-    Variable("status", "output", "Result of the last image, a TautscopeStatus", "", 0),
+    Variable("command_*", "output", "Command to the drives"),
+    Variable("delta_minus_*", "output", "Negative contact offset"),
+    Variable("delta_plus_*", "output", "Positive contact offset"),
+    Variable("estimate_*", "output", "State estimate; NaN: not known"),
+    Variable("status", "output", "Result of the last update, a TautscopeStatus", "", 0),
     Variable("reaction", "output", "From 6 on the drives must stop; a TautscopeReaction", "", 0),
     Variable("flags", "output", "Active flags, a bit 1 << TautscopeFlag each", "", 0),
 ]
 UNITS = {"twin": TWIN, "loop": LOOP}
 DESCRIPTIONS = {
     "twin": "Simulated flexible endoscopic instrument with hysteresis and a camera",
-    "loop": "Image-based hysteresis compensation for flexible endoscopic instruments",
+    "loop": "Hysteresis compensation for robotic flexible instruments",
 }
 CAUSALITY = {
     "time": ("independent", "continuous"),
@@ -115,9 +114,25 @@ CAUSALITY = {
 }
 
 
+def variables_of(kind: str, config: Config) -> list[Variable]:
+    """The variables of a unit, of the degrees of freedom and the sensor of the configuration."""
+    if config.dof and kind == "twin":
+        names = [dof.name for dof in config.dof]
+        raise ConfigError("dof", names, "none: the twin is the article's instrument")
+    absent = ("has_image", "features_") if config.dof else ("has_measured", "measured_")
+    variables: list[Variable] = []
+    for each in UNITS[kind]:
+        group, star, _ = each.name.partition("_*")
+        for dof in config.dofs if star else ():
+            unit = "m" if dof.display_unit == "mm" else "rad"
+            variables.append(each._replace(name=f"{group}_{dof.label}", unit=unit, group=group))
+        variables += [] if star else [each]
+    return [each for each in variables if not each.name.startswith(absent)]
+
+
 def token(kind: str, config: Config) -> str:
     """The instantiation token: another one for other variables or another configuration."""
-    return sha256(f"{UNITS[kind]}{dump_config(config)}".encode()).hexdigest()[:32]
+    return sha256(f"{variables_of(kind, config)}{dump_config(config)}".encode()).hexdigest()[:32]
 
 
 def start_text(variable: Variable) -> str:
@@ -127,7 +142,8 @@ def start_text(variable: Variable) -> str:
 
 def model_description(kind: str, config: Config) -> bytes:
     """The unit's modelDescription.xml."""
-    variables, name, period = UNITS[kind], f"tautscope_{kind}", repr(config.control.period)
+    variables, name = variables_of(kind, config), f"tautscope_{kind}"
+    period = repr(config.control.period)
     root = ElementTree.Element("fmiModelDescription", fmiVersion="3.0", modelName=name)
     root.attrib |= {"instantiationToken": token(kind, config), "version": __version__}
     root.attrib |= {"description": DESCRIPTIONS[kind], "generationTool": "tautscope"}
@@ -167,8 +183,9 @@ def quoted(text: str) -> str:
 
 def header(kind: str, config: Config) -> str:
     """`variables.h` of `unit.c`: indices, types, roles and start values."""
-    variables = UNITS[kind]
-    names = ", ".join(variable.name.upper() for variable in variables)
+    variables = variables_of(kind, config)
+    first = {v.group or v.name: index for index, v in reversed(list(enumerate(variables)))}
+    names = ", ".join(f"{name.upper()} = {index}" for name, index in first.items())
     rows = ", ".join(
         f"{{{v.type.upper()}, {v.role.upper() if v.role != 'time' else 'OUTPUT'}, "
         f"{0.0 if v.type == 'String' else float(v.start)!r}}}"
@@ -177,7 +194,7 @@ def header(kind: str, config: Config) -> str:
     text = next((str(v.start) for v in variables if v.type == "String"), "")
     outputs = sum(variable.role == "output" for variable in variables)
     return (
-        f"enum {{ {names}, VARIABLES }};\n"
+        f"enum {{ {names}, VARIABLES = {len(variables)} }};\n"
         "enum { NONE, FLOAT64, INT32, BOOLEAN, STRING };\n"
         "enum { INPUT, FIXED, TUNABLE, OUTPUT };\n"
         f"#define OUTPUTS {outputs}\n"
@@ -240,10 +257,9 @@ def main() -> None:
     parser.add_argument("--config", metavar="FILE", help="TOML file; missing keys are the defaults")
     options = parser.parse_args()
     try:
-        config = load_config(options.config)
+        build(options.kind, options.out, load_config(options.config))
     except TautscopeError as error:
         parser.error(str(error))
-    build(options.kind, options.out, config)
     print(options.out)
 
 

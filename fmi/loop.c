@@ -11,11 +11,11 @@ static fmi3Status checked(Unit *unit, TautscopeResult result) {
         return fmi3Error;
     }
     const LoopBlock *block = unit->content;
-    for (int dof = 0; dof < 3; ++dof) {
-        unit->values[COMMAND_INSERTION + dof] = block->command[dof];
-        unit->values[DELTA_MINUS_INSERTION + dof] = block->report.delta_minus[dof];
-        unit->values[DELTA_PLUS_INSERTION + dof] = block->report.delta_plus[dof];
-        unit->values[ESTIMATE_INSERTION + dof] = block->report.state_estimate[dof];
+    for (size_t dof = 0; dof < block->dofs; ++dof) {
+        unit->values[COMMAND + dof] = block->command[dof];
+        unit->values[DELTA_MINUS + dof] = block->report.delta_minus[dof];
+        unit->values[DELTA_PLUS + dof] = block->report.delta_plus[dof];
+        unit->values[ESTIMATE + dof] = block->report.state_estimate[dof];
     }
     unit->values[STATUS] = block->report.status;
     unit->values[REACTION] = block->supervision.reaction;
@@ -41,10 +41,11 @@ fmi3Status content_step(Unit *unit, double time, long periods) {
     const double *values = unit->values;
     TautscopeResult result = TAUTSCOPE_RESULT_OK;
     for (long i = 0; i < periods && result == TAUTSCOPE_RESULT_OK; ++i) {
-        result = block_tick(block, values + REFERENCE_INSERTION, values[REFERENCE_AGE], time + (double)i * PERIOD,
+        result = block_tick(block, values + REFERENCE, values[REFERENCE_AGE], time + (double)i * PERIOD,
                             values + ENGAGE, values[COMPENSATION]);
-        if (i == 0 && result == TAUTSCOPE_RESULT_OK && values[HAS_IMAGE] != 0.0) {
-            result = block_update(block, values + FEATURES_A_X, values[CAPTURED_AT]);
+        /* Whether there is an image or a measurement, when it was taken, and its values follow one another. */
+        if (i == 0 && result == TAUTSCOPE_RESULT_OK && values[CAPTURED_AT - 1] != 0.0) {
+            result = block_update(block, values + CAPTURED_AT + 1, values[CAPTURED_AT]);
         }
     }
     return checked(unit, result);

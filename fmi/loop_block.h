@@ -21,15 +21,19 @@ enum { BLOCK_ENGAGE, BLOCK_ACKNOWLEDGE, BLOCK_DRIVE_FAULT, BLOCK_ACTIONS };
 
 typedef struct {
     TautscopeLoop *loop;
-    TautscopeReport report; /* of the last image */
+    size_t dofs, measured; /* numbers of a reference and of a measurement */
+    double period;
+    int has_bands;
+    TautscopeTipReport report; /* of the last measurement */
     TautscopeSupervision supervision;
-    double command[3];
+    double command[8];
     int was_set[BLOCK_ACTIONS];
     double share;
 } LoopBlock;
 
-/* Creates the loop from a file that has every key of the configuration; on failure `message` says why. 1 on success. */
+/* Creates the loop from the file of a configuration, without [[dof]] with every key; else 0, and `message` says why. */
 static inline int block_create(LoopBlock *block, const char *file, char *message, size_t length) {
+    TautscopeStatePrediction bands;
     FILE *stream = fopen(file, "rb");
     char *toml = NULL;
     long size = -1;
@@ -42,12 +46,13 @@ static inline int block_create(LoopBlock *block, const char *file, char *message
     }
     if (!toml || fread(toml, 1, (size_t)size, stream) != (size_t)size) {
         snprintf(message, length, "File cannot be read: %s", file);
-    } else if (tautscope_loop_create((const uint8_t *)toml, (size_t)size, &block->loop) != TAUTSCOPE_RESULT_OK ||
-               tautscope_loop_predict_state(block->loop, 0.0, &(TautscopeStatePrediction){.is_known = 0}) != TAUTSCOPE_RESULT_OK) {
-        /* The second refuses a robot with [[dof]]: the signals are those of the article's instrument. */
+    } else if (tautscope_loop_create((const uint8_t *)toml, (size_t)size, &block->loop) != TAUTSCOPE_RESULT_OK) {
         snprintf(message, length, "%s: %s", file, tautscope_error_message());
-        tautscope_loop_destroy(block->loop);
-        block->loop = NULL;
+    } else {
+        (void)tautscope_loop_size(block->loop, &block->dofs, &block->period);
+        /* With [[dof]] no bands can be predicted. */
+        block->has_bands = tautscope_loop_predict_state(block->loop, 0.0, &bands) == TAUTSCOPE_RESULT_OK;
+        block->measured = block->has_bands ? 4 : block->dofs;
     }
     free(toml);
     if (stream) {
@@ -75,16 +80,30 @@ static inline TautscopeResult block_tick(LoopBlock *block, const double *referen
         block->share = share;
     }
     if (result == TAUTSCOPE_RESULT_OK) {
-        result = tautscope_loop_step(block->loop, 3, reference, time - age, time, block->command);
+        result = tautscope_loop_step(block->loop, block->dofs, reference, time - age, time, block->command);
     }
     return result == TAUTSCOPE_RESULT_OK ? tautscope_loop_supervision(block->loop, &block->supervision) : result;
 }
 
-/* An image update after the tick; `features` (4) in px, NaN for a band that was not found. */
-static inline TautscopeResult block_update(LoopBlock *block, const double *features, double captured_at) {
-    const int has_band = !(isnan(features[0]) && isnan(features[1]) && isnan(features[2]) && isnan(features[3]));
-    const TautscopeResult result =
-        tautscope_loop_on_features(block->loop, has_band ? features : NULL, captured_at, &block->report);
+/* An update after the tick: features (4) in px, NaN for a band that was not found; with [[dof]] the tip (n) in m or rad, NaN for
+   what was not measured. All NaN are an image without bands, but no measurement of the tip. */
+static inline TautscopeResult block_update(LoopBlock *block, const double *measured, double captured_at) {
+    const TautscopeMeasurement tip = {.values = measured, .count = block->dofs, .captured_at = captured_at};
+    TautscopeReport image = {.size = sizeof image};
+    TautscopeResult result = TAUTSCOPE_RESULT_OK;
+    int known = 0;
+    for (size_t i = 0; i < block->measured; ++i) {
+        known += !isnan(measured[i]);
+    }
+    if (block->has_bands) {
+        result = tautscope_loop_on_features(block->loop, known > 0 ? measured : NULL, captured_at, &image);
+        block->report.status = image.status;
+        memcpy(block->report.state_estimate, image.state_estimate, sizeof image.state_estimate);
+        memcpy(block->report.delta_minus, image.delta_minus, sizeof image.delta_minus);
+        memcpy(block->report.delta_plus, image.delta_plus, sizeof image.delta_plus);
+    } else if (known > 0) {
+        result = tautscope_loop_on_tip(block->loop, &tip, &block->report);
+    }
     return result == TAUTSCOPE_RESULT_OK ? tautscope_loop_supervision(block->loop, &block->supervision) : result;
 }
 

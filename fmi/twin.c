@@ -75,7 +75,7 @@ static fmi3Status receive_outputs(Unit *unit, long periods) {
     if (!receive_all(unit, outputs, sizeof outputs, limit)) {
         return fmi3Error;
     }
-    memcpy(unit->values + APPLIED_INSERTION, outputs, sizeof outputs);
+    memcpy(unit->values + APPLIED, outputs, sizeof outputs);
     return fmi3OK;
 }
 
@@ -118,7 +118,7 @@ fmi3Status content_start(Unit *unit) {
 }
 
 fmi3Status content_step(Unit *unit, double time, long periods) {
-    const double *command = unit->values + COMMAND_INSERTION;
+    const double *command = unit->values + COMMAND;
     const double request[4] = {(double)periods, command[0], command[1], command[2]};
     (void)time;
     /* It does not block, as the process has read the one before. A process that has ended may have left a message. */

@@ -1,13 +1,14 @@
 /* S-function of the loop for Simulink: a C-MEX file, Level 2. build.m compiles it.
 
-   Dialog parameters: file of the configuration with every key, as `tautscope config` prints it; share of the compensation, 0 to 1.
-   Input ports: 1 reference (3), 2 its age (s), 3 features (4), 4 whether there is a new image, 5 captured_at (s),
-   6 engage, acknowledge, drive fault (3).
-   Output ports: 1 command (3), 2 delta_minus (3), 3 delta_plus (3), 4 state estimate (3),
+   Dialog parameters: file of the configuration, without [[dof]] with every key, as `tautscope config` prints it; share of the
+   compensation, 0 to 1.
+   Input ports: 1 reference (n), 2 its age (s), 3 features (4), with [[dof]] the tip (n), 4 whether there is a new measurement,
+   5 captured_at (s), 6 engage, acknowledge, drive fault (3).
+   Output ports: 1 command (n), 2 delta_minus (n), 3 delta_plus (n), 4 state estimate (n),
    5 status, reaction, flags as numbers of tautscope.h (3).
 
-   The sample time is `control.period`. Only the command and port 5 depend on the reference of the tick; an image changes the
-   outputs of the next tick, so that a plant with a camera closes the loop without an algebraic loop. */
+   The sample time is `control.period`. Only the command and port 5 depend on the reference of the tick; a measurement changes the
+   outputs of the next tick, so that a plant with a sensor closes the loop without an algebraic loop. */
 
 #define S_FUNCTION_NAME sfun_tautscope
 #define S_FUNCTION_LEVEL 2
@@ -17,11 +18,8 @@
 #include <loop_block.h>
 
 enum { FILE_PARAMETER, SHARE_PARAMETER, PARAMETERS };
-enum { REFERENCE, AGE, FEATURES, HAS_IMAGE, CAPTURED_AT, ACTIONS, INPUTS };
+enum { REFERENCE, AGE, MEASURED, HAS_MEASURED, CAPTURED_AT, ACTIONS, INPUTS };
 enum { COMMAND, DELTA_MINUS, DELTA_PLUS, STATE_ESTIMATE, STATE, OUTPUTS };
-
-static const int input_widths[INPUTS] = {3, 1, 4, 1, 1, BLOCK_ACTIONS};
-static const int output_widths[OUTPUTS] = {3, 3, 3, 3, 3};
 
 /* Simulink reads the text after the function has returned. */
 static char message[8192];
@@ -37,6 +35,13 @@ static LoopBlock *create(SimStruct *S) {
     free(block);
     ssSetErrorStatus(S, message);
     return NULL;
+}
+
+static void destroy(LoopBlock *block) {
+    if (block) {
+        tautscope_loop_destroy(block->loop);
+        free(block);
+    }
 }
 
 static void check(SimStruct *S, TautscopeResult result) {
@@ -65,6 +70,14 @@ static void mdlInitializeSizes(SimStruct *S) {
     if (ssGetErrorStatus(S) != NULL) {
         return;
     }
+    LoopBlock *block = create(S);
+    if (!block) {
+        return;
+    }
+    const int n = (int)block->dofs, measured = (int)block->measured;
+    const int input_widths[INPUTS] = {n, 1, measured, 1, 1, BLOCK_ACTIONS};
+    const int output_widths[OUTPUTS] = {n, n, n, n, 3};
+    destroy(block);
     ssSetSFcnParamTunable(S, FILE_PARAMETER, SS_PRM_NOT_TUNABLE);
     if (!ssSetNumInputPorts(S, INPUTS) || !ssSetNumOutputPorts(S, OUTPUTS)) {
         return;
@@ -82,15 +95,12 @@ static void mdlInitializeSizes(SimStruct *S) {
 }
 
 static void mdlInitializeSampleTimes(SimStruct *S) {
-    double period = 0.0;
     LoopBlock *block = create(S);
     if (block) {
-        check(S, tautscope_loop_size(block->loop, NULL, &period));
-        tautscope_loop_destroy(block->loop);
-        free(block);
-        ssSetSampleTime(S, 0, period);
+        ssSetSampleTime(S, 0, block->period);
         ssSetOffsetTime(S, 0, 0.0);
     }
+    destroy(block);
 }
 
 #define MDL_START
@@ -103,7 +113,7 @@ static void mdlOutputs(SimStruct *S, int_T tid) {
     check(S, block_tick(block, (const double *)ssGetInputPortSignal(S, REFERENCE), *(const double *)ssGetInputPortSignal(S, AGE),
                         ssGetT(S), (const double *)ssGetInputPortSignal(S, ACTIONS),
                         mxGetScalar(ssGetSFcnParam(S, SHARE_PARAMETER))));
-    for (int dof = 0; dof < 3; ++dof) {
+    for (size_t dof = 0; dof < block->dofs; ++dof) {
         ssGetOutputPortRealSignal(S, COMMAND)[dof] = block->command[dof];
         ssGetOutputPortRealSignal(S, DELTA_MINUS)[dof] = block->report.delta_minus[dof];
         ssGetOutputPortRealSignal(S, DELTA_PLUS)[dof] = block->report.delta_plus[dof];
@@ -117,19 +127,15 @@ static void mdlOutputs(SimStruct *S, int_T tid) {
 #define MDL_UPDATE
 static void mdlUpdate(SimStruct *S, int_T tid) {
     (void)tid;
-    if (*(const double *)ssGetInputPortSignal(S, HAS_IMAGE) != 0.0) {
-        check(S, block_update((LoopBlock *)ssGetPWorkValue(S, 0), (const double *)ssGetInputPortSignal(S, FEATURES),
+    if (*(const double *)ssGetInputPortSignal(S, HAS_MEASURED) != 0.0) {
+        check(S, block_update((LoopBlock *)ssGetPWorkValue(S, 0), (const double *)ssGetInputPortSignal(S, MEASURED),
                               *(const double *)ssGetInputPortSignal(S, CAPTURED_AT)));
     }
 }
 
 static void mdlTerminate(SimStruct *S) {
-    LoopBlock *block = (LoopBlock *)ssGetPWorkValue(S, 0);
-    if (block) {
-        tautscope_loop_destroy(block->loop);
-        free(block);
-        ssSetPWorkValue(S, 0, NULL);
-    }
+    destroy((LoopBlock *)ssGetPWorkValue(S, 0));
+    ssSetPWorkValue(S, 0, NULL);
 }
 
 #ifdef MATLAB_MEX_FILE

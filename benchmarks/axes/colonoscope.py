@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tautscope.calibration.robot import Sweep, fit, move
+from tautscope.calibration.robot import fit, move, sweep_motion
 from tautscope.commands.robot_calibration import result
 from tautscope.config import load_config
 from tautscope.report.operator_motion import evaluate_operator_motion, motion_of
@@ -32,7 +32,9 @@ def simulate(job: Job) -> list[float]:
         record = move(rig, motion_of(config, seed, 60.0), config)
         rig.close()
         return [fit(record, config, ["kinematics"]).values["measurement.delays[0]"]]
-    found = fit(move(ColonoscopeTwin(seed, delay=DELAY), Sweep(config), config), config, KEPT)
+    found = fit(
+        move(ColonoscopeTwin(seed, delay=DELAY), sweep_motion(config), config), config, KEPT
+    )
     calibrated = config.replace(**result("robot", found, config).rounded_values())
     motion = motion_of(config, seed, 120.0)
     free, *runs = (

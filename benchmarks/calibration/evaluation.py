@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from calibration.records import Case, Floats, contradictory, noisy_features
 from common.small_images import with_small_images
+from scipy.spatial.transform import Rotation
 from tautscope.calibration.geometry import GeometryFit, fit
-from tautscope.calibration.geometry.parameters import matrix
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import MotionHeldError, RecordError
@@ -103,10 +103,10 @@ def _compare(found: GeometryFit, actual: Config) -> tuple[dict[str, float], dict
     """Errors with the free directions aside, and whether the intervals contain the truth."""
     fitted = found.config
     pose, truth = fitted.camera.camera_from_guide, actual.camera.camera_from_guide
-    rotation = matrix(truth.rotation)
+    rotation = Rotation.from_rotvec(truth.rotation).as_matrix()
     channel, across = rotation[:, 2], rotation[:, :2]
     shift = np.array(pose.translation) - np.array(truth.translation)
-    turned = matrix(pose.rotation) @ rotation.T
+    turned = Rotation.from_rotvec(pose.rotation).as_matrix() @ rotation.T
     turn = 0.5 * np.array(
         [turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]]
     )

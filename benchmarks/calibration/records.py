@@ -9,7 +9,8 @@ from typing import Literal
 import numpy as np
 from common.small_images import full_size, with_small_images
 from numpy.typing import NDArray
-from tautscope.calibration.geometry import Recording, SweepReference, sweep
+from tautscope.calibration.geometry import Recording, sweep
+from tautscope.calibration.motion import sweep_motion
 from tautscope.config import Config, load_config
 from tautscope.loop.rig import Frame
 from tautscope.twin import Twin
@@ -90,7 +91,7 @@ def noisy_features(frame: Frame, noise: float, random: np.random.Generator) -> F
 def _feature_record(case: Case) -> Recording:
     ticks, images = [], []
     random, due = np.random.default_rng([case.seed, 1]), -np.inf
-    rig, reference = Twin(with_small_images(case.actual)), SweepReference(case.told)
+    rig, reference = Twin(with_small_images(case.actual)), sweep_motion(case.told)
     sample = rig.reset()
     while sample.time < reference.duration:
         ticks.append((sample.time, sample.applied))

@@ -14,6 +14,9 @@ with rows of float64:
 is the tip degree by degree, 1 that of `_own` by differences, 2 with its Jacobian.
 ``NAME-short.toml`` has only the keys that are not defaults.
 
+``tip_paper`` and ``tip_best`` are of two degrees of freedom, measured as they are: the same files,
+with (2,) in place of (3,), and in ``NAME.images`` the tip (2,) in place of features.
+
 ``frames.pixels`` has the images themselves, ``frames.workspace`` the states (3,) that the detection
 starts from without a prediction: starts, their standard deviations, postures. Units are m, rad, s,
 px; NaN is not known.
@@ -27,7 +30,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from tautscope import Config, Frame, HysteresisReduction, Report
+from tautscope import Config, Frame, HysteresisReduction, Report, axes
 from tautscope.config import ControlConfig, Profile, dump_config, load_config
 from tautscope.loop.construction import build_feature_model
 from tautscope.loop.reduction import Status
@@ -259,14 +262,38 @@ def record_axes(folder: Path, profile: Profile) -> None:
     np.array(rows).astype("<f8").tofile(folder / f"{name}.measurements")
 
 
+SLACK = np.array([0.6, 8e-3])
+"""Of the two plays of `record_tip` [rad, m]."""
+
+
+def record_tip(profile: Profile) -> Record:
+    """40 s at 200 Hz of two plays, whose tip is measured 25 times a second, 50 ms late."""
+    robot = axes(2, width_limit=[1.2, 12e-3], unit=["rad", "m"], names=["bend", "slide"])
+    record = Record(robot.replace(profile=profile))
+    random = np.random.default_rng(SEED)
+    tip, late = np.zeros(2), []
+    for tick in range(8000):
+        time = tick * 0.005
+        reference = [1.0, 10e-3] * np.sin(2 * np.pi * time / np.array([4.0, 5.0]))
+        command = record.step(time, reference, {4000: 4, 4400: 5}.get(tick, 0))
+        tip = np.clip(tip, command - SLACK / 2, command + SLACK / 2)
+        late.append((time, tip + random.normal(0, 1e-3, 2) * [1.2, 12e-3]))
+        if tick >= 10 and tick % 8 == 0:
+            at, values = late[tick - 10]
+            values[tick // 8 % 7 :][:1] = np.nan
+            record.keep(record.loop.on_tip(values, at), values)
+    return record
+
+
 def main() -> None:
     folder = Path(sys.argv[1])
     folder.mkdir(parents=True, exist_ok=True)
     for profile in ("paper", "best"):
         record_features(profile).write(folder, profile)
         record_axes(folder, profile)
+        record_tip(profile).write(folder, f"tip_{profile}")
     record_frames(folder).write(folder, "frames")
-    print(f"{folder}: 60 s of profiles paper and best and of a robot with [[dof]], 2 s of images")
+    print(f"{folder}: 60 s of profiles paper and best and of robots with [[dof]], 2 s of images")
 
 
 if __name__ == "__main__":

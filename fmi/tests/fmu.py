@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import build
 import fmpy
 import numpy as np
 import record
@@ -13,7 +12,7 @@ from tautscope import Config
 
 CONFIG = Config().replace(**{"twin.seed": 3})
 PERIOD = CONFIG.control.period
-DOFS = tuple(build.DOFS)
+DOFS = ("insertion", "rotation", "bending")
 
 
 class Unit:
@@ -22,6 +21,7 @@ class Unit:
     def __init__(self, path: Path, folder: Path, **parameters: float | str) -> None:
         description = fmpy.read_model_description(str(path))
         self._types = {v.name: (v.type, v.valueReference) for v in description.modelVariables}
+        self.dofs = [name[8:] for name in self._types if name.startswith("command_")]
         self.messages: list[str] = []
         self._fmu = FMU3Slave(
             guid=description.guid,
@@ -58,11 +58,11 @@ class Unit:
         return np.array(values, dtype=np.float64)
 
     def set_all(self, prefix: str, values: NDArray[np.float64]) -> None:
-        for dof, value in zip(DOFS, values, strict=True):
+        for dof, value in zip(self.dofs, values, strict=True):
             self.set(f"{prefix}_{dof}", value)
 
     def get_all(self, prefix: str) -> NDArray[np.float64]:
-        return self.get(*(f"{prefix}_{dof}" for dof in DOFS))
+        return self.get(*(f"{prefix}_{dof}" for dof in self.dofs))
 
     def step(self, at: float, size: float = PERIOD) -> None:
         self._fmu.doStep(at, size)

@@ -15,6 +15,8 @@ import pytest
 from conftest import Builder
 from fmpy.fmi1 import FMICallException
 from fmu import CONFIG, PERIOD, Unit
+from tautscope import axes
+from tautscope.errors import ConfigError
 
 
 @contextmanager
@@ -40,6 +42,16 @@ def test_bad_use_is_an_error_with_a_message(opened: Callable[..., Unit]) -> None
     with refused(twin, "command"):
         twin.set_all("command", np.array([np.nan, 0, 0]))
         twin.step(0.0)
+
+
+def test_a_robot_without_a_unit_is_refused_by_name(opened: Callable[..., Unit]) -> None:
+    robot = axes(2, width_limit=1.2, names=["bend_x", "bend_y"])
+    with pytest.raises(ConfigError, match=r"dof: got \['bend_x', 'bend_y'\], expected none"):
+        opened("twin", robot)
+    with pytest.raises(
+        RuntimeError, match=r'kinematics\.kind: got "two_planes", expected "joints"'
+    ):
+        opened("loop", robot.replace(**{"kinematics.kind": "two_planes"}))
 
 
 def test_an_interpreter_that_does_not_exist_is_named(opened: Callable[..., Unit]) -> None:

@@ -121,6 +121,38 @@ def test_the_loop_in_fmpy_is_the_loop_in_python(
     np.testing.assert_array_equal(answers, np.array(recording.images)[:, 6:18])
 
 
+@pytest.mark.parametrize("profile", ["paper", "best"])
+def test_the_loop_of_two_degrees_of_freedom_finds_their_slack_as_in_python(
+    profile: Profile, opened: Callable[..., Unit], builder: Builder
+) -> None:
+    """Late measurements, of which the half misses a degree of freedom."""
+    recording = record.record_tip(profile)
+    variables = fmpy.read_model_description(str(builder("loop", recording.config))).modelVariables
+    units = {v.name: v.unit for v in variables}
+    assert [units["measured_bend"], units["command_slide"]] == ["rad", "m"]
+    unit = opened("loop", recording.config)
+    images = {int(row[0]): row for row in recording.images}
+    for k, (at, _, *numbers) in enumerate(recording.ticks):
+        unit.set_all("reference", np.array(numbers[:2]))
+        unit.set("reference_age", np.nan)
+        if numbers[2]:
+            unit.set("compensation", 0.5 if numbers[2] == 4 else 1.0)
+        # Without any value it is no measurement.
+        seen = images.get(k, np.full(4, np.nan))
+        unit.set("has_measured", k in images or k % 100 == 50)
+        unit.set("captured_at", seen[1])
+        unit.set_all("measured", seen[2:4])
+        unit.step(at)
+        np.testing.assert_array_equal(unit.get_all("command"), numbers[3:])
+        if k in images:
+            state = unit.get("status", "reaction", "flags")
+            offsets = [unit.get_all(name) for name in ("estimate", "delta_minus", "delta_plus")]
+            np.testing.assert_array_equal(np.concatenate([state, *offsets]), seen[4:13])
+    found = unit.get_all("delta_plus") - unit.get_all("delta_minus")
+    print(f"loop, {profile}: slack found {found}, simulated {record.SLACK}")
+    np.testing.assert_allclose(found, record.SLACK, rtol=0.02)
+
+
 def test_the_two_units_together_are_the_loop_on_the_twin(opened: Callable[..., Unit]) -> None:
     """Images of the one unit go to the other, commands back; 10 s."""
     plant, loop = opened("twin", seed=3), opened("loop")

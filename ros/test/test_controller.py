@@ -18,10 +18,11 @@ def test_the_plugin_gives_the_commands_of_the_loop(tmp_path):
     import record
 
     record.record_features("best").write(tmp_path, "best")
+    record.record_tip("best").write(tmp_path, "tip_best")
     program = (
         Path(get_package_prefix("tautscope_control")) / "lib/tautscope_control/controller_test"
     )
-    subprocess.run([program, tmp_path / "best"], check=True, timeout=300)
+    subprocess.run([program, tmp_path / "best", tmp_path / "tip_best"], check=True, timeout=300)
 
 
 def test_a_session_on_mock_hardware(ros, processes, recorded):

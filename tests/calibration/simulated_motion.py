@@ -6,7 +6,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 from play_model import play
-from tautscope.calibration.geometry import Recording, SweepReference
+from tautscope.calibration.geometry import Recording
+from tautscope.calibration.motion import sweep_motion
 from tautscope.config import Config, load_config
 from tautscope.dof import Dof
 from tautscope.loop.construction import build_feature_model
@@ -65,7 +66,7 @@ def simulate(
     """A record of the calibration motion, and the true states of its images."""
     rig = rig or actual()
     time = np.arange(0.0, duration, 0.01)
-    reference = SweepReference(told(), duration)
+    reference = sweep_motion(told(), duration)
     motors = np.array([reference(at) for at in time])
     states = states_of(motors, elastic)[::8]
     features = build_feature_model(rig).predict_all(states, np.zeros(len(states)))[0]

@@ -6,10 +6,16 @@ import cv2
 import numpy as np
 import pytest
 from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
-from tautscope.calibration.bands.click import label_clicks
-from tautscope.calibration.bands.labels import BACKGROUND, BAND_A, BAND_B, labelled
+from tautscope.calibration.bands.labels import (
+    BACKGROUND,
+    BAND_A,
+    BAND_B,
+    from_mask,
+    label_clicks,
+    labelled,
+)
 from tautscope.calibration.bands.motion import find_moving_bands
-from tautscope.calibration.bands.result import fit_colour, from_mask
+from tautscope.calibration.bands.result import fit_colour
 from tautscope.errors import CalibrationError, FieldError
 
 GREEN, GREY, DARK, TISSUE = (40, 120, 35), (110, 112, 114), (25, 24, 26), (95, 110, 190)
@@ -185,7 +191,7 @@ def test_the_discriminant_is_that_of_scikit_learn() -> None:
     # Equal priors weigh the covariances of both classes alike.
     model = LinearDiscriminantAnalysis(solver="lsqr", priors=[0.5, 0.5]).fit(pixels, names)
     expected = model.coef_[0] / np.abs(model.coef_).max()
-    assert fit.discriminant.weights == pytest.approx(expected, rel=0.02, abs=0.02)
+    assert fit.weights == pytest.approx(expected, rel=0.02, abs=0.02)
 
 
 def test_overexposed_pixels_are_ignored() -> None:

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 from refused import failed
-from tautscope.calibration.bands.sweep import ImageSequence, record_motion
+from tautscope.calibration.bands.motion import ImageSequence, record_motion
 from tautscope.cli import main
 from tautscope.config import load_config
 from tautscope.loop.vision import MarkerDetector

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from boards import BOARD, CONFIG, FISHEYE, SIZE, pinhole, projected_views, rendered, values
 from tautscope.calibration.camera.board import Board, View
-from tautscope.calibration.camera.conversion import to_loop_model
 from tautscope.calibration.camera.intrinsics import Intrinsics, fit_intrinsics
+from tautscope.calibration.camera.result import to_loop_model
 from tautscope.errors import CalibrationError, FieldError
 
 

@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 from boards import BOARD, CONFIG, SIZE, rendered
 from tautscope.calibration.camera.board import MODULES
-from tautscope.calibration.camera.collector import ViewCollector
-from tautscope.calibration.camera.coverage import LEAST_VIEWS, Coverage
+from tautscope.calibration.camera.coverage import LEAST_VIEWS, Coverage, ViewCollector
 from tautscope.errors import CalibrationError
 from tautscope.twin.board import BoardCamera
 

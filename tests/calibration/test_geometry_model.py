@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 import pytest
 from play_model import play
 from simulated_motion import actual, simulate, told
 from tautscope import _core
-from tautscope.calibration.geometry.model import Data, Model
+from tautscope.calibration.geometry.model import Model
 from tautscope.calibration.geometry.parameters import (
     INDEX,
     NAMES,
     PARAMETERS,
-    compose,
     estimated,
-    matrix,
 )
 from tautscope.errors import ConfigError, FieldError, SignalError
 from tautscope.loop.construction import build_feature_model
@@ -61,25 +58,11 @@ def test_an_uneven_section_displaces_both_bands_alike_and_a_straight_one_does_no
     np.testing.assert_allclose(found[0, [0, 2]], expected, atol=0.05)
 
 
-def test_rotations_are_those_of_opencv() -> None:
-    random = np.random.default_rng(1)
-    for _ in range(20):
-        first, second = random.normal(0, 1, (2, 3))
-        np.testing.assert_allclose(matrix(first), cv2.Rodrigues(first)[0], atol=1e-12)
-        both = cv2.Rodrigues(first)[0] @ cv2.Rodrigues(second)[0]
-        np.testing.assert_allclose(cv2.Rodrigues(compose(first, second))[0], both, atol=1e-12)
-    np.testing.assert_allclose(matrix(np.zeros(3)), np.eye(3))
-    np.testing.assert_allclose(compose(np.zeros(3), (0.0, 0.0, 0.0)), np.zeros(3))
-
-
 def test_derivatives_are_those_of_differences() -> None:
     """By state and by parameter, with a step ten times as large as the model's own."""
     recording, states = simulate(duration=10.0)
     found = recording.found
-    data = Data(
-        recording.time, recording.motors, recording.captured_at[found], recording.features[found]
-    )
-    model = Model(told(), data, None)
+    model = Model(told(), recording.with_bands(), None)
     active = np.ones(len(NAMES), np.bool_)
     z = np.random.default_rng(2).normal(0, 0.3, len(NAMES))
     whole = np.column_stack([states[found], np.full(found.sum(), 0.02)])
@@ -148,12 +131,12 @@ def test_the_free_directions_are_fixed() -> None:
 
 
 def test_the_actual_rig_is_at_the_differences_of_its_parameters() -> None:
-    """`Geometry` at the true differences predicts what the actual configuration predicts."""
+    """The model at the true differences predicts what the actual configuration predicts."""
     config, rig = told(), actual()
     recording, _ = simulate(duration=5.0)
     model = Model(
         config,
-        Data(recording.time, recording.motors, recording.captured_at, recording.features),
+        recording,
         None,
     )
     truth = np.zeros(len(NAMES))
@@ -175,8 +158,7 @@ def test_one_factor_of_all_lengths_and_of_insertion_changes_no_feature() -> None
     config = config.replace(
         **{"instrument.diameter": 1e-5, "instrument.band_length": 1e-5}  # they are not estimated
     )
-    data = Data(recording.time, recording.motors, recording.captured_at, recording.features)
-    model = Model(config, data, None)
+    model = Model(config, recording, None)
     z, active = np.zeros(len(NAMES)), np.ones(len(NAMES), dtype=bool)
     states = np.column_stack([states + np.array([2e-3, 0.1, -0.1]), np.zeros(len(states))])
     by_z = model.by_parameters(z, states, active)

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 from tautscope import Config, Points, Pose, Sample, Tip, axes
-from tautscope.calibration.robot import MotionRecord, RobotFit, Sweep, fit, move
+from tautscope.calibration.robot import MotionRecord, RobotFit, fit, move, sweep_motion
 from tautscope.config import DofEntry, KinematicsConfig
 from tautscope.errors import CalibrationError, ConfigError, FieldError
 from tautscope.loop.measurement import Measurement
@@ -75,7 +75,7 @@ class Robot:
 
 
 def record(robot: Robot, config: Config, seconds: float = 30.0) -> MotionRecord:
-    return move(robot, Sweep(config, seconds), config)
+    return move(robot, sweep_motion(config, seconds), config)
 
 
 def check(found: RobotFit, true: dict[str, float]) -> None:
@@ -145,7 +145,7 @@ def test_what_a_sweep_does_not_determine_is_named() -> None:
     with pytest.raises(CalibrationError, match="Move for longer"):
         fit(MotionRecord(run.times, run.commands, run.measurements[:50]), CATHETER)
     with pytest.raises(ConfigError, match=r"dof\[0\].range"):
-        Sweep(axes(1, width_limit=1.0))
+        sweep_motion(axes(1, width_limit=1.0))
 
 
 def test_points_of_a_users_kinematics_have_zeros_and_gains_alone(

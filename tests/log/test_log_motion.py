@@ -1,14 +1,20 @@
 """Images and motor positions of a log, for calibration."""
 
+from argparse import Namespace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from tautscope.commands.recorded_motion import MOST_IMAGES, log_motion
+from tautscope.calibration.bands.motion import MOST_IMAGES, ImageSequence
+from tautscope.commands.recorded_motion import read_motion
 from tautscope.errors import MissingPathError
 from tautscope.log.reader import Update, read_log
 from tautscope.log.writer import LogSummary
 from tautscope.runs.recording import Recording, per_dof
+
+
+def log_motion(path: Path) -> ImageSequence:
+    return read_motion(Namespace(config=None), path, ImageSequence)[0]
 
 
 def test_images_have_the_positions_of_their_capture(

@@ -140,8 +140,8 @@ def test_the_joints_are_the_same_everywhere():
         "utf-8"
     )
     names = ", ".join(f'"{joint}"' for joint in JOINTS)
-    for path in (CONTROL / "src/controller.cpp", CONTROL / "src/node.cpp"):
-        assert f"{{{names}}}" in path.read_text("utf-8")
+    messages = CONTROL / "include/tautscope_control/messages.hpp"
+    assert f"default_joints{{{names}}}" in messages.read_text("utf-8")
     assert f"[{names}]" in (ROS / "tautscope_node/tautscope_node/messages.py").read_text("utf-8")
 
 

@@ -510,6 +510,12 @@ void tautscope_loop_destroy(struct TautscopeLoop *handle);
 // The handle is valid and used by this thread only; `dofs` and `period` are null or writable.
 TautscopeResult tautscope_loop_size(struct TautscopeLoop *handle, size_t *dofs, double *period);
 
+// Name and unit, "m" or "rad", of a degree of freedom from 0 to n - 1, else null; valid until the loop is destroyed.
+//
+// # Safety
+// The handle is valid and used by this thread only; `name` and `unit` are writable.
+TautscopeResult tautscope_loop_dof(struct TautscopeLoop *handle, size_t dof, const char **name, const char **unit);
+
 // One control tick: the command for a reference. It does not allocate, block or read a clock.
 //
 // `reference` and `command` are (n,) [m or rad], without `[[dof]]` insertion, rotation, bending [m, rad, rad]; `dofs` is n.

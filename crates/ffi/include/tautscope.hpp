@@ -3,6 +3,7 @@
 #ifndef TAUTSCOPE_HPP
 #define TAUTSCOPE_HPP
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -106,18 +107,26 @@ private:
 /// A number per degree of freedom, up to 8, without allocation.
 class Values {
 public:
-    explicit Values(std::size_t size = 0) noexcept : size_(size) {}
+    Values() noexcept = default;
+
+    explicit Values(std::size_t size, double value = 0.0) noexcept : size_(size) { values_.fill(value); }
+
+    /// A copy of the first 8 numbers.
+    explicit Values(Numbers numbers) noexcept : size_(std::min(numbers.size(), values_.size())) {
+        std::copy_n(numbers.data(), size_, values_.begin());
+    }
 
     double *data() noexcept { return values_.data(); }
     const double *data() const noexcept { return values_.data(); }
     std::size_t size() const noexcept { return size_; }
+    double &operator[](std::size_t index) noexcept { return values_[index]; }
     double operator[](std::size_t index) const noexcept { return values_[index]; }
     const double *begin() const noexcept { return data(); }
     const double *end() const noexcept { return data() + size_; }
 
 private:
     std::array<double, 8> values_{};
-    std::size_t size_;
+    std::size_t size_ = 0;
 };
 
 #ifdef TAUTSCOPE_WITH_OPENCV

@@ -1,5 +1,7 @@
 //! The configuration: TOML with every key, as `tautscope config` prints it; with `[[dof]]`, missing keys have their defaults.
 
+use std::ffi::{CStr, CString};
+
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use tautscope_axes::{AnyLoop, AxesSettings, Selection};
@@ -66,6 +68,9 @@ pub struct Sensors {
     /// `width_limit` of each degree of freedom [m or rad].
     #[serde(skip)]
     pub widths: Vec<f64>,
+    /// Name and unit of each degree of freedom, also without `[[dof]]`.
+    #[serde(skip)]
+    pub names: Vec<[CString; 2]>,
 }
 
 impl LoopDocument {
@@ -89,7 +94,10 @@ impl LoopDocument {
         let settings: core::Settings = parsed(text)?;
         Ok(Self {
             inner: selection.build_bands(&settings).map_err(wrong)?,
-            sensors: Sensors::default(),
+            sensors: Sensors {
+                names: ARTICLE.map(|texts| texts.map(CString::from)).into(),
+                ..Sensors::default()
+            },
             period: settings.control.period,
         })
     }
@@ -117,6 +125,11 @@ pub fn detector_settings(
     Ok((document, model, format))
 }
 
+const ARTICLE: [[&CStr; 2]; 3] = [
+    [c"insertion", c"m"],
+    [c"rotation", c"rad"],
+    [c"bending", c"rad"],
+];
 /// A configuration of one degree of freedom with every default, written by `tests/config/test_axes_defaults.py`.
 const DEFAULTS: &str = include_str!("defaults.toml");
 /// Keys of `[[dof]]` without a default.
@@ -136,25 +149,41 @@ fn axes_document(text: &[u8]) -> Result<(AxesSettings, Sensors), TautscopeResult
     for key in ["name", "width_limit"] {
         entry.remove(key);
     }
-    let (mut dofs, mut names) = (Vec::new(), Vec::new());
+    let (mut dofs, mut names) = (Vec::new(), Vec::<[CString; 2]>::new());
     for (name, value) in given {
         match (name.as_str(), value) {
             ("dof", Value::Array(entries)) => {
                 for own in entries {
                     let mut dof = entry.clone();
                     merge(&mut dof, own, "dof", &OPTIONAL)?;
-                    let name = dof.get("name").and_then(Value::as_str).unwrap_or_default();
-                    if name.is_empty() || names.iter().any(|other| other == name) {
+                    let text = |key| dof.get(key).and_then(Value::as_str).unwrap_or_default();
+                    let (name, unit) = (text("name"), text("unit"));
+                    let is_taken = |[other, _]: &[CString; 2]| other.to_str() == Ok(name);
+                    if name.is_empty() || name.contains('\0') || names.iter().any(is_taken) {
                         return Err(config(format_args!(
                             "dof.name: got {name:?}, expected a name used once"
                         )));
                     }
-                    names.push(name.to_owned());
+                    if !["m", "rad"].contains(&unit) {
+                        return Err(config(format_args!(
+                            "dof.unit: got {unit:?}, expected \"m\" or \"rad\""
+                        )));
+                    }
+                    names.push([name, unit].map(|text| CString::new(text).unwrap_or_default()));
                     dofs.push(Value::Table(dof));
                 }
             }
             ("profile", value) => {
                 table.insert(name, value);
+            }
+            ("kinematics", own) => {
+                let kind = own.get("kind").map_or(Some("joints"), Value::as_str);
+                if kind != Some("joints") {
+                    let kind = kind.unwrap_or_default();
+                    return Err(config(format_args!(
+                        "kinematics.kind: got {kind:?}, expected \"joints\"; others are in Python only"
+                    )));
+                }
             }
             // Not used with `[[dof]]`, but for defaults.
             ("drives" | "insertion" | "rotation" | "bending", _) => {}
@@ -168,7 +197,8 @@ fn axes_document(text: &[u8]) -> Result<(AxesSettings, Sensors), TautscopeResult
         }
     }
     table.insert("dof".into(), Value::Array(dofs));
-    let sensors = table["measurement"].clone().try_into().map_err(wrong)?;
+    let mut sensors: Sensors = table["measurement"].clone().try_into().map_err(wrong)?;
+    sensors.names = names;
     Ok((table.try_into().map_err(wrong)?, sensors))
 }
 

@@ -1,6 +1,9 @@
 //! `TautscopeLoop`, the loop of Fig. 6, and its control tick.
 #![allow(unsafe_code)]
 
+use std::ffi::c_char;
+use std::ptr::null;
+
 use tautscope_axes::AnyLoop;
 use tautscope_core::{Axes, BandLoop, DOFS};
 
@@ -124,6 +127,30 @@ pub unsafe extern "C" fn tautscope_loop_size(
         }
         if let Some(period) = period {
             *period = handle.period;
+        }
+        Ok(())
+    })
+}
+
+/// Name and unit, "m" or "rad", of a degree of freedom from 0 to n - 1, else null; valid until the loop is destroyed.
+///
+/// # Safety
+/// The handle is valid and used by this thread only; `name` and `unit` are writable.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn tautscope_loop_dof(
+    handle: *mut TautscopeLoop,
+    dof: usize,
+    name: *mut *const c_char,
+    unit: *mut *const c_char,
+) -> TautscopeResult {
+    // SAFETY: the caller's contract.
+    with_handle(unsafe { handle.as_mut() }, |handle| {
+        let found = handle.sensors.names.get(dof);
+        let texts = found.map_or([null(); 2], |[name, unit]| [name.as_ptr(), unit.as_ptr()]);
+        // SAFETY: the caller's contract.
+        unsafe {
+            *write("name", name)? = texts[0];
+            *write("unit", unit)? = texts[1];
         }
         Ok(())
     })

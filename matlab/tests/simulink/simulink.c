@@ -1,12 +1,11 @@
-/* Test double of Simulink: runs the S-function that includes this file against a recording of examples/cpp/record.py.
+/* Test double of Simulink: runs the S-function that includes this file against a recording of examples/cpp/record.py, of the
+   article's instrument or of a robot with [[dof]] whose tip is measured as it is.
 
      sfun_driver RECORDING
 
    It fails unless every command, estimate and offset has the bits that it had in Python. */
 
 #include <time.h>
-
-enum { TICK = 9, IMAGE = 23 };
 
 /* Ticks for which an action stays set: it acts once. The drive fault is still set when the loop is engaged again. */
 enum { PRESSED = 2000 };
@@ -50,7 +49,8 @@ static void is_refused(const mxArray *parameters, const char *words) {
 }
 
 int main(int count, char **arguments) {
-    static double nothing[4] = {0};
+    static double nothing[WIDTH] = {0};
+    const double *minus, *plus;
     char config[4096];
     size_t ticks, images, image = 0;
     double *tick_rows, *image_rows;
@@ -60,14 +60,17 @@ int main(int count, char **arguments) {
     clock_t begin;
     require(count == 2, "usage: sfun_driver RECORDING");
     snprintf(config, sizeof config, "%s.toml", arguments[1]);
-    tick_rows = read_rows(arguments[1], "ticks", TICK, &ticks);
-    image_rows = read_rows(arguments[1], "images", IMAGE, &images);
-
     is_refused((mxArray[]){{"missing.toml", 0.0}, {NULL, 1.0}}, "File cannot be read: missing.toml");
     is_refused((mxArray[]){{NULL, 1.0}, {NULL, 1.0}}, "name of a file");
     is_refused((mxArray[]){{config, 0.0}, {NULL, 1.5}}, "from 0 to 1");
 
     mdlInitializeSizes(&S);
+    require(S.error == NULL, S.error);
+    const size_t n = (size_t)S.inputs.width[REFERENCE], m = (size_t)S.inputs.width[MEASURED];
+    const size_t TICK = 3 + 2 * n, IMAGE = 10 + m + 3 * n, answers = 2 + m;
+    require(S.outputs.width[COMMAND] == S.inputs.width[REFERENCE], "as many commands as references");
+    tick_rows = read_rows(arguments[1], "ticks", TICK, &ticks);
+    image_rows = read_rows(arguments[1], "images", IMAGE, &images);
     S.phase = SAMPLE_TIMES;
     mdlInitializeSampleTimes(&S);
     require(S.sample_time == tick_rows[TICK], "the sample time is not the control period");
@@ -76,9 +79,9 @@ int main(int count, char **arguments) {
     begin = clock();
     for (size_t tick = 0; tick < ticks && !S.error; ++tick) {
         const double *now = tick_rows + TICK * tick;
-        const int event = (int)now[5];
+        const int event = (int)now[2 + n];
         S.time = now[0];
-        memcpy(S.inputs.signal[REFERENCE], now + 2, 3 * sizeof(double));
+        memcpy(S.inputs.signal[REFERENCE], now + 2, n * sizeof(double));
         S.inputs.signal[AGE][0] = now[0] - now[1];
         for (int action = 0; action < BLOCK_ACTIONS; ++action) {
             pressed_at[action] = event == action + 1 ? tick : pressed_at[action];
@@ -87,18 +90,18 @@ int main(int count, char **arguments) {
         parameters[SHARE_PARAMETER].number = event == 4 ? 0.5 : event == 5 ? 1.0 : parameters[SHARE_PARAMETER].number;
         S.phase = OUTPUTS_PHASE;
         mdlOutputs(&S, 0);
-        compare(S.outputs.signal[COMMAND], now + 6, 3);
+        compare(S.outputs.signal[COMMAND], now + 3 + n, n);
         if (image > 0) {
             const double *last = image_rows + IMAGE * (image - 1);
-            compare(S.outputs.signal[STATE], last + 6, 1);
-            compare(S.outputs.signal[STATE_ESTIMATE], last + 9, 3);
-            compare(S.outputs.signal[DELTA_MINUS], last + 12, 3);
-            compare(S.outputs.signal[DELTA_PLUS], last + 15, 3);
+            compare(S.outputs.signal[STATE], last + answers, 1);
+            compare(S.outputs.signal[STATE_ESTIMATE], last + answers + 3, n);
+            compare(S.outputs.signal[DELTA_MINUS], last + answers + 3 + n, n);
+            compare(S.outputs.signal[DELTA_PLUS], last + answers + 3 + 2 * n, n);
         }
         const int has_image = image < images && (size_t)image_rows[IMAGE * image] == tick;
-        memcpy(S.inputs.signal[FEATURES], has_image ? image_rows + IMAGE * image + 2 : nothing, 4 * sizeof(double));
+        memcpy(S.inputs.signal[MEASURED], has_image ? image_rows + IMAGE * image + 2 : nothing, m * sizeof(double));
         S.inputs.signal[CAPTURED_AT][0] = has_image ? image_rows[IMAGE * image + 1] : 0.0;
-        S.inputs.signal[HAS_IMAGE][0] = has_image;
+        S.inputs.signal[HAS_MEASURED][0] = has_image;
         image += (size_t)has_image;
         S.phase = UPDATE;
         mdlUpdate(&S, 0);
@@ -106,6 +109,11 @@ int main(int count, char **arguments) {
     printf("%s: %zu ticks, %zu image updates in %.2f s, %zu numbers unlike Python, largest difference %g\n", arguments[1], ticks,
            image, (double)(clock() - begin) / CLOCKS_PER_SEC, wrong, largest);
     require(S.error == NULL, S.error);
+    minus = S.outputs.signal[DELTA_MINUS];
+    plus = S.outputs.signal[DELTA_PLUS];
+    if (n == 2) { /* two plays of `record_tip` */
+        require(fabs(plus[0] - minus[0] - 0.6) < 0.02 && fabs(plus[1] - minus[1] - 8e-3) < 2e-4, "the slack is not found");
+    }
 
     /* A reference that is not finite ends the simulation with the library's message. */
     S.inputs.signal[REFERENCE][1] = NAN;

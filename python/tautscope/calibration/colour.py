@@ -2,64 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tautscope.errors import FieldError
-
-
-@dataclass(frozen=True, slots=True)
-class ColorDiscriminant:
-    """Linear classifier of marker pixels: w . x > threshold with x = (B, G, R) [grey levels].
-
-    Attributes:
-        weights: w for B, G, R; `vision.weights`.
-        threshold: `vision.threshold` [grey levels].
-        training_margin: `margin` of the marker pixels of the fit.
-    """
-
-    weights: tuple[float, float, float]
-    threshold: float
-    training_margin: float
-
-    @classmethod
-    def fit(cls, marker: ArrayLike, background: ArrayLike) -> ColorDiscriminant:
-        """Fit Fisher's discriminant to labelled pixels, see `fit_discriminant`.
-
-        Args:
-            marker: (n, 3) B, G, R of pixels on the bands.
-            background: (m, 3) B, G, R of all other pixels.
-
-        Raises:
-            FieldError: As `fit_discriminant`.
-        """
-        weights, threshold = fit_discriminant(marker, background)
-        unfitted = cls(weights, threshold, 0.0)
-        return cls(weights, threshold, unfitted.margin(marker))
-
-    def is_marker(self, pixels: ArrayLike) -> NDArray[np.bool_]:
-        """Classify pixels (n, 3): (n,), True for marker pixels."""
-        values: NDArray[np.float64] = _checked("pixels", pixels) @ np.array(self.weights)
-        return values > self.threshold
-
-    def margin(self, marker: ArrayLike) -> float:
-        """Median margin of pixels (n, 3): (w . x - threshold) / |x|; 0 is on the boundary.
-
-        The normalization by brightness makes it nearly independent of the exposure.
-        """
-        pixels = _checked("marker", marker)
-        brightness = np.maximum(np.linalg.norm(pixels, axis=1), 1.0)
-        return float(np.median((pixels @ np.array(self.weights) - self.threshold) / brightness))
-
-    def has_drifted(self, marker: ArrayLike) -> bool:
-        """Whether the margin is below half of the training margin, so that a new fit is needed.
-
-        Args:
-            marker: (n, 3) pixels within the bands of a valid detection.
-        """
-        return self.margin(marker) < 0.5 * self.training_margin
 
 
 def fit_discriminant(

@@ -23,14 +23,15 @@ Wrong when the tip follows its plays with a lag of its own, which is then part o
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tautscope.calibration.delay_probes import Signal, fit_model, fit_turning_points
-from tautscope.calibration.delay_search import DelaySearch, Probe
+from tautscope.calibration.delay_probes import Fit, Signal, fit_model, fit_turning_points
 from tautscope.dof import Dof
 from tautscope.errors import SignalError
 
@@ -41,10 +42,48 @@ LIMIT = 5.0
 AGREEMENT = 0.15
 """Largest difference of the probes [s]; the model is late by up to 0.12 s where DOFs share their
 friction and move at once."""
+LARGEST_DRIFT = 0.02
+"""[s/s]"""
+LEAST_PARTS = 4
+"""Parts of the record per probe."""
+JUMP, JUMP_PARTS = 0.2, 4
+"""Deviation [s] of so many successive parts from the line that is a jump."""
+STRONG = 0.012
+"""A tenth of a second changes the tip by 1 % of the motor's range, summed over the images."""
+UNEXPLAINED = 0.5
+"""Largest share of the tip's motion that a probe may leave unexplained."""
+_STEP, _RATE = 0.05, 15.0  # of the first search: distance of delays [s], images per second
+_GAP = 0.2  # of log scores: a second delay that is so close is as good as the first
 LEAST_IMAGES = 50
 """Images with a measured tip."""
 MOST_POSITIONS = 200_000
 """Motor positions that are used; of longer records every second, third, ..."""
+
+
+@dataclass(frozen=True, slots=True)
+class Probe:
+    """Result of one probe.
+
+    Attributes:
+        delay: At the first image [s].
+        middle: Delay in the middle of the record, where it is known best [s].
+        delay_std: Standard deviation of `middle` [s].
+        drift: [s/s].
+        drift_std: Standard deviation of `drift` [s/s].
+        parts: Number of parts of the record with a value of their own.
+        unexplained: Share of the tip's motion that the fit does not explain.
+        gains: (3,) travel of the tip over that of the motor in contact; NaN for a DOF that did not
+            move, or was not seen.
+    """
+
+    delay: float
+    middle: float
+    delay_std: float
+    drift: float
+    drift_std: float
+    parts: int
+    unexplained: float
+    gains: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +109,11 @@ class DelayEstimate:
     reason: str = ""
     model: Probe | None = None
     turning_points: Probe | None = None
+
+    @classmethod
+    def unknown(cls, reason: str, *probes: Probe) -> DelayEstimate:
+        """No answer, with the probes that have a value, the model first."""
+        return cls(math.nan, math.nan, math.nan, math.nan, reason, *probes)
 
     @property
     def is_known(self) -> bool:
@@ -123,19 +167,19 @@ def estimate_delay(
         and np.count_nonzero(np.isfinite(tips[:, dof])) >= LEAST_IMAGES
     ]
     if not np.any(np.ptp(motors, axis=0) > 0):
-        return _unknown("no motor moved")
+        return DelayEstimate.unknown("no motor moved")
     if not signals:
         seen = int(np.isfinite(tips).sum(axis=0).max(initial=0))
-        return _unknown(
+        return DelayEstimate.unknown(
             f"only {seen} images measure a DOF whose motor moved; at least {LEAST_IMAGES} are "
             "needed"
         )
-    search = DelaySearch(signals, stamps, limit)
+    search = _Search(signals, stamps, limit)
     results: list[Probe] = []
     for name, fit in (("model", fit_model), ("turning points", fit_turning_points)):
-        found = search.run(fit, is_model=fit is fit_model)
+        found = search.run(fit)
         if isinstance(found, str):
-            return _unknown(f"{name}: {found}", *results)
+            return DelayEstimate.unknown(f"{name}: {found}", *results)
         results.append(found)
     model, turning_points = results
     return _combined(model, turning_points, float(stamps[-1] - stamps[0]))
@@ -149,7 +193,7 @@ def _combined(model: Probe, turning_points: Probe, span: float) -> DelayEstimate
         - 3 * math.hypot(model.drift_std, turning_points.drift_std),
     )
     if apart > AGREEMENT:
-        return _unknown(
+        return DelayEstimate.unknown(
             f"the probes disagree by {apart:.2f} s: the model says {model.middle:.3f} s, the "
             f"turning points {turning_points.middle:.3f} s in the middle of the record",
             model,
@@ -157,27 +201,128 @@ def _combined(model: Probe, turning_points: Probe, span: float) -> DelayEstimate
         )
     std = max(turning_points.delay_std, difference / 2)
     if std > AGREEMENT / 1.5:
-        return _unknown(f"uncertain by {std:.2f} s", model, turning_points)
+        return DelayEstimate.unknown(f"uncertain by {std:.2f} s", model, turning_points)
     found = turning_points
     drift_std = max(model.drift_std, found.drift_std)
     least = min(abs(model.drift), abs(found.drift))
     is_drifting = model.drift * found.drift > 0 and least > 3 * drift_std
-    return DelayEstimate(
-        found.delay if is_drifting else found.middle,
-        std,
-        found.drift if is_drifting else 0.0,
-        drift_std,
-        "",
-        model,
-        turning_points,
-    )
+    delay, drift = (found.delay, found.drift) if is_drifting else (found.middle, 0.0)
+    return DelayEstimate(delay, std, drift, drift_std, "", model, turning_points)
 
 
-def _unknown(
-    reason: str, model: Probe | None = None, turning_points: Probe | None = None
-) -> DelayEstimate:
-    nan = math.nan
-    return DelayEstimate(nan, nan, nan, nan, reason, model, turning_points)
+class _Search:
+    """Finds the delay and drift with which a probe explains the record best."""
+
+    def __init__(self, signals: list[Signal], stamps: Floats, limit: float) -> None:
+        self._signals, self._limit = signals, limit
+        self._first, self._middle = float(stamps[0]), float(stamps[-1] - stamps[0]) / 2
+        rate = (len(stamps) - 1) / max(2 * self._middle, 1e-9)
+        self._thinned = [signal.thinned(max(1, round(rate / _RATE))) for signal in signals]
+
+    def run(self, fit: Callable[..., Fit | None]) -> Probe | str:
+        """The probe's result, or why it has none.
+
+        The model has one minimum if there is an answer, and an error of its own in each DOF.
+        """
+        delays = np.arange(-self._limit, self._limit + _STEP / 2, _STEP)
+        scores = np.array([_score(self._fits(fit, self._thinned, delay, 0.0)) for delay in delays])
+        if not np.isfinite(scores).any():
+            return "too few images around the motions of the motors"
+        best = int(np.nanargmin(scores))
+        if best in (0, len(delays) - 1):
+            return f"no delay within {self._limit:g} s explains the record"
+        is_low = (scores[1:-1] < scores[:-2]) & (scores[1:-1] < scores[2:])
+        is_low &= (np.abs(delays - delays[best]) > 1.0)[1:-1] & (scores[1:-1] < scores[best] + _GAP)
+        if fit is fit_model and is_low.any():
+            rival = delays[1:-1][is_low][0]
+            return f"{delays[best]:.1f} s and {rival:.1f} s explain the record equally well"
+        return self._refine(fit, float(delays[best]))
+
+    def _fits(
+        self, fit: Callable[..., Fit | None], signals: list[Signal], delay: float, drift: float
+    ) -> list[Fit]:
+        found = (
+            fit(signal, signal.stamps - delay - drift * (signal.stamps - self._first))
+            for signal in signals
+        )
+        return [each for each in found if each is not None]
+
+    def _refine(self, fit: Callable[..., Fit | None], delay: float) -> Probe | str:
+        drift = 0.0
+        for _ in range(8):
+            fits = self._fits(partial(fit, by_parts=True), self._signals, delay, drift)
+            parts = [(k, *part) for k, each in enumerate(fits) for part in each.parts]
+            if len(parts) < LEAST_PARTS:
+                return f"{len(parts)} motions to compare; at least {LEAST_PARTS} are needed"
+            group, at, correction, weight, strength = np.array(parts).T
+            x = at - self._first - self._middle
+            value, std, slope, drift_std = _line(x, correction, weight, group, fit is fit_model)
+            change = min(max(slope, -0.005), 0.005)
+            drift += change
+            delay += min(max(value, -0.2), 0.2) - change * self._middle
+        middle = delay + drift * self._middle
+        share = sum(_share(each) * each.count for each in fits) / sum(each.count for each in fits)
+        if abs(drift) > LARGEST_DRIFT or abs(middle) > 1.2 * self._limit:
+            return f"no delay within {self._limit:g} s explains the record"
+        if share > UNEXPLAINED:
+            return f"the motors do not explain {100 * share:.0f} % of the tip's motion"
+        by_dof = {each.dof: each.gain for each in fits}
+        gains = tuple(by_dof.get(dof, math.nan) for dof in Dof)
+        if fit is not fit_model and (jump := _jump(at, correction, strength)) > JUMP:
+            return f"the delay changes by {jump:.2f} s within the record; are images missing?"
+        return Probe(delay, middle, std, drift, drift_std, len(parts), share, gains)
+
+
+def _score(fits: list[Fit]) -> float:
+    """Mean logarithm of the unexplained share, over the DOFs."""
+    count = sum(each.count for each in fits)
+    return sum(each.count * math.log(_share(each)) for each in fits) / count if count else math.nan
+
+
+def _share(fit: Fit) -> float:
+    return max(fit.left / fit.total, 1e-12)
+
+
+def _jump(at: Floats, correction: Floats, strength: Floats) -> float:
+    """Largest deviation from the line that `JUMP_PARTS` successive parts have in common [s].
+
+    Only of parts that show it clearly: with a `strength` of at least `STRONG`.
+    """
+    order = np.argsort(at)
+    strong = order[strength[order] >= STRONG]
+    if len(strong) < JUMP_PARTS:
+        return 0.0
+    runs = np.lib.stride_tricks.sliding_window_view(correction[strong], JUMP_PARTS)
+    return float(np.abs(np.sort(runs, axis=1)[:, 1:-1].mean(axis=1)).max())
+
+
+def _line(
+    x: Floats, y: Floats, weight: Floats, group: Floats, own_levels: bool
+) -> tuple[float, float, float, float]:
+    """Value at x = 0 and slope of a line, each with its standard deviation, with Huber's weights.
+
+    Each group has a scatter and, if asked for, a level of its own; the value is the mean of these.
+    """
+    members = np.unique(group)[None, :] == group[:, None]
+    levels = members if own_levels else np.ones((len(x), 1))
+    design = np.column_stack([levels, x])
+    size = members @ (weight @ members)
+    w = weight / weight.sum()
+    for _ in range(10):
+        root = np.sqrt(w)
+        found = np.linalg.lstsq(root[:, None] * design, root * y, rcond=1e-9)[0]
+        residual = np.abs(y - design @ found)
+        scatter = [max(1.4826 * np.median(residual[each]), 0.004) for each in members.T]
+        scale = members @ np.array(scatter)
+        huber = np.minimum(1.0, 1.5 * scale / np.maximum(residual, 1e-12))
+        w = weight / size / scale**2 * huber * (members @ members.sum(axis=0))
+    inverse = np.linalg.pinv(design.T @ (w[:, None] * design))
+    scattered = (w * residual)[:, None] * design
+    freedom = max(len(x) - design.shape[1], 1)
+    covariance = inverse @ (scattered.T @ scattered) @ inverse * len(x) / freedom
+    mean = np.append(w @ levels / w.sum(), 0.0)
+    std = math.sqrt(float(mean @ covariance @ mean))
+    return float(mean @ found), std, float(found[-1]), math.sqrt(float(covariance[-1, -1]))
 
 
 def _checked(

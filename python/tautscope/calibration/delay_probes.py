@@ -1,8 +1,8 @@
-"""The two probes of `tautscope.calibration.delay`: scores of a delay, and corrections by parts."""
+"""The two probes of `tautscope.calibration.delay`: how well a delay explains the tip."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,23 +50,24 @@ class Signal:
         self.range = float(np.ptp(self.motor))
         others = np.delete(motors, dof, axis=1)
         self.others = others[:, np.ptp(others, axis=0) > 0]
-        start = float(self.motor[0])
-        plays = [
-            Play(delta_minus=-r * self.range, delta_plus=r * self.range, output=start)
-            for r in RADII
-        ]
-        self.plays = np.stack([play.run(self.motor) for play in plays], axis=1)
+        start, radii = float(self.motor[0]), self.range * RADII
+        plays = [Play(delta_minus=-r, delta_plus=r, output=start) for r in radii]
+        self.table = np.stack([self.motor, *(play.run(self.motor) for play in plays)], axis=1)
+        """(n, 1 + plays) the motor and its plays."""
         self.motions = list(_motions(times, self.motor, 0.4 * LEAST_TRAVEL * self.range))
         self.turns = list(self._turn_windows())
 
     def thinned(self, stride: int) -> Signal:
         """The same with every ``stride``-th image, for a first search."""
         new = object.__new__(Signal)
-        new.__dict__ = self.__dict__ | {
-            "stamps": self.stamps[::stride],
-            "tip": self.tip[::stride],
-        }
+        images = {"stamps": self.stamps[::stride], "tip": self.tip[::stride]}
+        new.__dict__ = self.__dict__ | images
         return new
+
+    def images(self, shown: Floats, first: int, last: int) -> slice | None:
+        """The images that show the motor between two of its indices; None if they are too few."""
+        a, b = np.searchsorted(shown, self.times[[first, last]])
+        return slice(a, b) if b - a >= LEAST_IMAGES else None
 
     def _turn_windows(self) -> Iterator[tuple[int, int, int]]:
         """First, turning and last index of the motor around each end of a motion."""
@@ -74,10 +75,9 @@ class Signal:
         for k, direction in _turning_points(c, LEAST_TRAVEL * self.range):
             back = direction * (c[k] - c)
             near = (back >= -0.005 * self.range) & (back <= travel) & (np.abs(t - t[k]) < LONGEST)
-            outside = np.flatnonzero(~near)
+            outside = np.flatnonzero(np.concatenate([[True], ~near, [True]])) - 1
             after = int(np.searchsorted(outside, k))
-            first = int(outside[after - 1]) + 1 if after else 0
-            last = int(outside[after]) - 1 if after < len(outside) else len(c) - 1
+            first, last = int(outside[after - 1]) + 1, int(outside[after]) - 1
             if back[first] > 0.6 * travel:
                 yield first, k, last
 
@@ -105,8 +105,7 @@ def _motions(times: Floats, motor: Floats, least: float) -> Iterator[tuple[int, 
     starts = np.flatnonzero(np.abs(motor[ahead] - motor) > least)
     np.add.at(moves, starts, 1)
     np.add.at(moves, ahead[starts], -1)
-    is_moving = np.cumsum(moves) > 0
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], is_moving, [False]]).astype(int)))
+    edges = np.flatnonzero(np.diff(np.cumsum(moves) > 0, prepend=False, append=False))
     for first, end in edges.reshape(-1, 2):
         if times[min(end, len(times) - 1)] - times[first] > 2.0:
             yield int(first), int(min(end, len(times) - 1))
@@ -138,71 +137,37 @@ def fit_model(signal: Signal, shown: Floats, *, by_parts: bool = False) -> Fit |
 
     None if too few images show a motion.
     """
-    centred: list[Floats] = []
-    lines: list[Floats] = []
-    tips: list[Floats] = []
-    chosen: list[NDArray[np.int64]] = []
-    for first, last in signal.motions:
-        a, b = np.searchsorted(shown, (signal.times[first], signal.times[last]))
-        if b - a < LEAST_IMAGES:
-            continue
-        x = shown[a:b]
-        after = np.clip(np.searchsorted(signal.times, x), 1, len(signal.times) - 1)
-        share = (x - signal.times[after - 1]) / (signal.times[after] - signal.times[after - 1])
-        table = signal.plays[after - 1] + share[:, None] * (
-            signal.plays[after] - signal.plays[after - 1]
-        )
-        line = np.interp(x, signal.times, signal.motor)
-        centred.append(table - table.mean(axis=0))
-        lines.append(line - line.mean())
-        tips.append(signal.tip[a:b] - signal.tip[a:b].mean())
-        chosen.append(np.arange(a, b))
-    if not tips:
+    groups = [
+        np.arange(len(shown))[images]
+        for first, last in signal.motions
+        if (images := signal.images(shown, first, last)) is not None
+    ]
+    if not groups:
         return None
-    table, line, tip = np.concatenate(centred), np.concatenate(lines), np.concatenate(tips)
-    size = float(np.linalg.norm(line))
-    total = float(tip @ tip)
-    if size == 0 or total == 0:
+    index = np.concatenate(groups)
+    table = _centred(_interpolated(shown[index], signal.times, signal.table), groups)
+    tip = _centred(signal.tip[index], groups)
+    line, plays, total = table[:, :1], table[:, 1:], float(tip @ tip)
+    if total == 0 or not line.any():
         return None
-    unit = line / size
-    table = table - np.outer(unit, unit @ table)
-    rest = tip - unit * (unit @ tip)
-    power = np.maximum((table * table).sum(axis=0), 1e-9 * len(tip) * signal.range**2)
-    gained = (table.T @ rest) ** 2 / power
-    best = int(np.argmax(gained))
-    weight = float(table[:, best] @ rest / power[best])
-    # The part of the play along the line was taken off the table.
-    along = unit @ np.concatenate(centred)[:, best]
-    gain = float(unit @ tip - weight * along) / size
-    left = float(rest @ rest - gained[best])
-    parts: list[Part] = []
+    own, rest = _without(plays, line), _without(tip, line)
+    power = np.maximum((own * own).sum(axis=0), 1e-9 * len(tip) * signal.range**2)
+    used = [0, 1 + int(np.argmax((own.T @ rest) ** 2 / power))]
+    gains = np.linalg.lstsq(table[:, used], tip, rcond=1e-9)[0]
+    residual = tip - table[:, used] @ gains
+    left, parts = float(residual @ residual), []
     if by_parts:
-        index = np.concatenate(chosen)
-        motion = gain * signal.motor + weight * signal.plays[:, best]
-        slope = _slope(signal.times, motion, shown[index])
-        at = 0
-        for group in tips:
-            slope[at : at + len(group)] -= slope[at : at + len(group)].mean()
-            at += len(group)
-        basis, _ = np.linalg.qr(np.column_stack([line, table[:, best]]))
-        slope -= basis @ (basis.T @ slope)
-        residual = rest - weight * table[:, best]
-        parts = _block_parts(signal, signal.stamps[index], residual, slope)
-    return Fit(signal.dof, left, total, len(tip), gain + weight, parts)
-
-
-def _block_parts(signal: Signal, stamps: Floats, residual: Floats, slope: Floats) -> list[Part]:
-    """Parts of `BLOCK` seconds, from the residual and its change with the delay."""
-    variance = float(residual @ residual) / len(residual)
-    parts: list[Part] = []
-    ends = np.flatnonzero(np.diff(stamps // BLOCK) > 0) + 1
-    for block in np.split(np.arange(len(stamps)), ends):
-        power = float(slope[block] @ slope[block])
-        if len(block) >= LEAST_IMAGES and power > 0:
-            correction = float(residual[block] @ slope[block]) / power
-            strength = power / signal.range**2
-            parts.append((float(stamps[block].mean()), correction, power / variance, strength))
-    return parts
+        slope = _slope(signal.times, signal.table[:, used] @ gains, shown[index])
+        slope = _without(_centred(slope, groups), table[:, used])
+        stamps = signal.stamps[index]
+        for block in np.split(
+            np.arange(len(tip)), np.flatnonzero(np.diff(stamps // BLOCK) > 0) + 1
+        ):
+            if len(block) >= LEAST_IMAGES:
+                variance = left / len(tip)
+                own_part = stamps[block], residual[block], slope[block], variance
+                parts += _part(signal, *own_part)
+    return Fit(signal.dof, left, total, len(tip), float(gains.sum()), parts)
 
 
 def fit_turning_points(signal: Signal, shown: Floats, *, by_parts: bool = False) -> Fit | None:
@@ -210,47 +175,61 @@ def fit_turning_points(signal: Signal, shown: Floats, *, by_parts: bool = False)
     left = total = 0.0
     count = 0
     parts: list[Part] = []
-    slopes: list[float] = []
+    gains_before: list[float] = []
     for first, turn, last in signal.turns:
-        a, b = np.searchsorted(shown, (signal.times[first], signal.times[last]))
-        if b - a < LEAST_IMAGES:
+        images = signal.images(shown, first, last)
+        if images is None:
             continue
-        x = shown[a:b]
+        x = shown[images]
         around = slice(max(first - 1, 0), last + 2)
-        times = signal.times[around]
-        moved = np.interp(x, times, signal.motor[around] - signal.motor[turn])
+        times, motor = signal.times[around], signal.motor[around] - signal.motor[turn]
+        moved = np.interp(x, times, motor)
         before = np.where(x < signal.times[turn], moved, 0.0)
-        columns = [before, moved - before]
-        columns += [np.interp(x, times, other[around]) for other in signal.others.T]
-        table = np.stack(columns, axis=1)
+        others = [np.interp(x, times, other[around]) for other in signal.others.T]
+        table = np.stack([before, moved - before, *others], axis=1)
         table -= table.mean(axis=0)
-        tip = signal.tip[a:b] - signal.tip[a:b].mean()
+        tip = signal.tip[images] - signal.tip[images].mean()
         total += float(tip @ tip)
         count += len(tip)
         # Coupled to the others, the tip moves with them; what they explain is left out.
-        basis = _basis(table[:, 2:])
-        own = table[:, :2] - basis @ (basis.T @ table[:, :2])
-        rest = tip - basis @ (basis.T @ tip)
+        own, rest = _without(table[:, :2], table[:, 2:]), _without(tip, table[:, 2:])
         gains = _falling_gains(own, rest)
         residual = rest - own @ gains
         left += float(residual @ residual)
-        slopes.append(float(gains[0]))
+        gains_before.append(float(gains[0]))
         if by_parts and gains[0] > 0:
-            displacement = signal.motor[around] - signal.motor[turn]
             side = np.where(times < signal.times[turn], gains[0], gains[1])
-            slope = _slope(times, side * displacement, x)
-            slope -= slope.mean()
-            basis = _basis(table)
-            slope -= basis @ (basis.T @ slope)
-            power = float(slope @ slope)
+            slope = _slope(times, side * motor, x)
+            slope = _without(slope - slope.mean(), table)
             noise = float(residual @ residual) / len(tip) + 1e-6 * signal.range**2
-            if power > 0:
-                stamp = float(signal.stamps[a:b].mean())
-                strength = power / signal.range**2
-                parts.append((stamp, float(residual @ slope) / power, power / noise, strength))
+            parts += _part(signal, signal.stamps[images], residual, slope, noise)
     if count == 0 or total == 0:
         return None
-    return Fit(signal.dof, left, total, count, float(np.median(slopes)), parts)
+    return Fit(signal.dof, left, total, count, float(np.median(gains_before)), parts)
+
+
+def _part(
+    signal: Signal, stamps: Floats, residual: Floats, slope: Floats, variance: float
+) -> list[Part]:
+    """A part of the record from its residual and the change of this with the delay, if any."""
+    power = float(slope @ slope)
+    if power == 0:
+        return []
+    correction = float(residual @ slope) / power
+    return [(float(stamps.mean()), correction, power / variance, power / signal.range**2)]
+
+
+def _interpolated(x: Floats, times: Floats, table: Floats) -> Floats:
+    """Rows of a table (n, columns) at times `x`, by straight lines."""
+    after = np.clip(np.searchsorted(times, x), 1, len(times) - 1)
+    share = (x - times[after - 1]) / (times[after] - times[after - 1])
+    return np.asarray(table[after - 1] + share[:, None] * (table[after] - table[after - 1]))
+
+
+def _centred(values: Floats, groups: Sequence[NDArray[np.int64]]) -> Floats:
+    """Values without the mean of each of successive groups."""
+    ends = np.cumsum([len(group) for group in groups])[:-1]
+    return np.concatenate([each - each.mean(axis=0) for each in np.split(values, ends)])
 
 
 def _slope(times: Floats, motion: Floats, x: Floats) -> Floats:
@@ -260,10 +239,11 @@ def _slope(times: Floats, motion: Floats, x: Floats) -> Floats:
     return np.asarray((behind - ahead) / (2 * _DIFFERENCE), dtype=np.float64)
 
 
-def _basis(table: Floats) -> Floats:
-    """Orthonormal basis of the columns, without those that are (nearly) constant."""
-    size = np.linalg.norm(table, axis=0)
-    return np.linalg.qr(table[:, size > 1e-9 * (size.max(initial=0.0) + 1e-300)])[0]
+def _without(values: Floats, columns: Floats) -> Floats:
+    """Values (m,) or (m, k) without what columns explain; those nearly constant explain nothing."""
+    size = np.linalg.norm(columns, axis=0)
+    basis, _ = np.linalg.qr(columns[:, size > 1e-9 * (size.max(initial=0.0) + 1e-300)])
+    return np.asarray(values - basis @ (basis.T @ values))
 
 
 def _falling_gains(table: Floats, tip: Floats) -> Floats:

@@ -16,8 +16,7 @@ from tautscope.commands.video_options import (
 )
 
 if TYPE_CHECKING:
-    from tautscope.calibration.delay import DelayEstimate
-    from tautscope.calibration.delay_search import Probe
+    from tautscope.calibration.delay import DelayEstimate, Probe
 
 NO_ANSWER = 1
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from tautscope.commands import arguments
 from tautscope.commands.article_config import article_config
 from tautscope.commands.calibrate_camera import add_board_options
-from tautscope.commands.calibration_rig import add_rig_options, refuse_wrong_limits
+from tautscope.commands.calibration_rig import add_rig_options, refuse_wrong_limits, twin_seed
 from tautscope.commands.printing import print_json
 from tautscope.commands.question import ask
 from tautscope.config import Config
@@ -57,13 +57,11 @@ def _run(options: argparse.Namespace) -> int:
     from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
 
     config = article_config(options.config)
-    if options.twin:
-        options.seed = config.twin.seed if options.seed is None else options.seed
-    else:
+    seed = options.seed = twin_seed(options, config) if options.twin else None
+    if not options.twin:
         refuse_wrong_limits(options.config)
     folder = options.out or default_folder("calibrate")
-    seed = options.seed if options.twin else None
-    session = CalibrationSession.open(Path(options.config), folder, seed, restart=options.restart)
+    session = CalibrationSession(Path(options.config), folder, seed, restart=options.restart)
     if not session.state.done:
         check_free(session.folder)
     else:

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
 from tautscope.commands.article_config import article_config
 from tautscope.commands.board_images import BoardImages, file_images, live_images, twin_images
-from tautscope.commands.calibration_output import add_options, check_options, finish
-from tautscope.commands.calibration_rig import actual_rig
-from tautscope.commands.printing import print_json
+from tautscope.commands.calibration_output import add_options, check_options, finish, finish_file
+from tautscope.commands.calibration_rig import add_twin, twin_seed
 from tautscope.errors import FieldError
 
 if TYPE_CHECKING:
@@ -49,15 +49,7 @@ def add_parser(kinds: arguments.Verbs) -> None:
     camera.add_argument(
         "--ros", type=Path, metavar="FILE", help="also write a ROS camera_info file"
     )
-    camera.add_argument(
-        "--twin", action="store_true", help="show a simulated board to the twin's camera"
-    )
-    camera.add_argument(
-        "--seed",
-        type=arguments.natural,
-        metavar="N",
-        help="seed of the twin [twin.seed of the configuration]",
-    )
+    add_twin(camera, "show a simulated board to the twin's camera")
     add_options(camera)
 
 
@@ -91,16 +83,15 @@ def add_board_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace) -> None:
-    from tautscope.calibration.camera.board import Board  # noqa: PLC0415
     from tautscope.runs.output_folder import check_free_file  # noqa: PLC0415
 
-    board = Board(options.columns, options.rows, options.square)
     if options.board is not None:
+        from tautscope.calibration.camera.board import Board  # noqa: PLC0415
+
+        board = Board(options.columns, options.rows, options.square)
         board.write_pdf(check_free_file(options.board))
-        if options.json:
-            print_json({"file": str(options.board)})
-        else:
-            print(f"Print {options.board} at 100 %, and measure its ruler and squares.")
+        text = f"Print {options.board} at 100 %, and measure its ruler and squares."
+        finish_file(options, options.board, text)
         return
     check_options(options)
     if options.ros is not None:
@@ -108,28 +99,30 @@ def _run(options: argparse.Namespace) -> None:
     if len(options.files) == 1 and options.files[0].suffix in (".yaml", ".yml"):
         finish(options, _import(options.files[0]))
         return
-    result, info = calibrate(_images(options, board), board, options.model)
+    if options.files and options.twin:
+        raise FieldError("--twin", True, "files or --twin, not both")
+    result, info = calibrate(options, options.files)
     if options.ros is not None:
         options.ros.write_text(info, encoding="utf-8")
     finish(options, result)
 
 
 def calibrate(
-    images: BoardImages, board: Board, model: Literal["pinhole", "fisheye"]
+    options: argparse.Namespace, files: Sequence[Path] = ()
 ) -> tuple[CalibrationResult, str]:
-    """Collect views until they suffice, or the images end, and fit the camera.
+    """The result, and the text of a ROS camera_info file.
 
-    Returns:
-        The result, and the text of a ROS camera_info file.
-
-    Raises:
-        CalibrationError: The views do not suffice.
+    Views of the board are collected until they suffice, or the images end. Files are images or a
+    video, in place of the camera of the rig or the twin.
     """
+    from tautscope.calibration.camera.board import Board  # noqa: PLC0415
     from tautscope.calibration.camera.camera_info import camera_info  # noqa: PLC0415
-    from tautscope.calibration.camera.collector import ViewCollector  # noqa: PLC0415
+    from tautscope.calibration.camera.coverage import ViewCollector  # noqa: PLC0415
     from tautscope.calibration.camera.intrinsics import fit_intrinsics  # noqa: PLC0415
     from tautscope.calibration.camera.result import camera_result  # noqa: PLC0415
 
+    board = Board(options.columns, options.rows, options.square)
+    images = file_images(files) if files else _camera_images(options, board)
     collector = ViewCollector(board, images.size, is_stream=images.is_stream)
     try:
         for image in images.images:
@@ -140,19 +133,17 @@ def calibrate(
     finally:
         images.images.close()
     collector.check()
-    fit = fit_intrinsics(collector.views, images.size, model)
+    fit = fit_intrinsics(collector.views, images.size, options.model)
     result = camera_result(fit, collector.coverage, images.serial_numbers)
     return result, camera_info(fit.intrinsics)
 
 
-def _images(options: argparse.Namespace, board: Board) -> BoardImages:
-    if options.files and options.twin:
-        raise FieldError("--twin", True, "files or --twin, not both")
-    if options.files:
-        return file_images(options.files)
+def _camera_images(options: argparse.Namespace, board: Board) -> BoardImages:
     config = article_config(options.config)
     if options.twin:
-        return twin_images(actual_rig(config, options.seed), board)
+        from tautscope.twin.drawn_rig import draw_rig  # noqa: PLC0415
+
+        return twin_images(draw_rig(config, twin_seed(options, config)), board)
     if options.config is None:
         raise FieldError("files", None, "images, a video, --config FILE of a rig, or --twin")
     return live_images(config, options.seconds)

@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
-from tautscope.commands.article_config import article_config
-from tautscope.commands.calibration_output import add_options, check_options, finish
+from tautscope.commands.calibration_output import add_options, check_options, finish, finish_file
 from tautscope.commands.calibration_rig import add_rig_options, rig_for_calibration
-from tautscope.commands.printing import print_json
+from tautscope.commands.recorded_motion import add_motor_options, read_motion
 from tautscope.errors import FieldError
 
 if TYPE_CHECKING:
@@ -55,16 +54,7 @@ def add_parser(kinds: arguments.Verbs) -> None:
         metavar="FILE.html",
         help="only write a page of the image that makes the command from clicks",
     )
-    colour.add_argument(
-        "--motors", type=Path, metavar="FILE.csv", help="motor positions of a video"
-    )
-    colour.add_argument(
-        "--video-start",
-        type=arguments.seconds,
-        default=0.0,
-        metavar="S",
-        help="time of the video's first frame in the CSV's [s] [%(default)s]",
-    )
+    add_motor_options(colour)
     add_rig_options(colour)
     add_options(colour)
 
@@ -88,10 +78,13 @@ def _run(options: argparse.Namespace) -> None:
         finish(options, calibrate(options))
         return
     elif len(files) == 1:
-        images = _moving(options, files[0])
+        from tautscope.calibration.bands.motion import ImageSequence  # noqa: PLC0415
+
+        allowed = "a log (.mcap), a video with --motors, an image with --click, IMAGE MASK ..."
+        images = read_motion(options, files[0], ImageSequence, allowed)[0].label()
     else:
         images = _masked(files)
-    finish(options, result(images, {}))
+    finish(options, _result(images))
 
 
 def _write_page(options: argparse.Namespace, files: Sequence[Path]) -> None:
@@ -100,34 +93,29 @@ def _write_page(options: argparse.Namespace, files: Sequence[Path]) -> None:
     if len(files) != 1:
         raise FieldError("files", len(files), "one image, with --page")
     write_click_page(files[0], options.page)
-    if options.json:
-        print_json({"file": str(options.page)})
-    else:
-        print(f"Open {options.page} in a browser, and click on the bands.")
+    finish_file(options, options.page, f"Open {options.page} in a browser, and click on the bands.")
 
 
 def calibrate(options: argparse.Namespace) -> CalibrationResult:
     """Move the rig or the twin, and fit the colour of what moves with the motors."""
-    from tautscope.calibration.bands.motion import find_moving_bands  # noqa: PLC0415
-    from tautscope.calibration.bands.sweep import record_motion  # noqa: PLC0415
+    from tautscope.calibration.bands.motion import record_motion  # noqa: PLC0415
     from tautscope.commands.progress import progress_bar  # noqa: PLC0415
 
     with rig_for_calibration(options) as setup, progress_bar("motion") as progress:
         found = record_motion(setup.rig, setup.config, progress)
-        serial_numbers = setup.serial_numbers
-    images = find_moving_bands(found.images, found.times, found.positions)
-    return result(images, serial_numbers)
+    return _result(found.label(), setup.serial_numbers)
 
 
-def result(images: Sequence[LabelledImage], serial_numbers: Mapping[str, str]) -> CalibrationResult:
-    """Fit the colour to labelled images, and check it."""
+def _result(
+    images: Sequence[LabelledImage], serial_numbers: Mapping[str, str] | None = None
+) -> CalibrationResult:
     from tautscope.calibration.bands.result import colour_result, fit_colour  # noqa: PLC0415
 
-    return colour_result(fit_colour(images), images, serial_numbers)
+    return colour_result(fit_colour(images), images, serial_numbers or {})
 
 
 def _clicked(files: Sequence[Path], clicks: Sequence[tuple[int, int]]) -> list[LabelledImage]:
-    from tautscope.calibration.bands.click import label_clicks  # noqa: PLC0415
+    from tautscope.calibration.bands.labels import label_clicks  # noqa: PLC0415
     from tautscope.calibration.images import read_image  # noqa: PLC0415
 
     if len(files) != 1:
@@ -136,7 +124,7 @@ def _clicked(files: Sequence[Path], clicks: Sequence[tuple[int, int]]) -> list[L
 
 
 def _masked(files: Sequence[Path]) -> list[LabelledImage]:
-    from tautscope.calibration.bands.result import from_mask  # noqa: PLC0415
+    from tautscope.calibration.bands.labels import from_mask  # noqa: PLC0415
     from tautscope.calibration.images import read_image  # noqa: PLC0415
 
     if len(files) % 2:
@@ -149,18 +137,3 @@ def _masked(files: Sequence[Path]) -> list[LabelledImage]:
             raise FieldError(f"{frame_file}, {mask_file}", sizes, "two images of the same size")
         images.append(from_mask(frame, mask))
     return images
-
-
-def _moving(options: argparse.Namespace, file: Path) -> list[LabelledImage]:
-    from tautscope.calibration.bands.motion import find_moving_bands  # noqa: PLC0415
-    from tautscope.commands.recorded_motion import log_motion, video_motion  # noqa: PLC0415
-
-    if file.suffix == ".mcap":
-        found = log_motion(file)
-    elif options.motors is not None:
-        config = article_config(options.config)
-        found = video_motion(file, options.motors, options.video_start, config.camera)
-    else:
-        allowed = "a log (.mcap), a video with --motors, an image with --click, IMAGE MASK ..."
-        raise FieldError("files", str(file), allowed)
-    return find_moving_bands(found.images, found.times, found.positions)

@@ -13,9 +13,11 @@ from tautscope.commands.align import NO_ANSWER, print_delay
 from tautscope.commands.article_config import article_config
 from tautscope.commands.calibration_output import add_options, check_options, finish
 from tautscope.commands.calibration_rig import (
+    ARTICLE_MOTION,
     add_rig_options,
     confirm_motion,
-    simulated_experiment,
+    refuse_wrong_limits,
+    run_protocol,
 )
 from tautscope.commands.printing import print_json
 from tautscope.commands.rig_choice import add_rig
@@ -147,7 +149,8 @@ def _recording(options: argparse.Namespace) -> tuple[Recording, Mapping[str, str
         if config.drives is None:
             allowed = "a section [drives] that names the motors, a log, or --twin"
             raise ConfigError("drives", None, allowed)
-        confirm_motion(options)
+        refuse_wrong_limits(options.config)
+        confirm_motion(options, ARTICLE_MOTION, config)
     from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
 
     return record(options, config, check_free(options.log or default_folder("latency")))
@@ -156,39 +159,20 @@ def _recording(options: argparse.Namespace) -> tuple[Recording, Mapping[str, str
 def record(
     options: argparse.Namespace, config: Config, folder: Path
 ) -> tuple[Recording, Mapping[str, str]]:
-    """Move the rig or the twin without compensation.
+    """Move the rig, which logs it in a folder, or the twin: the recording and the devices.
 
-    Args:
-        options: With those of `add_rig_options`.
-        config: Of the rig.
-        folder: For the log of a rig.
-
-    Returns:
-        The recording, and the devices that took part.
-
-    Raises:
-        TautscopeError: Errors of the rig.
+    Gains of 1 are no compensation.
     """
-    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
-
-    config = _slow(config)
-    with progress_bar("motion") as progress:
-        if options.twin:
-            return simulated_experiment(options, config, progress, compensate=False), {}
-        from tautscope.hardware.experiment import run_on_hardware  # noqa: PLC0415
-        from tautscope.hardware.serial_numbers import read_serial_numbers  # noqa: PLC0415
-
-        serial_numbers = read_serial_numbers(config)
-        run = run_on_hardware(config, folder, progress)
-        return run.compensated.recording, serial_numbers
-
-
-def _slow(config: Config) -> Config:
-    """The configuration with the motion of the calibration, and without compensation."""
     changes: dict[str, object] = {"experiment.periods": PERIODS}
     for dof in Dof:
         sine = config.experiment[dof]
         changes[f"{dof.label}.free_gain"] = 1.0
         changes[f"experiment.{dof.label}.amplitude"] = SHARE * sine.amplitude
         changes[f"experiment.{dof.label}.period"] = SHARE * sine.period
-    return config.replace(**changes)
+    serial_numbers: Mapping[str, str] = {}
+    if not options.twin:
+        from tautscope.hardware.serial_numbers import read_serial_numbers  # noqa: PLC0415
+
+        serial_numbers = read_serial_numbers(config)
+    recording, _ = run_protocol(options, config.replace(**changes), folder, "motion")
+    return recording, serial_numbers

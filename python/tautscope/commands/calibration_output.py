@@ -70,6 +70,14 @@ def finish(options: argparse.Namespace, result: CalibrationResult) -> None:
         print(f"# written: {options.config}")
 
 
+def finish_file(options: argparse.Namespace, file: Path, text: str) -> None:
+    """Print what to do with a file that was written, or its name as JSON."""
+    if options.json:
+        print_json({"file": str(file)})
+    else:
+        print(text)
+
+
 def _write_folder(folder: Path, result: CalibrationResult, text: str) -> None:
     from tautscope.runs.output_folder import new_folder  # noqa: PLC0415
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
+from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
@@ -17,51 +19,64 @@ from tautscope.errors import ConfigError, FieldError
 from tautscope.extras import require_extras
 
 if TYPE_CHECKING:
+    from tautscope.hardware.run_results import HardwareRun
     from tautscope.loop.rig import Rig
     from tautscope.runs.recording import Recording
+
+ARTICLE_MOTION = "in the range of [experiment]. Hold the scope still, keep"
 
 
 @dataclass(frozen=True)
 class Setup:
-    """A rig and its configuration.
+    """A rig, which is closed with the block, its configuration, and its devices.
 
     Attributes:
-        rig: To be moved; it is closed with the block.
-        config: What is known of it.
         serial_numbers: Of camera and drives, where they have one.
+        executor: For what takes longer than a control period; None for the twin.
     """
 
     rig: Rig
     config: Config
     serial_numbers: Mapping[str, str]
+    executor: Executor | None = None
 
 
 def add_rig_options(parser: argparse.ArgumentParser) -> None:
     """``--twin``, ``--seed``, ``--yes``."""
-    parser.add_argument(
-        "--twin",
-        action="store_true",
-        help="calibrate a simulated rig that differs from --config, see --seed",
-    )
+    add_twin(parser, "calibrate a simulated rig that differs from --config, see --seed")
+    add_yes(parser)
+
+
+def add_twin(parser: argparse.ArgumentParser, text: str) -> None:
+    """``--twin`` and ``--seed``."""
+    parser.add_argument("--twin", action="store_true", help=text)
     parser.add_argument(
         "--seed",
         type=arguments.natural,
         metavar="N",
         help="seed of the twin and of its differences [twin.seed of the configuration]",
     )
+
+
+def add_yes(parser: argparse.ArgumentParser) -> None:
+    """``--yes``."""
     parser.add_argument("--yes", action="store_true", help="move the motors without asking")
 
 
-def actual_rig(config: Config, seed: int | None) -> Config:
-    """The configuration of the twin: it differs from `config` as drawn with the seed."""
-    from tautscope.twin.drawn_rig import draw_rig  # noqa: PLC0415
-
-    return draw_rig(config, config.twin.seed if seed is None else seed)
+def twin_seed(options: argparse.Namespace, config: Config) -> int:
+    """The seed of ``--seed``, or of the configuration."""
+    return int(config.twin.seed if options.seed is None else options.seed)
 
 
 @contextmanager
-def rig_for_calibration(options: argparse.Namespace) -> Iterator[Setup]:
+def rig_for_calibration(
+    options: argparse.Namespace, *, camera_is_known: bool = False
+) -> Iterator[Setup]:
     """Open the rig of the options, and close it at the end.
+
+    Args:
+        options: With those of `add_rig_options`.
+        camera_is_known: Whether the twin's camera is calibrated, apart from its focal lengths.
 
     Raises:
         FieldError: Neither ``--config`` with drives nor ``--twin`` is given, or the question
@@ -71,64 +86,56 @@ def rig_for_calibration(options: argparse.Namespace) -> Iterator[Setup]:
     config = article_config(options.config)
     if options.twin:
         require_extras("--twin", ["twin"])
+        from tautscope.twin.drawn_rig import draw_geometry, draw_rig  # noqa: PLC0415
         from tautscope.twin.rig import Twin  # noqa: PLC0415
 
-        twin = Twin(actual_rig(config, options.seed))
+        draw = draw_geometry if camera_is_known else draw_rig
+        twin = Twin(draw(config, twin_seed(options, config)))
         try:
             yield Setup(twin, config, {})
         finally:
             twin.close()
         return
     if options.config is None:
-        raise FieldError("files", None, "files, --config FILE of a rig, or --twin")
-    confirm_motion(options)
-    with open_rig(config) as setup:
-        yield setup
-
-
-def simulated_experiment(
-    options: argparse.Namespace,
-    config: Config,
-    progress: Callable[[float], None],
-    *,
-    compensate: bool = True,
-) -> Recording:
-    """Run the sines of a configuration on the twin of the options.
-
-    Args:
-        options: With those of `add_rig_options`, and ``--twin``.
-        config: Of the loop.
-        progress: Called with the share of the motion done.
-        compensate: Whether the hysteresis is compensated.
-    """
-    from tautscope.loop.references import SineSequence  # noqa: PLC0415
-    from tautscope.runs.experiment import run_experiment  # noqa: PLC0415
-
-    with rig_for_calibration(options) as setup:
-        return run_experiment(
-            setup.rig,
-            SineSequence(config.experiment),
-            config,
-            compensate,
-            progress=lambda elapsed, duration: progress(elapsed / duration),
-        )
-
-
-@contextmanager
-def open_rig(config: Config) -> Iterator[Setup]:
-    """Open drives and camera; on every exit the motors are quick-stopped."""
+        raise FieldError("--config", None, "the configuration of a rig; or a file, or --twin")
+    refuse_wrong_limits(options.config)
+    confirm_motion(options, ARTICLE_MOTION, config)
+    from tautscope.hardware.realtime import VISION, realtime_executor  # noqa: PLC0415
     from tautscope.hardware.rig import HardwareRig, require_drives  # noqa: PLC0415
     from tautscope.hardware.serial_numbers import read_serial_numbers  # noqa: PLC0415
     from tautscope.hardware.signals import exit_on_signals  # noqa: PLC0415
 
     require_drives(config)
-    with exit_on_signals():
-        serials = read_serial_numbers(config)
+    # On every exit the motors are quick-stopped.
+    with realtime_executor("vision", VISION) as executor, exit_on_signals():
+        serial_numbers = read_serial_numbers(config)
         rig = HardwareRig(config)
         try:
-            yield Setup(rig, config, serials)
+            yield Setup(rig, config, serial_numbers, executor)
         finally:
             rig.close()
+
+
+def run_protocol(
+    options: argparse.Namespace, config: Config, folder: Path, title: str
+) -> tuple[Recording, HardwareRun | None]:
+    """Run the sines of a configuration on the rig, which logs them in a folder, or on the twin."""
+    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
+    from tautscope.loop.references import SineSequence  # noqa: PLC0415
+    from tautscope.runs.experiment import run_experiment  # noqa: PLC0415
+
+    with progress_bar(title) as progress:
+        if not options.twin:
+            from tautscope.hardware.experiment import run_on_hardware  # noqa: PLC0415
+
+            run = run_on_hardware(config, folder, progress)
+            return run.compensated.recording, run
+        with rig_for_calibration(options) as setup:
+            motion = SineSequence(config.experiment)
+            recording = run_experiment(
+                setup.rig, motion, config, progress=lambda now, end: progress(now / end)
+            )
+            return recording, None
 
 
 def refuse_wrong_limits(config: str) -> None:
@@ -143,16 +150,11 @@ def refuse_wrong_limits(config: str) -> None:
         raise ConfigError(", ".join(marked), f"placeholders of {config}", allowed)
 
 
-def confirm_motion(options: argparse.Namespace) -> None:
+def confirm_motion(options: argparse.Namespace, what: str, config: Config) -> None:
     """Ask whether the motors may move, unless ``--yes``.
 
     Raises:
-        ConfigError: The limits of the drives are placeholders.
         FieldError: The answer is not y.
     """
-    refuse_wrong_limits(options.config)
-    question = (
-        "THE MOTORS WILL MOVE, in the range of [experiment]. Hold the scope still, keep tissue and "
-        "hands away, the emergency stop within reach."
-    )
-    confirm(question, options, article_config(options.config).camera)
+    text = f"{what} tissue and hands away, the emergency stop within reach."
+    confirm(f"THE MOTORS WILL MOVE, {text}", options, config.camera)

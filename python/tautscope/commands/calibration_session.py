@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -37,60 +36,44 @@ class SessionState(msgspec.Struct, forbid_unknown_fields=True):
     is_finished: bool = False
 
 
-@dataclass
 class CalibrationSession:
-    """A sequence of calibrations of one configuration file.
+    """A sequence of calibrations of one configuration file, begun or resumed.
+
+    Args:
+        file: The configuration.
+        folder: Folder of the report of a new session.
+        seed: Seed of the twin, None on a rig.
+        restart: Whether an unfinished session is dropped.
 
     Attributes:
-        file: The configuration.
         state: What is done.
+
+    Raises:
+        MissingPathError, ConfigError: The file is missing or shipped, its state is damaged, or the
+            session to be resumed is of another rig.
     """
 
-    file: Path
-    state: SessionState
-
-    @staticmethod
-    def state_file(file: Path) -> Path:
-        """The state file of a configuration."""
-        return file.with_suffix(".calibration.json")
-
-    @classmethod
-    def open(
-        cls, file: Path, folder: Path, seed: int | None, *, restart: bool
-    ) -> CalibrationSession:
-        """Resume the session of a configuration, or begin one.
-
-        Raises:
-            MissingPathError, ConfigError: The file is missing or shipped, its state is damaged, or
-                the session to be resumed is of another rig.
-        """
-        path = cls.state_file(writable_file(file))
-        state = None if restart else _read(path)
+    def __init__(self, file: Path, folder: Path, seed: int | None, *, restart: bool) -> None:
+        self._file = file
+        self._state_file = writable_file(file).with_suffix(".calibration.json")
+        state = None if restart else _read(self._state_file)
         if state is None or state.is_finished:
-            return cls(file, SessionState(str(folder), seed))
+            state = SessionState(str(folder), seed)
         if state.seed != seed:
             names = [
                 "the rig" if one is None else f"--twin --seed {one}" for one in (state.seed, seed)
             ]
             allowed = f"{names[0]}, whose calibration is unfinished; or --restart"
             raise ConfigError("session", names[1], allowed)
-        return cls(file, state)
-
-    @property
-    def folder(self) -> Path:
-        """Folder of the report."""
-        return Path(self.state.folder)
+        self.state, self.folder = state, Path(state.folder)
 
     @property
     def config(self) -> Config:
         """The configuration as it is now."""
-        return article_config(self.file)
+        return article_config(self._file)
 
     def finish_step(self, name: str, result: CalibrationResult | None) -> None:
-        """Write the values, figures and notes of a step, then note it as done.
-
-        A result of None is a step that was skipped.
-        """
+        """Write values, figures and notes of a step, None if it was skipped; note it as done."""
         if result is not None:
             self.folder.mkdir(parents=True, exist_ok=True)
             files = []
@@ -100,19 +83,18 @@ class CalibrationSession:
                 files.append([file, caption])
             values = result.rounded_values()
             document = {"values": values, "notes": list(result.notes), "figures": files}
-            document["std"] = dict(result.std)
-            _write(self.folder / f"{name}.json", document)
+            _write(self.folder / f"{name}.json", document | {"std": dict(result.std)})
             if values:
-                write_values(self.file, result.changes())
+                write_values(self._file, result.changes())
         self.state.done.append(name)
-        _write(self.state_file(self.file), msgspec.to_builtins(self.state))
+        _write(self._state_file, msgspec.to_builtins(self.state))
 
     def finish(self, titles: Mapping[str, str]) -> Path:
         """Write the report, and note that all is done; the path of the report."""
         report = self.folder / "report.html"
         report.write_text(self._page(titles), encoding="utf-8")
         self.state.is_finished = True
-        _write(self.state_file(self.file), msgspec.to_builtins(self.state))
+        _write(self._state_file, msgspec.to_builtins(self.state))
         return report
 
     def _page(self, titles: Mapping[str, str]) -> str:
@@ -137,7 +119,7 @@ class CalibrationSession:
                 )
         parts.append(f"<h2>Configuration</h2><pre>{escape(dump_config(self.config))}</pre>")
         kind = "a simulated rig" if self.state.seed is not None else "the rig"
-        return document("Calibration", f"Calibration of {kind} of {self.file}.", "\n".join(parts))
+        return document("Calibration", f"Calibration of {kind} of {self._file}.", "\n".join(parts))
 
 
 def _table(values: Mapping[str, Any], std: Mapping[str, float]) -> str:

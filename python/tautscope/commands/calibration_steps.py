@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import itertools
 from collections.abc import Callable
-from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,11 +15,7 @@ from tautscope.commands import (
     calibrate_geometry,
     calibrate_latency,
 )
-from tautscope.commands.calibration_rig import (
-    actual_rig,
-    rig_for_calibration,
-    simulated_experiment,
-)
+from tautscope.commands.calibration_rig import run_protocol
 from tautscope.config import Config
 from tautscope.errors import CalibrationError
 
@@ -48,15 +43,7 @@ class Step:
 
 
 def _camera(options: argparse.Namespace, config: Config, folder: Path) -> CalibrationResult:
-    from tautscope.calibration.camera.board import Board  # noqa: PLC0415
-    from tautscope.commands.board_images import live_images, twin_images  # noqa: PLC0415
-
-    board = Board(options.columns, options.rows, options.square)
-    if options.twin:
-        images = twin_images(actual_rig(config, options.seed), board)
-    else:
-        images = live_images(config, options.seconds)
-    result, info = calibrate_camera.calibrate(images, board, options.model)
+    result, info = calibrate_camera.calibrate(options)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "camera_info.yaml").write_text(info, encoding="utf-8")
     return result
@@ -67,18 +54,9 @@ def _colour(options: argparse.Namespace, config: Config, folder: Path) -> Calibr
 
 
 def _geometry(options: argparse.Namespace, config: Config, folder: Path) -> CalibrationResult:
-    from tautscope.calibration.geometry import fit, sweep  # noqa: PLC0415
-    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
-    from tautscope.hardware.realtime import VISION, realtime_executor  # noqa: PLC0415
+    from tautscope.calibration.geometry import fit  # noqa: PLC0415
 
-    with ExitStack() as resources:
-        setup = resources.enter_context(rig_for_calibration(options))
-        executor = None
-        if not options.twin:
-            executor = resources.enter_context(realtime_executor("vision", VISION))
-        progress = resources.enter_context(progress_bar("sweep"))
-        recording = sweep(setup.rig, config, executor=executor, progress=progress)
-        serial_numbers = setup.serial_numbers
+    recording, _, serial_numbers = calibrate_geometry.move(options, camera_is_known=False)
     # A board determines the intrinsics better than the instrument.
     found = fit(
         recording, config, intrinsics="focal" if config.calibration.camera is None else "none"
@@ -114,25 +92,20 @@ def _doctor(options: argparse.Namespace, config: Config, folder: Path) -> Calibr
 
 
 def _motion(options: argparse.Namespace, config: Config, folder: Path) -> CalibrationResult:
-    from tautscope.commands.progress import progress_bar  # noqa: PLC0415
     from tautscope.commands.result_lines import summary_line  # noqa: PLC0415
     from tautscope.report import figures  # noqa: PLC0415
     from tautscope.report.results import evaluate  # noqa: PLC0415
 
     config = config.replace(**{"experiment.periods": MOTION_PERIODS})
     place = _unused(folder, MOTION)
-    with progress_bar("first compensated motion") as progress:
-        if options.twin:
-            recording = simulated_experiment(options, config, progress)
-            place.mkdir(parents=True)
-            recording.write(place)
-        else:
-            from tautscope.hardware.experiment import run_on_hardware  # noqa: PLC0415
-            from tautscope.hardware.run_results import write_run_folder  # noqa: PLC0415
+    recording, run = run_protocol(options, config, place, "first compensated motion")
+    if run is None:
+        place.mkdir(parents=True)
+        recording.write(place)
+    else:
+        from tautscope.hardware.run_results import write_run_folder  # noqa: PLC0415
 
-            run = run_on_hardware(config, place, progress)
-            write_run_folder(run, place)
-            recording = run.compensated.recording
+        write_run_folder(run, place)
     results = evaluate(None, recording)
     figure = figures.figure9(None, recording)
     notes = [summary_line(dof, result) for dof, result in results.items()]

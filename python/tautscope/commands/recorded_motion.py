@@ -2,85 +2,82 @@
 
 from __future__ import annotations
 
+import argparse
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
-import numpy as np
-
-from tautscope.config import CameraConfig
-from tautscope.errors import RecordError
+from tautscope.commands import arguments
+from tautscope.commands.article_config import article_config
+from tautscope.config import Config
+from tautscope.errors import FieldError
 
 if TYPE_CHECKING:
-    from tautscope.calibration.bands.sweep import ImageSequence
+    from tautscope.calibration.motion import ImageRecorder
 
-MOST_IMAGES = 60
+Recorder = TypeVar("Recorder", bound="ImageRecorder")
 
 
-def log_motion(file: Path) -> ImageSequence:
-    """Images of a log, evenly chosen, with the positions that the drives reported.
+def add_motor_options(parser: argparse.ArgumentParser) -> None:
+    """``--motors`` and ``--video-start``."""
+    parser.add_argument(
+        "--motors", type=Path, metavar="FILE.csv", help="motor positions of a video"
+    )
+    parser.add_argument(
+        "--video-start",
+        type=arguments.seconds,
+        default=0.0,
+        metavar="S",
+        help="time of the video's first frame in the CSV's [s] [%(default)s]",
+    )
+
+
+def read_motion(
+    options: argparse.Namespace,
+    file: Path,
+    make: Callable[[Config], Recorder],
+    allowed: str = "a log (.mcap), or a video with --motors",
+) -> tuple[Recorder, Config]:
+    """Read a log, or a video with ``--motors``, into a recorder.
 
     Raises:
-        MissingPathError, RecordError: As `tautscope.log.reader.read_log`; or it has no images.
+        FieldError: The file is a video without positions; `allowed` is what the command reads.
+        MissingPathError, RecordError, CameraError: A file is missing or cannot be read.
     """
-    from tautscope.calibration.bands.sweep import ImageSequence  # noqa: PLC0415
-    from tautscope.calibration.images import to_bgr  # noqa: PLC0415
+    if file.suffix == ".mcap":
+        return _read_log(options, file, make)
+    if options.motors is None:
+        raise FieldError("file", str(file), allowed)
+    from tautscope.hardware.video import read_video  # noqa: PLC0415
+    from tautscope.runs.records import read_motors  # noqa: PLC0415
+
+    config = article_config(options.config)
+    recorder = make(config)
+    times, positions = read_motors(options.motors)
+    for time, position in zip(times, positions, strict=True):
+        recorder.add_tick(float(time), position)
+    for frame in read_video(str(file), config.camera, options.video_start):
+        if times[0] <= frame.captured_at <= times[-1] and recorder.is_due(frame.captured_at):
+            recorder.add_image(frame.image, frame.captured_at)
+    return recorder, config
+
+
+def _read_log(
+    options: argparse.Namespace, file: Path, make: Callable[[Config], Recorder]
+) -> tuple[Recorder, Config]:
     from tautscope.log.reader import Tick, Update, read_log  # noqa: PLC0415
     from tautscope.runs.recording import FRAME_COLUMNS  # noqa: PLC0415
 
     log = read_log(file)
-    ticks = [event.sample for event in log.events.values() if isinstance(event, Tick)]
-    updates = [
-        (index, event)
-        for index, event in log.events.items()
-        if isinstance(event, Update) and log.has_image(index)
-    ]
-    if not ticks or not updates:
-        raise RecordError(str(file), f"{len(ticks)} ticks, {len(updates)} images", "both")
-    column = (FRAME_COLUMNS.names or ()).index("captured_at")
-    chosen = [updates[k] for k in _evenly(len(updates))]
-    stamps = np.array([event.row[column] for _, event in chosen])
-    at = np.array([tick.time for tick in ticks])
-    applied = np.array([tick.applied for tick in ticks])
-    positions = np.column_stack([np.interp(stamps, at, dof) for dof in applied.T])
-    pixel_format = log.config.camera.pixel_format
-    images = [to_bgr(log.image(index), pixel_format) for index, _ in chosen]
-    return ImageSequence(stamps, positions, images)
-
-
-def video_motion(file: Path, motors: Path, start: float, camera: CameraConfig) -> ImageSequence:
-    """Images of a video within the time of a table of motor positions, evenly chosen.
-
-    Raises:
-        MissingPathError: A file does not exist.
-        CameraError: The video cannot be read, or has another size.
-        RecordError: As `tautscope.runs.records.read_motors`; or the times do not overlap.
-    """
-    from tautscope.calibration.bands.sweep import ImageSequence  # noqa: PLC0415
-    from tautscope.calibration.images import to_bgr  # noqa: PLC0415
-    from tautscope.hardware.video import read_video  # noqa: PLC0415
-    from tautscope.runs.records import read_motors  # noqa: PLC0415
-
-    at, applied = read_motors(motors)
-    stamps = [
-        frame.captured_at
-        for frame in read_video(str(file), camera, start)
-        if at[0] <= frame.captured_at <= at[-1]
-    ]
-    if not stamps:
-        span = f"frames between {at[0]:g} and {at[-1]:g} s, the time of {motors}"
-        raise RecordError("video", "no frame in that time", span)
-    chosen = {stamps[k] for k in _evenly(len(stamps))}
-    images = [
-        to_bgr(frame.image, camera.pixel_format)
-        for frame in read_video(str(file), camera, start)
-        if frame.captured_at in chosen
-    ]
-    times = np.array(sorted(chosen))
-    positions = np.column_stack([np.interp(times, at, dof) for dof in applied.T])
-    return ImageSequence(times, positions, images)
-
-
-def _evenly(count: int) -> list[int]:
-    """At most `MOST_IMAGES` indices, evenly spaced."""
-    indices = np.linspace(0, count - 1, min(count, MOST_IMAGES)).round().astype(int)
-    return [int(index) for index in dict.fromkeys(indices.tolist())]
+    config = log.config if options.config is None else article_config(options.config)
+    config = config.replace(**{"camera.pixel_format": log.config.camera.pixel_format})
+    recorder = make(config)
+    captured = (FRAME_COLUMNS.names or ()).index("captured_at")
+    for index, event in log.events.items():
+        if isinstance(event, Tick):
+            recorder.add_tick(event.sample.time, event.sample.applied)
+        elif isinstance(event, Update) and log.has_image(index):
+            captured_at = float(event.row[captured])  # type: ignore[arg-type]
+            if recorder.is_due(captured_at):
+                recorder.add_image(log.image(index), captured_at)
+    return recorder, config

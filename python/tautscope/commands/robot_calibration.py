@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
 from tautscope.commands.calibration_output import add_options, check_options, finish
-from tautscope.commands.question import confirm
+from tautscope.commands.calibration_rig import add_yes, confirm_motion
 from tautscope.commands.rig_choice import add_rig, choose_rig
 from tautscope.commands.robot import DURATION, add_seconds
 from tautscope.config import Config
@@ -19,10 +19,6 @@ if TYPE_CHECKING:
     from tautscope.calibration.result import CalibrationResult
     from tautscope.calibration.robot import RobotFit
 
-QUESTION = (
-    "THE MOTORS WILL MOVE, over 80 % of each range. Keep tissue and hands away, the emergency stop "
-    "within reach."
-)
 SYSTEMATIC = 0.01
 """Standard deviation of what loops take for a delay, or the reverse [s]."""
 
@@ -49,7 +45,7 @@ def add_parser(kinds: arguments.Verbs) -> None:
         "kinematics.base_rotation; repeatable",
     )
     add_seconds(robot, "the sweep", DURATION / 2)
-    robot.add_argument("--yes", action="store_true", help="move the motors without asking")
+    add_yes(robot)
     add_options(robot)
 
 
@@ -68,26 +64,21 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def run_latency(options: argparse.Namespace) -> int:
-    """The delays alone, with the kinematics as configured.
-
-    Raises:
-        CalibrationError: Too little was measured.
-        TautscopeError: Errors of the rig.
-    """
+    """The delays alone, with the kinematics as configured."""
     config, found = _sweep(options, ("kinematics",))
     finish(options, result("latency", found, config))
     return 0
 
 
 def _sweep(options: argparse.Namespace, keep: Sequence[str]) -> tuple[Config, RobotFit]:
-    from tautscope.calibration.robot import Sweep, fit, move  # noqa: PLC0415
+    from tautscope.calibration.robot import fit, move, sweep_motion  # noqa: PLC0415
     from tautscope.commands.progress import progress_bar  # noqa: PLC0415
 
     config, make = choose_rig(options)
     if not config.dof:
         raise ConfigError("dof", "none", "degrees of freedom: [[dof]]")
-    sweep = Sweep(config, options.seconds or DURATION / 2)
-    confirm(QUESTION, options, config.camera)
+    sweep = sweep_motion(config, options.seconds or DURATION / 2)
+    confirm_motion(options, "over 80 % of each range. Keep", config)
     rig = make(config)
     try:
         with progress_bar("sweep") as progress:

@@ -11,10 +11,6 @@ namespace {
 
 constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
-bool is_finite(const Vector &values) noexcept {
-    return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
-}
-
 bool contains(std::uint32_t requests, Request request) noexcept {
     return (requests & static_cast<std::uint32_t>(request)) != 0;
 }
@@ -61,22 +57,38 @@ std::string flag_names(std::uint32_t flags) {
 }
 
 ControlLoop::ControlLoop(const std::string &toml)
-    : loop_(toml), period_(loop_.period()), measured_{unknown, unknown, unknown}, reference_(measured_), used_(measured_),
-      command_(measured_), made_at_(unknown),
-      engaged_at_(unknown) {}
+    : loop_(toml), start_tolerance_(loop_.dofs()), period_(loop_.period()), measured_(loop_.dofs(), unknown), reference_(measured_),
+      used_(measured_), command_(measured_), made_at_(unknown), engaged_at_(unknown) {
+    for (std::size_t dof = 0; dof < loop_.dofs(); ++dof) {
+        const char *name = "", *unit = "";
+        tautscope::check(tautscope_loop_dof(loop_.handle(), dof, &name, &unit));
+        dofs_.emplace_back(name);
+        start_tolerance_[dof] = std::string_view(unit) == "m" ? 1e-3 : 0.05;
+    }
+    // With `[[dof]]` no bands can be predicted.
+    TautscopeStatePrediction bands;
+    has_bands_ = tautscope_loop_predict_state(loop_.handle(), 0.0, &bands) == TAUTSCOPE_RESULT_OK;
+}
 
-void ControlLoop::set_measured(const Vector &position) noexcept {
+bool ControlLoop::is_finite(Numbers values) const noexcept {
+    return values.size() == dofs_.size() &&
+           std::all_of(values.data(), values.data() + values.size(), [](double value) { return std::isfinite(value); });
+}
+
+void ControlLoop::set_measured(Numbers position) noexcept {
     if (is_finite(position)) {
-        measured_ = position;
+        measured_ = Values(position);
     }
 }
 
-void ControlLoop::set_reference(const Vector &position, double made_at) noexcept {
-    if (is_finite(position)) {
-        reference_ = position;
+bool ControlLoop::set_reference(Numbers position, double made_at) noexcept {
+    const bool is_new = is_finite(position);
+    if (is_new) {
+        reference_ = Values(position);
         made_at_ = made_at;
         has_new_reference_ = true;
     }
+    return is_new;
 }
 
 Tick ControlLoop::step(double time) noexcept {
@@ -114,7 +126,7 @@ Tick ControlLoop::step(double time) noexcept {
 }
 
 void ControlLoop::exchange() noexcept {
-    if (state_ != OperatingState::disabled && exchange_.serve(loop_)) {
+    if (exchange_.serve(loop_, state_ != OperatingState::disabled)) {
         update_state();
     }
 }
@@ -170,7 +182,7 @@ void ControlLoop::enable() noexcept {
     if (is_finite(command_)) {
         is_misplaced_ = false;
         for (std::size_t i = 0; i < command_.size() && is_finite(measured_); ++i) {
-            is_misplaced_ |= std::abs(measured_[i] - command_[i]) > start_tolerance[i];
+            is_misplaced_ |= std::abs(measured_[i] - command_[i]) > start_tolerance_[i];
         }
         if (is_misplaced_) {
             state_ = OperatingState::fault;

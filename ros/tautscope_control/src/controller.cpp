@@ -1,6 +1,7 @@
-/* ros2_control controller: references of insertion, rotation and bending in, position commands of the joints out. */
+/* ros2_control controller: references of the joints in, their position commands out. */
 
-#include <array>
+#include <algorithm>
+#include <cmath>
 #include <limits>
 #include <memory>
 #include <string>
@@ -28,11 +29,7 @@ class HysteresisController : public ChainableController {
 public:
     CallbackReturn on_init() override {
         try {
-            auto_declare<std::string>("config", "");
-            auto_declare<std::vector<std::string>>("joints", {"insertion", "rotation", "bending"});
-            auto_declare<std::string>("image_topic", "/endoscope/image_raw");
-            auto_declare<std::string>("frame_id", "guide");
-            auto_declare<double>("compensation", 1.0);
+            Session::declare_parameters(*get_node());
         } catch (const std::exception &error) {
             RCLCPP_ERROR(get_node()->get_logger(), "%s", error.what());
             return CallbackReturn::ERROR;
@@ -47,13 +44,7 @@ public:
     CallbackReturn on_configure(const rclcpp_lifecycle::State &) override {
         const auto node = get_node();
         try {
-            session_ = Session::create(
-                *node, SessionSettings{node->get_parameter("config").as_string(), joints(),
-                                       node->get_parameter("image_topic").as_string(),
-                                       node->get_parameter("frame_id").as_string(), "~/"});
-            if (!session_->control().set_compensation(node->get_parameter("compensation").as_double())) {
-                throw std::invalid_argument("Parameter compensation: expected a number from 0 to 1.");
-            }
+            session_ = Session::create(*node, "~/");
             const double rate = 1.0 / session_->control().period();
             if (!is_updated_at(rate)) {
                 throw std::invalid_argument("Parameter update_rate: expected " + std::to_string(rate) +
@@ -67,11 +58,12 @@ public:
         }
         servo_ = node->create_subscription<sensor_msgs::msg::JointState>(
             "~/servo_jp", rclcpp::QoS(1), [this, session = session_](const sensor_msgs::msg::JointState &message) {
-                if (const auto position = positions(message, session->joints())) {
-                    received_.writeFromNonRT({*position, session->seconds(message.header.stamp), ++messages_});
-                } else {
+                const Values position = positions(message, session->joints());
+                if (std::any_of(position.begin(), position.end(), [](double value) { return std::isnan(value); })) {
                     RCLCPP_WARN_THROTTLE(get_node()->get_logger(), *get_node()->get_clock(), 1000,
                                          "servo_jp: joints are missing");
+                } else {
+                    received_.writeFromNonRT({position, session->seconds(message.header.stamp), ++messages_});
                 }
             });
         report_ = node->create_wall_timer(std::chrono::milliseconds(100), [session = session_] { session->report(); });
@@ -79,12 +71,14 @@ public:
     }
 
     CallbackReturn on_activate(const rclcpp_lifecycle::State &) override {
-        Vector measured{};
+        Values measured(reference_interfaces_.size());
         for (std::size_t i = 0; i < measured.size(); ++i) {
             measured[i] = read(state_interfaces_[i]).value_or(unknown);
             reference_interfaces_[i] = unknown;
         }
         used_message_ = received_.readFromRT()->number;
+        // What was measured before is dropped.
+        session_->control().exchange();
         session_->control().set_measured(measured);
         session_->control().post(Request::enable);
         return CallbackReturn::SUCCESS;
@@ -104,7 +98,7 @@ public:
 
 protected:
     std::vector<hardware_interface::CommandInterface> on_export_reference_interfaces() override {
-        const auto names = joints();
+        const auto &names = session_->joints();
         reference_interfaces_.assign(names.size(), unknown);
         std::vector<hardware_interface::CommandInterface> interfaces;
         interfaces.reserve(names.size());
@@ -129,8 +123,7 @@ protected:
 
     return_type update_and_write_commands(const rclcpp::Time &, const rclcpp::Duration &) override {
         ControlLoop &control = session_->control();
-        const Vector reference{reference_interfaces_[0], reference_interfaces_[1], reference_interfaces_[2]};
-        control.set_reference(reference, is_in_chained_mode() ? unknown : made_at_);
+        control.set_reference(reference_interfaces_, is_in_chained_mode() ? unknown : made_at_);
         // Of the clock of the images; the time given is that of the controller manager.
         const Tick tick = control.step(session_->now());
         for (std::size_t i = 0; i < tick.command.size() && tick.is_sent; ++i) {
@@ -144,20 +137,14 @@ private:
     static constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
     struct Received {
-        Vector position{unknown, unknown, unknown};
+        Values position;
         double made_at = unknown;
         std::uint64_t number = 0;
     };
 
-    std::vector<std::string> joints() const {
-        const auto names = get_node()->get_parameter("joints").as_string_array();
-        check_joints(names);
-        return names;
-    }
-
     InterfaceConfiguration positions_of_joints() const {
         InterfaceConfiguration configuration{controller_interface::interface_configuration_type::INDIVIDUAL, {}};
-        for (const std::string &joint : joints()) {
+        for (const std::string &joint : session_ ? session_->joints() : std::vector<std::string>{}) {
             configuration.names.push_back(joint + "/" + hardware_interface::HW_IF_POSITION);
         }
         return configuration;

@@ -42,7 +42,21 @@ const TautscopeReport *DetectionExchange::take_report() noexcept {
 
 bool DetectionExchange::is_free() const noexcept { return phase_.load(std::memory_order_acquire) == Phase::free; }
 
-bool DetectionExchange::serve(tautscope::Loop &loop) noexcept {
+bool DetectionExchange::serve(tautscope::Loop &loop, bool is_used) noexcept {
+    bool is_updated = is_used && serve_image(loop);
+    for (Measurement given; measurements.pop(given);) {
+        const TautscopeMeasurement tip{given.values.data(), given.values.size(), nullptr, given.captured_at, given.sensor, 0};
+        TautscopeTipReport report{};
+        report.size = sizeof report;
+        if (is_used && tautscope_loop_on_tip(loop.handle(), &tip, &report) == TAUTSCOPE_RESULT_OK) {
+            reports.push(report);
+            is_updated = true;
+        }
+    }
+    return is_updated;
+}
+
+bool DetectionExchange::serve_image(tautscope::Loop &loop) noexcept {
     switch (phase_.load(std::memory_order_acquire)) {
     case Phase::requested: {
         // Taken before it is read: the request may be withdrawn at any time.

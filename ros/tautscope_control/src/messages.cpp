@@ -1,40 +1,42 @@
 #include "tautscope_control/messages.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <set>
 #include <stdexcept>
 #include <utility>
 
 namespace tautscope_control {
 
-void check_joints(const std::vector<std::string> &joints) {
-    if (joints.size() != 3 || std::set<std::string>(joints.begin(), joints.end()).size() != 3) {
-        throw std::invalid_argument("Parameter joints: expected three different names, of insertion, rotation and bending.");
+std::vector<std::string> joints_of(std::vector<std::string> names, const ControlLoop &control) {
+    if (!control.has_bands() && names == default_joints) {
+        names = control.dofs();
     }
+    const std::size_t count = control.dofs().size();
+    if (names.size() != count || std::set<std::string>(names.begin(), names.end()).size() != count) {
+        throw std::invalid_argument("Parameter joints: got " + std::to_string(names.size()) + " names, expected " +
+                                    std::to_string(count) + " different ones, one for each degree of freedom.");
+    }
+    return names;
 }
 
-std::optional<Vector> positions(const sensor_msgs::msg::JointState &message, const std::vector<std::string> &joints) {
-    Vector values{};
-    if (message.name.empty()) {
-        if (message.position.size() != values.size()) {
-            return std::nullopt;
-        }
-        std::copy(message.position.begin(), message.position.end(), values.begin());
-        return values;
+Values positions(const sensor_msgs::msg::JointState &message, const std::vector<std::string> &joints) {
+    Values values(joints.size(), std::numeric_limits<double>::quiet_NaN());
+    if (message.name.empty() && message.position.size() == joints.size()) {
+        return Values(message.position);
     }
-    for (std::size_t i = 0; i < values.size(); ++i) {
+    for (std::size_t i = 0; i < joints.size(); ++i) {
         const auto found = std::find(message.name.begin(), message.name.end(), joints[i]);
         const auto index = static_cast<std::size_t>(found - message.name.begin());
-        if (found == message.name.end() || index >= message.position.size()) {
-            return std::nullopt;
+        if (found != message.name.end() && index < message.position.size()) {
+            values[i] = message.position[index];
         }
-        values[i] = message.position[index];
     }
     return values;
 }
 
-void set_positions(sensor_msgs::msg::JointState &message, const Vector &positions) {
-    message.position.assign(positions.begin(), positions.end());
+void set_positions(sensor_msgs::msg::JointState &message, Numbers positions) {
+    message.position.assign(positions.data(), positions.data() + positions.size());
 }
 
 std::optional<OwnedImage> image(sensor_msgs::msg::Image::ConstSharedPtr message, double captured_at) {

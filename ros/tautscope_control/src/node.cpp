@@ -3,7 +3,6 @@
 #include <chrono>
 #include <future>
 #include <memory>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -21,24 +20,13 @@ using CallbackReturn = rclcpp_lifecycle::node_interfaces::LifecycleNodeInterface
 /// Node of the instrument. Everything but images runs in its default callback group, one at a time.
 class InstrumentNode : public rclcpp_lifecycle::LifecycleNode {
 public:
-    InstrumentNode() : LifecycleNode("tautscope") {
-        declare_parameter("config", "");
-        declare_parameter("joints", std::vector<std::string>{"insertion", "rotation", "bending"});
-        declare_parameter("image_topic", "/endoscope/image_raw");
-        declare_parameter("frame_id", "guide");
-        declare_parameter("compensation", 1.0);
-    }
+    InstrumentNode() : LifecycleNode("tautscope") { Session::declare_parameters(*this); }
 
     ~InstrumentNode() override { stop(); }
 
     CallbackReturn on_configure(const rclcpp_lifecycle::State &) override {
         try {
-            session_ = Session::create(
-                *this, SessionSettings{get_parameter("config").as_string(), get_parameter("joints").as_string_array(),
-                                       get_parameter("image_topic").as_string(), get_parameter("frame_id").as_string(), ""});
-            if (!session_->control().set_compensation(get_parameter("compensation").as_double())) {
-                throw std::invalid_argument("Parameter compensation: expected a number from 0 to 1.");
-            }
+            session_ = Session::create(*this, "");
         } catch (const std::exception &error) {
             RCLCPP_ERROR(get_logger(), "%s", error.what());
             session_.reset();
@@ -51,17 +39,15 @@ public:
             rclcpp::create_publisher<crtk_msgs::msg::StringStamped>(*this, "actuators/state_command", rclcpp::QoS(10));
         setpoint_message_ = command_message_ = session_->joint_state();
         servo_ = create_subscription<JointState>("servo_jp", latest, [this](const JointState &message) {
-            if (const auto reference = positions(message, session_->joints())) {
-                session_->control().set_reference(*reference, session_->seconds(message.header.stamp));
-            } else {
+            if (!session_->control().set_reference(positions(message, session_->joints()),
+                                                   session_->seconds(message.header.stamp))) {
                 RCLCPP_WARN_THROTTLE(get_logger(), *get_clock(), 1000, "servo_jp: joints are missing");
             }
         });
         actuators_measured_ =
             create_subscription<JointState>("actuators/measured_js", latest, [this](const JointState &message) {
-                const auto measured = positions(message, session_->joints());
-                if (measured && rclcpp::Time(message.header.stamp).nanoseconds() != 0) {
-                    session_->control().set_measured(*measured);
+                if (rclcpp::Time(message.header.stamp).nanoseconds() != 0) {
+                    session_->control().set_measured(positions(message, session_->joints()));
                 }
             });
         actuators_state_ = create_subscription<crtk_msgs::msg::OperatingState>(

@@ -1,7 +1,8 @@
 /* The controller as plugin, with interfaces and a clock of this test: the commands of the loop, bit for bit, without an allocation.
 
-   controller RECORDING                                        (a recording of examples/cpp/record.py at 1 kHz, as .../best) */
+   controller RECORDING TIP        (recordings of examples/cpp/record.py: at 1 kHz, as .../best, and of a robot, as .../tip_best) */
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -17,6 +18,7 @@
 #include <rcl/time.h>
 #include <rclcpp/rclcpp.hpp>
 #include <sensor_msgs/msg/joint_state.hpp>
+#include <std_msgs/msg/float64_multi_array.hpp>
 
 #include "expect.hpp"
 #include "recording.hpp"
@@ -58,18 +60,26 @@ using hardware_interface::LoanedStateInterface;
 using hardware_interface::StateInterface;
 using lifecycle_msgs::msg::State;
 
-constexpr std::array<const char *, 3> joints{"insertion", "rotation", "bending"};
+using tautscope::Numbers;
+
+const std::vector<std::string> joints_of_article{"insertion", "rotation", "bending"};
 constexpr tautscope::Vector start{25e-3, 0.0, 0.9};
+
+/// The encoders of the robot of `record_tip`.
+constexpr char encoders[] = "/encoders";
 
 /// The controller, with motors that are where they were last commanded.
 class Rig {
 public:
-    Rig(pluginlib::ClassLoader<controller_interface::ChainableControllerInterface> &loader, const std::string &config)
-        : controller_(loader.createSharedInstance("tautscope_control/HysteresisController")) {
+    Rig(pluginlib::ClassLoader<controller_interface::ChainableControllerInterface> &loader, const std::string &config,
+        std::vector<std::string> names = joints_of_article, Numbers begin = start, unsigned int rate = 1000)
+        : command(begin.data(), begin.data() + begin.size()), measured(command), joints(std::move(names)),
+          controller_(loader.createSharedInstance("tautscope_control/HysteresisController")) {
         controller_interface::ControllerInterfaceParams parameters;
         parameters.controller_name = "instrument";
-        parameters.controller_manager_update_rate = parameters.update_rate = 1000;
-        parameters.node_options.parameter_overrides({{"config", config}});
+        parameters.controller_manager_update_rate = parameters.update_rate = rate;
+        parameters.node_options.parameter_overrides(
+            {{"config", config}, {"measurement_topics", std::vector<std::string>{encoders}}});
         EXPECT(controller_->init(parameters) == return_type::OK);
         // Simulated time.
         EXPECT(rcl_enable_ros_time_override(clock()) == RCL_RET_OK);
@@ -84,7 +94,7 @@ public:
         references_ = controller_->export_reference_interfaces();
         EXPECT(references_.size() == joints.size());
         for (std::size_t i = 0; i < joints.size(); ++i) {
-            EXPECT(references_[i]->get_name() == std::string("instrument/") + joints[i] + "/position");
+            EXPECT(references_[i]->get_name() == "instrument/" + joints[i] + "/position");
         }
     }
 
@@ -95,7 +105,7 @@ public:
         const auto command_names = controller_->command_interface_configuration().names;
         const auto state_names = controller_->state_interface_configuration().names;
         for (std::size_t i = 0; i < joints.size(); ++i) {
-            const std::string name = std::string(joints[i]) + "/position";
+            const std::string name = joints[i] + "/position";
             EXPECT(command_names.at(i) == name && state_names.at(i) == name);
             // A loan does not keep its interface.
             const auto lent = std::make_shared<CommandInterface>(joints[i], "position", &command[i]);
@@ -113,9 +123,9 @@ public:
         controller_->release_interfaces();
     }
 
-    void refer(const tautscope::Vector &reference) {
+    void refer(Numbers reference) {
         for (std::size_t i = 0; i < joints.size(); ++i) {
-            EXPECT(references_[i]->set_value(reference[i]));
+            EXPECT(references_[i]->set_value(reference.data()[i]));
         }
     }
 
@@ -132,14 +142,16 @@ public:
 
     rclcpp_lifecycle::LifecycleNode &node() { return *controller_->get_node(); }
 
-    std::array<double, 3> command{start}, measured{start};
+    /// Nanoseconds since 1970 at the begin of the simulated time.
+    static constexpr std::int64_t epoch = 1'700'000'000'000'000'000;
+
+    std::vector<double> command, measured;
+    const std::vector<std::string> joints;
 
 private:
     rcl_clock_t *clock() { return controller_->get_node()->get_clock()->get_clock_handle(); }
 
     void set_time(std::int64_t nanoseconds) { EXPECT(rcl_set_ros_time_override(clock(), epoch + nanoseconds) == RCL_RET_OK); }
-
-    static constexpr std::int64_t epoch = 1'700'000'000'000'000'000;
 
     std::shared_ptr<controller_interface::ChainableControllerInterface> controller_;
     std::vector<CommandInterface::SharedPtr> references_;
@@ -165,7 +177,7 @@ void chained_references_give_the_commands_of_the_loop(Loader &loader, const std:
         EXPECT(rig.update(nanoseconds) == return_type::OK);
         expected.set_reference(ticks[tick].reference, std::nan(""));
         const auto wanted = expected.step(1e-9 * static_cast<double>(nanoseconds)).command;
-        wrong += std::memcmp(wanted.data(), rig.command.data(), sizeof wanted) != 0;
+        wrong += std::memcmp(wanted.data(), rig.command.data(), wanted.size() * sizeof(double)) != 0;
         moved += rig.command != before;
     }
     std::printf("%zu updates unlike the loop, %zu with motion, %lu allocations\n", wrong, moved, allocations);
@@ -188,6 +200,80 @@ void chained_references_give_the_commands_of_the_loop(Loader &loader, const std:
     EXPECT(rig.update(13002 * 1000000LL) == return_type::OK && rig.command == rest);
 }
 
+void a_robot_has_its_degrees_of_freedom_and_finds_their_slack(Loader &loader, const std::string &recording) {
+    struct TipTick {
+        double time, made_at, reference[2], event, command[2];
+    };
+    const tautscope::Vector ends{0.6, 8e-3, 0.0};
+    Rig rig(loader, recording + ".toml", {"bend", "slide"}, Numbers{0.0, 0.0}, 200);
+    rig.configure();
+    tautscope_control::ControlLoop expected(tautscope::read_file(recording + ".toml"));
+    expected.set_measured(Numbers{0.0, 0.0});
+    expected.post(tautscope_control::Request::enable);
+    const auto publisher = rclcpp::create_publisher<sensor_msgs::msg::JointState>(rig.node(), encoders, rclcpp::QoS(10));
+    std::size_t arrived = 0, sent = 0, wrong = 0, reports = 0;
+    std::vector<double> delta;
+    sensor_msgs::msg::JointState last;
+    const auto arrival = rig.node().create_subscription<sensor_msgs::msg::JointState>(
+        encoders, rclcpp::SensorDataQoS().keep_last(10), [&](const sensor_msgs::msg::JointState &) { ++arrived; });
+    const auto estimate = rig.node().create_subscription<sensor_msgs::msg::JointState>(
+        "/instrument/measured_js", rclcpp::QoS(10), [&](const sensor_msgs::msg::JointState &message) {
+            last = message.header.stamp.sec != 0 ? message : last;
+        });
+    const auto offsets = rig.node().create_subscription<std_msgs::msg::Float64MultiArray>(
+        "/instrument/hysteresis/delta", rclcpp::QoS(10),
+        [&](const std_msgs::msg::Float64MultiArray &message) {
+            delta = message.data;
+            ++reports;
+        });
+    const auto publish = [&](const sensor_msgs::msg::JointState &message) {
+        publisher->publish(message);
+        for (++sent; arrived < sent;) {
+            rig.spin();
+        }
+    };
+    sensor_msgs::msg::JointState before;
+    before.name = {"bend", "slide"};
+    before.position = {0.5, 5e-3};
+    publish(before);
+    rig.activate(true);
+    double tip[2] = {0.0, 0.0};
+    std::int64_t nanoseconds = 0;
+    for (const TipTick &now : read_rows<TipTick>(recording + ".ticks")) {
+        if (nanoseconds > 0 && nanoseconds % 40000000 == 0) {
+            // By name, in any order; one is missing in turns.
+            sensor_msgs::msg::JointState message;
+            message.header.stamp = rclcpp::Time(Rig::epoch + nanoseconds);
+            message.name = {"slide", "bend"};
+            message.position = {tip[1], tip[0]};
+            tautscope::Values values(Numbers{tip[0], tip[1]});
+            if (sent % 3 == 1) {
+                message.name.pop_back();
+                message.position.pop_back();
+                values[0] = std::nan("");
+            }
+            publish(message);
+            EXPECT(expected.detection().measurements.push({values, 1e-9 * static_cast<double>(nanoseconds), 0}));
+        }
+        rig.refer(now.reference);
+        EXPECT(rig.update(nanoseconds) == return_type::OK);
+        expected.set_reference(now.reference, std::nan(""));
+        const auto wanted = expected.step(1e-9 * static_cast<double>(nanoseconds)).command;
+        expected.exchange();
+        wrong += std::memcmp(wanted.data(), rig.command.data(), sizeof tip) != 0;
+        for (std::size_t i = 0; i < 2; ++i) {
+            tip[i] = std::min(std::max(tip[i], rig.command[i] - ends[i] / 2), rig.command[i] + ends[i] / 2);
+        }
+        nanoseconds += 5000000;
+    }
+    rig.spin();
+    rig.spin();
+    std::printf("%zu measurements, %zu commands unlike the loop, %lu allocations\n", sent, wrong, allocations);
+    EXPECT(wrong == 0 && sent > 900 && reports == sent - 1 && allocations == 0 && delta.size() == 4 && last.name == rig.joints);
+    EXPECT(delta.size() == 4 && std::abs(delta[1] - delta[0] - ends[0]) < 0.02 && std::abs(delta[3] - delta[2] - ends[1]) < 0.2e-3);
+    EXPECT(last.position.size() == 2 && std::abs(last.position[0] - tip[0]) < 0.1 && std::abs(last.position[1] - tip[1]) < 1e-3);
+}
+
 void references_of_a_topic_stop_with_their_device(Loader &loader, const std::string &recording) {
     Rig rig(loader, recording + ".toml");
     rig.configure();
@@ -195,7 +281,7 @@ void references_of_a_topic_stop_with_their_device(Loader &loader, const std::str
     const auto publisher =
         rclcpp::create_publisher<sensor_msgs::msg::JointState>(rig.node(), "/instrument/servo_jp", rclcpp::QoS(1));
     sensor_msgs::msg::JointState message;
-    message.name = {joints.begin(), joints.end()};
+    message.name = rig.joints;
     message.position = {start.begin(), start.end()};
     std::int64_t now = 0;
     const auto run = [&](int ticks, double speed) {
@@ -223,13 +309,16 @@ void references_of_a_topic_stop_with_their_device(Loader &loader, const std::str
     EXPECT(allocations == 0);
 }
 
-void wrong_parameters_are_refused(Loader &loader, const std::string &recording) {
-    for (const rclcpp::Parameter &wrong :
-         {rclcpp::Parameter("config", "missing.toml"), rclcpp::Parameter("compensation", 1.5), rclcpp::Parameter("update_rate", 200)}) {
+void wrong_parameters_are_refused(Loader &loader, const std::string &recording, const std::string &tip) {
+    const std::vector<std::string> two{"bend", "bend"};
+    // The last one has no topics.
+    const std::initializer_list<rclcpp::Parameter> wrongs{{"config", "missing.toml"}, {"compensation", 1.5}, {"update_rate", 200},
+                                                          {"joints", two}, {"config", tip + ".toml"}};
+    for (const rclcpp::Parameter &wrong : wrongs) {
         const auto controller = loader.createSharedInstance("tautscope_control/HysteresisController");
         controller_interface::ControllerInterfaceParams parameters;
         parameters.controller_name = "instrument";
-        parameters.controller_manager_update_rate = parameters.update_rate = 1000;
+        parameters.controller_manager_update_rate = parameters.update_rate = &wrong == wrongs.end() - 1 ? 200 : 1000;
         std::vector<rclcpp::Parameter> overrides{wrong};
         if (wrong.get_name() != "config") {
             overrides.emplace_back("config", recording + ".toml");
@@ -246,11 +335,12 @@ void wrong_parameters_are_refused(Loader &loader, const std::string &recording) 
 int main(int count, char **arguments) {
     rclcpp::init(0, nullptr);
     {
-        const std::string recording = count == 2 ? arguments[1] : "best";
+        const std::string recording = count == 3 ? arguments[1] : "best", tip = count == 3 ? arguments[2] : "tip_best";
         Loader loader("controller_interface", "controller_interface::ChainableControllerInterface");
         chained_references_give_the_commands_of_the_loop(loader, recording);
         references_of_a_topic_stop_with_their_device(loader, recording);
-        wrong_parameters_are_refused(loader, recording);
+        a_robot_has_its_degrees_of_freedom_and_finds_their_slack(loader, tip);
+        wrong_parameters_are_refused(loader, recording, tip);
     }
     rclcpp::shutdown();
     std::printf("%d failures\n", failures);

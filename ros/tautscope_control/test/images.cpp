@@ -60,7 +60,7 @@ int in_turn(const Recorded &recorded) {
     for (std::size_t tick = 0; tick < recorded.ticks.size(); ++tick) {
         const ::Tick &now = recorded.ticks[tick];
         control.set_reference(now.reference, now.made_at);
-        const Vector command = control.step(now.time).command;
+        const Values command = control.step(now.time).command;
         const double values[] = {command[0], command[1], command[2]};
         wrong += !is_same(values, now.command);
         for (; image < recorded.images.size() && static_cast<std::size_t>(recorded.images[image].tick) == tick; ++image) {

@@ -15,7 +15,9 @@ using namespace tautscope_control;
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr Vector start{25e-3, 0.0, 0.9};
+constexpr tautscope::Vector start{25e-3, 0.0, 0.9};
+
+bool operator==(const Values &a, const Values &b) { return std::equal(a.begin(), a.end(), b.begin(), b.end()); }
 
 /// A loop with its clock, and an operator who moves the insertion at 10 mm/s.
 struct Rig {
@@ -47,7 +49,7 @@ struct Rig {
     }
 
     ControlLoop control;
-    Vector reference = start;
+    tautscope::Vector reference = start;
     double time = 100.0, last = nan, last_motion = nan, largest_step = 0.0;
 };
 
@@ -143,7 +145,7 @@ void a_drive_fault_stops_the_drives(const std::string &toml) {
 
 void motion_begins_where_the_drives_are(const std::string &toml) {
     Rig rig(toml);
-    const Vector measured{35e-3, 0.1, 0.8};
+    const Values measured(Numbers{35e-3, 0.1, 0.8});
     rig.control.set_measured({nan, nan, nan});
     rig.control.set_measured(measured);
     rig.control.post(Request::enable);

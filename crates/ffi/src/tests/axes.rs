@@ -7,8 +7,9 @@ use std::ptr::{null, null_mut};
 
 use crate::measurement::{tautscope_loop_on_measurement, tautscope_loop_on_tip};
 use crate::reduction::{
-    TautscopeLoop, tautscope_loop_create, tautscope_loop_destroy, tautscope_loop_hysteresis,
-    tautscope_loop_predicted_state, tautscope_loop_size, tautscope_loop_step,
+    TautscopeLoop, tautscope_loop_create, tautscope_loop_destroy, tautscope_loop_dof,
+    tautscope_loop_hysteresis, tautscope_loop_predicted_state, tautscope_loop_size,
+    tautscope_loop_step,
 };
 use crate::result::{TautscopeResult, tautscope_error_message};
 use crate::supervision::{tautscope_loop_raise_flag, tautscope_loop_set_compensation};
@@ -51,6 +52,14 @@ fn configurations_that_are_wrong_name_their_key() {
         (dof("expected_width = 2"), "expected_width"),
         (dof("gain_limit = 0.5"), "gain"),
         (dof("delta_minus = 1"), "delta"),
+        (
+            dof("unit = \"mm\""),
+            "dof.unit: got \"mm\", expected \"m\" or \"rad\"",
+        ),
+        (
+            dof("[kinematics]\nkind = \"two_planes\""),
+            "kinematics.kind: got \"two_planes\", expected \"joints\"",
+        ),
         (dof("[saftey]"), "saftey: unknown key"),
         (dof("[safety]\nframe_aeg = 1"), "safety.frame_aeg"),
         (
@@ -80,6 +89,14 @@ fn any_count_of_dofs_from_one_to_eight_has_a_loop() {
         let (mut dofs, mut period) = (0, 0.0);
         // SAFETY: the handle is valid until it is destroyed.
         unsafe {
+            let (mut name, mut unit) = (null(), null());
+            for dof in 0..count {
+                tautscope_loop_dof(handle, dof, &raw mut name, &raw mut unit);
+                let texts = [name, unit].map(|text| CStr::from_ptr(text).to_str().unwrap());
+                assert_eq!(texts, [format!("a{dof}").as_str(), "rad"]);
+            }
+            tautscope_loop_dof(handle, count, &raw mut name, &raw mut unit);
+            assert!(name.is_null() && unit.is_null());
             tautscope_loop_size(handle, &raw mut dofs, &raw mut period);
             tautscope_loop_destroy(handle);
         }

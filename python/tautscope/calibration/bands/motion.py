@@ -8,15 +8,37 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from tautscope.calibration.bands.labels import Image, LabelledImage, Mask, labelled
-from tautscope.calibration.bands.regions import LEAST_AREA, centroid, two_bands
+from tautscope.calibration.bands.labels import (
+    LEAST_AREA,
+    LabelledImage,
+    Mask,
+    centroid,
+    labelled,
+    two_bands,
+)
 from tautscope.calibration.colour import fit_discriminant
-from tautscope.errors import CalibrationError, FieldError
+from tautscope.calibration.images import to_bgr
+from tautscope.calibration.motion import (
+    Floats,
+    Image,
+    ImageRecorder,
+    Progress,
+    Sines,
+    article_sines,
+)
+from tautscope.config import Config
+from tautscope.errors import CalibrationError, FieldError, RecordError
+from tautscope.loop.rig import Rig
 
-Floats = NDArray[np.float64]
-
+DURATION = 10.0
+"""Duration of the motion [s]."""
+MOST_IMAGES = 60
+_SHARE = (1.0, 0.0, 0.6)
+"""Amplitude relative to that of the experiment."""
+_TURNS = (1, 1, 2)
+"""Periods in the motion."""
 LEAST_IMAGES = 20
 LEAST_CHANGE = 24.0
 """A pixel has changed if a channel differs from its median by more [grey levels]."""
@@ -37,6 +59,55 @@ _LEAST_TISSUE = 0.3
 """Least share of the pixels that never change."""
 _LAGS = (0.0, 0.5, 1.0)
 """Delays of the motors that may explain the position: slack delays the tip [s]."""
+
+
+class ImageSequence(ImageRecorder):
+    """Collects images of a moving instrument, evenly in time and at most `MOST_IMAGES`.
+
+    Args:
+        config: With the camera.
+
+    Attributes:
+        images: (n) B, G, R.
+        times: (n,) capture times [s].
+    """
+
+    def __init__(self, config: Config) -> None:
+        super().__init__(DURATION / MOST_IMAGES)
+        self.images: list[Image] = []
+        self.times: list[float] = []
+        self._format = config.camera.pixel_format
+
+    def add_image(self, image: Image, captured_at: float) -> None:
+        """Keep an image; every second one is dropped where there are too many."""
+        self.used(captured_at)
+        self.images.append(to_bgr(image, self._format).copy())
+        self.times.append(captured_at)
+        if len(self.images) > MOST_IMAGES:
+            self.images, self.times = self.images[::2], self.times[::2]
+            self.period *= 2
+
+    @property
+    def positions(self) -> Floats:
+        """(n, 3) positions of the motors at the times of the images [m, rad, rad]."""
+        at, applied = (np.array(column) for column in zip(*self.ticks, strict=True))
+        return np.column_stack([np.interp(self.times, at, dof) for dof in applied.T])
+
+    def label(self) -> list[LabelledImage]:
+        """The images in which the bands were found, see `find_moving_bands`."""
+        if not self.ticks or not self.images:
+            found = f"{len(self.ticks)} motor positions and {len(self.images)} images"
+            raise RecordError("recording", found, "both, of the same motion")
+        return find_moving_bands(self.images, self.times, self.positions)
+
+
+def record_motion(rig: Rig, config: Config, progress: Progress | None = None) -> ImageSequence:
+    """Move insertion and bending, as `move_rig`, within the experiment's range; keep images."""
+    centre, amplitude = article_sines(config)
+    found = ImageSequence(config)
+    motion = Sines(centre, amplitude * _SHARE, DURATION / np.array(_TURNS), DURATION)
+    found.move(rig, config, motion, progress)
+    return found
 
 
 @dataclass(frozen=True)

@@ -10,15 +10,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from tautscope.calibration.bands.labels import (
-    BACKGROUND,
-    BAND_A,
-    BAND_B,
-    IGNORED,
-    Image,
-    LabelledImage,
-)
-from tautscope.calibration.colour import ColorDiscriminant
+from tautscope.calibration.bands.labels import BACKGROUND, BAND_A, BAND_B, LabelledImage
+from tautscope.calibration.colour import fit_discriminant
+from tautscope.calibration.motion import Image
 from tautscope.calibration.result import CalibrationResult
 from tautscope.errors import CalibrationError
 from tautscope.figure_style import BLACK, GREEN, GREY
@@ -40,13 +34,15 @@ class ColourFit:
     """A discriminant and its errors on labelled pixels.
 
     Attributes:
-        discriminant: The classifier.
+        weights: w for B, G, R; `vision.weights`.
+        threshold: `vision.threshold` [grey levels].
         hits: Share of the pixels of each labelled band that are classified as marker.
         errors: Share of all other pixels.
         separation: Distance of the means of w . x over the root of their mean variance [1].
     """
 
-    discriminant: ColorDiscriminant
+    weights: tuple[float, float, float]
+    threshold: float
     hits: tuple[float, ...]
     errors: float
     separation: float
@@ -69,16 +65,14 @@ def fit_colour(images: Sequence[LabelledImage]) -> ColourFit:
             "Reduce the light or the exposure, and bring the bands closer",
         )
     marker = np.concatenate([_of(train, BAND_A), _of(train, BAND_B)])
-    colour = ColorDiscriminant.fit(marker, _of(train, BACKGROUND))
-    bands = [_of(check, label) for label in labels]
-    others = _of(check, BACKGROUND)
-    hits = tuple(float(colour.is_marker(band).mean()) for band in bands)
-    errors = float(colour.is_marker(others).mean())
-    weights = np.array(colour.weights)
-    inside, outside = np.concatenate(bands) @ weights, others @ weights
+    weights, threshold = fit_discriminant(marker, _of(train, BACKGROUND))
+    bands = [_of(check, label) @ np.array(weights) for label in labels]
+    inside, outside = np.concatenate(bands), _of(check, BACKGROUND) @ np.array(weights)
+    hits = tuple(float((band > threshold).mean()) for band in bands)
+    errors = float((outside > threshold).mean())
     spread = np.sqrt((inside.var() + outside.var()) / 2)
     separation = float((inside.mean() - outside.mean()) / max(spread, 1e-9))
-    fit = ColourFit(colour, hits, errors, separation)
+    fit = ColourFit(weights, threshold, hits, errors, separation)
     _check(fit)
     return fit
 
@@ -87,10 +81,9 @@ def colour_result(
     fit: ColourFit, images: Sequence[LabelledImage], serial_numbers: Mapping[str, str]
 ) -> CalibrationResult:
     """The result of a fit."""
-    colour = fit.discriminant
     values = {
-        "vision.weights": tuple(round(float(weight), 4) for weight in colour.weights),
-        "vision.threshold": round(float(colour.threshold), 2),
+        "vision.weights": tuple(round(float(weight), 4) for weight in fit.weights),
+        "vision.threshold": round(float(fit.threshold), 2),
     }
     shares = " and ".join(f"{share:.1%}" for share in fit.hits)
     notes = (
@@ -140,21 +133,14 @@ def _figure(fit: ColourFit, images: Sequence[LabelledImage]) -> Figure:
     left, right = figure.subplots(1, 2)
     left.imshow(shown)
     left.set_axis_off()
-    weights = np.array(fit.discriminant.weights)
+    weights = np.array(fit.weights)
     groups = {"bands": (BAND_A, BAND_B), "everything else": (BACKGROUND,)}
     for (name, labels), colour in zip(groups.items(), (GREEN, GREY), strict=True):
         pixels = np.concatenate([_of(images, label) for label in labels])
         values: NDArray[np.float64] = pixels @ weights
         share = np.full(len(values), 1 / max(len(values), 1))
         right.hist(values, bins=120, weights=share, label=name, color=colour, alpha=0.7)
-    right.axvline(fit.discriminant.threshold, color=BLACK, linewidth=1, label="threshold")
+    right.axvline(fit.threshold, color=BLACK, linewidth=1, label="threshold")
     right.set(xlabel="w . x [grey levels]", ylabel="share of the pixels", yscale="log")
     right.legend(frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
     return figure
-
-
-def from_mask(image: Image, mask: Image) -> LabelledImage:
-    """Label an image by a mask: white on the bands, black elsewhere, grey where ignored."""
-    labels = np.full(mask.shape, IGNORED, np.uint8)
-    labels[mask > 250], labels[mask < 5] = BAND_A, BACKGROUND
-    return LabelledImage(image, labels)

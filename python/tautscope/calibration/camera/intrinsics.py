@@ -154,13 +154,7 @@ def _calibrate(
     """Camera matrix, distortion, and pose of each view, by OpenCV."""
     points, pixels = [view.points for view in views], [view.pixels for view in views]
     if model == "pinhole":
-        _, matrix, distortion, turns, shifts = cv2.calibrateCamera(
-            points,
-            pixels,
-            size,
-            None,
-            None,
-        )
+        _, matrix, distortion, turns, shifts = cv2.calibrateCamera(points, pixels, size, None, None)
     else:
         # OpenCV 5 has the flags without the namespace.
         flags = sum(

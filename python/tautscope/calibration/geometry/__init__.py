@@ -5,8 +5,7 @@
 
 from tautscope.calibration.geometry.fit import GeometryFit, fit
 from tautscope.calibration.geometry.parameters import INTRINSICS, Intrinsics
-from tautscope.calibration.geometry.recording import Patch, Recorder, Recording
-from tautscope.calibration.geometry.sweep import SweepReference, sweep
+from tautscope.calibration.geometry.recording import Patch, Recorder, Recording, sweep
 from tautscope.calibration.geometry.values import Value
 
 __all__ = [
@@ -16,7 +15,6 @@ __all__ = [
     "Patch",
     "Recorder",
     "Recording",
-    "SweepReference",
     "Value",
     "fit",
     "sweep",

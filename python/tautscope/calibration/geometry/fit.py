@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -9,16 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.calibration.geometry.checks import LARGEST_RESIDUAL, check_record, find_doubts
-from tautscope.calibration.geometry.model import TIP_STD, Data, Model
+from tautscope.calibration.geometry.model import TIP_STD, Model
 from tautscope.calibration.geometry.parameters import Intrinsics, estimated
 from tautscope.calibration.geometry.recording import Recording, generic
 from tautscope.calibration.geometry.solver import Solution, solve
-from tautscope.calibration.geometry.values import (
-    Value,
-    changed_keys,
-    estimated_values,
-    key_stds,
-)
+from tautscope.calibration.geometry.values import Value, changes_and_stds, estimated_values
 from tautscope.config import Config
 from tautscope.errors import FieldError
 from tautscope.loop.state_prediction import StatePrediction
@@ -99,23 +95,15 @@ def fit(
         raise FieldError("band_distance", band_distance, "a length above instrument.band_length")
     active = estimated(intrinsics, by_band_distance=band_distance is not None)
     check_record(recording, config)
-    model = _model(recording, config, band_distance)
+    model = Model(config, recording.with_bands(), band_distance)
     solution = solve(model, active)
     for _ in range(DETECTIONS if recording.patches else 0):
         recording = _detect_again(recording, config, model, solution, band_distance)
         check_record(recording, config)
-        model = _model(recording, config, band_distance)
+        model = Model(config, recording.with_bands(), band_distance)
         solution = solve(model, active, solution.z)
     free = solve(model, active, solution.z, free_states=True)
     return _result(recording, config, model, (solution, free), active)
-
-
-def _model(recording: Recording, config: Config, band_distance: float | None) -> Model:
-    found = recording.found
-    data = Data(
-        recording.time, recording.motors, recording.captured_at[found], recording.features[found]
-    )
-    return Model(config, data, band_distance)
 
 
 def _detect_again(
@@ -126,22 +114,17 @@ def _detect_again(
     band_distance: float | None,
 ) -> Recording:
     """The record with the bands searched near the fitted or expected tip of every image."""
-    found, everywhere = (
-        recording.found,
-        Data(recording.time, recording.motors, recording.captured_at, recording.features),
-    )
-    tips = Model(config, everywhere, band_distance).expected(solution.z)[:, :3]
-    tips[found] = solution.states[:, :3]
-    fitted = config.replace(**model.geometry(solution.z).values())
-    detector, std = MarkerDetector(fitted), TIP_STD * np.array(config.safety.width_limit)
-    features, reasons = np.full_like(recording.features, np.nan), dict[str, int]()
+    tips = Model(config, recording, band_distance).expected(solution.z)[:, :3]
+    tips[recording.found] = solution.states[:, :3]
+    detector = MarkerDetector(model.configured(solution.z))
+    std = TIP_STD * np.array(config.safety.width_limit)
+    features, reasons = np.full_like(recording.features, np.nan), Counter[str]()
     for index, (patch, tip) in enumerate(zip(recording.patches, tips, strict=True)):
         detection = detector.detect(patch.image(config.camera), None, StatePrediction(tip, std))
         if detection.valid:
             features[index] = detection.features
         else:
-            reason = generic(detection.reason)
-            reasons[reason] = reasons.get(reason, 0) + 1
+            reasons[generic(detection.reason)] += 1
     return replace(recording, features=features, reasons=reasons)
 
 
@@ -155,15 +138,14 @@ def _result(
     solution, _ = solutions
     doubts, warnings = find_doubts(model, *solutions, active)
     values = estimated_values(config, model, solution, active)
-    changes = changed_keys(config, model.geometry(solution.z), values)
-    delay, std = next(
-        (value.after, value.std) for value in values if value.name == "camera.source.delay"
-    )
-    if delay < -2 * std:
+    changes, stds = changes_and_stds(config, model.configured(solution.z), values)
+    delay = next(value for value in values if value.name == "camera.source.delay")
+    if delay.after < -2 * delay.std:
         warnings.append(
-            f"Images are stamped {-delay * 1e3:.0f} ms before the motors' clock: "
+            f"Images are stamped {-delay.after * 1e3:.0f} ms before the motors' clock: "
             "camera.source.delay is set to 0, which cannot express it"
         )
+    explained = solution.residuals[np.abs(solution.residuals).max(axis=1) < LARGEST_RESIDUAL]
 
     def per_image(table: Floats) -> Floats:
         whole = np.full((len(recording.captured_at), table.shape[1]), np.nan)
@@ -173,9 +155,9 @@ def _result(
     return GeometryFit(
         config=config.replace(**changes),
         changes=changes,
-        std=key_stds(values, changes),
+        std=stds,
         pose_covariance=(solution.covariance * np.outer(model.prior_std, model.prior_std))[:6, :6],
-        residual_px=_rms(solution.residuals),
+        residual_px=float(np.sqrt(np.mean(explained**2))) if len(explained) else float("nan"),
         warnings=(*doubts, *warnings),
         is_plausible=not doubts,
         values=values,
@@ -185,9 +167,3 @@ def _result(
         residuals=per_image(solution.residuals),
         expected=per_image(solution.expected[:, :3]),
     )
-
-
-def _rms(residuals: Floats) -> float:
-    """Root mean square of the residuals of explained images [px]; NaN if there is none."""
-    explained = residuals[np.abs(residuals).max(axis=1) < LARGEST_RESIDUAL]
-    return float(np.sqrt(np.mean(explained**2))) if len(explained) else float("nan")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +15,13 @@ from tautscope.calibration.geometry.parameters import (
     PARAMETERS,
     TYPICAL_ELASTIC_SHARE,
     TYPICAL_LAG,
-    Geometry,
+    configured,
     prior_std,
 )
+from tautscope.calibration.geometry.recording import Recording
 from tautscope.config import Config
 from tautscope.dof import Dof
+from tautscope.loop.construction import build_feature_model
 
 Floats = NDArray[np.float64]
 FEATURE_STD = 0.5
@@ -39,28 +41,6 @@ _STEP = 1e-3
 """Step of the numerical derivatives, in standard deviations of the prior."""
 
 
-@dataclass(frozen=True, eq=False)
-class Data:
-    """The measurements of a fit.
-
-    Attributes:
-        time: (n,) [s].
-        motors: (n, 3) [m, rad, rad].
-        captured_at: (images,) stamped capture times [s].
-        features: (images, 4) of images with both bands [px].
-    """
-
-    time: Floats
-    motors: Floats
-    captured_at: Floats
-    features: Floats
-
-    def thinned(self) -> Data:
-        """The same with motor positions no closer than the model needs."""
-        step = max(int(_TICK / np.median(np.diff(self.time)) + 0.5), 1)
-        return Data(self.time[::step], self.motors[::step], self.captured_at, self.features)
-
-
 class Model:
     """The features of each image and the expectation of its tip, with their derivatives.
 
@@ -76,12 +56,13 @@ class Model:
 
     Args:
         config: The configuration that the parameters are differences from.
-        data: The record.
+        data: The record; all of its images are used.
         band_distance: Measured distance of the bands [m], or None.
     """
 
-    def __init__(self, config: Config, data: Data, band_distance: float | None) -> None:
-        self.data = data.thinned()
+    def __init__(self, config: Config, data: Recording, band_distance: float | None) -> None:
+        step = max(int(_TICK / np.median(np.diff(data.time)) + 0.5), 1)
+        self.data = replace(data, time=data.time[::step], motors=data.motors[::step])
         self.count = len(data.captured_at)
         self._config, self._band_distance = config, band_distance
         self.prior_std = prior_std(by_band_distance=band_distance is not None)
@@ -91,9 +72,9 @@ class Model:
         self._centre = config.experiment.bending.centre
         self.state_std = np.append(TIP_STD * self.width_limit, UNEVENNESS_STD)
 
-    def geometry(self, z: Floats) -> Geometry:
-        """Geometry for parameters z in standard deviations of their priors."""
-        return Geometry(self._config, self._band_distance, z * self.prior_std)
+    def configured(self, z: Floats) -> Config:
+        """The configuration for parameters z in standard deviations of their priors."""
+        return configured(self._config, self._band_distance, z * self.prior_std)
 
     def features(self, z: Floats, states: Floats) -> tuple[Floats, Floats]:
         """Features (n, 4) and their derivatives (n, 4, 4) by the states (n, 4).
@@ -101,7 +82,7 @@ class Model:
         NaN where a band is not visible.
         """
         slope = (z * self.prior_std)[INDEX["unevenness over bending"]]
-        model = self.geometry(z).feature_model()
+        model = build_feature_model(self.configured(z))
         predicted, by_q = model.predict_all(states[:, :3], self._unevenness(z, states))
         shift = np.array([0.0, 0.0, 0.0, _STEP])
         ahead, behind = (
@@ -168,7 +149,7 @@ class Model:
 
     def _features_alone(self, z: Floats, states: Floats) -> Floats:
         unevenness = self._unevenness(z, states)
-        return self.geometry(z).feature_model().predict_all(states[:, :3], unevenness)[0]
+        return build_feature_model(self.configured(z)).predict_all(states[:, :3], unevenness)[0]
 
     def _unevenness(self, z: Floats, states: Floats) -> Floats:
         value = z * self.prior_std

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
+import cv2
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from tautscope import _core
 from tautscope.config import Config
 from tautscope.dof import Dof
 from tautscope.errors import FieldError
@@ -38,9 +39,9 @@ class Parameter:
     unit: str
 
 
-_POSE = "camera.camera_from_guide"
-_TRANSLATION = tuple(Parameter(f"{_POSE}.translation.{axis}", 4e-3, 1e3, "mm") for axis in "xyz")
-_ROTATION = tuple(Parameter(f"{_POSE}.rotation.{axis}", 0.07, 180 / np.pi, "deg") for axis in "xyz")
+POSE = "camera.camera_from_guide"
+_TRANSLATION = tuple(Parameter(f"{POSE}.translation.{axis}", 4e-3, 1e3, "mm") for axis in "xyz")
+_ROTATION = tuple(Parameter(f"{POSE}.rotation.{axis}", 0.07, 180 / np.pi, "deg") for axis in "xyz")
 _LENGTHS = (
     Parameter("instrument.bending_length", 0.1, 100, "%"),
     Parameter("instrument.marker_a", 0.8e-3, 1e3, "mm"),
@@ -123,100 +124,47 @@ def estimated(intrinsics: Intrinsics, *, by_band_distance: bool) -> NDArray[np.b
     return np.array([name not in fixed for name in NAMES])
 
 
-class Geometry:
+def configured(config: Config, band_distance: float | None, difference: Floats) -> Config:
     """Camera, pose and instrument at a difference from a configuration.
+
+    Nothing is checked: lengths and focal lengths stay positive.
 
     Args:
         config: The configuration.
         band_distance: Measured distance of the bands' centres [m], or None.
         difference: (parameters,) in SI units; relative for lengths and focal lengths (logarithm).
     """
-
-    def __init__(self, config: Config, band_distance: float | None, difference: Floats) -> None:
-        value = dict(zip(NAMES, difference.tolist(), strict=True))
-        camera, instrument = config.camera, config.instrument
-        pose = camera.camera_from_guide
-        self.translation = _vector(np.array(pose.translation) + difference[0:3])
-        self.rotation = _vector(compose(difference[3:6], pose.rotation))
-        self.bending_length = instrument.bending_length * np.exp(value["instrument.bending_length"])
-        half = instrument.band_length / 2
-        self.marker_a = max(instrument.marker_a + value["instrument.marker_a"], half)
-        self.marker_b = instrument.marker_b + value["instrument.marker_b"]
-        if band_distance is not None:
-            self.marker_b = self.marker_a + band_distance
-        self.marker_b = max(self.marker_b, self.marker_a + 2 * half)
-        self.fx = camera.fx * np.exp(value["camera.focal"])
-        self.fy = camera.fy * np.exp(value["camera.focal"] + value["camera.fy over fx"])
-        self.cx, self.cy = camera.cx + value["camera.cx"], camera.cy + value["camera.cy"]
-        k1, *others = camera.distortion
-        self.distortion = (k1 + value["camera.distortion.k1"], *others)
-        self._config = config
-
-    def feature_model(self) -> _core.FeatureModel:
-        """The feature model of the core, Eqs. (9)-(11)."""
-        instrument = self._config.instrument
-        return _core.FeatureModel(
-            _core.Instrument(
-                bending_length=self.bending_length,
-                marker_a=self.marker_a,
-                marker_b=self.marker_b,
-                radius=instrument.diameter / 2,
-                band_length=instrument.band_length,
-            ),
-            _core.Camera(
-                fx=self.fx, fy=self.fy, cx=self.cx, cy=self.cy, distortion=self.distortion
-            ),
-            translation=self.translation,
-            rotation=self.rotation,
-        )
-
-    def values(self) -> dict[str, Any]:
-        """The values by dotted path, as for `Config.replace`."""
-        instrument = self._config.instrument
-        end = self.marker_b + instrument.band_length / 2
-        return {
-            f"{_POSE}.translation": list(self.translation),
-            f"{_POSE}.rotation": list(self.rotation),
-            "camera.fx": float(self.fx),
-            "camera.fy": float(self.fy),
-            "camera.cx": float(self.cx),
-            "camera.cy": float(self.cy),
-            "camera.distortion": [float(value) for value in self.distortion],
-            "instrument.bending_length": float(self.bending_length),
-            "instrument.marker_a": float(self.marker_a),
-            "instrument.marker_b": float(self.marker_b),
-            "instrument.tip_length": float(max(instrument.tip_length, end)),
-        }
-
-
-def matrix(rotation: Sequence[float] | Floats) -> Floats:
-    """Rotation matrix (3, 3) of a rotation vector (3,), axis times angle [rad] (Rodrigues)."""
-    vector = np.asarray(rotation, dtype=np.float64)
-    angle = float(np.linalg.norm(vector))
-    x, y, z = vector
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    half = np.sinc(angle / 2 / np.pi)
-    rotated: Floats = np.eye(3) + np.sinc(angle / np.pi) * cross + half**2 / 2 * cross @ cross
-    return rotated
-
-
-def compose(first: Floats, second: Sequence[float]) -> Floats:
-    """Rotation vector (3,) of the rotation `second`, then `first`; both rotation vectors."""
-    a, b = _quaternion(first), _quaternion(np.asarray(second, dtype=np.float64))
-    scalar = a[0] * b[0] - a[1:] @ b[1:]
-    vector = a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:])
-    if scalar < 0:
-        scalar, vector = -scalar, -vector
-    length = float(np.linalg.norm(vector))
-    angle = 2 * np.arctan2(length, scalar)
-    return np.asarray(vector * (angle / length if length > 0 else 2.0))
-
-
-def _quaternion(rotation: Floats) -> Floats:
-    angle = float(np.linalg.norm(rotation))
-    return np.concatenate([[np.cos(angle / 2)], np.sinc(angle / 2 / np.pi) / 2 * rotation])
-
-
-def _vector(values: Floats) -> tuple[float, float, float]:
-    x, y, z = values.tolist()
-    return x, y, z
+    value = dict(zip(NAMES, difference.tolist(), strict=True))
+    camera, instrument = config.camera, config.instrument
+    pose, zero = camera.camera_from_guide, np.zeros(3)
+    rotation = cv2.composeRT(np.array(pose.rotation), zero, difference[3:6].copy(), zero)[0]
+    pose = replace(
+        pose,
+        translation=tuple((np.array(pose.translation) + difference[0:3]).tolist()),
+        rotation=tuple(rotation.ravel().tolist()),
+    )
+    focal = math.exp(value["camera.focal"])
+    k1, *others = camera.distortion
+    camera = replace(
+        camera,
+        camera_from_guide=pose,
+        fx=camera.fx * focal,
+        fy=camera.fy * focal * math.exp(value["camera.fy over fx"]),
+        cx=camera.cx + value["camera.cx"],
+        cy=camera.cy + value["camera.cy"],
+        distortion=(k1 + value["camera.distortion.k1"], *others),
+    )
+    band = instrument.band_length
+    marker_a = max(instrument.marker_a + value["instrument.marker_a"], band / 2)
+    marker_b = instrument.marker_b + value["instrument.marker_b"]
+    if band_distance is not None:
+        marker_b = marker_a + band_distance
+    marker_b = max(marker_b, marker_a + band)
+    instrument = replace(
+        instrument,
+        bending_length=instrument.bending_length * math.exp(value["instrument.bending_length"]),
+        marker_a=marker_a,
+        marker_b=marker_b,
+        tip_length=max(instrument.tip_length, marker_b + band / 2),
+    )
+    return replace(config, camera=camera, instrument=instrument)

@@ -3,21 +3,30 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from collections import Counter
+from concurrent.futures import Executor
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope.calibration.bands.regions import centroid, two_bands
+from tautscope.calibration.bands.labels import centroid, two_bands
 from tautscope.calibration.images import to_bgr
+from tautscope.calibration.motion import (
+    DURATION,
+    Floats,
+    Image,
+    ImageRecorder,
+    Progress,
+    sweep_motion,
+)
 from tautscope.config import CameraConfig, Config
 from tautscope.errors import RecordError, SignalError
 from tautscope.loop.construction import build_feature_model
 from tautscope.loop.frame_layout import FrameLayout
+from tautscope.loop.rig import Rig
 from tautscope.loop.vision import Detection, MarkerDetector
 
-Floats = NDArray[np.float64]
-Image = NDArray[np.uint8]
 IMAGE_PERIOD = 0.08
 """Least time between two images that are used [s]; neighbouring ones tell the same."""
 LEAST_FOUND = 0.25
@@ -104,8 +113,14 @@ class Recording:
         """(images,) whether both bands were found."""
         return np.asarray(np.isfinite(self.features).all(axis=1))
 
+    def with_bands(self) -> Recording:
+        """The same of the images with both bands, without their pixels."""
+        found = self.found
+        stamps, features = self.captured_at[found], self.features[found]
+        return replace(self, captured_at=stamps, features=features, patches=())
 
-class Recorder:
+
+class Recorder(ImageRecorder):
     """Collects a `Recording`: motor positions, and images in which the bands are searched.
 
     The bands are searched without a prediction, because the configured geometry is what is unknown.
@@ -114,26 +129,18 @@ class Recorder:
 
     Args:
         config: Camera, instrument and vision.
+        executor: As of `ImageRecorder`.
     """
 
-    def __init__(self, config: Config) -> None:
+    def __init__(self, config: Config, executor: Executor | None = None) -> None:
+        super().__init__(IMAGE_PERIOD, executor)
         self._camera = config.camera
         self._vision = config.vision
         self._detector = MarkerDetector(config)
         self._model = build_feature_model(config)
-        self._ticks: list[tuple[float, Floats]] = []
         self._images: list[tuple[float, Floats, Patch, float]] = []
-        self._reasons: dict[str, int] = {}
+        self._reasons = Counter[str]()
         self._regions: list[tuple[float, Floats]] = []
-        self._due = -np.inf
-
-    def add_tick(self, time: float, motors: Floats) -> None:
-        """Add the positions (3,) of the drives at a time."""
-        self._ticks.append((time, np.array(motors, dtype=np.float64)))
-
-    def is_due(self, captured_at: float) -> bool:
-        """Whether an image of this capture time is needed."""
-        return captured_at >= self._due
 
     def add_image(self, image: Image, captured_at: float) -> Detection:
         """Search the bands in an image, and keep its features and its pixels around the bands.
@@ -141,11 +148,10 @@ class Recorder:
         Raises:
             FrameError: The image is not what the configured camera gives.
         """
-        self._due = captured_at + IMAGE_PERIOD - 1e-9
+        self.used(captured_at)
         detection = self._detector.detect(image)
         if not detection.valid:
-            reason = generic(detection.reason)
-            self._reasons[reason] = self._reasons.get(reason, 0) + 1
+            self._reasons[generic(detection.reason)] += 1
         features = detection.features if detection.valid else np.full(4, np.nan)
         self._regions.append((captured_at, self._by_regions(image)))
         patch = self._patch(image, detection)
@@ -156,7 +162,7 @@ class Recorder:
     def _by_regions(self, image: Image) -> Floats:
         """The centroids of two regions of the bands' colour, ordered as the motors let expect."""
         unknown = np.full(4, np.nan)
-        predicted = self._model.predict(self._ticks[-1][1]) if self._ticks else None
+        predicted = self._model.predict(self.ticks[-1][1]) if self.ticks else None
         if predicted is None:
             return unknown
         vision = self._vision
@@ -175,10 +181,10 @@ class Recorder:
         Raises:
             RecordError: There is no motor position or no image.
         """
-        if not self._ticks or not self._images:
-            found = f"{len(self._ticks)} motor positions and {len(self._images)} images"
+        if not self.ticks or not self._images:
+            found = f"{len(self.ticks)} motor positions and {len(self._images)} images"
             raise RecordError("recording", found, "both, of the same motion")
-        times, motors = zip(*self._ticks, strict=True)
+        times, motors = zip(*self.ticks, strict=True)
         images = sorted(self._images, key=lambda each: each[0])
         captured_at, features, patches, saturated = zip(*images, strict=True)
         if np.isfinite(features).all(axis=1).mean() < LEAST_FOUND:
@@ -189,7 +195,7 @@ class Recorder:
             np.array(captured_at),
             np.array(features),
             patches,
-            dict(sorted(self._reasons.items(), key=lambda each: -each[1])),
+            dict(self._reasons.most_common()),
             float(np.median(saturated)),
         )
 
@@ -206,3 +212,25 @@ class Recorder:
 def generic(reason: str) -> str:
     """The reason why bands were not found, without its numbers."""
     return re.sub(r"[\d.]+", "N", reason)
+
+
+def sweep(
+    rig: Rig,
+    config: Config,
+    *,
+    duration: float = DURATION,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+) -> Recording:
+    """Move all degrees of freedom at once (`sweep_motion`), and record motors and images.
+
+    As `move_rig`, with the duration [s] and an executor as of `ImageRecorder`.
+
+    Raises:
+        RecordError: No image arrived.
+        FrameError: An image is not what the configured camera gives.
+        TautscopeError: As `move_rig`.
+    """
+    recorder = Recorder(config, executor)
+    recorder.move(rig, config, sweep_motion(config, duration), progress)
+    return recorder.recording()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,11 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.calibration.geometry.model import Model
-from tautscope.calibration.geometry.parameters import PARAMETERS, Geometry
+from tautscope.calibration.geometry.parameters import PARAMETERS, POSE
 from tautscope.calibration.geometry.solver import Solution
 from tautscope.config import Config
-
-_POSE = "camera.camera_from_guide"
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,76 +42,70 @@ def estimated_values(
     config: Config, model: Model, solution: Solution, active: NDArray[np.bool_]
 ) -> tuple[Value, ...]:
     """The estimated parameters; without a key of their own they are differences from 0."""
-    instrument, camera, geometry = config.instrument, config.camera, model.geometry(solution.z)
-    pose = camera.camera_from_guide
-    known = {
-        "instrument.bending_length": (instrument.bending_length, geometry.bending_length),
-        "instrument.marker_a": (instrument.marker_a, geometry.marker_a),
-        "instrument.marker_b": (instrument.marker_b, geometry.marker_b),
-        "camera.focal": (1.0, geometry.fx / camera.fx),
-        "camera.fy over fx": (1.0, geometry.fy / camera.fy * camera.fx / geometry.fx),
-        "camera.cx": (camera.cx, geometry.cx),
-        "camera.cy": (camera.cy, geometry.cy),
-        "camera.distortion.k1": (camera.distortion[0], geometry.distortion[0]),
-    }
-    for k, axis in enumerate("xyz"):
-        known[f"{_POSE}.translation.{axis}"] = pose.translation[k], geometry.translation[k]
-        known[f"{_POSE}.rotation.{axis}"] = pose.rotation[k], geometry.rotation[k]
+    fitted = model.configured(solution.z)
+    start, end = _values(config, config), _values(fitted, config)
+    difference = solution.z * model.prior_std
     std = np.sqrt(np.diag(solution.covariance))
     found = []
     for index in np.flatnonzero(active):
         parameter = PARAMETERS[index]
-        before = camera.source.delay if parameter.name == "camera.source.delay" else 0.0
-        after = before + float(solution.z[index] * model.prior_std[index])
-        before, after = known.get(parameter.name, (before, after))
-        # The length of the section is estimated as a factor.
-        is_length = parameter.name == "instrument.bending_length"
-        scale = geometry.bending_length if is_length else 1.0
-        shown, unit = (1e3, "mm") if is_length else (parameter.shown, parameter.unit)
-        prior = scale * model.prior_std[index]
-        found.append(
-            Value(
-                parameter.name,
-                float(before),
-                float(after),
-                float(prior),
-                float(prior * std[index]),
-                shown,
-                unit,
-            )
-        )
+        before = start.get(parameter.name, 0.0)
+        after = end.get(parameter.name, before + float(difference[index]))
+        prior, shown, unit = float(model.prior_std[index]), parameter.shown, parameter.unit
+        if parameter.name == "instrument.bending_length":  # estimated as a factor
+            prior, shown, unit = prior * after, 1e3, "mm"
+        own_std = prior * float(std[index])
+        found.append(Value(parameter.name, before, after, prior, own_std, shown, unit))
     return tuple(found)
 
 
-def changed_keys(config: Config, geometry: Geometry, values: tuple[Value, ...]) -> dict[str, Any]:
-    """The keys of the configuration that were estimated, with their values."""
-    names = {value.name: value for value in values}
-    changes = geometry.values()
-    if "camera.focal" not in names:
-        del changes["camera.fx"], changes["camera.fy"]
-    if "camera.cx" not in names:
-        del changes["camera.cx"], changes["camera.cy"], changes["camera.distortion"]
-    if changes["instrument.tip_length"] == config.instrument.tip_length:
-        del changes["instrument.tip_length"]
-    return changes | {"camera.source.delay": max(names["camera.source.delay"].after, 0.0)}
+def _values(config: Config, before: Config) -> dict[str, float]:
+    """Values of parameters in a configuration; focal lengths are factors to those before."""
+    camera, instrument, old = config.camera, config.instrument, before.camera
+    pose = camera.camera_from_guide
+    return {
+        "instrument.bending_length": instrument.bending_length,
+        "instrument.marker_a": instrument.marker_a,
+        "instrument.marker_b": instrument.marker_b,
+        "camera.focal": camera.fx / old.fx,
+        "camera.fy over fx": camera.fy / old.fy * old.fx / camera.fx,
+        "camera.cx": camera.cx,
+        "camera.cy": camera.cy,
+        "camera.distortion.k1": camera.distortion[0],
+        **{f"{POSE}.translation.{a}": v for a, v in zip("xyz", pose.translation, strict=True)},
+        **{f"{POSE}.rotation.{a}": v for a, v in zip("xyz", pose.rotation, strict=True)},
+    }
 
 
-def key_stds(values: tuple[Value, ...], changes: dict[str, Any]) -> dict[str, float]:
-    """Standard deviations by the key of the configuration, in its unit."""
-    std = {value.name: value.std for value in values}
-    found = {}
-    for index, axis in enumerate("xyz"):
-        for part in ("translation", "rotation"):
-            found[f"{_POSE}.{part}[{index}]"] = std[f"{_POSE}.{part}.{axis}"]
-    for key in ("instrument.bending_length", "instrument.marker_a", "camera.source.delay"):
-        found[key] = std[key]
+def changes_and_stds(
+    config: Config, fitted: Config, values: tuple[Value, ...]
+) -> tuple[dict[str, Any], dict[str, float]]:
+    """The keys that were estimated with their values, and standard deviations in their units."""
+    known = {value.name: value for value in values}
+    std = {name: value.std for name, value in known.items()}
+    camera, instrument, pose = fitted.camera, fitted.instrument, fitted.camera.camera_from_guide
+    delay, lengths = "camera.source.delay", ("bending_length", "marker_a", "marker_b")
+    changes: dict[str, Any] = {
+        f"{POSE}.translation": list(pose.translation),
+        f"{POSE}.rotation": list(pose.rotation),
+        delay: max(known[delay].after, 0.0),
+    }
+    changes |= {f"instrument.{key}": getattr(instrument, key) for key in lengths}
     # With a measured distance both bands move together.
-    found["instrument.marker_b"] = std.get("instrument.marker_b", std["instrument.marker_a"])
-    if "camera.focal" in std:
+    std.setdefault("instrument.marker_b", std["instrument.marker_a"])
+    stds = {key: std[key] for key in changes if key in std}
+    for part in ("translation", "rotation"):
+        stds |= {f"{POSE}.{part}[{k}]": std[f"{POSE}.{part}.{a}"] for k, a in enumerate("xyz")}
+    if "camera.focal" in known:
+        changes |= {"camera.fx": camera.fx, "camera.fy": camera.fy}
         ratio = std.get("camera.fy over fx", 0.0)
-        found["camera.fx"] = changes["camera.fx"] * std["camera.focal"]
-        found["camera.fy"] = changes["camera.fy"] * float(np.hypot(std["camera.focal"], ratio))
-    if "camera.cx" in std:
-        found |= {key: std[key] for key in ("camera.cx", "camera.cy")}
-        found["camera.distortion[0]"] = std["camera.distortion.k1"]
-    return found
+        stds["camera.fx"] = camera.fx * std["camera.focal"]
+        stds["camera.fy"] = camera.fy * math.hypot(std["camera.focal"], ratio)
+    if "camera.cx" in known:
+        changes |= {"camera.cx": camera.cx, "camera.cy": camera.cy}
+        changes["camera.distortion"] = list(camera.distortion)
+        stds |= {key: std[key] for key in ("camera.cx", "camera.cy")}
+        stds["camera.distortion[0]"] = std["camera.distortion.k1"]
+    if instrument.tip_length != config.instrument.tip_length:
+        changes["instrument.tip_length"] = instrument.tip_length
+    return changes, stds

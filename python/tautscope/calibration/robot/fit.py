@@ -9,13 +9,13 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
 
+from tautscope.calibration.motion import MotionRecord
 from tautscope.calibration.robot.model import PLAYS, Model
-from tautscope.calibration.robot.motion_record import MotionRecord
 from tautscope.calibration.robot.parameters import Parameter, fitted
 from tautscope.config import Config
 from tautscope.errors import CalibrationError
-from tautscope.loop.kinematics import rotation_vector
 
 Floats = NDArray[np.float64]
 
@@ -222,7 +222,7 @@ def _first(model: Model, parameters: Sequence[Parameter]) -> Floats:
         model.signs = np.array(signs)
         p = model.start()
         if is_free:
-            p = _aligned(model, p, names)
+            p = _aligned(model, p, names.index("kinematics.base_position[0]"))
         left = (model.values - model.predict(p, model.motion(p)[0])) / noise
         misfit = float(np.mean(np.abs(left)))
         if misfit < _PREFERRED * best:
@@ -231,24 +231,17 @@ def _first(model: Model, parameters: Sequence[Parameter]) -> Floats:
     return found
 
 
-def _aligned(model: Model, p: Floats, names: Sequence[str]) -> Floats:
-    """Parameters with the base's pose for which the positions agree best (Kabsch, 1976)."""
-    own = np.all(model.groups[:, :3] == "position_deviation", axis=1) & model.is_seen[:, :3].all(
-        axis=1
-    )
+def _aligned(model: Model, p: Floats, first: int) -> Floats:
+    """Parameters with the base's pose, from index `first` on, for which positions agree best."""
+    own = np.all(model.groups[:, :3] == "position_deviation", axis=1)
+    own &= model.is_seen[:, :3].all(axis=1)
     if own.sum() < LEAST / 2:
         return p
-    first = names.index("kinematics.base_position[0]")
-    p = p.copy()
     p[first : first + 6] = 0.0
-    there = model.predict(p, model.motion(p)[0])[own, :3]
-    here = model.values[own, :3]
-    outer = (there - there.mean(axis=0)).T @ (here - here.mean(axis=0))
-    left, _, right = np.linalg.svd(outer)
-    mirror = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
-    rotation = (left @ mirror @ right).T
-    p[first : first + 3] = here.mean(axis=0) - rotation @ there.mean(axis=0)
-    p[first + 3 : first + 6] = rotation_vector(rotation)
+    there, here = model.predict(p, model.motion(p)[0])[own, :3], model.values[own, :3]
+    middle, end = there.mean(axis=0), here.mean(axis=0)
+    rotation, _ = Rotation.align_vectors(here - end, there - middle)
+    p[first : first + 6] = [*(end - rotation.apply(middle)), *rotation.as_rotvec()]
     return p
 
 

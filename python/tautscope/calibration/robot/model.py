@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from tautscope.calibration.robot.motion_record import MotionRecord
+from tautscope._core import Play
+from tautscope.calibration.motion import MotionRecord
 from tautscope.calibration.robot.parameters import Parameter, with_values
 from tautscope.config import Config
 from tautscope.loop.kinematics import STEP, build_kinematics, own_kinematics
@@ -68,17 +69,15 @@ class Model:
         self.times = np.array([each.captured_at for each in self.own])
         is_pose = np.array([isinstance(each, Pose) for each in self.own], dtype=np.bool_)
         self._poses, self._others = np.flatnonzero(is_pose), np.flatnonzero(~is_pose)
-        orientations = [each.orientation for each in self.own if isinstance(each, Pose)]
-        has = any(each is not None for each in orientations)
-        self._turned = np.array(
-            [np.eye(3) if each is None else check_rotation(each) for each in orientations if has]
-        )
+        given = [each.orientation for each in self.own if isinstance(each, Pose)]
+        turned = [np.eye(3) if each is None else check_rotation(each) for each in given]
+        self._turned = np.array(turned if any(each is not None for each in given) else [])
         self._last: tuple[object, tuple[Floats, Floats]] | None = None
         self._sensor = np.array([each.sensor for each in self.own])
         limits = np.array([dof.width_limit for dof in config.dof])
         self.half_widths = np.outer(limits, np.linspace(0.0, 0.5, PLAYS))
-        self._plays = _plays(record.commands, self.half_widths)
-        self._index = {each.name: k for k, each in enumerate(parameters)}
+        self._plays = list(map(_plays, record.commands.T, self.half_widths))
+        self._names = [each.name for each in parameters]
         self.weights_from = len(parameters)
 
     def start(self) -> Floats:
@@ -88,21 +87,18 @@ class Model:
 
     def motion(self, p: Floats) -> tuple[Floats, Floats]:
         """States (N, n), and plays (N, n, PLAYS) by whose weights they change."""
-        names = [f"measurement.delays[{k}]" for k in self._sensor]
+        known = dict(zip(self._names, p.tolist(), strict=False))
         given = (*self.config.measurement.delays, *[0.0] * 4)
-        delays = np.array(
-            [self._of(p, name, given[k]) for name, k in zip(names, self._sensor, strict=True)]
-        )
-        lags = np.array([self._of(p, f"dof.{dof.name}.lag", 0.0) for dof in self.config.dof])
-        at = (self.times - delays - self._record.times[0])[:, None] - lags
-        period = (self._record.times[-1] - self._record.times[0]) / (len(self._plays) - 1)
-        place = np.clip(at / period, 0, len(self._plays) - 1.001)
-        low, dofs = place.astype(int), np.arange(len(lags))
-        share = (place - low)[:, :, None]
-        plays = self._plays[low, dofs] * (1 - share) + self._plays[low + 1, dofs] * share
+        delays = [known.get(f"measurement.delays[{k}]", given[k]) for k in self._sensor]
+        shown, names = self.times - delays, [dof.name for dof in self.config.dof]
+        plays = np.empty((len(shown), *self.half_widths.shape))
+        for index, name in enumerate(names):
+            at = shown - known.get(f"dof.{name}.lag", 0.0)
+            for column, play in zip(plays[:, index].T, self._plays[index], strict=True):
+                column[:] = np.interp(at, self._record.times, play)
+        plays *= self.signs[:, None]
         weights = p[self.weights_from :].reshape(plays.shape[1:])
-        zeros = [self._of(p, f"dof.{dof.name}.zero", 0.0) for dof in self.config.dof]
-        plays = plays * self.signs[:, None]
+        zeros = [known.get(f"dof.{name}.zero", 0.0) for name in names]
         return np.sum(plays * weights, axis=2) + zeros, plays
 
     def predict(self, p: Floats, states: Floats) -> Floats:
@@ -151,8 +147,7 @@ class Model:
         return columns
 
     def _configured(self, p: Floats) -> Config:
-        names = [each.name for each in self.parameters]
-        changes = with_values(self.config, dict(zip(names, p.tolist(), strict=False)))
+        changes = with_values(self.config, dict(zip(self._names, p.tolist(), strict=False)))
         own = {key: each for key, each in changes.items() if key.startswith("kinematics.")}
         return self.config.replace(**own) if own else self.config
 
@@ -169,10 +164,6 @@ class Model:
             places, turned = zip(*found, strict=True)
             self._last = key, (np.array(places), np.array(turned))
         return self._last[1]
-
-    def _of(self, p: Floats, name: str, otherwise: float) -> float:
-        index = self._index.get(name)
-        return otherwise if index is None else float(p[index])
 
 
 def _own(record: MotionRecord) -> list[Measurement]:
@@ -193,11 +184,7 @@ def _groups(measurement: Measurement, count: int) -> list[str]:
     return [""] * count
 
 
-def _plays(commands: Floats, half_widths: Floats) -> Floats:
-    """(ticks, n, PLAYS) of plays that start in their middle."""
-    found = np.empty((len(commands), *half_widths.shape))
-    now = np.repeat(commands[0][:, None], half_widths.shape[1], axis=1)
-    for row, command in zip(found, commands[:, :, None], strict=True):
-        now = np.minimum(np.maximum(now, command - half_widths), command + half_widths)
-        row[:] = now
-    return found
+def _plays(command: Floats, half_widths: Floats) -> list[Floats]:
+    """Plays (ticks,) that start in their middle, for each half width."""
+    start = float(command[0])
+    return [Play(delta_minus=-r, delta_plus=r, output=start).run(command) for r in half_widths]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -20,7 +19,6 @@ RELATIVE = 0.3
 """Of lengths, as a share of them."""
 _SHORTEST = 1e-4
 """Shortest length [m]."""
-_NAME = re.compile(r"(?P<path>[a-z_.]+)(\[(?P<index>\d)\])?")
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,13 +68,14 @@ def fitted(
         found += _vector(config, "base_position", LENGTH) + _vector(config, "base_rotation", ANGLE)
     if any(each.orientation is not None for each in poses):
         found += _vector(config, "sensor_rotation", ANGLE)
+    names = [each.name for each in found]
     for name in keep:
-        if not any(is_named(each.name, name) for each in found):
-            raise FieldError("--keep", name, ", ".join(each.name for each in found))
-    return tuple(each for each in found if not any(is_named(each.name, name) for name in keep))
+        if not any(_is_named(each, name) for each in names):
+            raise FieldError("--keep", name, ", ".join(names))
+    return tuple(each for each in found if not any(_is_named(each.name, name) for name in keep))
 
 
-def is_named(name: str, by: str) -> bool:
+def _is_named(name: str, by: str) -> bool:
     """Whether a name is this one or an item of it."""
     return name == by or name.startswith((f"{by}[", f"{by}."))
 
@@ -85,14 +84,13 @@ def with_values(config: Config, values: Mapping[str, float]) -> dict[str, Any]:
     """Changes of a configuration by values of parameters that are keys of it."""
     changes: dict[str, Any] = {}
     for name, value in values.items():
-        matched = _NAME.fullmatch(name)
-        if matched is None or name.startswith("dof."):
+        path, _, index = name.rstrip("]").partition("[")
+        section, key, *others = path.split(".")
+        if others:  # of a degree of freedom
             continue
-        path, index = matched["path"], matched["index"]
-        if index is None:
+        if not index:
             changes[path] = value
             continue
-        section, key = path.split(".")
         items = changes.setdefault(path, list(getattr(getattr(config, section), key)))
         items += [0.0] * (int(index) + 1 - len(items))
         items[int(index)] = max(value, 0.0) if section == "measurement" else value

@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <tautscope.hpp>
 
@@ -15,7 +16,8 @@
 
 namespace tautscope_control {
 
-using tautscope::Vector;
+using tautscope::Numbers;
+using tautscope::Values;
 
 /// Operating states of the collaborative robotics toolkit (CRTK).
 enum class OperatingState : std::uint8_t {
@@ -47,8 +49,8 @@ std::optional<Request> parse_state_command(std::string_view text) noexcept;
 
 /// Result of a control tick.
 struct Tick {
-    /// Insertion, rotation, bending [m, rad, rad]; NaN before the first reference.
-    Vector command;
+    /// (n,) [m or rad]; NaN before the first reference.
+    Values command;
     /// Whether the command is to be sent to the drives.
     bool is_sent;
     OperatingState state;
@@ -69,31 +71,34 @@ struct Status {
 /// The names of flags, separated by commas.
 std::string flag_names(std::uint32_t flags);
 
-/// Control loop: reference in, command out, in operating states.
+/// Control loop of any robot: reference in, command out, in operating states.
 ///
 /// All functions are for the control thread, but for `post`, `set_compensation` and `status`. None but the constructor allocates,
 /// blocks or reads a clock. Times are seconds on one clock, the same for references, ticks and images.
 class ControlLoop {
 public:
-    /// Largest distance of the drives from the last command when they are enabled again [m, rad, rad].
-    static constexpr Vector start_tolerance{1e-3, 0.05, 0.05};
-
-    /// From the configuration with every key, as `tautscope config` prints it. Throws `tautscope::Error`.
+    /// From a configuration, without `[[dof]]` with every key, as `tautscope config` prints it. Throws `tautscope::Error`.
     explicit ControlLoop(const std::string &toml);
+
+    /// Names of the degrees of freedom.
+    const std::vector<std::string> &dofs() const noexcept { return dofs_; }
+
+    /// Whether images measure the tip; with `[[dof]]` what is offered does.
+    bool has_bands() const noexcept { return has_bands_; }
 
     /// The control period [s].
     double period() const noexcept { return period_; }
 
-    /// Position of the drives [m, rad, rad], before `enable`; values that are not finite are ignored.
-    void set_measured(const Vector &position) noexcept;
+    /// Position of the drives (n,) [m or rad], before `enable`; ignored unless n numbers are finite.
+    void set_measured(Numbers position) noexcept;
 
-    /// The newest reference [m, rad, rad], made at `made_at` [s], NaN if that is not known; none if it is not finite.
-    void set_reference(const Vector &position, double made_at) noexcept;
+    /// The newest reference (n,) [m or rad], made at `made_at` [s], NaN if that is not known; ignored likewise, and then false.
+    bool set_reference(Numbers position, double made_at) noexcept;
 
     /// One control tick at `time` [s]: applies requests, then steps the loop.
     Tick step(double time) noexcept;
 
-    /// After the command of a tick has been sent: hands predictions to the detection, and its results to the loop.
+    /// After the command of a tick has been sent: hands predictions to the detection, and results and measurements to the loop.
     void exchange() noexcept;
 
     /// Requests an operation for the next tick.
@@ -104,10 +109,10 @@ public:
 
     Status status() const noexcept;
 
-    /// The newest reference that went into the loop [m, rad, rad]; NaN before the first.
-    const Vector &reference() const noexcept { return used_; }
+    /// The newest reference that went into the loop (n,) [m or rad]; NaN before the first.
+    const Values &reference() const noexcept { return used_; }
 
-    /// For the thread that detects.
+    /// For the thread that detects, or that receives measurements.
     DetectionExchange &detection() noexcept { return exchange_; }
 
     /// The loop itself, for features from a detector of your own.
@@ -118,11 +123,16 @@ private:
     void enable() noexcept;
     void engage() noexcept;
     void update_state() noexcept;
+    bool is_finite(Numbers values) const noexcept;
 
     tautscope::Loop loop_;
+    std::vector<std::string> dofs_;
+    bool has_bands_;
+    /// Largest distance of the drives from the last command when they are enabled again.
+    Values start_tolerance_;
     DetectionExchange exchange_;
     double period_;
-    Vector measured_, reference_, used_, command_;
+    Values measured_, reference_, used_, command_;
     double made_at_;
     /// When motion was last enabled or resumed [s].
     double engaged_at_;

@@ -1,14 +1,49 @@
-/* One image at a time between the control thread and the thread that detects, without locks. */
+/* Images and measurements between the control thread and another one, without locks. */
 
 #ifndef TAUTSCOPE_CONTROL__DETECTION_EXCHANGE_HPP_
 #define TAUTSCOPE_CONTROL__DETECTION_EXCHANGE_HPP_
 
+#include <array>
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 
 #include <tautscope.hpp>
 
 namespace tautscope_control {
+
+/// Up to N items from the one thread that calls `push` to the one that calls `pop`. Both return whether they did.
+template <class Item, std::size_t N> class Queue {
+public:
+    bool push(const Item &item) noexcept {
+        const bool has_place = end_ - begin_ < N;
+        if (has_place) {
+            items_[end_ % N] = item;
+            ++end_;
+        }
+        return has_place;
+    }
+
+    bool pop(Item &item) noexcept {
+        const bool has_item = begin_ != end_;
+        if (has_item) {
+            item = items_[begin_ % N];
+            ++begin_;
+        }
+        return has_item;
+    }
+
+private:
+    std::array<Item, N> items_{};
+    std::atomic<std::size_t> begin_{0}, end_{0};
+};
+
+/// The tip (n,) [m or rad] as a sensor, 0 to 3, of a robot with `[[dof]]` measured it; NaN for what was not measured.
+struct Measurement {
+    tautscope::Values values;
+    double captured_at = 0.0;
+    std::uint32_t sensor = 0;
+};
 
 /// Exchange of one image's prediction, detection and report.
 ///
@@ -38,10 +73,16 @@ public:
     /// Detection thread: whether no image is under way.
     bool is_free() const noexcept;
 
-    /// Control thread: does what is its turn. Returns true if an image has updated the loop.
-    bool serve(tautscope::Loop &loop) noexcept;
+    /// Control thread: does what is its turn, or drops it. Returns true if the loop was updated.
+    bool serve(tautscope::Loop &loop, bool is_used = true) noexcept;
+
+    /// Measurements from one thread, and the reports on them back to it.
+    Queue<Measurement, 64> measurements;
+    Queue<TautscopeTipReport, 64> reports;
 
 private:
+    bool serve_image(tautscope::Loop &loop) noexcept;
+
     enum class Phase : std::uint8_t { free, requested, serving, predicted, detected, reported };
 
     std::atomic<Phase> phase_{Phase::free};

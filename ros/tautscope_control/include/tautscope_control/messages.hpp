@@ -15,14 +15,18 @@
 
 namespace tautscope_control {
 
-/// Throws `std::invalid_argument` unless there are three different joint names.
-void check_joints(const std::vector<std::string> &joints);
+/// Names of the article's joints.
+inline const std::vector<std::string> default_joints{"insertion", "rotation", "bending"};
 
-/// Positions of the joints, by their names; by their order where the message has no names. None if one is missing.
-std::optional<Vector> positions(const sensor_msgs::msg::JointState &message, const std::vector<std::string> &joints);
+/// The joints' names by the parameter; of a robot with `[[dof]]` by default those of its degrees of freedom. Throws
+/// `std::invalid_argument` unless they are different, one per degree of freedom.
+std::vector<std::string> joints_of(std::vector<std::string> names, const ControlLoop &control);
+
+/// Positions of the joints, by their names; by their order where the message has no names. NaN for one that is missing.
+Values positions(const sensor_msgs::msg::JointState &message, const std::vector<std::string> &joints);
 
 /// Writes positions into a message of these joints.
-void set_positions(sensor_msgs::msg::JointState &message, const Vector &positions);
+void set_positions(sensor_msgs::msg::JointState &message, Numbers positions);
 
 /// An image of its message, without a copy. None if the encoding is not one of bgr8, rgb8, bgra8, yuv422_yuy2, uyvy, yuv422,
 /// nv12.

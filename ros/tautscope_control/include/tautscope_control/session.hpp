@@ -23,29 +23,19 @@
 
 namespace tautscope_control {
 
-/// Settings of a session, as parameters of its node.
-struct SessionSettings {
-    /// File of the configuration with every key, as `tautscope config` prints it.
-    std::string config;
-    /// Names of insertion, rotation and bending.
-    std::vector<std::string> joints;
-    /// Topic of the endoscope's images.
-    std::string image_topic;
-    /// `frame_id` of what is published.
-    std::string frame_id;
-    /// Begin of the names of topics: empty, or "~/".
-    std::string prefix;
-};
-
-/// Control loop with image subscription, `state_command`, `measured_js`, `hysteresis/delta`, `operating_state`, `warning` and
-/// diagnostics, from configuring a node to cleaning it up.
+/// Control loop with subscription of images or measurements, `state_command`, `measured_js`, `hysteresis/delta`, `operating_state`,
+/// `warning` and diagnostics, from configuring a node to cleaning it up.
 ///
 /// Images are received in a callback group of their own and detected in a thread of their own. No callback that still runs uses a
 /// session that has ended.
 class Session {
 public:
-    /// Throws `tautscope::Error` or `std::invalid_argument`, which say what is wrong in the settings.
-    static std::shared_ptr<Session> create(rclcpp_lifecycle::LifecycleNode &node, const SessionSettings &settings);
+    /// Declares the parameters of a node.
+    static void declare_parameters(rclcpp_lifecycle::LifecycleNode &node);
+
+    /// From the node's parameters, with topics whose names begin with `prefix`: empty, or "~/". Throws `tautscope::Error` or
+    /// `std::invalid_argument`, which say what is wrong in the parameters.
+    static std::shared_ptr<Session> create(rclcpp_lifecycle::LifecycleNode &node, const std::string &prefix);
 
     ~Session();
 
@@ -54,7 +44,7 @@ public:
 
     ControlLoop &control() noexcept { return control_; }
 
-    const std::vector<std::string> &joints() const noexcept { return settings_.joints; }
+    const std::vector<std::string> &joints() const noexcept { return joints_; }
 
     /// Seconds since the session began, on the node's clock.
     double now() const { return seconds(clock_->now()); }
@@ -69,19 +59,22 @@ public:
     sensor_msgs::msg::JointState joint_state() const;
 
 private:
-    Session(rclcpp_lifecycle::LifecycleNode &node, const SessionSettings &settings);
+    Session(rclcpp_lifecycle::LifecycleNode &node, const std::string &prefix);
 
     double seconds(const rclcpp::Time &time) const { return 1e-9 * static_cast<double>((time - origin_).nanoseconds()); }
-    void on_report(const TautscopeReport &report);
+    template <class Report> void on_report(const Report &report);
+    void on_measurement(const sensor_msgs::msg::JointState &message, std::uint32_t sensor);
+    void publish_reports();
     void publish_state(const Status &status, const rclcpp::Time &now);
     void publish_diagnostics(const Status &status, const rclcpp::Time &now);
 
-    SessionSettings settings_;
     rclcpp::Clock::SharedPtr clock_;
     rclcpp::Logger logger_;
     std::string name_;
     rclcpp::Time origin_;
+    std::string config_, frame_id_;
     ControlLoop control_;
+    std::vector<std::string> joints_;
     rclcpp::Publisher<sensor_msgs::msg::JointState>::SharedPtr measured_;
     rclcpp::Publisher<std_msgs::msg::Float64MultiArray>::SharedPtr delta_;
     rclcpp::Publisher<crtk_msgs::msg::OperatingState>::SharedPtr operating_state_;
@@ -91,9 +84,12 @@ private:
     std::atomic<double> measured_at_{-1.0};
     Status last_{OperatingState::disabled, TAUTSCOPE_REACTION_NONE, 0, 0, false};
     int reports_ = 0;
+    /// Of images the worker counts.
+    ImageCounts counts_{0, 0, 0, 0};
     std::shared_ptr<DetectionWorker> worker_;
     rclcpp::CallbackGroup::SharedPtr image_group_;
     rclcpp::Subscription<sensor_msgs::msg::Image>::SharedPtr images_;
+    std::vector<rclcpp::Subscription<sensor_msgs::msg::JointState>::SharedPtr> sensors_;
     rclcpp::Subscription<crtk_msgs::msg::StringStamped>::SharedPtr state_command_;
 };
 
