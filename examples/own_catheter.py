@@ -5,14 +5,12 @@ Run it with ``uv run python examples/own_catheter.py``.
 
 import numpy as np
 from numpy.typing import ArrayLike
-from tautscope import Config, Pose, Sample, run_experiment
-from tautscope.config import DofEntry, KinematicsConfig, Sine
+from tautscope import Pose, Sample, axes, run_experiment
 from tautscope.loop.kinematics import TwoPlanes
-from tautscope.references import OperatorMotion
+from tautscope.report.operator_motion import motion_of
 
-CONFIG = Config(
-    dof=(DofEntry(name="bend_x", width_limit=1.0), DofEntry(name="bend_y", width_limit=1.0)),
-    kinematics=KinematicsConfig(kind="two_planes", length=0.06, tip_length=0.01),
+CONFIG = axes(2, names=["bend_x", "bend_y"], width_limit=1.0, range=(-2.0, 2.0)).replace(
+    kinematics={"kind": "two_planes", "length": 0.06, "tip_length": 0.01}
 )
 
 
@@ -34,19 +32,14 @@ class Catheter:
         position, rotation = TwoPlanes(CONFIG).tip(self.tip)
         pose = Pose(position + self.rng.normal(0, 0.3e-3, 3), time, rotation)
         seen = (pose,) if self.ticks % 5 == 0 else ()
-        return Sample(time, motors, true_state=self.tip.copy(), measurement=seen)
+        return Sample(time, motors, true_state=self.tip, measurement=seen)
 
     def close(self) -> None:
         """Stop your motors."""
 
 
-def main() -> None:
-    motion = OperatorMotion([Sine(centre=0.0, amplitude=1.2)] * 2, seed=3, duration=60.0)
-    without, with_it = (run_experiment(Catheter(), motion, CONFIG, on) for on in (False, True))
-    rms = zip(CONFIG.dofs, without.tracking_rms(), with_it.tracking_rms(), strict=True)
-    for dof, before, after in rms:
-        print(f"{dof.label}: tip off by {before:.3f} rad, with tautscope by {after:.3f} rad")
-
-
 if __name__ == "__main__":
-    main()
+    motion = motion_of(CONFIG, seed=3, duration=60.0)
+    for how, compensate in (("without", False), ("with", True)):
+        rms = run_experiment(Catheter(), motion, CONFIG, compensate).tracking_rms()
+        print(f"{how} tautscope the tip is off by {rms.round(3)} rad")

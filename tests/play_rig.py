@@ -3,15 +3,13 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from tautscope import Points, Pose, Sample, Tip
+from numpy.typing import NDArray
+from tautscope import PlayRig, Points, Pose, Tip
 from tautscope.config import Config
 from tautscope.loop.kinematics import TwoPlanes, rotation_matrix
 from tautscope.loop.measurement import Measurement
 
 Floats = NDArray[np.float64]
-HALF_WIDTH = 0.3
-"""Of the slack of each degree of freedom [its width_limit]."""
 Sensor = Callable[[Floats, float, np.random.Generator], Measurement]
 """What is measured of a tip (n,) at a time [s]."""
 
@@ -65,39 +63,16 @@ class TrackedPlanes:
         return Pose(position + rng.normal(0, 3e-4, 3), time, turned @ noise)
 
 
-class PlayRig:
-    """A rig of [[dof]] whose tip follows its motors with slack; implements `Rig`.
+class SensorRig(PlayRig):
+    """Plays with sensors, each of which measures in every fifth tick."""
 
-    Args:
-        config: Has the degrees of freedom.
-        sensors: One or several, each of which measures in every fifth tick.
-        knows_tip: Whether a sample has the true state.
-    """
+    def __init__(self, config: Config, sensors: Sequence[Sensor] = (by_joints,)) -> None:
+        super().__init__(config, [0.6 * dof.width_limit for dof in config.dof], seed=1)
+        self._sensors = sensors
 
-    def __init__(
-        self, config: Config, sensors: Sequence[Sensor] = (by_joints,), *, knows_tip: bool = True
-    ) -> None:
-        self.control_period = config.control.period
-        self._half = HALF_WIDTH * np.array([dof.width_limit for dof in config.dof])
-        self._sensors, self._knows_tip = sensors, knows_tip
-
-    def reset(self) -> Sample:
-        self._ticks, self._tip = 0, np.zeros(len(self._half))
-        self._rng = np.random.default_rng(1)
-        return self.step(self._tip)
-
-    def step(self, command: ArrayLike) -> Sample:
-        command = np.asarray(command)
-        self._tip = np.clip(self._tip, command - self._half, command + self._half)
-        self._ticks += 1
-        time = self._ticks * self.control_period
-        seen = [
-            sensor(self._tip, time, self._rng)
+    def measure(self, tip: Floats, time: float) -> list[Measurement]:
+        return [
+            sensor(tip, time, self.rng)
             for index, sensor in enumerate(self._sensors)
-            if self._ticks % 5 == index % 2  # several measurements in one tick, and one alone
+            if self.ticks % 5 == index % 2  # several measurements in one tick, and one alone
         ]
-        measurement = seen[0] if len(seen) == 1 else tuple(seen)
-        return Sample(time, command, None, self._tip if self._knows_tip else None, measurement)
-
-    def close(self) -> None:
-        pass

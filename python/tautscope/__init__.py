@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from tautscope.loop.rig import Frame, Rig, Sample
     from tautscope.loop.vision import Detection, MarkerDetector
     from tautscope.runs.experiment import run_experiment
+    from tautscope.runs.play_rig import PlayRig
     from tautscope.runs.recording import Recording
     from tautscope.twin import Twin
 
@@ -37,6 +38,7 @@ _LOCATIONS = {
     "Instrument": "_core",
     "MarkerDetector": "loop.vision",
     "Play": "_core",
+    "PlayRig": "runs.play_rig",
     "Points": "loop.measurement",
     "Pose": "loop.measurement",
     "Recording": "runs.recording",
@@ -64,6 +66,7 @@ __all__ = [
     "Instrument",
     "MarkerDetector",
     "Play",
+    "PlayRig",
     "Points",
     "Pose",
     "Recording",

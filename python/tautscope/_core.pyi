@@ -199,7 +199,13 @@ _Update = tuple[
 @final
 class Reduction:
     def __new__(cls, settings: Mapping[str, Any], compensate: bool = True) -> Reduction: ...
-    def step(self, reference: ArrayLike, time: float, stamp: float | None = None) -> _Floats: ...
+    def step(
+        self,
+        reference: ArrayLike,
+        time: float,
+        stamp: float | None = None,
+        limit: Callable[[_Floats, _Floats], ArrayLike] | None = None,
+    ) -> _Floats: ...
     def run(self, references: ArrayLike, times: ArrayLike) -> _Floats: ...
     def on_features(
         self,

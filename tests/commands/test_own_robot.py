@@ -235,6 +235,47 @@ def test_the_kinematics_of_a_rig_is_written_or_what_the_sweep_leaves_open_is_nam
     assert found.measurement.delays[0] == pytest.approx(0.005, abs=0.02)
 
 
+WRONG = """
+from tautscope import PlayRig, axes
+
+class Wrong(PlayRig):
+    def __init__(self):
+        robot = axes(2, names=["bend_x", "bend_y"], width_limit=1.0)
+        super().__init__(robot, gains=[-0.8, 1.15], zeros=[0.12, -0.2])
+"""
+
+
+@pytest.mark.parametrize("matrix", [[], [[3.0, 0.0], [0.0, -2.0], [-1.0, 2.0]]])
+def test_gains_signs_and_zeros_are_right_after_one_calibration(
+    matrix: list[list[float]], folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The rig knows its motors by itself, the configuration has them as they were assumed."""
+    name = f"wrong_{len(matrix)}"
+    section = f"[actuators]\nmatrix = {matrix}\noffsets = [1, 0, 2]\n" if matrix else ""
+    change = f".replace(actuators=dict(matrix={matrix}, offsets=[1, 0, 2]))" if matrix else ""
+    (folder / f"{name}.py").write_text(WRONG.replace("1.0)", f"1.0){change}"), encoding="utf-8")
+    robot = ROBOT.replace('[kinematics]\nkind = "two_planes"\n', section)
+    (folder / "robot.toml").write_text(robot, encoding="utf-8")
+    options = ["calibrate", "robot", "--config", "robot.toml", "--rig", f"{name}:Wrong", "--json"]
+    options += ["--seconds", "30", "--yes", "--write"]
+    assert main(options) == 0
+    found = load_config("robot.toml").actuators
+    assert found is not None
+    assert found.names == (() if matrix else ("bend_x", "bend_y"))
+    assumed = np.array(matrix or np.eye(2))
+    np.testing.assert_allclose(found.matrix, assumed / [-0.8, 1.15], rtol=0.03, atol=1e-9)
+    capsys.readouterr()
+    assert main(options) == 0
+    again = json.loads(capsys.readouterr().out)
+    for k, dof in enumerate(("bend_x", "bend_y")):  # row k moves by this degree of freedom alone
+        share = abs(found.matrix[k][k])
+        std = again["std"][f"actuators.matrix[{k}][{k}]"] / share
+        assert again["fit"][f"dof.{dof}.gain"] == pytest.approx(1.0, abs=3 * std)
+        std = again["std"][f"actuators.offsets[{k}]"] / share
+        assert again["fit"][f"dof.{dof}.zero"] == pytest.approx(0.0, abs=3 * std)
+        assert 0 < std < 0.01
+
+
 def test_nothing_moves_without_an_answer(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -16,7 +16,7 @@ import tautscope
 from common.paths import ROOT
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 from running import AGE, Arm, RunningConsole, rests, running_console
-from tautscope.console.start import make_rig
+from tautscope.console.paced_rig import PacedRig
 
 CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
 AXE = ROOT / "target" / "axe-core" / "package" / "axe.min.js"
@@ -282,7 +282,7 @@ def test_any_number_of_axes_is_drawn_and_steered_without_an_image(
 ) -> None:
     config = tautscope.axes(count, width_limit=1.0, unit="rad")
     arm = Arm(count)
-    rig, config = make_rig(config, is_twin=True, make=lambda _: arm)
+    rig = PacedRig(lambda: arm, config.control.period, is_simulated=True)
     context = browser.new_context(viewport={"width": 1280, "height": 800})
     context.set_default_timeout(TIMEOUT)
     with running_console(tmp_path, config, rig) as console:

@@ -7,13 +7,14 @@ import signal
 import socket
 import subprocess
 import sys
+from argparse import Namespace
 from pathlib import Path
 
 import pytest
 from refused import failed
+from tautscope.commands.rig_choice import choose_rig
 from tautscope.config import load_config
 from tautscope.console.rig_control import RigControl
-from tautscope.console.start import make_rig
 from tautscope.hardware.rig import HardwareRig
 from tautscope.twin.rig import Twin
 
@@ -27,21 +28,22 @@ def test_drives_need_a_configuration_and_the_twin_has_none(
     assert "--robot: got 'colonoscope'" in failed(capsys, "console", "--robot", "colonoscope")
     assert "rig: got 'nothing:Here'" in failed(capsys, "console", "--rig", "nothing:Here")
     colonoscope = ("console", "--twin", "--config", "colonoscope")
-    assert "this command is for the article's instrument" in failed(capsys, *colonoscope)
+    assert "this is for the article's instrument" in failed(capsys, *colonoscope)
     err = failed(capsys, "console", "--config", "article_rig")
     assert "placeholders of" in err
-    config = load_config("bench")
-    twin, _ = make_rig(config, is_twin=True)
+    config, make = choose_rig(Namespace(config="bench", twin=True))
+    assert config.drives is None
+    twin = make(config)
     assert isinstance(twin, Twin)
     twin.close()
-    rig, used = make_rig(config, is_twin=False)
-    assert isinstance(rig, HardwareRig)
-    assert used.drives == config.drives
+    config, make = choose_rig(Namespace(config="bench"))
+    assert config.drives == load_config("bench").drives
+    assert isinstance(make(config), HardwareRig)
 
 
 def test_motors_are_enabled_only_on_request(tmp_path: Path) -> None:
-    rig, config = make_rig(load_config("bench"), is_twin=False)
-    control = RigControl(config, rig, tmp_path, None)  # type: ignore[arg-type]
+    config = load_config("bench")
+    control = RigControl(config, HardwareRig(config), tmp_path, None)  # type: ignore[arg-type]
     assert control.is_hardware
     assert control.run is None
     control.shut_down()

@@ -20,7 +20,6 @@ from tautscope.console.messages import Received, Servo, decode_state
 from tautscope.console.operator_input import OperatorInput
 from tautscope.console.paced_rig import PacedRig
 from tautscope.console.shared import Channels, SharedMemory
-from tautscope.console.start import make_rig
 from tautscope.log.reader import Log, Tick, read_log
 from tautscope.log.replay import replay_same
 from tautscope.loop.kinematics import TwoPlanes
@@ -36,7 +35,7 @@ SLACK = 0.3
 def console_of(
     folder: Path, config: Config, make: Callable[[Config], Rig], *, is_twin: bool
 ) -> Iterator[RunningConsole]:
-    rig, config = make_rig(config, is_twin=is_twin, make=make)
+    rig = PacedRig(lambda: make(config), config.control.period, is_simulated=is_twin)
     with running_console(folder, config, rig) as console:
         yield console
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from tautscope import _core
 from tautscope.config import Config
-from tautscope.loop.construction import build_estimator
 
 
 def record(seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -17,7 +16,9 @@ def record(seed: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def new_estimator() -> _core.Estimator:
-    return build_estimator(Config().insertion)
+    names = ("update_distance", "contact_tolerance", "smoothing_factor")
+    settings = {name: getattr(Config().insertion, name) for name in names}
+    return _core.Estimator(**settings, delta_minus=0.0, delta_plus=0.0)
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -17,7 +17,8 @@ def of_your_own_rig(reductions: list[float]) -> None:
 
 
 def of_a_robot(errors: list[float]) -> None:
-    for before, after in zip(*[iter(errors)] * 2, strict=True):
+    half = len(errors) // 2
+    for before, after in zip(errors[:half], errors[half:], strict=True):
         assert after < 0.25 * before
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from play_rig import (
-    PlayRig,
     Sensor,
+    SensorRig,
     TrackedPlanes,
     by_joints,
     by_points,
@@ -47,7 +47,7 @@ def record(path: Path, config: Config, sensors: Sequence[Sensor] = (by_joints,))
     sines = [Sine(centre=0.0, amplitude=0.8 * dof.width_limit) for dof in config.dof]
     with LogWriter(path, config, wait=True) as log:
         motion = OperatorMotion(sines, 3, SECONDS)
-        return run_experiment(PlayRig(config, sensors), motion, config, log=log)
+        return run_experiment(SensorRig(config, sensors), motion, config, log=log)
 
 
 @pytest.fixture(scope="module")

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linprog
-from tautscope import Sample, Tip, run_experiment
+from tautscope import PlayRig, Report, Sample, Tip, axes, run_experiment
 from tautscope.config import Config, Sine, from_document
 from tautscope.errors import ConfigError, SignalError
 from tautscope.loop.actuators import ActuatedRig, Actuators
+from tautscope.loop.measurement import Measurement
 from tautscope.references import OperatorMotion
 
 Floats = NDArray[np.float64]
@@ -188,6 +189,43 @@ def test_a_limited_command_is_said_once(caplog: pytest.LogCaptureFixture) -> Non
     np.testing.assert_allclose(sample.applied, [0.015, 0.5])
     # On the way back nothing is held.
     np.testing.assert_allclose(rig.step([0.012, -0.5]).applied, [0.012, -0.5])
+
+
+def test_the_loop_knows_what_was_commanded_within_the_limits(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """What is not commanded is no slack, and the warnings name whose it is."""
+    robot = axes(2, names=["bend_x", "bend_y"], width_limit=1.0)
+    limits = [[-1.8, 1.8], [-4, 4], [-3, 3]]
+    robot = robot.replace(actuators={"matrix": [[3, 0], [0, 2], [-1, 1]], "limits": limits})
+    reports: list[Report] = []
+
+    class Log:
+        def tick(self, *_: Any) -> None: ...
+
+        def event(self, *_: Any) -> None: ...
+
+        def measurement(self, _: float, __: Measurement, report: Report) -> None:
+            reports.append(report)
+
+    motion = OperatorMotion([Sine(centre=0, amplitude=1), Sine(centre=0, amplitude=0.8)], 3, 30.0)
+    run = run_experiment(PlayRig(robot, [0.5, 0.3]), motion, robot, log=Log())  # type: ignore[arg-type]
+    (record,) = caplog.records
+    assert record.getMessage().startswith("bend_x: limited by actuators.limits; the command needs")
+    assert abs(run.trace["command_bend_x"]).max() == pytest.approx(0.6)
+    assert abs(run.trace["reference_bend_x"]).max() > 0.7
+    for name, slack in (("bend_x", 0.5), ("bend_y", 0.3)):
+        command, applied = (run.trace[f"{of}_{name}"] for of in ("command", "applied"))
+        np.testing.assert_allclose(applied[1:], command[:-1], atol=1e-12)
+        found = run.trace[f"delta_plus_{name}"][-1] - run.trace[f"delta_minus_{name}"][-1]
+        assert found == pytest.approx(slack, abs=0.05)
+    what = "bend_x limited by actuators.limits"
+    named = [report for report in reports if what in report.warnings]
+    assert 0 < len(named) < len(reports) / 3
+    assert all("monitor" in report.warnings for report in named)
+    (line,) = run.warnings
+    assert line.startswith("monitor (")
+    assert line.endswith(f"; {what}")
 
 
 def test_a_start_beyond_the_limits_is_refused() -> None:

@@ -31,7 +31,8 @@ def test_a_line_says_how_often_when_and_the_strongest_reaction() -> None:
     ]
     lost, late = summarise(images, ("lost", "late"))
     assert lost.startswith(
-        "lost (no marker was found, or none that agrees with the prediction) at 2 of 4 images"
+        "lost (nothing was measured that agrees with the prediction: no marker, or no value of a "
+        "sensor) at 2 of 4 images"
     )
     assert "first 0.0 s into the run; the compensation faded out meanwhile" in lost
     assert late.startswith("late (") and "at 2 of 4 images, first 0.1 s" in late

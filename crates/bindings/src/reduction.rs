@@ -55,19 +55,34 @@ impl Reduction {
     }
 
     /// One control tick at `time` in s: command (n,) for a reference (n,), which was generated at `stamp` in s.
-    #[pyo3(signature = (reference, time, stamp=None))]
+    ///
+    /// `limit` brings a command within the limits of the actuators: (last, next) to (n,) between them.
+    #[pyo3(signature = (reference, time, stamp=None, limit=None))]
     fn step<'py>(
         &mut self,
         py: Python<'py>,
         reference: Vector<'py>,
         time: f64,
         stamp: Option<f64>,
+        limit: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Floats<'py>> {
         let reference = reference.as_array().to_vec();
         self.check(py, "reference", reference.len())?;
         let mut command = vec![f64::NAN; reference.len()];
-        self.0.step(&reference, stamp, time, &mut command);
-        Ok(PyArray1::from_vec(py, command))
+        let mut failed = None;
+        let mut within = |last: &[f64], next: &mut [f64]| {
+            let Some(limit) = limit else { return };
+            match limited(py, limit, last, next) {
+                Ok(found) => next.copy_from_slice(&found),
+                Err(error) => {
+                    next.copy_from_slice(last);
+                    failed = Some(error);
+                }
+            }
+        };
+        self.0
+            .step_within(&reference, stamp, time, &mut command, &mut within);
+        failed.map_or_else(|| Ok(PyArray1::from_vec(py, command)), Err)
     }
 
     /// `step` for references (m, n) at times (m,): commands (m, n).
@@ -341,6 +356,22 @@ impl Reduction {
         let allowed = format!("{dofs} values, one per degree of freedom");
         Err(errors::length(py, field, found, &allowed))
     }
+}
+
+/// The command (n,) of the user's limit for the last and the next one.
+fn limited(
+    py: Python<'_>,
+    limit: &Bound<'_, PyAny>,
+    last: &[f64],
+    next: &[f64],
+) -> PyResult<Vec<f64>> {
+    let (from, to) = (
+        PyArray1::from_slice(py, last),
+        PyArray1::from_slice(py, next),
+    );
+    let found: Vector<'_> = limit.call1((from, to))?.extract()?;
+    same_length(py, "limit", found.as_array().len(), next.len())?;
+    Ok(found.as_array().to_vec())
 }
 
 /// The error of a call that is for another kind of loop.

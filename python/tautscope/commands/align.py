@@ -26,6 +26,7 @@ def add_parser(verbs: arguments.Verbs) -> None:
     align = arguments.add_verb(
         verbs,
         "align",
+        _run,
         help="delay between motors and images of a log, or of a video with motor positions",
         description="Estimate the delay of the images behind the motors, and the drift of their "
         "clocks, from a log or from a video with motor positions. Two probes must agree; without "
@@ -42,7 +43,6 @@ def add_parser(verbs: arguments.Verbs) -> None:
     )
     arguments.add_config(align)
     arguments.add_json(align)
-    align.set_defaults(run=_run)
 
 
 def _run(options: argparse.Namespace) -> int:

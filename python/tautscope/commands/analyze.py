@@ -20,6 +20,7 @@ def add_parser(verbs: arguments.Verbs) -> None:
     analyze = arguments.add_verb(
         verbs,
         "analyze",
+        _run,
         help="compare models of hysteresis on a recorded file",
         description="Compare models of hysteresis on a CSV or Parquet file with the positions of "
         "an actuator and its tip, each in any unit. Delimiter, decimal comma, comments and a line "
@@ -59,7 +60,6 @@ def add_parser(verbs: arguments.Verbs) -> None:
     arguments.add_out(analyze, "analyze")
     arguments.add_config(analyze)
     arguments.add_json(analyze)
-    analyze.set_defaults(run=_run)
 
 
 def _run(options: argparse.Namespace) -> None:
@@ -67,11 +67,10 @@ def _run(options: argparse.Namespace) -> None:
     from tautscope.analysis.output import write_analysis  # noqa: PLC0415
     from tautscope.analysis.suggestion import suggest_settings  # noqa: PLC0415
     from tautscope.commands.progress import progress_bar  # noqa: PLC0415
-    from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
     from tautscope.runs.records import read_record  # noqa: PLC0415
 
     config = load_config(options.config)
-    folder = check_free(options.out or default_folder("analyze"))
+    folder = arguments.out_folder(options)
     record = read_record(options.file, options.command, options.measured, options.time)
     with progress_bar("fits") as progress:
         analysis = analyze(record, config, options.update_distance, options.gain, progress=progress)

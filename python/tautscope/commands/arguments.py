@@ -4,29 +4,37 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TypeAlias, get_args
 
 from tautscope.config import RIGS, Profile
+from tautscope.runs.output_folder import check_free, default_folder
 
 Verbs: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 
 def add_verb(
-    verbs: Verbs, name: str, *, help: str, description: str, extras: Sequence[str] = ()
+    verbs: Verbs,
+    name: str,
+    run: Callable[[argparse.Namespace], int | None] | None = None,
+    *,
+    help: str,
+    description: str,
+    extras: Sequence[str] = (),
 ) -> argparse.ArgumentParser:
     """Add a verb to the command line.
 
     Args:
         verbs: The verbs so far.
         name: Its name.
+        run: What it does with its options; the exit status. None of a verb with verbs of its own.
         help: One line for the list of verbs.
         description: Text of its own ``--help``.
         extras: Extras of the package that it needs; `tautscope.cli.main` checks them first.
     """
     parser = verbs.add_parser(name, allow_abbrev=False, help=help, description=description)
-    parser.set_defaults(extras=tuple(extras), usage_error=parser.error)
+    parser.set_defaults(run=run, extras=tuple(extras), usage_error=parser.error)
     add_verbose(parser, default=argparse.SUPPRESS)
     return parser
 
@@ -65,13 +73,22 @@ def add_profile(parser: argparse.ArgumentParser, what: str) -> None:
 
 
 def add_out(parser: argparse.ArgumentParser, verb: str) -> None:
-    """``--out``, by default `tautscope.runs.output_folder.default_folder` of the verb."""
+    """``--out``, see `out_folder`."""
     parser.add_argument(
         "--out",
         type=Path,
         metavar="DIR",
         help=f"output folder, new or empty [runs/<date-time>-{verb}]",
     )
+
+
+def out_folder(options: argparse.Namespace) -> Path:
+    """The folder of ``--out``, or one with date and verb in its name.
+
+    Raises:
+        OutputError: It is not empty, or cannot be written.
+    """
+    return check_free(options.out or default_folder(options.verb))
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:

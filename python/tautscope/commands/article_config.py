@@ -19,6 +19,8 @@ def article_config(
     config = load_config(path, profile)
     if config.dof:
         found = ", ".join(dof.name for dof in config.dof)
-        allowed = "none: this command is for the article's instrument; run_experiment runs any rig"
+        allowed = (
+            "none: this is for the article's instrument. docs/robots.md has what other robots use"
+        )
         raise ConfigError("dof", found, allowed)
     return config

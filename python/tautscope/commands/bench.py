@@ -23,6 +23,7 @@ def add_parser(verbs: arguments.Verbs) -> None:
     bench = arguments.add_verb(
         verbs,
         "bench",
+        _bench,
         help="run a simulated rig: drives and a camera for `tautscope run`",
         description="Run a simulated rig for another process: the simulated instrument behind "
         "three CiA 402 drives on a CAN bus and a camera stream, in real time. Ends with its input, "
@@ -58,7 +59,6 @@ def add_parser(verbs: arguments.Verbs) -> None:
         metavar="N",
         help="modes of operation that the drives support [7 8]",
     )
-    bench.set_defaults(run=_bench)
 
 
 def _fault(text: str) -> tuple[float, str]:

@@ -30,6 +30,7 @@ def add_parser(kinds: arguments.Verbs) -> None:
     every = arguments.add_verb(
         kinds,
         "all",
+        _run,
         help="all calibrations in turn, then a check and a first compensated motion",
         description="Calibrate the camera, the colour of the bands and the geometry, check the rig "
         "as doctor, and run a first compensated motion. Each result is written into the "
@@ -48,7 +49,6 @@ def add_parser(kinds: arguments.Verbs) -> None:
     )
     arguments.add_out(every, "calibrate")
     arguments.add_json(every)
-    every.set_defaults(run=_run)
 
 
 def _run(options: argparse.Namespace) -> int:

@@ -27,6 +27,7 @@ def add_parser(kinds: arguments.Verbs) -> None:
     camera = arguments.add_verb(
         kinds,
         "camera",
+        _run,
         help="intrinsics of the camera, with a ChArUco board",
         description="Calibrate the camera with a ChArUco board, from images, a video, the live "
         "camera of --config, or a ROS camera_info file; print the section [camera]. Live and in a "
@@ -50,7 +51,6 @@ def add_parser(kinds: arguments.Verbs) -> None:
     )
     add_twin(camera, "show a simulated board to the twin's camera")
     add_options(camera)
-    camera.set_defaults(run=_run)
 
 
 def add_board_options(parser: argparse.ArgumentParser) -> None:

@@ -23,6 +23,7 @@ def add_parser(kinds: arguments.Verbs) -> None:
     colour = arguments.add_verb(
         kinds,
         "colour",
+        _run,
         help="colour of the bands, from their motion, clicks or masks",
         description="Fit the colour of the bands, and print the section [vision]. Without files, "
         "the rig of --config or the twin moves insertion and bending for 10 s, and the bands are "
@@ -56,7 +57,6 @@ def add_parser(kinds: arguments.Verbs) -> None:
     add_motor_options(colour)
     add_rig_options(colour)
     add_options(colour)
-    colour.set_defaults(run=_run)
 
 
 def _pixel(text: str) -> tuple[int, int]:

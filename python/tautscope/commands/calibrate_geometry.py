@@ -28,6 +28,7 @@ def add_parser(kinds: arguments.Verbs) -> None:
     geometry = arguments.add_verb(
         kinds,
         "geometry",
+        _run,
         help="pose of the channel, lengths and delay, from the instrument's own motion",
         description="Estimate the pose of the channel in the camera frame, the lengths of section "
         "and bands, focal length and delay of the images, with standard deviations. Without a "
@@ -59,7 +60,6 @@ def add_parser(kinds: arguments.Verbs) -> None:
     )
     add_rig_options(geometry)
     add_options(geometry)
-    geometry.set_defaults(run=_run)
 
 
 def _run(options: argparse.Namespace) -> int:

@@ -20,6 +20,7 @@ from tautscope.commands.calibration_rig import (
     run_protocol,
 )
 from tautscope.commands.printing import print_json
+from tautscope.commands.rig_choice import add_rig
 from tautscope.commands.robot import DURATION
 from tautscope.config import Config
 from tautscope.dof import Dof
@@ -43,6 +44,7 @@ def add_parser(kinds: arguments.Verbs) -> None:
     latency = arguments.add_verb(
         kinds,
         "latency",
+        _run,
         help="delay of the images behind the motors",
         description="Estimate the delay of the images behind the motors, as `tautscope align`, and "
         "print camera.source.delay. Each DOF moves by a sine, without compensation, three periods "
@@ -59,16 +61,14 @@ def add_parser(kinds: arguments.Verbs) -> None:
         metavar="DIR",
         help="folder of the log of a motion on a rig, new or empty [runs/<date-time>-latency]",
     )
-    latency.add_argument(
-        "--rig",
-        metavar="MODULE:CLASS",
-        help="delay of the sensors of a rig of your own with [[dof]], as measurement.delays: a "
-        "sweep of all degrees of freedom within 80 %% of their ranges; docs/robots.md",
+    add_rig(
+        latency,
+        "delay of the sensors of a rig of your own with [[dof]], as measurement.delays: a sweep of "
+        "all degrees of freedom within 80 %% of their ranges",
     )
     robot.add_seconds(latency, "a rig", DURATION / 2)
     add_rig_options(latency)
     add_options(latency)
-    latency.set_defaults(run=_run)
 
 
 def _run(options: argparse.Namespace) -> int:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
 from tautscope.commands.article_config import article_config
-from tautscope.commands.question import ask
+from tautscope.commands.question import confirm
 from tautscope.config import Config
 from tautscope.config.placeholders import MARK, placeholders
 from tautscope.errors import ConfigError, FieldError
@@ -156,9 +156,5 @@ def confirm_motion(options: argparse.Namespace, what: str, config: Config) -> No
     Raises:
         FieldError: The answer is not y.
     """
-    question = (
-        f"THE MOTORS WILL MOVE, {what} tissue and hands away, the emergency stop within reach. "
-        "Type y to start: "
-    )
-    if not options.yes and ask(question, config.camera).strip() not in ("y", "yes"):
-        raise FieldError("answer", "no", "y, or the option --yes; nothing moved")
+    text = f"{what} tissue and hands away, the emergency stop within reach."
+    confirm(f"THE MOTORS WILL MOVE, {text}", options, config.camera)

@@ -14,12 +14,12 @@ def add_parser(verbs: arguments.Verbs) -> None:
     config = arguments.add_verb(
         verbs,
         "config",
+        _config,
         help="print the configuration",
         description="Print the configuration as TOML: every key with its meaning, unit and range.",
     )
     arguments.add_config(config)
     arguments.add_json(config)
-    config.set_defaults(run=_config)
 
 
 def _config(options: argparse.Namespace) -> None:

@@ -11,7 +11,8 @@ from tautscope.commands import arguments, robot
 from tautscope.commands.article_config import article_config
 from tautscope.commands.held_run import recording_saved
 from tautscope.commands.printing import announce, console, print_json
-from tautscope.config import DISTURBANCES, Config, load_config
+from tautscope.commands.rig_choice import add_robot, choose_rig
+from tautscope.config import DISTURBANCES, Config
 from tautscope.errors import FieldError, MissingPathError
 from tautscope.loop.references import SineSequence
 
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from tautscope.dof import NamedDof
     from tautscope.report.demo import Demo
     from tautscope.report.rows import Row
-    from tautscope.runs.trials import Trial
 
 SPEED = 12.0
 """Simulated seconds per second and processor, measured on two shared cores in 2026."""
@@ -36,6 +36,7 @@ def add_parser(verbs: arguments.Verbs) -> None:
     demo = arguments.add_verb(
         verbs,
         "demo",
+        _run,
         help="run the article's experiment on the simulated instrument",
         description="Run the article's experiment and an operator motion on the simulated "
         "instrument, each with and without compensation, with camera images as the only feedback. "
@@ -67,23 +68,20 @@ def add_parser(verbs: arguments.Verbs) -> None:
         metavar="NAME[,NAME]",
         help=f"image disturbances: {', '.join(DISTURBANCES)} [twin.disturb of the configuration]",
     )
-    demo.add_argument(
-        "--robot",
-        choices=["colonoscope"],
-        help="another simulated robot in place of the article's instrument: the steerable tip of a "
+    add_robot(
+        demo,
+        "another simulated robot in place of the article's instrument: the steerable tip of a "
         "colonoscope with an EM tracker; an operator's motion without and with compensation",
     )
     robot.add_seconds(demo, "--robot")
     arguments.add_out(demo, "demo")
     arguments.add_config(demo)
     arguments.add_json(demo)
-    demo.set_defaults(run=_run)
 
 
 def _run(options: argparse.Namespace) -> None:
     from tautscope.commands.progress import progress_bar  # noqa: PLC0415
     from tautscope.report import demo, tables  # noqa: PLC0415
-    from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
 
     if options.robot is not None:
         _run_robot(options)
@@ -91,12 +89,13 @@ def _run(options: argparse.Namespace) -> None:
     if options.seconds is not None:
         raise FieldError("--seconds", options.seconds, "--robot")
     config = _load(options)
-    folder = check_free(options.out or default_folder("demo"))
+    folder = arguments.out_folder(options)
     first = config.twin.seed
     seeds = range(first, first + options.seeds)
     trials = demo.demo_trials(config)
     runs = len(seeds) * len(trials)
-    seconds = sum(map(_duration, trials))
+    motions = (each.motion or SineSequence(each.config.experiment) for each in trials)
+    seconds = sum(motion.duration for motion in motions)
     processors = min(os.cpu_count() or 1, runs)
     announce(
         f"{runs} runs with {'seeds' if len(seeds) > 1 else 'seed'} {', '.join(map(str, seeds))}",
@@ -125,22 +124,14 @@ def _run(options: argparse.Namespace) -> None:
 
 
 def _run_robot(options: argparse.Namespace) -> None:
-    from tautscope.twin.colonoscope import ColonoscopeTwin  # noqa: PLC0415
-
     for name in ("background", "disturb"):
         if getattr(options, name) is not None:
             raise FieldError(f"--{name}", getattr(options, name), "no --robot, which has no camera")
     if options.seeds != 1:
         raise FieldError("--seeds", options.seeds, "1 with --robot")
-    config = load_config(options.config or options.robot, options.profile)
+    config, make = choose_rig(options)
     seed = options.seed or 0
-    name = f"simulated {options.robot}, seed {seed}"
-    robot.run(options, config, name, lambda _: ColonoscopeTwin(seed), "demo", seed=seed)
-
-
-def _duration(trial: Trial) -> float:
-    """Simulated time of a run [s]."""
-    return (trial.motion or SineSequence(trial.config.experiment)).duration
+    robot.run(options, config, f"simulated {options.robot}, seed {seed}", make, seed=seed)
 
 
 def _load(options: argparse.Namespace) -> Config:

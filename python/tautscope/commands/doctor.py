@@ -11,16 +11,17 @@ from tautscope.commands import arguments
 from tautscope.commands.article_config import article_config
 from tautscope.commands.printing import print_json
 from tautscope.commands.question import ask
-from tautscope.config import load_config
+from tautscope.commands.rig_choice import add_rig, choose_rig
 from tautscope.config.placeholders import MARK, placeholders
 from tautscope.errors import ConfigError, FieldError
 from tautscope.extras import missing_modules
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from tautscope.config import Config
     from tautscope.hardware.doctor.check_result import CheckResult
+    from tautscope.loop.rig import Rig
 
 QUESTION = (
     "The rig will be reset, WHICH MAY MOVE ITS MOTORS to their start, and held there for 3 s. "
@@ -33,22 +34,20 @@ def add_parser(verbs: arguments.Verbs) -> None:
     doctor = arguments.add_verb(
         verbs,
         "doctor",
+        _doctor,
         help="check a rig, and say what is missing and what to do",
         description="Check the computer, its cameras and CAN interfaces; with a configuration, "
         "open its camera, configure its drives and read the settings back. No motor is enabled. "
         "Exit status 0 if nothing is missing, else 1.",
     )
-    doctor.add_argument(
-        "--rig",
-        metavar="MODULE:CLASS",
-        help="check a rig of your own with [[dof]] instead, while it is held for 3 s: shapes, "
-        "units, clock, rates and delays, and whether its sensors determine every degree of "
-        "freedom; docs/robots.md",
+    add_rig(
+        doctor,
+        "check a rig of your own with [[dof]] instead, while it is held for 3 s: shapes, units, "
+        "clock, rates and delays, and whether its sensors determine every degree of freedom",
     )
     doctor.add_argument("--yes", action="store_true", help="reset the rig without asking")
     arguments.add_config(doctor)
     arguments.add_json(doctor)
-    doctor.set_defaults(run=_doctor)
 
 
 def run_checks(config: Config, *, is_rig: bool, folder: Path) -> Iterator[CheckResult]:
@@ -97,7 +96,9 @@ def run_checks(config: Config, *, is_rig: bool, folder: Path) -> Iterator[CheckR
     yield from check_calibration(config.calibration, serial_numbers)
 
 
-def check_own(options: argparse.Namespace, config: Config) -> Iterator[CheckResult]:
+def _check_own(
+    options: argparse.Namespace, config: Config, make: Callable[[Config], Rig]
+) -> Iterator[CheckResult]:
     """Open the rig of ``--rig``, and check it if it may be reset.
 
     Raises:
@@ -105,11 +106,10 @@ def check_own(options: argparse.Namespace, config: Config) -> Iterator[CheckResu
     """
     from tautscope.hardware.doctor.check_result import CheckResult  # noqa: PLC0415
     from tautscope.hardware.doctor.rig import check_rig  # noqa: PLC0415
-    from tautscope.runs.rigs import rig_maker  # noqa: PLC0415
 
     if not config.dof:
         raise ConfigError("dof", "none", "degrees of freedom: [[dof]], in --config")
-    rig = rig_maker(options.rig)(config)
+    rig = make(config)
     try:
         period = f"control_period {1e3 * config.control.period:g} ms, as control.period"
         yield CheckResult("rig", options.rig, "ok", period)
@@ -127,14 +127,14 @@ def _doctor(options: argparse.Namespace) -> int:
 
     if options.rig is None and options.yes:
         raise FieldError("--yes", True, "--rig: without it nothing moves")
-    config = article_config(options.config) if options.rig is None else load_config(options.config)
+    if options.rig is None:
+        config = article_config(options.config)
+        checks = run_checks(config, is_rig=options.config is not None, folder=Path.cwd())
+    else:
+        checks = _check_own(options, *choose_rig(options))
     marked = placeholders(options.config)
     findings: list[CheckResult] = []
     with exit_on_signals():
-        if options.rig is None:
-            checks = run_checks(config, is_rig=options.config is not None, folder=Path.cwd())
-        else:
-            checks = check_own(options, config)
         for found in itertools.chain(_check_placeholders(marked), checks):
             findings.append(found)
             if not options.json:

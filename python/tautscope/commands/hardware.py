@@ -10,8 +10,8 @@ from tautscope.commands.article_config import article_config
 from tautscope.commands.held_run import recording_saved
 from tautscope.commands.positions import add_reference, read_reference
 from tautscope.commands.printing import announce, print_json
-from tautscope.commands.result_lines import result_lines
-from tautscope.config import load_config
+from tautscope.commands.result_lines import print_results
+from tautscope.commands.rig_choice import add_rig, choose_rig
 from tautscope.config.placeholders import refuse_placeholders
 from tautscope.errors import FieldError
 from tautscope.loop.references import SineSequence
@@ -22,6 +22,7 @@ def add_parser(verbs: arguments.Verbs) -> None:
     run = arguments.add_verb(
         verbs,
         "run",
+        _run,
         help="run the article's experiment, or a recorded motion, on the drives and camera of a "
         "configuration",
         description="Run the article's experiment on the drives and the camera of a configuration, "
@@ -45,16 +46,14 @@ def add_parser(verbs: arguments.Verbs) -> None:
         help="periods of the reference per DOF [experiment.periods of the configuration]",
     )
     add_reference(run, "the article's experiment")
-    run.add_argument(
-        "--rig",
-        metavar="MODULE:CLASS",
-        help="run an operator's motion, without and then with compensation, on a rig of your own "
-        "in place of [drives] and [camera]: docs/robots.md",
+    add_rig(
+        run,
+        "run an operator's motion, without and then with compensation, on a rig of your own in "
+        "place of [drives] and [camera]",
     )
     robot.add_seconds(run, "a rig")
     arguments.add_out(run, "run")
     arguments.add_json(run)
-    run.set_defaults(run=_run)
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -62,16 +61,13 @@ def _run(options: argparse.Namespace) -> int:
     from tautscope.hardware.doctor.computer import bytes_per_second  # noqa: PLC0415
     from tautscope.hardware.experiment import run_on_hardware  # noqa: PLC0415
     from tautscope.hardware.run_results import write_run_folder  # noqa: PLC0415
-    from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
 
     if options.rig is not None:
-        from tautscope.runs.rigs import rig_maker  # noqa: PLC0415
-
         if options.reference is not None or options.periods is not None or options.compare:
             what = "neither --reference nor --periods nor --compare"
             raise FieldError("--rig", options.rig, what)
-        config = load_config(options.config, options.profile)
-        robot.run(options, config, options.rig, rig_maker(options.rig), "run", seed=0)
+        config, make = choose_rig(options)
+        robot.run(options, config, options.rig, make, seed=0)
         return 0
     if options.seconds is not None:
         raise FieldError("--seconds", options.seconds, "--rig")
@@ -82,7 +78,7 @@ def _run(options: argparse.Namespace) -> int:
             raise FieldError("--periods", options.periods, "no --reference, which has no periods")
         config = config.replace(**{"experiment.periods": options.periods})
     reference = read_reference(options, config) or SineSequence(config.experiment)
-    folder = check_free(options.out or default_folder("run"))
+    folder = arguments.out_folder(options)
     runs = 2 if options.compare else 1
     seconds = runs * reference.duration
     announce(f"{runs} run{'s' * (runs > 1)}", seconds, seconds * bytes_per_second(config), folder)
@@ -103,9 +99,5 @@ def _run(options: argparse.Namespace) -> int:
         f"{timing['jitter_ms']['worst']:.2g} ms late; {timing['frames']} frames, age "
         f"{timing['frame_age_ms']['median']:.3g} ms (median)."
     )
-    for line in result_lines(found.recorded):
-        print(line)
-    for warning in found.compensated.recording.warnings:
-        print(f"Warning: {warning}.")
-    print(f"Report, figures and traces: {folder / 'report.html'}")
+    print_results(found.recorded, folder)
     return 0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
@@ -11,7 +10,8 @@ from tautscope.commands import arguments
 from tautscope.commands.article_config import article_config
 from tautscope.commands.calibration_rig import refuse_wrong_limits
 from tautscope.commands.printing import print_json
-from tautscope.config import load_config
+from tautscope.commands.question import confirm
+from tautscope.commands.rig_choice import add_rig, choose_rig
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError, FieldError
 
@@ -24,6 +24,7 @@ def add_parser(verbs: arguments.Verbs) -> None:
     jog = arguments.add_verb(
         verbs,
         "jog",
+        _jog,
         help="move one motor slowly out and back",
         description="Move one motor slowly out and back in 4 s, while you watch the instrument. "
         "THE MOTOR MOVES; have an emergency stop within reach.",
@@ -36,25 +37,24 @@ def add_parser(verbs: arguments.Verbs) -> None:
         metavar="DISTANCE",
         help="m or rad, at most 0.002 m or 0.2 rad; with --rig at most width_limit",
     )
-    jog.add_argument(
-        "--rig",
-        metavar="MODULE:CLASS",
-        help="move a degree of freedom of a rig of your own with [[dof]], and print what its "
-        "sensors measured; docs/robots.md",
+    add_rig(
+        jog,
+        "move a degree of freedom of a rig of your own with [[dof]], and print what its sensors "
+        "measured",
     )
     jog.add_argument("--yes", action="store_true", help="start without asking")
     arguments.add_config(jog, required=True)
     arguments.add_json(jog)
-    jog.set_defaults(run=_jog)
 
 
 def _jog(options: argparse.Namespace) -> None:
     from tautscope.hardware.jog import check_distance, jog, jog_rig  # noqa: PLC0415
 
-    config, distance = (
-        (load_config if options.rig else article_config)(options.config),
-        options.distance,
-    )
+    distance = options.distance
+    if options.rig is None:
+        config = article_config(options.config)
+    else:
+        config, make_rig = choose_rig(options)
     names = [dof.label for dof in config.dofs]
     if options.dof not in names:
         raise FieldError("dof", options.dof, f"one of {', '.join(names)}")
@@ -63,17 +63,10 @@ def _jog(options: argparse.Namespace) -> None:
     if options.rig is None and config.drives is None:
         raise ConfigError("drives", None, "a section [drives] that names the motors, or --rig")
     check_distance(dof, distance)
-    if options.rig is not None:
-        from tautscope.runs.rigs import rig_maker  # noqa: PLC0415
-
-        make_rig = rig_maker(options.rig)
     refuse_wrong_limits(options.config)
-    if not options.yes:
-        before = "After a reset, which may move all motors to their start, " if options.rig else ""
-        question = f"{before}{dof.label} will move by {distance:g} and back. Type y to start: "
-        print(question, end="", file=sys.stderr, flush=True)
-        if sys.stdin.readline().strip().lower() not in ("y", "yes"):
-            raise FieldError("answer", "no", "y, or the option --yes; nothing moved")
+    before = "After a reset, which may move all motors to their start, " if options.rig else ""
+    question = f"{before}{dof.label} will move by {distance:g} and back."
+    confirm(question, options, config.camera)
     seen: list[SensorMotion] = []
     if options.rig is not None:
         rig = make_rig(config)

@@ -19,6 +19,7 @@ from tautscope.commands.video_options import (
 )
 from tautscope.config import Config, load_config
 from tautscope.errors import FieldError
+from tautscope.runs.output_folder import check_free
 
 if TYPE_CHECKING:
     from tautscope.log.mcap_records import Damage
@@ -34,6 +35,7 @@ def add_parsers(verbs: arguments.Verbs) -> None:
     recover = arguments.add_verb(
         verbs,
         "recover",
+        _recover,
         help="repair a truncated log",
         description="Copy the undamaged messages of a log into a new file that every MCAP reader "
         "can open. The old file is not changed.",
@@ -44,11 +46,11 @@ def add_parsers(verbs: arguments.Verbs) -> None:
         "--out", type=Path, metavar="FILE", help="new file [FILE-recovered.mcap beside it]"
     )
     arguments.add_json(recover)
-    recover.set_defaults(run=_recover)
 
     export = arguments.add_verb(
         verbs,
         "export",
+        _export,
         help="export a log as CSV or as a rosbag2 folder",
         description="Export a log, complete or truncated, as CSV (one line per tick, one line per "
         "update) or as a rosbag2 folder.",
@@ -66,11 +68,11 @@ def add_parsers(verbs: arguments.Verbs) -> None:
     )
     kinds.add_argument("--rosbag", type=Path, metavar="DIR", help="folder, new or empty")
     arguments.add_json(export)
-    export.set_defaults(run=_export)
 
     replay = arguments.add_verb(
         verbs,
         "replay",
+        _replay,
         help="replay a log, or a video with motor positions",
         description="Replay the inputs of a log through the loop. With the log's configuration the "
         "outputs must be identical, bit for bit (exit status 1 if not). With another "
@@ -85,7 +87,6 @@ def add_parsers(verbs: arguments.Verbs) -> None:
     arguments.add_profile(replay, "how the backlash is estimated")
     arguments.add_out(replay, "replay")
     arguments.add_json(replay)
-    replay.set_defaults(run=_replay)
 
 
 def _recover(options: argparse.Namespace) -> None:
@@ -159,7 +160,6 @@ def _replay(options: argparse.Namespace) -> int:
 def _replay_same(options: argparse.Namespace, log: Log) -> int:
     from tautscope.log.comparison import write_replay  # noqa: PLC0415
     from tautscope.log.replay import replay_same  # noqa: PLC0415
-    from tautscope.runs.output_folder import check_free  # noqa: PLC0415
 
     if options.out is not None:
         check_free(options.out)
@@ -194,7 +194,7 @@ def _estimate_from_log(options: argparse.Namespace, log: Log) -> int:
         config = log.config.replace(profile=options.profile)
     else:
         config = load_config(options.config, options.profile)
-    folder = _folder(options)
+    folder = arguments.out_folder(options)
     replayed, skipped = estimate_from_log(log, config)
     write_estimates(folder, replayed, log.recording(), as_json=options.json)
     if not options.json:
@@ -212,7 +212,7 @@ def _estimate_from_video(options: argparse.Namespace) -> int:
     from tautscope.log.replay import estimate_from_video, retimed  # noqa: PLC0415
 
     config: Config = article_config(options.config, options.profile)
-    folder = _folder(options)
+    folder = arguments.out_folder(options)
     motors = read_motor_options(options, config)
     found, stamps = align_video_options(options, config, motors)
     for note in implausible_motors(found):
@@ -252,12 +252,6 @@ def _estimate_from_video(options: argparse.Namespace) -> int:
             f"{images[0]:.2f} to {images[-1]:.2f} s of their {times[0]:.2f} to {times[-1]:.2f} s."
         )
     return 0
-
-
-def _folder(options: argparse.Namespace) -> Path:
-    from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
-
-    return check_free(options.out or default_folder("replay"))
 
 
 def _print_warnings(log: Log) -> None:

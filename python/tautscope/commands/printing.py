@@ -20,6 +20,15 @@ def print_json(document: dict[str, Any]) -> None:
     print(json.dumps(document, allow_nan=False))
 
 
+def print_now(is_json: bool, key: str, value: str, text: str) -> None:
+    """Print a text, or of ``--json`` a key with its value, at once, also into a pipe."""
+    if is_json:
+        print_json({key: value})
+    else:
+        print(text)
+    sys.stdout.flush()
+
+
 def announce(what: str, seconds: float, size: float, folder: Path) -> None:
     """Print on stderr how long a command takes, and where it writes.
 

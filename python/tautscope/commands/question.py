@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import argparse
 import sys
 from pathlib import Path
 
 from tautscope.config import CameraConfig
+from tautscope.errors import FieldError
 
 TERMINAL = Path("/dev/tty")
 
@@ -25,3 +27,15 @@ def ask(question: str, camera: CameraConfig) -> str:
             return terminal.readline().lower()
     except OSError:
         return ""
+
+
+def confirm(question: str, options: argparse.Namespace, camera: CameraConfig) -> None:
+    """Ask whether the motors may move, unless ``--yes``.
+
+    Raises:
+        FieldError: The answer is not y.
+    """
+    if options.yes:
+        return
+    if ask(f"{question} Type y to start: ", camera).strip() not in ("y", "yes"):
+        raise FieldError("answer", "no", "y, or the option --yes; nothing moved")

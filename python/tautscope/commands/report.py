@@ -7,7 +7,8 @@ from pathlib import Path
 
 from tautscope.commands import arguments
 from tautscope.commands.printing import print_json
-from tautscope.commands.result_lines import result_lines
+from tautscope.commands.result_lines import print_results
+from tautscope.runs.output_folder import new_folder
 
 
 def add_parser(verbs: arguments.Verbs) -> None:
@@ -15,6 +16,7 @@ def add_parser(verbs: arguments.Verbs) -> None:
     report = arguments.add_verb(
         verbs,
         "report",
+        _run,
         help="tables and figures of a stored run",
         description="Write report.html, figures and tables of a stored run: of a log of `run`, "
         "`console` or `ros2`, also a truncated one, of a run folder, or of tables of `export`. "
@@ -31,19 +33,13 @@ def add_parser(verbs: arguments.Verbs) -> None:
     )
     arguments.add_out(report, "report")
     arguments.add_json(report)
-    report.set_defaults(run=_run)
 
 
 def _run(options: argparse.Namespace) -> None:
     from tautscope.log.stored_run import read_run  # noqa: PLC0415
     from tautscope.report.run_folder import write_report  # noqa: PLC0415
-    from tautscope.runs.output_folder import (  # noqa: PLC0415
-        check_free,
-        default_folder,
-        new_folder,
-    )
 
-    folder = check_free(options.out or default_folder("report"))
+    folder = arguments.out_folder(options)
     stored = read_run(options.path, options.uncompensated)
     recording = stored.run.main
     time, seen = recording.trace["time"], "measurements" if recording.config.dof else "images"
@@ -56,8 +52,4 @@ def _run(options: argparse.Namespace) -> None:
     if options.json:
         print_json({"folder": str(folder), "source": str(stored.source), **stored.run.summary()})
         return
-    for line in result_lines(stored.run):
-        print(line)
-    for warning in stored.run.main.warnings:
-        print(f"Warning: {warning}.")
-    print(f"Report and figures: {folder / 'report.html'}")
+    print_results(stored.run, folder)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tautscope.dof import NamedDof
@@ -27,6 +28,15 @@ def result_lines(run: RecordedRun) -> list[str]:
     return [summary_line(dof, result) for dof, result in run.results.items()] + [
         tracking_line(dof, tracking, run.tip) for dof, tracking in run.operator_results.items()
     ]
+
+
+def print_results(run: RecordedRun, folder: Path) -> None:
+    """Print a line of results per DOF, the warnings, and where the report is."""
+    for line in result_lines(run):
+        print(line)
+    for warning in run.main.warnings:
+        print(f"Warning: {warning}.")
+    print(f"Report, figures and traces: {folder / 'report.html'}")
 
 
 def summary_line(dof: NamedDof, result: DofResult) -> str:

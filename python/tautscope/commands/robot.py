@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from tautscope.commands import arguments
 from tautscope.commands.held_run import recording_saved
 from tautscope.commands.printing import announce, print_json
-from tautscope.commands.result_lines import result_lines
+from tautscope.commands.result_lines import print_results
 from tautscope.config import Config
 from tautscope.loop.rig import Rig
 
@@ -38,7 +38,6 @@ def run(
     config: Config,
     name: str,
     make_rig: Callable[[Config], Rig],
-    verb: str,
     *,
     seed: int,
 ) -> None:
@@ -53,9 +52,8 @@ def run(
     from tautscope.report.recorded_run import RecordedRun  # noqa: PLC0415
     from tautscope.report.run_folder import write_report  # noqa: PLC0415
     from tautscope.runs.experiment import run_experiment  # noqa: PLC0415
-    from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
 
-    folder = check_free(options.out or default_folder(verb))
+    folder = arguments.out_folder(options)
     motion = motion_of(config, seed, options.seconds or DURATION)
     seconds = 2 * motion.duration
     announce("2 runs", seconds, seconds * BYTES_PER_SECOND, folder)
@@ -80,8 +78,4 @@ def run(
     if options.json:
         print_json({"folder": str(folder), **found.summary()})
         return
-    for line in result_lines(found):
-        print(line)
-    for warning in found.main.warnings:
-        print(f"Warning: {warning}.")
-    print(f"Report, figures, logs and traces: {folder / 'report.html'}")
+    print_results(found, folder)

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 from tautscope.commands import arguments
 from tautscope.commands.calibration_output import add_options, check_options, finish
 from tautscope.commands.calibration_rig import add_yes, confirm_motion
+from tautscope.commands.rig_choice import add_rig, choose_rig
 from tautscope.commands.robot import DURATION, add_seconds
-from tautscope.config import Config, load_config
+from tautscope.config import Config
 from tautscope.errors import CalibrationError, ConfigError
 
 if TYPE_CHECKING:
@@ -27,13 +28,14 @@ def add_parser(kinds: arguments.Verbs) -> None:
     robot = arguments.add_verb(
         kinds,
         "robot",
+        _run,
         help="kinematics, zeros, gains and delay of a rig with [[dof]]",
         description="Move all degrees of freedom by slow sines over 80 % of their ranges, and fit "
         "lengths, pose of the sensor's frame, delay, zeros and gains to what was measured. THE "
         "MOTORS MOVE, after a question.",
         extras=["analysis"],
     )
-    robot.add_argument("--rig", metavar="MODULE:CLASS", required=True, help="a rig of your own")
+    add_rig(robot, "a rig of your own", required=True)
     robot.add_argument(
         "--keep",
         action="append",
@@ -45,7 +47,6 @@ def add_parser(kinds: arguments.Verbs) -> None:
     add_seconds(robot, "the sweep", DURATION / 2)
     add_yes(robot)
     add_options(robot)
-    robot.set_defaults(run=_run)
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -72,13 +73,11 @@ def run_latency(options: argparse.Namespace) -> int:
 def _sweep(options: argparse.Namespace, keep: Sequence[str]) -> tuple[Config, RobotFit]:
     from tautscope.calibration.robot import fit, move, sweep_motion  # noqa: PLC0415
     from tautscope.commands.progress import progress_bar  # noqa: PLC0415
-    from tautscope.runs.rigs import rig_maker  # noqa: PLC0415
 
-    config = load_config(options.config)
+    config, make = choose_rig(options)
     if not config.dof:
         raise ConfigError("dof", "none", "degrees of freedom: [[dof]]")
     sweep = sweep_motion(config, options.seconds or DURATION / 2)
-    make = rig_maker(options.rig)
     confirm_motion(options, "over 80 % of each range. Keep", config)
     rig = make(config)
     try:
@@ -92,22 +91,25 @@ def _sweep(options: argparse.Namespace, keep: Sequence[str]) -> tuple[Config, Ro
 def result(kind: str, found: RobotFit, config: Config) -> CalibrationResult:
     """The fit in the form that all calibrations have; of ``latency`` the delays alone."""
     from tautscope.calibration.result import CalibrationResult  # noqa: PLC0415
+    from tautscope.calibration.robot.motor_map import motor_map  # noqa: PLC0415
     from tautscope.calibration.robot.parameters import with_values  # noqa: PLC0415
 
-    values = with_values(config, found.values)
-    values |= found.deviations
+    motors, motor_std = motor_map(config, found)
+    values = {**with_values(config, found.values), **found.deviations, **motors}
     if kind == "latency":
         values = {"measurement.delays": values["measurement.delays"]}
     std = {
         name: math.hypot(each, SYSTEMATIC) if name.startswith("measurement.delays") else each
-        for name, each in found.std.items()
+        for name, each in (*found.std.items(), *motor_std.items())
         if name.partition("[")[0] in values
     }
     notes = []
     for name in values:
         section, key = name.split(".")
-        before = getattr(getattr(config, section), key)
+        before = getattr(getattr(config, section), key, "not there")
         notes.append(f"{name} was {before}")
+    is_written = "actuators.matrix" in values
+    written = "in actuators.matrix and offsets" if is_written else "not written"
     units = {dof.name: dof.unit for dof in config.dof}
     for name, unit in units.items():
         zero, gain, slack = (f"dof.{name}.{key}" for key in ("zero", "gain", "slack"))
@@ -118,7 +120,7 @@ def result(kind: str, found: RobotFit, config: Config) -> CalibrationResult:
         )
         notes.append(
             f"{name}: gain {found.values[gain]:.4g} +- {found.std[gain]:.2g}{at}, slack "
-            f"{found.values[slack]:.3g} {unit}; not written, the loop estimates them"
+            f"{found.values[slack]:.3g} {unit}; gain and zero are {written}"
         )
     data = {"fit": dict(found.values)}
     return CalibrationResult(kind, values, std, notes=tuple(notes), data=data)

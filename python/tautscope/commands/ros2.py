@@ -3,20 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import sys
-from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
-from tautscope.commands.printing import print_json
-from tautscope.config import Config, load_config
-from tautscope.config.placeholders import refuse_placeholders
-from tautscope.errors import ConfigError, FieldError
+from tautscope.commands.printing import print_now
+from tautscope.commands.rig_choice import add_rig, add_robot, choose_rig, rig_in_words
+from tautscope.config import load_config
+from tautscope.errors import ConfigError
 from tautscope.extras import require_extras
-
-if TYPE_CHECKING:
-    from tautscope.loop.rig import Rig
-    from tautscope.ros2.start import MakeRig
 
 
 def add_parser(verbs: arguments.Verbs) -> None:
@@ -24,6 +17,7 @@ def add_parser(verbs: arguments.Verbs) -> None:
     ros2 = arguments.add_verb(
         verbs,
         "ros2",
+        _ros2,
         help="run the loop as a node of ROS 2, without a ROS installation",
         description="Run the loop as a node of ROS 2: messages of rmw_zenoh over Zenoh. References "
         "come from ROS; docs/interfaces/ros2.md lists the topics. Without --twin or --driver THE "
@@ -41,16 +35,8 @@ def add_parser(verbs: arguments.Verbs) -> None:
         action="store_true",
         help="send set-points to a driver in ROS, and take images or measurements from ROS",
     )
-    kind.add_argument(
-        "--rig",
-        metavar="MODULE:CLASS",
-        help="move a rig of yours in real time: a class, or an entry point of tautscope.rigs",
-    )
-    ros2.add_argument(
-        "--robot",
-        choices=["colonoscope"],
-        help="with --twin, another simulated robot in place of the article's instrument",
-    )
+    add_rig(kind, "move a rig of yours in real time")
+    add_robot(ros2, "with --twin, another simulated robot in place of the article's instrument")
     ros2.add_argument(
         "--device",
         choices=["servo_jp", "joy"],
@@ -95,7 +81,6 @@ def add_parser(verbs: arguments.Verbs) -> None:
     )
     arguments.add_out(ros2, "ros2")
     arguments.add_json(ros2)
-    ros2.set_defaults(run=_ros2)
 
 
 def _ros2(options: argparse.Namespace) -> int:
@@ -105,16 +90,15 @@ def _ros2(options: argparse.Namespace) -> int:
     from tautscope.ros2.inputs import JoyAxes  # noqa: PLC0415
     from tautscope.ros2.session import Node  # noqa: PLC0415
     from tautscope.ros2.start import NAME, start_node  # noqa: PLC0415
-    from tautscope.runs.output_folder import check_free, default_folder  # noqa: PLC0415
 
-    if options.robot is not None and not options.twin:
-        raise FieldError("--robot", options.robot, "--twin beside it")
-    config = load_config(options.config or options.robot, options.profile)
-    make_rig = _rig(options, config)
+    if options.driver and options.robot is None:
+        config, make_rig = load_config(options.config, options.profile), None
+    else:
+        config, make_rig = choose_rig(options, in_real_time=True)
     if options.device == "joy" and len(options.axes) != len(config.dofs):
         allowed = f"{len(config.dofs)} axes, one per degree of freedom"
         raise ConfigError("--axes", list(options.axes), allowed)
-    folder = check_free(options.out or default_folder("ros2"))
+    folder = arguments.out_folder(options)
     endpoints = {"connect": options.connect}
     if options.listen is not None:
         endpoints = {"connect": "", "listen": options.listen}
@@ -136,53 +120,11 @@ def _ros2(options: argparse.Namespace) -> int:
             make_rig=make_rig,
             device=options.device,
             layout=JoyAxes(tuple(options.axes), options.button),
-            on_result=lambda text: _print(options, "result", text),
+            on_result=lambda text: print_now(options.json, "result", text, text),
         )
 
 
-def _rig(options: argparse.Namespace, config: Config) -> MakeRig | None:
-    """What makes the rig; None for a driver in ROS."""
-    from tautscope.console.paced_rig import PacedRig  # noqa: PLC0415
-    from tautscope.hardware.rig import HardwareRig  # noqa: PLC0415
-    from tautscope.runs.rigs import rig_maker  # noqa: PLC0415
-
-    if options.driver:
-        return None
-    make: Callable[[Config], Rig] | None = None
-    if options.rig:
-        make = rig_maker(options.rig)
-    elif options.robot:
-        from tautscope.twin.colonoscope import ColonoscopeTwin  # noqa: PLC0415
-
-        make = lambda _: ColonoscopeTwin()  # noqa: E731
-    if make is not None:
-        period = config.control.period
-        return lambda config: PacedRig(lambda: make(config), period, is_simulated=options.twin)
-    if config.dof:
-        found = ", ".join(dof.name for dof in config.dof)
-        allowed = "the option --driver, --rig or --robot: drives are the article's instrument"
-        raise ConfigError("dof", found, allowed)
-    if options.twin:
-        from tautscope.console.live_twin import LiveTwin  # noqa: PLC0415  MuJoCo
-
-        return LiveTwin
-    refuse_placeholders(options.config)
-    if config.drives is None:
-        allowed = "a section [drives], or the option --twin, --driver or --rig"
-        raise ConfigError("drives", None, allowed)
-    return HardwareRig
-
-
 def _announce(options: argparse.Namespace, name: str) -> None:
-    what = f"REAL MOTORS of {options.rig or options.config}"
-    what = "the twin" if options.twin else "a driver in ROS" if options.driver else what
+    what = "a driver in ROS" if options.driver else rig_in_words(options)
     text = f"The node {name} commands {what}, once it is enabled. Ctrl-C ends."
-    _print(options, "node", name, text)
-
-
-def _print(options: argparse.Namespace, key: str, value: str, text: str = "") -> None:
-    if options.json:
-        print_json({key: value})
-    else:
-        print(text or value)
-    sys.stdout.flush()
+    print_now(options.json, "node", name, text)

@@ -9,30 +9,20 @@ from tautscope.config.actuators import ActuatorsConfig
 from tautscope.config.axes import DofEntry, KinematicsConfig, MeasurementConfig, TopicConfig
 from tautscope.config.calibration import CalibrationConfig, CalibrationRecord
 from tautscope.config.camera import (
-    CameraClock,
     CameraConfig,
-    Deinterlace,
     PixelFormat,
     PoseConfig,
     SourceConfig,
-    Vector8,
 )
 from tautscope.config.control import ControlConfig
 from tautscope.config.dof import DofConfig
 from tautscope.config.drives import AxisConfig, DrivesConfig
 from tautscope.config.estimation import EstimationConfig
 from tautscope.config.experiment import ExperimentConfig, Sine
-from tautscope.config.fields import (
-    Fraction,
-    Gain,
-    NonNegative,
-    Positive,
-    Vector3,
-)
 from tautscope.config.instrument import InstrumentConfig
 from tautscope.config.law import LawConfig
 from tautscope.config.load import RIGS, axes, config_file, dump_config, load_config
-from tautscope.config.recording import ImageFormat, RecordingConfig
+from tautscope.config.recording import RecordingConfig
 from tautscope.config.root import Config, Profile, from_document, to_document
 from tautscope.config.safety import SafetyConfig
 from tautscope.config.twin import (
@@ -55,29 +45,22 @@ __all__ = [
     "CableConfig",
     "CalibrationConfig",
     "CalibrationRecord",
-    "CameraClock",
     "CameraConfig",
     "Config",
     "ControlConfig",
-    "Deinterlace",
     "DofConfig",
     "DofEntry",
     "DriveConfig",
     "DrivesConfig",
     "EstimationConfig",
     "ExperimentConfig",
-    "Fraction",
     "FrictionConfig",
-    "Gain",
-    "ImageFormat",
     "InstrumentConfig",
     "KinematicsConfig",
     "LawConfig",
     "MeasurementConfig",
-    "NonNegative",
     "PixelFormat",
     "PoseConfig",
-    "Positive",
     "Profile",
     "RecordingConfig",
     "SafetyConfig",
@@ -88,8 +71,6 @@ __all__ = [
     "TopicConfig",
     "TransmissionConfig",
     "TwinConfig",
-    "Vector3",
-    "Vector8",
     "VisionConfig",
     "axes",
     "config_file",

@@ -38,6 +38,7 @@ def write_values(path: str | PathLike[str], values: Mapping[str, Any]) -> None:
     """
     file = writable_file(path)
     text = edited_text(file.read_text(encoding="utf-8"), values)
+    from_document(tomllib.loads(text))
     try:
         with NamedTemporaryFile(
             "w", encoding="utf-8", dir=file.parent, prefix=f".{file.name}.", delete=False
@@ -71,10 +72,10 @@ def writable_file(path: str | PathLike[str]) -> Path:
 
 
 def edited_text(text: str, values: Mapping[str, Any]) -> str:
-    """The text of a TOML file with changed values; the result is checked.
+    """The text of a TOML file with changed values, which may be a part of a configuration.
 
     Raises:
-        ConfigError: The text is not TOML, or the result would not be a valid configuration.
+        ConfigError: The text is not TOML.
     """
     try:
         document = tomlkit.parse(text)
@@ -90,9 +91,7 @@ def edited_text(text: str, values: Mapping[str, Any]) -> str:
                 place[section] = tomlkit.table(is_super_table=is_super)
             place = place[section]
         _set(place, key, without_numpy(value))
-    edited = tomlkit.dumps(document)
-    from_document(tomllib.loads(edited))
-    return edited
+    return tomlkit.dumps(document)
 
 
 def _set(place: Any, key: str, value: Any) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
+from collections.abc import Callable
 from concurrent.futures import Executor
 from pathlib import Path
 from typing import Protocol
@@ -12,12 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.config import Config
-from tautscope.hardware.plausibility import PlausibilityMonitor
 from tautscope.log.writer import LogWriter
 from tautscope.loop.measurement import Measurement
 from tautscope.loop.reduction import Report
 from tautscope.loop.rig import Frame, Rig, Sample
-from tautscope.runs.control_loop import ControlLoop
+from tautscope.runs.control_loop import ControlLoop, Monitor
 
 Floats = NDArray[np.float64]
 LATE = 2.0
@@ -54,7 +54,7 @@ class ControlRun(ControlLoop):
         operator: The source of the reference.
         path: New file of the log.
         executor: Runs the marker detection.
-        monitor: Compares drives and images with the configuration; for a rig.
+        monitor: As of `ControlLoop`.
 
     Attributes:
         log: Its log.
@@ -76,13 +76,13 @@ class ControlRun(ControlLoop):
         *,
         path: Path,
         executor: Executor,
-        monitor: PlausibilityMonitor | None = None,
+        monitor: Callable[[Floats], Monitor] | None = None,
     ) -> None:
-        super().__init__(config, rig, sample, executor=executor)
+        super().__init__(config, rig, sample, executor=executor, monitor=monitor)
         self.path = path
         self.log = LogWriter(path, config)
         self.write_to(self.log)
-        self._operator, self._monitor = operator, monitor
+        self._operator = operator
         self._arrivals: deque[tuple[int, float]] = deque(maxlen=16)
         self._last_frame: int | None = None
         self._began = 0.0
@@ -95,7 +95,7 @@ class ControlRun(ControlLoop):
         """Compute the command; the updates that have ended, with the arrivals of what caused them.
 
         Raises:
-            ConfigError: The rig differs from its configuration; see `PlausibilityMonitor`.
+            ConfigError: The rig differs from its configuration.
         """
         began, sample, period = time.monotonic(), self.sample, self._rig.control_period
         self.late += self.ticks > 0 and began - self._began > LATE * period
@@ -105,8 +105,6 @@ class ControlRun(ControlLoop):
         self.control(self.reference, None if age is None else sample.time - age)
         self.ticks += 1
         self.times.append(time.monotonic() - began)
-        if self._monitor is not None:
-            self._monitor.add_sample(sample.time, sample.applied)
         if sample.frame is not None:
             self._arrivals.append((sample.frame.sequence, began))
         updates: list[tuple[Frame | Measurement, Report, float]] = []
@@ -115,8 +113,6 @@ class ControlRun(ControlLoop):
             if not isinstance(source, Frame):
                 updates.append((source, report, began))
                 continue
-            if self._monitor is not None:
-                self._monitor.check_frame(source.captured_at, report)
             if self._last_frame is not None:
                 self.unused += max(source.sequence - self._last_frame - 1, 0)
             self._last_frame = source.sequence

@@ -49,6 +49,8 @@ class OperatorInput:
         age: None, because the reference is made in the tick.
         rested_by: Why the last motion ended, if the operator did not end it.
         stopped_by: Why motion is stopped until it is enabled; empty if it is not.
+        must_release: Whether the operator has to let go of the input device before it moves
+            anything.
         refused: Reason -> number of refused commands.
     """
 
@@ -69,17 +71,12 @@ class OperatorInput:
         self._axes = np.zeros(count)
         self._velocity = np.zeros(count)
         self._accepted_at = -float("inf")
-        self._must_release = True
+        self.must_release = True
 
     @property
     def is_moving(self) -> bool:
         """Whether the reference moves."""
         return self.program is not None or bool(self._velocity.any())
-
-    @property
-    def must_release(self) -> bool:
-        """Whether the operator has to let go of the input device before it moves anything."""
-        return self._must_release
 
     def is_present(self, now: float) -> bool:
         """Whether a command was accepted in the last `COMMAND_TIMEOUT`, at a time [s]."""
@@ -100,9 +97,9 @@ class OperatorInput:
         # Its age counts from the arrival, also if the control loop reads it late.
         self._accepted_at = min(received.at, now)
         if not servo.is_holding:
-            self._must_release = False
+            self.must_release = False
             self._axes[:] = 0
-        elif not self._must_release:
+        elif not self.must_release:
             self.rested_by = ""
             self.program = None
             self._axes[:] = servo.axes
@@ -126,7 +123,7 @@ class OperatorInput:
         """Rest until the operator has let go of the input device; `reason` is shown."""
         if self.is_moving or not reason:
             self.rested_by = reason
-        self._must_release = True
+        self.must_release = True
         self._axes[:] = 0
         self._velocity[:] = 0
         self.program = None

@@ -3,31 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.config import Config
 from tautscope.console.motion_limits import motion_limits
-from tautscope.loop.references import MINIMUM_JERK_PEAK, SineSequence
+from tautscope.loop.references import MINIMUM_JERK_PEAK, Motion, SineSequence
 
 Floats = NDArray[np.float64]
 MOVE_SPEED = 0.25
 """Peak speed of a move to the start [of the largest speed that the loop follows]."""
-
-
-class Motion(Protocol):
-    """A motion of the reference."""
-
-    @property
-    def duration(self) -> float:
-        """Duration [s]."""
-        ...
-
-    def __call__(self, time: float) -> Floats:
-        """(n,) [m or rad] at `time` [s from its start]."""
-        ...
 
 
 class Move:
@@ -90,23 +76,8 @@ def experiment(config: Config, reference: Floats) -> Program:
 
 def sweep(config: Config, reference: Floats) -> Program:
     """One period of the experiment's sine per DOF, in which the slack is estimated."""
-    periods = _FirstPeriods(SineSequence(config.experiment))
-    return Program("calibration sweep", [_move_to_start(config, reference), periods])
-
-
-class _FirstPeriods:
-    """The first period of each DOF of a sine sequence."""
-
-    def __init__(self, sines: SineSequence) -> None:
-        self._sines = sines
-        self._ends = np.cumsum([segment.period for segment in sines.segments])
-        self.duration = float(self._ends[-1])
-
-    def __call__(self, time: float) -> Floats:
-        index = min(int(np.searchsorted(self._ends, time, side="right")), len(self._ends) - 1)
-        segment = self._sines.segments[index]
-        since = min(time - (self._ends[index] - segment.period), segment.period)
-        return self._sines(segment.start + since)
+    sines = SineSequence(config.experiment, periods=1)
+    return Program("calibration sweep", [_move_to_start(config, reference), sines])
 
 
 def _move_to_start(config: Config, reference: Floats) -> Move:

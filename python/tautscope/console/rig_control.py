@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Executor
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -154,7 +155,7 @@ class RigControl:
         self._runs += 1
         path = self.folder / f"console-{self._runs}.mcap"
         is_article = isinstance(self._rig, HardwareRig)
-        monitor = PlausibilityMonitor(self.config, sample.applied) if is_article else None
+        monitor = partial(PlausibilityMonitor, self.config) if is_article else None
         # Threads of the log inherit the priority.
         with realtime(OTHERS):
             self.run = ControlRun(

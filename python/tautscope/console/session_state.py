@@ -21,7 +21,7 @@ _EFFECTS = {
     Reaction.PASS_THROUGH: "No compensation; the command follows the reference",
     Reaction.HOLD_MOTION: "Motion is held",
     Reaction.QUICK_STOP: "Quick stop",
-    Reaction.DISABLE: "The drives are disabled",
+    Reaction.DISABLE: "The motors are disabled",
 }
 
 
@@ -78,15 +78,15 @@ def _motion(control: RigControl) -> tuple[str, str]:
     """The kind of motion, and what is in force and why, in one line."""
     operator, run = control.operator, control.run
     if control.is_opening:
-        found = "opening", "The drives are being enabled and move to the start position."
+        found = "opening", "The motors are being enabled and move to the start position."
     elif operator.stopped_by:
         found = "stopped", f"{operator.stopped_by}. Motion is stopped until it is enabled."
     elif run is not None:
         found = _reaction(control, run)
     elif control.fault:
-        found = "off", f"The drives are off: {control.fault}"
+        found = "off", f"The motors are off: {control.fault}"
     else:
-        found = "off", "The drives are off. Enabling moves the motors to the start position."
+        found = "off", "The motors are off. Enabling moves them to the start position."
     return found
 
 
@@ -111,4 +111,4 @@ def _reaction(control: RigControl, run: ControlRun) -> tuple[str, str]:
 def _drives(control: RigControl) -> str:
     if not control.is_hardware:
         return "simulated"
-    return "operation enabled" if control.run is not None else "quick stop, or off"
+    return "enabled" if control.run is not None else "stopped, or off"

@@ -11,7 +11,6 @@ from pathlib import Path
 
 from tautscope.config import Config
 from tautscope.console.access import ADDRESS, new_token
-from tautscope.console.paced_rig import PacedRig
 from tautscope.console.rig_control import RigControl
 from tautscope.console.server import run_server
 from tautscope.console.session import Session
@@ -54,27 +53,6 @@ def start_console(
     error = StateError("web server", "it ended", "Motion is stopped. Start the console again")
     error.exit_status = STOPPED
     raise error
-
-
-def make_rig(
-    config: Config, *, is_twin: bool, make: Callable[[Config], Rig] | None = None
-) -> tuple[Rig, Config]:
-    """The simulated instrument, or the drives and camera of a configuration; with its settings.
-
-    With `make` what that makes of the configuration, a simulation or not.
-
-    Raises:
-        ConfigError: The configuration does not describe a rig.
-    """
-    if make is not None:
-        period = config.control.period
-        return PacedRig(lambda: make(config), period, is_simulated=is_twin), config
-    if not is_twin:
-        return HardwareRig(config), config
-    from tautscope.console.live_twin import LiveTwin  # noqa: PLC0415  MuJoCo
-
-    config = config.replace(drives=None)
-    return LiveTwin(config), config
 
 
 @contextmanager

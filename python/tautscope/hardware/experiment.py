@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from tautscope.config import Config
@@ -13,15 +14,11 @@ from tautscope.hardware.realtime import OTHERS, VISION, realtime_executor, realt
 from tautscope.hardware.rig import HardwareRig
 from tautscope.hardware.run_results import HardwareRun, ProtocolRun
 from tautscope.hardware.signals import exit_on_signals
-from tautscope.log.writer import LogWriter, run_log
-from tautscope.loop.measurement import Measurement
-from tautscope.loop.reduction import Report
+from tautscope.log.writer import run_log
 from tautscope.loop.references import Reference, SineSequence
-from tautscope.loop.rig import Frame, Sample
 from tautscope.loop.safety import Reaction, Supervision
 from tautscope.runs.experiment import run_experiment
 from tautscope.runs.output_folder import check_free
-from tautscope.runs.recording import Floats
 
 RigMaker = Callable[[Config], HardwareRig]
 _LOG = logging.getLogger(__name__)
@@ -96,9 +93,10 @@ def _run(
                 config,
                 compensate,
                 lambda elapsed, duration: progress(min(elapsed / duration, 1.0)),
-                log=_MonitoredLog(log, config),
+                log=log,
                 executor=executor,
                 watch=lambda supervision: _apply_reaction(rig, supervision),
+                monitor=partial(PlausibilityMonitor, config),
             )
         except BaseException as error:
             log.warn(f"{type(error).__name__}: {error}")
@@ -133,34 +131,6 @@ def _apply_reaction(rig: HardwareRig, supervision: Supervision) -> None:
     except TautscopeError as error:
         stop.add_note(str(error))
     raise stop
-
-
-class _MonitoredLog:
-    """Writes the log and checks the plausibility of every sample and frame."""
-
-    def __init__(self, log: LogWriter, config: Config) -> None:
-        self._log = log
-        self._config = config
-        self._monitor: PlausibilityMonitor | None = None
-
-    def tick(
-        self, sample: Sample, reference: Floats, command: Floats, made_at: float | None = None
-    ) -> None:
-        self._log.tick(sample, reference, command, made_at)
-        if self._monitor is None:
-            self._monitor = PlausibilityMonitor(self._config, sample.applied)
-        self._monitor.add_sample(sample.time, sample.applied)
-
-    def frame(self, now: float, frame: Frame, report: Report) -> None:
-        self._log.frame(now, frame, report)
-        if self._monitor is not None:
-            self._monitor.check_frame(frame.captured_at, report)
-
-    def measurement(self, now: float, measurement: Measurement, report: Report) -> None:
-        self._log.measurement(now, measurement, report)
-
-    def event(self, now: float, what: str) -> None:
-        self._log.event(now, what)
 
 
 def _make_folder(folder: Path) -> None:

@@ -84,11 +84,14 @@ class Actuators:
     def excess(self, command: ArrayLike) -> str:
         """The motors beyond their limits at a command, in words; empty if there are none."""
         positions, config = self.motors(command), self._config
+        outside = self._is_outside(positions)
+        if not outside.any():
+            return ""
         names = config.names or [f"motor_{index + 1}" for index in range(len(positions))]
         units = config.units or [""] * len(positions)
         return ", ".join(
             f"{names[motor]} {positions[motor]:.4g} {units[motor]}".strip()
-            for motor in np.flatnonzero(self._is_outside(positions))
+            for motor in np.flatnonzero(outside)
         )
 
     def limited(self, start: Floats, command: Floats) -> Floats:

@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 
 from tautscope import _core
-from tautscope.config import Config, DofConfig
+from tautscope.config import Config
 from tautscope.dof import Dof
 
 
@@ -21,17 +21,6 @@ def core_settings(config: Config, compensate: bool = True) -> dict[str, Any]:
         for dof in Dof:
             document[dof.label]["free_gain"] = 1.0
     return document
-
-
-def build_estimator(dof: DofConfig) -> _core.Estimator:
-    """The hysteresis estimator of one DOF, Eqs. (4)-(6)."""
-    return _core.Estimator(
-        update_distance=dof.update_distance,
-        contact_tolerance=dof.contact_tolerance,
-        smoothing_factor=dof.smoothing_factor,
-        delta_minus=dof.delta_minus,
-        delta_plus=dof.delta_plus,
-    )
 
 
 def build_instrument(config: Config) -> _core.Instrument:

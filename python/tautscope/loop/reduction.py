@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
@@ -15,6 +16,7 @@ from tautscope._core import MOST_SENSORS
 from tautscope.config import Config
 from tautscope.dof import display_text
 from tautscope.errors import SignalError
+from tautscope.loop.actuators import Actuators
 from tautscope.loop.construction import build_loop
 from tautscope.loop.kinematics import Predict, build_kinematics
 from tautscope.loop.measurement import (
@@ -38,6 +40,9 @@ if TYPE_CHECKING:
     from tautscope.loop.vision import Detection, MarkerDetector
 
 Triggers = tuple[str | None, str | None]
+LIMITED = "limited by actuators.limits"
+"""After the name of a degree of freedom in `Report.warnings`."""
+_LOG = logging.getLogger(__name__)
 
 
 class Status(StrEnum):
@@ -89,7 +94,8 @@ class Report:
         delta_plus: (n,) contact offsets after this frame, input minus output.
         reaction: The reaction in force after this frame.
         warnings: The flags in force, by the names of `tautscope.loop.safety.DETECTORS`, and a line
-            for every monitor that ``safety.off`` disables.
+            for every monitor that ``safety.off`` disables, and for every degree of freedom that
+            ``actuators.limits`` limited in the last tick.
     """
 
     detection: Detection | None
@@ -175,6 +181,10 @@ class HysteresisReduction:
         self._loop = build_loop(config, compensate)
         if config.dof:
             self._sensors = Sensors(config, build_kinematics(config))
+        is_limited = config.actuators is not None and bool(config.actuators.limits)
+        self._actuators = Actuators(config) if is_limited else None
+        self._limited: tuple[str, ...] = ()
+        self._limited_before: set[str] = set()
 
     def __repr__(self) -> str:
         slack = display_text(self.delta_plus - self.delta_minus, self._config.dofs)
@@ -195,20 +205,24 @@ class HysteresisReduction:
                 than ``safety.reference_age`` causes no motion.
 
         Returns:
-            c (n,) [m or rad]. The first reference is passed through. While motion is held, the
-            last command.
+            c (n,) [m or rad], as far as ``actuators.limits`` allow; what they do not allow of the
+            reference's motion is discarded. The first reference is passed through. While motion is
+            held, the last command.
 
         Raises:
             SignalError: The reference is not n finite numbers, or a time is not finite; the
-                loop is unchanged.
+                loop is unchanged. Or ``actuators.map`` returned something else than m numbers; the
+                command rests.
         """
         values = check_signal("reference", reference, (self._dofs,))
         if time is None:
             time = self._ticks * self._config.control.period
         time = check_time("time", time)
+        made_at = None if made_at is None else check_time("made_at", made_at)
         self._ticks += 1
+        self._limited = ()
         return self._loop.step(
-            values, time, None if made_at is None else check_time("made_at", made_at)
+            values, time, made_at, None if self._actuators is None else self._within_limits
         )
 
     def on_frame(self, frame: Frame) -> Report:
@@ -485,6 +499,24 @@ class HysteresisReduction:
         )
         return self._report(result, captured_at)
 
+    def _within_limits(
+        self, last: NDArray[np.float64], command: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        assert self._actuators is not None
+        excess = self._actuators.excess(command)
+        if not excess or not np.isfinite(last).all():  # the rig refuses such a first command
+            return command
+        reached = self._actuators.limited(last, command)
+        held = (reached != command).tolist()
+        self._limited = tuple(
+            dof.label for dof, is_held in zip(self._config.dofs, held, strict=True) if is_held
+        )
+        if not self._limited_before.issuperset(self._limited):
+            self._limited_before.update(self._limited)
+            what = " and ".join(self._limited)
+            _LOG.warning("%s: %s; the command needs %s", what, LIMITED, excess)
+        return reached
+
     def _notify(self, what: str) -> None:
         if self.on_event is not None:
             self.on_event(what)
@@ -506,7 +538,8 @@ class HysteresisReduction:
     ) -> Report:
         self.updates += 1
         now = self.supervision
-        warnings = (*self._disabled, *now.flags)
+        limited = (f"{name} {LIMITED}" for name in self._limited)
+        warnings = (*self._disabled, *now.flags, *limited)
         return Report(
             detection, captured_at, Status(result[0]), *result[1:], now.reaction, warnings
         )

@@ -38,7 +38,7 @@ class Segment:
         return self.start + self.period * self.periods
 
 
-class Reference(Protocol):
+class Motion(Protocol):
     """A desired motion of the tip; (n,) for n degrees of freedom."""
 
     @property
@@ -46,13 +46,17 @@ class Reference(Protocol):
         """Duration [s]."""
         ...
 
+    def __call__(self, time: float) -> NDArray[np.float64]:
+        """(n,) [m or rad] at `time` [s from its start]."""
+        ...
+
+
+class Reference(Motion, Protocol):
+    """A motion whose parts are known."""
+
     @property
     def segments(self) -> Sequence[Segment]:
         """Which DOF moves when; may be empty."""
-        ...
-
-    def __call__(self, time: float) -> NDArray[np.float64]:
-        """(3,) [m, rad, rad] at `time` [s from the start of the reference]."""
         ...
 
 
@@ -78,15 +82,16 @@ class SineSequence:
 
     Args:
         experiment: Centre, amplitude and period per DOF; number of periods.
+        periods: In place of this number.
     """
 
-    def __init__(self, experiment: ExperimentConfig) -> None:
+    def __init__(self, experiment: ExperimentConfig, periods: int | None = None) -> None:
         self._sines = [experiment[dof] for dof in Dof]
         self._centre = np.array([sine.centre for sine in self._sines])
         segments: list[Segment] = []
         start = 0.0
         for dof, sine in zip(Dof, self._sines, strict=True):
-            segments.append(Segment(dof, start, sine.period, experiment.periods))
+            segments.append(Segment(dof, start, sine.period, periods or experiment.periods))
             start = segments[-1].end
         self.segments: tuple[Segment, ...] = tuple(segments)
         self.duration: float = start

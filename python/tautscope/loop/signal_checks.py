@@ -31,11 +31,9 @@ def check_signal(field: str, values: ArrayLike, shape: tuple[int, ...]) -> NDArr
     Raises:
         SignalError: The shape is different, or a number is not finite.
     """
-    allowed = f"{shape[0]} finite numbers"
-    try:
-        array = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise SignalError(field, values, allowed) from None
+    allowed = "finite numbers"
+    allowed = f"{shape[0]} {allowed}" if len(shape) == 1 else f"an array {shape} of {allowed}"
+    array = _numbers(field, values, allowed)
     if array.shape != shape or not np.isfinite(array).all():
         raise SignalError(field, array.tolist(), allowed)
     return array
@@ -61,10 +59,7 @@ def check_numbers(
         SignalError: They are anything else.
     """
     allowed = f"an array {shape} of {allowed}"
-    try:
-        array = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise SignalError(field, values, allowed) from None
+    array = _numbers(field, values, allowed)
     if array.shape != shape or np.isinf(array).any() or np.isnan(array).all():
         raise SignalError(field, array.tolist(), allowed)
     return array
@@ -77,10 +72,7 @@ def check_values(values: ArrayLike) -> NDArray[np.float64]:
         SignalError: They are anything else.
     """
     allowed = f"1 to {MOST_VALUES} numbers or NaN, not all NaN"
-    try:
-        array = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise SignalError("values", values, allowed) from None
+    array = _numbers("values", values, allowed)
     if array.ndim != 1 or not 1 <= len(array) <= MOST_VALUES:
         raise SignalError("values", f"an array {array.shape}", allowed)
     return check_numbers("values", array, array.shape, "numbers or NaN, not all NaN")
@@ -92,7 +84,7 @@ def check_covariance(field: str, values: ArrayLike, count: int) -> NDArray[np.fl
     Raises:
         SignalError: It is not.
     """
-    array = check_signal_shape(field, values, (count, count))
+    array = check_signal(field, values, (count, count))
     is_symmetric = np.allclose(array, array.T, rtol=1e-6, atol=0)
     if not is_symmetric or (np.linalg.eigvalsh(array) <= 0).any():
         allowed = f"a covariance {(count, count)}: symmetric and positive definite"
@@ -100,15 +92,8 @@ def check_covariance(field: str, values: ArrayLike, count: int) -> NDArray[np.fl
     return array
 
 
-def check_signal_shape(
-    field: str, values: ArrayLike, shape: tuple[int, ...]
-) -> NDArray[np.float64]:
-    """Finite numbers as an array of this shape; the error names `field`.
-
-    Raises:
-        SignalError: The shape is different, or a number is not finite.
-    """
-    array = check_numbers(field, values, shape, "finite numbers")
-    if np.isnan(array).any():
-        raise SignalError(field, array.tolist(), f"an array {shape} of finite numbers")
-    return array
+def _numbers(field: str, values: ArrayLike, allowed: str) -> NDArray[np.float64]:
+    try:
+        return np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise SignalError(field, values, allowed) from None

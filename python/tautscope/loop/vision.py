@@ -112,15 +112,6 @@ class Detection:
         return all(self.found)
 
     @property
-    def colours_drifted(self) -> bool:
-        """Whether a band was found, but not by the trained discriminant.
-
-        Exposure or white balance then differ from the training pixels; `tautscope calibrate
-        colour` finds new ones.
-        """
-        return self.discriminant > 0 and any(self.found)
-
-    @property
     def reason(self) -> str:
         """Why the detection is not valid; empty if it is."""
         a, b = self.reasons

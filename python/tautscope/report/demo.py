@@ -19,7 +19,7 @@ from tautscope.report.operator_motion import (
 )
 from tautscope.report.report import FIGURE5_CAPTION, CaptionedFigure
 from tautscope.report.results import Results, evaluate
-from tautscope.report.rows import ROWS
+from tautscope.report.rows import OPERATOR_ROWS, ROWS
 from tautscope.runs.output_folder import new_folder
 from tautscope.runs.recording import Recording
 from tautscope.runs.trials import RigMaker, Trial, make_twin, run_trials
@@ -183,9 +183,8 @@ def write_run_folder(demo: Demo, folder: str | PathLike[str]) -> None:
         demo.compensated.write(place)
         demo.uncompensated.write(place, "_uncompensated")
         tables.write_csv(place / "table1.csv", demo.seeds, demo.by_profile)
-        tables.write_operator_csv(
-            place / "operator_motion.csv", demo.config.profile, demo.seeds, demo.operator_results
-        )
+        motions = {str(demo.config.profile): demo.operator_results}
+        tables.write_csv(place / "operator_motion.csv", demo.seeds, motions, OPERATOR_ROWS)
         with style():
             figure9.savefig(place / "fig9.png")
             figure9.savefig(place / "fig9.pdf", metadata={"CreationDate": None})

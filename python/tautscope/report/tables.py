@@ -11,7 +11,7 @@ from typing import Any
 
 from tautscope.dof import Dof, NamedDof
 from tautscope.report.results import DofResult, Figures, Results, combine
-from tautscope.report.rows import ARTICLE, OPERATOR_ROWS, ROWS, Row
+from tautscope.report.rows import ARTICLE, ROWS, Row
 
 
 def median(results: Sequence[dict[NamedDof, Figures]]) -> dict[NamedDof, Figures]:
@@ -81,38 +81,29 @@ def article_cell(row: Row, dof: NamedDof, by_camera: bool = False) -> str:
 
 
 def write_csv(
-    path: Path, seeds: Sequence[int], by_profile: Mapping[str, Sequence[Results]]
+    path: Path,
+    seeds: Sequence[int],
+    by_profile: Mapping[str, Sequence[dict[NamedDof, Figures]]],
+    rows: Sequence[Row] = ROWS,
 ) -> None:
-    """Write table1.csv in display units: per DOF the article, per profile seeds, median, worst."""
+    """Write figures in display units: per DOF the article's, per profile seeds, median, worst.
+
+    Of an operator motion, `OPERATOR_ROWS`, the article has none.
+    """
     lines = [
         (profile, source, found)
         for profile, results in by_profile.items()
-        for source, found in _sources(seeds, results, ROWS)
+        for source, found in _sources(seeds, results, rows)
     ]
-    dofs = lines[0][2]
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(["dof", "unit", "profile", "source", *(row.name for row in ROWS)])
-        for dof in dofs:
-            article = [_number(row, dof, ARTICLE.get(row.name, {}).get(dof)) for row in ROWS]
-            writer.writerow([dof.label, dof.display_unit, "", "article", *article])
+        writer.writerow(["dof", "unit", "profile", "source", *(row.name for row in rows)])
+        for dof in lines[0][2]:
+            if rows is ROWS:
+                article = [_number(row, dof, ARTICLE.get(row.name, {}).get(dof)) for row in rows]
+                writer.writerow([dof.label, dof.display_unit, "", "article", *article])
             for profile, source, result in lines:
-                writer.writerow(
-                    [dof.label, dof.display_unit, profile, source, *_numbers(result, dof, ROWS)]
-                )
-
-
-def write_operator_csv(
-    path: Path, profile: str, seeds: Sequence[int], results: Sequence[dict[NamedDof, Figures]]
-) -> None:
-    """Write operator_motion.csv in display units: per DOF seeds, median, worst."""
-    sources = _sources(seeds, results, OPERATOR_ROWS)
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(["dof", "unit", "profile", "source", *(row.name for row in OPERATOR_ROWS)])
-        for dof in results[0]:
-            for source, result in sources:
-                values = _numbers(result, dof, OPERATOR_ROWS)
+                values = [_number(row, dof, getattr(result[dof], row.name)) for row in rows]
                 writer.writerow([dof.label, dof.display_unit, profile, source, *values])
 
 
@@ -125,10 +116,6 @@ def _sources(
         ("median", median(results)),
         ("worst", worst(results, rows)),
     ]
-
-
-def _numbers(result: dict[NamedDof, Figures], dof: NamedDof, rows: Sequence[Row]) -> list[str]:
-    return [_number(row, dof, getattr(result[dof], row.name)) for row in rows]
 
 
 def to_json(

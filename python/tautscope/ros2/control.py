@@ -7,6 +7,7 @@ import logging
 import time
 from collections.abc import Callable
 from concurrent.futures import Executor
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -233,7 +234,7 @@ class NodeControl:
                 self._source,
                 path=self._folder / f"ros2-{self._runs}.mcap",
                 executor=self._executor,
-                monitor=PlausibilityMonitor(self._config, sample.applied) if is_hardware else None,
+                monitor=partial(PlausibilityMonitor, self._config) if is_hardware else None,
             )
         if not self._config.dof:
             # The detector is made and used now, because its first use is slow.

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.config import Config
+from tautscope.console.control_run import ReferenceSource
 from tautscope.console.lease import ImageTimes, Lease
 from tautscope.console.messages import Command, Received, Servo
 from tautscope.console.operator_input import OperatorInput
@@ -26,15 +27,8 @@ Refuse = Callable[[MessageError], None]
 """Called with the reason for which a message is refused."""
 
 
-class Source(Protocol):
-    """A `tautscope.console.control_run.ReferenceSource` that can be started and clutched."""
-
-    reference: Floats
-
-    @property
-    def age(self) -> float | None:
-        """Time from when the reference was made to the last tick [s]; None: made in the tick."""
-        ...
+class Source(ReferenceSource, Protocol):
+    """A source of references that can be started and clutched."""
 
     def reset(self, reference: Floats) -> None:
         """Start at a reference (n,) [m or rad]."""
@@ -42,10 +36,6 @@ class Source(Protocol):
 
     def engage(self) -> None:
         """Follow the device again, from where the reference is."""
-        ...
-
-    def update(self, now: float, period: float, command: Floats, *, is_held: bool) -> Floats:
-        """The reference of a tick."""
         ...
 
 
@@ -195,10 +185,6 @@ class JoyReference:
     def reference(self) -> Floats:
         """Reference u (n,) [m or rad] of the last tick."""
         return self._operator.reference
-
-    @reference.setter
-    def reference(self, reference: Floats) -> None:
-        self._operator.reference = reference
 
     def reset(self, reference: Floats) -> None:
         """Start at a reference (n,) [m or rad], after the button was released once."""

@@ -49,6 +49,21 @@ class Log(Protocol):
         ...
 
 
+class Monitor(Protocol):
+    """Compares motors and tip of a rig, e.g. `tautscope.hardware.plausibility`.
+
+    Its methods raise a `ConfigError` where they disagree.
+    """
+
+    def add_sample(self, time: float, applied: Floats) -> None:
+        """Add a sample of the rig."""
+        ...
+
+    def check_frame(self, captured_at: float, report: Report) -> None:
+        """Compare an image update with the samples."""
+        ...
+
+
 class ControlLoop:
     """Ticks of the loop on a rig, all of them in a log.
 
@@ -62,6 +77,7 @@ class ControlLoop:
         look: The image update.
         executor: Runs the marker detection in the background, in place of `look`; a robot with
             [[dof]] has none, and does not use its images.
+        monitor: Makes a monitor from the motors (n,) at the start.
 
     Attributes:
         loop: The loop.
@@ -70,6 +86,7 @@ class ControlLoop:
 
     Raises:
         SignalError: A sample is not as `Sample` says, or the rig's clock does not advance.
+        ConfigError: The monitor found that the rig differs from its configuration.
     """
 
     def __init__(
@@ -81,6 +98,7 @@ class ControlLoop:
         compensate: bool = True,
         look: ImageUpdate = HysteresisReduction.on_frame,
         executor: Executor | None = None,
+        monitor: Callable[[Floats], Monitor] | None = None,
     ) -> None:
         self.loop = HysteresisReduction(config, compensate=compensate)
         self._config, self._rig = config, rig
@@ -91,6 +109,7 @@ class ControlLoop:
         self._events: list[tuple[int, str]] = []
         self.sample = check_sample(rig.reset() if sample is None else sample, config)
         self.command = np.array(self.sample.applied, np.float64)
+        self._monitor = None if monitor is None else monitor(self.sample.applied)
 
     def write_to(self, log: Log) -> None:
         """Write all that happens from now on to a log."""
@@ -104,6 +123,8 @@ class ControlLoop:
         self.command = self.loop.step(reference, self.sample.time, made_at)
         if self._log is not None:
             self._log.tick(self.sample, np.asarray(reference), self.command, made_at)
+        if self._monitor is not None:
+            self._monitor.add_sample(self.sample.time, self.sample.applied)
         return self.command
 
     def updates(self) -> Iterator[tuple[Frame | Measurement, Report]]:
@@ -113,6 +134,8 @@ class ControlLoop:
             if self._log is not None:
                 self.write_events(self.loop.updates)
                 self._log.frame(now, frame, report)
+            if self._monitor is not None:
+                self._monitor.check_frame(frame.captured_at, report)
             yield frame, report
         for measurement in self.sample.measurements:
             report = self.loop.on_sample(measurement)

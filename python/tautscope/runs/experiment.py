@@ -15,7 +15,7 @@ from tautscope.loop.reduction import HysteresisReduction, Report
 from tautscope.loop.references import DatedReference, Reference
 from tautscope.loop.rig import Frame, Rig
 from tautscope.loop.safety import Reaction, Supervision, disabled_monitors
-from tautscope.runs.control_loop import ControlLoop, ImageUpdate, Log
+from tautscope.runs.control_loop import ControlLoop, Floats, ImageUpdate, Log, Monitor
 from tautscope.runs.flag_summary import FlagSummary
 from tautscope.runs.recording import Recording, Snapshot
 from tautscope.runs.run_recorder import RunRecorder, update_row
@@ -40,6 +40,7 @@ def run_experiment(
     executor: Executor | None = None,
     watch: Callable[[Supervision], None] | None = None,
     engage: Engage | None = None,
+    monitor: Callable[[Floats], Monitor] | None = None,
 ) -> Recording:
     """Run a reference on a rig, with the camera, or other sensors of the tip, as the only feedback.
 
@@ -66,6 +67,7 @@ def run_experiment(
         engage: The operator's decision to re-engage: called in every tick in which motion is held,
             re-engages if it returns True. Without it nobody can, and neither where the loop has to
             be restarted (reaction `disable`): the run then ends after `HELD_TIME`.
+        monitor: Makes a monitor of the rig from its motors (n,) at the start.
 
     Raises:
         MotionHeldError: Motion was held, and nobody could re-engage it. The error has the recording
@@ -76,7 +78,9 @@ def run_experiment(
     """
     rig = with_actuators(rig, config)
     dated = reference if isinstance(reference, DatedReference) else None
-    ticks = ControlLoop(config, rig, compensate=compensate, look=look, executor=executor)
+    ticks = ControlLoop(
+        config, rig, compensate=compensate, look=look, executor=executor, monitor=monitor
+    )
     if log is not None:
         ticks.write_to(log)
     recorder = _ExperimentRecorder(config, reference.duration / 2)

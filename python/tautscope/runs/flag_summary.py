@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tautscope.config import Config
+from tautscope.loop.reduction import LIMITED
 from tautscope.loop.safety import MEANINGS, REMEDIES, Reaction
 
 _CONSEQUENCES = {
@@ -15,8 +16,8 @@ _CONSEQUENCES = {
     Reaction.FADE: "the compensation faded out meanwhile",
     Reaction.PASS_THROUGH: "the command moved with the reference, uncompensated, meanwhile",
     Reaction.HOLD_MOTION: "motion was held",
-    Reaction.QUICK_STOP: "the drives were stopped",
-    Reaction.DISABLE: "the drives were disabled",
+    Reaction.QUICK_STOP: "the motors were stopped",
+    Reaction.DISABLE: "the motors were disabled",
 }
 
 
@@ -37,13 +38,14 @@ class FlagSummary:
     def __init__(self, config: Config) -> None:
         self._updates, self._what = 0, "measurements" if config.dof else "images"
         self._counts: dict[str, _Count] = {}
+        self._limited: dict[str, None] = {}
 
     def add(self, elapsed: float, flags: Sequence[str], reaction: Reaction) -> None:
         """Add an update.
 
         Args:
             elapsed: Time since the start of the run [s].
-            flags: In force at it.
+            flags: `Report.warnings`.
             reaction: To them.
         """
         self._updates += 1
@@ -52,6 +54,8 @@ class FlagSummary:
                 count = self._counts.setdefault(name, _Count(elapsed))
                 count.updates += 1
                 count.reaction = max(count.reaction, reaction, key=lambda each: each.rank)
+            elif name.endswith(LIMITED):
+                self._limited[name] = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -69,6 +73,8 @@ class FlagSummary:
         meaning = MEANINGS[name].rstrip(".").replace("`", "")
         flag = f"{name} ({meaning[0].lower()}{meaning[1:]})"
         remedy = f"; {REMEDIES[name]}" if name in REMEDIES else ""
+        if name == "monitor" and self._limited:
+            remedy = f"; {', '.join(self._limited)}"
         count = self._counts.get(name)
         if count is None:
             return f"{flag} between two {self._what}{remedy}"

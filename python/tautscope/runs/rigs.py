@@ -6,6 +6,7 @@ import inspect
 import math
 from collections.abc import Callable
 from importlib.metadata import entry_points
+from typing import Any
 
 from tautscope.config import Config
 from tautscope.errors import ConfigError
@@ -17,11 +18,11 @@ GROUP = "tautscope.rigs"
 """Entry points of this group are rigs by their names."""
 
 
-def rig_maker(name: str) -> Callable[[Config], Rig]:
+def rig_maker(name: str, **arguments: Any) -> Callable[[Config], Rig]:
     """What makes the rig of a name: ``module:Class``, or an entry point of `GROUP`.
 
-    The class is called with the configuration if its constructor needs an argument, or has one
-    named config; else without.
+    The class is called with `arguments`, and with the configuration if its constructor needs an
+    argument, or has one named config.
 
     Raises:
         ConfigError: There is none of this name, or what it makes is no `Rig`.
@@ -41,7 +42,7 @@ def rig_maker(name: str) -> Callable[[Config], Rig]:
     )
 
     def make(config: Config) -> Rig:
-        rig = made(config) if takes_config else made()
+        rig = made(*([config] if takes_config else []), **arguments)
         missing = [part for part in _PARTS if not hasattr(rig, part)]
         if missing:
             raise ConfigError(field, name, f"a rig with {', '.join(missing)}: tautscope.Rig")

@@ -164,12 +164,18 @@ impl<S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, const N: usize> History<S, N> {
 }
 
 /// Entries that a history of `span` in s needs for a control tick every `period` in s: from the last tick before the
-/// span to the newest.
+/// span to the newest. Two where that is no finite number, as of a period of 0, which [`History::new`] refuses.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
     reason = "a cast from f64 saturates"
 )]
 pub fn history_entries(span: f64, period: f64) -> usize {
-    libm::ceil(span / period) as usize + 2
+    let periods = libm::ceil(span / period);
+    let periods = if periods.is_finite() {
+        periods as usize
+    } else {
+        0
+    };
+    periods.saturating_add(2)
 }

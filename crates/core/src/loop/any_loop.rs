@@ -19,7 +19,19 @@ pub trait Loop {
     fn dofs(&self) -> usize;
 
     /// Control tick, as [`HysteresisReduction::step`]: `command` (n,) for a reference (n,).
-    fn step(&mut self, reference: &[f64], stamp: Option<f64>, time: f64, command: &mut [f64]);
+    fn step(&mut self, reference: &[f64], stamp: Option<f64>, time: f64, command: &mut [f64]) {
+        self.step_within(reference, stamp, time, command, &mut |_, _| {});
+    }
+
+    /// As [`HysteresisReduction::step_within`]: `limit` has the last command and changes the next one.
+    fn step_within(
+        &mut self,
+        reference: &[f64],
+        stamp: Option<f64>,
+        time: f64,
+        command: &mut [f64],
+        limit: &mut dyn FnMut(&[f64], &mut [f64]),
+    );
 
     /// The predicted state now.
     fn predicted_state(&self) -> [f64; DOFS];
@@ -75,13 +87,23 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
         N
     }
 
-    fn step(&mut self, reference: &[f64], stamp: Option<f64>, time: f64, command: &mut [f64]) {
+    fn step_within(
+        &mut self,
+        reference: &[f64],
+        stamp: Option<f64>,
+        time: f64,
+        command: &mut [f64],
+        limit: &mut dyn FnMut(&[f64], &mut [f64]),
+    ) {
         let mut taken = [f64::NAN; N];
         taken
             .iter_mut()
             .zip(reference)
             .for_each(|(to, of)| *to = *of);
-        let next = Self::step(self, taken, stamp, time);
+        let next = Self::step_within(self, taken, stamp, time, |last, mut next| {
+            limit(&last, &mut next);
+            next
+        });
         command.iter_mut().zip(next).for_each(|(to, of)| *to = of);
     }
 

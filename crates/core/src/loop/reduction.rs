@@ -93,9 +93,21 @@ impl<P: Profile<N>, S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, V, const N: usize>
     /// `stamp` is the time in s at which the reference was generated, if known. A reference that is not finite
     /// holds the command, which before the first reference is NaN.
     pub fn step(&mut self, reference: [f64; N], stamp: Option<f64>, time: f64) -> [f64; N] {
+        self.step_within(reference, stamp, time, |_, command| command)
+    }
+
+    /// As [`Self::step`], within limits of the actuators: `limit` has the last command, NaN before the first, and the next
+    /// one, and returns the farthest command between them that the actuators can follow.
+    pub fn step_within(
+        &mut self,
+        reference: [f64; N],
+        stamp: Option<f64>,
+        time: f64,
+        limit: impl FnOnce([f64; N], [f64; N]) -> [f64; N],
+    ) -> [f64; N] {
         let (command_before, state_before) = (self.profile.command(), self.predicted_state());
         self.monitors
-            .step(&mut self.profile, reference, stamp, time);
+            .step(&mut self.profile, reference, stamp, time, limit);
         let (gated, command) = (self.monitors.reference(), self.profile.command());
         let distance = |to: f64, from: f64| (to - from).abs();
         let mut moved = zip_with(command, command_before, distance);

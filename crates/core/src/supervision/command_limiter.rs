@@ -185,6 +185,23 @@ impl<const N: usize> CommandLimiters<N> {
         (commands, results)
     }
 
+    /// Continue from the commands (N,) that the actuators can follow, which are no farther than the limited ones.
+    pub fn continue_from(&mut self, commands: [f64; N], results: &mut [LimiterResult; N]) {
+        let dofs = self.dofs.iter_mut().zip(commands).zip(results);
+        for ((limiter, command), found) in dofs {
+            let Some((_, last)) = &mut limiter.last else {
+                continue;
+            };
+            let changed = if *found == LimiterResult::Violation {
+                LimiterResult::Violation
+            } else {
+                LimiterResult::Limited
+            };
+            *found = result(command, *last, *found, changed);
+            *last = command;
+        }
+    }
+
     /// Limits the commands of the DOFs of a group.
     fn limit_group(
         &mut self,

@@ -35,13 +35,13 @@ macro_rules! flags {
 }
 
 flags! {
-    /// The image is identical to an earlier one although the command has moved.
+    /// An image or measurement repeats an earlier one although the command has moved.
     Frozen = "frozen",
-    /// The frame was older than `frame_age` when it arrived.
+    /// An image or measurement was older than `frame_age` when it arrived.
     Late = "late",
-    /// The frame was captured no later than the one before it.
+    /// An image or measurement was made no later than the one before it.
     Duplicate = "duplicate",
-    /// No frame has arrived for longer than `frame_gap`.
+    /// No image or measurement has arrived for longer than `frame_gap`.
     Dropped = "dropped",
     /// A time is later than the control tick, goes back, or is not a number.
     Clock = "clock",
@@ -49,11 +49,11 @@ flags! {
     Innovation = "innovation",
     /// The image agrees with the prediction if its two markers are exchanged.
     Swapped = "swapped",
-    /// Only one marker was found, or one of the two is where it cannot be.
+    /// Part of a measurement is missing or impossible: one of two markers, or values of a sensor.
     Merged = "merged",
-    /// No marker was found, or none that agrees with the prediction.
+    /// Nothing was measured that agrees with the prediction: no marker, or no value of a sensor.
     Lost = "lost",
-    /// Both markers were found, but they do not determine every degree of freedom.
+    /// What was measured does not determine every degree of freedom.
     Unobservable = "unobservable",
     /// The rig reports that a drive does not follow its command.
     FollowingError = "following_error",
@@ -83,7 +83,7 @@ flags! {
     Overcompensation = "overcompensation",
     /// Reference and tip oscillate with growing swings.
     LimitCycle = "limit_cycle",
-    /// Images show the tip elsewhere than predicted: the slack has changed, the instrument was pushed, or images or commands are wrong.
+    /// The tip is measured elsewhere than predicted: the slack has changed, the instrument was pushed, or measurements or commands are wrong.
     SlackChanged = "slack_changed",
     /// The images contradict the configured camera: its pose or principal point seems wrong by more than a degree.
     GeometryOff = "geometry_off",

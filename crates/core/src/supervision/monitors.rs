@@ -106,13 +106,14 @@ impl<const N: usize> Monitors<N> {
         self.play_limits
     }
 
-    /// A control tick: gate, law, limiter.
+    /// A control tick: gate, law, limiter, and the limits of the actuators.
     pub(crate) fn step<L: Law<N>>(
         &mut self,
         law: &mut L,
         reference: [f64; N],
         stamp: Option<f64>,
         time: f64,
+        limit: impl FnOnce([f64; N], [f64; N]) -> [f64; N],
     ) {
         let is_held = self.supervisor.reaction() >= Reaction::HoldMotion;
         let gated = self.gate.step(reference, time, stamp, is_held, self.off);
@@ -132,7 +133,7 @@ impl<const N: usize> Monitors<N> {
             let motion = self.motion.update_reference(reference);
             event.raised = event.raised.union(self.enabled(motion));
             self.set_share(law);
-            self.step_law(law, reference, gated.increments, &mut event);
+            self.step_law(law, reference, gated.increments, limit, &mut event);
         }
         self.time = time;
         self.supervisor.update(&event);
@@ -147,15 +148,18 @@ impl<const N: usize> Monitors<N> {
         law: &mut L,
         reference: [f64; N],
         increments: [f64; N],
+        limit: impl FnOnce([f64; N], [f64; N]) -> [f64; N],
         event: &mut Event,
     ) {
         let before = law.command();
         let proposed = law.propose(reference);
         if self.off.contains(Flag::Monitor) {
-            law.commit(proposed);
+            law.commit(limit(before, proposed));
             return;
         }
-        let (limited, results) = self.limiters.limit(reference, proposed);
+        let (lawful, mut results) = self.limiters.limit(reference, proposed);
+        let limited = limit(before, lawful);
+        self.limiters.continue_from(limited, &mut results);
         law.commit(limited);
         let mut shifts = [0.0; N];
         let motions = limited.into_iter().zip(before).zip(proposed);

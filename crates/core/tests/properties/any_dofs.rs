@@ -253,7 +253,13 @@ fn supervision_is_transparent<const N: usize>(group: [usize; N]) {
             let speed = 0.004 + 0.0007 * f64::from(u8::try_from(dof).unwrap());
             12.0 * units::<N>()[dof] * (speed * f64::from(tick)).sin()
         });
-        monitors.step(&mut law, reference, None, PERIOD * f64::from(tick));
+        monitors.step(
+            &mut law,
+            reference,
+            None,
+            PERIOD * f64::from(tick),
+            |_, command| command,
+        );
         assert_eq!(
             monitors.supervision().latched,
             Flags::NONE,
@@ -279,7 +285,7 @@ fn one_dof_stops_all<const N: usize>(group: [usize; N]) {
             let mut time = 0.0;
             let mut go = |monitors: &mut Monitors<N>, law: &mut Article<N>, reference| {
                 time += PERIOD;
-                monitors.step(law, reference, None, time);
+                monitors.step(law, reference, None, time, |_, command| command);
                 (law.command(), monitors.supervision().reaction)
             };
             let moved = |by: f64| units::<N>().map(|unit| by * unit);
@@ -307,9 +313,15 @@ fn one_dof_stops_all<const N: usize>(group: [usize; N]) {
 /// The compensation fades with the travel of all DOFs, each in its `width_limit`.
 fn fading_takes_the_travel_of_all<const N: usize>(group: [usize; N]) {
     let (mut monitors, mut law) = supervised(group, 5.0);
-    monitors.step(&mut law, [0.0; N], None, 0.0);
+    monitors.step(&mut law, [0.0; N], None, 0.0, |_, command| command);
     monitors.raise(Flag::LimitCycle);
-    monitors.step(&mut law, units().map(|unit: f64| 0.3 * unit), None, PERIOD);
+    monitors.step(
+        &mut law,
+        units().map(|unit: f64| 0.3 * unit),
+        None,
+        PERIOD,
+        |_, command| command,
+    );
     let travel: f64 = (0..N).map(|_| 0.3 / 30.0).sum();
     let share = monitors.supervision().lead;
     assert!((share - (1.0 - travel / 2.0)).abs() < 1e-12, "{N}: {share}");

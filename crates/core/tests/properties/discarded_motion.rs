@@ -12,6 +12,8 @@ struct Run {
     reduction: Loop<Paper>,
     input: f64,
     time: f64,
+    /// Largest command that the actuators can follow.
+    end: f64,
 }
 
 impl Run {
@@ -22,6 +24,7 @@ impl Run {
             }),
             input: 0.0,
             time: 0.0,
+            end: f64::INFINITY,
         };
         run.go(0.0);
         run
@@ -35,7 +38,11 @@ impl Run {
             self.input = from + (place - from) * f64::from(tick) / 500.0;
             self.time += PERIOD;
             let reference = [self.input * UNITS[0], 0.0, 0.0];
-            [command, ..] = self.reduction.step(reference, None, self.time);
+            let end = self.end * UNITS[0];
+            let within = |_, [first, second, third]: [f64; 3]| [end.min(first), second, third];
+            [command, ..] = self
+                .reduction
+                .step_within(reference, None, self.time, within);
         }
         let [tip, ..] = self.reduction.predicted_state();
         (command / UNITS[0], tip / UNITS[0])
@@ -45,6 +52,25 @@ impl Run {
         let supervision = self.reduction.supervision();
         supervision.latched.contains(Flag::Monitor)
     }
+}
+
+/// The law continues from what the actuators followed, as at the end of the travel.
+#[test]
+fn the_limit_of_an_actuator_is_an_end_of_the_travel() {
+    let mut run = Run::begun(0.0, -10.0, 15.0);
+    run.go(150.0);
+    let (_, before) = run.go(100.0);
+    assert!(!run.is_limited());
+    run.end = 180.0;
+    let (end, tip) = run.go(230.0);
+    assert!(run.is_limited());
+    assert!(
+        (end - 180.0).abs() < 1e-9 && (end - tip - 15.0).abs() < 1e-9,
+        "{end}, {tip}"
+    );
+    let (_, after) = run.go(100.0);
+    // The command is at the end when the reference is at 168.
+    assert!((before - after - 62.0).abs() < 1e-6, "{}", before - after);
 }
 
 /// Nothing catches up later, also by a law that returns its command to the reference.

@@ -144,6 +144,15 @@ fn an_entry_needs_finite_values() {
 fn the_storage_is_one_entry_per_period_and_two() {
     assert_eq!(history_entries(1.0, 0.125), 10);
     assert_eq!(history_entries(1.1, 0.125), 11);
+    assert_eq!(history_entries(1e300, 1e-5), usize::MAX);
+}
+
+#[test]
+fn a_history_without_a_period_is_refused() {
+    for (span, period) in [(1.0, 0.0), (f64::INFINITY, 0.1), (f64::NAN, 0.1)] {
+        let storage = vec![Entry::<3>::BLANK; history_entries(span, period)];
+        assert!(History::new(span, period, storage).is_err());
+    }
 }
 
 #[test]

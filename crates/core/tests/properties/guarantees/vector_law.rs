@@ -254,7 +254,7 @@ fn supervised_walk(seed: u64, wanted: u64) -> Count {
     let (mut reference, mut time, mut ticks) = ([0.0; 3], 0.0, 0);
     let mut led = [0.0_f64; 3];
     let mut speed = [0.0; 3];
-    monitors.step(&mut checked, reference, None, time);
+    monitors.step(&mut checked, reference, None, time, |_, command| command);
     while checked.count.steps < wanted && ticks < 4 * wanted {
         time += PERIOD;
         ticks += 1;
@@ -282,7 +282,7 @@ fn supervised_walk(seed: u64, wanted: u64) -> Count {
                 *next += 40.0 * unit * random.within(-1.0, 1.0);
             }
         }
-        monitors.step(&mut checked, next, None, time);
+        monitors.step(&mut checked, next, None, time, |_, command| command);
         reference = next;
         for (dof, limit) in safety().width_limit.into_iter().enumerate() {
             let lead = (checked.law.command()[dof] - checked.reference[dof]).abs();

@@ -1,0 +1,53 @@
+"""The simulated robot of plays is any robot of a configuration."""
+
+import numpy as np
+import pytest
+from drawn import EXAMPLES
+from play_model import play
+from tautscope import PlayRig, Pose, Tip, axes, load_config, run_experiment
+from tautscope.config import Config
+from tautscope.errors import ConfigError
+from tautscope.loop.actuators import with_actuators
+from tautscope.report.operator_motion import motion_of
+from tautscope.runs.rigs import rig_maker
+
+
+def test_each_tip_is_a_play_with_gain_and_zero() -> None:
+    rig = PlayRig(axes(2, width_limit=[1.0, 2.0]), gains=[0.8, -1.1], zeros=[0.1, -0.2])
+    commands = np.random.default_rng(0).normal(0, 1, (200, 2)).cumsum(axis=0) / 5
+    rig.reset()
+    samples = [rig.step(command) for command in commands]
+    tips = np.array([sample.true_state for sample in samples])
+    for k, (half, gain, zero) in enumerate([(0.25, 0.8, 0.1), (0.5, -1.1, -0.2)]):
+        expected = zero + gain * play(commands[:, k], -half, half, start=0.0)
+        np.testing.assert_allclose(tips[:, k], expected, atol=1e-12)
+    seen = [one for sample in samples for one in sample.measurements]
+    errors = np.array([one.values - tips[round(one.captured_at / 0.005) - 2] for one in seen])
+    assert len(seen) == 40
+    assert (errors.std(axis=0) < [0.015, 0.03]).all()
+
+
+def test_motors_pose_and_what_does_not_move_the_tip() -> None:
+    config = load_config(EXAMPLES / "own_instrument.toml")
+    rig = with_actuators(PlayRig(config, delay=0.05), config)
+    rig.reset()
+    samples = [rig.step([0.5, 0.0, 0.0, 0.0, 0.8]) for _ in range(30)]
+    np.testing.assert_allclose(samples[-1].applied, [0.5, 0, 0, 0, 0.8], atol=1e-9)
+    np.testing.assert_allclose(samples[-1].true_state, [0.25, 0, 0, 0, 0.65], atol=1e-9)
+    first = next(sample for sample in samples if sample.measurements)
+    pose, jaw = first.measurements
+    assert isinstance(pose, Pose)
+    assert isinstance(jaw, Tip)
+    assert jaw.sensor == 1
+    assert np.isnan(jaw.values[:4]).all()
+    assert first.time - pose.captured_at == pytest.approx(0.05, abs=0.0051)
+
+
+def test_a_configuration_alone_is_a_rig() -> None:
+    config = load_config("colonoscope")
+    rig = rig_maker("tautscope:PlayRig")(config)
+    motion = motion_of(config, 1, 30.0)
+    runs = [run_experiment(rig, motion, config, on).tracking_rms(15.0) for on in (False, True)]
+    assert (runs[1] < 0.3 * runs[0]).all()
+    with pytest.raises(ConfigError, match=r"dof: got 'none'"):
+        PlayRig(Config())
