@@ -112,6 +112,7 @@ def test_demo_writes_a_run_folder_and_prints_one_json_object(
         "operator_motion.csv",
         "operator_motion.png",
         "operator_motion.pdf",
+        "film.gif",
         *(
             f"{name}{motion}{run}.{end}"
             for name, end in (("trace", "csv"), ("frames", "csv"), ("recording", "toml"))

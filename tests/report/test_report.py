@@ -70,19 +70,19 @@ def demo(runs: tuple[Recording, Recording]) -> Demo:
 
 def test_the_report_is_self_contained(demo: Demo) -> None:
     figure = CaptionedFigure(Figure(figsize=(2, 1)), "A <figure> of nothing.")
-    page_text = demo_report(demo, [figure])
+    page_text = demo_report(demo, [figure], b"GIF")
     page = Page(page_text)
     assert page.open == []
     assert {"script", "link", "iframe"}.isdisjoint(page.tags)
-    assert all(link.startswith("data:image/jpeg;base64,") for link in page.links)
-    assert len(page.links) == 1
-    image = base64.b64decode(page.links[0].partition(",")[2])
-    assert image.startswith(b"\xff\xd8\xff")
+    (film, image) = page.links
+    assert film == "data:image/gif;base64,R0lG"
+    assert image.startswith("data:image/jpeg;base64,")
+    assert base64.b64decode(image.partition(",")[2]).startswith(b"\xff\xd8\xff")
     assert not re.search(r"url\(|@import|https?:", page_text)
 
 
 def test_the_report_contains_the_results(demo: Demo) -> None:
-    page = Page(demo_report(demo, []))
+    page = Page(demo_report(demo, [], b""))
     for row in ROWS:
         assert row.title in page.text
     result = demo.results[0][Dof.INSERTION]
@@ -94,7 +94,7 @@ def test_the_report_contains_the_results(demo: Demo) -> None:
 
 
 def test_the_report_has_the_operator_motion(demo: Demo) -> None:
-    text = demo_report(demo, [])
+    text = demo_report(demo, [], b"")
     for row in OPERATOR_ROWS:
         assert f"<td>{row.title}</td>" in text
     assert text.count("<td>58 %<small>(50 %)</small></td>") == len(Dof)
@@ -111,12 +111,12 @@ def test_the_report_has_a_column_for_each_profile_that_was_run(demo: Demo) -> No
     both = replace(
         demo, config=demo.config.replace(profile="best"), seeds=(3, 4, 5), article_results=worse
     )
-    text = demo_report(both, [])
+    text = demo_report(both, [], b"")
     assert text.count("<th>paper</th><th>best</th>") == len(Dof)
     assert text.count("<td>12 %<small>(12 %)</small></td>") == len(Dof)
     assert "in 15 runs" in text  # of three seeds: three of the article, two of the operator
-    assert "<th>best</th>" not in demo_report(demo, [])
-    assert "in 8 runs" in demo_report(demo, [])
+    assert "<th>best</th>" not in demo_report(demo, [], b"")
+    assert "in 8 runs" in demo_report(demo, [], b"")
 
 
 def test_the_report_of_one_run_without_a_true_state(runs: tuple[Recording, Recording]) -> None:
@@ -185,7 +185,7 @@ def test_every_row_is_explained_and_a_missed_goal_is_named(demo: Demo) -> None:
     }
     best[Dof.ROTATION] = replace(best[Dof.ROTATION], reduction=0.95)
     text = demo_report(
-        replace(demo, config=demo.config.replace(profile="best"), results=(best, best)), []
+        replace(demo, config=demo.config.replace(profile="best"), results=(best, best)), [], b""
     )
     page = Page(text)
     for row in (*ROWS, *OPERATOR_ROWS):
@@ -194,7 +194,7 @@ def test_every_row_is_explained_and_a_missed_goal_is_named(demo: Demo) -> None:
     assert "<td>at most 2</td><td>holds</td>" in text
     assert "<td>at least 90 %</td><td>holds</td>" in text
     assert "<td>at most 2 mm, 0.5 rad, 0.25 rad</td><td>holds</td>" in text
-    assert "missed" not in demo_report(demo, []), "the goals are not those of profile paper"
+    assert "missed" not in demo_report(demo, [], b""), "the goals are not those of profile paper"
 
 
 def test_the_goals_are_those_of_the_benchmark(monkeypatch: pytest.MonkeyPatch) -> None:

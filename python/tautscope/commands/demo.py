@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 SPEED = 12.0
 """Simulated seconds per second and processor, measured on two shared cores in 2026."""
-START_TIME = 5.0
-"""Time for the start of the processes and for figures [s]."""
+START_TIME = 15.0
+"""Time for the start of the processes, for figures and for the film [s]."""
 BYTES_PER_SECOND = 80e3
 """Size of the run folder per simulated second of the first seed [byte/s]."""
 
@@ -225,4 +225,5 @@ def _print_facts(demo: Demo, folder: Path) -> None:
     screen.print(f"{demo.sim_seconds:.0f} s simulated in {demo.wall_seconds:.0f} s.")
     for line in demo.warnings:
         screen.print(f"Warning: {line}.", soft_wrap=True)
+    screen.print(f"Without and with compensation: {folder / 'film.gif'}", soft_wrap=True)
     screen.print(f"Report, figures and traces: {folder / 'report.html'}", soft_wrap=True)

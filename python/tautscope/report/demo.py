@@ -55,6 +55,12 @@ _OPERATOR_CAPTION = (
 )
 
 
+_FILM_CAPTION = (
+    "The same motion of an operator without and with compensation, in the twin's camera. The rings "
+    "are where the reference wants the two bands."
+)
+
+
 @dataclass(frozen=True)
 class Demo:
     """Results of ``tautscope demo``.
@@ -155,7 +161,7 @@ def write_run_folder(demo: Demo, folder: str | PathLike[str]) -> None:
 
     Files: config.toml, table1.csv, trace.csv and frames.csv (first seed, compensated), the same
     with _uncompensated, fig9.png, fig9.pdf, fig5.png; of the operator motion
-    operator_motion.csv, .png and .pdf, and trace and frames with _operator_motion and
+    operator_motion.csv, .png and .pdf, film.gif, and trace and frames with _operator_motion and
     _operator_motion_uncompensated; report.html.
 
     Raises:
@@ -164,6 +170,7 @@ def write_run_folder(demo: Demo, folder: str | PathLike[str]) -> None:
     # Matplotlib takes half a second to import.
     from tautscope.figure_style import style  # noqa: PLC0415
     from tautscope.report import figures  # noqa: PLC0415
+    from tautscope.report.film import write_film  # noqa: PLC0415
     from tautscope.report.operator_figure import draw_operator_motion  # noqa: PLC0415
 
     figure9 = figures.figure9(demo.uncompensated, demo.compensated, demo.article)
@@ -192,7 +199,9 @@ def write_run_folder(demo: Demo, folder: str | PathLike[str]) -> None:
             operator_figure.savefig(place / "operator_motion.pdf", metadata={"CreationDate": None})
             for each in captioned[1:-1]:
                 each.figure.savefig(place / "fig5.png")
-            page = demo_report(demo, captioned)
+        film = place / "film.gif"
+        write_film(film, demo.operator_uncompensated, demo.operator_compensated)
+        page = demo_report(demo, captioned, film.read_bytes())
         (place / "report.html").write_text(page, encoding="utf-8")
 
 
@@ -208,8 +217,8 @@ def _figure9_caption(demo: Demo) -> str:
     )
 
 
-def demo_report(demo: Demo, figures: Sequence[CaptionedFigure]) -> str:
-    """The page of ``tautscope demo``."""
+def demo_report(demo: Demo, figures: Sequence[CaptionedFigure], film: bytes) -> str:
+    """The page of ``tautscope demo``, with an animated GIF of the operator's motion."""
     seeds, profiles = demo.seeds, demo.by_profile
     several = len(seeds) > 1
     count = f"{len(seeds)} seeds" if several else "one seed"
@@ -224,7 +233,8 @@ def demo_report(demo: Demo, figures: Sequence[CaptionedFigure]) -> str:
     }
     return report.page(
         f"on a simulated instrument, camera images the only feedback; {count}",
-        f"""<h2>Table 1</h2>
+        f"""{report.embedded(film, "gif", _FILM_CAPTION)}
+<h2>Table 1</h2>
 <div class="wide">{report.results_table(profiles)}</div>
 <p class="note">{"Median over the seeds, the worst seed in brackets. " if several else ""}{
             " ".join(_PROFILES[name] for name in profiles)

@@ -275,9 +275,13 @@ def operator_table(results: Sequence[OperatorResults], rows: Sequence[Row]) -> s
 def _figure(captioned: CaptionedFigure) -> str:
     data = io.BytesIO()
     captioned.figure.savefig(data, format="jpg", dpi=170, pil_kwargs={"quality": 88})
-    code = base64.b64encode(data.getvalue()).decode()
-    caption = escape(captioned.caption)
+    return embedded(data.getvalue(), "jpeg", captioned.caption)
+
+
+def embedded(data: bytes, kind: str, caption: str) -> str:
+    """A figure of an encoded image, ``jpeg`` or ``gif``, in the page itself."""
+    code, text = base64.b64encode(data).decode(), escape(caption)
     return (
-        f'<figure><img alt="{caption}" src="data:image/jpeg;base64,{code}">'
-        f"<figcaption>{caption}</figcaption></figure>"
+        f'<figure><img alt="{text}" src="data:image/{kind};base64,{code}">'
+        f"<figcaption>{text}</figcaption></figure>"
     )
