@@ -128,13 +128,13 @@ enum TautscopeFlag
   : uint32_t
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
-    // The image is identical to an earlier one although the command has moved.
+    // An image or measurement repeats an earlier one although the command has moved.
     TAUTSCOPE_FLAG_FROZEN = 0,
-    // The frame was older than `frame_age` when it arrived.
+    // An image or measurement was older than `frame_age` when it arrived.
     TAUTSCOPE_FLAG_LATE = 1,
-    // The frame was captured no later than the one before it.
+    // An image or measurement was made no later than the one before it.
     TAUTSCOPE_FLAG_DUPLICATE = 2,
-    // No frame has arrived for longer than `frame_gap`.
+    // No image or measurement has arrived for longer than `frame_gap`.
     TAUTSCOPE_FLAG_DROPPED = 3,
     // A time is later than the control tick, goes back, or is not a number.
     TAUTSCOPE_FLAG_CLOCK = 4,
@@ -142,11 +142,11 @@ enum TautscopeFlag
     TAUTSCOPE_FLAG_INNOVATION = 5,
     // The image agrees with the prediction if its two markers are exchanged.
     TAUTSCOPE_FLAG_SWAPPED = 6,
-    // Only one marker was found, or one of the two is where it cannot be.
+    // Part of a measurement is missing or impossible: one of two markers, or values of a sensor.
     TAUTSCOPE_FLAG_MERGED = 7,
-    // No marker was found, or none that agrees with the prediction.
+    // Nothing was measured that agrees with the prediction: no marker, or no value of a sensor.
     TAUTSCOPE_FLAG_LOST = 8,
-    // Both markers were found, but they do not determine every degree of freedom.
+    // What was measured does not determine every degree of freedom.
     TAUTSCOPE_FLAG_UNOBSERVABLE = 9,
     // The rig reports that a drive does not follow its command.
     TAUTSCOPE_FLAG_FOLLOWING_ERROR = 10,
@@ -174,9 +174,9 @@ enum TautscopeFlag
     TAUTSCOPE_FLAG_TREMOR = 21,
     // The tip has moved farther than the reference since the reference turned.
     TAUTSCOPE_FLAG_OVERCOMPENSATION = 22,
-    // Reference and tip oscillate with growing amplitude.
+    // Reference and tip oscillate with growing swings.
     TAUTSCOPE_FLAG_LIMIT_CYCLE = 23,
-    // Images show the tip elsewhere than predicted: the slack has changed, the instrument was pushed, or images or commands are wrong.
+    // The tip is measured elsewhere than predicted: the slack has changed, the instrument was pushed, or measurements or commands are wrong.
     TAUTSCOPE_FLAG_SLACK_CHANGED = 24,
     // The images contradict the configured camera: its pose or principal point seems wrong by more than a degree.
     TAUTSCOPE_FLAG_GEOMETRY_OFF = 25,

@@ -293,13 +293,13 @@ pub struct TautscopeSupervision {
 #[repr(u32)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TautscopeFlag {
-    /// The image is identical to an earlier one although the command has moved.
+    /// An image or measurement repeats an earlier one although the command has moved.
     Frozen = 0,
-    /// The frame was older than `frame_age` when it arrived.
+    /// An image or measurement was older than `frame_age` when it arrived.
     Late = 1,
-    /// The frame was captured no later than the one before it.
+    /// An image or measurement was made no later than the one before it.
     Duplicate = 2,
-    /// No frame has arrived for longer than `frame_gap`.
+    /// No image or measurement has arrived for longer than `frame_gap`.
     Dropped = 3,
     /// A time is later than the control tick, goes back, or is not a number.
     Clock = 4,
@@ -307,11 +307,11 @@ pub enum TautscopeFlag {
     Innovation = 5,
     /// The image agrees with the prediction if its two markers are exchanged.
     Swapped = 6,
-    /// Only one marker was found, or one of the two is where it cannot be.
+    /// Part of a measurement is missing or impossible: one of two markers, or values of a sensor.
     Merged = 7,
-    /// No marker was found, or none that agrees with the prediction.
+    /// Nothing was measured that agrees with the prediction: no marker, or no value of a sensor.
     Lost = 8,
-    /// Both markers were found, but they do not determine every degree of freedom.
+    /// What was measured does not determine every degree of freedom.
     Unobservable = 9,
     /// The rig reports that a drive does not follow its command.
     FollowingError = 10,
@@ -339,9 +339,9 @@ pub enum TautscopeFlag {
     Tremor = 21,
     /// The tip has moved farther than the reference since the reference turned.
     Overcompensation = 22,
-    /// Reference and tip oscillate with growing amplitude.
+    /// Reference and tip oscillate with growing swings.
     LimitCycle = 23,
-    /// Images show the tip elsewhere than predicted: the slack has changed, the instrument was pushed, or images or commands are wrong.
+    /// The tip is measured elsewhere than predicted: the slack has changed, the instrument was pushed, or measurements or commands are wrong.
     SlackChanged = 24,
     /// The images contradict the configured camera: its pose or principal point seems wrong by more than a degree.
     GeometryOff = 25,
