@@ -16,9 +16,9 @@ from drive_settings import AXES, drives_config, drives_document
 from tautscope.config import Config, dump_config, from_document, load_config
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError
-from tautscope.hardware.cia402 import Scale
 from tautscope.hardware.drives import open_drives
 from tautscope.hardware.object_dictionary import device_profile, eds_text, load_eds
+from tautscope.hardware.scale import Scale
 
 
 def rotation(**changes: Any) -> dict[str, Any]:
