@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tautscope.config import DrivesConfig
+from tautscope.config.servos import PORTS
 from tautscope.dof import Dof
 from tautscope.errors import DriveError, SignalError, StateError
 from tautscope.extras import require_extras
@@ -58,6 +59,10 @@ def open_group(config: DrivesConfig) -> DriveGroup:
         from tautscope.hardware.ethercat_fieldbus import EthercatFieldbus  # noqa: PLC0415
 
         return Cia402Drives(config, EthercatFieldbus(config))
+    if config.protocol in PORTS:
+        from tautscope.hardware.servos.servo_drives import ServoDrives  # noqa: PLC0415
+
+        return ServoDrives(config)
     require_extras("CANopen", ["hardware"])
     from tautscope.hardware.canopen_fieldbus import CanopenFieldbus  # noqa: PLC0415
 

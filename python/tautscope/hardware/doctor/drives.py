@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 
 from tautscope.config import DrivesConfig
+from tautscope.config.servos import PORTS
 from tautscope.dof import Dof
 from tautscope.errors import DriveError, FieldError
 from tautscope.hardware.doctor.check_result import CheckResult, from_error, none_found
@@ -19,6 +20,8 @@ VIRTUAL_INTERFACES = ("virtual", "udp_multicast", "tautscope")
 """Interfaces of python-can without a physical bus."""
 BUILT_IN_PORT = "/dev/ttyS"
 """Prefix of serial ports that are no adapters."""
+SERIAL_DRIVERS = Path("/sys/bus/usb-serial/devices")
+"""Drivers of serial adapters, by the name of the port."""
 CYCLES = 50
 """Minimum number of set-points in the test of the answers."""
 
@@ -59,7 +62,7 @@ def check_drives(config: DrivesConfig) -> list[CheckResult]:
 
     Nothing is written to a drive that is enabled or in fault. A motor in quick stop stays held.
     """
-    name = "EtherCAT" if config.protocol == "ethercat" else config.interface
+    name = config.interface if config.protocol == "canopen" else config.protocol
     bus = f"bus {name} {config.channel}"
     try:
         group = open_group(config)
@@ -67,6 +70,7 @@ def check_drives(config: DrivesConfig) -> list[CheckResult]:
         return [from_error("drives", bus, error)]
     try:
         findings = [CheckResult("drives", bus, "ok", "open; no other master found")]
+        findings += _check_latency(config)
         findings += [_check_drive(group, config, dof) for dof in Dof]
         if any(finding.status == "missing" for finding in findings):
             return findings
@@ -85,6 +89,19 @@ def check_drives(config: DrivesConfig) -> list[CheckResult]:
     finally:
         group.close()
     return findings
+
+
+def _check_latency(config: DrivesConfig) -> list[CheckResult]:
+    """Check how long the driver of a serial adapter (FTDI) keeps answers of servos back."""
+    timer = SERIAL_DRIVERS / Path(config.channel).resolve().name / "latency_timer"
+    if config.protocol not in PORTS or not timer.is_file():
+        return []
+    found = int(timer.read_text(encoding="ascii"))
+    what = f"latency of {config.channel}"
+    if 1e-3 * found < config.reply_timeout / 2:
+        return [CheckResult("drives", what, "ok", f"{found} ms")]
+    todo = f"echo 1 | sudo tee {timer}; again after each time it is connected, or by a udev rule"
+    return [CheckResult("drives", what, "missing", f"{found} ms", todo)]
 
 
 def _check_drive(group: DriveGroup, config: DrivesConfig, dof: Dof) -> CheckResult:
@@ -138,14 +155,15 @@ def _check_answers(group: DriveGroup, config: DrivesConfig) -> CheckResult:
         answers = [one.answers for one in feedback]
         time.sleep(max(0.0, config.cycle - times[-1]))
     silent = [group.name(dof) for dof in Dof if not answers[dof]]
-    what = "heartbeats and answers"
+    what = "answers" if config.protocol in PORTS else "heartbeats and answers"
     data = {"cycles": len(times), "late": late, "median": statistics.median(times)}
     if silent:
         found = f"no answer to any of {len(times)} set-points from {', '.join(silent)}"
         todo = "Its PDOs are not as configured; power-cycle it"
         return CheckResult("drives", what, "missing", found, todo, data)
+    every = f"both ways every {1e3 * config.heartbeat_period:.0f} ms; "
     found = (
-        f"both ways every {1e3 * config.heartbeat_period:.0f} ms; {len(times)} set-points, "
+        f"{'' if config.protocol in PORTS else every}{len(times)} set-points, "
         f"answered in {1e3 * data['median']:.1f} ms (median), {1e3 * max(times):.1f} ms (worst), "
         f"{late} of {3 * len(times)} late"
     )
