@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from servo_settings import AXES, MODELS, START, servos_config
+from servo_settings import AXES, MODELS, START, servos_config, servos_document
 from tautscope.bench.servos import FaultKind, SimulatedServos
-from tautscope.config import DrivesConfig
+from tautscope.config import DrivesConfig, dump_config, from_document
 from tautscope.dof import Dof
 from tautscope.errors import (
     BusError,
@@ -27,7 +27,8 @@ from tautscope.errors import (
 )
 from tautscope.hardware.doctor.drives import check_drives
 from tautscope.hardware.drives import Drives, open_drives
-from waiting import until
+from test_processes import MASTER, process
+from waiting import TIMEOUT, until
 
 FAMILIES = pytest.mark.parametrize("protocol", ["dynamixel", "feetech"])
 SPEED = np.array([0.005, 0.5, 0.4])
@@ -146,6 +147,24 @@ def test_fault_while_running_stops_all_motors(
         until(lambda: goals_are_positions(servos))
         with pytest.raises(StateError, match="before start\\(\\) or after stop"):
             drives.exchange([0, 0, 0])
+
+
+@FAMILIES
+def test_killed_host(protocol: str, tmp_path: Path) -> None:
+    """A Dynamixel stops by its bus watchdog, a Feetech at its last set-point; both hold."""
+    config = from_document({"drives": servos_document(protocol, tmp_path)})
+    file = tmp_path / "rig.toml"
+    file.write_text(dump_config(config), encoding="utf-8")
+    assert config.drives is not None
+    with SimulatedServos(config.drives, start=START) as servos:
+        with process(MASTER, str(file), "signal") as (master, output):
+            output._queue.get(timeout=TIMEOUT)  # it moves
+            master.kill()
+            master.wait(TIMEOUT)
+        if protocol == "dynamixel":
+            until(lambda: sum(one.what == "bus watchdog" for one in servos.events) == 3)
+        until(lambda: goals_are_positions(servos))
+        assert all(one.get(one.family.torque) for one in servos.servos)
 
 
 @FAMILIES

@@ -12,6 +12,7 @@ from typing import Any
 
 import dynamixel_sdk as dynamixel
 import pytest
+import rustypot
 import scservo_sdk as feetech
 from hypothesis import given
 from hypothesis import strategies as st
@@ -173,6 +174,22 @@ def test_stored_settings_of_a_locked_feetech_are_lost_with_its_power(sts: Line) 
         until(lambda count=count: any(e.what == "restart" for e in servos.events[count:]))
         assert packets.read1ByteTxRx(port, 2, 7)[0] == kept
         servos.clear(Dof.ROTATION)
+
+
+def test_ids_are_set_as_the_documentation_says(tmp_path: Path) -> None:
+    for protocol, controller in (
+        ("dynamixel", rustypot.Xl330PyController),
+        ("feetech", rustypot.Sts3215PyController),
+    ):
+        folder = tmp_path / protocol
+        folder.mkdir()
+        config = servos_config(protocol, folder)
+        with SimulatedServos(config, start=START) as servos:
+            bus = rustypot.Bus(config.channel, 1_000_000, 1.0, {})
+            bus.change_id(controller.definition(), 1, 17)
+            assert sorted(bus.scan(controller.definition(), range(1, 21))) == [2, 3, 17]
+            bus.close()
+            assert servos.servos[0].stored[7 if protocol == "dynamixel" else 5] == 17
 
 
 def test_crc_is_that_of_the_manual() -> None:

@@ -43,7 +43,7 @@ class SimulatedServo:
         self, axis: AxisConfig, label: str, protocol: str, log: Callable[[float, str], None]
     ) -> None:
         self.family = FAMILIES[protocol]
-        self.id = axis.node
+        self.first_id = axis.node
         self.model = MODELS[axis.model or ""]
         self.scale = Scale(axis, label)
         self.rules: Rules = _RULES[protocol]
@@ -61,6 +61,11 @@ class SimulatedServo:
         self._heard_at = 0.0
         self.rules.defaults(self)
         self.stored[:] = self.memory
+
+    @property
+    def id(self) -> int:
+        """Its id, in its memory."""
+        return self.memory[7 if self.family.alert else 5]
 
     def restart(self, now: float) -> None:
         """Power on: without torque, turns, and settings that are not stored."""
@@ -167,7 +172,7 @@ _RANGES = {11: (0, 16), 64: (0, 1), 68: (0, 2), 98: (0, 127)}
 
 class _DynamixelRules:
     def defaults(self, servo: SimulatedServo) -> None:
-        identity = {(0, 2): servo.model.number, (6, 1): 48, (7, 1): servo.id, (8, 1): 3}
+        identity = {(0, 2): servo.model.number, (6, 1): 48, (7, 1): servo.first_id, (8, 1): 3}
         stored = {(9, 1): 250, (11, 1): 3, (13, 1): 2, (36, 2): 885, (48, 4): 4095, (63, 1): 0x35}
         _fill(servo.memory, identity | stored)
         _fill(servo.memory, {(68, 1): 2, (100, 2): 885, (144, 2): 50, (146, 1): 31})
@@ -203,7 +208,7 @@ class _DynamixelRules:
 
 class _FeetechRules:
     def defaults(self, servo: SimulatedServo) -> None:
-        identity = {(0, 1): 3, (1, 1): 10, (3, 2): servo.model.number, (5, 1): servo.id}
+        identity = {(0, 1): 3, (1, 1): 10, (3, 2): servo.model.number, (5, 1): servo.first_id}
         stored = {(7, 1): 250, (8, 1): 1, (11, 2): 4095, (16, 2): 1000, (18, 1): 0x0C}
         _fill(servo.memory, identity | stored)
         _fill(servo.memory, {(48, 2): 1000, (55, 1): 1, (62, 1): 74, (63, 1): 30})

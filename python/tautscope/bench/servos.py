@@ -221,13 +221,13 @@ class SimulatedServos:
             )
         at = now + self._wire_time(packet.size)
         for servo in servos:
-            error, data = CHECKSUM, b""
+            name, (error, data) = servo.id, (CHECKSUM, b"")  # a new id holds from the next packet
             if packet.is_intact:
                 error, data = self._carry_out(servo, packet, now)
             elif not self._is_v2:
                 continue
             if answers:
-                raw = self._codec.status(servo.id, error * self._is_v2 or servo.error, data)
+                raw = self._codec.status(name, error * self._is_v2 or servo.error, data)
                 at += self._wire_time(len(raw))
                 late = self._faults[Dof(self.servos.index(servo))].get("delay", 0.0)
                 heapq.heappush(self._answers, (at + late, next(self._order), raw))
