@@ -8,6 +8,7 @@ of goals, sync read), and by the clock when no client cycles.
 
 from __future__ import annotations
 
+import fcntl
 import heapq
 import itertools
 import os
@@ -127,6 +128,7 @@ class SimulatedServos:
         self._thread.join()
         self._link.unlink(missing_ok=True)
         os.close(self._line)
+        os.close(self._lock)
         if self._failure is not None:
             raise self._failure
 
@@ -134,8 +136,11 @@ class SimulatedServos:
         line, end = os.openpty()
         try:
             tty.setraw(end)
-            if self._link.is_symlink() and not self._link.exists():
-                self._link.unlink()  # of a bench that was killed
+            # The lock ends with the process; a link of one that was killed stays.
+            self._lock = os.open(f"{self._link}.lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if self._link.is_symlink():
+                self._link.unlink()
             self._link.symlink_to(os.ttyname(end))
         except OSError as error:
             os.close(line)

@@ -165,7 +165,7 @@ def check_topics(
 
 _OF_CIA_402 = ("interface", "options", "lead_points", "master_node", "heartbeat_period", "waive")
 """Keys of [drives] that servos do not use."""
-_OF_SERVOS = ("model", "homing_offset", "torque_limit")
+_OF_SERVOS = ("model", "homing_offset", "stops", "torque_limit")
 """Keys of a motor that only servos use."""
 
 
@@ -191,6 +191,9 @@ def _check_drives(drives: DrivesConfig) -> None:
             known = axis.model in models_of(drives.protocol)
             _require(known, f"{path}.model", axis.model, allowed)
             _require_defaults(axis, path, ("eds",), "servos do not use it")
+            lower, upper = axis.stops or (-math.inf, math.inf)
+            inside = lower <= axis.travel[0] and axis.travel[1] <= upper
+            _require(inside, f"{path}.travel", axis.travel, f"within stops = {axis.stops}")
         else:
             _require_defaults(axis, path, _OF_SERVOS, "only servos use it")
         _require(

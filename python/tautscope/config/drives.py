@@ -42,6 +42,9 @@ class AxisConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """Model of a servo, which must be the connected one; other drives have none."""
     homing_offset: Annotated[int, Meta(ge=-2047, le=2047)] = 0
     """What the servo itself adds to its position, set in the servo [counts]."""
+    stops: tuple[float, float] | None = None
+    """Mechanical stops of a servo [m or rad], found by `tautscope calibrate stops`; `travel` lies
+    between them."""
     torque_limit: Annotated[float, Meta(gt=0, le=1)] = 1.0
     """Share of its largest motor voltage (Dynamixel, goal PWM) or torque (Feetech) that a servo
     uses, set in the servo."""
