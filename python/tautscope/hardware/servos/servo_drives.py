@@ -8,36 +8,19 @@ says what moves after the end of the host.
 
 from __future__ import annotations
 
-import logging
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeVar
 
 from tautscope.config import DrivesConfig
-from tautscope.config.servos import COUNTS_PER_TURN, MODELS
 from tautscope.dof import Dof
-from tautscope.errors import (
-    DriveError,
-    EmergencyError,
-    ModeRefusedError,
-    SettingRefusedError,
-    SilentDriveError,
-    StateError,
-)
+from tautscope.errors import DriveError, EmergencyError, StateError
 from tautscope.hardware.drive_group import CommissionedDrive, DriveStatus
-from tautscope.hardware.scale import Scale
-from tautscope.hardware.servos.families import FAMILIES, Register, Setting
+from tautscope.hardware.servos.families import FAMILIES, Register
 from tautscope.hardware.servos.line import NoAnswerError, ServoLine
+from tautscope.hardware.servos.servo import Servo
 
-T = TypeVar("T")
-_LOG = logging.getLogger(__name__)
 _WATCHDOG_UNIT = 0.02
 """Unit of the bus watchdog [s]."""
-_FAULT_REMEDY = (
-    "Find the cause (load, supply, temperature; docs/hardware.md), then power-cycle it or start "
-    "with reset_faults"
-)
 
 
 @dataclass(slots=True)
@@ -68,8 +51,9 @@ class ServoDrives:
     def __init__(self, config: DrivesConfig) -> None:
         self._config = config
         self._family = family = FAMILIES[config.protocol]
-        self._ids = [config[dof].node for dof in Dof]
         self._line = ServoLine(config, family)
+        self._servos = [Servo(config, dof, self._line) for dof in Dof]
+        self._ids = [servo.id for servo in self._servos]
         self._feedback = [ServoFeedback() for _ in Dof]
         self._goals = [0, 0, 0]
         self._sent_at = 0.0
@@ -79,74 +63,26 @@ class ServoDrives:
 
     def name(self, dof: Dof) -> str:
         """See `DriveGroup.name`."""
-        return f"{dof.label}, servo {self._ids[dof]}"
+        return self._servos[dof].name
 
     def serial_number(self, dof: Dof) -> str:
         """Servos have none."""
         return ""
 
     def status(self, dof: Dof) -> DriveStatus:
-        """Read model, torque, faults, voltage, temperature and position."""
-        family, wanted = self._family, self._config[dof].model or ""
-        number = self._read(dof, family.model)
-        position, torque = self._read(dof, family.position), self._read(dof, family.torque)
-        faults = self._read(dof, family.faults)
-        voltage = self._read(dof, family.voltage) / 10
-        temperature = self._read(dof, family.temperature)
-        names = family.faults_in(faults)
-        problem = ""
-        if number != MODELS[wanted].number:
-            problem = self._wrong_model(dof, number)[1]
-        elif faults:
-            problem = _FAULT_REMEDY
-        state = f"fault: {', '.join(names) or hex(faults)}" if faults else "no fault"
-        return DriveStatus(
-            position,
-            f"{_model_name(number)}; torque {'on' if torque else 'off'}; {state}; "
-            f"{voltage:.1f} V; {temperature} °C",
-            problem,
-            data={
-                "model": number,
-                "torque": bool(torque),
-                "faults": names,
-                "voltage": voltage,
-                "temperature": temperature,
-            },
-        )
+        """See `Servo.status`."""
+        return self._servos[dof].status()
 
     def commission(self, dof: Dof) -> CommissionedDrive:
-        """Set the mode for several turns, speed and torque limit, and read them back.
-
-        Raises:
-            ModeRefusedError: It is another model.
-            StateError: A stored setting differs while the torque is on.
-            SettingRefusedError: A setting was refused, or reads back differently.
-        """
-        axis, name = self._config[dof], self.name(dof)
-        number = self._read(dof, self._family.model)
-        if number != MODELS[axis.model or ""].number:
-            raise ModeRefusedError(name, *self._wrong_model(dof, number))
-        scale = Scale(axis, dof.label)
-        furthest = max(map(abs, scale.travel_counts()))
-        if furthest > self._family.largest:
-            raise SettingRefusedError(
-                name,
-                f"drives.{dof.label}.travel is up to {furthest} counts from 0",
-                f"It counts to {self._family.largest}: correct travel, home or counts_per_unit",
-            )
-        settings = self._family.settings(axis, scale.speed_counts())
-        for setting in settings:
-            self._set(dof, setting)
-        _LOG.info("%s: %s, settings read back", name, axis.model)
-        values = {str(one.register): one.value for one in settings}
-        return CommissionedDrive(name, 0, number, self._family.mode, values)
+        """See `Servo.commission`."""
+        return self._servos[dof].commission()
 
     def configure(self) -> None:
         """Nothing: the bus watchdog is set when the motors are enabled."""
 
     def read_positions(self) -> list[int]:
         """See `DriveGroup.read_positions`."""
-        return [self._read(dof, self._family.position) for dof in Dof]
+        return [servo.read(self._family.position) for servo in self._servos]
 
     def start(self, positions: list[int]) -> None:
         """See `DriveGroup.start`."""
@@ -165,22 +101,23 @@ class ServoDrives:
         """See `DriveGroup.enable`."""
         family = self._family
         self._line.set_timeout(self._config.request_timeout)
-        for dof in Dof:
-            if faults := self._read(dof, family.faults):
+        for dof, servo in zip(Dof, self._servos, strict=True):
+            if faults := servo.read(family.faults):
                 if not reset_faults:
-                    raise StateError(self.name(dof), *self._fault(faults))
-                self._reset_fault(dof)
-        for dof in Dof:
+                    raise StateError(servo.name, *servo.fault(faults))
+                self._goals[dof] = servo.reset_fault(self._goals[dof])
+        for servo, goal in zip(self._servos, self._goals, strict=True):
             self._was_enabled = self._is_moving = True
-            self._write(dof, family.goal, self._goals[dof])
-            self._write(dof, family.torque, 1)
-            if not self._read(dof, family.torque):
+            servo.may_search = False
+            servo.write(family.goal, goal)
+            servo.write(family.torque, 1)
+            if not servo.read(family.torque):
                 raise StateError(
-                    self.name(dof), "its torque stays off", "Check its supply; power-cycle it"
+                    servo.name, "its torque stays off", "Check its supply; power-cycle it"
                 )
             if family.watchdog is not None:
                 units = -(-self._config.heartbeat_timeout // _WATCHDOG_UNIT)
-                self._write(dof, family.watchdog, max(1, int(units)))
+                servo.write(family.watchdog, max(1, int(units)))
         self.start(self._goals)
         return self.exchange(self._goals)
 
@@ -234,9 +171,8 @@ class ServoDrives:
         try:
             self._line.set_timeout(self._config.reply_timeout)
             while pending and time.monotonic() < deadline:
-                if (
-                    self._family.watchdog is not None
-                ):  # it makes goals read-only once it has tripped
+                # Goals are read-only once the watchdog has tripped.
+                if self._family.watchdog is not None:
                     self._line.write_all(dict.fromkeys(self._ids, 0), self._family.watchdog)
                 self._line.write_all(dict(zip(self._ids, values, strict=True)), register)
                 for dof in sorted(pending):
@@ -282,95 +218,10 @@ class ServoDrives:
             return None
 
     def _check_faults(self, dof: Dof, error: int) -> None:
-        faults = error
+        faults, servo = error, self._servos[dof]
         if self._family.alert:
             if not error & self._family.alert:
                 return
-            faults = self._read(dof, self._family.faults)
+            faults = servo.read(self._family.faults)
         if faults:
-            raise EmergencyError(self.name(dof), *self._fault(faults))
-
-    def _fault(self, faults: int) -> tuple[str, str]:
-        names = ", ".join(self._family.faults_in(faults)) or "unknown"
-        return f"it reports a fault: {names} (0x{faults:02X})", _FAULT_REMEDY
-
-    def _reset_fault(self, dof: Dof) -> None:
-        """Restart a Dynamixel; a Feetech clears its faults when the torque is switched off."""
-        if self._family.alert:
-            self._ask(dof, self._line.reboot)
-            deadline = time.monotonic() + self._config.state_timeout
-            while self._try_read(self._ids[dof]) is None and time.monotonic() < deadline:
-                pass
-            self.commission(dof)
-        else:
-            self._write(dof, self._family.torque, 0)
-        if faults := self._read(dof, self._family.faults):
-            raise StateError(self.name(dof), *self._fault(faults))
-        position = self._read(dof, self._family.position)
-        if abs(position - self._goals[dof]) > COUNTS_PER_TURN / 2:
-            raise StateError(
-                self.name(dof),
-                f"its position changed from {self._goals[dof]} to {position} counts by the reset",
-                f"It has forgotten its turns: correct drives.{dof.label}.home",
-            )
-        self._goals[dof] = position
-
-    def _set(self, dof: Dof, setting: Setting) -> None:
-        """Write a setting if it differs, and read it back; EEPROM wears out."""
-        register, family = setting.register, self._family
-        found = self._read(dof, register)
-        wanted = found & ~setting.bits | setting.value
-        if found == wanted:
-            return
-        if setting.is_stored and self._read(dof, family.torque):
-            raise StateError(
-                self.name(dof),
-                f"{register} is {found} and must become {wanted}, but its torque is on",
-                "Let nothing depend on the torque, and power-cycle it",
-            )
-        locks = setting.is_stored and family.lock is not None
-        if locks and family.lock is not None:
-            self._write(dof, family.lock, 0)
-        self._write(dof, register, wanted)
-        if locks and family.lock is not None:
-            self._write(dof, family.lock, 1)
-        if (found := self._read(dof, register)) != wanted:
-            raise SettingRefusedError(
-                self.name(dof),
-                f"{register} was set to {wanted} and reads back {found}",
-                "Look up in its manual which values it accepts, and in which state",
-            )
-
-    def _wrong_model(self, dof: Dof, number: int) -> tuple[str, str]:
-        wanted = self._config[dof].model or ""
-        return (
-            f"it is a {_model_name(number)}, not a {wanted} ({MODELS[wanted].number})",
-            f"Correct drives.{dof.label}.model or drives.{dof.label}.node",
-        )
-
-    def _read(self, dof: Dof, register: Register) -> int:
-        data, _ = self._ask(
-            dof, lambda servo: self._line.read(servo, register.address, register.size)
-        )
-        return register.decode(data)
-
-    def _write(self, dof: Dof, register: Register, value: int) -> None:
-        self._ask(dof, lambda servo: self._line.write(servo, register, value))
-
-    def _ask(self, dof: Dof, transfer: Callable[[int], T]) -> T:
-        try:
-            return transfer(self._ids[dof])
-        except NoAnswerError:
-            what = "no answer"
-            remedy = "Check its supply and cable"
-            if not self._is_moving:
-                remedy = (
-                    f"Check its supply and cable, drives.{dof.label}.node and drives.bitrate: "
-                    f"{self._line.search()}"
-                )
-            raise SilentDriveError(self.name(dof), what, remedy) from None
-
-
-def _model_name(number: int) -> str:
-    names = [name for name, model in MODELS.items() if model.number == number]
-    return f"{names[0] if names else 'model unknown here'} ({number})"
+            raise EmergencyError(servo.name, *servo.fault(faults))
