@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import signal
+import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -17,10 +19,12 @@ from tautscope.bench.servos import SimulatedServos
 from tautscope.cli import main
 from tautscope.config import Config, dump_config, from_document, load_config
 from tautscope.config.root import to_document
+from tautscope.console.messages import Received, Servo
+from tautscope.console.rig_control import RigControl
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError
 from tautscope.hardware.experiment import run_on_hardware
-from tautscope.hardware.rig import require_drives
+from tautscope.hardware.rig import HardwareRig, require_drives
 from tautscope.runs.recording import per_dof
 from test_bench import RUN
 from test_processes import Lines, process
@@ -104,6 +108,31 @@ def test_doctor_jog_and_a_fault_by_name(
             lines.until("fault: overload")
             assert running.wait(TIMEOUT) in (3, 4)  # before or after the loop began
             assert "rotation, servo 2: it reports a fault: overload" in running.stderr.read()
+
+
+def test_the_console_enables_and_stops_servos(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tautscope.console.operator_input.COMMAND_TIMEOUT", TIMEOUT)
+    config = bench_config("dynamixel", tmp_path)
+    with running_bench(config, tmp_path) as (_, _, lines), ThreadPoolExecutor(1) as executor:
+        control = RigControl(config, HardwareRig(config), tmp_path / "console", executor)
+        control.lease.take(1)
+        now = time.monotonic()
+        servo = Servo(control.lease.number, 1, 0, (0.0, 0.0, 0.0), False)
+        control.operator.receive(Received(1, now, servo), now)
+        try:
+            control.open()
+            lines.until("torque on", 3)
+            assert control.run is not None, control.fault
+            for _ in range(3):
+                control.run.tick()
+                control.run.step()
+            control.stop("STOP")
+            assert control.run is None
+            assert control.fault == "STOP"
+        finally:
+            control.shut_down()
 
 
 def test_the_bench_is_no_device_and_survives_the_end_of_another(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 from tautscope.config import DrivesConfig
 from tautscope.config.servos import PORTS
 from tautscope.dof import Dof
-from tautscope.errors import DriveError, FieldError
+from tautscope.errors import DriveError, TautscopeError
 from tautscope.hardware.doctor.check_result import CheckResult, from_error, none_found
 from tautscope.hardware.drive_group import CommissionedDrive, DriveGroup
 from tautscope.hardware.drives import open_group
@@ -66,7 +66,7 @@ def check_drives(config: DrivesConfig) -> list[CheckResult]:
     bus = f"bus {name} {config.channel}"
     try:
         group = open_group(config)
-    except (DriveError, FieldError) as error:
+    except TautscopeError as error:
         return [from_error("drives", bus, error)]
     try:
         findings = [CheckResult("drives", bus, "ok", "open; no other master found")]
