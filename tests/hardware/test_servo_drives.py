@@ -224,7 +224,7 @@ def test_fault_persists_until_it_is_reset(protocol: str, tmp_path: Path) -> None
     ("changes", "error", "message"),
     [
         ({"node": 9}, SilentDriveError, "rotation.node.*ids 1, 2, 3 answer at 1000000"),
-        ({"model": None}, ModeRefusedError, "it is a .* not a .*Correct drives.rotation.model"),
+        ({}, ModeRefusedError, "it is a .* not a .*Correct drives.rotation.model"),
         ({"travel": [-1e4, 0.0]}, SettingRefusedError, "It counts to"),
     ],
     ids=["id", "model", "turns"],
@@ -236,14 +236,11 @@ def test_wrong_configuration_is_named_before_anything_moves(
     error: type[DriveError],
     message: str,
 ) -> None:
-    other = {"dynamixel": "XL430-W250", "feetech": "STS3215"}[protocol]
-    if changes == {"model": None}:
-        if protocol == "feetech":
-            pytest.skip("one model is known")
-        changes = {"model": other}
     rotation = AXES["rotation"] | {"model": MODELS[protocol]} | changes
     config = servos_config(protocol, tmp_path, rotation=rotation, request_timeout=0.1)
     with SimulatedServos(servos_config(protocol, tmp_path), start=START) as servos:
+        if not changes:  # another model is connected
+            servos.servos[1].set(servos.servos[1].family.model, 2825)
         with pytest.raises(error, match=message):
             open_drives(config)
         findings = {one.what: one for one in check_drives(config) if one.status == "missing"}
