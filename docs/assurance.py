@@ -36,7 +36,10 @@ CONTROLS = {
         "crates/core/src/supervision/reference_gate.rs",
     ],
     "C4": ["crates/core/src/article/compensator.rs"],
-    "D1": ["python/tautscope/hardware/drive_monitor.py"],
+    "D1": [
+        "python/tautscope/hardware/cia402_drives.py",
+        "python/tautscope/hardware/servos/servo_drives.py",
+    ],
     "D2": ["python/tautscope/hardware/canopen_master.py"],
     "D3": ["python/tautscope/hardware/following_error.py"],
     "D4": ["python/tautscope/hardware/commissioning.py"],
@@ -87,14 +90,15 @@ PURPOSE = {
     "canopen": "SDO transfers and EDS files of drives",
     "python-can": "CAN frames: set-points, heartbeats, quick stop",
     "pysoem": "EtherCAT master",
+    "rustypot": "packets of Dynamixel and Feetech servos",
     "dask": "benchmarks on a cluster",
     "eclipse-zenoh": "messages of ROS 2, in the process of the loop",
     "rosbags": "types, hashes and CDR of ROS 2",
     "websockets": "web server of the console, in a process of its own",
 }
 """Python package -> what this software uses it for."""
-LICENCES = {"pysoem": "MIT License"}
-"""Licence of packages that a clone does not install."""
+LICENCES = {"pysoem": "MIT License", "rustypot": "Apache-2.0"}
+"""Licence of packages that a clone does not install, or whose metadata do not name it."""
 
 TRACEABILITY = """# Traceability
 

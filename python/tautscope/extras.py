@@ -14,6 +14,7 @@ MODULES = {
     "ros2": ("cv2", "mcap", "rosbags", "zenoh"),
     "hardware": ("av", "can", "canopen", "cv2", "matplotlib", "mcap", "polars", "rich"),
     "ethercat": ("pysoem",),
+    "servo": ("rustypot",),
     "cluster": ("dask", "distributed"),
 }
 """Extra -> modules that it installs for import."""

@@ -16,9 +16,9 @@ from drive_settings import AXES, drives_config, drives_document
 from tautscope.config import Config, dump_config, from_document, load_config
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError
-from tautscope.hardware.cia402 import Scale
 from tautscope.hardware.drives import open_drives
 from tautscope.hardware.object_dictionary import device_profile, eds_text, load_eds
+from tautscope.hardware.scale import Scale
 
 
 def rotation(**changes: Any) -> dict[str, Any]:
@@ -118,10 +118,71 @@ def test_import_loads_no_bus_library() -> None:
     assert done.returncode == 0, done.stderr
 
 
-def test_documented_configuration_is_valid() -> None:
+def test_documented_configurations_are_valid() -> None:
     page = ROOT / "docs" / "hardware.md"
-    (block,) = re.findall(r"```toml\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
-    drives = from_document(tomllib.loads(block)).drives
-    assert drives is not None
+    blocks = re.findall(r"```toml\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+    of_can, *of_servos = (from_document(tomllib.loads(block)).drives for block in blocks)
+    assert of_can is not None
     # 4096 counts per turn, gear ratio 20:1, divided by 2 pi.
-    assert drives.rotation.counts_per_unit == pytest.approx(4096 * 20 / (2 * math.pi), rel=1e-5)
+    assert of_can.rotation.counts_per_unit == pytest.approx(4096 * 20 / (2 * math.pi), rel=1e-5)
+    assert [one.protocol for one in of_servos if one] == ["dynamixel", "feetech"]
+    for block, drives in zip(blocks[1:], of_servos, strict=True):
+        assert len(block.splitlines()) <= 15
+        assert drives is not None
+        for dof in Dof:  # every travel begins within the first turn
+            assert 0 <= Scale(drives[dof], dof.label).to_counts(0.0) < 4096
+
+
+SERVO = {
+    "protocol": "feetech",
+    "insertion": {"node": 1, "model": "STS3215", "counts_per_unit": 1e5, "travel": [0.0, 0.04]},
+    "rotation": {"node": 2, "model": "STS3215", "travel": [-3.0, 3.0]},
+    "bending": {"node": 3, "model": "STS3215", "travel": [0.0, 2.0]},
+}
+
+
+def test_servos_have_defaults_in_units_of_the_dof() -> None:
+    drives = from_document({"drives": SERVO}).drives
+    assert drives is not None
+    assert drives.channel == "/dev/ttyACM0"
+    # 0.8 of 50 turns per minute; a turn of rotation is 2 pi rad, one of insertion 40.96 mm.
+    assert drives.rotation.speed_limit == pytest.approx(0.8 * 50 / 60 * 2 * math.pi)
+    assert drives.insertion.speed_limit == pytest.approx(0.8 * 50 / 60 * 40.96e-3)
+    assert drives.bending.following_error == pytest.approx(math.radians(5.625))
+
+
+@pytest.mark.parametrize(
+    ("changes", "field", "message"),
+    [
+        ({"rotation": {"node": 2, "travel": [0, 1]}}, "drives.rotation.model", "one of STS3215"),
+        ({"rotation": SERVO["rotation"] | {"model": "XL330-M288"}}, "drives.rotation.model", "STS"),  # type: ignore[operator]
+        ({"rotation": SERVO["rotation"] | {"eds": "x"}}, "drives.rotation.eds", "servos do not"),  # type: ignore[operator]
+        (
+            {"rotation": SERVO["rotation"] | {"torque_limit": 1.5}},
+            "drives.rotation.torque_limit",
+            "1",
+        ),  # type: ignore[operator]
+        (
+            {"insertion": {"node": 1, "model": "STS3215", "travel": [0, 1]}},
+            "drives.insertion.counts_per_unit",
+            "no default",
+        ),
+        ({"interface": "slcan"}, "drives.interface", "servos do not use it"),
+        ({"waive": ["6007"]}, "drives.waive", "servos do not use it"),
+    ],
+)
+def test_error_names_the_invalid_field_of_servos(
+    changes: dict[str, Any], field: str, message: str
+) -> None:
+    with pytest.raises(ConfigError) as found:
+        from_document({"drives": SERVO | changes})
+    assert found.value.field == field
+    assert message in found.value.allowed
+
+
+@pytest.mark.parametrize(
+    "changes", [{"model": "STS3215"}, {"homing_offset": 3}, {"torque_limit": 0.5}]
+)
+def test_cia_402_drives_have_no_keys_of_servos(changes: dict[str, Any]) -> None:
+    with pytest.raises(ConfigError, match="only servos use it"):
+        from_document({"drives": drives_document(**rotation(**changes))})

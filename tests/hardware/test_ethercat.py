@@ -25,6 +25,7 @@ from tautscope.errors import (
     StateError,
 )
 from tautscope.hardware.cia402 import STOPPED_STATES, Mode, State
+from tautscope.hardware.cia402_drives import Cia402Drives
 from tautscope.hardware.drives import Drives
 from tautscope.hardware.ethercat_fieldbus import EthercatFieldbus
 
@@ -193,7 +194,7 @@ def states(master: Master) -> set[State]:
 @pytest.mark.parametrize("mode", [8, 7])
 def test_motors_follow_and_stop(mode: int) -> None:
     soem, master, config = line((mode,))
-    with Drives(config, EthercatFieldbus(config, soem)) as drives:
+    with Drives(config, Cia402Drives(config, EthercatFieldbus(config, soem))) as drives:
         assert {one.mode for one in drives.commissioned} == {Mode(mode)}
         assert {slave.watchdog for slave in master.slaves} == {("processdata", 20.0)}
         command = drives.start()
@@ -213,7 +214,7 @@ def test_motors_follow_and_stop(mode: int) -> None:
 
 
 def running(soem: Any, config: DrivesConfig) -> Drives:
-    drives = Drives(config, EthercatFieldbus(config, soem))
+    drives = Drives(config, Cia402Drives(config, EthercatFieldbus(config, soem)))
     drives.start()
     return drives
 
@@ -260,20 +261,20 @@ def test_missing_adapter_and_devices() -> None:
 def test_refused_settings_and_states() -> None:
     soem, master, config = line((1, 3))
     with pytest.raises(ModeRefusedError, match="neither"):
-        Drives(config, EthercatFieldbus(config, soem))
+        Drives(config, Cia402Drives(config, EthercatFieldbus(config, soem)))
     assert master.open_on is None
 
     soem, master, config = line()
     for slave in master.slaves:
         del slave.drive.entries[0x607D, 1]
     with pytest.raises(SettingRefusedError, match="add 607D"):
-        Drives(config, EthercatFieldbus(config, soem))
+        Drives(config, Cia402Drives(config, EthercatFieldbus(config, soem)))
 
     soem, master, config = line()
     master.slaves[0].is_silent = True
     with pytest.raises(SilentDriveError, match="insertion, device 1"):
-        Drives(config, EthercatFieldbus(config, soem))
+        Drives(config, Cia402Drives(config, EthercatFieldbus(config, soem)))
 
     soem, master, config = line(stuck_in=PREOP)
     with pytest.raises(StateError, match=r"safe-operational is not reached.*AL status 0x001B"):
-        Drives(config, EthercatFieldbus(config, soem))
+        Drives(config, Cia402Drives(config, EthercatFieldbus(config, soem)))

@@ -70,7 +70,7 @@ def test_another_process_holds_the_lock_until_it_is_killed(bus: DrivesConfig) ->
 
 def test_drives_are_not_opened_twice(bus: DrivesConfig, monkeypatch: pytest.MonkeyPatch) -> None:
     opened: list[DrivesConfig] = []
-    monkeypatch.setattr(drives_module, "open_fieldbus", opened.append)
+    monkeypatch.setattr(drives_module, "open_group", opened.append)
     with RigLock(bus), pytest.raises(SecondMasterError):
         open_drives(bus)
     assert opened == []
@@ -82,7 +82,7 @@ def test_a_lock_is_released_when_the_bus_cannot_be_opened(
     def fail(config: DrivesConfig) -> None:
         raise RuntimeError(config.channel)
 
-    monkeypatch.setattr(drives_module, "open_fieldbus", fail)
+    monkeypatch.setattr(drives_module, "open_group", fail)
     with pytest.raises(RuntimeError):
         open_drives(bus)
     with RigLock(bus):

@@ -9,7 +9,8 @@ from collections.abc import Callable
 from tautscope.bench.canopen_node import OUT_OF_RANGE, CanopenNode, Key, Send
 from tautscope.config import DrivesConfig
 from tautscope.dof import Dof
-from tautscope.hardware.cia402 import Mode, Scale, State
+from tautscope.hardware.cia402 import Mode, State
+from tautscope.hardware.scale import Scale
 
 _STATUSWORD = {
     State.NOT_READY: 0x0000,

@@ -1,8 +1,8 @@
-"""The simulated rig of `tautscope bench`: the twin behind a CAN bus and a camera, in real time.
+"""The simulated rig of `tautscope bench`: the twin behind a bus and a camera, in real time.
 
     with Bench(config) as bench: bench.request("freeze rotation")
 
-Another process drives it through two sockets.
+Another process drives it through a CAN bus or a serial line of servos, and a socket of images.
 """
 
 from __future__ import annotations
@@ -21,7 +21,9 @@ from tautscope.bench.can_bus import Hub, LocalBus
 from tautscope.bench.drives import SimulatedDrives
 from tautscope.bench.events import Event
 from tautscope.bench.ground_truth import GroundTruthWriter
+from tautscope.bench.servos import SimulatedServos
 from tautscope.config import Config
+from tautscope.config.servos import PORTS
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError
 from tautscope.hardware.rig import require_drives
@@ -31,15 +33,16 @@ CAMERA = "camera"
 
 
 class Bench:
-    """Three simulated drives that move the twin's plant, and the twin's camera.
+    """Three simulated drives or servos that move the twin's plant, and the twin's camera.
 
     A ``twin.seed`` gives the same instrument as in `tautscope.twin.Twin`. The plant advances by one
-    ``control.period`` with every SYNC.
+    ``control.period`` with every SYNC; servos also advance it when nobody commands them.
 
     Args:
-        config: ``drives.channel`` and ``camera.source.url`` (``unix:PATH``) name the sockets.
-        truth: CSV file for the true tip state at every SYNC, for evaluation only.
-        modes: Supported modes of operation of the drives.
+        config: ``drives.channel`` and ``camera.source.url`` (``unix:PATH``) name the sockets, or
+            the link to the servos' pseudo-terminal.
+        truth: CSV file for the true tip state at every step of the plant, for evaluation only.
+        modes: Supported modes of operation of CiA 402 drives.
 
     Raises:
         ConfigError: The configuration does not describe a bench, or a socket cannot be made.
@@ -50,8 +53,11 @@ class Bench:
         self, config: Config, truth: Path | None = None, *, modes: tuple[int, ...] = (7, 8)
     ) -> None:
         drives = require_drives(config)
-        if drives.interface != "tautscope":
+        is_servo = drives.protocol in PORTS
+        if not is_servo and drives.interface != "tautscope":
             raise ConfigError("drives.interface", drives.interface, "tautscope, on the bench")
+        if is_servo and drives.channel.startswith("/dev/"):
+            raise ConfigError("drives.channel", drives.channel, "no device, on the bench")
         url = config.camera.source.url
         if not url.startswith("unix:"):
             raise ConfigError("camera.source.url", url, "unix:PATH, on the bench")
@@ -69,9 +75,13 @@ class Bench:
         try:
             if truth is not None:
                 self._truth = self._resources.enter_context(GroundTruthWriter(truth))
-            bus = self._open_bus(drives.channel)
             start = self._plant.applied
-            self.drives = SimulatedDrives(bus, drives, self._on_sync, start=start, modes=modes)
+            self.drives: SimulatedDrives | SimulatedServos
+            if is_servo:
+                self.drives = SimulatedServos(drives, self._on_sync, start=start)
+            else:
+                bus = self._open_bus(drives.channel)
+                self.drives = SimulatedDrives(bus, drives, self._on_sync, start=start, modes=modes)
         except BaseException:
             self._resources.close()
             raise

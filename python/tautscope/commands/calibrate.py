@@ -9,6 +9,7 @@ from tautscope.commands import (
     calibrate_colour,
     calibrate_geometry,
     calibrate_latency,
+    calibrate_stops,
     robot_calibration,
 )
 
@@ -27,4 +28,5 @@ def add_parser(verbs: arguments.Verbs) -> None:
     calibrate_colour.add_parser(kinds)
     calibrate_geometry.add_parser(kinds)
     calibrate_latency.add_parser(kinds)
+    calibrate_stops.add_parser(kinds)
     robot_calibration.add_parser(kinds)

@@ -9,6 +9,8 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 
+import msgspec
+
 from tautscope._core import DETECTORS, MOST_DOFS, MOST_RANGE
 from tautscope.config.axes import DofEntry, KinematicsConfig, MeasurementConfig
 from tautscope.config.control import ControlConfig
@@ -17,7 +19,8 @@ from tautscope.config.drives import DrivesConfig
 from tautscope.config.experiment import ExperimentConfig
 from tautscope.config.instrument import InstrumentConfig
 from tautscope.config.safety import SafetyConfig
-from tautscope.config.section import relation
+from tautscope.config.section import default_of, relation
+from tautscope.config.servos import PORTS, models_of
 from tautscope.config.twin import DISTURBANCES, TwinConfig
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError
@@ -160,6 +163,12 @@ def check_topics(
             _require(kinematics.kind != "joints", "kinematics.kind", kinematics.kind, allowed)
 
 
+_OF_CIA_402 = ("interface", "options", "lead_points", "master_node", "heartbeat_period", "waive")
+"""Keys of [drives] that servos do not use."""
+_OF_SERVOS = ("model", "homing_offset", "stops", "torque_limit")
+"""Keys of a motor that only servos use."""
+
+
 @relation(DrivesConfig)
 def _check_drives(drives: DrivesConfig) -> None:
     """Also the ranges that CANopen can express."""
@@ -177,12 +186,26 @@ def _check_drives(drives: DrivesConfig) -> None:
             f"less than 2^31 counts over the travel {axis.travel}",
         )
         _require_at_most(path, axis, "following_window", "following_error")
+        if drives.protocol in PORTS:
+            allowed = "one of " + ", ".join(models_of(drives.protocol))
+            known = axis.model in models_of(drives.protocol)
+            _require(known, f"{path}.model", axis.model, allowed)
+            _require_defaults(axis, path, ("eds",), "servos do not use it")
+            lower, upper = axis.stops or (-math.inf, math.inf)
+            inside = lower <= axis.travel[0] and axis.travel[1] <= upper
+            _require(inside, f"{path}.travel", axis.travel, f"within stops = {axis.stops}")
+        else:
+            _require_defaults(axis, path, _OF_SERVOS, "only servos use it")
         _require(
             axis.speed_limit * drives.cycle * axis.counts_per_unit >= 1,
             f"{path}.counts_per_unit",
             axis.counts_per_unit,
             "at least one count per cycle at the speed limit; per m or rad, not mm or deg",
         )
+    if drives.protocol in PORTS:
+        _require_defaults(drives, "", _OF_CIA_402, "servos do not use it")
+    else:
+        _require(drives.bitrate <= 1_000_000, "bitrate", drives.bitrate, "at most 1000000 on CAN")
     for name, most in (
         ("cycle", 0.255),
         ("heartbeat_period", 65.535),
@@ -207,6 +230,13 @@ def _check_drives(drives: DrivesConfig) -> None:
 def _require(is_valid: bool, field: str, value: object, allowed: str) -> None:
     if not is_valid:
         raise ConfigError(field, value, allowed)
+
+
+def _require_defaults(block: msgspec.Struct, path: str, names: Sequence[str], why: str) -> None:
+    defaults = {one.name: default_of(one) for one in msgspec.structs.fields(block)}
+    for name in names:
+        value, field = getattr(block, name), f"{path}.{name}".lstrip(".")
+        _require(value == defaults[name], field, value, f"its default: {why}")
 
 
 def _require_names(field: str, names: Sequence[str], allowed: Sequence[str]) -> None:

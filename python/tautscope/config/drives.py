@@ -1,4 +1,4 @@
-"""Configuration of the drives on a fieldbus."""
+"""Configuration of the drives or servos on a bus."""
 
 from __future__ import annotations
 
@@ -12,12 +12,17 @@ from tautscope.dof import Dof
 
 
 class AxisConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """One motor and its drive. Values without a default depend on the rig."""
+    """One motor and its drive.
+
+    Values without a default depend on the rig. A servo needs only `node`, `model`, `travel`, and
+    for insertion `counts_per_unit`.
+    """
 
     node: Annotated[int, Meta(ge=1, le=127)]
-    """CANopen node id; with EtherCAT, the position on the line, counted from 1."""
+    """CANopen node id; with EtherCAT, the position on the line, counted from 1; id of a servo."""
     counts_per_unit: Positive
-    """Encoder counts per m or rad of the instrument's DOF, including gears."""
+    """Encoder counts per m or rad of the instrument's DOF, including gears. A servo has 4096 per
+    turn of its horn; without gears these are 651.9 per rad, the default of servos."""
     sign: Literal[-1, 1]
     """1 if the counts increase with the DOF, else -1."""
     travel: tuple[float, float]
@@ -33,10 +38,20 @@ class AxisConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """Position of the DOF at 0 counts [m or rad]."""
     eds: str | None = None
     """The drive's EDS file, relative to the TOML file; without it, the default types of CiA 402."""
+    model: str | None = None
+    """Model of a servo, which must be the connected one; other drives have none."""
+    homing_offset: Annotated[int, Meta(ge=-2047, le=2047)] = 0
+    """What the servo itself adds to its position, set in the servo [counts]."""
+    stops: tuple[float, float] | None = None
+    """Mechanical stops of a servo [m or rad], found by `tautscope calibrate stops`; `travel` lies
+    between them."""
+    torque_limit: Annotated[float, Meta(gt=0, le=1)] = 1.0
+    """Share of its largest motor voltage (Dynamixel, goal PWM) or torque (Feetech) that a servo
+    uses, set in the servo."""
 
 
 class DrivesConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Drives on a fieldbus; only a physical rig and the bench have this section.
+    """Drives or servos on a bus; only a physical rig and the bench have this section.
 
     The default times are [ours].
     """
@@ -44,13 +59,15 @@ class DrivesConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     insertion: AxisConfig
     rotation: AxisConfig
     bending: AxisConfig
-    protocol: Literal["canopen", "ethercat"] = "canopen"
-    """Protocol of the fieldbus."""
+    protocol: Literal["canopen", "ethercat", "dynamixel", "feetech"] = "canopen"
+    """Protocol of the bus: CiA 402 drives on CANopen or EtherCAT, Dynamixel X servos (protocol 2.0)
+    or Feetech STS servos."""
     interface: str = "socketcan"
     """Name of a python-can interface that does not receive its own frames."""
     channel: str = "can0"
-    """Channel of the interface; with EtherCAT, the network adapter."""
-    bitrate: Annotated[int, Meta(ge=10_000, le=1_000_000)] = 1_000_000
+    """Channel of the interface; with EtherCAT, the network adapter; of servos, the serial port, by
+    default /dev/ttyUSB0 (Dynamixel) or /dev/ttyACM0 (Feetech)."""
+    bitrate: Annotated[int, Meta(ge=9_600, le=4_000_000)] = 1_000_000
     """[bit/s]; SocketCAN uses the setting of the operating system."""
     options: dict[str, str | int | float | bool] = field(default_factory=dict)
     """Further options of the interface."""
@@ -67,13 +84,15 @@ class DrivesConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     """Period of the heartbeats of master and drives [s], whole milliseconds."""
     heartbeat_timeout: Positive = 0.08
     """Time without a heartbeat after which a drive quick-stops, and the master stops all drives
-    [s], whole milliseconds."""
+    [s], whole milliseconds. Of servos, time without an answer or a set-point, and the bus watchdog
+    of Dynamixel, rounded up to 20 ms."""
     state_timeout: Positive = 1.0
     """Timeout of each state transition [s]."""
     request_timeout: Positive = 0.3
-    """Timeout of each SDO response [s]."""
+    """Timeout of each SDO response, or answer of a servo to a setting [s]."""
     lag: Positive = 0.02
-    """Largest delay of the motors [s]: filters and servo loops of the drives, late set-points."""
+    """Largest delay of the motors [s]: filters and servo loops of the drives, late set-points; by
+    default 0.06 of servos."""
     following_timeout: Positive = 0.05
     """How long the following error may exceed `following_window` [s], whole milliseconds."""
     command_timeout: Positive = 0.5

@@ -23,6 +23,7 @@ from tautscope.config.law import LawConfig
 from tautscope.config.recording import RecordingConfig
 from tautscope.config.safety import SafetyConfig
 from tautscope.config.section import Section, converted_value, without_numpy
+from tautscope.config.servos import with_servo_defaults
 from tautscope.config.twin import TwinConfig
 from tautscope.config.vision import VisionConfig
 from tautscope.dof import Dof, NamedDof
@@ -135,6 +136,8 @@ def from_document(document: dict[str, Any]) -> Config:
 
 def _checked(document: dict[str, Any]) -> Config:
     document = _merged(to_document(Config()), without_numpy(document))
+    if isinstance(document.get("drives"), dict):
+        document["drives"] = with_servo_defaults(document["drives"])
     config: Config = converted_value("", document, Config)
     return config
 

@@ -42,12 +42,12 @@ class Section(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
         values = (
             f"{field.name}={value!r}"
             for field in msgspec.structs.fields(type(self))
-            if (value := getattr(self, field.name)) != _default(field) or field.name == "profile"
+            if (value := getattr(self, field.name)) != default_of(field) or field.name == "profile"
         )
         return f"{type(self).__name__}({', '.join(values)})"
 
 
-def _default(field: msgspec.structs.FieldInfo) -> Any:
+def default_of(field: msgspec.structs.FieldInfo) -> Any:
     """The default of a field; `msgspec.NODEFAULT` if it is required."""
     if field.default_factory is msgspec.NODEFAULT:
         return field.default

@@ -9,42 +9,23 @@ from __future__ import annotations
 
 import logging
 import time
-from dataclasses import dataclass
 
 from tautscope.config import DrivesConfig
 from tautscope.dof import Dof
 from tautscope.errors import ModeRefusedError, SettingRefusedError
 from tautscope.hardware import cia402
 from tautscope.hardware import object_dictionary as objects
-from tautscope.hardware.cia402 import Mode, Scale
+from tautscope.hardware.cia402 import Mode
+from tautscope.hardware.drive_group import CommissionedDrive
 from tautscope.hardware.fieldbus import AbsentError, Fieldbus, verify_setting
 from tautscope.hardware.object_dictionary import Entry
+from tautscope.hardware.scale import Scale
 
 _LOG = logging.getLogger(__name__)
 WAIVABLE = ("6007", "605A", "607D")
 """Objects that `drives.waive` may name."""
 CIA_402 = 402
 """Device profile number, the low 16 bits of 0x1000."""
-
-
-@dataclass(frozen=True, slots=True)
-class CommissionedDrive:
-    """A drive's identity and settings.
-
-    Attributes:
-        name: Its name for messages.
-        vendor, product: From the identity object, 0x1018; 0 where it is missing.
-        mode: The mode of operation it entered.
-        settings: Object and value as read back.
-        absent: Objects that the drive lacks.
-    """
-
-    name: str
-    vendor: int
-    product: int
-    mode: Mode
-    settings: dict[str, int]
-    absent: tuple[str, ...]
 
 
 def commission(bus: Fieldbus, config: DrivesConfig, dof: Dof) -> CommissionedDrive:

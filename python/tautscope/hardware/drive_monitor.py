@@ -1,8 +1,9 @@
-"""Checks of what three drives report: state, mode, timeliness, following error."""
+"""Checks of what three drives report, whatever their protocol: timeliness, following error."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,11 +11,10 @@ from numpy.typing import NDArray
 
 from tautscope.config import DrivesConfig
 from tautscope.dof import Dof
-from tautscope.errors import FollowingError, SilentDriveError, StateError
-from tautscope.hardware import cia402
-from tautscope.hardware.cia402 import Mode, Scale, State
-from tautscope.hardware.fieldbus import Feedback
+from tautscope.errors import FollowingError, SilentDriveError
+from tautscope.hardware.drive_group import Feedback
 from tautscope.hardware.following_error import FollowingErrorMonitor
+from tautscope.hardware.scale import Scale
 
 
 @dataclass(slots=True)
@@ -51,25 +51,28 @@ class DriveMonitor:
     Args:
         config: Limits and timeouts.
         names: The drives' names for messages.
-        modes: Mode of operation of each drive.
+        pending: As in `DriveGroup`.
     """
 
-    def __init__(
-        self, config: DrivesConfig, names: Sequence[str], modes: Mapping[Dof, Mode]
-    ) -> None:
+    def __init__(self, config: DrivesConfig, names: Sequence[str], pending: int) -> None:
         self._config = config
         self._names = names
-        self._modes = modes
         self._scales = [Scale(config[dof], dof.label) for dof in Dof]
-        self._feedback: list[Feedback] = []
+        self._feedback: Sequence[Feedback] = []
         self._answers = [0, 0, 0]
-        # A drive samples its position when the set-point arrives; buffered set-points act later.
-        is_buffered = Mode.INTERPOLATED_POSITION in modes.values()
-        pending = 1 + (config.lead_points if is_buffered else 0)
         self._following = FollowingErrorMonitor(config, config.cycle, pending)
+        self._last_cycle = 0.0
         self.statistics = BusStatistics()
 
-    def reset(self, feedback: list[Feedback]) -> NDArray[np.float64]:
+    def begin_cycle(self) -> None:
+        """Count a cycle, and the time since the one before."""
+        now, statistics = time.monotonic(), self.statistics
+        if statistics.cycles:
+            statistics.longest_pause = max(statistics.longest_pause, now - self._last_cycle)
+        self._last_cycle = now
+        statistics.cycles += 1
+
+    def reset(self, feedback: Sequence[Feedback]) -> NDArray[np.float64]:
         """Start from motors that are enabled and at rest; their positions (3,) [m, rad, rad]."""
         self._feedback = feedback
         self._answers = [one.answers for one in feedback]
@@ -85,19 +88,20 @@ class DriveMonitor:
             [scale.to_position(count) for scale, count in zip(self._scales, counts, strict=True)]
         )
 
-    def check(self, command: NDArray[np.float64], feedback: list[Feedback]) -> NDArray[np.float64]:
+    def check(
+        self, command: NDArray[np.float64], feedback: Sequence[Feedback]
+    ) -> NDArray[np.float64]:
         """Check one cycle; position actual values (3,) [m, rad, rad].
 
         Raises:
             SilentDriveError: A drive has not answered for `heartbeat_timeout`.
-            StateError: A drive left operation enabled or its mode, or ignores set-points.
             FollowingError: The following error is too large, or the position jumped.
         """
         self._count(feedback)
         positions, fresh = self.positions(feedback), [one.age == 0 for one in feedback]
         exceeded = self._following.update(command, positions, fresh)
         for dof in Dof:
-            self._check_state(dof, feedback[dof])
+            self._check_silence(dof, feedback[dof])
             if fresh[dof]:
                 self._check_position(dof, feedback[dof], positions[dof], bool(exceeded[dof]))
         self._feedback = feedback
@@ -127,66 +131,24 @@ class DriveMonitor:
             "and its real-time priority (tautscope doctor)"
         )
 
-    def transition_error(self, dof: Dof, feedback: Feedback) -> SilentDriveError | StateError:
-        """The error for a drive that does not reach the next state."""
-        if feedback.age:
-            return SilentDriveError(
-                self._names[dof],
-                f"no answer to {feedback.age} set-points",
-                "Check its supply, and whether it supports synchronous PDOs",
-            )
-        return self.state_error(dof, feedback, "it stays in {}")
-
-    def state_error(
-        self, dof: Dof, feedback: Feedback, what: str = "it is in {}, not operation enabled"
-    ) -> StateError:
-        """The error for a drive that is in the wrong state."""
-        state = cia402.state_of(feedback.statusword)
-        shown = "a state unknown to CiA 402" if state is None else state.value
-        if state in (State.FAULT, State.FAULT_REACTION):
-            remedy = "Look its error code (0x603F) up in the manual, then start with reset_faults"
-        else:
-            remedy = "Check its supply, its enable input and its limit switches"
-        return StateError(
-            self._names[dof],
-            f"{what.format(shown)} (statusword 0x{feedback.statusword:04X})",
-            remedy,
-        )
-
-    def _count(self, feedback: list[Feedback]) -> None:
+    def _count(self, feedback: Sequence[Feedback]) -> None:
         for dof, one in enumerate(feedback):
             self.statistics.late[dof] += one.age > 0
             self.statistics.lost[dof] = self.statistics.cycles - (one.answers - self._answers[dof])
 
-    def _check_state(self, dof: Dof, feedback: Feedback) -> None:
-        name, mode = self._names[dof], self._modes[dof]
+    def _check_silence(self, dof: Dof, feedback: Feedback) -> None:
         if feedback.silence > self._config.heartbeat_timeout:
             raise SilentDriveError(
-                name,
+                self._names[dof],
                 f"no answer to {feedback.age} set-points, {feedback.silence * 1e3:.0f} ms",
                 "Check its supply, the bus, and the load of this computer",
-            )
-        if cia402.state_of(feedback.statusword) is not State.OPERATION_ENABLED:
-            raise self.state_error(dof, feedback)
-        if feedback.mode != mode:
-            raise StateError(
-                name,
-                f"it changed from mode {mode.value} to {feedback.mode}",
-                "End every other program that commands it",
-            )
-        if not feedback.statusword & cia402.FOLLOWS_COMMAND:
-            raise StateError(
-                name,
-                f"it ignores set-points (statusword 0x{feedback.statusword:04X}, bit 12)",
-                "Check its limit switches and inputs; it may be halted",
             )
 
     def _check_position(
         self, dof: Dof, feedback: Feedback, position: float, has_exceeded: bool
     ) -> None:
         axis, name, before = self._config[dof], self._names[dof], self._feedback[dof]
-        cyclic = self._modes[dof] is Mode.CYCLIC_SYNCHRONOUS_POSITION
-        is_flagged = cyclic and bool(feedback.statusword & cia402.FOLLOWING_ERROR_BIT)
+        is_flagged = feedback.reports_following_error
         if has_exceeded or is_flagged:
             following = self._following
             note = " (the drive reports it too)" if is_flagged else ""

@@ -1,13 +1,13 @@
-"""Three CiA 402 drives that follow set-points and quick-stop whenever their context is left.
+"""Three drives that follow set-points and quick-stop whenever their context is left.
 
     with open_drives(config.drives) as drives:
         position = drives.start()
         while running:
             applied = drives.exchange(command)  # once per drives.cycle, from one thread
 
-The drives run in mode 8 (cyclic synchronous position), else in mode 7 (interpolated position).
-Their reaction to a lost connection, their quick stop option, position and velocity limits are set
-and read back. Every failure raises a `DriveError` after the motors have been quick-stopped.
+Their reaction to a lost connection, position and velocity limits are set and read back. `Drives`
+knows no protocol: CiA 402 drives and servos are behind `DriveGroup`. Every failure raises a
+`DriveError` after the motors have been quick-stopped.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tautscope.config import DrivesConfig
+from tautscope.config.servos import PORTS
 from tautscope.dof import Dof
 from tautscope.errors import DriveError, SignalError, StateError
 from tautscope.extras import require_extras
-from tautscope.hardware.cia402 import Scale
-from tautscope.hardware.commissioning import commission
+from tautscope.hardware.cia402_drives import Cia402Drives
+from tautscope.hardware.drive_group import DriveGroup
 from tautscope.hardware.drive_monitor import BusStatistics, DriveMonitor
-from tautscope.hardware.drive_state_machine import DriveStateMachine
-from tautscope.hardware.fieldbus import Fieldbus
 from tautscope.hardware.rig_lock import RigLock
+from tautscope.hardware.scale import Scale
 from tautscope.hardware.signals import defer_signals
 
 
@@ -40,13 +40,13 @@ def open_drives(config: DrivesConfig) -> Drives:
     """
     lock = RigLock(config)
     try:
-        return Drives(config, open_fieldbus(config), lock)
+        return Drives(config, open_group(config), lock)
     except BaseException:
         lock.release()
         raise
 
 
-def open_fieldbus(config: DrivesConfig) -> Fieldbus:
+def open_group(config: DrivesConfig) -> DriveGroup:
     """Open the bus and identify the drives; no setting is changed.
 
     Raises:
@@ -58,11 +58,15 @@ def open_fieldbus(config: DrivesConfig) -> Fieldbus:
     if config.protocol == "ethercat":
         from tautscope.hardware.ethercat_fieldbus import EthercatFieldbus  # noqa: PLC0415
 
-        return EthercatFieldbus(config)
+        return Cia402Drives(config, EthercatFieldbus(config))
+    if config.protocol in PORTS:
+        from tautscope.hardware.servos.servo_drives import ServoDrives  # noqa: PLC0415
+
+        return ServoDrives(config)
     require_extras("CANopen", ["hardware"])
     from tautscope.hardware.canopen_fieldbus import CanopenFieldbus  # noqa: PLC0415
 
-    return CanopenFieldbus(config)
+    return Cia402Drives(config, CanopenFieldbus(config))
 
 
 class Drives:
@@ -70,7 +74,7 @@ class Drives:
 
     Args:
         config: Bus, drives, limits and timeouts.
-        bus: The open bus; it is closed with the drives.
+        group: The drives on an open bus, which is closed with them.
         lock: Released with the drives.
 
     Raises:
@@ -79,22 +83,22 @@ class Drives:
         DriveError: A drive does not answer, or is no CiA 402 drive.
     """
 
-    def __init__(self, config: DrivesConfig, bus: Fieldbus, lock: RigLock | None = None) -> None:
+    def __init__(
+        self, config: DrivesConfig, group: DriveGroup, lock: RigLock | None = None
+    ) -> None:
         self.config = config
         self._lock = lock
-        self._bus = bus
+        self._group = group
         self._scales = [Scale(config[dof], dof.label) for dof in Dof]
         self._is_running = False
         self._is_closed = False
         self._previous: NDArray[np.float64] = np.zeros(3)
         try:
-            self.commissioned = tuple(commission(bus, config, dof) for dof in Dof)
-            modes = {dof: self.commissioned[dof].mode for dof in Dof}
-            self._monitor = DriveMonitor(config, [bus.name(dof) for dof in Dof], modes)
-            self._machine = DriveStateMachine(config, bus, modes, self._monitor)
-            bus.configure(modes)
+            self.commissioned = tuple(group.commission(dof) for dof in Dof)
+            self._monitor = DriveMonitor(config, [group.name(dof) for dof in Dof], group.pending)
+            group.configure()
         except BaseException:
-            bus.close()
+            group.close()
             raise
 
     @property
@@ -136,7 +140,10 @@ class Drives:
                 "drives", "start() was called while running or closed", "Open them again"
             )
         try:
-            feedback = self._machine.enable(reset_faults=reset_faults)
+            positions = self._group.read_positions()
+            self._monitor.check_start_positions(positions)
+            self._group.start(positions)
+            feedback = self._group.enable(reset_faults=reset_faults)
         except BaseException as error:
             self._stop_after(error)
             raise
@@ -177,7 +184,8 @@ class Drives:
                 scale.checked_counts(setpoint[dof], self._previous[dof], self.cycle)
                 for dof, scale in enumerate(self._scales)
             ]
-            applied = self._monitor.check(setpoint, self._machine.exchange(targets))
+            self._monitor.begin_cycle()
+            applied = self._monitor.check(setpoint, self._group.exchange(targets))
         except BaseException as error:
             self._stop_after(error)
             raise
@@ -205,7 +213,7 @@ class Drives:
         """
         with defer_signals():
             self._is_running = False
-            unconfirmed = self._machine.disable()
+            unconfirmed = self._group.disable()
         if unconfirmed:
             raise _unconfirmed(unconfirmed, "disabling")
 
@@ -222,7 +230,7 @@ class Drives:
             try:
                 unconfirmed = self._quick_stop()
             finally:
-                self._bus.close()
+                self._group.close()
                 if self._lock is not None:
                     self._lock.release()
         if unconfirmed:
@@ -250,7 +258,7 @@ class Drives:
     def _quick_stop(self) -> list[str]:
         """Quick-stop all drives; names of those that do not confirm it."""
         self._is_running = False
-        return self._machine.quick_stop()
+        return self._group.quick_stop()
 
 
 def _as_vector(command: ArrayLike) -> NDArray[np.float64]:

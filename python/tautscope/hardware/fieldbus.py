@@ -10,7 +10,7 @@ from typing import NamedTuple, Protocol
 from tautscope.dof import Dof
 from tautscope.errors import SettingRefusedError
 from tautscope.hardware import object_dictionary as objects
-from tautscope.hardware.cia402 import Mode
+from tautscope.hardware.cia402 import FOLLOWING_ERROR_BIT, Mode
 from tautscope.hardware.object_dictionary import Entry
 
 
@@ -51,6 +51,12 @@ class Feedback:
     age: int
     answers: int
     silence: float
+
+    @property
+    def reports_following_error(self) -> bool:
+        """Whether the drive reports a following error; in mode 7 the bit means another thing."""
+        is_cyclic = self.mode == Mode.CYCLIC_SYNCHRONOUS_POSITION
+        return is_cyclic and bool(self.statusword & FOLLOWING_ERROR_BIT)
 
 
 class AbsentError(SettingRefusedError):

@@ -7,9 +7,7 @@ from pathlib import Path
 from tautscope.config import CameraConfig, Config
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError
-from tautscope.hardware import object_dictionary as objects
-from tautscope.hardware.drives import open_fieldbus
-from tautscope.hardware.fieldbus import AbsentError, Fieldbus
+from tautscope.hardware.drives import open_group
 
 CAMERA = "camera"
 
@@ -28,23 +26,6 @@ def camera_serial_number(config: CameraConfig) -> dict[str, str]:
     return {}
 
 
-def drive_serial_numbers(fieldbus: Fieldbus) -> dict[str, str]:
-    """The serial numbers of the drives (0x1018:4) that have one, by the name of the DOF.
-
-    Raises:
-        DriveError: A drive does not answer.
-    """
-    found = {}
-    for dof in Dof:
-        try:
-            number = fieldbus.read(dof, objects.SERIAL_NUMBER)
-        except AbsentError:
-            continue
-        if number:
-            found[dof.label] = f"{number:08X}"
-    return found
-
-
 def read_serial_numbers(config: Config) -> dict[str, str]:
     """The serial numbers of camera and drives of a configuration, where they have one.
 
@@ -54,9 +35,9 @@ def read_serial_numbers(config: Config) -> dict[str, str]:
     """
     if config.drives is None:
         raise ConfigError("drives", None, "a section [drives] that names the motors")
-    fieldbus = open_fieldbus(config.drives)
+    group = open_group(config.drives)
     try:
-        drives = drive_serial_numbers(fieldbus)
+        drives = {dof.label: number for dof in Dof if (number := group.serial_number(dof))}
     finally:
-        fieldbus.close()
+        group.close()
     return camera_serial_number(config.camera) | drives

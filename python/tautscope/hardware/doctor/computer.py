@@ -12,6 +12,7 @@ from pathlib import Path
 
 from tautscope._core import __version__
 from tautscope.config import Config
+from tautscope.config.servos import PORTS
 from tautscope.extras import MODULES, missing_modules
 from tautscope.hardware.doctor.check_result import CheckResult
 from tautscope.hardware.realtime import REMEDY, SETPOINTS, locked_memory, realtime
@@ -35,11 +36,12 @@ def check_computer(config: Config) -> list[CheckResult]:
     except (OSError, AttributeError):
         load = ""
     cores = f"{os.cpu_count()} cores{load}"
-    is_ethercat = config.drives is not None and config.drives.protocol == "ethercat"
+    protocol = config.drives.protocol if config.drives is not None else ""
     return [
         CheckResult("computer", "system", "note", f"{system}, {cores}"),
         _extra("hardware"),
-        *([_extra("ethercat")] if is_ethercat else []),
+        *([_extra("ethercat")] if protocol == "ethercat" else []),
+        *([_extra("servo")] if protocol in PORTS else []),
         _priority(),
         _memory(),
     ]

@@ -8,32 +8,20 @@ import time
 from pathlib import Path
 
 from tautscope.config import DrivesConfig
+from tautscope.config.servos import PORTS
 from tautscope.dof import Dof
-from tautscope.errors import DriveError, FieldError
-from tautscope.hardware import cia402
-from tautscope.hardware import object_dictionary as objects
-from tautscope.hardware.cia402 import Scale, State
-from tautscope.hardware.commissioning import CommissionedDrive, commission
+from tautscope.errors import DriveError, TautscopeError
 from tautscope.hardware.doctor.check_result import CheckResult, from_error, none_found
-from tautscope.hardware.drives import open_fieldbus
-from tautscope.hardware.fieldbus import AbsentError, Fieldbus
+from tautscope.hardware.drive_group import CommissionedDrive, DriveGroup
+from tautscope.hardware.drives import open_group
+from tautscope.hardware.scale import Scale
 
-MODES = {
-    1: "profile position",
-    2: "velocity",
-    3: "profile velocity",
-    4: "torque",
-    6: "homing",
-    7: "interpolated position",
-    8: "cyclic synchronous position",
-    9: "cyclic synchronous velocity",
-    10: "cyclic synchronous torque",
-}
-"""Modes of operation of CiA 402; mode n is bit n - 1 of 0x6502."""
 VIRTUAL_INTERFACES = ("virtual", "udp_multicast", "tautscope")
 """Interfaces of python-can without a physical bus."""
 BUILT_IN_PORT = "/dev/ttyS"
 """Prefix of serial ports that are no adapters."""
+SERIAL_DRIVERS = Path("/sys/bus/usb-serial/devices")
+"""Drivers of serial adapters, by the name of the port."""
 CYCLES = 50
 """Minimum number of set-points in the test of the answers."""
 
@@ -74,91 +62,77 @@ def check_drives(config: DrivesConfig) -> list[CheckResult]:
 
     Nothing is written to a drive that is enabled or in fault. A motor in quick stop stays held.
     """
-    bus = f"bus {config.interface if config.protocol == 'canopen' else 'EtherCAT'} {config.channel}"
+    name = config.interface if config.protocol == "canopen" else config.protocol
+    bus = f"bus {name} {config.channel}"
     try:
-        fieldbus = open_fieldbus(config)
-    except (DriveError, FieldError) as error:
+        group = open_group(config)
+    except TautscopeError as error:
         return [from_error("drives", bus, error)]
     try:
         findings = [CheckResult("drives", bus, "ok", "open; no other master found")]
-        findings += [_check_drive(fieldbus, config, dof) for dof in Dof]
+        findings += _check_latency(config)
+        findings += [_check_drive(group, config, dof) for dof in Dof]
         if any(finding.status == "missing" for finding in findings):
             return findings
-        settings, modes = [], {}
+        settings = []
         for dof in Dof:
             try:
-                drive = commission(fieldbus, config, dof)
+                settings.append(_settings(group.commission(dof), config))
             except DriveError as error:
-                settings.append(from_error("drives", f"{fieldbus.name(dof)}: settings", error))
-            else:
-                settings.append(_settings(drive, config))
-                modes[dof] = drive.mode
+                settings.append(from_error("drives", f"{group.name(dof)}: settings", error))
         findings += settings
-        if len(modes) == len(Dof):
-            fieldbus.configure(modes)
-            findings.append(_check_answers(fieldbus, config))
+        if all(finding.status != "missing" for finding in settings):
+            group.configure()
+            findings.append(_check_answers(group, config))
     except DriveError as error:
         findings.append(from_error("drives", "heartbeats and answers", error))
     finally:
-        fieldbus.close()
+        group.close()
     return findings
 
 
-def _check_drive(fieldbus: Fieldbus, config: DrivesConfig, dof: Dof) -> CheckResult:
-    """Read state, position and supported modes of one drive without writing to it."""
-    what = fieldbus.name(dof)
+def _check_latency(config: DrivesConfig) -> list[CheckResult]:
+    """Check how long the driver of a serial adapter (FTDI) keeps answers of servos back."""
+    timer = SERIAL_DRIVERS / Path(config.channel).resolve().name / "latency_timer"
+    if config.protocol not in PORTS or not timer.is_file():
+        return []
+    found = int(timer.read_text(encoding="ascii"))
+    what = f"latency of {config.channel}"
+    if 1e-3 * found < config.reply_timeout / 2:
+        return [CheckResult("drives", what, "ok", f"{found} ms")]
+    todo = f"echo 1 | sudo tee {timer}; again after each time it is connected, or by a udev rule"
+    return [CheckResult("drives", what, "missing", f"{found} ms", todo)]
+
+
+def _check_drive(group: DriveGroup, config: DrivesConfig, dof: Dof) -> CheckResult:
+    """Read state and position of one drive without writing to it."""
+    what = group.name(dof)
     try:
-        supported = fieldbus.read(dof, objects.SUPPORTED_MODES)
-        state = cia402.state_of(fieldbus.read(dof, objects.STATUSWORD))
-        position = Scale(config[dof], dof.label).to_position(
-            fieldbus.read(dof, objects.POSITION_ACTUAL)
-        )
-        vendor = _or_zero(fieldbus, dof, objects.VENDOR_ID)
-        serial_number = _or_zero(fieldbus, dof, objects.SERIAL_NUMBER)
+        status = group.status(dof)
     except DriveError as error:
         return from_error("drives", what, error)
-    modes = [number for number in MODES if supported >> (number - 1) & 1]
+    position = Scale(config[dof], dof.label).to_position(status.position)
     unit, scale = dof.display_unit, dof.display_scale
-    found = (
-        f"vendor 0x{vendor:X}; {state.value if state else 'unknown state'}; "
-        f"at {scale * position:.4g} {unit}; modes "
-        + ", ".join(f"{number} {MODES[number]}" for number in modes)
-    )
+    found = f"at {scale * position:.4g} {unit}; {status.found}"
     data = {
         "dof": dof.label,
-        "vendor": vendor,
-        "serial_number": f"{serial_number:08X}" if serial_number else None,
-        "state": state.value if state else None,
         "position": position,
-        "modes": modes,
+        "serial_number": status.serial_number or None,
+        **status.data,
     }
     lower, upper = config[dof].travel
-    if state in (State.FAULT, State.FAULT_REACTION):
-        todo = "Find the cause: look its error code (0x603F) up in the manual, then power-cycle it"
-    elif state is State.OPERATION_ENABLED:
-        todo = "It is enabled: end the program that commands it, or power-cycle it"
-    elif not {7, 8} & set(modes):
-        todo = "It cannot follow a stream of positions; use another drive or firmware"
-    elif not lower <= position <= upper:
+    todo = status.problem
+    if not todo and not lower <= position <= upper:
         todo = (
             f"Move it by hand into drives.{dof.label}.travel, {scale * lower:.4g} to "
             f"{scale * upper:.4g} {unit}; or correct home, sign or counts_per_unit"
         )
-    else:
-        return CheckResult("drives", what, "ok", found, data=data)
-    return CheckResult("drives", what, "missing", found, todo, data)
-
-
-def _or_zero(fieldbus: Fieldbus, dof: Dof, entry: objects.Entry) -> int:
-    try:
-        return fieldbus.read(dof, entry)
-    except AbsentError:
-        return 0
+    return CheckResult("drives", what, "missing" if todo else "ok", found, todo, data)
 
 
 def _settings(drive: CommissionedDrive, config: DrivesConfig) -> CheckResult:
-    found = f"mode {drive.mode.value}; {len(drive.settings)} settings read back correctly"
-    data = {"mode": drive.mode.value, "settings": drive.settings, "absent": list(drive.absent)}
+    found = f"mode {drive.mode}; {len(drive.settings)} settings read back correctly"
+    data = {"mode": drive.mode, "settings": drive.settings, "absent": list(drive.absent)}
     what = f"{drive.name}: settings"
     if drive.absent:
         waived = f"; waived: {', '.join(config.waive)}" if config.waive else ""
@@ -168,28 +142,28 @@ def _settings(drive: CommissionedDrive, config: DrivesConfig) -> CheckResult:
     return CheckResult("drives", what, "ok", found, data=data)
 
 
-def _check_answers(fieldbus: Fieldbus, config: DrivesConfig) -> CheckResult:
-    """Run cycles as in an experiment, all with the controlword quick stop."""
-    targets = [fieldbus.read(dof, objects.POSITION_ACTUAL) for dof in Dof]
-    fieldbus.start()
+def _check_answers(group: DriveGroup, config: DrivesConfig) -> CheckResult:
+    """Run cycles as in an experiment, in which no motor is enabled."""
+    group.start(group.read_positions())
     times: list[float] = []
     late, answers = 0, [0, 0, 0]
     end = time.monotonic() + max(CYCLES * config.cycle, 1.5 * config.heartbeat_timeout)
     while (began := time.monotonic()) < end:
-        feedback = fieldbus.exchange([cia402.QUICK_STOP] * 3, targets)
+        feedback = group.probe()
         times.append(time.monotonic() - began)
         late += sum(one.age > 0 for one in feedback)
         answers = [one.answers for one in feedback]
         time.sleep(max(0.0, config.cycle - times[-1]))
-    silent = [fieldbus.name(dof) for dof in Dof if not answers[dof]]
-    what = "heartbeats and answers"
+    silent = [group.name(dof) for dof in Dof if not answers[dof]]
+    what = "answers" if config.protocol in PORTS else "heartbeats and answers"
     data = {"cycles": len(times), "late": late, "median": statistics.median(times)}
     if silent:
         found = f"no answer to any of {len(times)} set-points from {', '.join(silent)}"
         todo = "Its PDOs are not as configured; power-cycle it"
         return CheckResult("drives", what, "missing", found, todo, data)
+    every = f"both ways every {1e3 * config.heartbeat_period:.0f} ms; "
     found = (
-        f"both ways every {1e3 * config.heartbeat_period:.0f} ms; {len(times)} set-points, "
+        f"{'' if config.protocol in PORTS else every}{len(times)} set-points, "
         f"answered in {1e3 * data['median']:.1f} ms (median), {1e3 * max(times):.1f} ms (worst), "
         f"{late} of {3 * len(times)} late"
     )

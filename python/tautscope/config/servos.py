@@ -1,0 +1,93 @@
+"""Models of servos, and what their drives section has by default."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from tautscope.dof import Dof
+from tautscope.errors import ConfigError
+
+COUNTS_PER_TURN = 4096
+"""Resolution of every servo here [counts per turn of the horn]."""
+
+
+@dataclass(frozen=True, slots=True)
+class ServoModel:
+    """A model of a servo.
+
+    Attributes:
+        protocol: ``drives.protocol`` for it.
+        number: Its model number.
+        speed: Speed without load at the recommended voltage [1/min], from its manual.
+    """
+
+    protocol: str
+    number: int
+    speed: float
+
+
+MODELS = {
+    "XL330-M077": ServoModel("dynamixel", 1190, 383),
+    "XL330-M288": ServoModel("dynamixel", 1200, 103),
+    "XC330-T288": ServoModel("dynamixel", 1220, 65),
+    "XL430-W250": ServoModel("dynamixel", 1060, 57),
+    "XM430-W350": ServoModel("dynamixel", 1020, 46),
+    "XM430-W210": ServoModel("dynamixel", 1030, 77),
+    "STS3215": ServoModel("feetech", 777, 50),
+}
+"""Servos that are known, by the names of their makers."""
+PORTS = {"dynamixel": "/dev/ttyUSB0", "feetech": "/dev/ttyACM0"}
+"""Protocols of servos, and the serial port of the makers' adapters on Linux."""
+LAG = 0.06
+"""`DrivesConfig.lag` of servos [s]: their position loops lag more than those of drives."""
+_SPEED_SHARE = 0.8
+"""Speed limit over the speed without load."""
+_FOLLOWING_ERROR = 64
+"""Default of `AxisConfig.following_error` [counts]: 5.6 degrees of the horn."""
+
+
+def models_of(protocol: str) -> tuple[str, ...]:
+    """Names of the models with a protocol."""
+    return tuple(name for name, model in MODELS.items() if model.protocol == protocol)
+
+
+def with_servo_defaults(drives: dict[str, Any]) -> dict[str, Any]:
+    """The document of a section ``drives``, with the defaults of its servos if it has any.
+
+    A horn that is the DOF itself turns by 1 rad per rad; a motor of insertion has no default
+    of ``counts_per_unit``.
+
+    Raises:
+        ConfigError: A model is unknown, or of another protocol.
+    """
+    protocol = drives.get("protocol")
+    if protocol not in PORTS:
+        return drives
+    filled = {"channel": PORTS[protocol], "lag": LAG, **drives}
+    for dof in Dof:
+        axis = drives.get(dof.label)
+        if not isinstance(axis, dict):
+            continue
+        name = axis.get("model")
+        if name not in models_of(protocol):
+            allowed = "one of " + ", ".join(models_of(protocol))
+            raise ConfigError(f"drives.{dof.label}.model", name, allowed)
+        filled[dof.label] = _with_defaults(axis, MODELS[name], dof)
+    return filled
+
+
+def _with_defaults(axis: dict[str, Any], model: ServoModel, dof: Dof) -> dict[str, Any]:
+    radian = {} if dof is Dof.INSERTION else {"counts_per_unit": COUNTS_PER_TURN / (2 * math.pi)}
+    filled = {"sign": 1, **radian, **axis}
+    counts = filled.get("counts_per_unit")
+    if not isinstance(counts, int | float) or counts <= 0:
+        return filled  # refused when it is checked
+    turns = _SPEED_SHARE * model.speed / 60
+    return {
+        "speed_limit": turns * COUNTS_PER_TURN / counts,
+        "following_error": _FOLLOWING_ERROR / counts,
+        "following_window": _FOLLOWING_ERROR / 2 / counts,
+        **filled,
+    }

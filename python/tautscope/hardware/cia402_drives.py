@@ -1,0 +1,291 @@
+"""Three CiA 402 drives: state transitions from enabling over set-points to quick stop."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from tautscope.config import DrivesConfig
+from tautscope.dof import Dof
+from tautscope.errors import DriveError, SilentDriveError, StateError
+from tautscope.hardware import cia402
+from tautscope.hardware import object_dictionary as objects
+from tautscope.hardware.cia402 import Mode, State
+from tautscope.hardware.commissioning import commission
+from tautscope.hardware.drive_group import CommissionedDrive, DriveStatus
+from tautscope.hardware.fieldbus import AbsentError, Feedback, Fieldbus
+from tautscope.hardware.object_dictionary import Entry
+
+MODES = {
+    1: "profile position",
+    2: "velocity",
+    3: "profile velocity",
+    4: "torque",
+    6: "homing",
+    7: "interpolated position",
+    8: "cyclic synchronous position",
+    9: "cyclic synchronous velocity",
+    10: "cyclic synchronous torque",
+}
+"""Modes of operation of CiA 402; mode n is bit n - 1 of 0x6502."""
+CONFIRMATIONS = 2
+"""Consecutive answers that confirm a state; the first may predate the command."""
+
+
+class Cia402Drives:
+    """Three CiA 402 drives on a fieldbus; a `tautscope.hardware.drive_group.DriveGroup`.
+
+    Args:
+        config: Cycle and timeouts.
+        bus: The open bus; it is closed with the drives.
+
+    Every method raises what `Fieldbus` raises.
+    """
+
+    def __init__(self, config: DrivesConfig, bus: Fieldbus) -> None:
+        self._config = config
+        self._bus = bus
+        self._modes: dict[Dof, Mode] = {}
+        self._controlwords = [cia402.DISABLE_VOLTAGE] * 3
+        self._targets = [0, 0, 0]
+        self._feedback: list[Feedback] = []
+        self._is_operational = False
+
+    @property
+    def pending(self) -> int:
+        """See `DriveGroup.pending`."""
+        # A drive samples its position when the set-point arrives; buffered set-points act later.
+        is_buffered = Mode.INTERPOLATED_POSITION in self._modes.values()
+        return 1 + (self._config.lead_points if is_buffered else 0)
+
+    def name(self, dof: Dof) -> str:
+        """See `DriveGroup.name`."""
+        return self._bus.name(dof)
+
+    def serial_number(self, dof: Dof) -> str:
+        """The serial number in the identity object (0x1018:4)."""
+        number = self._read_or_zero(dof, objects.SERIAL_NUMBER)
+        return f"{number:08X}" if number else ""
+
+    def status(self, dof: Dof) -> DriveStatus:
+        """Read state, position, supported modes and identity."""
+        supported = self._bus.read(dof, objects.SUPPORTED_MODES)
+        state = cia402.state_of(self._bus.read(dof, objects.STATUSWORD))
+        position = self._bus.read(dof, objects.POSITION_ACTUAL)
+        vendor = self._read_or_zero(dof, objects.VENDOR_ID)
+        modes = [number for number in MODES if supported >> (number - 1) & 1]
+        problem = ""
+        if state in (State.FAULT, State.FAULT_REACTION):
+            problem = (
+                "Find the cause: look its error code (0x603F) up in the manual, then power-cycle it"
+            )
+        elif state is State.OPERATION_ENABLED:
+            problem = "It is enabled: end the program that commands it, or power-cycle it"
+        elif not {7, 8} & set(modes):
+            problem = "It cannot follow a stream of positions; use another drive or firmware"
+        return DriveStatus(
+            position,
+            f"vendor 0x{vendor:X}; {state.value if state else 'unknown state'}; modes "
+            + ", ".join(f"{number} {MODES[number]}" for number in modes),
+            problem,
+            self.serial_number(dof),
+            {"vendor": vendor, "state": state.value if state else None, "modes": modes},
+        )
+
+    def commission(self, dof: Dof) -> CommissionedDrive:
+        """See `tautscope.hardware.commissioning.commission`."""
+        drive = commission(self._bus, self._config, dof)
+        self._modes[dof] = Mode(drive.mode)
+        return drive
+
+    def configure(self) -> None:
+        """See `Fieldbus.configure`."""
+        self._bus.configure(self._modes)
+
+    def read_positions(self) -> list[int]:
+        """See `DriveGroup.read_positions`."""
+        return [self._bus.read(dof, objects.POSITION_ACTUAL) for dof in Dof]
+
+    def start(self, positions: list[int]) -> None:
+        """See `DriveGroup.start`."""
+        self._targets = positions
+        self._bus.start()
+
+    def probe(self) -> list[Feedback]:
+        """Run one cycle with the controlword quick stop."""
+        return self._bus.exchange([cia402.QUICK_STOP] * 3, self._targets)
+
+    def exchange(self, targets: list[int]) -> list[Feedback]:
+        """Run one cycle with new target positions [counts].
+
+        Raises:
+            StateError: A drive left operation enabled or its mode, or ignores set-points.
+        """
+        self._targets = targets
+        self._cycle()
+        for dof in Dof:
+            self._check_state(dof, self._feedback[dof])
+        return self._feedback
+
+    def enable(self, *, reset_faults: bool) -> list[Feedback]:
+        """See `DriveGroup.enable`.
+
+        Raises:
+            StateError: A drive is in fault, or did not reach a state within `state_timeout`.
+            SilentDriveError: A drive did not answer within `state_timeout`.
+        """
+        self._is_operational = True
+        if reset_faults:
+            self._run_transition(self._reset_fault)
+        self._controlwords = [cia402.DISABLE_VOLTAGE] * 3
+        self._run_transition(self._enable)
+        if Mode.INTERPOLATED_POSITION in self._modes.values():
+            for _ in range(self._config.lead_points):
+                self._paced_cycle()
+        self._run_transition(self._start_following)
+        return self._feedback
+
+    def quick_stop(self) -> list[str]:
+        """Quick-stop all drives; names of those that do not confirm it within `state_timeout`.
+
+        Does nothing if the drives never ran, or are stopped already.
+        """
+        if not self._feedback:
+            return []
+        self._feedback = []
+        return self._command_until(cia402.QUICK_STOP, cia402.STOPPED_STATES)
+
+    def disable(self) -> list[str]:
+        """Quick-stop, then disable voltage; names of the drives that do not confirm it.
+
+        Disable voltage alone would let a moving motor coast. Does nothing if the drives never ran.
+        """
+        if not self._is_operational:
+            return []
+        return self.quick_stop() or self._command_until(
+            cia402.DISABLE_VOLTAGE, cia402.POWER_OFF_STATES
+        )
+
+    def close(self) -> None:
+        """Release the bus; a second call does nothing."""
+        self._bus.close()
+
+    def _command_until(self, controlword: int, states: frozenset[State]) -> list[str]:
+        """Repeat a controlword until all drives confirm a state; names of those that do not."""
+        confirmed = [0, 0, 0]
+        deadline = time.monotonic() + self._config.state_timeout
+        while min(confirmed) < CONFIRMATIONS and time.monotonic() < deadline:
+            try:
+                feedback = self._bus.broadcast(controlword, self._targets)
+            except DriveError:
+                break  # the bus is lost
+            for dof, one in enumerate(feedback):
+                is_there = not one.age and cia402.state_of(one.statusword) in states
+                confirmed[dof] = confirmed[dof] + 1 if is_there else 0
+            if not all(confirmed):
+                time.sleep(self._config.cycle / 4)
+        pending = [dof for dof in Dof if confirmed[dof] < CONFIRMATIONS]
+        if pending:
+            self._bus.stop_communication(pending)
+        return [self._bus.name(dof) for dof in pending]
+
+    def _cycle(self) -> None:
+        self._feedback = self._bus.exchange(self._controlwords, self._targets)
+
+    def _paced_cycle(self) -> None:
+        began = time.monotonic()
+        self._cycle()
+        time.sleep(max(0.0, self._config.cycle - (time.monotonic() - began)))
+
+    def _run_transition(self, step: Callable[[Dof, State | None, Feedback], bool]) -> None:
+        """Cycle until `step` is true for every drive; each state has its own timeout."""
+        seen: list[int | None] = [None] * 3
+        since = [time.monotonic()] * 3
+        while True:
+            self._paced_cycle()
+            all_done = True
+            for dof in Dof:
+                feedback = self._feedback[dof]
+                has_answered = not feedback.age or bool(feedback.statusword)
+                is_done = has_answered and step(dof, cia402.state_of(feedback.statusword), feedback)
+                all_done = all_done and is_done
+                if is_done or feedback.statusword != seen[dof]:
+                    seen[dof], since[dof] = feedback.statusword, time.monotonic()
+                elif time.monotonic() - since[dof] > self._config.state_timeout:
+                    raise self._transition_error(dof, feedback)
+            if all_done:
+                return
+
+    def _reset_fault(self, dof: Dof, state: State | None, feedback: Feedback) -> bool:
+        if state in (State.FAULT, State.FAULT_REACTION):
+            # Fault reset is the rising edge of bit 7.
+            self._controlwords[dof] ^= cia402.FAULT_RESET
+            return False
+        self._controlwords[dof] = cia402.DISABLE_VOLTAGE
+        return True
+
+    def _enable(self, dof: Dof, state: State | None, feedback: Feedback) -> bool:
+        if state is State.FAULT:
+            raise self._state_error(dof, feedback)
+        word = cia402.next_controlword(state)
+        if word is not None:
+            self._controlwords[dof] = word
+        if state is not State.OPERATION_ENABLED:
+            self._targets[dof] = feedback.position  # no step when it becomes enabled
+        return state is State.OPERATION_ENABLED
+
+    def _start_following(self, dof: Dof, state: State | None, feedback: Feedback) -> bool:
+        if state is not State.OPERATION_ENABLED:
+            raise self._state_error(dof, feedback)
+        if self._modes[dof] is Mode.INTERPOLATED_POSITION:
+            self._controlwords[dof] = cia402.ENABLE_INTERPOLATION
+        return bool(feedback.statusword & cia402.FOLLOWS_COMMAND)
+
+    def _check_state(self, dof: Dof, feedback: Feedback) -> None:
+        name, mode = self._bus.name(dof), self._modes[dof]
+        if cia402.state_of(feedback.statusword) is not State.OPERATION_ENABLED:
+            raise self._state_error(dof, feedback)
+        if feedback.mode != mode:
+            raise StateError(
+                name,
+                f"it changed from mode {mode.value} to {feedback.mode}",
+                "End every other program that commands it",
+            )
+        if not feedback.statusword & cia402.FOLLOWS_COMMAND:
+            raise StateError(
+                name,
+                f"it ignores set-points (statusword 0x{feedback.statusword:04X}, bit 12)",
+                "Check its limit switches and inputs; it may be halted",
+            )
+
+    def _transition_error(self, dof: Dof, feedback: Feedback) -> SilentDriveError | StateError:
+        """The error for a drive that does not reach the next state."""
+        if feedback.age:
+            return SilentDriveError(
+                self._bus.name(dof),
+                f"no answer to {feedback.age} set-points",
+                "Check its supply, and whether it supports synchronous PDOs",
+            )
+        return self._state_error(dof, feedback, "it stays in {}")
+
+    def _state_error(
+        self, dof: Dof, feedback: Feedback, what: str = "it is in {}, not operation enabled"
+    ) -> StateError:
+        """The error for a drive that is in the wrong state."""
+        state = cia402.state_of(feedback.statusword)
+        shown = "a state unknown to CiA 402" if state is None else state.value
+        if state in (State.FAULT, State.FAULT_REACTION):
+            remedy = "Look its error code (0x603F) up in the manual, then start with reset_faults"
+        else:
+            remedy = "Check its supply, its enable input and its limit switches"
+        return StateError(
+            self._bus.name(dof),
+            f"{what.format(shown)} (statusword 0x{feedback.statusword:04X})",
+            remedy,
+        )
+
+    def _read_or_zero(self, dof: Dof, entry: Entry) -> int:
+        try:
+            return self._bus.read(dof, entry)
+        except AbsentError:
+            return 0

@@ -1,0 +1,72 @@
+"""Conversion between SI units and the counts of an encoder, and the limits of a command."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from tautscope.config import AxisConfig
+from tautscope.errors import SignalError
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """Conversion of one DOF between SI units and encoder counts.
+
+        x = home + sign counts / counts_per_unit
+
+    Attributes:
+        axis: Units, sign, home and limits.
+        label: The DOF's name, for errors.
+    """
+
+    axis: AxisConfig
+    label: str
+
+    def to_counts(self, position: float) -> int:
+        """Convert a position [m or rad] to the nearest count."""
+        axis = self.axis
+        return round(axis.sign * (position - axis.home) * axis.counts_per_unit)
+
+    def to_position(self, counts: int) -> float:
+        """Convert counts to a position [m or rad]."""
+        axis = self.axis
+        return axis.home + axis.sign * counts / axis.counts_per_unit
+
+    def travel_counts(self) -> tuple[int, int]:
+        """Both ends of the travel in counts, the smaller first."""
+        lower, upper = sorted(self.to_counts(end) for end in self.axis.travel)
+        return lower, upper
+
+    def speed_counts(self) -> int:
+        """The speed limit [counts/s], rounded up."""
+        return math.ceil(self.axis.speed_limit * self.axis.counts_per_unit)
+
+    def checked_counts(self, command: float, previous: float, cycle: float) -> int:
+        """Convert a command to counts, after checking it against the limits.
+
+        Args:
+            command: [m or rad].
+            previous: The previous command, or the position at the start [m or rad].
+            cycle: Time between the two [s].
+
+        Raises:
+            SignalError: The command is not finite, outside the travel, or exceeds the speed limit.
+        """
+        axis = self.axis
+        field = f"command[{self.label}]"
+        lower, upper = axis.travel
+        rounding = 1 / axis.counts_per_unit
+        if not math.isfinite(command):
+            raise SignalError(field, command, "a finite number")
+        if not lower - rounding <= command <= upper + rounding:
+            raise SignalError(field, command, f"{lower} to {upper}, drives.{self.label}.travel")
+        step = axis.speed_limit * cycle + rounding
+        if abs(command - previous) > step:
+            raise SignalError(
+                field,
+                command,
+                f"within {step:.6g} of {previous:.6g}, drives.{self.label}.speed_limit "
+                f"over a cycle of {cycle} s",
+            )
+        return self.to_counts(command)

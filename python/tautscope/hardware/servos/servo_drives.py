@@ -1,0 +1,227 @@
+"""Three servos on a serial line: a `tautscope.hardware.drive_group.DriveGroup`.
+
+Each cycle is one sync write of the set-points and one sync read of position, voltage and
+temperature. A servo in position mode holds its last set-point. Of the two families only Dynamixel
+stops by itself when packets are missing (bus watchdog, `heartbeat_timeout`); docs/hardware.md
+says what moves after the end of the host.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+from tautscope.config import DrivesConfig
+from tautscope.dof import Dof
+from tautscope.errors import DriveError, EmergencyError, StateError
+from tautscope.hardware.drive_group import CommissionedDrive, DriveStatus
+from tautscope.hardware.servos.families import FAMILIES, Register
+from tautscope.hardware.servos.line import NoAnswerError, ServoLine
+from tautscope.hardware.servos.servo import Servo
+
+_WATCHDOG_UNIT = 0.02
+"""Unit of the bus watchdog [s]."""
+
+
+@dataclass(slots=True)
+class ServoFeedback:
+    """The newest answer of a servo; see `tautscope.hardware.drive_group.Feedback`."""
+
+    position: int = 0
+    age: int = 0
+    answers: int = 0
+    silence: float = 0.0
+    reports_following_error: bool = False
+    answered_at: float = 0.0
+
+
+class ServoDrives:
+    """Three servos on a serial line.
+
+    Args:
+        config: Port, ids, models, limits and timeouts.
+
+    Raises:
+        MissingExtraError: The extra ``servo`` is not installed.
+        BusError: The port cannot be opened.
+    """
+
+    pending = 1
+
+    def __init__(self, config: DrivesConfig) -> None:
+        self._config = config
+        self._family = family = FAMILIES[config.protocol]
+        self._line = ServoLine(config, family)
+        self._servos = [Servo(config, dof, self._line) for dof in Dof]
+        self._ids = [servo.id for servo in self._servos]
+        self._feedback = [ServoFeedback() for _ in Dof]
+        self._goals = [0, 0, 0]
+        self._sent_at = 0.0
+        self._has_lost_answers = self._is_moving = self._was_enabled = False
+        self._block = family.position.address
+        self._block_size = family.temperature.address + family.temperature.size - self._block
+
+    def name(self, dof: Dof) -> str:
+        """See `DriveGroup.name`."""
+        return self._servos[dof].name
+
+    def serial_number(self, dof: Dof) -> str:
+        """Servos have none."""
+        return ""
+
+    def status(self, dof: Dof) -> DriveStatus:
+        """See `Servo.status`."""
+        return self._servos[dof].status()
+
+    def commission(self, dof: Dof) -> CommissionedDrive:
+        """See `Servo.commission`."""
+        return self._servos[dof].commission()
+
+    def configure(self) -> None:
+        """Nothing: the bus watchdog is set when the motors are enabled."""
+
+    def read_positions(self) -> list[int]:
+        """See `DriveGroup.read_positions`."""
+        return [servo.read(self._family.position) for servo in self._servos]
+
+    def start(self, positions: list[int]) -> None:
+        """See `DriveGroup.start`."""
+        self._goals = positions
+        self._line.set_timeout(self._config.reply_timeout)
+        now = self._sent_at = time.monotonic()
+        for one, position in zip(self._feedback, positions, strict=True):
+            one.position, one.age, one.silence, one.answered_at = position, 0, 0.0, now
+
+    def probe(self) -> list[ServoFeedback]:
+        """Read all servos once."""
+        self._receive()
+        return self._feedback
+
+    def enable(self, *, reset_faults: bool) -> list[ServoFeedback]:
+        """See `DriveGroup.enable`."""
+        family = self._family
+        self._line.set_timeout(self._config.request_timeout)
+        for dof, servo in zip(Dof, self._servos, strict=True):
+            if faults := servo.read(family.faults):
+                if not reset_faults:
+                    raise StateError(servo.name, *servo.fault(faults))
+                self._goals[dof] = servo.reset_fault(self._goals[dof])
+        for servo, goal in zip(self._servos, self._goals, strict=True):
+            self._was_enabled = self._is_moving = True
+            servo.may_search = False
+            servo.write(family.goal, goal)
+            servo.write(family.torque, 1)
+            if not servo.read(family.torque):
+                raise StateError(
+                    servo.name, "its torque stays off", "Check its supply; power-cycle it"
+                )
+            if family.watchdog is not None:
+                units = -(-self._config.heartbeat_timeout // _WATCHDOG_UNIT)
+                servo.write(family.watchdog, max(1, int(units)))
+        self.start(self._goals)
+        return self.exchange(self._goals)
+
+    def exchange(self, targets: list[int]) -> list[ServoFeedback]:
+        """Send the set-points, read the positions.
+
+        Raises:
+            StateError: More than `heartbeat_timeout` passed since the last set-point.
+            EmergencyError: A servo reports a fault.
+            BusError: The port is lost.
+        """
+        now = time.monotonic()
+        pause, self._sent_at = now - self._sent_at, now
+        if pause > self._config.heartbeat_timeout:
+            raise StateError(
+                f"servos on {self._config.channel}",
+                f"no set-point for {1e3 * pause:.0f} ms, which is more than "
+                "drives.heartbeat_timeout",
+                "Check the load of this computer (tautscope doctor)",
+            )
+        self._goals = targets
+        self._line.write_all(dict(zip(self._ids, targets, strict=True)), self._family.goal)
+        self._receive()
+        return self._feedback
+
+    def quick_stop(self) -> list[str]:
+        """Hold each motor where it was in the last cycle, or release it, as `after_quick_stop`."""
+        if not self._is_moving:
+            return []
+        self._is_moving = False
+        goals = [one.position for one in self._feedback]
+        unconfirmed = self._command_until(self._family.goal, goals)
+        if self._config.after_quick_stop == "release" and not unconfirmed:
+            return self._command_until(self._family.torque, [0, 0, 0])
+        return unconfirmed
+
+    def disable(self) -> list[str]:
+        """Stop, then switch the torque off."""
+        if not self._was_enabled:
+            return []
+        return self.quick_stop() or self._command_until(self._family.torque, [0, 0, 0])
+
+    def close(self) -> None:
+        """Release the port; a second call does nothing."""
+        self._line.close()
+
+    def _command_until(self, register: Register, values: list[int]) -> list[str]:
+        """Repeat a sync write until each servo has the value; names of those that do not."""
+        pending = set(Dof)
+        deadline = time.monotonic() + self._config.state_timeout
+        try:
+            self._line.set_timeout(self._config.reply_timeout)
+            while pending and time.monotonic() < deadline:
+                # Goals are read-only once the watchdog has tripped.
+                if self._family.watchdog is not None:
+                    self._line.write_all(dict.fromkeys(self._ids, 0), self._family.watchdog)
+                self._line.write_all(dict(zip(self._ids, values, strict=True)), register)
+                for dof in sorted(pending):
+                    try:
+                        data, _ = self._line.read(self._ids[dof], register.address, register.size)
+                    except NoAnswerError:
+                        continue
+                    if register.decode(data) == values[dof]:
+                        pending.discard(dof)
+        except DriveError:
+            pass  # the port is lost
+        return [self.name(dof) for dof in sorted(pending)]
+
+    def _receive(self) -> None:
+        """Read all servos with one packet; one by one in the cycle after one did not answer."""
+        was_lossy, self._has_lost_answers = self._has_lost_answers, False
+        answers: list[tuple[bytes, int] | None] = []
+        try:
+            if was_lossy:
+                answers = [self._try_read(servo) for servo in self._ids]
+            else:
+                answers += self._line.read_all(self._ids, self._block, self._block_size)
+        except NoAnswerError:
+            answers = [None] * len(Dof)
+        now = time.monotonic()
+        for dof, answer in zip(Dof, answers, strict=True):
+            one = self._feedback[dof]
+            if answer is None:
+                self._has_lost_answers = True
+                one.age, one.silence = one.age + 1, now - one.answered_at
+                continue
+            one.age, one.silence, one.answered_at = 0, 0.0, now
+            one.answers += 1
+            one.position = self._family.position.decode(answer[0][: self._family.position.size])
+        for dof, answer in zip(Dof, answers, strict=True):
+            if answer is not None and self._is_moving:
+                self._check_faults(dof, answer[1])
+
+    def _try_read(self, servo: int) -> tuple[bytes, int] | None:
+        try:
+            return self._line.read(servo, self._block, self._block_size)
+        except NoAnswerError:
+            return None
+
+    def _check_faults(self, dof: Dof, error: int) -> None:
+        faults, servo = error, self._servos[dof]
+        if self._family.alert:
+            if not error & self._family.alert:
+                return
+            faults = servo.read(self._family.faults)
+        if faults:
+            raise EmergencyError(servo.name, *servo.fault(faults))

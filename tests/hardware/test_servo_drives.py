@@ -1,0 +1,288 @@
+"""Servos behind `Drives`: units, turns, settings; faults end in a named error and a stop."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from servo_settings import AXES, MODELS, START, servos_config, servos_document
+from tautscope.bench.servos import FaultKind, SimulatedServos
+from tautscope.config import DrivesConfig, dump_config, from_document
+from tautscope.dof import Dof
+from tautscope.errors import (
+    BusError,
+    DriveError,
+    EmergencyError,
+    FollowingError,
+    ModeRefusedError,
+    SettingRefusedError,
+    SilentDriveError,
+    StateError,
+)
+from tautscope.hardware.doctor.drives import check_drives
+from tautscope.hardware.drives import Drives, open_drives
+from test_processes import MASTER, process
+from waiting import TIMEOUT, until
+
+FAMILIES = pytest.mark.parametrize("protocol", ["dynamixel", "feetech"])
+SPEED = np.array([0.005, 0.5, 0.4])
+
+
+@contextmanager
+def running(config: DrivesConfig) -> Iterator[tuple[SimulatedServos, Drives]]:
+    """Simulated servos and their master, enabled."""
+    with SimulatedServos(config, start=START) as servos, open_drives(config) as drives:
+        drives.start()
+        yield servos, drives
+
+
+def drive(drives: Drives, cycles: int) -> None:
+    """Move back and forth, paced."""
+    command = drives.last_command
+    for count in range(cycles):
+        command = command + SPEED * drives.cycle * (1 if count // 40 % 2 == 0 else -1)
+        drives.exchange(command)
+        time.sleep(drives.cycle / 2)
+
+
+def goals_are_positions(servos: SimulatedServos) -> bool:
+    """Whether no servo is on its way; a count is the resolution."""
+    positions = [one.get(one.family.position) for one in servos.servos]
+    goals = [one.get(one.family.goal) for one in servos.servos]
+    torques = [one.get(one.family.torque) for one in servos.servos]
+    return all(
+        abs(goal - position) <= 1 or not torque
+        for goal, position, torque in zip(goals, positions, torques, strict=True)
+    )
+
+
+@FAMILIES
+def test_motors_follow_in_si_units_over_several_turns(protocol: str, tmp_path: Path) -> None:
+    config = servos_config(protocol, tmp_path)
+    demands: list[np.ndarray] = []
+
+    def plant(demand: np.ndarray) -> np.ndarray:
+        demands.append(demand.copy())
+        return demand
+
+    resolution = np.array([1 / config[dof].counts_per_unit for dof in Dof])
+    with SimulatedServos(config, plant, start=START) as servos, open_drives(config) as drives:
+        position = drives.start()
+        assert (abs(position - START) <= resolution).all()
+        goal = START + np.array([0.05, 7.0, -3.2])  # more than a turn of rotation
+        for step in range(1, 201):
+            command = START + (goal - START) * step / 200
+            drives.exchange(command)
+            time.sleep(drives.cycle / 4)
+        until(lambda: bool((abs(drives.exchange(goal) - goal) <= resolution).all()))
+        assert (abs(demands[-1] - goal) <= resolution).all()
+    until(lambda: goals_are_positions(servos))
+    assert [one.what for one in servos.events] == ["torque on"] * 3  # and held
+
+
+@FAMILIES
+def test_settings_are_read_back_and_stored_only_if_they_differ(
+    protocol: str, tmp_path: Path
+) -> None:
+    axes = {"rotation": AXES["rotation"] | {"model": MODELS[protocol], "homing_offset": -40}}
+    config = servos_config(protocol, tmp_path, **axes)
+    with SimulatedServos(config, start=START) as servos:
+        written: list[int] = []
+        for servo in servos.servos:
+            write = servo.write
+            servo.write = lambda at, data, now, write=write: (
+                written.append(at)
+                or write(  # type: ignore[method-assign]
+                    at, data, now
+                )
+            )
+        for _ in range(2):
+            with open_drives(config) as drives:
+                (first, *_) = drives.commissioned
+                assert (first.name, first.product) == (
+                    "insertion, servo 1",
+                    servos.servos[0].model.number,
+                )
+            stored, written[:] = list(written), []
+        assert stored == []
+        assert drives.commissioned[1].settings[
+            "Homing Offset (20)" if protocol == "dynamixel" else "Offset (31)"
+        ] == (-40 if protocol == "dynamixel" else 40)
+        with open_drives(config) as drives:
+            shift = -40 / config.rotation.counts_per_unit  # the servo adds it
+            start = drives.start()
+            assert start[Dof.ROTATION] == pytest.approx(START[Dof.ROTATION] + shift, abs=1e-3)
+
+
+@FAMILIES
+@pytest.mark.parametrize(
+    ("kind", "error", "message"),
+    [
+        ("drop", SilentDriveError, "no answer to"),
+        ("delay", SilentDriveError, "no answer to"),
+        ("fault", EmergencyError, r"it reports a fault: overload \(0x20\)"),
+        ("freeze", FollowingError, "blocks the motor"),
+        ("restart", FollowingError, "following error|jumped"),
+    ],
+)
+def test_fault_while_running_stops_all_motors(
+    protocol: str, tmp_path: Path, kind: FaultKind, error: type[DriveError], message: str
+) -> None:
+    with running(servos_config(protocol, tmp_path)) as (servos, drives):
+        drive(drives, 5)
+        servos.inject(kind, Dof.ROTATION, 60.0)
+        with pytest.raises(error, match=message) as found:
+            drive(drives, 10_000)
+        assert "rotation, servo 2" in str(found.value)
+        assert not drives.is_running
+        if kind in ("drop", "delay"):
+            assert "rotation, servo 2: quick stop is not confirmed" in str(found.value.__notes__)
+        servos.clear(Dof.ROTATION)
+        until(lambda: goals_are_positions(servos))
+        with pytest.raises(StateError, match="before start\\(\\) or after stop"):
+            drives.exchange([0, 0, 0])
+
+
+@FAMILIES
+def test_killed_host(protocol: str, tmp_path: Path) -> None:
+    """A Dynamixel stops by its bus watchdog, a Feetech at its last set-point; both hold."""
+    config = from_document({"drives": servos_document(protocol, tmp_path)})
+    file = tmp_path / "rig.toml"
+    file.write_text(dump_config(config), encoding="utf-8")
+    assert config.drives is not None
+    with SimulatedServos(config.drives, start=START) as servos:
+        with process(MASTER, str(file), "signal") as (master, output):
+            output._queue.get(timeout=TIMEOUT)  # it moves
+            master.kill()
+            master.wait(TIMEOUT)
+        if protocol == "dynamixel":
+            until(lambda: sum(one.what == "bus watchdog" for one in servos.events) == 3)
+        until(lambda: goals_are_positions(servos))
+        assert all(one.get(one.family.torque) for one in servos.servos)
+
+
+@FAMILIES
+def test_unplugged_port_is_a_bus_error(protocol: str, tmp_path: Path) -> None:
+    with running(servos_config(protocol, tmp_path, state_timeout=0.2)) as (servos, drives):
+        drive(drives, 3)
+        os.dup2(os.open(os.devnull, os.O_RDWR), servos._line)  # the other end is closed
+        with pytest.raises((BusError, SilentDriveError)) as found:
+            drive(drives, 10_000)
+        assert "quick stop is not confirmed" in str(found.value.__notes__)
+
+
+def test_dynamixel_stops_when_the_host_hangs_and_a_feetech_goes_to_its_last_goal(
+    tmp_path: Path,
+) -> None:
+    for protocol, events in (("dynamixel", ["bus watchdog"] * 3), ("feetech", [])):
+        folder = tmp_path / protocol
+        folder.mkdir()
+        config = servos_config(protocol, folder, heartbeat_timeout=0.2)
+        with running(config) as (servos, drives):
+            drive(drives, 3)
+            before = len(servos.events)
+            time.sleep(2 * config.heartbeat_timeout)
+            with pytest.raises(StateError, match=r"no set-point for .*heartbeat_timeout"):
+                drive(drives, 1)
+            assert [one.what for one in servos.events[before:]] == events
+            until(lambda servos=servos: goals_are_positions(servos))
+        # The watchdog is off: the motors are held.
+        assert all(one.get(one.family.torque) for one in servos.servos)
+
+
+@FAMILIES
+def test_released_and_disabled_motors_have_no_torque(protocol: str, tmp_path: Path) -> None:
+    for changes, release in (({"after_quick_stop": "release"}, Drives.stop), ({}, Drives.disable)):
+        with running(servos_config(protocol, tmp_path, **changes)) as (servos, drives):
+            drive(drives, 3)
+            release(drives)
+            assert not any(one.get(one.family.torque) for one in servos.servos)
+
+
+@FAMILIES
+def test_fault_persists_until_it_is_reset(protocol: str, tmp_path: Path) -> None:
+    config = servos_config(protocol, tmp_path)
+    with SimulatedServos(config, start=START) as servos:
+        servos.inject("fault", Dof.BENDING)
+        until(lambda: bool(servos.events))
+        with open_drives(config) as drives, pytest.raises(StateError, match=r"bending.*overload"):
+            drives.start()
+        servos.clear(Dof.BENDING)
+        with open_drives(config) as drives:
+            position = drives.start(reset_faults=True)
+            np.testing.assert_allclose(position, START, atol=2e-3)
+
+
+@FAMILIES
+@pytest.mark.parametrize(
+    ("changes", "error", "message"),
+    [
+        ({"node": 9}, SilentDriveError, "rotation.node.*ids 1, 2, 3 answer at 1000000"),
+        ({}, ModeRefusedError, "it is a .* not a .*Correct drives.rotation.model"),
+        ({"travel": [-1e4, 0.0]}, SettingRefusedError, "It counts to"),
+    ],
+    ids=["id", "model", "turns"],
+)
+def test_wrong_configuration_is_named_before_anything_moves(
+    protocol: str,
+    tmp_path: Path,
+    changes: dict[str, Any],
+    error: type[DriveError],
+    message: str,
+) -> None:
+    rotation = AXES["rotation"] | {"model": MODELS[protocol]} | changes
+    config = servos_config(protocol, tmp_path, rotation=rotation, request_timeout=0.1)
+    with SimulatedServos(servos_config(protocol, tmp_path), start=START) as servos:
+        if not changes:  # another model is connected
+            servos.servos[1].set(servos.servos[1].family.model, 2825)
+        with pytest.raises(error, match=message):
+            open_drives(config)
+        findings = {one.what: one for one in check_drives(config) if one.status == "missing"}
+        assert len(findings) == 1
+        assert any("rotation" in what for what in findings)
+        assert not servos.events
+
+
+@FAMILIES
+def test_position_outside_the_travel_and_missing_port(protocol: str, tmp_path: Path) -> None:
+    config = servos_config(protocol, tmp_path)
+    with pytest.raises(BusError, match=r"cannot be opened.*drives\.channel"):
+        open_drives(config)
+    bending = AXES["bending"] | {"model": MODELS[protocol], "travel": [1.0, 2.0]}
+    with (
+        SimulatedServos(config, start=START),
+        open_drives(servos_config(protocol, tmp_path, bending=bending)) as drives,
+        pytest.raises(FollowingError, match="outside its travel") as found,
+    ):
+        drives.start()
+    assert "drives.bending.home" in str(found.value)
+
+
+@FAMILIES
+def test_doctor_finds_all_there_and_enables_nothing(protocol: str, tmp_path: Path) -> None:
+    config = servos_config(protocol, tmp_path)
+    with SimulatedServos(config, start=START) as servos:
+        findings = check_drives(config)
+        assert not servos.events
+    assert [one.what for one in findings if one.status == "missing"] == []
+    text = "; ".join(one.found for one in findings)
+    assert MODELS[protocol] in text
+    assert "torque off; no fault" in text
+    assert "°C" in text
+
+
+def test_lost_answers_are_counted_for_the_servo_that_is_silent(tmp_path: Path) -> None:
+    """The others are read one by one meanwhile, and the motion goes on."""
+    with running(servos_config("dynamixel", tmp_path)) as (servos, drives):
+        late = drives.statistics.late
+        servos.inject("drop", Dof.BENDING)
+        until(lambda: drives.exchange(drives.last_command) is not None and late[Dof.BENDING] > 3)
+        assert late[Dof.BENDING] > late[Dof.INSERTION]
+        servos.clear(Dof.BENDING)
+        drive(drives, 10)

@@ -1,0 +1,93 @@
+"""The search for mechanical stops finds them, at low torque, and restores a forgotten turn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from servo_settings import AXES, MODELS, servos_document
+from tautscope.bench.servos import SimulatedServos
+from tautscope.cli import main
+from tautscope.config import Config, dump_config, from_document, load_config
+from tautscope.dof import Dof
+from tautscope.errors import CalibrationError
+from tautscope.hardware.drives import open_drives
+from tautscope.hardware.stops import find_stops
+
+LOWER, UPPER = -0.011, 0.062  # m, of insertion: 1.8 turns
+COUNT = 1 / AXES["insertion"]["counts_per_unit"]
+
+
+@contextmanager
+def between_stops(
+    config: Config, at: float, stops: tuple[float, float] = (LOWER, UPPER)
+) -> Iterator[SimulatedServos]:
+    """Servos whose motor of insertion is between stops; positions are those of the mechanism."""
+
+    def plant(demand: np.ndarray) -> np.ndarray:
+        return np.array([np.clip(demand[0], *stops), *demand[1:]])
+
+    assert config.drives is not None
+    with SimulatedServos(config.drives, plant, start=np.array([at, 0.0, 0.5])) as servos:
+        yield servos
+
+
+def rig(protocol: str, folder: Path, **insertion: Any) -> Config:
+    axis = AXES["insertion"] | {"model": MODELS[protocol]} | insertion
+    drives = servos_document(protocol, folder, insertion=axis, cycle=0.01, reply_timeout=0.009)
+    return from_document({"control": {"period": 0.01}, "drives": drives})
+
+
+def test_stops_are_found_and_a_forgotten_turn_is_restored(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = rig("dynamixel", tmp_path, travel=[-0.02, 0.08], speed_limit=0.5)
+    file = tmp_path / "rig.toml"
+    file.write_text(dump_config(config), encoding="utf-8")
+    command = ["calibrate", "stops", "insertion", "--config", str(file), "--yes", "--write"]
+    with between_stops(config, 0.02) as servos:
+        assert main(command) == 0
+        assert abs(servos.servos[0].shaft * COUNT - 0.02) < 2e-3  # back where it was
+    found = load_config(file).drives
+    assert found is not None
+    assert found.insertion.stops == pytest.approx((LOWER, UPPER), abs=2 * COUNT)
+    assert LOWER < found.insertion.travel[0] < found.insertion.travel[1] < UPPER
+
+    # 0.05 m is in the second turn, which a restarted servo calls the first.
+    with between_stops(config, 0.05) as servos:
+        with open_drives(found) as drives:
+            assert drives.start()[0] == pytest.approx(0.05 - 4096 * COUNT, abs=COUNT)
+        assert main(command) == 0
+        restored = load_config(file).drives
+        assert restored is not None
+        with open_drives(restored) as drives:
+            assert drives.start()[0] == pytest.approx(servos.servos[0].shaft * COUNT, abs=3 * COUNT)
+    assert restored.insertion.home == pytest.approx(4096 * COUNT, abs=3 * COUNT)
+    assert "drives.insertion.home = 0.04" in capsys.readouterr().out
+
+
+def test_stops_of_a_feetech_are_found(tmp_path: Path) -> None:
+    config = rig("feetech", tmp_path, travel=[0.018, 0.024], counts_per_unit=3e5)
+    with between_stops(config, 0.002, stops=(0.0, 0.004)):
+        stops = find_stops(config, Dof.INSERTION, torque=0.5)
+    assert (stops.lower, stops.upper) == pytest.approx((0.0, 0.004), abs=2 / 3e5)
+
+
+def test_without_a_stop_or_with_other_stops_there_is_no_answer(tmp_path: Path) -> None:
+    config = rig("dynamixel", tmp_path, travel=[0.01, 0.012])
+    with between_stops(config, 0.02), pytest.raises(CalibrationError, match="no stop on a way"):
+        find_stops(config, Dof.INSERTION)
+    other = rig("dynamixel", tmp_path, travel=[0.0, 0.03], stops=[-0.011, 0.04], speed_limit=0.5)
+    with (
+        between_stops(other, 0.02),
+        pytest.raises(CalibrationError, match=r"0\.073 between the stops, and 0\.051 before"),
+    ):
+        find_stops(other, Dof.INSERTION).changes(other.drives, Dof.INSERTION)  # type: ignore[arg-type]
+
+
+def test_only_motors_with_limited_torque_are_driven_against_stops(tmp_path: Path) -> None:
+    assert main(["calibrate", "stops", "insertion", "--config", "bench", "--yes"]) == 2
