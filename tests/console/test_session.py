@@ -143,6 +143,26 @@ def test_settings_programs_and_profile(console: RunningConsole, page: Page) -> N
     page.wait(lambda: not page.state["program"])
 
 
+@pytest.mark.parametrize("text", ["\x01" * 200, "\N{ROCKET}" * 150, "\x7f\t\n" * 66])
+def test_any_mark_that_is_accepted_leaves_the_connection_open(
+    console: RunningConsole, page: Page, text: str
+) -> None:
+    assert page.request(type="action", name="mark", text=text)["is_accepted"]
+    assert page.request(type="action", name="mark", text="again")["is_accepted"]
+
+
+def test_a_long_error_is_shown_and_ends_nothing(
+    console: RunningConsole, page: Page, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(console.control, "fault", "\x01" * 5000)
+    monkeypatch.setattr(console.control, "run", None)
+    monkeypatch.setattr(console.control, "open", lambda: None)
+    reply = page.request(type="action", name="enable")
+    assert reply["reason"].startswith("\x01" * 100)
+    page.wait(lambda: page.state["motion"] == "off")
+    assert "\x01" * 100 in page.state["message"]
+
+
 def test_everything_is_in_the_log_and_the_log_replays(tmp_path: Path) -> None:
     with running_console(tmp_path) as console:
         page = console.page()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from tautscope.console.control_run import ControlRun
+from tautscope.console.messages import LONGEST_REASON
 from tautscope.console.rig_control import RigControl
 from tautscope.console.state import (
     ImageState,
@@ -48,7 +49,8 @@ def session_state(control: RigControl, log: LogState, now: float) -> State:
         dropped = run.log.dropped
         state.log = LogState(log.path, log.size, log.remaining, dropped, run.log.failure)
     state.image.sequence = control.images.newest
-    state.motion, state.message = _motion(control)
+    state.motion, message = _motion(control)
+    state.message = message[:LONGEST_REASON]
     state.drives = _drives(control)
     return state
 
