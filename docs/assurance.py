@@ -71,6 +71,12 @@ CONTROLS = {
     "N5": ["python/tautscope/console/lease.py"],
     "M1": ["python/tautscope/hardware/rig_lock.py", "python/tautscope/console/lease.py"],
     "M2": ["python/tautscope/commands/console.py", "python/tautscope/twin/faults.py"],
+    "H1": [
+        "python/tautscope/console/operator_input.py",
+        "python/tautscope/console/page/steer.js",
+    ],
+    "H2": ["python/tautscope/console/page/steer.js"],
+    "C10": ["python/tautscope/config/checks.py"],
     "U1": ["python/tautscope/console/session_state.py"],
 }
 """Hazard -> files of its control beyond those that raise the flags of its response."""
@@ -143,7 +149,7 @@ def traceability() -> str:
 
 def hazards(page: str) -> Iterator[tuple[str, str, str, str]]:
     """Name, cause, response and tests of each hazard in docs/safety.md."""
-    for row in re.findall(r"^\| ([VECDPLNMU]\d+) \| (.*) \|$", page, re.MULTILINE):
+    for row in re.findall(r"^\| ([VECDPLNMUH]\d+) \| (.*) \|$", page, re.MULTILINE):
         cause, response, shown = re.split(r" (?<!\\)\| ", row[1], maxsplit=2)
         yield row[0], cause, response, shown
 

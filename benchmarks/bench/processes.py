@@ -87,7 +87,7 @@ def start_rig(config: Config, folder: Path, *more: str) -> Iterator[Rig]:
 def run(file: Path, out: Path, *more: str) -> subprocess.Popen[str]:
     """Start `tautscope run`, which controls the rig."""
     return subprocess.Popen(
-        [*TAUTSCOPE, "run", "--config", str(file), "--out", str(out), "--json", *more],
+        [*TAUTSCOPE, "run", "--config", str(file), "--out", str(out), "--yes", "--json", *more],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

@@ -18,7 +18,7 @@ from playwright.sync_api import Page as BrowserPage
 from playwright.sync_api import sync_playwright
 from tautscope.config import Config
 from tautscope.console.live_twin import LiveTwin
-from tautscope.console.operator_input import LARGEST_SPEED
+from tautscope.console.operator_input import DEAD_BAND, LARGEST_SPEED
 from tautscope.console.rig_control import RigControl
 from tautscope.console.session import Session
 from tautscope.console.start import web_server
@@ -45,10 +45,9 @@ START_TIME = 8.0
 """Time after which a measurement begins [s]."""
 HAND_SIZE = "360x288"
 """Size of the images of the operator motion, which runs twice in one process too."""
-DEAD_BAND = 0.1
 """Of the page's gamepad."""
 GAMEPAD = """
-window.pad = {connected: true, id: "simulated", axes: [0, 0, 0, 0],
+window.pad = {connected: true, id: "simulated", mapping: "standard", axes: [0, 0, 0, 0],
               buttons: Array.from({length: 17}, () => ({pressed: false}))};
 navigator.getGamepads = () => {
   if (window.motion) {

@@ -134,6 +134,7 @@ class Page:
 
     def servo(self, axes: tuple[float, ...] = (1, 0, 0), *, is_holding: bool = True) -> None:
         """Send a deflection."""
+        axes = tuple(axis * is_holding for axis in axes)
         self.send({"type": "servo", **self.fields(), "axes": axes, "is_holding": is_holding})
 
     def action(self, name: str) -> None:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import io
 import logging
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -137,12 +139,47 @@ def test_a_bench_that_does_not_run_is_named(capsys: Capture, tmp_path: Path) -> 
     file = tmp_path / "rig.toml"
     bench = (ROOT / "configs" / "bench.toml").read_text(encoding="utf-8")
     file.write_text(bench.replace("/tmp/tautscope-bench", f"{tmp_path}/bench"), encoding="utf-8")
-    arguments = ["run", "--config", str(file), "--out", str(tmp_path / "run"), "--periods", "3"]
+    arguments = [
+        "run",
+        "--config",
+        str(file),
+        "--out",
+        str(tmp_path / "run"),
+        "--periods",
+        "3",
+        "--yes",
+    ]
     assert main(arguments) == 3
     err = capsys.readouterr().err
     assert "1 run: about 1.5 min" in err  # three DOFs, three periods of 10 s
     assert f"error: No rig answers on unix:{tmp_path}/bench.video: start `tautscope bench`" in err
     assert list(tmp_path.iterdir()) == [file]
+
+
+@pytest.mark.parametrize("free", [1e12, 1e6], ids=["room", "no room"])
+@pytest.mark.parametrize("rig", [[], ["--rig", "tautscope.twin.colonoscope:ColonoscopeTwin"]])
+def test_a_run_without_consent_or_room_for_its_log_opens_no_rig(
+    capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rig: list[str], free: float
+) -> None:
+    usage = shutil.disk_usage(tmp_path)._replace(free=int(free))
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: usage)
+    monkeypatch.setattr("sys.stdin", io.StringIO("\n"))
+
+    def opened(self: object, config: object) -> None:
+        raise AssertionError("a rig was opened")
+
+    for name in ("hardware.rig.HardwareRig", "twin.colonoscope.ColonoscopeTwin"):
+        monkeypatch.setattr(f"tautscope.{name}.__init__", opened)
+    config = ["--config", "colonoscope" if rig else "bench"]
+    out = ["--out", str(tmp_path / "run")]
+    assert main(["run", *config, *rig, *out]) == 2
+    err = capsys.readouterr().err
+    has_room = free == 1e12
+    assert ("nothing moved" if has_room else f"out: got '{tmp_path} with") in err
+    assert ("Type y to start" in err) == has_room
+    assert list(tmp_path.iterdir()) == []
+    if not has_room:  # consent is no room
+        assert main(["run", *config, *rig, *out, "--yes"]) == 2
 
 
 def test_verbose_prints_the_log(capsys: Capture, tmp_path: Path) -> None:

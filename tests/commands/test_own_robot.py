@@ -59,7 +59,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def run(*options: str) -> int:
-    return main(["run", "--config", "robot.toml", *options])
+    return main(["run", "--config", "robot.toml", "--yes", *options])
 
 
 def test_a_rig_of_thirty_lines_is_compensated(

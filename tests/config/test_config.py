@@ -1,8 +1,9 @@
 """Configuration: defaults, files, and errors that name the key."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,9 +20,11 @@ from tautscope.config import (
     dump_config,
     from_document,
     load_config,
+    to_document,
 )
 from tautscope.dof import Dof
 from tautscope.errors import ConfigError, MissingPathError
+from tautscope.loop.safety import disabled_monitors
 
 CONFIGS = ROOT / "configs"
 
@@ -114,6 +117,66 @@ def test_a_bad_value_is_named(tmp_path: Path, text: str, field: str, value: obje
     if value is not None:
         assert error.value.value == value
     assert error.value.allowed
+
+
+def numbers(document: dict[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    """Dotted path and value of every number, and every list of numbers, but that of the twin."""
+    for key, value in document.items():
+        if isinstance(value, dict) and key != "twin":
+            yield from numbers(value, f"{above}{key}.")
+        elif type(value) in (int, float) or (isinstance(value, list) and value):
+            yield f"{above}{key}", value
+
+
+SIGNED = {
+    "camera.cx", "camera.cy", "camera.distortion", "camera.camera_from_guide.rotation",
+    "camera.camera_from_guide.translation", "vision.weights", "vision.threshold",
+    "vision.alternatives", "vision.unlocated.alternatives",
+}  # fmt: skip
+"""Numbers without a scale."""
+LIMIT_NOTHING = (
+    "safety.frozen_travel",
+    "recording.",
+    "experiment.",
+    "measurement.",
+    "calibration.",
+)
+
+
+@pytest.mark.parametrize("factor", [40.0, 57.3, 1e3, 1e6])
+def test_no_limit_can_be_switched_off_by_a_wrong_unit_or_digit(factor: float) -> None:
+    def times(value: Any) -> Any:
+        return [times(one) for one in value] if isinstance(value, list) else factor * value
+
+    accepted = []
+    for path, value in numbers(to_document(Config())):
+        if path in SIGNED or path.startswith(LIMIT_NOTHING) or times(value) == value:
+            continue
+        whole = int(times(value)) if isinstance(value, int) else times(value)
+        try:
+            Config().replace(**{path: whole})
+        except ConfigError as error:
+            assert error.field.partition(".")[0] == path.partition(".")[0]
+        else:
+            accepted.append(path)
+    assert accepted == []
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("safety.stall", 1e4), ("safety.innovation_limit", 1e-3), ("law.change_rate", 1.0)],
+)
+def test_a_number_beyond_its_range_is_named_in_the_file_and_in_every_report(
+    key: str, value: float
+) -> None:
+    with pytest.raises(ConfigError, match=f"{key} named in safety.unusual") as error:
+        Config().replace(**{key: value})
+    assert (error.value.field, error.value.value) == (key, value)
+    config = Config().replace(**{key: value, "safety.unusual": [key]})
+    assert any(key in line for line in disabled_monitors(config))
+    assert disabled_monitors(Config()) == ()
+    with pytest.raises(ConfigError, match=r"safety\.unusual\[0\]: got 'safety\.stal'"):
+        Config().replace(**{"safety.unusual": ["safety.stal"]})
 
 
 def test_a_missing_or_invalid_file_is_named(tmp_path: Path) -> None:

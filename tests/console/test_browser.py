@@ -25,7 +25,8 @@ FLAGS = [
     "--disable-background-networking", "--disable-component-update",
 ]  # fmt: skip
 GAMEPAD = """
-window.pad = {connected: true, id: "simulated", axes: [0, 0, 0, 0], buttons: []};
+window.pad = {connected: true, id: "simulated", index: 0, mapping: "standard"};
+Object.assign(pad, {axes: [0, 0, 0, 0], buttons: []});
 for (let k = 0; k < 17; k++) pad.buttons.push({pressed: false});
 navigator.getGamepads = () => [pad];
 """
@@ -167,6 +168,105 @@ def test_a_gamepad_moves_while_its_button_is_held(console: RunningConsole, open_
     page.evaluate("pad.buttons[5].pressed = false")
     wait(lambda: not moves(console))
     page.evaluate("pad.buttons[1].pressed = true")
+    expect(page.locator("#motion")).to_have_text("STOPPED", timeout=TIMEOUT)
+
+
+REST4, REST8 = [0, 0, 0, 0], [0, 0, -1, 0, 0, -1, 0, 0]
+PADS = {  # mapping, axes at rest, number of buttons, the button that is B
+    "standard": ("standard", REST4, 17, 1),
+    "standard, worn to 0.15": ("standard", [0.15, -0.15, 0.15, -0.15], 17, 1),
+    "standard, stuck": ("standard", [0, 0, 0, -1], 17, 1),
+    "standard, NaN": ("standard", [0, "NaN", 0, 0], 17, 1),
+    "standard, two axes": ("standard", [0, 0], 10, 1),
+    "PS4, Firefox on macOS": ("", [0, 0, 0, -1, -1, 0, 0, 0], 18, 2),
+    "PS4, Firefox on Linux": ("", REST8, 13, 1),
+    "Xbox, Firefox on Linux": ("", REST8, 11, 1),
+    "Xbox, Safari": ("", [0, 0, 0, 0, -1, -1], 17, 2),
+    "flight stick with a throttle": ("", [0, 0, 0, 1], 12, 0),
+    "steering wheel": ("", [0, 1, 1, 1], 20, 7),
+    "Switch, Chromium, Bluetooth": ("", [0, 0, 0, 0, 0, 0, 0, 0, 0, 1.28], 16, 1),
+}
+
+
+@pytest.mark.parametrize("pad", PADS)
+def test_no_gamepad_moves_anything_by_itself_and_each_stops(
+    console: RunningConsole, open_page, pad: str
+) -> None:
+    mapping, axes, count, stop = PADS[pad]
+    page = open_page(script=GAMEPAD + "navigator.getGamepads = () => [];")
+    take(page)
+    page.evaluate(
+        f"Object.assign(pad, {{mapping: '{mapping}', axes: [{', '.join(map(str, axes))}]}});"
+        f"pad.buttons = Array.from({{length: {count}}}, () => ({{pressed: false}}));"
+        "navigator.getGamepads = () => [null, null, pad]"
+    )
+    before = console.control.operator.reference
+    for held in (4, 5) if mapping else ():  # on any other each button stops
+        page.evaluate(f"pad.buttons[{held}].pressed = true")
+        assert rests(console, 0.3)
+        page.evaluate(f"pad.buttons[{held}].pressed = false")
+    assert (console.control.operator.reference == before).all()
+    assert rests(console, 0.2)
+    assert not console.control.operator.stopped_by
+    page.evaluate(f"pad.buttons[{stop}].pressed = true")
+    expect(page.locator("#motion")).to_have_text("STOPPED", timeout=TIMEOUT)
+    assert (console.control.operator.reference == before).all()
+
+
+def test_a_gamepad_that_is_plugged_in_with_its_stick_held_has_to_rest_first(
+    console: RunningConsole, open_page
+) -> None:
+    page = open_page(script=GAMEPAD)
+    take(page)
+    page.evaluate("pad.buttons[4].pressed = true; pad.axes = [0, -1, 0, 0]")
+    wait(lambda: moves(console))
+    page.evaluate("pad.connected = false")
+    wait(lambda: not moves(console))
+    page.evaluate("pad.connected = true")
+    assert rests(console, 0.5)
+    page.evaluate("pad.axes = [0, 0, 0, 0]")
+    assert rests(console, 0.3)  # the button was never released
+    page.evaluate("pad.buttons[4].pressed = false")
+    page.wait_for_timeout(200)
+    page.evaluate("pad.buttons[4].pressed = true; pad.axes = [0, -1, 0, 0]")
+    wait(lambda: moves(console))
+
+
+@pytest.mark.parametrize(
+    "control",
+    [
+        "#compensate",
+        "#gain",
+        "[aria-label='scale of bending']",
+        "#profile",
+        "#dofs [type=checkbox]",
+    ],
+)
+def test_keys_steer_after_a_click_on_any_control(
+    console: RunningConsole, open_page, control: str
+) -> None:
+    page = open_page()
+    take(page)
+    element = page.locator(control).first
+    if control == "#profile":
+        element.focus()
+    else:
+        element.click()
+        element.click()
+    wait(lambda: page.evaluate("Boolean(document.activeElement.matches('input, select'))"))
+    page.wait_for_timeout(300)
+    value = element.evaluate("each => [each.value, each.checked]")
+    for key in ("ArrowDown", "ArrowUp", "ArrowRight"):
+        page.keyboard.down(key)
+        wait(lambda: moves(console))
+        page.keyboard.up(key)
+        wait(lambda: not moves(console))
+    assert element.evaluate("each => [each.value, each.checked]") == value
+    page.focus("#mark")
+    page.keyboard.down("ArrowUp")
+    assert rests(console, 0.2)  # keys write there
+    expect(page.locator("#hint")).to_contain_text("Keys write into the text field")
+    page.keyboard.press("Escape")
     expect(page.locator("#motion")).to_have_text("STOPPED", timeout=TIMEOUT)
 
 

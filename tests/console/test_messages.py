@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import contextlib
 import json
+import multiprocessing
 import threading
 
 import msgspec
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from tautscope.config import Config
 from tautscope.console import messages as msg
+from tautscope.console.access import LARGEST_MESSAGE
+from tautscope.console.shared import Channels, SharedMemory
 from tautscope.console.slots import Slots
 
 NUMBERS = st.one_of(st.integers(), st.floats(), st.sampled_from([2**53, -1, 1e308]))
@@ -31,6 +35,8 @@ NEARLY = st.fixed_dictionaries(
     optional=dict.fromkeys(FIELDS[1:], VALUES)
     | {"axes": st.lists(NUMBERS, max_size=4) | VALUES, "lease": NUMBERS, "sequence": NUMBERS},
 )
+MARK = {"type": "action", "name": "mark"} | dict.fromkeys(("lease", "sequence", "image"), 2**53 - 1)
+CHANNELS = Channels(SharedMemory(multiprocessing.get_context("spawn"), Config()))
 DECODERS = [msg.decode_hello, msg.decode_control, msg.decode_video]
 
 
@@ -87,6 +93,15 @@ def test_every_message_crosses_unchanged() -> None:
         assert msg.decode_control(msg.encode(message)) == message
         received = msg.Received(7, 1.5, message)
         assert msg.decode_inbound(msg.encode(received)) == received
+
+
+@given(NEARLY.map(lambda found: json.dumps(found).encode()[:LARGEST_MESSAGE]))
+@example(json.dumps(MARK | {"text": "\x00" * 200}).encode())
+def test_every_message_fits_into_a_record(data: bytes) -> None:
+    with contextlib.suppress(msgspec.MsgspecError, UnicodeError):
+        received = msg.encode(msg.Received(2**53, 1e17 / 3, msg.decode_control(data)))
+        for slots in (CHANNELS.servo, CHANNELS.stop, CHANNELS.inbound):
+            assert len(received) <= slots.capacity
 
 
 @given(st.lists(st.binary(max_size=16), min_size=1, max_size=20), st.integers(2, 5))

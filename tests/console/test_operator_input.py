@@ -11,7 +11,12 @@ from hypothesis import strategies as st
 from tautscope.config import load_config
 from tautscope.console.lease import COMMAND_AGE, ImageTimes, Lease
 from tautscope.console.messages import Received, Servo
-from tautscope.console.operator_input import COMMAND_TIMEOUT, LARGEST_SPEED, OperatorInput
+from tautscope.console.operator_input import (
+    COMMAND_TIMEOUT,
+    DEAD_BAND,
+    LARGEST_SPEED,
+    OperatorInput,
+)
 from tautscope.console.programs import experiment, home, sweep
 from tautscope.dof import Dof
 
@@ -42,7 +47,7 @@ class Desk:
 
     def servo(
         self,
-        axes: tuple[float, float, float] = (1.0, 0.0, 0.0),
+        axes: tuple[float, float, float] | None = None,
         *,
         is_holding: bool = True,
         client: int = 1,
@@ -51,6 +56,8 @@ class Desk:
         image: int | None = None,
     ) -> None:
         self.sequence += 1
+        if axes is None:
+            axes = (1.0 * is_holding, 0.0, 0.0)
         servo = Servo(
             self.lease.number if lease is None else lease,
             self.sequence if sequence is None else sequence,
@@ -78,6 +85,23 @@ def test_a_held_key_moves_its_dof_alone() -> None:
     moved = sum(desk.tick() for _ in range(10))
     assert moved[Dof.INSERTION] > 0
     assert not moved[1:].any()
+
+
+@given(st.tuples(*[st.floats(-1, 1)] * 3), st.tuples(*[st.floats(-1, 1)] * 3))
+def test_only_axes_that_have_rested_move_and_none_within_the_dead_band(
+    rest: tuple[float, ...], held: tuple[float, ...]
+) -> None:
+    desk = Desk()
+    desk.lease.take(1)
+    desk.tick()
+    desk.servo(rest, is_holding=False)
+    desk.servo(held)
+    moved = desk.tick()
+    has_rested = max(map(abs, rest)) <= DEAD_BAND
+    assert desk.input.is_off_centre is not has_rested
+    for dof in range(3):
+        assert (moved[dof] != 0) == (has_rested and abs(held[dof]) > DEAD_BAND)
+        assert moved[dof] * held[dof] >= 0
 
 
 @pytest.mark.parametrize("client", [2, 3])

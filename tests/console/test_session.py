@@ -143,6 +143,52 @@ def test_settings_programs_and_profile(console: RunningConsole, page: Page) -> N
     page.wait(lambda: not page.state["program"])
 
 
+@pytest.mark.parametrize("profile", ["paper", "best"])
+def test_the_tip_shown_is_where_the_instrument_is(
+    console: RunningConsole, page: Page, profile: str
+) -> None:
+    """Not where a model is that knows no slack yet: it follows the command at once."""
+    page.let_go()
+    start = console.control.operator.reference[1]
+    axes = (0, -1 if start > 0 else 1, 0)
+
+    def has_travelled() -> bool:
+        page.servo(axes, is_holding=not page.state["must_release"])
+        return abs(page.state["reference"][1] - start) > 1.2
+
+    page.wait(has_travelled, PERIOD)
+    page.servo(is_holding=False)
+    page.wait(lambda: page.state["motion"] == "ready")
+    assert page.request(type="profile", profile=profile)["is_accepted"]
+    page.wait(lambda: page.state["profile"] == profile and page.state["image"]["updates"] > 20)
+    run = console.control.run
+    assert run is not None
+    assert page.state["tip"][1] == pytest.approx(run.sample.true_state[1], abs=0.15)
+    if profile == "paper":
+        assert abs(run.loop.predicted_state[1] - run.sample.true_state[1]) > 0.3
+        assert page.request(type="profile", profile="best")["is_accepted"]
+
+
+@pytest.mark.parametrize("text", ["\x01" * 200, "\N{ROCKET}" * 150, "\x7f\t\n" * 66])
+def test_any_mark_that_is_accepted_leaves_the_connection_open(
+    console: RunningConsole, page: Page, text: str
+) -> None:
+    assert page.request(type="action", name="mark", text=text)["is_accepted"]
+    assert page.request(type="action", name="mark", text="again")["is_accepted"]
+
+
+def test_a_long_error_is_shown_and_ends_nothing(
+    console: RunningConsole, page: Page, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(console.control, "fault", "\x01" * 5000)
+    monkeypatch.setattr(console.control, "run", None)
+    monkeypatch.setattr(console.control, "open", lambda: None)
+    reply = page.request(type="action", name="enable")
+    assert reply["reason"].startswith("\x01" * 100)
+    page.wait(lambda: page.state["motion"] == "off")
+    assert "\x01" * 100 in page.state["message"]
+
+
 def test_everything_is_in_the_log_and_the_log_replays(tmp_path: Path) -> None:
     with running_console(tmp_path) as console:
         page = console.page()

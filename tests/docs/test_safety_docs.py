@@ -8,7 +8,7 @@ from reactions.__main__ import table
 from tautscope.loop.safety import DETECTORS, Reaction
 
 PAGE = (ROOT / "docs" / "safety.md").read_text(encoding="utf-8")
-HAZARDS = {"V": 17, "E": 8, "C": 9, "D": 6, "P": 5, "L": 4, "N": 5, "M": 2, "U": 1}
+HAZARDS = {"V": 17, "E": 8, "C": 10, "D": 6, "P": 5, "L": 4, "N": 5, "M": 2, "U": 1, "H": 2}
 TEST = re.compile(r"`([\w./-]+\.(?:py|rs))::(\w+)`")
 
 

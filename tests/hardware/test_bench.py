@@ -235,7 +235,10 @@ def test_sigterm_stops_the_motors_and_keeps_the_log(
 ) -> None:
     _, file, lines = rig
     out = tmp_path / "run"
-    with process("-c", RUN, "run", "--config", str(file), "--out", str(out)) as (running, _):
+    with process("-c", RUN, "run", "--config", str(file), "--out", str(out), "--yes") as (
+        running,
+        _,
+    ):
         lines.until("operation enabled", 3)
         log = out / "compensated.mcap"
         until(lambda: log.is_file() and log.stat().st_size > 10_000)
@@ -252,7 +255,9 @@ def test_error_names_a_wrong_node_before_any_motion(
     wrong = tmp_path / "wrong.toml"
     text = file.read_text(encoding="utf-8").replace("node = 2", "node = 9")
     wrong.write_text(text.replace("request_timeout = 5.0", "request_timeout = 0.5"))
-    with process("-c", RUN, "run", "--config", str(wrong), "--out", str(tmp_path / "run")) as (
+    with process(
+        "-c", RUN, "run", "--config", str(wrong), "--out", str(tmp_path / "run"), "--yes"
+    ) as (
         running,
         _,
     ):

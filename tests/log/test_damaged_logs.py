@@ -4,9 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.writer import MCAP0_MAGIC, Writer
 from rosbags.highlevel import AnyReader
 from tautscope.errors import MissingPathError, OutputError, RecordError
-from tautscope.log.export import recover
+from tautscope.log.export import export_rosbag, recover
+from tautscope.log.mcap_records import Damage
 from tautscope.log.reader import Tick, read_log
 from tautscope.log.writer import LogSummary
 from tautscope.runs.recording import Recording, per_dof
@@ -55,6 +57,51 @@ def test_a_flipped_bit_costs_at_most_its_chunk(recorded: Recorded, tmp_path: Pat
         np.testing.assert_array_equal(
             [tick.command for tick in known.values()], per_dof(recording.trace, "command")[rows], at
         )
+
+
+def mcap(path: Path, topics: list[str]) -> Path:
+    """A complete log of another program, with a message of each topic."""
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start("ros2", "another program")
+        schema = writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
+        for time, topic in enumerate(topics):
+            channel = writer.register_channel(topic, "cdr", schema)
+            writer.add_message(channel, time, b"\0\1\0\0\2\0\0\0a\0", time)
+        writer.finish()
+    return path
+
+
+@pytest.mark.parametrize(
+    ("topics", "found"),
+    [
+        ([], "no messages"),
+        (["/PSM1/measured_js", "/tf"], "/PSM1/measured_js, /tf"),
+        (["/instrument/measured_js", "/tf"], "/instrument/measured_js, /tf"),  # CRTK is not ours
+    ],
+)
+def test_nothing_is_written_of_a_foreign_log(tmp_path: Path, topics: list[str], found: str) -> None:
+    file, out = mcap(tmp_path / "foreign.mcap", topics), tmp_path / "out.mcap"
+    for repair in (lambda: recover(file, out), lambda: export_rosbag(file, tmp_path / "bag")):
+        with pytest.raises(RecordError, match=f"{found}', expected a log of tautscope, with"):
+            repair()
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_what_is_missing_is_said_in_words(recorded: Recorded, tmp_path: Path) -> None:
+    complete = recorded[0].read_bytes()
+    file = tmp_path / "cut.mcap"
+    sizes: set[bool] = set()
+    for cut in (len(complete) - 1, len(complete) - len(MCAP0_MAGIC), len(complete) - 37):
+        file.write_bytes(complete[:cut])
+        damage = read_log(file).damage
+        sizes.add(damage.lost_bytes > 0)
+        expected = f"its last {damage.lost_bytes} bytes are" if damage.lost_bytes else "no end"
+        assert expected in str(damage)
+        assert " 0 bytes" not in str(damage)
+    assert sizes == {True, False}
+    assert str(Damage(is_truncated=False, bad_chunks=2)) == "2 damaged chunks were skipped"
+    assert str(Damage(is_truncated=False)) == ""
 
 
 def test_files_that_are_not_logs_are_rejected(tmp_path: Path, recorded: Recorded) -> None:

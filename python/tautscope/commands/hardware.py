@@ -7,6 +7,7 @@ import sys
 
 from tautscope.commands import arguments, robot
 from tautscope.commands.article_config import article_config
+from tautscope.commands.calibration_rig import add_yes, confirm_motion
 from tautscope.commands.held_run import recording_saved
 from tautscope.commands.positions import add_reference, read_reference
 from tautscope.commands.printing import announce, print_json
@@ -52,6 +53,7 @@ def add_parser(verbs: arguments.Verbs) -> None:
         "place of [drives] and [camera]",
     )
     robot.add_seconds(run, "a rig")
+    add_yes(run)
     arguments.add_out(run, "run")
     arguments.add_json(run)
 
@@ -82,6 +84,7 @@ def _run(options: argparse.Namespace) -> int:
     runs = 2 if options.compare else 1
     seconds = runs * reference.duration
     announce(f"{runs} run{'s' * (runs > 1)}", seconds, seconds * bytes_per_second(config), folder)
+    confirm_motion(options, "as the reference does. Keep", config)
     try:
         with recording_saved(folder), progress_bar("run") as progress:
             found = run_on_hardware(config, folder, progress, reference, compare=options.compare)

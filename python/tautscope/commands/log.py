@@ -100,12 +100,15 @@ def _recover(options: argparse.Namespace) -> None:
             {
                 "file": str(recovery.path),
                 "messages": recovery.messages,
+                "skipped": recovery.skipped,
                 "seconds": duration,
                 "damage": _damage(recovery.damage),
             }
         )
         return
     print(f"{recovery.path}: {sum(recovery.messages.values())} messages over {duration:.1f} s.")
+    if recovery.skipped:
+        print(f"Not copied, because no log of tautscope has them: {', '.join(recovery.skipped)}.")
     if not recovery.damage:
         print(f"{file} was complete.")
     _print_damage(file, recovery.damage)
@@ -139,10 +142,8 @@ def _damage(damage: Damage) -> dict[str, int]:
 
 
 def _print_damage(file: Path, damage: Damage) -> None:
-    if damage.is_truncated:
-        print(f"{file} is truncated: the last {damage.lost_bytes} bytes are incomplete.")
-    if damage.bad_chunks:
-        print(f"{file}: {damage.bad_chunks} damaged chunks were skipped.")
+    if damage:
+        print(f"{file} is {'truncated' if damage.is_truncated else 'damaged'}: {damage}.")
 
 
 def _replay(options: argparse.Namespace) -> int:

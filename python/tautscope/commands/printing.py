@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import json
-import logging
 import shutil
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tautscope.errors import OutputError
+
 if TYPE_CHECKING:
     from rich.console import Console
-
-_LOG = logging.getLogger(__name__)
 
 
 def print_json(document: dict[str, Any]) -> None:
@@ -37,6 +36,9 @@ def announce(what: str, seconds: float, size: float, folder: Path) -> None:
         seconds: Estimated duration [s].
         size: Estimated, or largest size of the files [byte].
         folder: Where they will be.
+
+    Raises:
+        OutputError: The disk has no room for the files.
     """
     above = next(each for each in folder.absolute().parents if each.exists())
     free = shutil.disk_usage(above).free
@@ -45,7 +47,8 @@ def announce(what: str, seconds: float, size: float, folder: Path) -> None:
     text = f"{what}: about {duration}, up to {size / scale:.2g} {unit} in {folder}"
     print(f"{text} ({free / 1e9:.0f} GB free)", file=sys.stderr, flush=True)
     if size > free:
-        _LOG.warning("the disk may become full: df -h %s", above)
+        allowed = f"a folder with {size / scale:.2g} {unit} free: --out, or a shorter run"
+        raise OutputError("out", f"{above} with {free / scale:.2g} {unit} free", allowed)
 
 
 def console() -> Console:

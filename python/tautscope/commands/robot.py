@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from tautscope.commands import arguments
+from tautscope.commands.calibration_rig import confirm_motion
 from tautscope.commands.held_run import recording_saved
 from tautscope.commands.printing import announce, print_json
 from tautscope.commands.result_lines import print_results
@@ -57,6 +58,8 @@ def run(
     motion = motion_of(config, seed, options.seconds or DURATION)
     seconds = 2 * motion.duration
     announce("2 runs", seconds, seconds * BYTES_PER_SECOND, folder)
+    if getattr(options, "rig", None) is not None:
+        confirm_motion(options, "over 60 % of each range. Keep", config)
     runs: list[Recording] = []
     with recording_saved(folder), exit_on_signals(), progress_bar("2 runs") as progress:
 

@@ -22,20 +22,20 @@ class DofEntry(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     name: Name
     """Its name in traces, tables and messages: small letters, digits and underscores."""
-    width_limit: Positive
+    width_limit: Annotated[float, Meta(gt=0, le=100)]
     """Largest width of the slack that is compensated, and the unit of its other lengths [m or
     rad]."""
     unit: Literal["m", "rad"] = "rad"
     """Its unit in every array."""
     range: tuple[float, float] | None = None
     """Least and largest command [m or rad]; without it 50 width_limit to both sides of 0."""
-    speed: Positive | None = None
+    speed: Annotated[float, Meta(gt=0, le=1000)] | None = None
     """Largest speed of the reference that is followed [m or rad per s]; without it 2 width_limit
     per s."""
     friction: str = ""
     """Degrees of freedom of one name share one friction, as a shaft that slides and turns in a
     channel; without a name it has its own."""
-    lever: Positive = 1.0
+    lever: Annotated[float, Meta(gt=0, le=100)] = 1.0
     """Of one that shares a friction: motion of the surface that rubs, over its own [m/rad], 1 for
     a translation."""
     expected_width: Positive | None = None

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, field
 
-from tautscope.config.fields import NonNegative, Positive, Vector3
+from tautscope.config.fields import Positive, Vector3
 from tautscope.config.section import Section
 
 PixelFormat = Literal["bgr", "rgb", "bgra", "yuyv", "uyvy", "nv12", "i420"]
@@ -42,7 +42,7 @@ class SourceConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     (V4L2); ``arrival``, its arrival time, for a source without time stamps."""
     clock_window: Positive = 10.0
     """Window of ``clock = "stream"`` [s]."""
-    delay: NonNegative = 0.0
+    delay: Annotated[float, Meta(ge=0, le=10)] = 0.0
     """Time from exposure to time stamp for ``device``, otherwise lowest time from exposure to
     arrival [s]; `tautscope calibrate geometry` measures it."""
     timeout: Positive = 2.0

@@ -7,7 +7,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+
+from msgspec import Struct
+from msgspec.inspect import FloatType, IntType, TupleType, type_info
+from msgspec.structs import fields
 
 import msgspec
 
@@ -26,6 +30,14 @@ from tautscope.dof import Dof
 from tautscope.errors import ConfigError
 
 _RANGE = "the lower limit, then the upper"
+RANGE = 30.0
+"""Largest ratio of a number to its default, in either direction. Robots differ by less; a wrong
+unit (mm for m, degrees for rad) or a digit too many is more."""
+RANGED = (
+    "law", "estimation", "insertion", "rotation", "bending", "instrument", "camera", "control",
+    "safety", "kinematics", "vision",
+)  # fmt: skip
+"""Sections in which it holds for every number whose type has no upper limit."""
 
 
 @relation(DofConfig)
@@ -67,11 +79,17 @@ def _check_control(control: ControlConfig) -> None:
     )
 
 
+_TRAVEL = next(each.default for each in fields(SafetyConfig) if each.name == "command_travel")
+
+
 @relation(SafetyConfig)
 def _check_safety(safety: SafetyConfig) -> None:
     _require_names("off", safety.off, DETECTORS)
     for index, limits in enumerate(safety.command_travel):
         _require(limits[0] < limits[1], f"command_travel[{index}]", limits, _RANGE)
+        most = RANGE * max(map(abs, _TRAVEL[index]))
+        is_usual = max(map(abs, limits)) <= most or "safety.command_travel" in safety.unusual
+        _require(is_usual, f"command_travel[{index}]", limits, f"within -{most:.3g} to {most:.3g}")
 
 
 def check_references(
@@ -106,6 +124,20 @@ def _check_dof_entry(dof: DofEntry) -> None:
         most = MOST_RANGE * dof.width_limit
         degrees = "; in m and rad, not mm and degrees" if high - low > most else ""
         _require(not degrees, "range", dof.range, f"at most {most:.3g} wide{degrees}")
+    # A slack of more than a metre is one in millimetres.
+    most_width, most_speed = (1.0, 10.0) if dof.unit == "m" else (100.0, 1000.0)
+    _require(
+        dof.width_limit <= most_width,
+        "width_limit",
+        dof.width_limit,
+        f"at most {most_width:g} {dof.unit}",
+    )
+    _require(
+        dof.largest_speed <= most_speed,
+        "speed",
+        dof.largest_speed,
+        f"at most {most_speed:g} {dof.unit}/s",
+    )
     if dof.expected_width is not None:
         _require_at_most("", dof, "expected_width", "width_limit")
     _require_at_most("", dof, "delta_minus", "delta_plus")
@@ -225,6 +257,43 @@ def _check_drives(drives: DrivesConfig) -> None:
         drives.heartbeat_timeout,
         f"at least {least}: two heartbeats and two cycles",
     )
+
+
+def check_ranges(config: Struct) -> None:
+    """Check that numbers are of the order of their defaults; keys from the root."""
+    defaults = {field.name: field.default_factory for field in fields(config)}
+    unusual: tuple[str, ...] = config.safety.unusual  # type: ignore[attr-defined]
+    known = {"safety.command_travel"}
+    for name in RANGED:
+        section, default = getattr(config, name), defaults[name]()
+        for path, value, usual, is_positive in _ranged(name, section, default):
+            key = path.partition("[")[0]
+            known.add(key)
+            low, high = usual / RANGE * is_positive, usual * RANGE
+            allowed = f"{low:.3g} to {high:.3g}, or {key} named in safety.unusual"
+            _require(low <= value <= high or key in unusual, path, value, allowed)
+    _require_names("safety.unusual", unusual, sorted(known))
+
+
+def _ranged(
+    path: str, section: Struct, default: Struct
+) -> Iterator[tuple[str, float, float, bool]]:
+    """Path, value, default, and whether it has to be above 0, of the numbers without a limit."""
+    for field in type_info(type(section)).fields:  # type: ignore[attr-defined]
+        place = f"{path}.{field.name}"
+        value, usual = getattr(section, field.name), getattr(default, field.name)
+        if isinstance(value, Struct):
+            yield from _ranged(place, value, usual)
+            continue
+        is_list = isinstance(field.type, TupleType)
+        kinds = field.type.item_types if is_list else (field.type,)
+        values, defaults = (value, usual) if is_list else ((value,), (usual,))
+        for index, (kind, one, of) in enumerate(zip(kinds, values, defaults, strict=True)):
+            if not isinstance(kind, FloatType | IntType):
+                continue
+            is_positive = isinstance(kind, FloatType) and kind.gt is not None
+            if of and kind.lt is kind.le is None and (is_positive or kind.ge is not None):
+                yield f"{place}[{index}]" if is_list else place, one, of, is_positive
 
 
 def _require(is_valid: bool, field: str, value: object, allowed: str) -> None:

@@ -12,7 +12,7 @@ from tautscope.config.actuators import ActuatorsConfig, check_actuators
 from tautscope.config.axes import DofEntry, KinematicsConfig, MeasurementConfig
 from tautscope.config.calibration import CalibrationConfig
 from tautscope.config.camera import CameraConfig
-from tautscope.config.checks import check_axes, check_references, check_topics
+from tautscope.config.checks import check_axes, check_ranges, check_references, check_topics
 from tautscope.config.control import ControlConfig
 from tautscope.config.dof import DofConfig
 from tautscope.config.drives import DrivesConfig
@@ -86,6 +86,7 @@ class Config(Section, frozen=True, forbid_unknown_fields=True, kw_only=True):
         Section.__post_init__(self)
         check_references(self.safety, self.experiment, {dof: self[dof] for dof in Dof})
         check_axes(self.dof, self.kinematics, self.safety)
+        check_ranges(self)
         check_topics(self.dof, self.kinematics, self.measurement)
         if self.actuators is not None:
             check_actuators(self.actuators, self.dof, self.drives)

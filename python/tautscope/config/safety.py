@@ -10,7 +10,7 @@ from tautscope.config.fields import NonNegative, PerDof, Positive, Vector3
 from tautscope.config.section import Section
 
 Range = tuple[float, float]
-Count = Annotated[int, Meta(ge=1, le=1_000_000)]
+Count = Annotated[int, Meta(ge=1)]
 SmoothingFactor = Annotated[float, Meta(gt=0, le=1)]
 
 
@@ -24,6 +24,9 @@ class SafetyConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     off: tuple[str, ...] = ()
     """Detectors that are switched off, by the names of `tautscope.loop.safety.DETECTORS`; every
     report names them."""
+    unusual: tuple[str, ...] = ()
+    """Keys by dotted path, as "safety.stall", that may be beyond a 30th to 30 times their default;
+    every report names them."""
     width_limit: PerDof = (12e-3, 2.6, 1.5)
     """Largest estimated width of the slack; the article's are 10 mm, 1.8 rad, 1.1 rad. Also the
     largest difference between command and reference, and the unit of the travels below."""
@@ -63,7 +66,7 @@ class SafetyConfig(Section, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     clock_jump: Positive = 1.0
     """A frame captured this much earlier than the one before it shows that the camera's clock was
     set back; less is a frame out of order [s]."""
-    frozen_travel: Positive = 0.01
+    frozen_travel: Annotated[float, Meta(gt=0, le=1_000_000)] = 0.01
     """Travel of the command, in either direction, after which an identical image counts as frozen
     [in update_distance]. Sensor noise makes every image different, also at rest; a source without
     noise needs more than the slack."""

@@ -52,7 +52,7 @@ class Actions:
             reason = self._execute(message)
         if not reason:
             self._control.note(f"page {client}: {_described(message)}")
-        return msg.Reply(client, what, not reason, reason)
+        return msg.Reply(client, what, not reason, reason[: msg.LONGEST_REASON])
 
     def _execute(self, message: msg.Request) -> str:
         """Execute a request; why it cannot be, else empty."""

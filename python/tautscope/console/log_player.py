@@ -13,7 +13,7 @@ from tautscope.console import messages as msg
 from tautscope.console.publisher import Bands, Publisher, Update
 from tautscope.console.shared import Channels
 from tautscope.console.start import web_server
-from tautscope.console.state import ImageState, LogState, blank_state, show_truth, values
+from tautscope.console.state import ImageState, LogState, blank_state, known, show_truth, values
 from tautscope.hardware.signals import exit_on_signals
 from tautscope.log.reader import Log, Request, Tick, read_log
 from tautscope.log.reader import Update as LoggedUpdate
@@ -122,8 +122,11 @@ class LogPlayer:
         state, dofs = self._state, self._log.config.dofs
         estimate = np.array([row[f"estimate_{dof.label}"] for dof in dofs], np.float64)
         predicted = np.array([row[f"predicted_{dof.label}"] for dof in dofs], np.float64)
-        tip = np.where(np.isfinite(estimate), estimate, predicted)
-        state.tip = values(tip)
+        if self._log.config.profile == "paper":  # as in `session_state`
+            tip = np.where([bool(row[f"observable_{dof.label}"]) for dof in dofs], estimate, np.nan)
+        else:
+            tip = np.where(np.isfinite(estimate), estimate, predicted)
+        state.tip = known(tip)
         state.delta_minus, state.delta_plus = values(update.delta_minus), values(update.delta_plus)
         self._images += 1
         captured_at, arrived_at = float(row["captured_at"]), float(row["arrived_at"])  # type: ignore[arg-type]

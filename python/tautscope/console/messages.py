@@ -122,6 +122,8 @@ class Drawn(_Message, frozen=True, tag="drawn"):
     width: Annotated[int, Meta(ge=0, le=16384)]
 
 
+LONGEST_REASON = 500
+"""Characters of an error shown at most; escaped, they fit into a record of shared memory."""
 Request: TypeAlias = Action | Setting | SetProfile
 """Commands that are executed once, in their order."""
 ControlMessage: TypeAlias = Stop | Take | Servo | Action | Setting | SetProfile

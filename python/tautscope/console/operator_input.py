@@ -23,6 +23,8 @@ COMMAND_TIMEOUT = 0.1
 """Time without an accepted command after which motion stops [s]."""
 LARGEST_SPEED = 0.75
 """Speed at full deflection and scale 1 [of the largest speed that the loop follows]."""
+DEAD_BAND = 0.2
+"""Deflection of an axis that counts as rest; sticks that are worn rest at up to 0.15."""
 RAMP_TIME = 0.15
 """Time from rest to the largest speed [s]; deceleration is immediate."""
 
@@ -36,6 +38,9 @@ class OperatorInput:
     - no command was accepted for `COMMAND_TIMEOUT`,
     - the lease changes,
     - motion is stopped (`stop`) or held by the supervisor.
+
+    It is let go when nothing is held and every axis is within `DEAD_BAND`: one that never rests, as
+    a trigger in place of a stick, moves nothing.
 
     Args:
         config: Limits of speed and travel.
@@ -51,6 +56,7 @@ class OperatorInput:
         stopped_by: Why motion is stopped until it is enabled; empty if it is not.
         must_release: Whether the operator has to let go of the input device before it moves
             anything.
+        is_off_centre: Whether the device moves nothing because an axis does not rest.
         refused: Reason -> number of refused commands.
     """
 
@@ -72,6 +78,7 @@ class OperatorInput:
         self._velocity = np.zeros(count)
         self._accepted_at = -float("inf")
         self.must_release = True
+        self.is_off_centre = False
 
     @property
     def is_moving(self) -> bool:
@@ -96,13 +103,16 @@ class OperatorInput:
             return
         # Its age counts from the arrival, also if the control loop reads it late.
         self._accepted_at = min(received.at, now)
+        axes = np.array(servo.axes)
+        beyond = np.maximum(np.abs(axes) - DEAD_BAND, 0)
         if not servo.is_holding:
-            self.must_release = False
+            self.must_release &= bool(beyond.any())
+            self.is_off_centre = self.must_release
             self._axes[:] = 0
         elif not self.must_release:
             self.rested_by = ""
             self.program = None
-            self._axes[:] = servo.axes
+            self._axes[:] = np.sign(axes) * beyond / (1 - DEAD_BAND)
 
     def reset(self, reference: Floats) -> None:
         """Continue from another reference (n,) [m or rad], at the start of a new run."""

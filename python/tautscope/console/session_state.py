@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from tautscope.console.control_run import ControlRun
+from tautscope.console.messages import LONGEST_REASON
 from tautscope.console.rig_control import RigControl
 from tautscope.console.state import (
     ImageState,
@@ -35,6 +38,7 @@ def session_state(control: RigControl, log: LogState, now: float) -> State:
     state.clutch = tuple(operator.is_coupled.tolist())
     state.compensation = control.compensation
     state.rested_by, state.must_release = operator.rested_by, operator.must_release
+    state.is_off_centre = operator.is_off_centre
     state.lease, state.holder = lease.number, lease.holder
     if program is not None:
         state.program, state.progress = program.name, program.elapsed / program.duration
@@ -48,7 +52,8 @@ def session_state(control: RigControl, log: LogState, now: float) -> State:
         dropped = run.log.dropped
         state.log = LogState(log.path, log.size, log.remaining, dropped, run.log.failure)
     state.image.sequence = control.images.newest
-    state.motion, state.message = _motion(control)
+    state.motion, message = _motion(control)
+    state.message = message[:LONGEST_REASON]
     state.drives = _drives(control)
     return state
 
@@ -58,7 +63,13 @@ def _add_run(state: State, run: ControlRun) -> None:
     state.time = sample.time
     state.command = values(run.command)
     state.applied = values(sample.applied)
-    state.tip = values(loop.predicted_state)
+    # Between images `paper` has no estimate of the tip: its predicted state is the model's alone.
+    if state.profile == "best":
+        state.tip = values(loop.predicted_state)
+    elif report is None:
+        state.tip = (None,) * len(state.tip)
+    else:
+        state.tip = known(np.where(report.observable, report.state_estimate, np.nan))
     state.delta_minus, state.delta_plus = values(loop.delta_minus), values(loop.delta_plus)
     if (hysteresis := loop.hysteresis) is not None:
         state.width_std = known(2 * hysteresis.width_std)

@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.config import Config
+from tautscope.console.access import LARGEST_MESSAGE
 from tautscope.console.slots import Slots
 from tautscope.console.state import layout_of
 from tautscope.loop.frame_layout import FrameLayout
 
 Image = NDArray[np.uint8]
-_SMALL, _STATE, _INFO = 1 << 10, 1 << 14, 1 << 14
+_SMALL, _STATE, _INFO = 2 * LARGEST_MESSAGE, 1 << 15, 1 << 14
 _QUEUE = 256
 _IMAGES = 3
 

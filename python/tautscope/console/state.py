@@ -105,12 +105,12 @@ class Positions(Struct):
 
     Attributes:
         reference: Where the reference is.
-        tip: The model's tip.
+        tip: The estimated tip; None if not known.
         true: The true tip, in simulations.
     """
 
-    reference: Values
-    tip: Values
+    reference: Values | None
+    tip: Values | None
     true: Values | None
 
 
@@ -123,7 +123,8 @@ class State(Struct):
         time: The rig's clock [s].
         motion: ``off``, ``stopped``, ``held``, ``moving``, ``ready``.
         message: What is in force and why, in one line.
-        reference, command, applied, tip, delta_minus, delta_plus: (n,).
+        reference, command, applied, delta_minus, delta_plus: (n,).
+        tip: (n,) estimated; in profile ``paper`` that of the newest image, if this determined it.
         true: (n,) true tip, in simulations without an image of it.
         positions: For the side view, where a kinematics has positions.
         width_std: (n,) standard deviations of the slack's width.
@@ -137,6 +138,7 @@ class State(Struct):
         clutch: (n,) whether it moves each DOF.
         rested_by: Why the last motion ended, if the operator did not end it.
         must_release: Whether the operator has to let go of the input device first.
+        is_off_centre: Whether it moves nothing because an axis of it does not rest.
         lease: Number of the lease.
         holder: Connection that holds it.
         program: Motion that runs by itself; empty if none.
@@ -159,7 +161,7 @@ class State(Struct):
     reference: Values = ()
     command: Values = ()
     applied: Values = ()
-    tip: Values = ()
+    tip: Known = ()
     delta_minus: Values = ()
     delta_plus: Values = ()
     true: Values | None = None
@@ -174,6 +176,7 @@ class State(Struct):
     clutch: tuple[bool, ...] = ()
     rested_by: str = ""
     must_release: bool = True
+    is_off_centre: bool = False
     lease: int = 0
     holder: int | None = None
     program: str = ""
@@ -201,9 +204,9 @@ def blank_state(mode: Mode, config: Config) -> State:
 def show_truth(state: State, true: ArrayLike | None, kinematics: Kinematics | None) -> None:
     """Add what an image would show: the true tip (n,), and positions by the kinematics."""
 
-    def position(of: Values) -> Values:
+    def position(of: Known) -> Values | None:
         assert kinematics is not None
-        return values(kinematics.tip(np.array(of))[0])
+        return None if None in of else values(kinematics.tip(np.array(of))[0])
 
     state.true = None if true is None else values(true)
     if kinematics is not None:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
-from tautscope.errors import OutputError
+from tautscope.errors import OutputError, RecordError
 from tautscope.log import topics
 from tautscope.log.mcap_file import McapFile
 from tautscope.log.mcap_records import Damage, read_messages
@@ -21,6 +22,7 @@ class Recovery:
     Attributes:
         path: The new, complete file.
         messages: Topic -> number of messages.
+        skipped: The same of the topics that no log of tautscope has; they are not copied.
         first: Earliest log time [ns since 1970]; 0 without messages.
         last: Latest log time [ns since 1970].
         damage: Damage of the old file.
@@ -28,6 +30,7 @@ class Recovery:
 
     path: Path
     messages: dict[str, int]
+    skipped: dict[str, int]
     first: int
     last: int
     damage: Damage
@@ -38,11 +41,12 @@ def recover(path: str | PathLike[str], out: str | PathLike[str]) -> Recovery:
 
     Raises:
         MissingPathError: There is no such file.
-        RecordError: The file is not MCAP.
+        RecordError: The file is not MCAP, or not a log of tautscope.
         OutputError: `out` exists already, or cannot be written.
     """
     source, target = Path(path), check_free_file(out)
     damage = Damage()
+    skipped: Counter[str] = Counter()
     first = last = 0
     partial = target.with_name(f".{target.name}.partial")
     messages = read_messages(source, damage)
@@ -51,17 +55,23 @@ def recover(path: str | PathLike[str], out: str | PathLike[str]) -> Recovery:
             copy = McapFile(file)
             for _, topic, message in messages:
                 if topic not in copy:
+                    skipped[topic] += 1
                     continue
                 at = message.log_time
                 copy.add(topic, message.data, message.sequence, at, message.publish_time)
                 first, last = min(first or at, at), max(last, at)
+            if topics.CONFIG not in copy.counts:  # without it nothing of the copy can be read
+                found = ", ".join([*copy.counts, *skipped]) or "no messages"
+                raise RecordError(
+                    "log", f"{source} with {found}", f"a log of tautscope, with {topics.CONFIG}"
+                )
             copy.finish()
         partial.rename(target)
     except OSError as error:
         raise OutputError("out", str(target), f"a place that can be written ({error})") from None
     finally:
         partial.unlink(missing_ok=True)
-    return Recovery(target, dict(copy.counts), first, last, damage)
+    return Recovery(target, dict(copy.counts), dict(skipped), first, last, damage)
 
 
 def export_csv(path: str | PathLike[str], folder: str | PathLike[str]) -> Damage:

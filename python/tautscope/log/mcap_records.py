@@ -40,6 +40,15 @@ class Damage:
         """Whether there is any damage."""
         return self.is_truncated or self.bad_chunks > 0
 
+    def __str__(self) -> str:
+        """What is missing, in words; empty without damage."""
+        lost = f"its last {self.lost_bytes} bytes are incomplete"
+        parts = {
+            lost if self.lost_bytes else "it has no end": self.is_truncated,
+            f"{self.bad_chunks} damaged chunks were skipped": self.bad_chunks,
+        }
+        return "; ".join(text for text, is_so in parts.items() if is_so)
+
 
 @dataclass(frozen=True, slots=True)
 class RawRecord:

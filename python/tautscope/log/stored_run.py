@@ -98,7 +98,7 @@ def _from_log(path: Path) -> Recording:
     recording = _checked(log.recording(), path)
     found = [*disabled_monitors(log.config), *_flags(log, recording), *log.warnings]
     if log.damage:
-        found.append(f"{path.name} is damaged or truncated: {log.damage.lost_bytes} bytes lost")
+        found.append(f"{path.name} is damaged or truncated: {log.damage}")
     if log.missing:
         found.append(f"{log.missing} ticks or updates of the run are not in {path.name}")
     return replace(recording, warnings=tuple(found), snapshot=_snapshot(log, recording))

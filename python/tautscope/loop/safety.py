@@ -68,8 +68,10 @@ class Supervision:
 
 
 def disabled_monitors(config: Config) -> tuple[str, ...]:
-    """A line for every detector that ``safety.off`` disables; logs contain these very words."""
-    return tuple(f"safety.off = {name}: nobody looks for it" for name in config.safety.off)
+    """A line for each entry of ``safety.off`` and ``safety.unusual``; in logs word by word."""
+    off = (f"safety.off = {name}: nobody looks for it" for name in config.safety.off)
+    unusual = (f"safety.unusual: {key} may be beyond its range" for key in config.safety.unusual)
+    return (*off, *unusual)
 
 
 def checksum(image: NDArray[np.uint8]) -> int:

@@ -12,7 +12,7 @@ from tautscope.config import Config
 from tautscope.console.control_run import ReferenceSource
 from tautscope.console.lease import ImageTimes, Lease
 from tautscope.console.messages import Command, Received, Servo
-from tautscope.console.operator_input import OperatorInput
+from tautscope.console.operator_input import DEAD_BAND, OperatorInput
 from tautscope.errors import MessageError
 from tautscope.ros2.clock import Clock
 from tautscope.ros2.inputs import JoyAxes, Stamps, joint_positions, joy_deflection
@@ -208,6 +208,9 @@ class JoyReference:
                 axes = tuple(deflection.tolist())
                 servo = Servo(lease=0, sequence=0, image=0, axes=axes, is_holding=is_holding)
                 self._operator.receive(Received(0, now - age, servo), now)
+                if self._operator.is_off_centre:
+                    allowed = f"each at most {DEAD_BAND} once, at rest; else --axes names a trigger"
+                    raise MessageError(f"{self._messages.topic} axes", axes, allowed)
         except MessageError as error:
             self._refuse(error)
         return self._operator.update(now, period, command, is_held=is_held)

@@ -5,7 +5,7 @@ import { ImageView } from "./image.js";
 import { Link, readToken } from "./link.js";
 import { PathView } from "./path.js";
 import { Sound } from "./sound.js";
-import { Steering } from "./steer.js";
+import { Steering, isText } from "./steer.js";
 
 const LOST = 500; // ms without a state, or without an image
 const MODES = { twin: "SIMULATED", hardware: "REAL MOTORS", replay: "RECORDING" };
@@ -216,6 +216,8 @@ function hint() {
   if (!steering.isActive) return "This page does not have the focus: nothing moves.";
   if (["stopped", "held", "off"].includes(state.motion)) return "Press Enable; then hold a key to move.";
   if (state.rested_by) return `Motion ended: ${state.rested_by}. Let go, then hold again.`;
+  if (state.is_off_centre) return "A stick of the gamepad is off centre: let go of it. If it stays, unplug the gamepad: it is worn.";
+  if (isText(document.activeElement)) return "Keys write into the text field; click beside it to steer by them.";
   if (state.must_release) return "Let go of all keys and buttons, then hold one to move.";
   const pick = rows.length > 3 ? ` Keys 3 to ${rows.length}, or the pad's cross, pick what W S and the right stick move.` : "";
   const touch = matchMedia("(any-pointer: coarse), (max-width: 700px)").matches ? "Hold − or +, or hold" : "Hold";

@@ -1,25 +1,24 @@
 // The operator's input: keyboard, gamepad and touch, sent every 20 ms while this page has the lease and the focus.
 
 const PERIOD = 20; // ms
-const DEAD_BAND = 0.1;
+const REST = 0.2; // deflection, as DEAD_BAND of operator_input.py
+const UNKNOWN = ": its buttons are not known; each stops, and nothing of it moves";
 // Two degrees of freedom have keys and a stick of their own; the third pair moves the one picked of the others.
 const PICKED = 2;
 const KEYS = {
   ArrowUp: [0, 1], ArrowDown: [0, -1], ArrowRight: [1, 1], ArrowLeft: [1, -1], KeyW: [PICKED, 1], KeyS: [PICKED, -1],
 };
 const KEY_NAMES = ["↑ ↓", "← →", "W S"];
-const ENABLING = [4, 5]; // shoulder buttons of a standard gamepad
-const PICK = { 14: -1, 15: 1 }; // its directional pad, left and right
+// Of a gamepad whose `mapping` is "standard"; the numbers of any other mean something else on each.
+const ENABLING = [4, 5]; // shoulder buttons
+const PICK = { 14: -1, 15: 1 }; // directional pad, left and right
 const STOP = 1;
 const AXES = [[1, -1], [0, 1], [3, -1]]; // index and sign: left stick up and right, right stick up
 
-const isText = (element) => element instanceof Element && element.matches("input, select, textarea");
-
-/** A stick's deflection without the dead band around its centre. */
-export function deflection(value) {
-  const size = Math.abs(value);
-  return size <= DEAD_BAND ? 0 : (Math.sign(value) * Math.min(1, (size - DEAD_BAND))) / (1 - DEAD_BAND);
-}
+/** Whether keys are typed into an element. All others leave the keys that move to the instrument. */
+export const isText = (element) => element instanceof Element && element.matches("input:not([type]), textarea");
+const bounded = (value) => (Number.isFinite(value) ? Math.max(-1, Math.min(1, value)) : 1);
+const isKnown = (pad) => pad.mapping === "standard";
 
 /** Sends the input for `count` axes; `getCommand` returns the fields of a command, or null without the lease. */
 export class Steering {
@@ -28,7 +27,8 @@ export class Steering {
     this.pressed = new Map(); // key or button -> axis and sign
     this.picked = PICKED;
     this.device = "keyboard";
-    this.wasDown = new Set(); // buttons of the gamepad
+    this.wasDown = new Map(); // index of a gamepad -> its buttons
+    this.pad = ""; // the gamepad in use
     addEventListener("keydown", (event) => this.#press(event), true);
     addEventListener("keyup", (event) => this.pressed.delete(event.code), true);
     const release = () => this.#release();
@@ -96,26 +96,37 @@ export class Steering {
   }
 
   #tick() {
-    const pad = [...navigator.getGamepads()].find((each) => each?.connected);
-    const down = new Set([...(pad?.buttons ?? []).keys()].filter((k) => pad.buttons[k].pressed));
-    const isEnabled = ENABLING.some((button) => down.has(button));
-    const begins = (button) => down.has(button) && !this.wasDown.has(button);
-    if (begins(STOP)) this.onStop();
+    const pads = [...navigator.getGamepads()].filter((each) => each?.connected);
+    const pad = pads.find(isKnown);
+    const begun = new Map(pads.map((each) => [each, this.#begun(each)]));
+    // Which button of an unknown device means STOP nobody knows: each does.
+    if (pads.some((each) => (isKnown(each) ? begun.get(each).has(STOP) : begun.get(each).size))) this.onStop();
+    const isEnabled = ENABLING.some((button) => pad?.buttons[button]?.pressed);
     for (const [button, step] of Object.entries(PICK)) {
-      if (begins(Number(button)) && !isEnabled) this.pick(this.picked + step);
+      if (!isEnabled && begun.get(pad)?.has(Number(button))) this.pick(this.picked + step);
     }
-    this.wasDown = down;
     if (!this.isActive) return;
-    this.device = pad ? `gamepad, ${pad.id.slice(0, 30)}` : "keyboard";
-    const moves = isEnabled
-      ? AXES.map(([index, sign], slot) => [this.axis(slot), sign * deflection(pad.axes[index] ?? 0)])
-      : [...this.pressed.values()];
-    this.#send(moves, isEnabled || this.pressed.size > 0);
+    this.device = pads.length ? pads.map((each) => `${each.id.slice(0, 30)}${isKnown(each) ? "" : UNKNOWN}`).join("; ") : "keyboard";
+    // An axis that is no number counts as one that does not rest.
+    const sticks = AXES.map(([index, sign], slot) => [this.axis(slot), pad ? sign * bounded(pad.axes[index]) : 0]);
+    const name = pad ? `${pad.index} ${pad.id}` : "";
+    this.hasRested = name === this.pad && (this.hasRested || (!isEnabled && sticks.every(([, value]) => Math.abs(value) < REST)));
+    this.pad = name;
+    const isMoved = isEnabled && this.hasRested;
+    this.#send(isMoved || !this.pressed.size ? sticks : [...this.pressed.values()], isMoved || this.pressed.size > 0);
+  }
+
+  /** The buttons of a gamepad that are pressed since now. */
+  #begun(pad) {
+    const down = new Set([...pad.buttons.keys()].filter((button) => pad.buttons[button].pressed));
+    const before = this.wasDown.get(pad.index) ?? new Set();
+    this.wasDown.set(pad.index, down);
+    return new Set([...down].filter((button) => !before.has(button)));
   }
 
   #send(moves, isHolding) {
     const axes = Array(this.count).fill(0);
-    for (const [axis, value] of moves) if (axis < this.count) axes[axis] += value;
+    for (const [axis, value] of moves) if (axis < this.count) axes[axis] = Math.max(-1, Math.min(1, axes[axis] + value));
     const command = this.getCommand();
     if (command) this.send({ type: "servo", ...command, axes: axes.map((a) => a || 0), is_holding: isHolding });
   }
