@@ -42,9 +42,9 @@ def test_analyze_finds_the_offsets_of_a_play(
     file, out = tmp_path / "log.csv", tmp_path / "found"
     write_record(file)
     found = analyzed(capsys, file, out)
-    assert found["samples"] == 2999
+    assert found["samples"] == 3000
     assert found["scored"] == 1500
-    assert found["cleaning"].pop("blank") == 1
+    assert found["cleaning"].pop("interpolated") == 1
     assert not any(found["cleaning"].values())
     paper = found["models"]["paper"]["parameters"]
     assert paper["update_distance"] == pytest.approx(0.3, rel=1e-2)
@@ -57,10 +57,10 @@ def test_analyze_finds_the_offsets_of_a_play(
         assert parameters["width"] == pytest.approx(width)
     assert {path.name for path in out.iterdir()} == {"analysis.csv", "analyze.png"}
     samples = np.genfromtxt(out / "analysis.csv", delimiter=",", names=True)
-    assert len(samples) == 2999
-    assert samples["line"][7] == 10  # the header is line 1, and line 9 was removed
+    assert len(samples) == 3000
+    assert samples["line"][7] == 9
     for name, model in found["models"].items():
-        late = (samples[name] - samples["measured"])[1499:]
+        late = (samples[name] - samples["measured"])[1500:]
         assert model["rmse"] == pytest.approx(np.sqrt(np.mean(late**2)), rel=1e-6), name
         share = model["rmse"] / found["models"]["none"]["rmse"]
         assert model["share_of_no_model"] == pytest.approx(share)
