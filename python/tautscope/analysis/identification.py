@@ -15,11 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tautscope.analysis.models.constant_play import operator
-from tautscope.analysis.models.task import Floats, fit_samples
+from tautscope.analysis.delayed_play import Shape, Signals, turns
+from tautscope.analysis.models.task import Floats
 
-SAMPLES = 4000
-"""Largest number of samples in the fit; a longer record is decimated."""
 CONFIDENCE = 0.95
 LARGEST_UNCERTAINTY = 0.1
 """Half the interval over the width, up to which a width is identified."""
@@ -28,12 +26,9 @@ LEAST_STROKES = 4
 SURROGATES, LARGEST_P = 199, 0.01
 LEAST_ADVANTAGE = 1.05
 """Error of a lag without slack, over that of the model."""
-_PLAYS = np.linspace(-1, 1, 7)
 _LARGEST = 0.49
 """Largest half width, as a share of the command's range; at 0.5 the play never moves."""
 _RADII = _LARGEST * (np.arange(24) / 24) ** 1.5
-_TURN = 0.1
-"""Motions below this share of the command's range are no strokes."""
 _BLOCKS = 20
 
 
@@ -104,16 +99,14 @@ class Identification:
         if self.is_at_limit:
             return "the best fit is at the limit of the search"
         if not self.width.half <= LARGEST_UNCERTAINTY * self.width.value:
-            return (
-                f"its interval, {self.width.low:.3g} to {self.width.high:.3g}, is wider than "
-                f"± {100 * LARGEST_UNCERTAINTY:.0f} %"
-            )
+            limits = f"{self.width.low:.3g} to {self.width.high:.3g}".replace("inf", "any width")
+            return f"its interval, {limits}, is wider than ± {100 * LARGEST_UNCERTAINTY:.0f} %"
         return ""
 
     @property
     def half_widths(self) -> Floats:
         """Of the plays [command's unit]."""
-        return _Shape(self.radius, self.rounding, 0.0).half_widths
+        return Shape(self.radius, self.rounding, 0.0).half_widths
 
     @property
     def is_identified(self) -> bool:
@@ -132,102 +125,6 @@ class Identification:
         )
 
 
-@dataclass(frozen=True)
-class _Shape:
-    radius: float
-    rounding: float
-    delay: float
-
-    @property
-    def half_widths(self) -> Floats:
-        """Of the plays."""
-        plays = _PLAYS if self.rounding else np.zeros(1)
-        return np.asarray(self.radius * (1 + self.rounding * plays))
-
-    def output(self, times: Floats, time: Floats, command: Floats) -> Floats:
-        """P(c(t - d)) at the times."""
-        delayed = np.interp(times - self.delay, time, command)
-        plays = [operator(delayed, each, 0.0) for each in self.half_widths.tolist()]
-        return np.asarray(np.mean(plays, axis=0))
-
-
-class _Signals:
-    """Samples of a record for a fit, decimated.
-
-    Args:
-        time: (n,), never decreasing.
-        command: (n,).
-        measured: (n,), NaN where the tip is not known.
-    """
-
-    def __init__(self, time: Floats, command: Floats, measured: Floats) -> None:
-        self.all_times, self.all_commands = time, command
-        seen = np.flatnonzero(np.isfinite(measured))
-        step = -(-len(seen) // SAMPLES)
-        kept = np.unique(np.concatenate([seen[::step], _turns(command, 0.0)]))[: 4 * SAMPLES]
-        self.time, self.measured = time[kept], measured[kept]
-        self.extent = float(np.ptp(command))
-        self.resolution = float(np.min(np.diff(np.unique(measured[seen])), initial=np.inf))
-        turns = time[_turns(command, _TURN * self.extent)]
-        strokes = np.diff(turns)
-        duration = float(time[-1] - time[0])
-        self.stroke = float(np.median(strokes)) if len(strokes) else duration / 10
-        self.longest_delay = max(self.stroke / 2, 1e-9)
-        self.where = fit_samples(command[kept], self.measured)
-        self.target = self.measured[self.where]
-        x = (
-            np.linspace(-1, 1, len(kept))
-            if duration == 0
-            else (2 * (self.time - time[0]) / duration - 1)
-        )
-        degree = 3 if len(turns) >= 12 else 1
-        self.drifts = np.polynomial.legendre.legvander(x, degree)
-
-    def output(self, shape: _Shape) -> Floats:
-        """P(c(t - d)) at the samples."""
-        return shape.output(self.time, self.all_times, self.all_commands)
-
-    def columns(self, shape: _Shape) -> Floats:
-        """Regressors of gain, offset and drift."""
-        return np.asarray(np.column_stack([self.output(shape), self.drifts]))
-
-    def lag_error(self) -> float:
-        """RMS error of the best first-order lag, with a gain and drift, but without slack."""
-        from scipy.signal import lfilter  # noqa: PLC0415
-
-        grid = np.linspace(self.all_times[0], self.all_times[-1], 4 * SAMPLES)
-        command = np.interp(grid, self.all_times, self.all_commands)
-        least = np.inf
-        for constant in self.stroke * np.geomspace(0.01, 1, 25):
-            memory = float(np.exp((grid[0] - grid[1]) / constant))
-            lagged = lfilter([1 - memory], [1, -memory], command - command[0])
-            columns = np.column_stack([np.interp(self.time, grid, lagged), self.drifts])
-            _, residual = self.regress(columns)
-            least = min(least, float(np.sqrt(np.mean(residual**2))))
-        return least
-
-    def solve(self, shape: _Shape) -> tuple[Floats, Floats]:
-        """Weights of the regressors, and residual."""
-        return self.regress(self.columns(shape))
-
-    def regress(self, columns: Floats) -> tuple[Floats, Floats]:
-        """Weights of regressors (n, m) by least squares, and residual."""
-        columns = columns[self.where]
-        scale = np.linalg.norm(columns, axis=0) + 1e-300
-        scaled = columns / scale
-        gram = scaled.T @ scaled
-        weights = np.linalg.lstsq(gram, scaled.T @ self.target, rcond=1e-12)[0] / scale
-        return weights, columns @ weights - self.target
-
-
-def _turns(values: Floats, least: float) -> NDArray[np.intp]:
-    """Indices at which a signal reverses by more than `least`, after the fact."""
-    moved = operator(values, least / 2, 0.0) if least > 0 else values
-    steps = np.sign(np.diff(moved))
-    at = np.flatnonzero(steps)
-    return np.asarray(at[1:][steps[at[1:]] != steps[at[:-1]]])
-
-
 def identify(time: Floats, command: Floats, measured: Floats) -> Identification:
     """Fit the model, and judge what it determines.
 
@@ -238,10 +135,10 @@ def identify(time: Floats, command: Floats, measured: Floats) -> Identification:
     """
     from scipy.optimize import least_squares  # noqa: PLC0415  takes a third of a second
 
-    signals = _Signals(time, command, measured)
+    signals = Signals(time, command, measured)
     delays = signals.longest_delay * np.linspace(-1, 1, 9)
     grid = [
-        _Shape(share * signals.extent, rounding, delay)
+        Shape(share * signals.extent, rounding, delay)
         for delay in delays.tolist()
         for share in _RADII.tolist()
         for rounding in ((0.0, 1.0) if share else (0.0,))
@@ -251,10 +148,10 @@ def identify(time: Floats, command: Floats, measured: Floats) -> Identification:
     scale = np.array([signals.extent, 1.0, signals.longest_delay])
     bounds = np.array([0.0, 0.0, -1.0]), np.array([_LARGEST, 1.0, 1.0])
 
-    def shape(x: Floats) -> _Shape:
-        return _Shape(*(x * scale).tolist())
+    def shape(x: Floats) -> Shape:
+        return Shape(*(x * scale).tolist())
 
-    def refined(start: _Shape, free: NDArray[np.bool_]) -> tuple[Floats, float]:
+    def refined(start: Shape, free: NDArray[np.bool_]) -> tuple[Floats, float]:
         begin = np.array([start.radius, start.rounding, start.delay]) / scale
         low, high = (bound[free] for bound in bounds)
 
@@ -325,7 +222,7 @@ def identify(time: Floats, command: Floats, measured: Floats) -> Identification:
 
 
 def _extended(
-    time: Floats, signals: _Signals, shape: _Shape, weights: Floats
+    time: Floats, signals: Signals, shape: Shape, weights: Floats
 ) -> tuple[Floats, Floats]:
     """Output of the model, and drift, at every sample of the record."""
     drift = np.interp(time, signals.time, signals.drifts[:, 1:] @ weights[2:])
@@ -333,7 +230,7 @@ def _extended(
     return weights[0] * output + weights[1] + drift, drift - drift.mean()
 
 
-def _surrogate_test(signals: _Signals, grid: list[_Shape]) -> tuple[Floats, float]:
+def _surrogate_test(signals: Signals, grid: list[Shape]) -> tuple[Floats, float]:
     """Squared error of each shape, and p-value of the best one.
 
     A surrogate has the increments of the tip, shuffled and with random signs: the tip as a random
@@ -362,13 +259,13 @@ def _surrogate_test(signals: _Signals, grid: list[_Shape]) -> tuple[Floats, floa
     return total[0] - gains[:, 0], p_value
 
 
-def _stroke_ends(signals: _Signals, shape: _Shape) -> NDArray[np.intp]:
+def _stroke_ends(signals: Signals, shape: Shape) -> NDArray[np.intp]:
     """Samples at which the tip of the model reverses, by more than a ripple."""
     moved = signals.output(shape)
-    return _turns(moved, 0.02 * float(np.ptp(moved)))
+    return turns(moved, 0.02 * float(np.ptp(moved)))
 
 
-def _jackknife(signals: _Signals, shape: _Shape) -> tuple[Interval, Interval]:
+def _jackknife(signals: Signals, shape: Shape) -> tuple[Interval, Interval]:
     """Intervals of width and delay: each block of strokes left out once, one Newton step each.
 
     Errors that are correlated within a stroke are thus counted once.
@@ -389,7 +286,7 @@ def _jackknife(signals: _Signals, shape: _Shape) -> tuple[Interval, Interval]:
         value = getattr(shape, name)
         low, high = np.clip([value - steps[name], value + steps[name]], *limits[name]).tolist()
         outputs = [
-            signals.output(_Shape(**{**vars(shape), name: each}))[signals.where]
+            signals.output(Shape(**{**vars(shape), name: each}))[signals.where]
             for each in (low, high)
         ]
         derivatives.append(gain * (outputs[1] - outputs[0]) / (high - low))
