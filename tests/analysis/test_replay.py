@@ -68,13 +68,15 @@ def test_a_file_is_read_by_column_name(tmp_path: Path) -> None:
     file = tmp_path / "log.csv"
     file.write_text("﻿t, motor ,tip\n0,1,2\n\n0.1,,3\n0.3,3,nan\n0.7,4,5\n", encoding="utf-8")
     found = replay.read_record(file, "motor", "tip", "t")
-    np.testing.assert_array_equal(found.command, [1, 3, 4])
-    np.testing.assert_array_equal(found.measured, [2, np.nan, 5])
+    np.testing.assert_allclose(found.command, [1, 5 / 3, 3, 4])
+    np.testing.assert_array_equal(found.measured, [2, 3, np.nan, 5])
     assert found.time is not None
-    np.testing.assert_array_equal(found.time, [0, 0.3, 0.7])
-    np.testing.assert_array_equal(found.rows, [2, 5, 6])
-    assert found.cleaning == replay.Cleaning(blank=1, unseen=1)
-    assert replay.read_record(file, "motor", "tip").cleaning == found.cleaning
+    np.testing.assert_array_equal(found.time, [0, 0.1, 0.3, 0.7])
+    np.testing.assert_array_equal(found.rows, [2, 4, 5, 6])
+    assert found.cleaning == replay.Cleaning(interpolated=1, unseen=1)
+    untimed = replay.read_record(file, "motor", "tip")
+    np.testing.assert_array_equal(untimed.command, [1, 3, 4])
+    assert untimed.cleaning == replay.Cleaning(blank=1, unseen=1)
 
 
 Line = tuple[float, float, float]

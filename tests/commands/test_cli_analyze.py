@@ -42,9 +42,9 @@ def test_analyze_finds_the_offsets_of_a_play(
     file, out = tmp_path / "log.csv", tmp_path / "found"
     write_record(file)
     found = analyzed(capsys, file, out)
-    assert found["samples"] == 2999
+    assert found["samples"] == 3000
     assert found["scored"] == 1500
-    assert found["cleaning"].pop("blank") == 1
+    assert found["cleaning"].pop("interpolated") == 1
     assert not any(found["cleaning"].values())
     paper = found["models"]["paper"]["parameters"]
     assert paper["update_distance"] == pytest.approx(0.3, rel=1e-2)
@@ -57,10 +57,10 @@ def test_analyze_finds_the_offsets_of_a_play(
         assert parameters["width"] == pytest.approx(width)
     assert {path.name for path in out.iterdir()} == {"analysis.csv", "analyze.png"}
     samples = np.genfromtxt(out / "analysis.csv", delimiter=",", names=True)
-    assert len(samples) == 2999
-    assert samples["line"][7] == 10  # the header is line 1, and line 9 was removed
+    assert len(samples) == 3000
+    assert samples["line"][7] == 9
     for name, model in found["models"].items():
-        late = (samples[name] - samples["measured"])[1499:]
+        late = (samples[name] - samples["measured"])[1500:]
         assert model["rmse"] == pytest.approx(np.sqrt(np.mean(late**2)), rel=1e-6), name
         share = model["rmse"] / found["models"]["none"]["rmse"]
         assert model["share_of_no_model"] == pytest.approx(share)
@@ -86,13 +86,15 @@ def test_files_have_nine_digits_and_figures_the_extremes_of_each_part() -> None:
 def test_analyze_prints_a_row_per_model(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     file = tmp_path / "log.csv"
     write_record(file)
+    file.write_text(file.read_text().replace("t,motor", "n,motor"))
     columns = ["--command", "motor", "--measured", "tip", "--update-distance", "0.5"]
     assert main(["analyze", str(file), *columns, "--out", str(tmp_path / "table")]) == 0
     text = capsys.readouterr().out
     for model in MODELS:
         assert f"\n{model.title} " in text
         assert model.fitted_to in text
-    assert "2999 samples, 1500 of them scored; lines without a command, removed: 1;" in text
+    assert "2999 samples, 1500 of them scored; lines without a command or time, removed: 1;" in text
+    assert text.startswith("The slack is 8.0")
     assert "not checked without --time" in text
 
 
@@ -104,6 +106,82 @@ def test_analyze_takes_a_gain(capsys: pytest.CaptureFixture[str], tmp_path: Path
         assert found["models"][name]["parameters"]["gain"] == 0.9
     samples = np.genfromtxt(tmp_path / "out" / "analysis.csv", delimiter=",", names=True)
     assert np.isfinite(samples["paper"][1:]).all()
+
+
+def test_a_verdict_comes_first_and_its_fields_are_in_the_document(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    file = tmp_path / "log.csv"
+    write_record(file)
+    found = analyzed(capsys, file, tmp_path / "a", "--check")
+    [dof] = found["dofs"]
+    assert dof["identified"]
+    assert dof["width"] == pytest.approx(8, rel=0.02)
+    assert dof["interval"][0] < 8 < dof["interval"][1]
+    assert dof["delay"] == pytest.approx(0, abs=0.01)
+    assert dof["delay_unit"] == "s"
+    assert dof["compensation"]["after"] < 0.3 * dof["compensation"]["before"]
+    assert found["verdict"].startswith("The slack is 8.0")
+    assert found["settings"] == dof["settings"] is not None
+
+
+def test_a_pure_delay_gets_no_settings(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    time = np.arange(2000) * 0.02
+    noise = np.random.default_rng(3).normal(0, 0.05, len(time))
+    motor, tip = 15 * np.sin(time), 15 * np.sin(time - 0.2) + noise
+    lines = [f"{a:.3f},{b:.5f},{c:.5f}\n" for a, b, c in zip(time, motor, tip, strict=True)]
+    file.write_text("time,motor,tip\n" + "".join(lines))
+    columns = ["analyze", str(file), "--command", "motor", "--measured", "tip", "--check"]
+    assert main([*columns, "--json", "--out", str(tmp_path / "a")]) == 1
+    found = json.loads(capsys.readouterr().out)
+    [dof] = found["dofs"]
+    assert (dof["identified"], dof["aligned"], dof["width"]) == (False, True, 0)
+    assert dof["delay"] == pytest.approx(0.2, abs=0.005)
+    assert found["settings"] is None
+    assert main([*columns[:-1], "--out", str(tmp_path / "b")]) == 0
+    text = capsys.readouterr().out
+    assert "aligned by its delay of 0.19" in text or "delay of 0.20" in text
+    assert "the slack is 0, at most" in text
+    assert "width" not in text.split("\n\n")[1]
+    assert "To paste" not in text
+
+
+def test_columns_are_listed_and_pairs_proposed(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    file = tmp_path / "log.csv"
+    write_record(file)
+    assert main(["analyze", str(file), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert [each["title"] for each in found["columns"]] == ["t", "motor", "tip"]
+    assert found["columns"][0]["largest"] == 59.98
+    assert found["pairs"] == [{"command": "motor", "measured": "tip"}]
+    assert main(["analyze", str(file)]) == 0
+    assert f"analyze {file} --command motor --measured tip" in capsys.readouterr().out
+
+
+def test_a_tip_of_its_own_file_and_rate(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """Motor at 100 Hz, tip at 27 Hz that begins later, in ns since 1970."""
+    motor, tip = tmp_path / "motor.csv", tmp_path / "tip.csv"
+    time, seen = np.arange(0, 40, 0.01), np.arange(1.003, 39, 0.037)
+    command = 15 * np.sin(time) + 5 * np.sin(2.7 * time)
+    measured = np.interp(seen, time, play(command, -3.0, 5.0))
+    start = 1_763_000_000
+    for file, title, at, values in (
+        (motor, "motor", time, command),
+        (tip, "tip", seen, measured),
+    ):
+        stamps = [start * 10**9 + round(1e9 * each) for each in at.tolist()]
+        rows = [f"{a},{b:.5f}\n" for a, b in zip(stamps, values.tolist(), strict=True)]
+        file.write_text(f"stamp,{title}\n" + "".join(rows))
+    columns = ["--command", "motor", "--measured", "tip", "--tip-file", str(tip)]
+    out = ["--json", "--out", str(tmp_path / "out")]
+    assert main(["analyze", str(motor), *columns, *out]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["dofs"][0]["width"] == pytest.approx(8, rel=0.02)
+    assert found["dofs"][0]["delay"] == pytest.approx(0, abs=0.01)
+    assert found["cleaning"]["interpolated"] == len(seen)
 
 
 def test_cleaning_recovers_the_result_of_the_clean_record(

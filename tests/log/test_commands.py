@@ -259,7 +259,7 @@ def test_replay_rejects_unusable_input(capsys: Capture, recorded: Recorded, tmp_
     video = ["replay", "--video", str(table), "--motors", str(table)]
     assert "got 'bending', expected one of its columns" in failed(capsys, *video)
     table.write_text("time,insertion,rotation,bending\n0,0.01,2,3\n0,0.01,2,3\n")
-    assert "line 3, column time: got 0.0, expected later than 0.0" in failed(capsys, *video)
+    assert "line 3, column time: got '0 again, as in 2 lines of 2'" in failed(capsys, *video)
     table.write_text("time,insertion,rotation,bending\n0,20,2,3\n1,30,2,3\n")
     assert "if the column is in mm, type --units insertion=mm" in failed(capsys, *video)
     table.write_text("time,insertion,rotation,bending\n0,0.01,2,3\n1,0.01,2,3\n")

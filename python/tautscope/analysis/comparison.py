@@ -140,14 +140,8 @@ def analyze(
     Raises:
         RecordError: Command or tip does not move in the first half.
     """
+    half = check_motion(record)
     with_tip = np.flatnonzero(np.isfinite(record.measured))
-    half = int(with_tip[len(with_tip) // 2])
-    first = with_tip[with_tip < half]
-    for name, values in (("command", record.command[:half]), ("measured", record.measured[first])):
-        if np.ptp(values) == 0:
-            raise RecordError(
-                name, f"{values[0]:g} throughout the first half", "a signal that moves"
-            )
     task = Task(record.command, record.measured, half, gain, update_distance, config)
     scored = with_tip[with_tip >= half]
 
@@ -172,6 +166,23 @@ def analyze(
 
     counts = tuple(int(np.isfinite(seen.measured).sum()) for seen in masked)
     return Analysis(record, half, tuple(entry(model) for model in models), counts)
+
+
+def check_motion(record: Record) -> int:
+    """First sample of the second half; both halves have equally many measured tips.
+
+    Raises:
+        RecordError: Command or tip does not move in the first half.
+    """
+    with_tip = np.flatnonzero(np.isfinite(record.measured))
+    half = int(with_tip[len(with_tip) // 2])
+    first = with_tip[with_tip < half]
+    for name, values in (("command", record.command[:half]), ("measured", record.measured[first])):
+        if np.ptp(values) == 0:
+            raise RecordError(
+                name, f"{values[0]:g} throughout the first half", "a signal that moves"
+            )
+    return half
 
 
 def seen_at(task: Task, share: float) -> Task:

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tautscope.analysis.comparison import Analysis
+from tautscope.analysis.identification import Identification
 from tautscope.analysis.models.online import UPDATE_SHARE
+from tautscope.runs.records import Record
 from tautscope.runs.units import ANGLES, LENGTHS
 
 GAIN_TOLERANCE = 0.05
@@ -39,20 +40,15 @@ class Suggestion:
         return "\n".join(lines)
 
 
-def suggest_settings(analysis: Analysis) -> Suggestion | None:
-    """Settings by the constant play that fits the record; None without that model.
+def suggest_settings(record: Record, found: Identification) -> Suggestion:
+    """Settings by the slack that was identified.
 
-    The offsets are those of the play, the update distance 1 % of the travel, the deviation before
-    the first image half the width. Offsets of one sign mean that the zeros of motor and tip differ;
-    the offsets are then those about their middle, which is noted. A smaller difference stays in
-    them.
+    The update distance is 1 % of the travel, the deviation before the first image half the width.
+    Offsets of one sign mean that the zeros of motor and tip differ; the offsets are then those
+    about their middle, which is noted. A smaller difference stays in them.
     """
-    play = next((entry for entry in analysis.entries if entry.model.name == "play"), None)
-    if play is None:
-        return None
-    found = play.prediction.parameters
-    gain, width = float(found["gain"]), float(found["width"])
-    unit = analysis.record.units[1]
+    gain, width = found.gain, found.width.value
+    unit = record.units[1]
     notes: list[str] = []
     dofs: tuple[str, ...]
     if unit in LENGTHS:
@@ -64,12 +60,12 @@ def suggest_settings(analysis: Analysis) -> Suggestion | None:
         notes.append("in the tip's unit, which the file does not name: convert to m or rad")
     if abs(gain - 1) > GAIN_TOLERANCE:
         notes.append(f"the tip moves {gain:.3g} times as far as the motor: the loop assumes 1")
-    minus, plus = float(found["delta_minus"]), float(found["delta_plus"])
+    minus, plus = -width / 2 - found.offset, width / 2 - found.offset
     if not minus <= 0 <= plus:
         middle = (minus + plus) / 2
         notes.append(f"the zeros of motor and tip differ by {scale * middle:.4g}: set the motor's")
         minus, plus = minus - middle, plus - middle
-    travel = abs(gain) * float(np.ptp(analysis.record.command))
+    travel = abs(gain) * float(np.ptp(record.command))
     values = {
         "update_distance": UPDATE_SHARE * travel,
         "start_deviation": width / 2,

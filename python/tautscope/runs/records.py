@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 
@@ -13,12 +13,16 @@ from numpy.typing import NDArray
 from tautscope.dof import Dof
 from tautscope.errors import RecordError
 from tautscope.runs.tables import read_table
-from tautscope.runs.units import TIMES, units_of
+from tautscope.runs.units import TIMES, time_scale, units_of
 
 Floats = NDArray[np.float64]
 
 GAP = 10.0
 """A sampling interval above this many medians is a gap."""
+SINCE_1970 = 1e8
+"""Times above are since 1970, and become those since the first one [s]."""
+LONGEST_INTERVAL = 5.0
+"""Between samples [s]; a longer one, where nobody named the unit, is another unit."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +30,8 @@ class Cleaning:
     """Counts of what the cleaning of a file removed, moved or found.
 
     Attributes:
-        blank: Removed lines without a command or time.
+        blank: Removed lines without a time, or whose command is not known.
+        interpolated: Lines with a tip whose command was interpolated in time.
         unseen: Kept lines with a command but no tip; they are neither fitted nor scored.
         duplicates: Removed lines whose time, command and tip equal those of an earlier line.
         reordered: Late lines, sorted by time.
@@ -37,6 +42,7 @@ class Cleaning:
     """
 
     blank: int = 0
+    interpolated: int = 0
     unseen: int = 0
     duplicates: int = 0
     reordered: int = 0
@@ -52,7 +58,8 @@ class Record:
     Attributes:
         command: (n,) actuator position, the user's unit.
         measured: (n,) tip position, the user's unit; NaN where it was not measured.
-        time: (n,) [s], never decreasing, if a column was named; no model uses it.
+        time: (n,) [s], never decreasing; None if no column was named, or all times are equal. No
+            model of the comparison uses it.
         rows: (n,) line of the file of each sample.
         cleaning: What the cleaning did.
         units: Units of command and measured, as the file names them; empty where it does not.
@@ -65,22 +72,43 @@ class Record:
     cleaning: Cleaning
     units: tuple[str, str] = ("", "")
 
+    @property
+    def is_timed(self) -> bool:
+        """Whether there is a time that is new at most samples."""
+        return self.time is not None and bool(np.mean(np.diff(self.time) > 0) > 0.5)
+
+    @property
+    def clock(self) -> Floats:
+        """(n,) time [s], or the numbers of the samples where it is not known."""
+        samples = np.arange(len(self.command), dtype=np.float64)
+        return self.time if self.is_timed and self.time is not None else samples
+
 
 def read_record(
-    path: str | PathLike[str], command: str, measured: str, time: str | None = None
+    path: str | PathLike[str],
+    command: str,
+    measured: str,
+    time: str | None = None,
+    *,
+    tip_path: str | PathLike[str] | None = None,
+    missing: Sequence[float] = (),
 ) -> Record:
     """Read columns of a CSV or Parquet file, and clean them.
 
-    A blank or NaN cell is a missing value. A line without a command is removed; one without a tip
-    is kept, because the play moves with its command. Any other text is an error. With a time
-    column, duplicates are removed and lines sorted, see `Cleaning`; without one the order of the
-    file is kept.
+    A blank or NaN cell is a missing value; any other text is an error. A line without a tip is
+    kept, because the play moves with its command. At a line without a command, the command is
+    interpolated in time between the lines before and after; without a time, or farther apart than
+    `GAP`, the line is removed. With a time column, duplicates are removed and lines sorted, see
+    `Cleaning`; without one the order of the file is kept.
 
     Args:
         path: The file, see `tautscope.runs.tables.read_table`; ``-`` is standard input.
         command: Column of the actuator position.
         measured: Column of the tip position.
-        time: Column of the time, in s or the unit of its title, or ISO 8601.
+        time: Column of the time, in s or the unit of its title, since 1970 by its size, or a date
+            or time of day.
+        tip_path: File of the tip, with a time of the same clock, if it is not in the first.
+        missing: Values that stand for none, such as -9999.
 
     Raises:
         MissingExtraError: Polars is not installed.
@@ -88,18 +116,54 @@ def read_record(
         RecordError: A column is missing, a cell is not a number, or fewer than two samples have a
             tip; the error names file, line and column.
     """
-    names = [command, measured] + ([] if time is None else [time])
-    found = read_table(path, names)
-    table = np.stack([found.columns[name] for name in names], axis=1)
+    if tip_path is None:
+        table, rows, units = _read(path, (command, measured), time)
+    else:
+        if time is None:
+            raise RecordError(str(tip_path), "no time", "a column of the time in both files")
+        motor, motor_rows, motor_units = _read(path, (command,), time)
+        tip, tip_rows, tip_units = _read(tip_path, (measured,), time)
+        nothing = [np.full((len(each), 1), np.nan) for each in (motor, tip)]
+        table = np.vstack(
+            [
+                np.hstack([motor[:, :1], nothing[0], motor[:, 1:]]),
+                np.hstack([nothing[1], tip]),
+            ]
+        )
+        order = np.argsort(table[:, 2], kind="stable")
+        table, rows = table[order], np.concatenate([motor_rows, tip_rows])[order]
+        units = motor_units + tip_units
+    if time is not None and np.nanmin(table[:, 2]) > SINCE_1970:
+        table[:, 2] -= np.floor(np.nanmin(table[:, 2]))
+    table[:, :2][np.isin(table[:, :2], missing)] = np.nan
+    is_blank = (
+        np.isnan(table[:, 0])
+        if time is None
+        else (np.isnan(table[:, 2]) | np.isnan(table[:, :2]).all(axis=1))
+    )
+    table, rows = table[~is_blank], rows[~is_blank]
+    for column, name in enumerate((command, measured)):
+        count = int(np.count_nonzero(np.isfinite(table[:, column])))
+        if count < 2:
+            raise RecordError(f"{path}, column {name}", f"{count} samples", "at least 2")
+    return replace(_clean(table, rows, int(np.count_nonzero(is_blank))), units=(units[0], units[1]))
+
+
+def _read(
+    path: str | PathLike[str], names: tuple[str, ...], time: str | None
+) -> tuple[Floats, NDArray[np.int64], tuple[str, ...]]:
+    """Columns, the last one the time [s] if there is one, their lines, and units."""
+    wanted = names if time is None else (*names, time)
+    found = read_table(path, wanted)
+    table = np.stack([found.columns[name] for name in wanted], axis=1)
     if time is not None:
-        table[:, 2] *= TIMES.get(found.units.get(time, "s"), 1.0)
-    is_blank = np.isnan(np.delete(table, 1, axis=1)).any(axis=1)
-    table, rows = table[~is_blank], found.rows[~is_blank]
-    count = int(np.count_nonzero(np.isfinite(table[:, 1])))
-    if count < 2:
-        raise RecordError(str(path), f"{count} samples", "at least 2")
-    units = found.units.get(command, ""), found.units.get(measured, "")
-    return replace(_clean(table, rows, int(np.count_nonzero(is_blank))), units=units)
+        stamps = table[:, -1]
+        unit = found.units.get(time, "")
+        if unit and unit not in TIMES:
+            allowed = f"one of {', '.join(TIMES)}"
+            raise RecordError(f"{path}, column {time}", f"unit {unit}", allowed)
+        table[:, -1] = stamps * time_scale(float(np.nanmedian(stamps)), unit)
+    return table, found.rows, tuple(found.units.get(name, "") for name in names)
 
 
 def read_motors(
@@ -134,6 +198,8 @@ def read_motors(
     table, rows = table[is_complete], found.rows[is_complete]
     if not len(table):
         raise RecordError(str(path), "no line with all columns", "at least one")
+    if "time" not in named:
+        table[:, 0] *= time_scale(float(np.median(table[:, 0])), "")
     for column, (name, known) in enumerate(zip(names, (TIMES, *map(units_of, Dof)), strict=True)):
         if name in named and named[name] not in known:
             allowed = f"one of {', '.join(known)}; type --units {name}=UNIT"
@@ -153,7 +219,20 @@ def read_motors(
     if len(backward):
         line = rows[backward[0] + 1]
         before, after = (float(value) for value in table[backward[0] : backward[0] + 2, 0])
-        raise RecordError(f"{path}, line {line}, column time", after, f"later than {before}")
+        where = f"{path}, line {line}, column time"
+        if after == before:
+            count = int(np.count_nonzero(np.diff(table[:, 0]) == 0)) + 1
+            got = f"{after:g} again, as in {count} lines of {len(table)}"
+            raise RecordError(where, got, "a time of its own for each line: finer time stamps")
+        raise RecordError(where, after, f"later than {before}")
+    interval = float(np.median(np.diff(table[:, 0]))) if len(table) > 1 else 0.0
+    if "time" not in named and interval > LONGEST_INTERVAL:
+        raise RecordError(
+            f"{path}, column time",
+            f"a position every {interval:g} s",
+            f"at most {LONGEST_INTERVAL:g} s; if the column is in ms, type --units time=ms, or "
+            "write its title as time_ms",
+        )
     return table[:, 0], table[:, 1:]
 
 
@@ -168,13 +247,18 @@ def _clean(table: Floats, rows: NDArray[np.int64], blank: int) -> Record:
         comparable = np.where(np.isnan(table), np.inf, table)  # NaN does not equal itself
         kept = np.sort(np.unique(comparable, axis=0, return_index=True)[1])
     duplicates = len(table) - len(kept)
-    order, time, reordered, clock_steps = _sort(table[kept, 2], table[kept, 0])
+    order, time, reordered, clock_steps = _sort_all(table[kept, 2], table[kept, 0])
     rows, table = rows[kept][order], table[kept][order]
+    is_lone = np.isnan(table[:, 0])
+    table[:, 0] = _interpolated(time, table[:, 0])
+    is_known = np.isfinite(table[:, 0])
+    table, rows, time = table[is_known], rows[is_known], time[is_known]
     steps = np.diff(time)
     median = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
     gaps = steps[steps > GAP * median]
     cleaning = Cleaning(
-        blank=blank,
+        blank=blank + int(np.count_nonzero(~is_known)),
+        interpolated=int(np.count_nonzero(is_lone & is_known)),
         unseen=int(np.count_nonzero(np.isnan(table[:, 1]))),
         duplicates=duplicates,
         reordered=reordered,
@@ -182,7 +266,40 @@ def _clean(table: Floats, rows: NDArray[np.int64], blank: int) -> Record:
         gaps=len(gaps),
         longest_gap=float(gaps.max()) if len(gaps) else 0.0,
     )
-    return Record(table[:, 0], table[:, 1], time, rows, cleaning)
+    has_time = time[-1] > time[0]
+    return Record(table[:, 0], table[:, 1], time if has_time else None, rows, cleaning)
+
+
+def _sort_all(time: Floats, command: Floats) -> tuple[NDArray[np.intp], Floats, int, int]:
+    """`_sort` of lines of which some have no command: these are put where their times are."""
+    known = np.flatnonzero(np.isfinite(command))
+    order, times, reordered, clock_steps = _sort(time[known], command[known])
+    if len(known) == len(command):
+        return order, times, reordered, clock_steps
+    if clock_steps:
+        return _sort(time, _filled(command))
+    lines = np.concatenate([known[order], np.flatnonzero(np.isnan(command))])
+    lines = lines[np.argsort(time[lines], kind="stable")]
+    return lines, time[lines], reordered, clock_steps
+
+
+def _filled(values: Floats) -> Floats:
+    """Missing values replaced by those between which they are, in the order of the file."""
+    at, known = np.arange(len(values)), np.isfinite(values)
+    return np.interp(at, at[known], values[known])
+
+
+def _interpolated(time: Floats, command: Floats) -> Floats:
+    """The command at every time; NaN before, after, and in its gaps."""
+    known = np.flatnonzero(np.isfinite(command))
+    if len(known) == len(command):
+        return command
+    times = time[known]
+    found = np.interp(time, times, command[known], left=np.nan, right=np.nan)
+    following = np.clip(np.searchsorted(times, time), 1, len(times) - 1)
+    steps = np.diff(times)
+    is_gap = steps[following - 1] > GAP * float(np.median(steps))
+    return np.where(np.isnan(command) & is_gap, np.nan, found)
 
 
 def _sort(time: Floats, command: Floats) -> tuple[NDArray[np.intp], Floats, int, int]:

@@ -1,16 +1,12 @@
-"""Columns of recorded tables: CSV of any dialect, Parquet, standard input; read with Polars.
-
-What the text does not say is recognised: encoding, delimiter, decimal comma, comment lines, and a
-line of units below the header.
-"""
+"""Columns of recorded tables: CSV of any dialect, Parquet, standard input; read with Polars."""
 
 from __future__ import annotations
 
 import io
-import re
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from importlib.util import find_spec
 from os import PathLike
 from pathlib import Path
@@ -20,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautscope.errors import MissingExtraError, MissingPathError, RecordError
-from tautscope.runs.units import split_unit, unit_of
+from tautscope.runs.table_text import NO_VALUE, split_table
+from tautscope.runs.units import check_unit, split_unit
 
 if TYPE_CHECKING:
     import polars as pl
@@ -28,12 +25,9 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 STDIN = "-"
-_LEFT_OUT = re.compile(rb"^[ \t]*(?:$|#|%|//)", re.MULTILINE)
-_HEAD = 50  # lines by which the dialect is recognised
-_DELIMITERS = ("\t", ";", ",", "|")
-_NO_VALUE = ("", "nan", "na", "n/a", "null", "none", "-")
-_DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+([eE][+-]?\d+)?\s*")
 _ALLOWED = "a finite number, or blank or NaN for none"
+_DATES = ("%Y-%m-%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%Y/%m/%d")
+_CLOCKS = ("%H:%M:%S%.f", "%I:%M:%S%.f %p")
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,11 +46,76 @@ class Table:
     rows: NDArray[np.int64]
 
 
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """A table whose cells are not read yet.
+
+    Attributes:
+        file: Its name, for errors.
+        frame: Columns of text, or of Parquet as they are, in the order of the file.
+        titles: Of the columns; their numbers if there is no title row.
+        groups: Titles above the titles, or none.
+        units: Of a line of units, or none.
+        rows: See `Table`.
+        line: What a row is called: "line" or "row".
+    """
+
+    file: str
+    frame: pl.DataFrame
+    titles: list[str]
+    groups: list[str]
+    units: list[str]
+    rows: NDArray[np.int64]
+    line: str
+
+    def read(self, names: Sequence[str]) -> Table:
+        """The columns with these titles, see `read_table`."""
+        columns, units = {}, {}
+        for name in names:
+            index = self.index(name)
+            title = self.titles[index]
+            check_unit(f"{self.file}, column {title}", title)
+            columns[name] = self.values(index, name)
+            if unit := self.unit(index):
+                units[name] = unit
+        return Table(columns, units, self.rows)
+
+    def values(self, index: int, name: str) -> Floats:
+        """(n,) numbers of a column."""
+        return _numbers(self.frame.to_series(index), self.file, self.line, name, self.rows)
+
+    def unit(self, index: int) -> str:
+        """Unit of a column, empty if the file does not name it."""
+        below = self.units[index] if index < len(self.units) else ""
+        return below or split_unit(self.titles[index])[1]
+
+    def index(self, name: str) -> int:
+        """The column of a title, of a title without its unit, of group/title, or of a number."""
+        wanted = name.strip()
+        grouped = [f"{group}/{title}" for group, title in zip(self.groups, self.titles)]  # noqa: B905
+        names = [split_unit(each)[0] for each in self.titles]
+        for candidates in (self.titles, names, grouped, [each.lower() for each in names]):
+            matches = [k for k, each in enumerate(candidates) if each == wanted]
+            if len(matches) == 1:
+                return matches[0]
+            if matches:
+                numbers = " and ".join(str(k + 1) for k in matches)
+                raise RecordError(
+                    f"{self.file}: {name}",
+                    f"{len(matches)} columns of this name",
+                    f"one; type the number of the column, {numbers}",
+                )
+        if wanted.isdecimal() and 0 < int(wanted) <= len(self.titles):
+            return int(wanted) - 1
+        allowed = f"one of its columns: {', '.join(self.titles)}, or a number"
+        raise RecordError(self.file, name, allowed)
+
+
 def read_table(path: str | PathLike[str], names: Sequence[str], what: str = "record") -> Table:
     """Read columns of a CSV or Parquet file.
 
     A column is found by its title, or by its title without the unit in brackets or after the last
-    underscore: ``tip``, ``tip [mm]``, ``tip (mm)``, ``tip_mm``.
+    underscore: ``tip``, ``tip [mm]``, ``tip (mm)``, ``tip_mm``; or by its number, from 1 on.
 
     Args:
         path: The file; ``-`` is standard input.
@@ -69,13 +128,40 @@ def read_table(path: str | PathLike[str], names: Sequence[str], what: str = "rec
         RecordError: It is no table, a column is missing, or a cell is not a number; the error names
             file, line and column.
     """
+    return open_table(path, what).read(names)
+
+
+def open_table(path: str | PathLike[str], what: str = "record") -> Sheet:
+    """Open a CSV or Parquet file, see `read_table`."""
     if find_spec("polars") is None:
         raise MissingExtraError("reading a table", ("polars",), ("analysis",))
-    name = "standard input" if str(path) == STDIN else str(path)
+    import polars as pl  # noqa: PLC0415  takes 0.3 s
+
+    file = "standard input" if str(path) == STDIN else str(path)
     data = _bytes(path, what)
-    if data.startswith(b"PAR1"):
-        return _read_parquet(data, name, names)
-    return _Text(data, name).read(names)
+    is_parquet = data.startswith(b"PAR1")
+    text = None if is_parquet else split_table(data, file)
+    try:
+        if text is None:
+            frame = pl.read_parquet(io.BytesIO(data))
+        else:
+            numbers = text.delimiter.join(map(str, range(text.width))).encode()
+            frame = pl.read_csv(
+                numbers + b"\n" + text.data,
+                separator=text.delimiter,
+                infer_schema=False,
+                truncate_ragged_lines=True,
+            )
+    except pl.exceptions.PolarsError as error:
+        kind = "a Parquet file" if is_parquet else "a CSV file with a header line"
+        raise RecordError(file, str(error).splitlines()[0], kind) from None
+    if text is None:
+        return Sheet(file, frame, frame.columns, [], [], np.arange(1, len(frame) + 1), "row")
+    titles = text.titles + [str(k + 1) for k in range(len(text.titles), text.width)]
+    rows = text.rows
+    if len(rows) != len(frame):  # cells of several lines
+        rows = np.arange(len(frame)) + (rows[0] if len(rows) else 1)
+    return Sheet(file, frame, titles, text.groups, text.units, rows, "line")
 
 
 def _bytes(path: str | PathLike[str], what: str) -> bytes:
@@ -88,151 +174,14 @@ def _bytes(path: str | PathLike[str], what: str) -> bytes:
         raise MissingPathError(what, str(path), allowed) from None
 
 
-def _read_parquet(data: bytes, file: str, names: Sequence[str]) -> Table:
-    import polars as pl  # noqa: PLC0415  takes 0.3 s
-
-    try:
-        frame = pl.read_parquet(io.BytesIO(data))
-    except pl.exceptions.PolarsError as error:
-        raise RecordError(file, str(error), "a Parquet file") from None
-    titles = [_column(file, frame.columns, name) for name in names]
-    rows = np.arange(1, len(frame) + 1)
-    columns = {
-        name: _numbers(frame[title], file, "row", name, rows)
-        for name, title in zip(names, titles, strict=True)
-    }
-    units = {
-        name: unit
-        for name, title in zip(names, titles, strict=True)
-        if (unit := split_unit(title)[1])
-    }
-    return Table(columns, units, rows)
-
-
-class _Text:
-    """A table as text.
-
-    Args:
-        data: Content of the file.
-        file: Its name, for errors.
-    """
-
-    def __init__(self, data: bytes, file: str) -> None:
-        self._file = file
-        data = self._as_utf8(data).rstrip()
-        self._lines: NDArray[np.int64] | None = None  # of the rows, if some were left out
-        if _LEFT_OUT.search(data):
-            lines = data.split(b"\n")
-            kept = [k for k, line in enumerate(lines) if not _LEFT_OUT.match(line)]
-            self._lines = np.array(kept, dtype=np.int64) + 1
-            data = b"\n".join([lines[k] for k in kept])
-        if not data:
-            raise RecordError(file, "there is no header", "a header line with the columns' titles")
-        self._delimiter = _delimiter(data.split(b"\n", _HEAD)[:_HEAD])
-        if self._delimiter == " ":
-            data = re.sub(rb"[ \t]+", b"\t", re.sub(rb"(?m)^[ \t]+", b"", data))
-            self._delimiter = "\t"
-        head = [self._cells(line) for line in data.split(b"\n", _HEAD)[:_HEAD]]
-        self.header = head[0]
-        self._units: list[str] = []
-        if len(head) > 1 and any(head[1]) and all(not cell or unit_of(cell) for cell in head[1]):
-            self._units = [unit_of(cell) for cell in head[1]]
-        self._above = 2 if self._units else 1
-        cells = [cell for line in head[self._above :] for cell in line]
-        has_comma = any(_DECIMAL_COMMA.fullmatch(cell) for cell in cells)
-        self._has_decimal_comma = self._delimiter != "," and has_comma
-        self._data = data
-
-    def read(self, names: Sequence[str]) -> Table:
-        """The columns with these titles."""
-        import polars as pl  # noqa: PLC0415  takes 0.3 s
-
-        at = [self.header.index(_column(self._file, self.header, name)) for name in names]
-        try:
-            frame = pl.read_csv(
-                self._data,
-                separator=self._delimiter,
-                skip_rows_after_header=self._above - 1,
-                columns=sorted(set(at)),
-                infer_schema=False,
-                truncate_ragged_lines=True,
-            )
-        except pl.exceptions.PolarsError as error:
-            reason = str(error).splitlines()[0]
-            raise RecordError(self._file, reason, "a CSV file with a header line") from None
-        rows = np.arange(len(frame)) + 1 + self._above
-        if self._lines is not None and len(self._lines) == len(frame) + self._above:
-            rows = self._lines[self._above :]
-        columns, units = {}, {}
-        for name, index in zip(names, at, strict=True):
-            series = frame.to_series(sorted(set(at)).index(index))
-            if self._has_decimal_comma:
-                series = series.str.replace(",", ".", literal=True)
-            columns[name] = _numbers(series, self._file, "line", name, rows)
-            below = self._units[index] if index < len(self._units) else ""
-            if unit := below or split_unit(self.header[index])[1]:
-                units[name] = unit
-        return Table(columns, units, rows)
-
-    def _as_utf8(self, data: bytes) -> bytes:
-        for mark, encoding in ((b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16")):
-            if data.startswith(mark):
-                try:
-                    data = data.decode(encoding).encode()
-                except UnicodeDecodeError as error:
-                    raise self._not_text(str(error)) from None
-        data = data.removeprefix(b"\xef\xbb\xbf")
-        if b"\0" in data:
-            raise self._not_text("a zero byte")
-        try:
-            data.decode()
-        except UnicodeDecodeError:
-            data = data.decode("latin-1").encode()
-        return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-
-    def _not_text(self, reason: str) -> RecordError:
-        return RecordError(self._file, reason, "a CSV file with a header line, or a Parquet file")
-
-    def _cells(self, line: bytes) -> list[str]:
-        cells = line.decode().split(self._delimiter)
-        return [cell.strip().strip('"').strip() for cell in cells]
-
-
-def _delimiter(head: Sequence[bytes]) -> str:
-    """The delimiter that splits the header and the lines below it into as many cells."""
-    lines = [line.decode() for line in head]
-    for delimiter in _DELIMITERS:
-        counts = [line.count(delimiter) for line in lines]
-        if counts[0] and np.median(counts) == counts[0]:
-            return delimiter
-    most = max(_DELIMITERS, key=lines[0].count)
-    if most not in lines[0] and len({len(line.split()) for line in lines}) == 1:
-        return " " if len(lines[0].split()) > 1 else ","
-    return most if most in lines[0] else ","
-
-
-def _column(file: str, header: Sequence[str], name: str) -> str:
-    """The title of a column."""
-    wanted = name.strip()
-    for matches in (
-        [title for title in header if title == wanted],
-        [title for title in header if split_unit(title)[0] == wanted],
-    ):
-        if len(matches) == 1:
-            return matches[0]
-        if matches:
-            raise RecordError(f"{file}: {name}", f"{len(matches)} columns of this name", "one")
-    raise RecordError(file, name, f"one of its columns: {', '.join(header)}")
-
-
 def _numbers(series: pl.Series, file: str, line: str, name: str, rows: NDArray[np.int64]) -> Floats:
     """A column as numbers; times become seconds since the first one."""
     import polars as pl  # noqa: PLC0415
 
     if series.dtype == pl.String:
-        text = series.str.strip_chars().str.strip_chars('"')
-        values = text.cast(pl.Float64, strict=False)
-        is_bad = values.is_null() & ~text.str.to_lowercase().is_in(_NO_VALUE).fill_null(True)
+        text = series.str.strip_chars().str.strip_chars('"').str.strip_chars()
+        values = _with_decimal_point(text).cast(pl.Float64, strict=False)
+        is_bad = values.is_null() & ~text.str.to_lowercase().is_in(NO_VALUE).fill_null(True)
         if is_bad.any() and not values.is_finite().any() and (times := _times(text)) is not None:
             return _seconds(times)
         is_bad = is_bad | values.is_infinite().fill_null(False)
@@ -253,19 +202,35 @@ def _numbers(series: pl.Series, file: str, line: str, name: str, rows: NDArray[n
     return values.fill_null(float("nan")).to_numpy().astype(np.float64)
 
 
+def _with_decimal_point(text: pl.Series) -> pl.Series:
+    """Numbers with a decimal comma, also 1.234,5; unchanged if others have a point alone."""
+    has_comma = text.str.contains(",", literal=True).fill_null(False)
+    has_point = text.str.contains(".", literal=True).fill_null(False)
+    if not has_comma.any() or (has_point & ~has_comma).any():
+        return text
+    if text.str.contains(r",.*[.,]").fill_null(False).any():
+        return text
+    return text.str.replace_all(".", "", literal=True).str.replace(",", ".", literal=True)
+
+
 def _times(text: pl.Series) -> pl.Series | None:
-    """Texts as dates or times of day of ISO 8601; None if one is neither."""
+    """Texts as dates or times of day, ISO 8601 or as people write them; None if one is neither."""
     import polars as pl  # noqa: PLC0415
 
-    plain = text.str.replace(r"(Z|[+-]\d\d:?\d\d)$", "").str.replace(" ", "T", literal=True)
+    plain = (
+        text.str.replace(",", ".", literal=True)
+        .str.replace(r"(Z|[+-]\d\d:?\d\d)$", "")
+        .str.replace("T", " ", literal=True)
+    )
     given = text.is_not_null() & (text != "")
-    for times in (
-        plain.str.strptime(pl.Datetime("ns"), "%Y-%m-%dT%H:%M:%S%.f", strict=False),
-        text.str.strptime(pl.Time, "%H:%M:%S%.f", strict=False),
-    ):
-        if (times.is_not_null() == given).all():
-            return times
-    return None
+    readers = [
+        partial(plain.str.strptime, pl.Datetime("ns"), f"{date} {clock}", strict=False)
+        for date in _DATES
+        for clock in _CLOCKS
+    ] + [partial(plain.str.strptime, pl.Time, clock, strict=False) for clock in _CLOCKS]
+    return next(
+        (found for read in readers if ((found := read()).is_not_null() == given).all()), None
+    )
 
 
 def _seconds(times: pl.Series) -> Floats:

@@ -1,0 +1,116 @@
+"""Plays of a delayed command, fitted to a record: gain, offset and drift by least squares."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tautscope.analysis.models.constant_play import operator
+from tautscope.analysis.models.task import Floats, fit_samples
+
+SAMPLES = 4000
+"""Largest number of samples in the fit; a longer record is decimated."""
+_PLAYS = np.linspace(-1, 1, 7)
+_TURN = 0.1
+"""Motions below this share of the command's range are no strokes."""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Plays of half widths in r (1 - k) .. r (1 + k), of a command delayed by d."""
+
+    radius: float
+    rounding: float
+    delay: float
+
+    @property
+    def half_widths(self) -> Floats:
+        """Of the plays."""
+        plays = _PLAYS if self.rounding else np.zeros(1)
+        return np.asarray(self.radius * (1 + self.rounding * plays))
+
+    def output(self, times: Floats, time: Floats, command: Floats) -> Floats:
+        """P(c(t - d)) at the times."""
+        delayed = np.interp(times - self.delay, time, command)
+        plays = [operator(delayed, each, 0.0) for each in self.half_widths.tolist()]
+        return np.asarray(np.mean(plays, axis=0))
+
+
+class Signals:
+    """Samples of a record for a fit, decimated.
+
+    Args:
+        time: (n,), never decreasing.
+        command: (n,).
+        measured: (n,), NaN where the tip is not known.
+    """
+
+    def __init__(self, time: Floats, command: Floats, measured: Floats) -> None:
+        self.all_times, self.all_commands = time, command
+        seen = np.flatnonzero(np.isfinite(measured))
+        step = -(-len(seen) // SAMPLES)
+        every = np.arange(0, len(command), -(-len(command) // (4 * SAMPLES)))
+        kept = np.union1d(seen[::step], every)
+        self.time, self.measured = time[kept], measured[kept]
+        self.extent = float(np.ptp(command))
+        self.resolution = float(np.min(np.diff(np.unique(measured[seen])), initial=np.inf))
+        at = time[turns(command, _TURN * self.extent)]
+        strokes = np.diff(at)
+        duration = float(time[-1] - time[0])
+        self.stroke = float(np.median(strokes)) if len(strokes) else duration / 10
+        self.longest_delay = max(self.stroke / 2, 1e-9)
+        self.where = fit_samples(command[kept], self.measured)
+        self.target = self.measured[self.where]
+        x = (
+            np.linspace(-1, 1, len(kept))
+            if duration == 0
+            else (2 * (self.time - time[0]) / duration - 1)
+        )
+        degree = 3 if len(at) >= 12 else 1
+        self.drifts = np.polynomial.legendre.legvander(x, degree)
+
+    def output(self, shape: Shape) -> Floats:
+        """P(c(t - d)) at the samples."""
+        return shape.output(self.time, self.all_times, self.all_commands)
+
+    def columns(self, shape: Shape) -> Floats:
+        """Regressors of gain, offset and drift."""
+        return np.asarray(np.column_stack([self.output(shape), self.drifts]))
+
+    def lag_error(self) -> float:
+        """RMS error of the best first-order lag, with a gain and drift, but without slack."""
+        from scipy.signal import lfilter  # noqa: PLC0415
+
+        grid = np.linspace(self.all_times[0], self.all_times[-1], 4 * SAMPLES)
+        command = np.interp(grid, self.all_times, self.all_commands)
+        least = np.inf
+        for constant in self.stroke * np.geomspace(0.01, 1, 25):
+            memory = float(np.exp((grid[0] - grid[1]) / constant))
+            lagged = lfilter([1 - memory], [1, -memory], command - command[0])
+            columns = np.column_stack([np.interp(self.time, grid, lagged), self.drifts])
+            _, residual = self.regress(columns)
+            least = min(least, float(np.sqrt(np.mean(residual**2))))
+        return least
+
+    def solve(self, shape: Shape) -> tuple[Floats, Floats]:
+        """Weights of the regressors, and residual."""
+        return self.regress(self.columns(shape))
+
+    def regress(self, columns: Floats) -> tuple[Floats, Floats]:
+        """Weights of regressors (n, m) by least squares, and residual."""
+        columns = columns[self.where]
+        scale = np.linalg.norm(columns, axis=0) + 1e-300
+        scaled = columns / scale
+        gram = scaled.T @ scaled
+        weights = np.linalg.lstsq(gram, scaled.T @ self.target, rcond=1e-12)[0] / scale
+        return weights, columns @ weights - self.target
+
+
+def turns(values: Floats, least: float) -> NDArray[np.intp]:
+    """Indices at which a signal reverses by more than `least`, after the fact."""
+    moved = operator(values, least / 2, 0.0) if least > 0 else values
+    steps = np.sign(np.diff(moved))
+    at = np.flatnonzero(steps)
+    return np.asarray(at[1:][steps[at[1:]] != steps[at[:-1]]])

@@ -1,0 +1,239 @@
+"""What is wrong with the samples of a record: found, named with its lines, and left out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tautscope.analysis.identification import Identification, identify
+from tautscope.analysis.models.task import Floats
+from tautscope.runs.records import LONGEST_INTERVAL, Record
+from tautscope.runs.units import ANGLES, LENGTHS
+
+Mask = NDArray[np.bool_]
+
+WRAPS = (2 * np.pi, 360.0, *(2.0**bits for bits in (8, 10, 12, 13, 14, 15, 16, 20, 24, 32)))
+"""Ranges after which counters and angles begin again."""
+FAR = 3.0
+"""A value that is farther from the others than this many of their ranges was not measured."""
+LONE = 4
+"""Samples in a row that may be an outlier."""
+SPIKE = 0.3
+"""Least height of an outlier, as a share of the range."""
+_FACTORS = {
+    1000.0: "the number of mm in 1 m",
+    180 / np.pi: "the number of degrees in a radian",
+    360.0: "the number of degrees in a turn",
+    2 * np.pi: "the number of radians in a turn",
+}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something wrong with a record.
+
+    Attributes:
+        signal: "command", "tip", "time" or "record".
+        what: What was found, and what was done about it.
+        rows: The first and the last line of each place.
+    """
+
+    signal: str
+    what: str
+    rows: tuple[tuple[int, int], ...] = ()
+
+    def __str__(self) -> str:
+        return f"{self.signal}: {self.what}{self._place()}"
+
+    def _place(self) -> str:
+        if not self.rows:
+            return ""
+        shown = [f"{a}" if a == b else f"{a} to {b}" for a, b in self.rows[:3]]
+        more = f" and {len(self.rows) - 3} more places" if len(self.rows) > 3 else ""
+        is_one = len(self.rows) == 1 and self.rows[0][0] == self.rows[0][1]
+        return f" (line{'' if is_one else 's'} {', '.join(shown)}{more})"
+
+
+def mend(record: Record) -> tuple[Record, list[Finding]]:
+    """Unwrap counters, and leave out values that were not measured."""
+    findings = list(_time_findings(record))
+    signals = {"command": record.command, "tip": record.measured}
+    for name, values in signals.items():
+        unwrapped, period, at = _unwrapped(values)
+        if len(at):
+            what = f"wraps at a range of {period:.6g}; it was unwrapped"
+            findings.append(Finding(name, what, _places(record, _mask(at, len(values)))))
+        is_far = _far(unwrapped)
+        for is_wrong, what in (
+            (is_far, "values far from all others, as those that mark missing ones"),
+            (_spikes(np.where(is_far, np.nan, unwrapped)), "lone outliers"),
+        ):
+            if is_wrong.any():
+                worst = unwrapped[is_wrong][np.argmax(np.abs(unwrapped[is_wrong]))]
+                text = f"{is_wrong.sum()} {what}, such as {worst:.6g}, left out"
+                findings.append(Finding(name, text, _places(record, is_wrong)))
+                unwrapped = np.where(is_wrong, np.nan, unwrapped)
+        signals[name] = unwrapped
+    command, clock = signals["command"], record.clock
+    is_known = np.isfinite(command)
+    filled = np.interp(clock, clock[is_known], command[is_known])
+    command = np.where(is_known, command, filled)
+    return replace(record, command=command, measured=signals["tip"]), findings
+
+
+def identify_fresh(record: Record) -> tuple[Record, Identification, list[Finding]]:
+    """Identify the slack, without the samples at which the tip repeats a value while it moves.
+
+    A play at rest repeats its value rightly. So the model is fitted to the other samples, too: if
+    it contradicts the repeated ones, these were not measured, or the tip was at an end.
+    """
+    time, measured = record.clock, record.measured
+    found = identify(time, record.command, measured)
+    seen = np.flatnonzero(np.isfinite(measured))
+    is_held = _mask(seen[1:][np.diff(measured[seen]) == 0], len(measured))
+    ends = {float(np.nanmin(measured)): -1.0, float(np.nanmax(measured)): 1.0}
+    ends = {end: sign for end, sign in ends.items() if np.count_nonzero(measured == end) > 5}
+    is_held |= np.isin(measured, list(ends))
+    fresh = np.where(is_held, np.nan, measured)
+    if np.count_nonzero(is_held) < 5 or len(seen) - np.count_nonzero(is_held) < 50:
+        return record, found, []
+    other = identify(time, record.command, fresh)
+    # Noise is cut off near an end: only the model may say which samples are clear of it.
+    for end, sign in ends.items():
+        fresh[sign * (end - other.predicted) < 2 * other.noise] = np.nan
+    if ends and np.count_nonzero(np.isfinite(fresh)) >= 50:
+        other = identify(time, record.command, fresh)
+    error, extent = other.predicted - measured, float(np.ptp(other.predicted))
+    passed = [
+        end
+        for end, sign in ends.items()
+        if np.mean(sign * error[measured == end]) > 0.05 * other.noise + 0.002 * extent
+    ]
+    repeated, at_end = [], []
+    for a, b in _runs(is_held):
+        if measured[a] in passed:
+            at_end.append((a, b))
+        elif np.max(np.abs(error[a : b + 1])) > 4 * other.noise + 0.01 * extent:
+            repeated.append((a, b))
+    if sum(b - a + 1 for a, b in repeated + at_end) < 0.2 * np.count_nonzero(is_held):
+        return record, found, []
+    findings = []
+    for name, places in (
+        ("it stays at its least or largest value while the command moves on", at_end),
+        ("it repeats its last value while the command moves", repeated),
+    ):
+        if places:
+            count = sum(b - a + 1 for a, b in places)
+            longest = sorted(places, key=lambda run: run[0] - run[1])
+            rows = tuple((int(record.rows[a]), int(record.rows[b])) for a, b in longest)
+            findings.append(Finding("tip", f"{name}; {count} samples left out", rows))
+    return replace(record, measured=fresh), other, findings
+
+
+def gain_finding(record: Record, gain: float) -> Finding | None:
+    """Whether gain and units contradict each other."""
+    command, tip = record.units
+    kinds = [next((k for k in (LENGTHS, ANGLES) if unit in k), None) for unit in (command, tip)]
+    if command and tip and kinds[0] is not None and kinds[1] is not None:
+        if kinds[0] is not kinds[1]:
+            what = f"the command is in {command}, the tip in {tip}: the gain converts them"
+            return Finding("record", what)
+        gain *= kinds[1][tip] / kinds[0][command]
+    for factor, meaning in _FACTORS.items():
+        for each in (factor, 1 / factor):
+            if abs(abs(gain) / each - 1) < 0.03:
+                what = f"the gain in one unit is {gain:.4g}, near {meaning}: check the units"
+                return Finding("record", what)
+    return None
+
+
+def _time_findings(record: Record) -> Iterator[Finding]:
+    if record.time is None:
+        return
+    steps = np.diff(record.time)
+    interval = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
+    if interval > LONGEST_INTERVAL:
+        yield Finding(
+            "time",
+            f"a sample every {interval:.4g} s is implausible: if the column is in ms, "
+            "write its title as time [ms]",
+        )
+    equal = np.count_nonzero(steps == 0)
+    if equal > 0.1 * len(steps):
+        instead = "" if record.is_timed else "; sample numbers are used instead"
+        what = f"{equal} of {len(record.time)} lines have the time of the line before{instead}"
+        yield Finding("time", what)
+
+
+def _unwrapped(values: Floats) -> tuple[Floats, float, NDArray[np.intp]]:
+    """Values, the range of the counter, and the samples after each wrap; none if there is none."""
+    seen = np.flatnonzero(np.isfinite(values))
+    none = values, 0.0, np.array([], dtype=np.intp)
+    if len(seen) < 10:
+        return none
+    steps = np.diff(values[seen])
+    sizes = np.abs(steps)
+    usual = float(np.quantile(sizes, 0.9))
+    extent = float(np.ptp(values[seen]))
+    for period in WRAPS:
+        is_wrap = sizes > period / 2
+        if not is_wrap.any() or extent > period * (1 + 1e-6) or usual > period / 8:
+            continue
+        if np.count_nonzero(is_wrap) > len(sizes) / 10:
+            continue
+        rest = period - sizes[is_wrap]
+        if np.all(np.abs(rest) <= 3 * max(usual, float(np.max(sizes[~is_wrap], initial=0.0)))):
+            unwrapped = values.copy()
+            unwrapped[seen] = np.unwrap(values[seen], period=period)
+            return unwrapped, period, seen[1:][is_wrap]
+    return none
+
+
+def _far(values: Floats) -> Mask:
+    """Values beyond a gap that is wider than `FAR` ranges of the more than 70 % on its side."""
+    is_far = np.zeros(len(values), dtype=bool)
+    ordered = np.sort(values[np.isfinite(values)])
+    if len(ordered) < 10 or ordered[0] == ordered[-1]:
+        return is_far
+    least = int(np.ceil(0.7 * len(ordered)))
+    gaps = np.diff(ordered)
+    for k in np.argsort(gaps)[::-1][:4].tolist():
+        low, high = ordered[: k + 1], ordered[k + 1 :]
+        main = low if len(low) >= least else high
+        if len(main) >= least and 0 < FAR * np.ptp(main) < gaps[k]:
+            is_far |= np.isfinite(values) & ((values < main[0]) | (values > main[-1]))
+    return is_far
+
+
+def _spikes(values: Floats) -> Mask:
+    """Up to `LONE` samples in a row that jump out and back: a Hampel filter."""
+    from scipy.ndimage import median_filter  # noqa: PLC0415
+
+    seen = np.flatnonzero(np.isfinite(values))
+    if len(seen) < 20:
+        return np.zeros(len(values), dtype=bool)
+    signal = values[seen]
+    away = np.abs(signal - median_filter(signal, 2 * LONE + 1, mode="nearest"))
+    extent = float(np.subtract(*np.quantile(signal, (0.98, 0.02))))
+    limit = max(10 * float(np.median(away[away > 0] if away.any() else away)), SPIKE * extent)
+    is_spike = _mask(seen[away > limit], len(values))
+    return is_spike if is_spike.sum() <= 0.05 * len(seen) else np.zeros_like(is_spike)
+
+
+def _mask(at: NDArray[np.intp], size: int) -> Mask:
+    mask = np.zeros(size, dtype=bool)
+    mask[at] = True
+    return mask
+
+
+def _runs(mask: Mask) -> list[tuple[int, int]]:
+    """First and last index of each run."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]])))
+    return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _places(record: Record, mask: Mask) -> tuple[tuple[int, int], ...]:
+    return tuple((int(record.rows[a]), int(record.rows[b])) for a, b in _runs(mask))

@@ -1,0 +1,204 @@
+"""The answer to a record: slack, how sure, what compensation would do, what to do next."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from tautscope.analysis.comparison import check_motion
+from tautscope.analysis.compensation import Compensation, simulate
+from tautscope.analysis.findings import Finding, gain_finding, identify_fresh, mend
+from tautscope.analysis.identification import (
+    LEAST_STROKES,
+    Identification,
+    Interval,
+)
+from tautscope.analysis.suggestion import Suggestion, suggest_settings
+from tautscope.report.tables import finite_or_none
+from tautscope.runs.records import Record
+
+PARSIMONY = 1.05
+"""A simpler explanation is as good if it leaves this factor of the error at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """What a record of one degree of freedom says.
+
+    Attributes:
+        record: Without the samples that were not measured.
+        found: Slack, delay, gain and drift.
+        findings: What is wrong with the record.
+        compensation: What the loop would do; None where nothing is identified.
+        settings: None where nothing is identified.
+    """
+
+    record: Record
+    found: Identification
+    findings: tuple[Finding, ...]
+    compensation: Compensation | None
+    settings: Suggestion | None
+
+    @property
+    def helps(self) -> bool:
+        """Whether the compensator would help."""
+        return self.compensation is not None and self.compensation.helps
+
+    @property
+    def text(self) -> str:
+        """One paragraph."""
+        found = self.found
+        if found.is_identified:
+            parts = [f"The slack is {self._width()} (95 % interval, {found.strokes} strokes)."]
+        elif found.is_aligned:
+            aligned = f"aligned by its delay of {self._delay()}" if self._is_late else "aligned"
+            parts = [
+                f"There is no slack to compensate: {aligned}, the slack is 0, "
+                f"at most {self._number(found.width.high)}."
+            ]
+        else:
+            parts = [f"The slack is not identified, and there are no settings: {found.missing}."]
+        if found.is_identified or found.is_aligned:
+            parts += [self._relation(), self._explanation()]
+        if self.compensation is not None:
+            before, after = self.compensation.before, self.compensation.after
+            verb = "would fall" if self.helps else "would not fall"
+            parts.append(
+                f"With the loop the tip's RMS error {verb} from {self._number(before)} to "
+                f"{self._number(after)}, simulated on this slack with this delay and noise."
+            )
+        listed = "; ".join(str(finding) for finding in self.findings)
+        parts.append(
+            f"Found in the record: {listed}." if listed else "Nothing is wrong with the samples."
+        )
+        return " ".join([*parts, f"Next: {self._next()}."])
+
+    def to_json(self) -> dict[str, Any]:
+        """The entry of a degree of freedom in ``tautscope analyze --json``."""
+        found, is_known = self.found, self.found.is_identified or self.found.is_aligned
+        width = found.width.value if found.is_identified else 0.0 if found.is_aligned else None
+        return {
+            "identified": found.is_identified,
+            "aligned": found.is_aligned,
+            "width": width,
+            "interval": [found.width.low, found.width.high] if is_known else None,
+            "delay": found.delay.value if is_known else None,
+            "delay_interval": [found.delay.low, found.delay.high] if is_known else None,
+            "delay_unit": self._clock,
+            "gain": found.gain if is_known else None,
+            "drift": float(np.ptp(found.drift)) if is_known else None,
+            "noise": found.noise if is_known else None,
+            "strokes": found.strokes,
+            "p_value": found.p_value,
+            "missing": found.missing or None,
+            "explanations": {k: finite_or_none(v) for k, v in found.explanations.items()},
+            "compensation": None
+            if self.compensation is None
+            else asdict(self.compensation) | {"helps": self.helps},
+            "findings": [asdict(finding) for finding in self.findings],
+            "settings": None if self.settings is None else asdict(self.settings),
+        }
+
+    @property
+    def _clock(self) -> str:
+        return "s" if self.record.is_timed else "samples"
+
+    @property
+    def _is_late(self) -> bool:
+        """Whether the delay differs from 0 by more than chance, and by more than a tick."""
+        delay, clock = self.found.delay, self.record.clock
+        tick = (clock[-1] - clock[0]) / len(clock)
+        return abs(delay.value) > max(delay.half, float(tick) / 2)
+
+    def _number(self, value: float) -> str:
+        unit = self.record.units[1]
+        return f"{value:.3g} {unit}".rstrip()
+
+    def _width(self) -> str:
+        return f"{plus_minus(self.found.width)} {self.record.units[1]}".rstrip()
+
+    def _delay(self) -> str:
+        return f"{plus_minus(self.found.delay)} {self._clock}"
+
+    def _relation(self) -> str:
+        gain = f"The tip follows the command with a gain of {self.found.gain:.3g}"
+        if not self._is_late:
+            return f"{gain} and no delay that can be seen ({self._delay()})."
+        return f"{gain} and a delay of {self._delay()}."
+
+    def _explanation(self) -> str:
+        errors = self.found.explanations
+        least = min(errors.values())
+        best = next(name for name, error in errors.items() if error <= PARSIMONY * least)
+        others = [f"{name} {self._number(errors[name])}" for name in errors if name != best]
+        return (
+            f"What explains the record best is {best}, which leaves {self._number(errors[best])} "
+            f"RMS ({', '.join(others[:3])})."
+        )
+
+    def _next(self) -> str:
+        found = self.found
+        if found.is_identified and self.helps:
+            late = found.delay.value if self._is_late and self._clock == "s" else 0.0
+            stamps = f"; set measurement.delays to [{late:.3g}] if it is not in the time stamps"
+            return f"use the settings below{stamps if late > 0 else ''}"
+        if found.is_identified:
+            return "measure the tip more often, earlier or with less noise, and record again"
+        if found.is_aligned:
+            stamps = f"subtract {found.delay.value:.3g} {self._clock} from the tip's time stamps"
+            return stamps if self._is_late else "command the motor directly"
+        if found.strokes < LEAST_STROKES:
+            return (
+                "record at least ten strokes, back and forth, each several times as long as "
+                "the slack"
+            )
+        if found.is_at_limit or not math.isfinite(found.width.high):
+            return "record longer and slower strokes"
+        return (
+            "check that the two columns belong together, then record more and longer strokes "
+            "at two speeds"
+        )
+
+
+def judge(record: Record) -> Verdict:
+    """Mend a record, fit its slack, and simulate the loop.
+
+    Args:
+        record: Actuator and tip, each in any unit.
+
+    Raises:
+        RecordError: Command or tip does not move in the first half.
+    """
+    check_motion(record)
+    record, findings = mend(record)
+    check_motion(record)
+    record, found, repeated = identify_fresh(record)
+    findings += repeated
+    if found.is_identified or found.is_aligned:
+        drift, extent = float(np.ptp(found.drift)), float(np.ptp(found.predicted))
+        if drift > max(3 * found.noise, 0.03 * extent):
+            findings.append(Finding("tip", f"it drifts by {drift:.3g} over the record"))
+        if (units := gain_finding(record, found.gain)) is not None:
+            findings.append(units)
+    is_used = found.is_identified
+    return Verdict(
+        record,
+        found,
+        tuple(findings),
+        simulate(record, found) if is_used else None,
+        suggest_settings(record, found) if is_used else None,
+    )
+
+
+def plus_minus(interval: Interval) -> str:
+    """A value with half its interval, both with two digits of the half."""
+    half = interval.half
+    if not math.isfinite(half):
+        return f"{interval.value:.3g} (unknown interval)"
+    size = max(half, 1e-3 * abs(interval.value), 1e-12)
+    places = 1 - math.floor(math.log10(size))
+    shown = max(places, 0)
+    return f"{round(interval.value, places):.{shown}f} ± {round(half, places):.{shown}f}"

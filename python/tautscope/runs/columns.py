@@ -1,0 +1,109 @@
+"""What columns a table has, and which of them may be a command and its tip."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tautscope.errors import RecordError
+from tautscope.runs.tables import Sheet
+from tautscope.runs.units import TIMES, split_unit
+
+Floats = NDArray[np.float64]
+
+_TIMES = {"time", "t", "timestamp", "stamp", "timestamps", "zeit", "datetime", "sec", "seconds"}
+_COMMANDS = ("motor", "command", "cmd", "servo", "actuator", "setpoint", "input", "encoder")
+_TIPS = ("tip", "measured", "tracker", "jaw", "output", "marker", "sensor", "aurora", "pose")
+LEAST_CORRELATION = 0.5
+MOST_PAIRS = 3
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of numbers.
+
+    Attributes:
+        number: From 1 on.
+        title: As in the file.
+        unit: Empty if the file does not name it.
+        count: Number of values.
+        least: Least value.
+        largest: Largest value.
+    """
+
+    number: int
+    title: str
+    unit: str
+    count: int
+    least: float
+    largest: float
+
+
+def time_column(titles: list[str]) -> str | None:
+    """Title of the column of the time, if one is called so."""
+    for title in titles:
+        name, unit = split_unit(title)
+        if name.strip("_ ").lower() in _TIMES and (not unit or unit in TIMES):
+            return title
+    return None
+
+
+def list_columns(sheet: Sheet) -> tuple[list[Column], list[tuple[str, str]]]:
+    """Columns of numbers, and pairs of command and tip, the most likely first.
+
+    A pair is proposed if its values are correlated; names such as motor and tip come first. Which
+    of two is the command follows from their names, else from which of them lags.
+    """
+    columns, moving = [], {}
+    time = time_column(sheet.titles)
+    for index, title in enumerate(sheet.titles):
+        try:
+            values = sheet.values(index, title)
+        except RecordError:
+            continue
+        seen = values[np.isfinite(values)]
+        if not len(seen):
+            continue
+        is_alone = sheet.titles.count(title) == 1
+        name = title if is_alone else str(index + 1)
+        unit = sheet.unit(index)
+        found = Column(index + 1, title, unit, len(seen), float(seen.min()), float(seen.max()))
+        columns.append(found)
+        is_counter = np.all(np.diff(seen) > 0)
+        if title != time and not is_counter and len(seen) > 3 and found.least < found.largest:
+            moving[name] = _filled(values)
+    pairs = [
+        (strength, *_ordered(one, other, moving))
+        for one, other in combinations(moving, 2)
+        if (strength := _strength(one, other, moving)) > LEAST_CORRELATION
+    ]
+    pairs.sort(key=lambda pair: -pair[0])
+    return columns, [(command, tip) for _, command, tip in pairs[:MOST_PAIRS]]
+
+
+def _filled(values: Floats) -> Floats:
+    at, known = np.arange(len(values)), np.isfinite(values)
+    return np.interp(at, at[known], values[known])
+
+
+def _rank(name: str) -> int:
+    """-1 for a name of a command, 1 for that of a tip, 0 for others."""
+    low = name.lower()
+    return any(word in low for word in _TIPS) - any(word in low for word in _COMMANDS)
+
+
+def _strength(one: str, other: str, values: dict[str, Floats]) -> float:
+    named = 1.0 if {_rank(one), _rank(other)} == {-1, 1} else 0.0
+    return named + abs(float(np.corrcoef(values[one], values[other])[0, 1]))
+
+
+def _ordered(one: str, other: str, values: dict[str, Floats]) -> tuple[str, str]:
+    """Command and tip."""
+    if _rank(one) != _rank(other):
+        return (one, other) if _rank(one) < _rank(other) else (other, one)
+    a, b = (values[name] - values[name].mean() for name in (one, other))
+    lag = float(a[:-1] @ b[1:] - a[1:] @ b[:-1]) * np.sign(a @ b)
+    return (one, other) if lag >= 0 else (other, one)

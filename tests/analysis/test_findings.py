@@ -1,0 +1,119 @@
+"""What is wrong with samples is named with its lines, and does not change the result."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from play_model import play
+from simulated import Simulated, simulate
+from tautscope.analysis.verdict import Verdict, judge
+
+SEEDS = range(2)
+
+
+def assert_found(truth: Simulated, verdict: Verdict, what: str, seed: int) -> None:
+    texts = [str(finding) for finding in verdict.findings]
+    assert any(what in text for text in texts), (seed, texts)
+    if verdict.found.is_identified:
+        assert verdict.found.width.value == pytest.approx(truth.width, rel=0.1), seed
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_sound_records_have_no_findings(seed: int) -> None:
+    for kind in ("play", "rounded", "delay only"):
+        assert judge(simulate(kind, seed).record).findings == (), kind
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_missing_values_and_outliers_are_left_out(seed: int) -> None:
+    truth = simulate("play", seed)
+    for value, what in ((-9999.0, "mark missing ones, such as -9999"), (40.0, "left out")):
+        tip = truth.record.measured.copy()
+        tip[50::100] = value
+        verdict = judge(replace(truth.record, measured=tip))
+        assert_found(truth, verdict, what, seed)
+        assert_found(truth, verdict, "lines 52, 152, 252 and 17 more places", seed)
+        assert np.isnan(verdict.record.measured[50::100]).all()
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_wrapped_counters_are_unwrapped(seed: int) -> None:
+    truth = simulate("play", seed)
+    counts = np.round(4000 * truth.record.command)
+    wrapped = (counts + 2**15) % 2**16 - 2**15
+    verdict = judge(replace(truth.record, command=wrapped))
+    assert_found(truth, verdict, "command: wraps at a range of 65536", seed)
+    np.testing.assert_array_equal(np.diff(verdict.record.command), np.diff(counts))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_frozen_tip_is_left_out(seed: int) -> None:
+    truth = simulate("play", seed)
+    tip = truth.record.measured.copy()
+    tip[1200:1600] = tip[1200]
+    verdict = judge(replace(truth.record, measured=tip))
+    assert_found(truth, verdict, "it repeats its last value while the command moves", seed)
+    assert np.isnan(verdict.record.measured[1201:1600]).all()
+    assert "(lines 1203 to 1601)" in verdict.text
+
+
+def test_a_frozen_rest_of_the_record_gives_no_confidence() -> None:
+    truth = simulate("play", 2)
+    tip = truth.record.measured.copy()
+    tip[1100:] = tip[1100]
+    tip[:1000] = tip[1000]
+    tip[:3] += [0.1, 0.2, 0.3]
+    verdict = judge(replace(truth.record, measured=tip))
+    assert verdict.settings is None
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_saturated_ends_are_named(seed: int) -> None:
+    truth = simulate("play", seed)
+    half = truth.width / abs(truth.gain) / 2
+    exact = play(truth.record.command, -half, half)
+    tip = exact + np.random.default_rng(seed).normal(0, 0.01 * np.ptp(exact), len(exact))
+    clipped = np.clip(tip, *np.quantile(exact, (0.15, 0.85)))
+    verdict = judge(replace(truth.record, measured=clipped))
+    if verdict.found.is_identified:
+        assert verdict.found.width.value == pytest.approx(2 * half, rel=0.1)
+    assert any("least or largest value" in str(each) for each in verdict.findings)
+
+
+def test_a_tip_that_rests_in_the_gap_is_not_frozen() -> None:
+    """Without noise a play repeats its value exactly, at its ends too."""
+    truth = simulate("play", 0)
+    record = truth.record
+    half = truth.width / abs(truth.gain) / 2
+    exact = play(record.command, -half, half)
+    for tip in (exact, np.round(exact, 1)):
+        verdict = judge(replace(record, measured=tip))
+        assert verdict.findings == ()
+        assert verdict.found.width.value == pytest.approx(2 * half, rel=0.05)
+
+
+def test_units_that_do_not_fit_are_named() -> None:
+    record = simulate("play", 0).record
+    gain = judge(record).found.gain
+    metres = replace(record, measured=record.measured / gain / 1000, units=("mm", "mm"))
+    assert "near the number of mm in 1 m" in judge(metres).text
+    degrees = replace(record, measured=record.measured / gain, units=("deg", "mm"))
+    assert "the command is in deg, the tip in mm" in judge(degrees).text
+    slow = replace(record, time=1000 * record.clock)
+    assert "a sample every 20 s is implausible" in judge(slow).text
+
+
+def test_a_verdict_says_what_compensation_would_do() -> None:
+    """The error without the loop is that of an independent play."""
+    truth = simulate("play", 4)
+    verdict = judge(truth.record)
+    assert verdict.compensation is not None
+    path = truth.gain * truth.record.command
+    half = truth.width / 2
+    before = play(path - path.mean(), -half, half, start=0.0) - (path - path.mean())
+    assert verdict.compensation.before == pytest.approx(
+        np.sqrt(np.mean(before[1000:] ** 2)), rel=0.15
+    )
+    assert verdict.compensation.after < 0.4 * verdict.compensation.before
+    assert verdict.helps
+    assert "With the loop the tip's RMS error would fall from" in verdict.text
