@@ -9,11 +9,10 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 
+import msgspec
 from msgspec import Struct
 from msgspec.inspect import FloatType, IntType, TupleType, type_info
 from msgspec.structs import fields
-
-import msgspec
 
 from tautscope._core import DETECTORS, MOST_DOFS, MOST_RANGE
 from tautscope.config.axes import DofEntry, KinematicsConfig, MeasurementConfig
