@@ -8,15 +8,27 @@ from typing import Any
 from hysteresis.tables import Row, show
 
 IDEAS: dict[str, dict[str, Any]] = {
-    "bound of the predicted tip's speed": {"law.tip_gain": 100.0},
-    "rate limit of the estimate in use": {"law.change_rate": 1e9},
+    "bound of the predicted tip's speed": {"law.tip_gain": 50.0},
+    "rate limit of the estimate in use": {
+        "law.change_rate": 1e9,
+        "safety.unusual": ["law.change_rate"],
+    },
     "offset that images measure": {"estimation.offset_deviation": 0.0},
-    "deviation of the tip from the plays": {"estimation.tip_deviation": 1e-3},
-    "weights that change": {"estimation.weight_travel": 1e9},
+    "deviation of the tip from the plays": {
+        "estimation.tip_deviation": 1e-3,
+        "safety.unusual": ["estimation.tip_deviation"],
+    },
+    "weights that change": {
+        "estimation.weight_travel": 1e9,
+        "safety.unusual": ["estimation.weight_travel"],
+    },
     "uneven curvature": {"estimation.shape_deviation": 0.0},
     "shift of the image": {"estimation.image_deviation": 0.0},
     "errors of the features that are alike": {"estimation.misfit_deviation": 0.0},
-    "rejection of a marker": {"estimation.outlier_distance": 1e6},
+    "rejection of a marker": {
+        "estimation.outlier_distance": 1e6,
+        "safety.unusual": ["estimation.outlier_distance"],
+    },
 }
 """Name of each idea, and the configuration changes that disable it."""
 

@@ -31,7 +31,7 @@ VARIANTS: dict[str, dict[str, float]] = {
         "image_deviation": 0.0,
         "misfit_deviation": 0.0,
     },
-    "best, no marker rejected": {"outlier_distance": 1e9},
+    "best, no marker rejected": {"outlier_distance": 120.0},
     OURS: {},
 }
 

@@ -187,7 +187,9 @@ def test_any_range_can_be_steered_and_is_not_left() -> None:
     for sign, ends in ((1, (2.75, 0.15)), (-1, (-1.75, 0.05))):
         for is_holding in (False, *[True] * 1000):
             now, sequence = now + 0.005, sequence + 1
-            servo = Servo(lease.number, sequence, images.add(now), (sign, sign), is_holding)
+            servo = Servo(
+                lease.number, sequence, images.add(now), (sign * is_holding,) * 2, is_holding
+            )
             operator.receive(Received(1, now, servo), now)
             operator.update(now, 0.005, operator.reference, is_held=False)
         # A quarter of the width within the range, or of a range that is narrower.

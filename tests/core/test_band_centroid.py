@@ -86,15 +86,21 @@ def test_with_distortion_the_error_is_below_the_marker_noise() -> None:
     assert found.max() < 0.4
 
 
+def thin(size: float) -> dict[str, object]:
+    """Bands that are points, which no instrument has."""
+    keys = ("instrument.diameter", "instrument.band_length")
+    return {**dict.fromkeys(keys, size), "safety.unusual": keys}
+
+
 def test_the_image_of_the_bands_centre_is_not_the_centroid() -> None:
     """The reason for decision 0002: the error of the article's h is several px."""
     config = Config()
-    points = config.replace(**{"instrument.diameter": 1e-9, "instrument.band_length": 1e-9})
+    points = config.replace(**thin(1e-9))
     assert np.median(errors(config, points)) > 5.0
 
 
 def test_without_thickness_the_model_is_the_articles() -> None:
-    config = Config().replace(**{"instrument.diameter": 1e-12, "instrument.band_length": 1e-12})
+    config = Config().replace(**thin(1e-12))
     rotation, translation = guide_to_camera(config)
     model, instrument, camera = (
         build_feature_model(config),

@@ -52,6 +52,7 @@ def test_features(bend: float, thickness: float) -> None:
     changes = {
         "instrument.diameter": 1e-9 + thickness * 3.5e-3,
         "instrument.band_length": 1e-9 + thickness * 4e-3,
+        "safety.unusual": ["instrument.diameter", "instrument.band_length"],
     }
     model = build_feature_model(Config().replace(**changes))
 

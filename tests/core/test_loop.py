@@ -144,7 +144,12 @@ def test_after_the_clock_jumps_back_frames_are_used_again() -> None:
 
 
 def test_a_held_dof_updates_no_offset() -> None:
-    strict = CONFIG.replace(**{"rotation.observable_deviation": 1e-6})
+    strict = CONFIG.replace(
+        **{
+            "rotation.observable_deviation": 1e-6,
+            "safety.unusual": ["rotation.observable_deviation"],
+        }
+    )
     loop = HysteresisReduction(strict)
     for tick in range(2000):
         wave = np.sin(2 * np.pi * tick / 1000)

@@ -172,6 +172,7 @@ def test_the_first_estimate_of_best_is_that_of_scipys_least_squares(seed: int) -
             "estimation.image_deviation": 0.0,
             "estimation.misfit_deviation": 0.0,
             "estimation.outlier_distance": 1e6,
+            "safety.unusual": ["estimation.outlier_distance"],
             "safety.off": ["innovation"],
         },
         **{f"{dof.label}.start_deviation": 5 * CONFIG[dof].start_deviation for dof in Dof},
