@@ -164,7 +164,7 @@ impl<S: AsRef<[Entry<N>]> + AsMut<[Entry<N>]>, const N: usize> History<S, N> {
 }
 
 /// Entries that a history of `span` in s needs for a control tick every `period` in s: from the last tick before the
-/// span to the newest. Two where that is no finite number, as of a period of 0, which [`History::new`] refuses.
+/// span to the newest. Two where that is no finite number, as of a period of 0, which `History::new` refuses.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
