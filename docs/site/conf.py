@@ -50,7 +50,7 @@ html_copy_source = html_show_sourcelink = False
 LINK = re.compile(r"(?<=\]\()(?!https?:)([^)#\s]+)")
 FOLDERS = {"docs/decisions": "/docs/site/decisions.md"}
 """Folders with a page of their own."""
-PAGES = (".md", ".ipynb", ".png", ".jpg")
+PAGES = (".md", ".ipynb", ".png", ".jpg", ".gif")
 TYPES = {
     r"[~\w.]*_Buffer \|.*?_NestedSequence\[complex \| bytes \| str\]": "ArrayLike",
     r"[~\w.]*ndarray\[[~\w.]*tuple\[[~\w.]*Any, \.\.\.\], [~\w.]*dtype\[[~\w.]*?(\w+)\]\]": (

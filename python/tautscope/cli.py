@@ -33,8 +33,7 @@ INTERRUPTED, CLOSED_PIPE = 128 + 2, 128 + 13
 """Exit status after SIGINT and SIGPIPE, as of a shell."""
 _STATUS = """exit status:
   0    success
-  1    the result is negative: replay differs, align has no answer, doctor found something missing,
-       the compensator would not help (analyze --check)
+  1    the result is negative: replay differs, align has no answer, something is missing or no use
   2    bad input: options, files, configuration, a missing extra
   3    refused by the rig: bus, drive or camera; the loop has not begun
   4    stopped for safety: the motors are stopped, or motion of the loop is held
