@@ -155,9 +155,8 @@ def test_one_factor_of_all_lengths_and_of_insertion_changes_no_feature() -> None
     """Whatever the motors let expect: a deviation from it says nothing about the scale."""
     recording, states = simulate(duration=10.0)
     config = told()
-    config = config.replace(
-        **{"instrument.diameter": 1e-5, "instrument.band_length": 1e-5}  # they are not estimated
-    )
+    thin = ("instrument.diameter", "instrument.band_length")  # they are not estimated
+    config = config.replace(**dict.fromkeys(thin, 1e-5) | {"safety.unusual": thin})
     model = Model(config, recording, None)
     z, active = np.zeros(len(NAMES)), np.ones(len(NAMES), dtype=bool)
     states = np.column_stack([states + np.array([2e-3, 0.1, -0.1]), np.zeros(len(states))])
