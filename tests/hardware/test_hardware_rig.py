@@ -158,7 +158,7 @@ def test_repeated_image_is_not_a_new_frame(setup: Callable[..., Setup]) -> None:
 
 @pytest.mark.parametrize("how", ["nothing", "frozen"])
 def test_lost_camera_ends_the_run(setup: Callable[..., Setup], how: str) -> None:
-    one = setup(source={"timeout": 0.05, "lost_timeout": 0.2})
+    one = setup(source={"timeout": 0.07, "lost_timeout": 0.2})
     start = one.rig.reset().applied
     what = "only repetitions of one image" if how == "frozen" else "no image"
     with pytest.raises(CameraError, match=f"{what}.*the motors are stopped"):
