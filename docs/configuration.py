@@ -10,7 +10,7 @@ from pathlib import Path
 
 import tomlkit
 from tautscope.config import Config
-from tautscope.config.checks import RANGE, RANGED
+from tautscope.config.checks import MOST_RATIO, RANGED
 from tautscope.config.descriptions import Key, all_sections, keys, package_text, section_text
 
 PAGE = Path(__file__).with_suffix(".md")
@@ -36,7 +36,9 @@ def page() -> str:
     """The whole page."""
     parts = [
         HEAD.format(
-            package=package_text(), factor=RANGE, ranged=", ".join(f"`[{name}]`" for name in RANGED)
+            package=package_text(),
+            factor=MOST_RATIO,
+            ranged=", ".join(f"`[{name}]`" for name in RANGED),
         )
     ]
     described: set[object] = set()

@@ -80,13 +80,13 @@ def test_stops_of_a_feetech_are_found(tmp_path: Path) -> None:
 def test_without_a_stop_or_with_other_stops_there_is_no_answer(tmp_path: Path) -> None:
     config = rig("dynamixel", tmp_path, travel=[0.01, 0.012])
     with between_stops(config, 0.02), pytest.raises(CalibrationError, match="no stop on a way"):
-        find_stops(config, Dof.INSERTION)
+        find_stops(config, Dof.INSERTION, torque=0.3)
     other = rig("dynamixel", tmp_path, travel=[0.0, 0.03], stops=[-0.011, 0.04], speed_limit=0.5)
     with (
         between_stops(other, 0.02),
         pytest.raises(CalibrationError, match=r"0\.073 between the stops, and 0\.051 before"),
     ):
-        find_stops(other, Dof.INSERTION).changes(other.drives, Dof.INSERTION)  # type: ignore[arg-type]
+        find_stops(other, Dof.INSERTION, torque=0.3).changes(other.drives, Dof.INSERTION)  # type: ignore[arg-type]
 
 
 def test_only_motors_with_limited_torque_are_driven_against_stops(tmp_path: Path) -> None:

@@ -174,7 +174,7 @@ enum TautscopeFlag
     TAUTSCOPE_FLAG_TREMOR = 21,
     // The tip has moved farther than the reference since the reference turned.
     TAUTSCOPE_FLAG_OVERCOMPENSATION = 22,
-    // Reference and tip oscillate with growing swings.
+    // Reference and tip oscillate with growing amplitude.
     TAUTSCOPE_FLAG_LIMIT_CYCLE = 23,
     // The tip is measured elsewhere than predicted: the slack has changed, the instrument was pushed, or measurements or commands are wrong.
     TAUTSCOPE_FLAG_SLACK_CHANGED = 24,

@@ -339,7 +339,7 @@ pub enum TautscopeFlag {
     Tremor = 21,
     /// The tip has moved farther than the reference since the reference turned.
     Overcompensation = 22,
-    /// Reference and tip oscillate with growing swings.
+    /// Reference and tip oscillate with growing amplitude.
     LimitCycle = 23,
     /// The tip is measured elsewhere than predicted: the slack has changed, the instrument was pushed, or measurements or commands are wrong.
     SlackChanged = 24,

@@ -57,7 +57,7 @@ class Finding:
         return f" (line{'' if is_one else 's'} {', '.join(shown)}{more})"
 
 
-def mend(record: Record) -> tuple[Record, list[Finding]]:
+def without_errors(record: Record) -> tuple[Record, list[Finding]]:
     """Unwrap counters, and leave out values that were not measured."""
     findings = list(_time_findings(record))
     signals = {"command": record.command, "tip": record.measured}
@@ -84,7 +84,7 @@ def mend(record: Record) -> tuple[Record, list[Finding]]:
     return replace(record, command=command, measured=signals["tip"]), findings
 
 
-def identify_fresh(record: Record) -> tuple[Record, Identification, list[Finding]]:
+def identify_without_repeats(record: Record) -> tuple[Record, Identification, list[Finding]]:
     """Identify the slack, without the samples at which the tip repeats a value while it moves.
 
     A play at rest repeats its value rightly. So the model is fitted to the other samples, too: if

@@ -10,7 +10,12 @@ import numpy as np
 
 from tautscope.analysis.comparison import check_motion
 from tautscope.analysis.compensation import Compensation, simulate
-from tautscope.analysis.findings import Finding, gain_finding, identify_fresh, mend
+from tautscope.analysis.findings import (
+    Finding,
+    gain_finding,
+    identify_without_repeats,
+    without_errors,
+)
 from tautscope.analysis.identification import (
     LEAST_STROKES,
     Identification,
@@ -164,7 +169,7 @@ class Verdict:
 
 
 def judge(record: Record) -> Verdict:
-    """Mend a record, fit its slack, and simulate the loop.
+    """Leave out wrong samples of a record, fit its slack, and simulate the loop.
 
     Args:
         record: Actuator and tip, each in any unit.
@@ -173,9 +178,9 @@ def judge(record: Record) -> Verdict:
         RecordError: Command or tip does not move in the first half.
     """
     check_motion(record)
-    record, findings = mend(record)
+    record, findings = without_errors(record)
     check_motion(record)
-    record, found, repeated = identify_fresh(record)
+    record, found, repeated = identify_without_repeats(record)
     findings += repeated
     if found.is_identified or found.is_aligned:
         drift, extent = float(np.ptp(found.drift)), float(np.ptp(found.predicted))

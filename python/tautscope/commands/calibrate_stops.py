@@ -20,6 +20,7 @@ def add_parser(kinds: arguments.Verbs) -> None:
     stops = arguments.add_verb(
         kinds,
         "stops",
+        _run,
         help="mechanical stops and zero position of a servo",
         description="Drive a servo slowly against both of its stops with little torque, and back. "
         "The first time, print its stops and a travel between them; later, print home, so that the "
@@ -33,7 +34,7 @@ def add_parser(kinds: arguments.Verbs) -> None:
         type=float,
         default=0.3,
         metavar="SHARE",
-        help="torque_limit during the search, 0 to 1 [0.3]",
+        help="torque_limit during the search, 0 to 1 [%(default)s]",
     )
     stops.add_argument("--yes", action="store_true", help="start without asking")
     stops.add_argument(
@@ -41,7 +42,6 @@ def add_parser(kinds: arguments.Verbs) -> None:
     )
     arguments.add_config(stops, required=True)
     arguments.add_json(stops)
-    stops.set_defaults(run=_run)
 
 
 def _run(options: argparse.Namespace) -> None:

@@ -29,7 +29,7 @@ from tautscope.dof import Dof
 from tautscope.errors import ConfigError
 
 _RANGE = "the lower limit, then the upper"
-RANGE = 30.0
+MOST_RATIO = 30.0
 """Largest ratio of a number to its default, in either direction. Robots differ by less; a wrong
 unit (mm for m, degrees for rad) or a digit too many is more."""
 RANGED = (
@@ -86,7 +86,7 @@ def _check_safety(safety: SafetyConfig) -> None:
     _require_names("off", safety.off, DETECTORS)
     for index, limits in enumerate(safety.command_travel):
         _require(limits[0] < limits[1], f"command_travel[{index}]", limits, _RANGE)
-        most = RANGE * max(map(abs, _TRAVEL[index]))
+        most = MOST_RATIO * max(map(abs, _TRAVEL[index]))
         is_usual = max(map(abs, limits)) <= most or "safety.command_travel" in safety.unusual
         _require(is_usual, f"command_travel[{index}]", limits, f"within -{most:.3g} to {most:.3g}")
 
@@ -123,20 +123,9 @@ def _check_dof_entry(dof: DofEntry) -> None:
         most = MOST_RANGE * dof.width_limit
         degrees = "; in m and rad, not mm and degrees" if high - low > most else ""
         _require(not degrees, "range", dof.range, f"at most {most:.3g} wide{degrees}")
-    # A slack of more than a metre is one in millimetres.
-    most_width, most_speed = (1.0, 10.0) if dof.unit == "m" else (100.0, 1000.0)
-    _require(
-        dof.width_limit <= most_width,
-        "width_limit",
-        dof.width_limit,
-        f"at most {most_width:g} {dof.unit}",
-    )
-    _require(
-        dof.largest_speed <= most_speed,
-        "speed",
-        dof.largest_speed,
-        f"at most {most_speed:g} {dof.unit}/s",
-    )
+    if dof.unit == "m":  # a slack of more than a metre is one in millimetres
+        _require(dof.width_limit <= 1, "width_limit", dof.width_limit, "at most 1 m")
+        _require(dof.largest_speed <= 10, "speed", dof.largest_speed, "at most 10 m/s")
     if dof.expected_width is not None:
         _require_at_most("", dof, "expected_width", "width_limit")
     _require_at_most("", dof, "delta_minus", "delta_plus")
@@ -268,7 +257,7 @@ def check_ranges(config: Struct) -> None:
         for path, value, usual, is_positive in _ranged(name, section, default):
             key = path.partition("[")[0]
             known.add(key)
-            low, high = usual / RANGE * is_positive, usual * RANGE
+            low, high = usual / MOST_RATIO * is_positive, usual * MOST_RATIO
             allowed = f"{low:.3g} to {high:.3g}, or {key} named in safety.unusual"
             _require(low <= value <= high or key in unusual, path, value, allowed)
     _require_names("safety.unusual", unusual, sorted(known))

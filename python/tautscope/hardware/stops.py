@@ -15,8 +15,6 @@ from tautscope.hardware.drives import Drives, open_drives
 from tautscope.hardware.scale import Scale
 from tautscope.hardware.signals import exit_on_signals
 
-TORQUE = 0.3
-"""Default of the torque limit during the search."""
 _SPEED_SHARE = 0.05
 """Speed of the search over the speed limit."""
 _REACH = 1.5
@@ -61,7 +59,7 @@ class Stops:
         return {f"{path}.home": round(axis.home + axis.stops[0] - self.lower, 6)}
 
 
-def find_stops(config: Config, dof: Dof, torque: float = TORQUE) -> Stops:
+def find_stops(config: Config, dof: Dof, torque: float) -> Stops:
     """Drive a motor slowly against both stops, and back to where it was.
 
     THE MOTOR MOVES. Its torque is limited; the stop is where its following error becomes too large.

@@ -81,7 +81,7 @@ flags! {
     Tremor = "tremor",
     /// The tip has moved farther than the reference since the reference turned.
     Overcompensation = "overcompensation",
-    /// Reference and tip oscillate with growing swings.
+    /// Reference and tip oscillate with growing amplitude.
     LimitCycle = "limit_cycle",
     /// The tip is measured elsewhere than predicted: the slack has changed, the instrument was pushed, or measurements or commands are wrong.
     SlackChanged = "slack_changed",
